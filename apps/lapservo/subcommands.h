@@ -1,0 +1,15 @@
+#pragma once
+
+#include <functional>
+
+#include <CLI/CLI.hpp>
+
+namespace lapservo::app {
+
+/// What a parsed command line asks for; returns the exit code: 0, or 1 when nothing was found or nothing converged.
+/// Throws InputError for bad input, which main() prints in one line and ends with 2.
+using Run = std::function<int()>;
+
+// Each adds its subcommand (one file each) and, when the command line names it, sets `run`.
+
+}  // namespace lapservo::app

@@ -1,0 +1,43 @@
+# One folder of lapservo/ is one target. lapservo_module(NAME SOURCES ... USES ... TESTS ...) declares what the folder
+# compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE), and its
+# tests, which stand beside the sources. The build thereby enforces the direction of dependencies.
+function(lapservo_module name)
+  cmake_parse_arguments(M "" "" "SOURCES;USES;PRIVATE;TESTS;TEST_USES" ${ARGN})
+  set(target lapservo_${name})
+  if(M_SOURCES)
+    add_library(${target} STATIC ${M_SOURCES})
+    set(scope PUBLIC)
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(lapservo::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  target_compile_features(${target} ${scope} cxx_std_20)
+  target_include_directories(${target} ${scope}
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(${target} ${scope} ${M_USES})
+  if(M_SOURCES)
+    target_link_libraries(${target} PRIVATE ${M_PRIVATE} lapservo_flags)
+  endif()
+  install(TARGETS ${target} EXPORT lapservoTargets)
+  if(LAPSERVO_BUILD_TESTS AND M_TESTS)
+    add_executable(${name}_test ${M_TESTS})
+    target_link_libraries(${name}_test PRIVATE lapservo::${name} ${M_TEST_USES} lapservo_flags GTest::gtest_main)
+    gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
+  endif()
+endfunction()
+
+# -Wno-restrict: GCC 12 reports it falsely inside std::string (GCC bug 105651).
+# Warnings and sanitizers for our own code only; never part of what users of the package inherit.
+add_library(lapservo_flags INTERFACE)
+target_compile_options(lapservo_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+  $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond -Wlogical-op -Wno-restrict>)
+install(TARGETS lapservo_flags EXPORT lapservoTargets)
+if(LAPSERVO_SANITIZE)
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+if(LAPSERVO_BUILD_FUZZERS)
+  add_compile_options(-fsanitize=fuzzer-no-link)
+endif()

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+namespace lapservo {
+
+inline constexpr double pi = std::numbers::pi;
+inline constexpr double two_pi = 2 * std::numbers::pi;
+
+constexpr double rad_from_deg(double angle_deg) { return angle_deg * (pi / 180); }
+constexpr double deg_from_rad(double angle_rad) { return angle_rad * (180 / pi); }
+
+/// The same angle in [-pi, pi).
+inline double wrap_pi(double angle_rad) {
+  const double wrapped = std::remainder(angle_rad, two_pi);
+  return wrapped >= pi ? wrapped - two_pi : wrapped;
+}
+
+/// The same angle in [0, 2 pi).
+inline double wrap_two_pi(double angle_rad) {
+  double wrapped = std::fmod(angle_rad, two_pi);
+  if (wrapped < 0) wrapped += two_pi;
+  return wrapped >= two_pi ? 0.0 : wrapped;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,104 @@
+#include "lapservo/core/csv.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+
+std::string_view trimmed(std::string_view text) {
+  const auto first = text.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos) return {};
+  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+std::vector<std::string> split_fields(std::string_view line) {
+  std::vector<std::string> fields;
+  while (true) {
+    const auto comma = line.find(',');
+    fields.emplace_back(trimmed(line.substr(0, comma)));
+    if (comma == std::string_view::npos) return fields;
+    line.remove_prefix(comma + 1);
+  }
+}
+
+std::string at_line(const std::string& source, std::size_t line) { return source + ":" + std::to_string(line); }
+
+}  // namespace
+
+std::optional<double> parse_finite(std::string_view text) {
+  double value = 0;
+  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+CsvTable CsvTable::read(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) throw InputError(path.string(), "is a folder, expected a CSV file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(path.string(), "can't be opened, expected a CSV file");
+  std::ostringstream text;
+  text << file.rdbuf();
+  return parse(text.view(), path.string());
+}
+
+CsvTable CsvTable::parse(std::string_view text, std::string source) {
+  if (text.find('\0') != std::string_view::npos) throw InputError(source, "holds NUL bytes, expected CSV text");
+  CsvTable table;
+  table.source_ = std::move(source);
+  for (std::size_t line_number = 1; !text.empty(); ++line_number) {
+    const auto end = text.find('\n');
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (trimmed(line).empty()) continue;
+    auto fields = split_fields(line);
+    if (table.header_.empty()) {
+      table.header_ = std::move(fields);
+      continue;
+    }
+    if (fields.size() != table.header_.size())
+      throw InputError(at_line(table.source_, line_number), "row", std::to_string(fields.size()) + " fields",
+                       std::to_string(table.header_.size()) + " as in the header");
+    table.rows_.push_back(std::move(fields));
+    table.line_numbers_.push_back(line_number);
+  }
+  if (table.header_.empty()) throw InputError(table.source_, "is empty, expected a CSV file with a header line");
+  return table;
+}
+
+bool CsvTable::has(std::string_view column) const {
+  return std::find(header_.begin(), header_.end(), column) != header_.end();
+}
+
+std::size_t CsvTable::index_of(std::string_view column) const {
+  const auto found = std::find(header_.begin(), header_.end(), column);
+  if (found == header_.end()) throw InputError(source_, "has no column '" + std::string(column) + "'");
+  return static_cast<std::size_t>(found - header_.begin());
+}
+
+const std::string& CsvTable::text(std::size_t row, std::string_view column) const {
+  return rows_.at(row)[index_of(column)];
+}
+
+std::optional<double> CsvTable::number_or_empty(std::size_t row, std::string_view column) const {
+  const std::string& field = text(row, column);
+  if (field.empty()) return std::nullopt;
+  const auto value = parse_finite(field);
+  if (!value) throw InputError(at_line(source_, line_numbers_[row]), column, field, "a finite number");
+  return value;
+}
+
+double CsvTable::number(std::size_t row, std::string_view column) const {
+  const auto value = number_or_empty(row, column);
+  if (!value) throw InputError(at_line(source_, line_numbers_.at(row)), column, "", "a finite number");
+  return *value;
+}
+
+}  // namespace lapservo

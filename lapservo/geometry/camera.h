@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/geometry/response.h"
+
+namespace lapservo {
+
+/// A point of the image plane and how it moves: d(u, v)/d(x, y, z) at a point in the camera frame, pixels per metre.
+struct ProjectionWithJacobian {
+  Eigen::Vector2d point_px;
+  Eigen::Matrix<double, 2, 3> d_px_d_point;
+};
+
+/// Pinhole camera with plumb_bob distortion (k1 k2 p1 p2 k3), as in a ROS camera_info. Pixel centres lie at integer
+/// coordinates. Raw pixels are those of the image; ideal pixels are undistorted with the same camera matrix.
+struct Camera {
+  int width_px = 0;
+  int height_px = 0;
+  double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
+  std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3
+  Response response;
+
+  bool distorted() const;
+  bool contains(const Eigen::Vector2d& raw_px, double margin_px = 0) const;
+
+  /// Pinhole image of a point in the camera frame; only for z > 0 (behind the camera it mirrors).
+  Eigen::Vector2d ideal_from_point(const Eigen::Vector3d& point_in_camera) const;
+  Eigen::Vector2d raw_from_ideal(const Eigen::Vector2d& ideal_px) const;
+  /// Newton's method; nullopt where the distortion can't be inverted (far outside the image of a barrel lens).
+  std::optional<Eigen::Vector2d> ideal_from_raw(const Eigen::Vector2d& raw_px) const;
+  Eigen::Vector2d raw_from_point(const Eigen::Vector3d& point_in_camera) const;
+  /// raw_from_point with its derivative.
+  ProjectionWithJacobian raw_with_jacobian(const Eigen::Vector3d& point_in_camera) const;
+  /// ideal_from_point with its derivative.
+  ProjectionWithJacobian ideal_with_jacobian(const Eigen::Vector3d& point_in_camera) const;
+  /// Direction (not normalised, z = 1) of the ray through an ideal pixel.
+  Eigen::Vector3d ray_from_ideal(const Eigen::Vector2d& ideal_px) const;
+};
+
+}  // namespace lapservo

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <array>
+
+namespace lapservo {
+
+/// How pixel values encode light. Values and light are in [0, 1].
+struct Response {
+  enum class Kind { srgb, power };
+  Kind kind = Kind::srgb;
+  double gamma = 1;  ///< for Kind::power: light = value^gamma; 1 is linear
+
+  double light_from_value(double value) const;
+  double value_from_light(double light) const;
+  /// Light for each 8-bit value.
+  std::array<float, 256> table() const;
+};
+
+}  // namespace lapservo

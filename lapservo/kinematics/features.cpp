@@ -1,0 +1,44 @@
+#include "lapservo/kinematics/features.h"
+
+#include <cmath>
+#include <cstddef>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/cylinder.h"
+
+namespace lapservo {
+
+std::optional<CentreLine> centre_line(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled,
+                                      double psi_rad) {
+  const auto view = view_cylinder(camera_from_unrolled, marker.radius_m());
+  if (!view) return std::nullopt;
+  CentreLine line;
+  line.facing_azimuth_rad = view->facing_azimuth_rad;
+  line.tau_rad = wrap_two_pi(view->facing_azimuth_rad - psi_rad - marker.seam_rad);
+  const auto along_m = boundaries_m(marker, line.tau_rad);
+  for (std::size_t k = 0; k < 4; ++k) {
+    line.points_in_camera_m[k] =
+        camera_from_unrolled * surface_point(marker.radius_m(), view->facing_azimuth_rad, along_m[k]);
+    if (!(line.points_in_camera_m[k].z() > 1e-6)) return std::nullopt;
+    line.ideal_px[k] = camera.ideal_from_point(line.points_in_camera_m[k]);
+  }
+  return line;
+}
+
+Features features_of(const std::array<Eigen::Vector2d, 4>& e, const std::optional<Eigen::Vector2d>& rcm_ideal_px) {
+  const Eigen::Vector2d whole = e[3] - e[0];
+  Features f;
+  f.s_rad = std::atan2(whole.x(), whole.y());
+  if (rcm_ideal_px) f.r_px = (e[0] - *rcm_ideal_px).norm();
+  f.l_px = whole.norm();
+  f.d_px = (e[2] - e[0]).norm();
+  f.cross_ratio = cross_ratio((e[1] - e[0]).norm(), (e[2] - e[1]).norm(), (e[3] - e[2]).norm());
+  return f;
+}
+
+std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigid3& camera_from_rcm) {
+  if (!(std::abs(camera_from_rcm.translation.z()) > 1e-6)) return std::nullopt;
+  return camera.ideal_from_point(camera_from_rcm.translation);
+}
+
+}  // namespace lapservo

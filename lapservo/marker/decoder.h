@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+
+#include "lapservo/marker/marker.h"
+
+namespace lapservo {
+
+/// tau from a cross-ratio (eq. 18). For the linear family (l1 : l2 constant) the map is linear and exact; for every
+/// other design r - 1 = l1 l3 / (l2 L) is a ratio of polynomials in tau, inverted in closed form.
+class CrossRatioDecoder {
+ public:
+  /// Throws std::invalid_argument with decoding_problem's text when the cross-ratio is not monotonic in tau.
+  explicit CrossRatioDecoder(const Marker& marker);
+
+  /// tau in [0, 2 pi]; a cross-ratio beyond the marker's range gives the nearer end, a non-finite one gives NaN.
+  double tau_rad(double cross_ratio) const;
+
+  double lowest_cross_ratio() const { return lowest_; }
+  double highest_cross_ratio() const { return highest_; }
+
+ private:
+  Marker marker_;
+  double at_upper_, at_lower_, lowest_, highest_;
+};
+
+/// Empty when the cross-ratio runs strictly monotonically over tau; else why and where it does not.
+std::string decoding_problem(const Marker& marker);
+
+}  // namespace lapservo

@@ -1,0 +1,81 @@
+#include "lapservo/marker/marker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <sstream>
+
+#include "lapservo/core/angles.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double smallest_diameter_m = 0.5e-3, largest_diameter_m = 0.1;
+constexpr double largest_band_m = 0.5;
+constexpr double smallest_hue_gap_deg = 40;  // closer hues blend under white balance, blur and smoke
+
+double hue_gap_deg(double a_deg, double b_deg) { return std::abs(std::remainder(a_deg - b_deg, 360.0)); }
+
+template <typename Value>
+std::string problem(const std::string& field, const Value& value, const std::string& expected) {
+  std::ostringstream text;
+  text << field << ": is " << value << ", expected " << expected;
+  return text.str();
+}
+
+}  // namespace
+
+std::array<double, 4> boundaries_m(const Marker& marker, double tau_rad) {
+  const double t = wrap_two_pi(tau_rad) / two_pi;
+  const auto& upper = marker.bands_upper_m;
+  const auto& lower = marker.bands_lower_m;
+  const double l1 = upper[0] + t * (lower[0] - upper[0]);
+  const double l2 = upper[1] + t * (lower[1] - upper[1]);
+  return {0, l1, l1 + l2, marker.length_m()};
+}
+
+std::array<double, 4> boundary_slopes_m(const Marker& marker) {
+  const double d1 = (marker.bands_lower_m[0] - marker.bands_upper_m[0]) / two_pi;
+  const double d2 = (marker.bands_lower_m[1] - marker.bands_upper_m[1]) / two_pi;
+  return {0, d1, d1 + d2, 0};
+}
+
+double cross_ratio(double l1, double l2, double l3) { return (l1 + l2) * (l2 + l3) / (l2 * (l1 + l2 + l3)); }
+
+double cross_ratio_at(const Marker& marker, double tau_rad) {
+  const auto e = boundaries_m(marker, tau_rad);
+  return cross_ratio(e[1] - e[0], e[2] - e[1], e[3] - e[2]);
+}
+
+std::string marker_problem(const Marker& marker) {
+  const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
+  if (!within(marker.diameter_m, smallest_diameter_m, largest_diameter_m))
+    return problem("diameter_m", marker.diameter_m, "0.0005 to 0.1 (metres)");
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::string index = "[" + std::to_string(i) + "]";
+    if (!within(marker.hues_deg[i], 0, 360)) return problem("hues_deg" + index, marker.hues_deg[i], "0 to 360");
+    if (!(marker.bands_upper_m[i] > 0 && marker.bands_upper_m[i] <= largest_band_m))
+      return problem("bands_upper_m" + index, marker.bands_upper_m[i], "a length above 0, up to 0.5 (metres)");
+    if (!(marker.bands_lower_m[i] > 0 && marker.bands_lower_m[i] <= largest_band_m))
+      return problem("bands_lower_m" + index, marker.bands_lower_m[i], "a length above 0, up to 0.5 (metres)");
+  }
+  for (std::size_t i = 0; i < 3; ++i)
+    if (hue_gap_deg(marker.hues_deg[i], marker.hues_deg[(i + 1) % 3]) < smallest_hue_gap_deg)
+      return problem("hues_deg[" + std::to_string((i + 1) % 3) + "]", marker.hues_deg[(i + 1) % 3],
+                     "hues at least 40 degrees apart");
+  const double lower_sum = marker.bands_lower_m[0] + marker.bands_lower_m[1] + marker.bands_lower_m[2];
+  if (!(std::abs(lower_sum - marker.length_m()) <= 1e-6))
+    return problem("bands_lower_m", "a sum of " + std::to_string(lower_sum),
+                   "the same sum as bands_upper_m (" + std::to_string(marker.length_m()) +
+                       "): both ends of the marker are circles");
+  if (!(std::abs(marker.seam_rad) <= 100)) return problem("seam_rad", marker.seam_rad, "an angle in radians");
+  return {};
+}
+
+bool same_colour_order(const Marker& a, const Marker& b) {
+  for (std::size_t i = 0; i < 3; ++i)
+    if (hue_gap_deg(a.hues_deg[i], b.hues_deg[i]) >= smallest_hue_gap_deg / 2) return false;
+  return true;
+}
+
+}  // namespace lapservo

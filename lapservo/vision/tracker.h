@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/observation.h"
+
+namespace lapservo {
+
+enum class Method {
+  surface,     ///< every visible generatrix, robust fit in linear light
+  centerline,  ///< the paper's Algorithm 1
+};
+
+struct TrackerOptions {
+  Method method = Method::surface;
+  bool single = false;  ///< treat every frame on its own instead of starting from the frame before
+};
+
+/// Finds all instruments of a rig in the frames of one camera. Holds what it learnt from the frame before.
+class Tracker {
+ public:
+  explicit Tracker(const Rig& rig, TrackerOptions options = {});
+  ~Tracker();
+  Tracker(Tracker&&) noexcept;
+  Tracker& operator=(Tracker&&) noexcept;
+
+  /// `image_bgr`: 8-bit, 3 channels, of the rig's size, else InputError. One observation per instrument of the rig, in
+  /// its order.
+  const std::vector<Observation>& track(const cv::Mat& image_bgr);
+
+  /// Forgets the frame before: the next one is searched anew.
+  void reset();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lapservo
