@@ -8,8 +8,12 @@ namespace lapservo {
 inline constexpr double pi = std::numbers::pi;
 inline constexpr double two_pi = 2 * std::numbers::pi;
 
-constexpr double rad_from_deg(double angle_deg) { return angle_deg * (pi / 180); }
-constexpr double deg_from_rad(double angle_rad) { return angle_rad * (180 / pi); }
+constexpr double rad_from_deg(double angle_deg) {
+  return angle_deg * (pi / 180);
+}
+constexpr double deg_from_rad(double angle_rad) {
+  return angle_rad * (180 / pi);
+}
 
 /// The same angle in [-pi, pi).
 inline double wrap_pi(double angle_rad) {

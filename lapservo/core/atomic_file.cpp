@@ -1,10 +1,9 @@
 #include "lapservo/core/atomic_file.h"
 
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <unistd.h>
 #include <utility>
 
 #include "lapservo/core/error.h"

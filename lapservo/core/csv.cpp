@@ -28,7 +28,9 @@ std::vector<std::string> split_fields(std::string_view line) {
   }
 }
 
-std::string at_line(const std::string& source, std::size_t line) { return source + ":" + std::to_string(line); }
+std::string at_line(const std::string& source, std::size_t line) {
+  return source + ":" + std::to_string(line);
+}
 
 }  // namespace
 

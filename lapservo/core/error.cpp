@@ -9,7 +9,8 @@ namespace {
 std::string one_line(std::string_view text) {
   constexpr std::size_t longest = 80;
   std::string line(text.substr(0, longest));
-  std::replace_if(line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 0x7f; }, ' ');
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 0x7f; }, ' ');
   return text.size() > longest ? line + "..." : line;
 }
 

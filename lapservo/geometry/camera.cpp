@@ -24,8 +24,8 @@ Distorted distort(const std::array<double, 5>& k, const Eigen::Vector2d& x) {
   out.point = radial * x + tangential;
   out.jacobian = radial * Eigen::Matrix2d::Identity() + 2 * d_radial * x * x.transpose();
   const double cross = 2 * (k[2] * x.x() + k[3] * x.y());
-  out.jacobian += Eigen::Matrix2d{{2 * k[2] * x.y() + 6 * k[3] * x.x(), cross},
-                                  {cross, 6 * k[2] * x.y() + 2 * k[3] * x.x()}};
+  out.jacobian +=
+      Eigen::Matrix2d{{2 * k[2] * x.y() + 6 * k[3] * x.x(), cross}, {cross, 6 * k[2] * x.y() + 2 * k[3] * x.x()}};
   return out;
 }
 

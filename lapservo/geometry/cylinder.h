@@ -12,9 +12,9 @@ namespace lapservo {
 /// A circular cylinder as the camera sees it. Its own frame has z along the axis (distal); azimuths are measured in
 /// it from x, right-handed about z.
 struct CylinderView {
-  double facing_azimuth_rad;     ///< gamma: azimuth of the direction from the axis to the camera centre
-  double half_visible_rad;       ///< azimuths within +- this of gamma are seen; the silhouettes lie at its ends
-  double camera_to_axis_m;       ///< distance of the camera centre from the axis
+  double facing_azimuth_rad;  ///< gamma: azimuth of the direction from the axis to the camera centre
+  double half_visible_rad;    ///< azimuths within +- this of gamma are seen; the silhouettes lie at its ends
+  double camera_to_axis_m;    ///< distance of the camera centre from the axis
 };
 
 /// nullopt when the camera centre lies inside the (infinite) cylinder.

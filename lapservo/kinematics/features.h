@@ -14,8 +14,8 @@ namespace lapservo {
 /// The marker on the centre line: the images of e0..e3 on the facing generatrix, where the plane through the shaft's
 /// axis and the camera centre meets the surface (CONVENTIONS "What the centre line shows").
 struct CentreLine {
-  double facing_azimuth_rad;                      ///< gamma, in the unrolled frame
-  double tau_rad;                                 ///< gamma - psi - seam, in [0, 2 pi)
+  double facing_azimuth_rad;  ///< gamma, in the unrolled frame
+  double tau_rad;             ///< gamma - psi - seam, in [0, 2 pi)
   std::array<Eigen::Vector3d, 4> points_in_camera_m;
   std::array<Eigen::Vector2d, 4> ideal_px;
 };

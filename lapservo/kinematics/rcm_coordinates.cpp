@@ -10,8 +10,8 @@ Eigen::Vector3d shaft_axis_in_rcm(const RcmCoordinates& q) {
 }
 
 Rigid3 rcm_from_unrolled(const RcmCoordinates& q) {
-  const Eigen::Quaterniond rotation = Eigen::AngleAxisd(q.theta_rad, Eigen::Vector3d::UnitZ()) *
-                                      Eigen::AngleAxisd(q.phi_rad, Eigen::Vector3d::UnitY());
+  const Eigen::Quaterniond rotation =
+      Eigen::AngleAxisd(q.theta_rad, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(q.phi_rad, Eigen::Vector3d::UnitY());
   return {rotation, q.rho_m * shaft_axis_in_rcm(q)};
 }
 

@@ -55,13 +55,15 @@ std::string decoding_problem(const Marker& marker) {
   const double scale = std::abs(c[0]) + std::abs(c[1]) + std::abs(c[2]);
   const double length_cubed = l.total * l.total * l.total;
   if (scale > 1e-6 * length_cubed && lowest_of_quadratic_on_unit_interval(c, sign) > 1e-6 * scale) return {};
-  if (scale <= 1e-6 * length_cubed) return "the cross-ratio is the same at every rotation: the inner boundaries must slope";
+  if (scale <= 1e-6 * length_cubed)
+    return "the cross-ratio is the same at every rotation: the inner boundaries must slope";
   const auto value = [&](double t) { return sign * (c[0] + t * (c[1] + t * c[2])); };
   double turns_at = 0;
   while (turns_at < 1 && value(turns_at) > 0) turns_at += 1.0 / 360;
   char text[160];
   std::snprintf(text, sizeof text,
-                "the cross-ratio turns back near tau = %.2f rad, so that two rotations look the same", two_pi * turns_at);
+                "the cross-ratio turns back near tau = %.2f rad, so that two rotations look the same",
+                two_pi * turns_at);
   return text;
 }
 

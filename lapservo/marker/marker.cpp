@@ -14,7 +14,9 @@ constexpr double smallest_diameter_m = 0.5e-3, largest_diameter_m = 0.1;
 constexpr double largest_band_m = 0.5;
 constexpr double smallest_hue_gap_deg = 40;  // closer hues blend under white balance, blur and smoke
 
-double hue_gap_deg(double a_deg, double b_deg) { return std::abs(std::remainder(a_deg - b_deg, 360.0)); }
+double hue_gap_deg(double a_deg, double b_deg) {
+  return std::abs(std::remainder(a_deg - b_deg, 360.0));
+}
 
 template <typename Value>
 std::string problem(const std::string& field, const Value& value, const std::string& expected) {
@@ -40,7 +42,9 @@ std::array<double, 4> boundary_slopes_m(const Marker& marker) {
   return {0, d1, d1 + d2, 0};
 }
 
-double cross_ratio(double l1, double l2, double l3) { return (l1 + l2) * (l2 + l3) / (l2 * (l1 + l2 + l3)); }
+double cross_ratio(double l1, double l2, double l3) {
+  return (l1 + l2) * (l2 + l3) / (l2 * (l1 + l2 + l3));
+}
 
 double cross_ratio_at(const Marker& marker, double tau_rad) {
   const auto e = boundaries_m(marker, tau_rad);

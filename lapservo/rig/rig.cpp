@@ -139,10 +139,12 @@ void check_invertible(const Camera& camera, const Field& coefficients) {
   const double u_end = camera.width_px - 1, v_end = camera.height_px - 1;
   constexpr int steps = 8;
   for (int i = 0; i <= steps; ++i)
-    for (const Eigen::Vector2d& border : {Eigen::Vector2d(u_end * i / steps, 0), Eigen::Vector2d(u_end * i / steps, v_end),
-                                         Eigen::Vector2d(0, v_end * i / steps), Eigen::Vector2d(u_end, v_end * i / steps)})
+    for (const Eigen::Vector2d& border :
+         {Eigen::Vector2d(u_end * i / steps, 0), Eigen::Vector2d(u_end * i / steps, v_end),
+          Eigen::Vector2d(0, v_end * i / steps), Eigen::Vector2d(u_end, v_end * i / steps)})
       if (!camera.ideal_from_raw(border))
-        coefficients.fail("not invertible at the image's border", "k1 k2 p1 p2 k3 of a calibration that covers the image");
+        coefficients.fail("not invertible at the image's border",
+                          "k1 k2 p1 p2 k3 of a calibration that covers the image");
 }
 
 Camera parse_camera_fields(const Field& field) {
@@ -245,6 +247,8 @@ Rig parse_rig(std::string_view yaml, const std::string& source, const fs::path& 
   }
 }
 
-Rig load_rig(const fs::path& path) { return parse_rig(read_text(path), path.string(), path.parent_path()); }
+Rig load_rig(const fs::path& path) {
+  return parse_rig(read_text(path), path.string(), path.parent_path());
+}
 
 }  // namespace lapservo

@@ -4,13 +4,20 @@ namespace lapservo {
 
 std::string_view status_word(Status status) {
   switch (status) {
-    case Status::ok: return "ok";
-    case Status::no_marker: return "no_marker";
-    case Status::cut: return "cut";
-    case Status::occluded: return "occluded";
-    case Status::ambiguous: return "ambiguous";
-    case Status::poor_fit: return "poor_fit";
-    case Status::uncertain: return "uncertain";
+    case Status::ok:
+      return "ok";
+    case Status::no_marker:
+      return "no_marker";
+    case Status::cut:
+      return "cut";
+    case Status::occluded:
+      return "occluded";
+    case Status::ambiguous:
+      return "ambiguous";
+    case Status::poor_fit:
+      return "poor_fit";
+    case Status::uncertain:
+      return "uncertain";
   }
   return "no_marker";
 }

@@ -14,12 +14,12 @@ namespace lapservo {
 /// Why there is, or is not, an observation. Words for files: status_word().
 enum class Status {
   ok,
-  no_marker,   ///< nothing in the image has the marker's colours in its order
-  cut,         ///< too little of the marker lies inside the image
-  occluded,    ///< too few of its boundaries are visible
-  ambiguous,   ///< two explanations fit about as well
-  poor_fit,    ///< something was found that does not look like the marker on closer sight
-  uncertain,   ///< found, but the rotation's standard deviation is too large to be of use
+  no_marker,  ///< nothing in the image has the marker's colours in its order
+  cut,        ///< too little of the marker lies inside the image
+  occluded,   ///< too few of its boundaries are visible
+  ambiguous,  ///< two explanations fit about as well
+  poor_fit,   ///< something was found that does not look like the marker on closer sight
+  uncertain,  ///< found, but the rotation's standard deviation is too large to be of use
 };
 std::string_view status_word(Status status);
 
@@ -35,7 +35,7 @@ struct Observation {
   };
   std::optional<Rcm> rcm;
 
-  double tau_rad = 0;        ///< azimuth of the marker on the centre line, [0, 2 pi)
+  double tau_rad = 0;  ///< azimuth of the marker on the centre line, [0, 2 pi)
   double sigma_tau_rad = 0;
   std::array<Eigen::Vector2d, 4> edges_ideal_px{};  ///< e0..e3 on the centre line
   std::array<Eigen::Vector2d, 4> edges_raw_px{};
@@ -43,7 +43,7 @@ struct Observation {
 
   /// Where the fitted shaft lies, to start the next frame from and to draw. camera_from_unrolled, psi.
   Rigid3 camera_from_unrolled;
-  double psi_rad = 0;        ///< in the azimuth reference of camera_from_unrolled
+  double psi_rad = 0;  ///< in the azimuth reference of camera_from_unrolled
 };
 
 }  // namespace lapservo

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "lapservo/vision/color_classes.h"
+#include "lapservo/vision/image_view.h"
+
+namespace lapservo {
+
+/// Pixels of the markers' colours that lie together, sampled on a sparse grid.
+struct Blob {
+  struct Sample {
+    int u, v;
+    std::uint8_t color;
+  };
+  std::vector<Sample> samples;
+  int grid_px = 0;  ///< distance of neighbouring samples
+};
+
+/// All groups of coloured samples of at least `least_samples`, largest first. Touches one pixel in grid_px^2 only.
+std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int least_samples);
+
+}  // namespace lapservo

@@ -1,0 +1,280 @@
+#include "lapservo/vision/coarse_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/vision/line_segmentation.h"
+#include "lapservo/vision/normal_equations.h"
+
+namespace lapservo {
+namespace {
+
+constexpr int line_count = 17, station_count = 15, samples_along = 160;
+constexpr double line_reach = 0.74;  // of the visible half angle: beyond, bands are too foreshortened and dark
+constexpr double side_sigma_px = 2.0, boundary_sigma_px = 1.5;
+constexpr double limb_inset_px = 1.0;  // the limb is dark, its colour ends inside the true silhouette
+constexpr int smallest_boundary_count = 10;
+
+// Measured image points that lie on the marker's outline or boundaries, attached to where they belong on its surface.
+struct SidePoint {
+  Eigen::Vector2d raw_px;
+  double side;  // -1, +1: silhouette at gamma + side * half_visible
+  double along_m;
+};
+struct BoundaryPoint {
+  Eigen::Vector2d raw_px;
+  double azimuth_rad;
+  std::size_t boundary;
+};
+
+Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azimuth_rad, double along_m) {
+  return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
+}
+
+// The stretch [first, last] of a section with the most marker colour in it (maximum subarray).
+struct Stretch {
+  int first = 0, last = -1;
+};
+Stretch most_colorful_stretch(const std::vector<std::uint8_t>& classes, const std::array<std::uint8_t, 3>& bands) {
+  Stretch best, current{0, -1};
+  float best_sum = 0, sum = 0;
+  for (int i = 0; i < static_cast<int>(classes.size()); ++i) {
+    const std::uint8_t color = classes[static_cast<std::size_t>(i)];
+    const bool ours = color == bands[0] || color == bands[1] || color == bands[2];
+    sum += ours ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
+    if (sum <= 0) {
+      sum = 0;
+      current.first = i + 1;
+    } else if (sum > best_sum) {
+      best_sum = sum;
+      best = {current.first, i};
+    }
+  }
+  return best;
+}
+
+// Sections across the shaft: where its colours begin and end.
+std::vector<SidePoint> measure_sides(const Scene& scene, const ShaftPose& pose, const CylinderView& view,
+                                     double reach_px) {
+  std::vector<SidePoint> points;
+  std::vector<std::uint8_t> classes;
+  for (int station = 0; station < station_count; ++station) {
+    const double along_m = scene.marker.length_m() * (0.04 + 0.92 * station / (station_count - 1));
+    const auto silhouette = [&](double side) {
+      return scene.camera.raw_from_point(
+          point_on(pose, scene.marker, view.facing_azimuth_rad + side * view.half_visible_rad, along_m));
+    };
+    const Eigen::Vector2d left = silhouette(-1), right = silhouette(1), middle = (left + right) / 2;
+    const double half_px = (right - left).norm() / 2;
+    if (!(half_px > 2) || half_px > 4000) continue;
+    const Eigen::Vector2d across = (right - left) / (2 * half_px);
+    const double step_px = std::max(1.0, half_px / 40);
+    const int reach = static_cast<int>((half_px + reach_px) / step_px);
+    classes.clear();
+    for (int i = -reach; i <= reach; ++i) classes.push_back(scene.class_at(middle + i * step_px * across));
+    const Stretch stretch = most_colorful_stretch(classes, scene.bands);
+    const double width_px = (stretch.last - stretch.first + 1) * step_px;
+    if (width_px < 0.5 * 2 * half_px || width_px > 1.4 * 2 * half_px) continue;
+    const auto add = [&](int inner, int outer, double side) {
+      if (outer < 0 || outer >= static_cast<int>(classes.size())) return;
+      if (classes[static_cast<std::size_t>(outer)] == Scene::outside) return;
+      const double t_px = (inner - reach + 0.5 * side) * step_px + side * limb_inset_px;
+      points.push_back({middle + t_px * across, side, along_m});
+    };
+    add(stretch.first, stretch.first - 1, -1);
+    add(stretch.last, stretch.last + 1, 1);
+  }
+  return points;
+}
+
+// Lines along the shaft, sampled evenly in metres from the marker's proximal end.
+struct SampledLine {
+  double azimuth_rad;
+  std::array<std::uint8_t, samples_along> classes;
+};
+struct SampledSurface {
+  double first_m, step_m;
+  std::array<SampledLine, line_count> lines;
+};
+
+SampledSurface sample_surface(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double reach) {
+  SampledSurface surface;
+  const double length_m = scene.marker.length_m();
+  surface.first_m = -reach * length_m;
+  surface.step_m = (1 + 2 * reach) * length_m / samples_along;
+  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  for (int i = 0; i < line_count; ++i) {
+    SampledLine& line = surface.lines[static_cast<std::size_t>(i)];
+    const double fraction = line_reach * (2.0 * i / (line_count - 1) - 1);
+    line.azimuth_rad = view.facing_azimuth_rad + fraction * view.half_visible_rad;
+    const Eigen::Vector3d base = point_on(pose, scene.marker, line.azimuth_rad, 0);
+    for (int k = 0; k < samples_along; ++k) {
+      const Eigen::Vector3d point = base + (surface.first_m + (k + 0.5) * surface.step_m) * axis;
+      line.classes[static_cast<std::size_t>(k)] =
+          point.z() > 1e-3 ? scene.class_at(scene.camera.raw_from_point(point)) : Scene::outside;
+    }
+  }
+  return surface;
+}
+
+std::vector<BoundaryPoint> measure_boundaries(const Scene& scene, const ShaftPose& pose,
+                                              const SampledSurface& surface) {
+  std::vector<BoundaryPoint> points;
+  for (const SampledLine& line : surface.lines) {
+    const LineSegmentation split = segment_line(line.classes, scene.bands);
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (!split.seen[k]) continue;
+      const double along_m = surface.first_m + split.position[k] * surface.step_m;
+      points.push_back(
+          {scene.camera.raw_from_point(point_on(pose, scene.marker, line.azimuth_rad, along_m)), line.azimuth_rad, k});
+    }
+  }
+  return points;
+}
+
+// Adds the image distance of a measured point from the curve through `point` with tangent `tangent` (camera frame).
+void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const Eigen::Vector3d& point,
+                        const Eigen::Vector3d& tangent, double psi_speed_m, const Eigen::Vector2d& measured_px,
+                        double sigma_px, NormalEquations& equations) {
+  if (!(point.z() > 1e-3)) return;
+  const ProjectionWithJacobian image = scene.camera.raw_with_jacobian(point);
+  const Eigen::Vector2d along = (image.d_px_d_point * tangent).normalized();
+  const Eigen::Vector2d normal(-along.y(), along.x());
+  if (!normal.allFinite()) return;
+  const double residual_px = normal.dot(measured_px - image.point_px);
+  const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
+  UnknownVector row = unknowns.row(point, pull);
+  const Eigen::Vector3d axis = unknowns.pose().camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  row[row.size() - 1] = psi_speed_m * pull.dot(axis);
+  equations.add(row, residual_px, cauchy_weight(residual_px / sigma_px, 2.5) / (sigma_px * sigma_px));
+}
+
+// One Gauss-Newton step on measured points. Inner boundaries count only once the rotation is known.
+std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unknowns,
+                                    const std::vector<SidePoint>& sides, const std::vector<BoundaryPoint>& boundaries,
+                                    bool with_rotation) {
+  const ShaftPose& pose = unknowns.pose();
+  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
+  if (!view) return std::nullopt;
+  const Eigen::Matrix3d axes = pose.camera_from_unrolled.rotation.toRotationMatrix();
+  const auto azimuth_direction = [&](double azimuth_rad) -> Eigen::Vector3d {
+    return axes * Eigen::Vector3d(-std::sin(azimuth_rad), std::cos(azimuth_rad), 0);
+  };
+  NormalEquations equations(unknowns.size());
+  for (const SidePoint& side : sides) {
+    const double azimuth_rad = view->facing_azimuth_rad + side.side * view->half_visible_rad;
+    add_curve_distance(scene, unknowns, point_on(pose, scene.marker, azimuth_rad, side.along_m), axes.col(2), 0,
+                       side.raw_px, side_sigma_px, equations);
+  }
+  const auto slopes_m = boundary_slopes_m(scene.marker);
+  for (const BoundaryPoint& b : boundaries) {
+    const bool inner = b.boundary == 1 || b.boundary == 2;
+    if (inner && !with_rotation) continue;
+    const double along_m = boundaries_m(scene.marker, b.azimuth_rad - pose.psi_rad - scene.marker.seam_rad)[b.boundary];
+    const double slope_m = slopes_m[b.boundary];
+    const Eigen::Vector3d tangent = scene.marker.radius_m() * azimuth_direction(b.azimuth_rad) + slope_m * axes.col(2);
+    add_curve_distance(scene, unknowns, point_on(pose, scene.marker, b.azimuth_rad, along_m), tangent, -slope_m,
+                       b.raw_px, boundary_sigma_px, equations);
+  }
+  const PoseUnknowns next = unknowns.changed_by(equations.solve(1e-4));
+  return next.pose().camera_from_unrolled.translation.allFinite() ? std::optional(next) : std::nullopt;
+}
+
+// Agreement of the sampled colours with the marker's at a rotation: matches minus wrong colours, over all colours seen.
+class RotationScore {
+ public:
+  RotationScore(const Scene& scene, const SampledSurface& surface) : scene_(scene), surface_(surface) {
+    for (std::size_t i = 0; i < line_count; ++i)
+      for (std::size_t band = 0; band < 3; ++band) {
+        auto& sums = sums_[i][band];
+        sums[0] = 0;
+        for (std::size_t k = 0; k < samples_along; ++k) {
+          const std::uint8_t color = surface.lines[i].classes[k];
+          const bool ours = color == scene.bands[0] || color == scene.bands[1] || color == scene.bands[2];
+          sums[k + 1] = sums[k] + (color == scene.bands[band] ? 1 : (ours ? -1 : 0));
+          seen_ += band == 0 && ours ? 1 : 0;
+        }
+      }
+  }
+
+  double at(double psi_rad) const {
+    int score = 0;
+    for (std::size_t i = 0; i < line_count; ++i) {
+      const auto ends_m = boundaries_m(scene_.marker, surface_.lines[i].azimuth_rad - psi_rad - scene_.marker.seam_rad);
+      for (std::size_t band = 0; band < 3; ++band)
+        score += sums_[i][band][index(ends_m[band + 1])] - sums_[i][band][index(ends_m[band])];
+    }
+    return seen_ ? static_cast<double>(score) / seen_ : 0;
+  }
+
+ private:
+  std::size_t index(double along_m) const {
+    const double k = std::round((along_m - surface_.first_m) / surface_.step_m);
+    return static_cast<std::size_t>(std::clamp(k, 0.0, static_cast<double>(samples_along)));
+  }
+
+  const Scene& scene_;
+  const SampledSurface& surface_;
+  std::array<std::array<std::array<int, samples_along + 1>, 3>, line_count> sums_{};
+  int seen_ = 0;
+};
+
+struct RotationSearch {
+  double psi_rad, score, rival_score;
+};
+RotationSearch search_rotation(const Scene& scene, const SampledSurface& surface) {
+  constexpr int steps = 180, rival_gap = 20;  // 0.7 rad
+  const RotationScore score(scene, surface);
+  std::array<double, steps> scores{};
+  for (int i = 0; i < steps; ++i) scores[static_cast<std::size_t>(i)] = score.at(two_pi * i / steps);
+  const int best = static_cast<int>(std::max_element(scores.begin(), scores.end()) - scores.begin());
+  double rival = -1;
+  for (int i = 0; i < steps; ++i) {
+    const int gap = std::abs(i - best);
+    if (std::min(gap, steps - gap) > rival_gap) rival = std::max(rival, scores[static_cast<std::size_t>(i)]);
+  }
+  return {two_pi * best / steps, scores[static_cast<std::size_t>(best)], rival};
+}
+
+}  // namespace
+
+CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOptions& options) {
+  constexpr int rounds = 3, steps_per_round = 4;
+  CoarseFit fit;
+  fit.unknowns = start;
+  bool rotation_known = !options.search_rotation;
+  for (int round = 0; round < rounds; ++round) {
+    const auto view = view_cylinder(fit.unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
+    if (!view) return fit;
+    const double narrowing = round == 0 ? 1 : 0.5;
+    const auto sides =
+        measure_sides(scene, fit.unknowns.pose(), *view, std::max(8.0, options.lateral_reach_px * narrowing));
+    const auto surface =
+        sample_surface(scene, fit.unknowns.pose(), *view, std::max(0.12, options.along_reach * narrowing));
+    const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
+    fit.boundaries_seen = static_cast<int>(boundaries.size());
+    if (fit.boundaries_seen < smallest_boundary_count || sides.size() < 4) return fit;
+    if (options.search_rotation && round == 1) {
+      const RotationSearch search = search_rotation(scene, surface);
+      fit.unknowns = fit.unknowns.with_psi(search.psi_rad);
+      fit.rotation_score = search.score;
+      fit.rival_score = search.rival_score;
+      rotation_known = true;
+    }
+    for (int step = 0; step < steps_per_round; ++step) {
+      const auto next = stepped(scene, fit.unknowns, sides, boundaries, rotation_known);
+      if (!next) return fit;
+      fit.unknowns = *next;
+    }
+  }
+  fit.found = true;
+  return fit;
+}
+
+}  // namespace lapservo

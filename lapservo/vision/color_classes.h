@@ -1,0 +1,34 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "lapservo/rig/rig.h"
+
+namespace lapservo {
+
+/// Which of the markers' colours a pixel has: 0 for none, else 1, 2, ... for the rig's distinct hues. A pixel has a
+/// colour when it is colourful and its HSV hue lies nearer to it than half the way to the next, so that exposure,
+/// shading and moderate white balance need no tuning. Looked up from the 5 high bits of each channel: 32 KiB.
+class ColorClasses {
+ public:
+  explicit ColorClasses(const std::vector<Instrument>& instruments);
+
+  std::uint8_t operator()(const std::uint8_t* bgr) const {
+    return table_[static_cast<std::size_t>((bgr[0] >> shift) << 2 * bits | (bgr[1] >> shift) << bits |
+                                           (bgr[2] >> shift))];
+  }
+  /// Class of one band of one instrument.
+  std::uint8_t of_band(std::size_t instrument, std::size_t band) const { return bands_[instrument][band]; }
+  int count() const { return static_cast<int>(hues_deg_.size()); }
+
+ private:
+  static constexpr int bits = 5, shift = 8 - bits;
+
+  std::vector<double> hues_deg_;
+  std::vector<std::array<std::uint8_t, 3>> bands_;
+  std::vector<std::uint8_t> table_;
+};
+
+}  // namespace lapservo

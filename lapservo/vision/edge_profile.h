@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace lapservo {
+
+/// Light along a short line across an edge: sample i lies at (first_px + i) px from where the edge is expected.
+struct EdgeProfile {
+  static constexpr std::size_t max_samples = 48;
+  float first_px = 0;
+  std::size_t count = 0;
+  std::array<std::array<float, max_samples>, 3> light;
+  std::array<std::array<bool, max_samples>, 3> usable;  ///< false where saturated
+};
+
+/// Where the edge is, by least squares over the three channels with amplitudes free in each.
+struct EdgeFit {
+  bool converged = false;
+  float offset_px = 0;                            ///< of the edge from where it is expected
+  float information = 0;                          ///< inverse variance of offset_px for unit noise in the light, 1/px^2
+  float residual_variance = 0;                    ///< of the light about the model
+  std::array<float, 3> step{};                    ///< change of the light over the edge, per channel
+  float blur_gradient = 0, blur_information = 0;  ///< Gauss-Newton terms of the blur, for unit noise
+};
+
+/// A step between two flat stretches, blurred by `blur_px`.
+EdgeFit fit_step(const EdgeProfile& profile, float blur_px);
+
+/// The limb of a diffusely lit cylinder of radius `radius_px` with the light near the camera; positive positions lie
+/// inside: background, then ambient plus diffuse light that rises like sqrt(1 - (1 - x / R)^2), blurred. The apparent
+/// edge of such a limb lies inside the true one; this finds the true one.
+EdgeFit fit_limb(const EdgeProfile& profile, float blur_px, float radius_px);
+
+}  // namespace lapservo

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <array>
+
+#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/scene.h"
+#include "lapservo/vision/shaft_pose.h"
+
+namespace lapservo {
+
+/// Width of the optical blur (one sigma) along the boundaries' normals and across the shaft's sides; carried from frame
+/// to frame.
+struct EdgeBlur {
+  double boundaries_px = 1.2;
+};
+
+struct FineFit {
+  bool converged = false;
+  PoseUnknowns unknowns;
+  UnknownMatrix covariance;  ///< of the unknowns, one sigma squared
+  EdgeBlur blur;
+  int lines = 0;                  ///< generatrices looked at
+  std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit
+  std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
+  int sides_used = 0;
+  double inlier_rms_sigmas = 0;  ///< of the boundaries' residuals
+};
+
+/// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
+/// pixel in linear light, with a robust loss. `start` must be good to some pixels.
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur);
+
+}  // namespace lapservo

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "lapservo/geometry/rigid3.h"
+#include "lapservo/vision/blob_search.h"
+#include "lapservo/vision/scene.h"
+#include "lapservo/vision/shaft_pose.h"
+
+namespace lapservo {
+
+/// Rough poses (rotation unknown, psi = 0) of a marker that a blob may be: the shaft's sides are two lines fitted to
+/// the blob's outline; their distance gives the depth, the ends of the colours the place along the axis. With
+/// camera_from_rcm there is at most one; without it the foreshortening leaves two (tip towards or away from the
+/// camera). Empty when the blob lacks the marker's colours in their order.
+std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
+                                        const std::optional<Rigid3>& camera_from_rcm);
+
+}  // namespace lapservo

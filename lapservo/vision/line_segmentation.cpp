@@ -1,0 +1,58 @@
+#include "lapservo/vision/line_segmentation.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "lapservo/vision/scene.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::size_t max_samples = 512;
+constexpr std::size_t states = 5;  // shaft, band 0, 1, 2, shaft
+
+float reward(std::size_t state, std::uint8_t color, const std::array<std::uint8_t, 3>& bands) {
+  if (color == Scene::outside) return 0;
+  if (state == 0 || state == states - 1) return color == 0 ? 0.3F : -0.7F;
+  if (color == bands[state - 1]) return 1;
+  return color == 0 ? -0.35F : -1;
+}
+
+// What a boundary needs on each of its sides to count as seen.
+bool supported(std::span<const std::uint8_t> classes, std::size_t boundary, std::size_t k,
+               const std::array<std::uint8_t, 3>& bands) {
+  constexpr std::size_t reach = 4, needed = 3;
+  if (boundary < reach || boundary + reach > classes.size()) return false;
+  const std::uint8_t before = k == 0 ? 0 : bands[k - 1];
+  const std::uint8_t after = k == 3 ? 0 : bands[k];
+  const auto at = classes.begin() + static_cast<std::ptrdiff_t>(boundary);
+  return std::count(at - reach, at, before) >= static_cast<std::ptrdiff_t>(needed) &&
+         std::count(at, at + reach, after) >= static_cast<std::ptrdiff_t>(needed);
+}
+
+}  // namespace
+
+LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands) {
+  const std::size_t count = std::min(classes.size(), max_samples);
+  std::array<std::array<bool, states>, max_samples> entered;  // the best path enters this state at this sample
+  std::array<float, states> best{0, 0, 0, 0, 0};
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t state = states; state-- > 0;) {
+      entered[i][state] = state > 0 && best[state - 1] > best[state];
+      if (entered[i][state]) best[state] = best[state - 1];
+      best[state] += reward(state, classes[i], bands);
+    }
+
+  LineSegmentation segmentation;
+  std::size_t state = static_cast<std::size_t>(std::max_element(best.begin(), best.end()) - best.begin());
+  for (std::size_t k = state; k < 4; ++k) segmentation.position[k] = static_cast<double>(count);
+  for (std::size_t i = count; i-- > 0 && state > 0;) {
+    if (!entered[i][state]) continue;
+    --state;
+    segmentation.position[state] = static_cast<double>(i);
+    segmentation.seen[state] = supported(classes.first(count), i, state, bands);
+  }
+  return segmentation;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/geometry/rigid3.h"
+#include "lapservo/kinematics/rcm_coordinates.h"
+
+namespace lapservo {
+
+/// Where a shaft with its marker is: the unrolled frame (z along the axis to the tip, origin at the marker's proximal
+/// end) and the rotation about the axis in its azimuths.
+struct ShaftPose {
+  Rigid3 camera_from_unrolled;
+  double psi_rad = 0;
+};
+
+/// Most unknowns of a fit: a pose's six, psi included, and one of the marker.
+inline constexpr int max_unknowns = 7;
+using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_unknowns, 1>;
+using UnknownMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_unknowns, max_unknowns>;
+
+/// The configuration (psi = 0) of a shaft through the RCM whose marker begins at a point; nullopt at the RCM itself.
+std::optional<RcmCoordinates> configuration_through(const Rigid3& camera_from_rcm,
+                                                    const Eigen::Vector3d& proximal_end_in_camera);
+
+/// The unknowns of a fit. With camera_from_rcm they are q = [theta, phi, rho, psi]; without it the axis' five
+/// (rotations about the unrolled x and y, translations along x, y and z) and psi.
+class PoseUnknowns {
+ public:
+  static PoseUnknowns rcm(const Rigid3& camera_from_rcm, const RcmCoordinates& q);
+  static PoseUnknowns free(const ShaftPose& pose);
+
+  int size() const { return camera_from_rcm_ ? 4 : 6; }
+  const ShaftPose& pose() const { return pose_; }
+  /// Present in the first form.
+  const std::optional<RcmCoordinates>& q() const { return q_; }
+
+  /// Rows d(n . p)/d(unknowns but psi) for a point p (camera frame) that moves with the shaft; psi's entry is 0.
+  UnknownVector row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction) const;
+
+  /// The pose after a small change of the unknowns.
+  PoseUnknowns changed_by(const UnknownVector& step) const;
+
+  /// The same pose with another rotation about the axis.
+  PoseUnknowns with_psi(double psi_rad) const;
+
+ private:
+  struct Twist {
+    Eigen::Vector3d angular, linear;
+  };
+  void derive();
+
+  std::optional<Rigid3> camera_from_rcm_;
+  std::optional<RcmCoordinates> q_;
+  ShaftPose pose_;
+  Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
+  std::array<Twist, 5> twists_{};
+};
+
+}  // namespace lapservo

@@ -1,0 +1,184 @@
+#include "lapservo/vision/surface_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/vision/coarse_fit.h"
+#include "lapservo/vision/initial_pose.h"
+#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/verification.h"
+
+namespace lapservo {
+namespace {
+
+constexpr int grid_px = 8, least_samples = 8, most_blobs = 6;
+constexpr double least_rotation_score = 0.5, rival_ratio = 0.93;
+
+// Standard deviation of tau: gamma moves with the pose, psi is its last unknown.
+double sigma_tau(const Scene& scene, const FineFit& fit, double tau_rad) {
+  const int n = fit.unknowns.size();
+  UnknownVector gradient = UnknownVector::Zero(n);
+  for (int i = 0; i < n; ++i) {
+    constexpr double step = 1e-6;
+    UnknownVector change = UnknownVector::Zero(n);
+    change[i] = step;
+    const ShaftPose pose = fit.unknowns.changed_by(change).pose();
+    if (const auto line = centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad))
+      gradient[i] = wrap_pi(line->tau_rad - tau_rad) / step;
+  }
+  return std::sqrt(gradient.dot(fit.covariance * gradient));
+}
+
+// q of a freely fitted shaft that misses the RCM: the shaft from the RCM to the marker's proximal end. The angle
+// between it and the fitted axis is how wrong each angle may be; where that is too much, q is unknown.
+std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scene, const FineFit& fit,
+                                                               const Rigid3& camera_from_rcm, double tau_rad) {
+  constexpr double largest_mismatch_rad = 0.03;
+  const Rigid3& fitted = fit.unknowns.pose().camera_from_unrolled;
+  auto q = configuration_through(camera_from_rcm, fitted.translation);
+  if (!q) return std::nullopt;
+  const Rigid3 through_rcm = camera_from_rcm * rcm_from_unrolled(*q);
+  const auto view = view_cylinder(through_rcm, scene.marker.radius_m());
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  const double mismatch_rad = std::atan2((fitted.rotation * z).cross(through_rcm.rotation * z).norm(),
+                                         (fitted.rotation * z).dot(through_rcm.rotation * z));
+  if (!view || !(mismatch_rad < largest_mismatch_rad)) return std::nullopt;
+  q->psi_rad = view->facing_azimuth_rad - tau_rad - scene.marker.seam_rad;
+  const double angle_variance =
+      mismatch_rad * mismatch_rad + fit.covariance(fit.unknowns.size() - 1, fit.unknowns.size() - 1);
+  const double rho_variance = mismatch_rad * mismatch_rad * q->rho_m * q->rho_m + fit.covariance(4, 4);
+  const Eigen::Vector4d variances(angle_variance, angle_variance, rho_variance, angle_variance);
+  return Observation::Rcm{*q, variances.asDiagonal()};
+}
+
+Observation observation_of(const Scene& scene, const FineFit& fit, const std::optional<Rigid3>& camera_from_rcm) {
+  Observation observation;
+  const ShaftPose& pose = fit.unknowns.pose();
+  const auto line = centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
+  if (!line) {
+    observation.status = Status::poor_fit;
+    return observation;
+  }
+  observation.status = Status::ok;
+  observation.tau_rad = line->tau_rad;
+  observation.sigma_tau_rad = sigma_tau(scene, fit, line->tau_rad);
+  observation.edges_ideal_px = line->ideal_px;
+  for (std::size_t k = 0; k < 4; ++k) observation.edges_raw_px[k] = scene.camera.raw_from_ideal(line->ideal_px[k]);
+  observation.features =
+      features_of(line->ideal_px, camera_from_rcm ? projected_rcm_px(scene.camera, *camera_from_rcm) : std::nullopt);
+  observation.camera_from_unrolled = pose.camera_from_unrolled;
+  observation.psi_rad = pose.psi_rad;
+  if (fit.unknowns.q()) {
+    observation.rcm = Observation::Rcm{*fit.unknowns.q(), fit.covariance};
+  } else if (camera_from_rcm) {
+    observation.rcm = configuration_despite_mismatch(scene, fit, *camera_from_rcm, line->tau_rad);
+  }
+  if (observation.rcm) {
+    observation.rcm->q.theta_rad = wrap_pi(observation.rcm->q.theta_rad);
+    observation.rcm->q.psi_rad = wrap_pi(observation.rcm->q.psi_rad);
+  }
+  return observation;
+}
+
+}  // namespace
+
+SurfaceTracker::SurfaceTracker(const Rig& rig, bool single)
+    : rig_(rig),
+      single_(single),
+      classes_(rig.instruments),
+      light_(rig.camera.response.table()),
+      memory_(rig.instruments.size()),
+      observations_(rig.instruments.size()) {}
+
+void SurfaceTracker::reset() {
+  std::fill(memory_.begin(), memory_.end(), std::nullopt);
+}
+
+Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
+  return {image,
+          rig_.camera,
+          classes_,
+          rig_.instruments[i].marker,
+          {classes_.of_band(i, 0), classes_.of_band(i, 1), classes_.of_band(i, 2)}};
+}
+
+void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
+  UnknownVector velocity = UnknownVector::Zero(fit.unknowns.size());
+  if (memory_[i] && memory_[i]->last.q() && fit.unknowns.q())
+    velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
+  memory_[i] = Memory{fit.unknowns, velocity, fit.blur};
+}
+
+SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImage& light, const Memory& memory) const {
+  CoarseFitOptions options;
+  options.search_rotation = false;
+  options.along_reach = 0.2;
+  const CoarseFit coarse = fit_coarsely(scene, memory.last.changed_by(memory.velocity), options);
+  if (!coarse.found) return {};
+  const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
+  const Status status = judge(scene, fit);
+  return status == Status::ok ? Found{status, fit} : Found{status, std::nullopt};
+}
+
+SurfaceTracker::Found SurfaceTracker::try_start(const Scene& scene, const LightImage& light,
+                                                const PoseUnknowns& start) const {
+  const CoarseFit coarse = fit_coarsely(scene, start, {});
+  if (!coarse.found || coarse.rotation_score < least_rotation_score) return {};
+  if (coarse.rival_score > rival_ratio * coarse.rotation_score) return {Status::ambiguous, std::nullopt};
+  const FineFit fit = fit_finely(scene, light, coarse.unknowns, {});
+  const Status status = judge(scene, fit);
+  return status == Status::ok ? Found{status, fit} : Found{status, std::nullopt};
+}
+
+SurfaceTracker::Found SurfaceTracker::detect(const Scene& scene, const LightImage& light,
+                                             const std::vector<Blob>& blobs,
+                                             const std::optional<Rigid3>& camera_from_rcm) const {
+  Found best;
+  for (const Blob& blob : blobs) {
+    for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm)) {
+      Found found = try_start(scene, light, start);
+      if (!found.fit) {
+        if (!best.fit && found.status != Status::no_marker) best = found;
+        continue;
+      }
+      if (!best.fit || found.fit->inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = std::move(found);
+      if (camera_from_rcm) break;  // the starts are ways to one solution; without the RCM they are rivals
+    }
+    if (best.fit) break;
+  }
+  return best;
+}
+
+const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) {
+  const ImageView image(image_bgr);
+  const LightImage light(image, light_);
+  if (single_) reset();
+  std::optional<std::vector<Blob>> blobs;
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
+    const Scene scene = scene_of(image, i);
+    const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
+    Found found;
+    if (memory_[i]) found = follow(scene, light, *memory_[i]);
+    if (!found.fit) {
+      memory_[i].reset();
+      if (!blobs) {
+        blobs = find_blobs(image, classes_, grid_px, least_samples);
+        if (blobs->size() > most_blobs) blobs->resize(most_blobs);
+      }
+      found = detect(scene, light, *blobs, camera_from_rcm);
+      if (!found.fit && camera_from_rcm)
+        if (Found free = detect(scene, light, *blobs, std::nullopt); free.fit) found = std::move(free);
+    }
+    observations_[i] = {};
+    observations_[i].status = found.status;
+    if (!found.fit) continue;
+    observations_[i] = observation_of(scene, *found.fit, camera_from_rcm);
+    remember(i, *found.fit);
+  }
+  return observations_;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/blob_search.h"
+#include "lapservo/vision/color_classes.h"
+#include "lapservo/vision/fine_fit.h"
+#include "lapservo/vision/observation.h"
+
+namespace lapservo {
+
+/// Method::surface: coarse search for the markers' colours, then a fit over all visible generatrices.
+///
+/// With camera_from_rcm the fit's unknowns are q. Where no q explains the image (a registration that is off), the axis
+/// is fitted freely: the image features are right then, and q is given only as far as the mismatch lets it be known.
+class SurfaceTracker {
+ public:
+  /// `single`: every frame on its own.
+  SurfaceTracker(const Rig& rig, bool single);
+
+  /// `image_bgr` is 8-bit BGR of the rig's size. One observation per instrument.
+  const std::vector<Observation>& track(const cv::Mat& image_bgr);
+  void reset();
+
+ private:
+  struct Memory {
+    PoseUnknowns last;
+    UnknownVector velocity;  // per frame
+    EdgeBlur blur;
+  };
+  struct Found {
+    Status status = Status::no_marker;
+    std::optional<FineFit> fit;  // when ok
+  };
+  Found follow(const Scene& scene, const LightImage& light, const Memory& memory) const;
+  Found detect(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
+               const std::optional<Rigid3>& camera_from_rcm) const;
+  Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start) const;
+  void remember(std::size_t instrument, const FineFit& fit);
+  Scene scene_of(const ImageView& image, std::size_t instrument) const;
+
+  Rig rig_;
+  bool single_;
+  ColorClasses classes_;
+  std::array<float, 256> light_;
+  std::vector<std::optional<Memory>> memory_;
+  std::vector<Observation> observations_;
+};
+
+}  // namespace lapservo

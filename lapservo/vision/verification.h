@@ -1,0 +1,22 @@
+#pragma once
+
+#include "lapservo/vision/coarse_fit.h"
+#include "lapservo/vision/fine_fit.h"
+#include "lapservo/vision/observation.h"
+#include "lapservo/vision/scene.h"
+
+namespace lapservo {
+
+/// How well the frame's colours agree with the marker at a pose, over a grid of its visible surface.
+struct ColorAgreement {
+  double matching = 0;  ///< share of the samples inside the image that have the predicted colour
+  double wrong = 0;     ///< share that has another of the marker's colours
+  double in_image = 0;  ///< share of the visible surface that lies inside the image
+  double beyond = 0;    ///< share of the shaft just beyond both ends that has a marker's colour
+};
+ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose);
+
+/// Whether a fit is good enough to move a robot by: Status::ok, or why not.
+Status judge(const Scene& scene, const FineFit& fit);
+
+}  // namespace lapservo
