@@ -1,21 +1,41 @@
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+
+#include <opencv2/core/utils/logger.hpp>
 
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
 
 namespace {
+
 constexpr int bad_input = 2;
+
+// The libraries beneath print their own complaints; ours is one line that names the file.
+void silence_libraries() {
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+  setenv("OPENCV_VIDEOIO_DEBUG", "0", 0);
 }
 
+}  // namespace
+
 int main(int argc, char** argv) {
+  silence_libraries();
   CLI::App app{"See and steer a laparoscopic instrument by its camera.", "lapservo"};
   app.require_subcommand(1);
+  app.footer(
+      "`lapservo SUBCOMMAND --help` shows its options and an example.\n"
+      "Exit codes: 0 done, 1 found nothing or did not converge, 2 bad input.");
   lapservo::app::Run run;
+  lapservo::app::add_track(app, run);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : bad_input;
+    std::fprintf(stderr, "lapservo: %s (try --help)\n", error.what());
+    return bad_input;
   }
   try {
     return run();

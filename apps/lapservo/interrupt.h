@@ -1,0 +1,9 @@
+#pragma once
+
+namespace lapservo::app {
+
+/// From now on Ctrl-C (and SIGTERM) asks the running job to end well; a second one ends it at once.
+void watch_for_interrupts();
+bool interrupted();
+
+}  // namespace lapservo::app

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+namespace lapservo::app {
+
+/// One line on stderr that tells how far a long job is, only on a terminal and only once it takes longer than a second.
+class Progress {
+ public:
+  explicit Progress(std::optional<int> total);
+  ~Progress();
+  void show(int done, const std::string& remark);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  std::optional<int> total_;
+  bool terminal_, shown_ = false;
+  Clock::time_point start_ = Clock::now(), last_ = start_;
+};
+
+}  // namespace lapservo::app

@@ -1,0 +1,205 @@
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <opencv2/highgui.hpp>
+
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/progress.h"
+#include "apps/lapservo/subcommands.h"
+#include "lapservo/core/error.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/io/observation_csv.h"
+#include "lapservo/io/overlay.h"
+#include "lapservo/io/overlay_writer.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::app {
+namespace {
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string input, rig, out = "obs.csv", overlay;
+  std::map<std::string, Method> methods{{"surface", Method::surface}, {"centerline", Method::centerline}};
+  Method method = Method::surface;
+  bool single = false, view = false;
+  double fps = 30;
+};
+
+// Which rig a frame is to be tracked with: the one named by --rig, else NAME.rig.yaml beside the picture, else rig.yaml
+// in its folder. The tracker begins anew when the rig changes.
+class RigByFrame {
+ public:
+  explicit RigByFrame(const Options& options) : options_(options) {
+    if (!options.rig.empty()) use(options.rig);
+  }
+
+  Tracker& tracker_for(const Frame& frame) {
+    if (options_.rig.empty()) {
+      const fs::path at = frame.file.empty() ? fs::path(options_.input) : frame.file;
+      const fs::path own = sidecar(at), shared = at.parent_path() / "rig.yaml";
+      const fs::path chosen = fs::exists(own) ? own : shared;
+      if (!fs::exists(chosen))
+        throw InputError(at.string(),
+                         "has no rig beside it (" + own.filename().string() + " or rig.yaml): name one with --rig");
+      if (chosen != path_) use(chosen);
+    } else if (!frame.file.empty() && !warned_ && fs::exists(sidecar(frame.file)) &&
+               !fs::equivalent(sidecar(frame.file), options_.rig)) {
+      std::fprintf(stderr, "lapservo: note: --rig is used for all frames, though %s has a rig of its own\n",
+                   frame.file.filename().c_str());
+      warned_ = true;
+    }
+    return *tracker_;
+  }
+  const Rig& rig() const { return rig_; }
+  const fs::path& path() const { return path_; }
+
+ private:
+  static fs::path sidecar(const fs::path& file) { return fs::path(file).replace_extension(".rig.yaml"); }
+  void use(const fs::path& path) {
+    rig_ = load_rig(path);
+    path_ = path;
+    tracker_.emplace(rig_, TrackerOptions{options_.method, options_.single});
+  }
+
+  const Options& options_;
+  fs::path path_;
+  Rig rig_;
+  std::optional<Tracker> tracker_;
+  bool warned_ = false;
+};
+
+// Tells whether the user closed the window or pressed q or Esc.
+class View {
+ public:
+  View() {
+    if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
+      throw InputError("--view", "needs a display and there is none: use --overlay to write pictures instead");
+  }
+  bool show(const cv::Mat& picture) {
+    cv::imshow(title, picture);
+    const int key = cv::waitKey(1) & 0xff;
+    return key != 'q' && key != 27;
+  }
+
+ private:
+  static constexpr auto title = "lapservo track (q to quit)";
+};
+
+struct Tally {
+  int frames = 0;
+  std::map<std::string, int> found;
+
+  void add(const Rig& rig, const std::vector<Observation>& observations) {
+    ++frames;
+    for (std::size_t i = 0; i < observations.size(); ++i)
+      found[rig.instruments[i].name] += observations[i].status == Status::ok;
+  }
+  std::string text() const {
+    std::string line;
+    for (const auto& [name, count] : found) line += fmt::format(", {} in {}", name, count);
+    return line;
+  }
+  bool anything() const {
+    return std::any_of(found.begin(), found.end(), [](const auto& entry) { return entry.second > 0; });
+  }
+};
+
+void check_output(const Options& options) {
+  std::error_code error;
+  for (const std::string& out : {options.out, options.overlay})
+    if (!out.empty() && fs::exists(out) && fs::equivalent(out, options.input, error))
+      throw InputError(out, "is the input itself, expected another place for the results");
+}
+
+[[noreturn]] void rethrow_with_frame(const InputError& error, const Options& options, const Frame& frame) {
+  const std::string name = frame.file.empty() ? options.input : frame.file.string();
+  const std::string text = error.what();
+  if (text.starts_with("image: ")) throw InputError(name, text.substr(7));
+  throw error;
+}
+
+int run(const Options& options) {
+  check_output(options);
+  RigByFrame rigs(options);
+  const auto source = open_frame_source(options.input, options.fps);
+  std::optional<View> view;
+  if (options.view) view.emplace();
+  ObservationCsv csv(options.out);
+  const auto overlay = options.overlay.empty() ? nullptr : open_overlay_writer(options.overlay, *source);
+  watch_for_interrupts();
+
+  Tally tally;
+  bool stopped = false;
+  {
+    Progress progress(source->frame_count());
+    while (!(stopped = interrupted())) {
+      const auto frame = source->next();
+      if (!frame) break;
+      Tracker& tracker = rigs.tracker_for(*frame);
+      try {
+        const auto& observations = tracker.track(frame->bgr);
+        tally.add(rigs.rig(), observations);
+        for (std::size_t i = 0; i < observations.size(); ++i)
+          csv.add(frame->index, frame->time_s, frame->file.filename().string(), rigs.rig().instruments[i].name,
+                  observations[i]);
+        if (overlay || view) {
+          const cv::Mat picture = draw_overlay(frame->bgr, rigs.rig(), observations);
+          if (overlay) overlay->add(*frame, picture);
+          if (view && !view->show(picture)) {
+            stopped = true;
+            break;
+          }
+        }
+      } catch (const InputError& error) {
+        rethrow_with_frame(error, options, *frame);
+      }
+      progress.show(tally.frames, tally.text());
+    }
+  }
+  csv.commit();
+  if (overlay) overlay->commit();
+  std::printf("%s%d frames%s\nobservations: %s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str(),
+              options.out.c_str());
+  if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
+  if (tally.anything()) return 0;
+  std::fprintf(
+      stderr,
+      "lapservo: no instrument was found: look at the status column, and whether the rig's hues_deg are the print's\n");
+  return 1;
+}
+
+}  // namespace
+
+void add_track(CLI::App& app, Run& run_later) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("track", "Measure the instruments in pictures, a video or a camera's frames.");
+  command
+      ->add_option("input", options->input,
+                   "Picture, folder of pictures, video file, camera (0, /dev/video0) or stream (rtsp://...)")
+      ->required();
+  command->add_option("--rig", options->rig,
+                      "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
+  command->add_option("--out", options->out, "CSV of observations to write")->capture_default_str();
+  command->add_option("--method", options->method, "surface: all visible lines; centerline: the paper's Algorithm 1")
+      ->transform(CLI::CheckedTransformer(options->methods, CLI::ignore_case))
+      ->default_str("surface");
+  command->add_flag("--single", options->single,
+                    "Treat every frame on its own, without tracking from the frame before");
+  command->add_option("--overlay", options->overlay,
+                      "Write pictures (a folder) or a video (.mp4) with the detection drawn in");
+  command->add_flag("--view", options->view, "Show a live window");
+  command->add_option("--fps", options->fps, "Frames per second of a folder's pictures")
+      ->capture_default_str()
+      ->check(CLI::Range(0.001, 100000.0));
+  command->footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
+  command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
+}
+
+}  // namespace lapservo::app

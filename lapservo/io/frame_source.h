@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+namespace lapservo {
+
+struct Frame {
+  cv::Mat bgr;                 ///< 8-bit
+  int index = 0;               ///< from 0
+  double time_s = 0;           ///< since the first frame
+  std::filesystem::path file;  ///< the picture's path; empty for videos and cameras
+};
+
+/// Frames of a picture, a folder of pictures (sorted by name), a video file, a camera ("0", "/dev/video0") or a stream
+/// ("rtsp://...").
+class FrameSource {
+ public:
+  enum class Kind { image, folder, video, live };
+
+  virtual ~FrameSource() = default;
+  /// nullopt at the end. Throws InputError for a picture that can't be read.
+  virtual std::optional<Frame> next() = 0;
+  virtual Kind kind() const = 0;
+  /// Where it is known beforehand.
+  virtual std::optional<int> frame_count() const = 0;
+  virtual double frames_per_second() const = 0;
+};
+
+/// `folder_fps` gives the pictures of a folder their times. Throws InputError when there is nothing to read: a missing
+/// or empty file, a folder without pictures, a video without frames, a camera that doesn't answer.
+std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps);
+
+}  // namespace lapservo

@@ -1,0 +1,123 @@
+#include "lapservo/io/image_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr std::uint32_t largest_side_px = 16384;
+
+bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
+}
+
+std::uint32_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
+  return std::uint32_t{bytes[at]} << 24 | std::uint32_t{bytes[at + 1]} << 16 | std::uint32_t{bytes[at + 2]} << 8 |
+         std::uint32_t{bytes[at + 3]};
+}
+
+// Decoders return half a picture for half a file: ask for the end themselves.
+void check_whole(std::span<const std::uint8_t> bytes, const std::string& source) {
+  using namespace std::string_view_literals;
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (starts_with(bytes, "\x89PNG\r\n\x1a\n"sv)) {
+    if (bytes.size() < 33 || text.rfind("IEND"sv) == std::string_view::npos)
+      throw InputError(source, "is a truncated PNG, expected a whole picture");
+    if (big_endian(bytes, 16) > largest_side_px || big_endian(bytes, 20) > largest_side_px)
+      throw InputError(source, "size",
+                       std::to_string(big_endian(bytes, 16)) + "x" + std::to_string(big_endian(bytes, 20)),
+                       "at most 16384 pixels a side");
+  }
+  if (starts_with(bytes, "\xff\xd8"sv) && text.rfind("\xff\xd9"sv) == std::string_view::npos)
+    throw InputError(source, "is a truncated JPEG, expected a whole picture");
+}
+
+}  // namespace
+
+bool has_image_extension(const fs::path& path) {
+  static constexpr std::array<std::string_view, 9> known{".png",  ".jpg",  ".jpeg", ".bmp", ".tif",
+                                                         ".tiff", ".webp", ".ppm",  ".pgm"};
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
+  cv::Mat eight_bit = image;
+  if (image.depth() == CV_16U) {
+    image.convertTo(eight_bit, CV_8U, 1.0 / 257);
+  } else if (image.depth() != CV_8U) {
+    throw InputError(source, "pixel type", "floating point or signed", "8 or 16 bits a channel");
+  }
+  cv::Mat bgr;
+  switch (eight_bit.channels()) {
+    case 1:
+      cv::cvtColor(eight_bit, bgr, cv::COLOR_GRAY2BGR);
+      return bgr;
+    case 3:
+      return eight_bit;
+    case 4:
+      cv::cvtColor(eight_bit, bgr, cv::COLOR_BGRA2BGR);
+      return bgr;
+    default:
+      throw InputError(source, "channels", std::to_string(eight_bit.channels()), "1 (grey), 3 or 4 (alpha)");
+  }
+}
+
+cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source) {
+  if (bytes.empty()) throw InputError(source, "is empty, expected a picture");
+  check_whole(bytes, source);
+  cv::Mat image;
+  try {
+    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
+    image = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
+  } catch (const cv::Exception&) {
+    image.release();
+  }
+  if (image.empty()) throw InputError(source, "can't be decoded, expected a picture");
+  return bgr8_from(image, source);
+}
+
+cv::Mat read_image(const fs::path& path) {
+  if (fs::is_directory(path)) throw InputError(path.string(), "is a folder, expected a picture");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(path.string(), "can't be opened, expected a picture");
+  const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  return decode_image(bytes, path.string());
+}
+
+void write_image(const fs::path& path, const cv::Mat& image) {
+  const fs::path temporary = temporary_name(path);
+  bool written = false;
+  try {
+    written = cv::imwrite(temporary.string(), image);
+  } catch (const cv::Exception&) {
+    written = false;
+  }
+  std::error_code error;
+  if (written) fs::rename(temporary, path, error);
+  if (!written || error) {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw InputError(path.string(), "can't be written as a picture");
+  }
+}
+
+}  // namespace lapservo

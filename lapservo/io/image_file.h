@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+namespace lapservo {
+
+/// Whether the name ends like a picture's (png, jpg, jpeg, bmp, tif, tiff, webp, ppm, pgm).
+bool has_image_extension(const std::filesystem::path& path);
+
+/// Decodes a picture to 8-bit BGR. Grey is repeated over the channels, alpha dropped, 16-bit rounded to 8; EXIF
+/// rotation is ignored, as the camera's calibration refers to the pixels as stored. Throws InputError for anything that
+/// isn't a whole picture: empty, truncated (PNG without its end chunk, JPEG without its end marker), not decodable,
+/// other pixel types.
+cv::Mat read_image(const std::filesystem::path& path);
+cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source);
+
+/// 8-bit BGR of any supported pixel type, as above.
+cv::Mat bgr8_from(const cv::Mat& image, const std::string& source);
+
+/// Writes under a temporary name, then renames. Throws InputError when that fails.
+void write_image(const std::filesystem::path& path, const cv::Mat& image);
+
+}  // namespace lapservo

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/vision/observation.h"
+
+namespace lapservo {
+
+/// The header line of an observation CSV (CONVENTIONS "lapservo track"), without the line's end.
+extern const char* const observation_csv_header;
+
+/// One row of it, without the line's end. Unknown values are empty fields.
+std::string observation_csv_row(int frame, double time_s, const std::string& file, const std::string& instrument,
+                                const Observation& observation);
+
+/// A CSV of observations that appears under its name when committed.
+class ObservationCsv {
+ public:
+  /// Throws InputError at once when `path` can't be written.
+  explicit ObservationCsv(const std::filesystem::path& path);
+  void add(int frame, double time_s, const std::string& file, const std::string& instrument,
+           const Observation& observation);
+  void commit() { file_.commit(); }
+
+ private:
+  AtomicFile file_;
+};
+
+}  // namespace lapservo

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/io/frame_source.h"
+
+namespace lapservo {
+
+/// Where `--overlay PATH` goes: a picture for a picture (when PATH ends like one), a folder of pictures for pictures, a
+/// video for videos and cameras. Pictures appear whole, one by one; a video when committed.
+class OverlayWriter {
+ public:
+  virtual ~OverlayWriter() = default;
+  virtual void add(const Frame& frame, const cv::Mat& overlay) = 0;
+  virtual void commit() = 0;
+};
+
+/// Throws InputError at once when PATH can't be written.
+std::unique_ptr<OverlayWriter> open_overlay_writer(const std::filesystem::path& path, const FrameSource& source);
+
+}  // namespace lapservo
