@@ -26,10 +26,10 @@ constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
 constexpr double interpolation_noise = 1.6;
 
 // The film that carries the marker stands out from the shaft. Seen from beyond an end, its edge shows too and moves the
-// apparent end inwards (towards the axis) by the film's thickness, as far as the edge is lit: with the light at the
-// camera it is lit like the tangent of the angle of view. The rig does not say how thick the film is, so each fit
-// estimates it.
-constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.05e-3, most_lit = 1.5;
+// apparent end inwards (towards the axis) by the film's thickness, as far as the edge is lit compared with the outside:
+// diffusely from the camera, with some ambient light. The rig does not say how thick it is, so each fit estimates it.
+constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.05e-3;
+constexpr double ambient_share = 0.18, most_lit = 2;
 
 struct Measurement {
   UnknownVector row;   // d(position along the image normal)/d(unknowns)
@@ -60,12 +60,16 @@ struct Frame {
   Eigen::Vector3d point(double azimuth_rad, double along_m) const {
     return unknowns.pose().camera_from_unrolled * surface_point(marker().radius_m(), azimuth_rad, along_m);
   }
-  // How brightly the film's edge at boundary k shows, relative to its outside; 0 when it is not seen.
-  double film_light(std::size_t k) const {
+  // How brightly the film's edge at boundary k shows, relative to the outside beside it; 0 when it is not seen.
+  double film_light(std::size_t k, double azimuth_rad) const {
     if (k == 1 || k == 2) return 0;
-    const Eigen::Vector3d camera = unknowns.pose().camera_from_unrolled.inverse().translation;
-    const double beyond_m = k == 0 ? -camera.z() : camera.z() - marker().length_m();
-    return std::clamp(beyond_m / camera.head<2>().norm(), 0.0, most_lit);
+    const Eigen::Vector3d to_camera = unknowns.pose().camera_from_unrolled.inverse().translation -
+                                      surface_point(marker().radius_m(), azimuth_rad, k == 0 ? 0 : marker().length_m());
+    const double beyond = (k == 0 ? -to_camera.z() : to_camera.z()) / to_camera.norm();
+    if (beyond <= 0) return 0;
+    const double facing = surface_point(1, azimuth_rad, 0).dot(to_camera) / to_camera.norm();
+    const auto lit = [](double cosine) { return ambient_share + (1 - ambient_share) * std::max(0.0, cosine); };
+    return std::min(lit(beyond) / lit(facing), most_lit);
   }
   double tau(double azimuth_rad) const { return azimuth_rad - unknowns.pose().psi_rad - marker().seam_rad; }
 };
@@ -108,7 +112,7 @@ bool colors_agree(const Frame& frame, std::size_t k, const Eigen::Vector2d& at_p
 std::optional<Candidate> measure_boundary(const Frame& frame, double azimuth_rad, std::size_t k,
                                           const std::array<double, 4>& along_m, double slope_m, double extra_px,
                                           double blur_px, int& in_image) {
-  const double film_light = frame.film_light(k);
+  const double film_light = frame.film_light(k, azimuth_rad);
   const Eigen::Vector3d outwards = frame.axes * surface_point(1, azimuth_rad, 0);
   const Eigen::Vector3d point = frame.point(azimuth_rad, along_m[k]) - film_light * frame.film_m * outwards;
   if (!(point.z() > 1e-3)) return std::nullopt;

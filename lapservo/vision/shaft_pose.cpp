@@ -1,18 +1,9 @@
 #include "lapservo/vision/shaft_pose.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
 namespace lapservo {
-
-std::optional<RcmCoordinates> configuration_through(const Rigid3& camera_from_rcm,
-                                                    const Eigen::Vector3d& proximal_end_in_camera) {
-  const Eigen::Vector3d arm = camera_from_rcm.inverse() * proximal_end_in_camera;
-  const double rho_m = arm.norm();
-  if (!(rho_m > 1e-3)) return std::nullopt;
-  return RcmCoordinates{std::atan2(arm.y(), arm.x()), std::acos(std::clamp(arm.z() / rho_m, -1.0, 1.0)), rho_m, 0};
-}
 
 PoseUnknowns PoseUnknowns::rcm(const Rigid3& camera_from_rcm, const RcmCoordinates& q) {
   PoseUnknowns unknowns;

@@ -22,10 +22,6 @@ inline constexpr int max_unknowns = 7;
 using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_unknowns, 1>;
 using UnknownMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_unknowns, max_unknowns>;
 
-/// The configuration (psi = 0) of a shaft through the RCM whose marker begins at a point; nullopt at the RCM itself.
-std::optional<RcmCoordinates> configuration_through(const Rigid3& camera_from_rcm,
-                                                    const Eigen::Vector3d& proximal_end_in_camera);
-
 /// The unknowns of a fit. With camera_from_rcm they are q = [theta, phi, rho, psi]; without it the axis' five
 /// (rotations about the unrolled x and y, translations along x, y and z) and psi.
 class PoseUnknowns {

@@ -1,0 +1,311 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/progress.h"
+#include "apps/lapservo/subcommands.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/io/image_file.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/sim/truth.h"
+
+namespace lapservo::app {
+namespace {
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string rig, out, poses, background = "tissue", condition = "rendered", format = "png";
+  int count = 20;
+  std::uint64_t seed = 1;
+  bool moving = false, video = false, force = false;
+  double fps = 30, light = 1, smoke = 0, blood = 0, noise = 1, blur_px = 0.8, motion = 0, film_mm = 0.1;
+};
+
+// One frame's configurations, an entry per instrument.
+using Configurations = std::vector<RcmCoordinates>;
+
+ShaftPlacement placement_of(const Instrument& instrument, const RcmCoordinates& q) {
+  return {*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
+}
+
+// Whether the whole marker is seen, from not too steep an angle.
+bool in_view(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q) {
+  const Marker& marker = instrument.marker;
+  const Rigid3 pose = placement_of(instrument, q).camera_from_unrolled;
+  const auto view = view_cylinder(pose, marker.radius_m());
+  if (!view) return false;
+  const Eigen::Vector3d camera_in_marker = pose.inverse().translation - Eigen::Vector3d(0, 0, marker.length_m() / 2);
+  if (std::abs(camera_in_marker.z()) > 1.2 * view->camera_to_axis_m) return false;
+  const double margin_px = 0.02 * camera.width_px;
+  for (const double side : {-1.0, 0.0, 1.0})
+    for (const double along_m : {0.0, marker.length_m()}) {
+      const Eigen::Vector3d point =
+          pose * surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
+      if (point.z() < 0.02 || !camera.contains(camera.raw_from_point(point), margin_px)) return false;
+      if (!camera.contains(camera.ideal_from_point(point), -0.5 * camera.width_px)) return false;
+    }
+  return true;
+}
+
+RcmCoordinates random_configuration(const Camera& camera, const Instrument& instrument, const std::string& rig,
+                                    Random& random) {
+  for (int attempt = 0; attempt < 20000; ++attempt) {
+    const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
+    const Eigen::Vector3d point = camera.ray_from_ideal(pixel) * random.uniform(0.06, 0.14);
+    auto q = configuration_through(*instrument.camera_from_rcm, point);
+    if (!q || q->rho_m < 0.02 || std::sin(q->phi_rad) < 0.1) continue;
+    q->psi_rad = random.uniform(-pi, pi);
+    if (in_view(camera, instrument, *q)) return *q;
+  }
+  throw InputError(
+      rig, "instrument " + instrument.name + " is never wholly in view between 60 and 140 mm: check camera_from_rcm");
+}
+
+std::vector<Configurations> random_configurations(const Rig& rig, const Options& options) {
+  Random random(options.seed);
+  const int knots = options.moving ? std::max(2, options.count / 25 + 2) : options.count;
+  std::vector<Configurations> drawn;
+  for (int i = 0; i < knots; ++i) {
+    Configurations frame;
+    for (const Instrument& instrument : rig.instruments)
+      frame.push_back(random_configuration(rig.camera, instrument, options.rig, random));
+    drawn.push_back(std::move(frame));
+  }
+  if (!options.moving) return drawn;
+  // From knot to knot with no speed at either.
+  std::vector<Configurations> path;
+  for (int i = 0; i < options.count; ++i) {
+    const double place = (knots - 1.0) * i / std::max(1, options.count - 1);
+    const auto knot = std::min(static_cast<std::size_t>(place), drawn.size() - 2);
+    const double share = 0.5 - 0.5 * std::cos(pi * (place - static_cast<double>(knot)));
+    Configurations frame;
+    for (std::size_t k = 0; k < rig.instruments.size(); ++k)
+      frame.push_back(
+          RcmCoordinates::from_vector((1 - share) * drawn[knot][k].vector() + share * drawn[knot + 1][k].vector()));
+    path.push_back(std::move(frame));
+  }
+  return path;
+}
+
+// Columns theta_rad, phi_rad, rho_m, psi_rad and, for several instruments, instrument; a row per instrument and frame.
+std::vector<Configurations> read_configurations(const Rig& rig, const std::string& path) {
+  const CsvTable table = CsvTable::read(path);
+  const std::size_t instruments = rig.instruments.size();
+  if (table.rows() == 0 || table.rows() % instruments != 0)
+    throw InputError(path, "rows", std::to_string(table.rows()),
+                     "a row per frame and instrument (" + std::to_string(instruments) + ")");
+  std::vector<Configurations> frames(table.rows() / instruments, Configurations(instruments));
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    std::size_t index = row % instruments;
+    if (table.has("instrument")) {
+      const std::string& name = table.text(row, "instrument");
+      const auto found = std::find_if(rig.instruments.begin(), rig.instruments.end(),
+                                      [&](const Instrument& i) { return i.name == name; });
+      if (found == rig.instruments.end()) throw InputError(path, "instrument", name, "an instrument of the rig");
+      index = static_cast<std::size_t>(found - rig.instruments.begin());
+    }
+    frames[row / instruments][index] = {table.number(row, "theta_rad"), table.number(row, "phi_rad"),
+                                        table.number(row, "rho_m"), table.number(row, "psi_rad")};
+  }
+  return frames;
+}
+
+cv::Mat background_light(const Camera& camera, const Options& options) {
+  if (options.background == "tissue") return make_tissue(camera.width_px, camera.height_px, options.seed);
+  cv::Mat picture = read_image(options.background), scaled;
+  cv::resize(picture, scaled, {camera.width_px, camera.height_px}, 0, 0, cv::INTER_AREA);
+  const auto table = camera.response.table();
+  cv::Mat light(scaled.size(), CV_32FC3);
+  for (int v = 0; v < scaled.rows; ++v)
+    for (int u = 0; u < scaled.cols; ++u)
+      for (int c = 0; c < 3; ++c) light.at<cv::Vec3f>(v, u)[c] = table[scaled.at<cv::Vec3b>(v, u)[c]];
+  return light;
+}
+
+std::vector<Blotch> blotches(const Marker& marker, double share, Random& random) {
+  std::vector<Blotch> discs;
+  const double surface_m2 = pi * marker.diameter_m * marker.length_m();
+  double covered_m2 = 0;
+  while (covered_m2 < share * surface_m2) {
+    const double radius_m = random.uniform(0.08, 0.25) * marker.diameter_m;
+    discs.push_back({random.uniform(0, two_pi), random.uniform(0, marker.length_m()), radius_m});
+    covered_m2 += 0.8 * pi * radius_m * radius_m;
+  }
+  return discs;
+}
+
+Renderer make_renderer(const Rig& rig, const Options& options) {
+  Random random(options.seed + 1);
+  std::vector<ShaftModel> shafts;
+  for (const Instrument& instrument : rig.instruments) {
+    ShaftModel shaft;
+    shaft.marker = instrument.marker;
+    shaft.film_m = 1e-3 * options.film_mm;
+    shaft.blotches = blotches(instrument.marker, options.blood, random);
+    shafts.push_back(std::move(shaft));
+  }
+  RenderOptions render;
+  render.smoke = static_cast<float>(options.smoke);
+  render.sensor.blur_px = options.blur_px;
+  render.sensor.gains = Light::Constant(static_cast<float>(options.light));
+  render.sensor.read_noise *= options.noise;
+  render.sensor.shot_noise *= options.noise * options.noise;
+  return Renderer(rig.camera, std::move(shafts), background_light(rig.camera, options), render);
+}
+
+// The moments of one exposure: from the configuration half a step back to half a step ahead.
+Exposure exposure_of(const Rig& rig, const std::vector<Configurations>& frames, std::size_t index, double motion) {
+  const int moments = motion > 0 ? 9 : 1;
+  const Configurations &now = frames[index], &next = frames[std::min(index + 1, frames.size() - 1)];
+  Exposure exposure;
+  for (int m = 0; m < moments; ++m) {
+    const double share = moments > 1 ? motion * (static_cast<double>(m) / (moments - 1) - 0.5) : 0;
+    std::vector<ShaftPlacement> placements;
+    for (std::size_t k = 0; k < now.size(); ++k)
+      placements.push_back(
+          placement_of(rig.instruments[k],
+                       RcmCoordinates::from_vector(now[k].vector() + share * (next[k].vector() - now[k].vector()))));
+    exposure.push_back(std::move(placements));
+  }
+  return exposure;
+}
+
+// The folder under its temporary name until all is in it.
+class OutputFolder {
+ public:
+  OutputFolder(const fs::path& path, bool force) : path_(path), temporary_(path.string() + ".part") {
+    if (fs::exists(path_) && !force)
+      throw InputError(path.string(), "exists already, expected a new folder (or --force to replace it)");
+    std::error_code error;
+    fs::remove_all(temporary_, error);
+    if (!fs::create_directories(temporary_, error))
+      throw InputError(path.string(), "can't be created: " + error.message());
+  }
+  ~OutputFolder() {
+    std::error_code ignored;
+    fs::remove_all(temporary_, ignored);
+  }
+  fs::path operator/(const std::string& name) const { return temporary_ / name; }
+  void commit() {
+    fs::remove_all(path_);
+    fs::rename(temporary_, path_);
+  }
+
+ private:
+  fs::path path_, temporary_;
+};
+
+int run(const Options& options) {
+  const Rig rig = load_rig(options.rig);
+  for (const Instrument& instrument : rig.instruments)
+    if (!instrument.camera_from_rcm)
+      throw InputError(options.rig, "instruments." + instrument.name + ".camera_from_rcm", "missing",
+                       "a transform: it says where the instrument is");
+  const auto frames =
+      options.poses.empty() ? random_configurations(rig, options) : read_configurations(rig, options.poses);
+  Renderer renderer = make_renderer(rig, options);
+  OutputFolder folder(options.out, options.force);
+  TruthCsv truth(folder / "truth.csv");
+  cv::VideoWriter video;
+  if (options.video) {
+    video.open((folder / "video.mp4").string(), cv::VideoWriter::fourcc('m', 'p', '4', 'v'), options.fps,
+               {rig.camera.width_px, rig.camera.height_px});
+    if (!video.isOpened()) throw InputError(options.out, "no video can be written here");
+  }
+  watch_for_interrupts();
+  {
+    Progress progress(static_cast<int>(frames.size()));
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      if (interrupted()) throw InputError(options.out, "was interrupted: nothing is written");
+      const std::string name = fmt::format("{:04}.{}", i, options.format);
+      for (std::size_t k = 0; k < rig.instruments.size(); ++k) {
+        try {
+          truth.add(name, options.condition, rig.camera, rig.instruments[k], frames[i][k]);
+        } catch (const std::invalid_argument& error) {
+          throw InputError(options.poses, fmt::format("frame {}: {}", i, error.what()));
+        }
+      }
+      const cv::Mat image = renderer.render_exposure(exposure_of(rig, frames, i, options.motion), options.seed + i);
+      if (options.video) {
+        video.write(image);
+      } else {
+        write_image(folder / name, image);
+      }
+      progress.show(static_cast<int>(i) + 1, "");
+    }
+  }
+  video.release();
+  truth.commit();
+  fs::copy_file(options.rig, folder / "rig.yaml");
+  folder.commit();
+  std::printf("%zu frames with truth.csv and rig.yaml: %s\n", frames.size(), options.out.c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, Run& run_later) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("render", "Render frames of a rig with exact truth.");
+  command->add_option("--rig", options->rig, "Camera and instruments, with camera_from_rcm")->required();
+  command->add_option("--out", options->out, "Folder to create: NNNN.png, truth.csv, rig.yaml")->required();
+  command->add_option("--poses", options->poses,
+                      "CSV of theta_rad, phi_rad, rho_m, psi_rad (and instrument), a row a frame and instrument; else "
+                      "random ones in view");
+  command->add_option("--count", options->count, "How many random configurations")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  command->add_option("--seed", options->seed, "Of configurations, background and noise")->capture_default_str();
+  command->add_flag("--moving", options->moving, "A smooth path through random configurations");
+  command->add_option("--background", options->background, "A picture, or tissue")->capture_default_str();
+  command->add_option("--light", options->light, "Exposure, 1 is normal")
+      ->capture_default_str()
+      ->check(CLI::Range(0.01, 10.0));
+  command->add_option("--smoke", options->smoke, "Share of grey veil, 0 to 1")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--blood", options->blood, "Share of the marker covered, 0 to 0.9")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 0.9));
+  command->add_option("--noise", options->noise, "Times the sensor's usual noise")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 20.0));
+  command->add_option("--blur-px", options->blur_px, "Sigma of the optical blur")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 20.0));
+  command->add_option("--motion", options->motion, "Motion blur: share of the step to the next frame, 0 to 1")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--film-mm", options->film_mm, "Thickness of the film that carries the marker")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--condition", options->condition, "Name for truth.csv")->capture_default_str();
+  command->add_option("--format", options->format, "png or jpg")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"png", "jpg"}));
+  command->add_flag("--video", options->video, "Write video.mp4 instead of pictures");
+  command->add_option("--fps", options->fps, "Of the video")->capture_default_str()->check(CLI::Range(0.1, 1000.0));
+  command->add_flag("--force", options->force, "Replace the folder if it exists");
+  command->footer(
+      "Example:\n  lapservo render --rig configs/example.yaml --out frames --count 50 --moving --blood 0.2");
+  command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/geometry/rigid3.h"
+#include "lapservo/marker/marker.h"
+
+namespace lapservo {
+
+/// Linear light, b g r as in images.
+using Light = Eigen::Vector3f;
+
+/// Light beside the camera: two lamps, an even ambient part, and a glossy film.
+struct Lighting {
+  std::array<Eigen::Vector3d, 2> lamps_in_camera_m{Eigen::Vector3d(-0.006, -0.003, 0),
+                                                   Eigen::Vector3d(0.006, -0.003, 0)};
+  float diffuse = 0.76F;  ///< of both lamps together, facing them at `reference_m`
+  float ambient = 0.24F;
+  float specular = 0.26F;
+  float specular_exponent = 43;  ///< Blinn-Phong
+  double reference_m = 0.1;      ///< lamps fade with the distance squared, capped near the camera
+};
+
+/// Blood on the marker: discs on its surface.
+struct Blotch {
+  double azimuth_rad, along_m, radius_m;  ///< azimuth on the marker (tau)
+};
+
+/// A shaft with its marker as a physical thing: the print on a film around a thinner black shaft with a rounded tip.
+struct ShaftModel {
+  Marker marker;
+  double film_m = 0.1e-3;
+  double shaft_before_m = 0.3;    ///< length of shaft shown on the proximal side
+  double shaft_beyond_m = 0.012;  ///< and on the distal side, before the tip
+  std::vector<Blotch> blotches;
+};
+
+/// Where one instrument is.
+struct ShaftPlacement {
+  Rigid3 camera_from_unrolled;  ///< z along the axis, origin at the marker's proximal end
+  double psi_rad = 0;
+};
+
+/// What the camera's chip adds, in linear light with 1 at white.
+struct Sensor {
+  double blur_px = 0.8;
+  double read_noise = 0.0036;
+  double shot_noise = 4.8e-5;    ///< variance per light
+  Light gains = Light(1, 1, 1);  ///< exposure and white balance
+};
+
+}  // namespace lapservo

@@ -1,0 +1,83 @@
+#include "lapservo/sim/tissue.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+// Smooth noise in about [-1, 1]: octaves of a random grid, interpolated.
+cv::Mat octaves(int width_px, int height_px, int cells, int count, Random& random) {
+  cv::Mat sum(height_px, width_px, CV_32F, cv::Scalar(0));
+  double amplitude = 1, total = 0;
+  for (int octave = 0; octave < count; ++octave) {
+    const int columns = cells << octave, rows = std::max(2, columns * height_px / width_px);
+    cv::Mat grid(rows + 3, columns + 3, CV_32F), fine;
+    for (int r = 0; r < grid.rows; ++r)
+      for (int c = 0; c < grid.cols; ++c) grid.at<float>(r, c) = static_cast<float>(random.uniform(-1, 1));
+    cv::resize(grid, fine, {width_px, height_px}, 0, 0, cv::INTER_CUBIC);
+    sum += fine * amplitude;
+    total += amplitude;
+    amplitude *= 0.5;
+  }
+  return sum / total * 2;
+}
+
+cv::Vec3f mix(const cv::Vec3f& a, const cv::Vec3f& b, float t) {
+  return a + (b - a) * std::clamp(t, 0.0F, 1.0F);
+}
+
+void add_highlights(cv::Mat& light, Random& random) {
+  cv::Mat glints(light.size(), CV_32F, cv::Scalar(0));
+  for (int cluster = 0; cluster < 7; ++cluster) {
+    const double u = random.uniform(0.15, 0.85) * light.cols, v = random.uniform(0.1, 0.9) * light.rows;
+    const int count = static_cast<int>(random.uniform(5, 40));
+    for (int i = 0; i < count; ++i) {
+      const cv::Point at(static_cast<int>(u + random.normal() * light.cols / 40),
+                         static_cast<int>(v + random.normal() * light.rows / 30));
+      const cv::Size size(static_cast<int>(random.uniform(1, 7)), static_cast<int>(random.uniform(1, 4)));
+      cv::ellipse(glints, at, size, random.uniform(0, 180), 0, 360, cv::Scalar(random.uniform(0.4, 1.2)), cv::FILLED);
+    }
+  }
+  cv::GaussianBlur(glints, glints, {0, 0}, 0.8);
+  cv::Mat channels;
+  cv::merge(std::vector<cv::Mat>{glints, glints, glints}, channels);
+  light += channels;
+}
+
+}  // namespace
+
+cv::Mat make_tissue(int width_px, int height_px, std::uint64_t seed) {
+  Random random(seed);
+  const cv::Mat organ = octaves(width_px, height_px, 3, 3, random), fold = octaves(width_px, height_px, 5, 6, random);
+  const cv::Mat grain = octaves(width_px, height_px, 60, 3, random),
+                vessel = octaves(width_px, height_px, 8, 4, random);
+  const cv::Vec3f liver(0.035F, 0.022F, 0.13F), fat(0.16F, 0.38F, 0.62F), pink(0.22F, 0.2F, 0.5F),
+      blood(0.03F, 0.015F, 0.22F);
+  cv::Mat light(height_px, width_px, CV_32FC3);
+  for (int v = 0; v < height_px; ++v)
+    for (int u = 0; u < width_px; ++u) {
+      const float o = organ.at<float>(v, u), f = fold.at<float>(v, u);
+      cv::Vec3f color = mix(liver, pink, 4 * (o + 0.05F));
+      color = mix(color, fat, 5 * (o - 0.35F));
+      const float thin = std::abs(vessel.at<float>(v, u));
+      color = mix(color, blood, 0.7F * std::max(0.0F, 1 - thin / 0.035F));
+      const float shade = 0.75F + 0.45F * f + 0.08F * grain.at<float>(v, u);
+      light.at<cv::Vec3f>(v, u) = color * std::max(0.05F, shade);
+    }
+  add_highlights(light, random);
+  const double field_px = 0.5 * std::max(height_px * 1.3, width_px * 0.9);
+  for (int v = 0; v < height_px; ++v)
+    for (int u = 0; u < width_px; ++u) {
+      const double r = std::hypot(u - 0.5 * width_px, v - 0.5 * height_px) / field_px;
+      const double inside = std::clamp((1 - r) * field_px / 1.5 + 0.5, 0.0, 1.0);
+      light.at<cv::Vec3f>(v, u) *= static_cast<float>(inside * (1 - 0.55 * r * r));
+    }
+  return light;
+}
+
+}  // namespace lapservo
