@@ -44,9 +44,10 @@ Basis<2> limb_basis(const EdgeProfile& profile, float edge_px, float blur_px, fl
     basis.value[1][i] = scale * root_blur * (edge.root - blur_px * edge.three_halves / (4 * radius_px));
     // d/du of the blurred root, by a central difference of the table's own functions
     const BlurredEdge ahead = blurred_edge(u + 0.1F), behind = blurred_edge(u - 0.1F);
-    basis.by_position[1][i] =
-        -scale / root_blur * ((ahead.root - behind.root) / 0.2F - blur_px * 1.5F * edge.root / (4 * radius_px));
-    basis.by_blur[0][i] = basis.by_blur[1][i] = 0;
+    const float root_slope = (ahead.root - behind.root) / 0.2F;
+    basis.by_position[1][i] = -scale / root_blur * (root_slope - blur_px * 1.5F * edge.root / (4 * radius_px));
+    basis.by_blur[0][i] = -edge.density * u / blur_px;
+    basis.by_blur[1][i] = scale / root_blur * (0.5F * edge.root - u * root_slope);
   }
   return basis;
 }

@@ -21,6 +21,8 @@ constexpr double line_reach = 0.9;  // of the visible half width: beyond, light 
 // What the model leaves out (shading across the blur, lens, print): of every single measurement, and of each boundary
 // and side as a whole.
 constexpr double single_floor_px = 0.05, common_boundary_px = 0.01, common_side_px = 0.02;
+// And as a share of the blur beyond a lens's: motion and defocus do not blur like a Gaussian.
+constexpr double usual_blur_px = 1.2, common_share_of_blur = 0.05;
 constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
 // Interpolated samples are smoother than the pixels are noisy.
 constexpr double interpolation_noise = 1.6;
@@ -44,7 +46,19 @@ struct Pass {
   std::vector<Measurement> measurements;
   std::array<int, 4> in_image{};
   int lines = 0;
-  double blur_gradient = 0, blur_information = 0;
+  struct BlurEvidence {
+    double gradient = 0, information = 0;
+    void add(const EdgeFit& edge, double variance) {
+      gradient += edge.blur_gradient / variance;
+      information += edge.blur_information / variance;
+    }
+    // The blur after a Gauss-Newton step of limited size.
+    double improved(double blur_px) const {
+      if (!(information > 0)) return blur_px;
+      return std::clamp(blur_px + gradient / information, std::max(0.5, 0.6 * blur_px), std::min(8.0, 1.7 * blur_px));
+    }
+  };
+  BlurEvidence boundary_blur, side_blur;
 };
 
 // What a pass measures with.
@@ -186,8 +200,7 @@ void trust(std::vector<Candidate>& candidates, Pass& pass) {
     candidate.measurement.sigma_px = std::sqrt(along_variance * candidate.normal_cosine * candidate.normal_cosine +
                                                single_floor_px * single_floor_px);
     pass.measurements.push_back(candidate.measurement);
-    pass.blur_gradient += candidate.edge.blur_gradient / variance;
-    pass.blur_information += candidate.edge.blur_information / variance;
+    pass.boundary_blur.add(candidate.edge, variance);
   }
 }
 
@@ -270,7 +283,9 @@ void measure_sides(const Frame& frame, double extra_px, double blur_px, Pass& pa
     const double variance =
         0.5 * (side.edge.residual_variance + typical_variance) * interpolation_noise / side.edge.information;
     side.measurement.sigma_px = std::sqrt(variance + 4 * single_floor_px * single_floor_px);
-    if (side.measurement.sigma_px < 2) pass.measurements.push_back(side.measurement);
+    if (side.measurement.sigma_px > 2) continue;
+    pass.measurements.push_back(side.measurement);
+    pass.side_blur.add(side.edge, variance * side.edge.information);
   }
 }
 
@@ -282,7 +297,7 @@ Pass measure(const Scene& scene, const LightImage& light, const PoseUnknowns& un
   const Frame frame{scene,  light, unknowns,
                     film_m, *view, unknowns.pose().camera_from_unrolled.rotation.toRotationMatrix()};
   measure_boundaries(frame, extra_px, blur.boundaries_px, pass);
-  measure_sides(frame, extra_px, blur.boundaries_px, pass);
+  measure_sides(frame, extra_px, blur.sides_px, pass);
   return pass;
 }
 
@@ -316,7 +331,7 @@ UnknownVector solve(const std::vector<Measurement>& measurements, int unknowns, 
 
 // Inverse information, widened by what each boundary and side as a whole may be off.
 std::optional<UnknownMatrix> covariance_of(const std::vector<Measurement>& measurements, int unknowns,
-                                           double residual_rms_sigmas) {
+                                           double residual_rms_sigmas, const EdgeBlur& blur) {
   NormalEquations equations(unknowns + 1);
   equations.add(UnknownVector::Unit(unknowns + 1, unknowns), 0, 1);
   std::array<UnknownVector, groups> pull;
@@ -334,7 +349,9 @@ std::optional<UnknownMatrix> covariance_of(const std::vector<Measurement>& measu
   UnknownMatrix covariance = inverse;
   for (std::size_t group = 0; group < groups; ++group) {
     const UnknownVector shift = inverse * pull[group];
-    const double common_px = group < 4 ? common_boundary_px : common_side_px;
+    const double blur_px = group < 4 ? blur.boundaries_px : blur.sides_px;
+    const double common_px = (group < 4 ? common_boundary_px : common_side_px) +
+                             common_share_of_blur * std::max(0.0, blur_px - usual_blur_px);
     covariance += common_px * common_px * shift * shift.transpose();
   }
   covariance *= scale * scale;
@@ -356,10 +373,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
     pass = measure(scene, light, fit.unknowns, film_m, extra_px[std::min(i, extra_px.size() - 1)], fit.blur);
     if (static_cast<int>(pass.measurements.size()) < 2 * fit.unknowns.size()) return fit;
     const UnknownVector step = solve(pass.measurements, unknowns, (film_mean_m - film_m) / film_sigma_m);
-    if (pass.blur_information > 0) {
-      const double change_px = pass.blur_gradient / pass.blur_information;
-      fit.blur.boundaries_px = std::clamp(fit.blur.boundaries_px + std::clamp(change_px, -0.4, 0.6), 0.5, 6.0);
-    }
+    fit.blur = {pass.boundary_blur.improved(fit.blur.boundaries_px), pass.side_blur.improved(fit.blur.sides_px)};
     if (i == extra_px.size()) {  // the last pass is for the residuals: the step is none
       for (Measurement& m : pass.measurements) m.residual_px -= extended_row(m).dot(step);
     }
@@ -378,7 +392,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
     if (m.group < 4) squares += sigmas * sigmas, ++inliers;
   }
   fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
-  const auto covariance = covariance_of(pass.measurements, fit.unknowns.size(), fit.inlier_rms_sigmas);
+  const auto covariance = covariance_of(pass.measurements, fit.unknowns.size(), fit.inlier_rms_sigmas, fit.blur);
   if (!covariance) return fit;
   fit.covariance = *covariance;
   fit.converged = true;

@@ -8,10 +8,10 @@
 
 namespace lapservo {
 
-/// Width of the optical blur (one sigma) along the boundaries' normals and across the shaft's sides; carried from frame
-/// to frame.
+/// Width of the blur (one sigma) along the boundaries' normals and across the shaft's sides: motion makes them differ.
+/// Carried from frame to frame.
 struct EdgeBlur {
-  double boundaries_px = 1.2;
+  double boundaries_px = 1.2, sides_px = 1.2;
 };
 
 struct FineFit {

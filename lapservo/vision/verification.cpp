@@ -69,6 +69,11 @@ Status judge(const Scene& scene, const FineFit& fit) {
   // noisy.
   const double share = static_cast<double>(located) / std::max(1, expected);
   if (share < 0.2 || fit.inlier_rms_sigmas > 1.2 + 1.5 * share) return Status::poor_fit;
+  // Smeared by motion across, the sides hold the shaft's place no more.
+  constexpr double smeared_px = 2.5;
+  constexpr int fewest_sides = 8;
+  if (std::max(fit.blur.boundaries_px, fit.blur.sides_px) > smeared_px && fit.sides_used < fewest_sides)
+    return Status::uncertain;
   const Eigen::Index psi = fit.unknowns.size() - 1;
   if (!(std::sqrt(fit.covariance(psi, psi)) < largest_sigma_psi_rad)) return Status::uncertain;
   return Status::ok;
