@@ -1,17 +1,10 @@
 #include "lapservo/vision/blurred_edges.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
 #include <numbers>
 
 namespace lapservo {
 namespace {
-
-constexpr float first_u = -6, last_u = 8;
-constexpr int per_sigma = 64;
-constexpr std::size_t entries = static_cast<std::size_t>((last_u - first_u) * per_sigma) + 2;
 
 BlurredEdge integrate(double u) {
   const auto density = [](double t) { return std::exp(-t * t / 2) / std::sqrt(2 * std::numbers::pi); };
@@ -29,29 +22,16 @@ BlurredEdge integrate(double u) {
           static_cast<float>(root), static_cast<float>(three_halves)};
 }
 
-const std::array<BlurredEdge, entries>& table() {
-  static const auto values = [] {
-    std::array<BlurredEdge, entries> t{};
-    for (std::size_t i = 0; i < entries; ++i) t[i] = integrate(first_u + static_cast<double>(i) / per_sigma);
-    return t;
-  }();
-  return values;
-}
-
 }  // namespace
 
-BlurredEdge blurred_edge(float u) {
-  if (!(u > first_u)) return {0, 0, 0, 0};
-  if (u >= last_u) {  // asymptotic expansions of the moments
-    const float root = std::sqrt(u);
-    return {0, 1, root * (1 - 1 / (8 * u * u)), root * u * (1 + 3 / (8 * u * u))};
-  }
-  const float place = (u - first_u) * per_sigma;
-  const auto i = static_cast<std::size_t>(place);
-  const float f = place - static_cast<float>(i);
-  const BlurredEdge &a = table()[i], &b = table()[i + 1];
-  return {a.density + f * (b.density - a.density), a.step + f * (b.step - a.step), a.root + f * (b.root - a.root),
-          a.three_halves + f * (b.three_halves - a.three_halves)};
+BlurredEdges::BlurredEdges() {
+  for (std::size_t i = 0; i < entries_.size(); ++i)
+    entries_[i] = integrate(first_u + static_cast<double>(i) / per_sigma);
+}
+
+const BlurredEdges& BlurredEdges::instance() {
+  static const BlurredEdges table;
+  return table;
 }
 
 }  // namespace lapservo

@@ -1,13 +1,44 @@
 #pragma once
 
+#include <array>
+#include <cmath>
+#include <cstddef>
+
 namespace lapservo {
 
 /// Edges as a Gaussian blur of one pixel sigma leaves them, at a distance u from the edge in sigmas (inside: u > 0):
 /// the convolution of the normal density with the step, the square root and the 3/2 power of max(0, u). The last two
-/// make the limb of a shaded cylinder. Tabulated; errors below 1e-4.
+/// make the limb of a shaded cylinder.
 struct BlurredEdge {
   float density, step, root, three_halves;
 };
-BlurredEdge blurred_edge(float u);
+
+/// Tabulates them; errors below 1e-4.
+class BlurredEdges {
+ public:
+  /// The one table.
+  static const BlurredEdges& instance();
+
+  BlurredEdge at(float u) const {
+    if (!(u > first_u)) return {0, 0, 0, 0};
+    if (u >= last_u) {  // asymptotic expansions of the moments
+      const float root = std::sqrt(u);
+      return {0, 1, root * (1 - 1 / (8 * u * u)), root * u * (1 + 3 / (8 * u * u))};
+    }
+    const float place = (u - first_u) * per_sigma;
+    const auto i = static_cast<std::size_t>(place);
+    const float f = place - static_cast<float>(i);
+    const BlurredEdge &a = entries_[i], &b = entries_[i + 1];
+    return {a.density + f * (b.density - a.density), a.step + f * (b.step - a.step), a.root + f * (b.root - a.root),
+            a.three_halves + f * (b.three_halves - a.three_halves)};
+  }
+
+ private:
+  BlurredEdges();
+
+  static constexpr float first_u = -6, last_u = 8;
+  static constexpr int per_sigma = 64;
+  std::array<BlurredEdge, static_cast<std::size_t>((last_u - first_u) * per_sigma) + 2> entries_;
+};
 
 }  // namespace lapservo

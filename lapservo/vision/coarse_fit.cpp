@@ -245,11 +245,11 @@ RotationSearch search_rotation(const Scene& scene, const SampledSurface& surface
 }  // namespace
 
 CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOptions& options) {
-  constexpr int rounds = 3, steps_per_round = 4;
+  constexpr int steps_per_round = 4;
   CoarseFit fit;
   fit.unknowns = start;
   bool rotation_known = !options.search_rotation;
-  for (int round = 0; round < rounds; ++round) {
+  for (int round = 0; round < options.rounds; ++round) {
     const auto view = view_cylinder(fit.unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
     if (!view) return fit;
     const double narrowing = round == 0 ? 1 : 0.5;

@@ -12,6 +12,7 @@ struct EdgeProfile {
   std::size_t count = 0;
   std::array<std::array<float, max_samples>, 3> light;
   std::array<std::array<bool, max_samples>, 3> usable;  ///< false where saturated
+  bool all_usable = true;
 };
 
 /// Where the edge is, by least squares over the three channels with amplitudes free in each.
@@ -24,12 +25,12 @@ struct EdgeFit {
   float blur_gradient = 0, blur_information = 0;  ///< Gauss-Newton terms of the blur, for unit noise
 };
 
-/// A step between two flat stretches, blurred by `blur_px`.
-EdgeFit fit_step(const EdgeProfile& profile, float blur_px);
+/// A step between two flat stretches, blurred by `blur_px`. Takes up to `iterations` Gauss-Newton steps.
+EdgeFit fit_step(const EdgeProfile& profile, float blur_px, int iterations);
 
 /// The limb of a diffusely lit cylinder of radius `radius_px` with the light near the camera; positive positions lie
 /// inside: background, then ambient plus diffuse light that rises like sqrt(1 - (1 - x / R)^2), blurred. The apparent
 /// edge of such a limb lies inside the true one; this finds the true one.
-EdgeFit fit_limb(const EdgeProfile& profile, float blur_px, float radius_px);
+EdgeFit fit_limb(const EdgeProfile& profile, float blur_px, float radius_px, int iterations);
 
 }  // namespace lapservo

@@ -61,6 +61,13 @@ struct Pass {
   BlurEvidence boundary_blur, side_blur;
 };
 
+// How far beyond the blur a pass looks for edges, and how often it refines each before the pose.
+struct Effort {
+  double extra_px;
+  int iterations;
+  int thinning;  // uses every so many generatrices and stations
+};
+
 // What a pass measures with.
 struct Frame {
   const Scene& scene;
@@ -103,6 +110,7 @@ std::optional<EdgeProfile> sample_profile(const Frame& frame, const Eigen::Vecto
     for (std::size_t c = 0; c < 3; ++c) {
       profile.light[c][i] = sample.light[c];
       profile.usable[c][i] = !sample.saturated[c];
+      profile.all_usable &= !sample.saturated[c];
     }
   }
   return profile;
@@ -124,7 +132,7 @@ bool colors_agree(const Frame& frame, std::size_t k, const Eigen::Vector2d& at_p
 }
 
 std::optional<Candidate> measure_boundary(const Frame& frame, double azimuth_rad, std::size_t k,
-                                          const std::array<double, 4>& along_m, double slope_m, double extra_px,
+                                          const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
                                           double blur_px, int& in_image) {
   const double film_light = frame.film_light(k, azimuth_rad);
   const Eigen::Vector3d outwards = frame.axes * surface_point(1, azimuth_rad, 0);
@@ -145,13 +153,14 @@ std::optional<Candidate> measure_boundary(const Frame& frame, double azimuth_rad
   if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
   if (k < 3) gap_px = std::min(gap_px, (along_m[k + 1] - along_m[k]) * px_per_m);
   const double line_blur_px = blur_px / std::abs(cosine);
-  const int reach = static_cast<int>(std::min({2.5 * line_blur_px + extra_px, 0.6 * gap_px - line_blur_px, 22.0}));
+  const int reach =
+      static_cast<int>(std::min({2.5 * line_blur_px + effort.extra_px, 0.6 * gap_px - line_blur_px, 22.0}));
   if (reach < 3) return std::nullopt;
   const auto profile = sample_profile(frame, image.point_px, along, reach, reach);
   if (!profile) return std::nullopt;
   ++in_image;
   Candidate candidate;
-  candidate.edge = fit_step(*profile, static_cast<float>(line_blur_px));
+  candidate.edge = fit_step(*profile, static_cast<float>(line_blur_px), effort.iterations);
   if (!candidate.edge.converged) return std::nullopt;
   candidate.colors_agree = colors_agree(frame, k, image.point_px, along, candidate.edge.offset_px + 0.8 * reach);
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
@@ -204,9 +213,9 @@ void trust(std::vector<Candidate>& candidates, Pass& pass) {
   }
 }
 
-void measure_boundaries(const Frame& frame, double extra_px, double blur_px, Pass& pass) {
+void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px, Pass& pass) {
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
-  pass.lines = std::clamp(static_cast<int>(1.8 * radius_px), fewest_lines, most_lines);
+  pass.lines = std::max(fewest_lines, std::min(static_cast<int>(1.8 * radius_px), most_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
   std::array<std::vector<Candidate>, 4> candidates;
   for (int i = 0; i < pass.lines; ++i) {
@@ -219,7 +228,7 @@ void measure_boundaries(const Frame& frame, double extra_px, double blur_px, Pas
       const bool inner = k == 1 || k == 2;
       if (inner && seam_px < 2.5 * blur_px + 1.5) continue;
       if (auto candidate =
-              measure_boundary(frame, azimuth_rad, k, along_m, slopes_m[k], extra_px, blur_px, pass.in_image[k]))
+              measure_boundary(frame, azimuth_rad, k, along_m, slopes_m[k], effort, blur_px, pass.in_image[k]))
         candidates[k].push_back(std::move(*candidate));
     }
   }
@@ -239,7 +248,7 @@ bool one_band(const Frame& frame, double azimuth_a_rad, double azimuth_b_rad, do
          first == band(tau_b, along_m + room_m);
 }
 
-void measure_sides(const Frame& frame, double extra_px, double blur_px, Pass& pass) {
+void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Pass& pass) {
   const double length_m = frame.marker().length_m();
   std::vector<float> variances;
   struct Side {
@@ -247,8 +256,9 @@ void measure_sides(const Frame& frame, double extra_px, double blur_px, Pass& pa
     EdgeFit edge;
   };
   std::vector<Side> sides;
-  for (int station = 0; station < stations; ++station) {
-    const double along_m = length_m * (station + 0.5) / stations;
+  const int count = stations / effort.thinning;
+  for (int station = 0; station < count; ++station) {
+    const double along_m = length_m * (station + 0.5) / count;
     for (const double side : {-1.0, 1.0}) {
       const double azimuth_rad = frame.view.facing_azimuth_rad + side * frame.view.half_visible_rad;
       const Eigen::Vector3d point = frame.point(azimuth_rad, along_m);
@@ -261,14 +271,14 @@ void measure_sides(const Frame& frame, double extra_px, double blur_px, Pass& pa
       if (inwards.dot(inwards_rough) < 0) inwards = -inwards;
       const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
       const int inside = static_cast<int>(std::min(0.34 * radius_px, 26.0));
-      const int outside = static_cast<int>(std::min(2.5 * blur_px + extra_px, 14.0));
+      const int outside = static_cast<int>(std::min(2.5 * blur_px + effort.extra_px, 14.0));
       if (inside < 5) continue;
       const double deep_azimuth_rad = azimuth_rad - side * 0.87;  // where d = R (1 - cos 0.87) = 0.35 R
       if (!one_band(frame, azimuth_rad, deep_azimuth_rad, along_m, 2.5 * blur_px * length_m / 200)) continue;
       const auto profile = sample_profile(frame, image.point_px, inwards, outside, inside);
       if (!profile) continue;
       Side measured;
-      measured.edge = fit_limb(*profile, static_cast<float>(blur_px), static_cast<float>(radius_px));
+      measured.edge = fit_limb(*profile, static_cast<float>(blur_px), static_cast<float>(radius_px), effort.iterations);
       if (!measured.edge.converged) continue;
       measured.measurement.row = frame.unknowns.row(point, image.d_px_d_point.transpose() * inwards);
       measured.measurement.residual_px = measured.edge.offset_px;
@@ -289,15 +299,15 @@ void measure_sides(const Frame& frame, double extra_px, double blur_px, Pass& pa
   }
 }
 
-Pass measure(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m, double extra_px,
-             const EdgeBlur& blur) {
+Pass measure(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,
+             const Effort& effort, const EdgeBlur& blur) {
   Pass pass;
   const auto view = view_cylinder(unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
   if (!view) return pass;
   const Frame frame{scene,  light, unknowns,
                     film_m, *view, unknowns.pose().camera_from_unrolled.rotation.toRotationMatrix()};
-  measure_boundaries(frame, extra_px, blur.boundaries_px, pass);
-  measure_sides(frame, extra_px, blur.sides_px, pass);
+  measure_boundaries(frame, effort, blur.boundaries_px, pass);
+  measure_sides(frame, effort, blur.sides_px, pass);
   return pass;
 }
 
@@ -315,7 +325,7 @@ UnknownVector extended_row(const Measurement& m) {
 // Minimises the robust cost of linearised measurements: iteratively reweighted. `film_prior` is what the film's
 // thickness lies below its expected one, in sigmas.
 UnknownVector solve(const std::vector<Measurement>& measurements, int unknowns, double film_prior) {
-  constexpr int iterations = 5;
+  constexpr int iterations = 4;
   UnknownVector step = UnknownVector::Zero(unknowns + 1);
   for (int i = 0; i < iterations; ++i) {
     NormalEquations equations(unknowns + 1);
@@ -362,21 +372,19 @@ std::optional<UnknownMatrix> covariance_of(const std::vector<Measurement>& measu
 }  // namespace
 
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur) {
-  constexpr std::array<double, 4> extra_px{6, 3, 2, 2};
+  constexpr std::array<Effort, 3> efforts{{{5, 3, 3}, {2, 2, 3}, {2, 1, 1}}};
   FineFit fit;
   fit.unknowns = start;
   fit.blur = blur;
   const int unknowns = start.size();
   double film_m = film_mean_m;
   Pass pass;
-  for (std::size_t i = 0; i <= extra_px.size(); ++i) {
-    pass = measure(scene, light, fit.unknowns, film_m, extra_px[std::min(i, extra_px.size() - 1)], fit.blur);
+  for (std::size_t i = 0; i < efforts.size(); ++i) {
+    pass = measure(scene, light, fit.unknowns, film_m, efforts[i], fit.blur);
     if (static_cast<int>(pass.measurements.size()) < 2 * fit.unknowns.size()) return fit;
     const UnknownVector step = solve(pass.measurements, unknowns, (film_mean_m - film_m) / film_sigma_m);
+    for (Measurement& m : pass.measurements) m.residual_px -= extended_row(m).dot(step);
     fit.blur = {pass.boundary_blur.improved(fit.blur.boundaries_px), pass.side_blur.improved(fit.blur.sides_px)};
-    if (i == extra_px.size()) {  // the last pass is for the residuals: the step is none
-      for (Measurement& m : pass.measurements) m.residual_px -= extended_row(m).dot(step);
-    }
     fit.unknowns = fit.unknowns.changed_by(step.head(unknowns));
     film_m = std::clamp(film_m + step[unknowns] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
     if (!fit.unknowns.pose().camera_from_unrolled.translation.allFinite()) return fit;

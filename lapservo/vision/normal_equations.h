@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -11,29 +12,37 @@ namespace lapservo {
 /// Gauss-Newton's normal equations of a few unknowns, gathered one scalar measurement at a time.
 class NormalEquations {
  public:
-  explicit NormalEquations(int unknowns)
-      : information_(UnknownMatrix::Zero(unknowns, unknowns)), gradient_(UnknownVector::Zero(unknowns)) {}
+  explicit NormalEquations(int unknowns) : unknowns_(unknowns) {}
 
   /// residual = measured - predicted, row = d(predicted)/d(unknowns).
   void add(const UnknownVector& row, double residual, double weight) {
-    information_.noalias() += weight * row * row.transpose();
-    gradient_.noalias() += (weight * residual) * row;
+    for (int i = 0; i < unknowns_; ++i) {
+      const double weighted = weight * row[i];
+      for (int j = 0; j <= i; ++j) lower_[i][j] += weighted * row[j];
+      gradient_[i] += weighted * residual;
+    }
   }
 
-  const UnknownMatrix& information() const { return information_; }
+  UnknownMatrix information() const {
+    UnknownMatrix information(unknowns_, unknowns_);
+    for (int i = 0; i < unknowns_; ++i)
+      for (int j = 0; j <= i; ++j) information(i, j) = information(j, i) = lower_[i][j];
+    return information;
+  }
 
   /// The step; `damping` scales the diagonal (Marquardt). Directions without information get no step.
   UnknownVector solve(double damping) const {
-    UnknownMatrix damped = information_;
-    const UnknownVector scale = information_.diagonal().cwiseMax(1e-12 * information_.diagonal().maxCoeff());
-    damped.diagonal() += damping * scale;
-    const UnknownVector step = damped.ldlt().solve(gradient_);
-    return step.allFinite() ? step : UnknownVector::Zero(gradient_.size());
+    UnknownMatrix damped = information();
+    const UnknownVector diagonal = damped.diagonal();
+    damped.diagonal() += damping * diagonal.cwiseMax(1e-12 * diagonal.maxCoeff());
+    const UnknownVector step = damped.ldlt().solve(Eigen::Map<const UnknownVector>(gradient_.data(), unknowns_));
+    return step.allFinite() ? step : UnknownVector::Zero(unknowns_);
   }
 
  private:
-  UnknownMatrix information_;
-  UnknownVector gradient_;
+  int unknowns_;
+  std::array<std::array<double, max_unknowns>, max_unknowns> lower_{};
+  std::array<double, max_unknowns> gradient_{};
 };
 
 /// Weight of a residual in units of its sigma under the Cauchy loss: 1 near zero, falling for outliers.

@@ -116,6 +116,7 @@ SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImag
   CoarseFitOptions options;
   options.search_rotation = false;
   options.along_reach = 0.2;
+  options.rounds = 1;
   const CoarseFit coarse = fit_coarsely(scene, memory.last.changed_by(memory.velocity), options);
   if (!coarse.found) return {};
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
