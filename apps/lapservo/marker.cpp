@@ -1,0 +1,234 @@
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/subcommands.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/error.h"
+#include "lapservo/marker/decoder.h"
+#include "lapservo/marker/design.h"
+#include "lapservo/marker/drawing.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::app {
+namespace {
+
+struct ViewingOptions {
+  double focal_px = 1100, distance_mm = 110, sigma_px = 0.1;
+  Viewing viewing() const { return {focal_px, 1e-3 * distance_mm, sigma_px}; }
+};
+
+void add_viewing(CLI::App* command, ViewingOptions& options) {
+  command->add_option("--focal-px", options.focal_px, "Focal length of the camera")
+      ->capture_default_str()
+      ->check(CLI::Range(10.0, 1e5));
+  command->add_option("--distance-mm", options.distance_mm, "From the camera to the marker")
+      ->capture_default_str()
+      ->check(CLI::Range(5.0, 2000.0));
+  command->add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-4, 100.0));
+}
+
+struct DesignOptions {
+  double diameter_mm = 8.4;
+  std::optional<double> length_mm, smallest_band_mm;
+  std::vector<double> hues_deg{90, 180, 270}, upper_mm, lower_mm;
+  std::string out;
+  ViewingOptions viewing;
+};
+
+Marker given_marker(const DesignOptions& options) {
+  if (options.upper_mm.size() != 3 || options.lower_mm.size() != 3)
+    throw InputError("--bands-upper-mm, --bands-lower-mm", "need three lengths each, like 3.5,3.5,17");
+  Marker marker;
+  marker.diameter_m = 1e-3 * options.diameter_mm;
+  for (std::size_t i = 0; i < 3; ++i) {
+    marker.hues_deg[i] = options.hues_deg[i];
+    marker.bands_upper_m[i] = 1e-3 * options.upper_mm[i];
+    marker.bands_lower_m[i] = 1e-3 * options.lower_mm[i];
+  }
+  if (const std::string problem = marker_problem(marker); !problem.empty()) throw InputError("marker", problem);
+  if (const std::string problem = decoding_problem(marker); !problem.empty())
+    throw InputError("marker", "not decodable: " + problem);
+  return marker;
+}
+
+std::string yaml_of(const Marker& marker) {
+  const auto list = [](const std::array<double, 3>& v) {
+    return fmt::format("[{:.8g}, {:.8g}, {:.8g}]", v[0], v[1], v[2]);
+  };
+  return fmt::format(
+      "marker:\n  diameter_m: {:.6g}\n  hues_deg: {}\n  bands_upper_m: {}\n  bands_lower_m: {}\n  seam_rad: {:.6g}\n",
+      marker.diameter_m, list(marker.hues_deg), list(marker.bands_upper_m), list(marker.bands_lower_m),
+      marker.seam_rad);
+}
+
+void print_sigmas(const Marker& marker, const Viewing& viewing) {
+  std::printf("\n  tau [deg]   cross-ratio   sigma [mrad]: centre line   whole surface\n");
+  for (int i = 0; i <= 8; ++i) {
+    const double tau_rad = two_pi * std::min(i / 8.0, 0.99999);
+    std::printf("  %9.0f   %11.4f   %25.1f   %13.2f\n", deg_from_rad(two_pi * i / 8), cross_ratio_at(marker, tau_rad),
+                1e3 * predicted_sigma_centre_line_rad(marker, tau_rad, viewing),
+                1e3 * predicted_sigma_surface_rad(marker, tau_rad, viewing));
+  }
+}
+
+int run_design(const DesignOptions& options) {
+  if (options.hues_deg.size() != 3) throw InputError("--hues", "needs three hues, like 90,180,270");
+  const Viewing viewing = options.viewing.viewing();
+  const bool given = !options.upper_mm.empty() || !options.lower_mm.empty();
+  Marker marker;
+  if (given) {
+    marker = given_marker(options);
+  } else {
+    DesignSpec spec{
+        1e-3 * options.diameter_mm, {}, {}, {options.hues_deg[0], options.hues_deg[1], options.hues_deg[2]}, viewing};
+    if (options.length_mm) spec.length_m = 1e-3 * *options.length_mm;
+    if (options.smallest_band_mm) spec.smallest_band_m = 1e-3 * *options.smallest_band_mm;
+    marker = design_marker(spec);
+  }
+  std::printf(
+      "diameter %.2f mm, length %.2f mm, seen from %.0f mm with a focal length of %.0f px, %.2f px a boundary\n\n",
+      1e3 * marker.diameter_m, 1e3 * marker.length_m(), 1e3 * viewing.distance_m, viewing.focal_px,
+      viewing.sigma_edge_px);
+  std::printf("  band   hue [deg]   upper edge [mm]   lower edge [mm]\n");
+  for (std::size_t i = 0; i < 3; ++i)
+    std::printf("  %4zu   %9.0f   %15.2f   %15.2f\n", i, marker.hues_deg[i], 1e3 * marker.bands_upper_m[i],
+                1e3 * marker.bands_lower_m[i]);
+  print_sigmas(marker, viewing);
+  std::printf(
+      "\nThe cross-ratio is monotonic over the turn%s.\n\n",
+      in_linear_family(marker) ? ", and linear: eq. (18) is exact" : " (not linear: decoded by the rational inverse)");
+  std::fputs(yaml_of(marker).c_str(), stdout);
+  if (!options.out.empty()) {
+    AtomicFile file(options.out);
+    file.stream() << yaml_of(marker);
+    file.commit();
+    std::printf("\nwritten: %s\n", options.out.c_str());
+  }
+  return 0;
+}
+
+struct RigOptions {
+  std::string rig, instrument, out, paper = "a4";
+  int copies = 4;
+  ViewingOptions viewing;
+};
+
+Instrument chosen(const RigOptions& options) {
+  const Rig rig = load_rig(options.rig);
+  if (options.instrument.empty()) return rig.instruments.front();
+  for (const Instrument& instrument : rig.instruments)
+    if (instrument.name == options.instrument) return instrument;
+  throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
+}
+
+int run_print(const RigOptions& options) {
+  const Instrument instrument = chosen(options);
+  if (!options.out.ends_with(".svg") && !options.out.ends_with(".pdf"))
+    throw InputError("--out", "name", options.out, "one that ends in .pdf or .svg");
+  write_print_sheet(options.out, instrument.name, instrument.marker, options.paper == "a4" ? Paper::a4 : Paper::letter,
+                    options.copies);
+  std::printf("print at 100 %% and measure the rulers: %s\n", options.out.c_str());
+  return 0;
+}
+
+// Rows of tau, columns along the shaft; colours on a terminal, else the band's number.
+void show_in_terminal(const Marker& marker) {
+  constexpr int rows = 16, columns = 48;
+  const bool colors = ::isatty(STDOUT_FILENO) != 0;
+  for (int row = 0; row < rows; ++row) {
+    const double tau_rad = two_pi * (row + 0.5) / rows;
+    const auto e = boundaries_m(marker, tau_rad);
+    std::string line = fmt::format("{:5.0f} deg  ", deg_from_rad(tau_rad));
+    for (int column = 0; column < columns; ++column) {
+      const double along_m = marker.length_m() * (column + 0.5) / columns;
+      const std::size_t band = along_m < e[1] ? 0 : (along_m < e[2] ? 1 : 2);
+      const PrintColor c = print_color(marker.hues_deg[band]);
+      line += colors ? fmt::format("\033[48;2;{:.0f};{:.0f};{:.0f}m \033[0m", 255 * c.r, 255 * c.g, 255 * c.b)
+                     : std::to_string(band);
+    }
+    std::puts(line.c_str());
+  }
+  std::printf("  tau      proximal %s tip\n", std::string(columns - 14, '-').append(">").c_str());
+}
+
+int run_show(const RigOptions& options) {
+  const Instrument instrument = chosen(options);
+  std::printf("%s: %.2f mm outer diameter, %.2f mm long\n", instrument.name.c_str(), 1e3 * instrument.marker.diameter_m,
+              1e3 * instrument.marker.length_m());
+  show_in_terminal(instrument.marker);
+  if (options.out.empty()) return 0;
+  write_marker_picture(options.out, instrument.name, instrument.marker, options.viewing.viewing());
+  std::printf("picture: %s\n", options.out.c_str());
+  return 0;
+}
+
+void add_design(CLI::App* parent, Run& run_later) {
+  auto options = std::make_shared<DesignOptions>();
+  CLI::App* command = parent->add_subcommand("design", "Choose the bands of a marker, or judge given ones.");
+  command->add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included")
+      ->capture_default_str()
+      ->check(CLI::Range(0.5, 100.0));
+  command->add_option("--length-mm", options->length_mm, "Length of the marker; default three diameters")
+      ->check(CLI::Range(1.0, 500.0));
+  command->add_option("--smallest-band-mm", options->smallest_band_mm, "No band is shorter; default 3 mm or 12 px")
+      ->check(CLI::Range(0.1, 200.0));
+  command->add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
+      ->delimiter(',')
+      ->capture_default_str();
+  command->add_option("--bands-upper-mm", options->upper_mm, "Judge this design: lengths at the upper edge")
+      ->delimiter(',');
+  command->add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge")->delimiter(',');
+  command->add_option("--out", options->out, "Write the marker: block of a rig");
+  add_viewing(command, options->viewing);
+  command->footer(
+      "Example:\n  lapservo marker design --diameter-mm 8.4 --distance-mm 110 --out marker.yaml\n"
+      "  lapservo marker design --bands-upper-mm 3.5,3.5,17 --bands-lower-mm 9.5,9.5,5");
+  command->callback([options, &run_later] { run_later = [options] { return run_design(*options); }; });
+}
+
+CLI::App* add_for_rig(CLI::App* parent, const std::string& name, const std::string& about,
+                      const std::shared_ptr<RigOptions>& options) {
+  CLI::App* command = parent->add_subcommand(name, about);
+  command->add_option("--rig", options->rig, "The rig whose marker it is")->required();
+  command->add_option("--instrument", options->instrument, "Its name; default the first");
+  return command;
+}
+
+}  // namespace
+
+void add_marker(CLI::App& app, Run& run_later) {
+  CLI::App* marker = app.add_subcommand("marker", "Design, print and look at markers.");
+  marker->require_subcommand(1);
+  marker->footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
+  add_design(marker, run_later);
+
+  auto printing = std::make_shared<RigOptions>();
+  CLI::App* print = add_for_rig(marker, "print", "Write a sheet to print at true scale.", printing);
+  print->add_option("--out", printing->out, "sheet.pdf or sheet.svg")->required();
+  print->add_option("--paper", printing->paper, "a4 or letter")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"a4", "letter"}));
+  print->add_option("--copies", printing->copies, "Markers on the sheet, as many as fit")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100));
+  print->footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
+  print->callback([printing, &run_later] { run_later = [printing] { return run_print(*printing); }; });
+
+  auto showing = std::make_shared<RigOptions>();
+  CLI::App* show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
+  show->add_option("--out", showing->out, "Write a picture too: .svg, .pdf or .png");
+  add_viewing(show, showing->viewing);
+  show->footer("Example:\n  lapservo marker show --rig configs/example.yaml --out marker.svg");
+  show->callback([showing, &run_later] { run_later = [showing] { return run_show(*showing); }; });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,105 @@
+#include "lapservo/marker/design.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <string>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/error.h"
+#include "lapservo/marker/decoder.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double rounding_m = 1e-4;
+
+double rounded(double length_m) {
+  return std::round(length_m / rounding_m) * rounding_m;
+}
+
+// The free numbers of the linear family: share of l1 in l1 + l2, and l1 + l2 at the upper and lower edge.
+struct Choice {
+  double share, upper_m, lower_m;
+};
+
+Marker marker_of(const DesignSpec& spec, double length_m, const Choice& choice) {
+  Marker marker;
+  marker.diameter_m = spec.diameter_m;
+  marker.hues_deg = spec.hues_deg;
+  const auto bands = [&](double sum_m) {
+    return std::array<double, 3>{choice.share * sum_m, (1 - choice.share) * sum_m, length_m - sum_m};
+  };
+  marker.bands_upper_m = bands(choice.upper_m);
+  marker.bands_lower_m = bands(choice.lower_m);
+  return marker;
+}
+
+double smallest_band(const Marker& marker) {
+  return std::min(*std::min_element(marker.bands_upper_m.begin(), marker.bands_upper_m.end()),
+                  *std::min_element(marker.bands_lower_m.begin(), marker.bands_lower_m.end()));
+}
+
+std::string millimetres(double length_m) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f mm", 1e3 * length_m);
+  return text;
+}
+
+// Best of a grid around a choice.
+Choice search(const DesignSpec& spec, double length_m, double smallest_m, const Choice& centre, double share_reach,
+              double sum_reach_m) {
+  constexpr int steps = 12;
+  Choice best = centre;
+  double best_sigma = std::numeric_limits<double>::infinity();
+  for (int i = -steps; i <= steps; ++i)
+    for (int j = -steps; j <= steps; ++j)
+      for (int k = -steps; k <= steps; ++k) {
+        const Choice choice{centre.share + share_reach * i / steps, centre.upper_m + sum_reach_m * j / steps,
+                            centre.lower_m + sum_reach_m * k / steps};
+        if (choice.share <= 0 || choice.share >= 1 || choice.lower_m - choice.upper_m < rounding_m) continue;
+        const Marker marker = marker_of(spec, length_m, choice);
+        if (smallest_band(marker) < smallest_m - 1e-9) continue;
+        const double sigma = worst_sigma_centre_line_rad(marker, spec.viewing);
+        if (sigma < best_sigma) best_sigma = sigma, best = choice;
+      }
+  return best;
+}
+
+}  // namespace
+
+double worst_sigma_centre_line_rad(const Marker& marker, const Viewing& viewing) {
+  constexpr int steps = 16;
+  double worst = 0;
+  for (int i = 0; i < steps; ++i)
+    worst = std::max(worst, predicted_sigma_centre_line_rad(marker, two_pi * i / (steps - 0.999), viewing));
+  return worst;
+}
+
+bool in_linear_family(const Marker& marker) {
+  const auto &u = marker.bands_upper_m, &l = marker.bands_lower_m;
+  return std::abs(u[0] * l[1] - u[1] * l[0]) < 1e-4 * (u[0] + u[1]) * (l[0] + l[1]);
+}
+
+Marker design_marker(const DesignSpec& spec) {
+  const double length_m = spec.length_m.value_or(std::round(3e3 * spec.diameter_m) * 1e-3);
+  const double smallest_m = spec.smallest_band_m.value_or(std::max(0.003, 12 / spec.viewing.px_per_m()));
+  if (!(length_m > 3 * smallest_m + rounding_m))
+    throw InputError("length", "no marker: three bands of at least " + millimetres(smallest_m) +
+                                   " that change over the turn do not fit into " + millimetres(length_m));
+  const Choice middle{0.5, (2 * smallest_m + length_m - smallest_m) / 2, (2 * smallest_m + length_m - smallest_m) / 2};
+  const double reach_m = (length_m - 3 * smallest_m) / 2;
+  Choice choice = search(spec, length_m, smallest_m, middle, 0.5, reach_m);
+  choice = search(spec, length_m, smallest_m, choice, 0.08, reach_m / 8);
+  // Rounded so that the ratio l1 : l2, and with it the linear family, survives.
+  choice.upper_m = rounded(choice.upper_m), choice.lower_m = rounded(choice.lower_m);
+  choice.lower_m = std::min(choice.lower_m, length_m - smallest_m);
+  Marker marker = marker_of(spec, length_m, choice);
+  if (const std::string problem = marker_problem(marker); !problem.empty()) throw InputError("marker", problem);
+  if (const std::string problem = decoding_problem(marker); !problem.empty())
+    throw InputError("marker", "not decodable: " + problem);
+  return marker;
+}
+
+}  // namespace lapservo

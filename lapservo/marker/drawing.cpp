@@ -1,0 +1,178 @@
+#include "lapservo/marker/drawing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/error.h"
+#include "lapservo/marker/canvas.h"
+
+namespace lapservo {
+namespace {
+
+using Anchor = Canvas::Anchor;
+const PrintColor black{0, 0, 0}, grey{0.55, 0.55, 0.55}, pale{0.93, 0.93, 0.93};
+
+constexpr double tab_mm = 4, gap_mm = 12;
+
+double width_mm(const Marker& marker) {
+  return 1e3 * pi * marker.diameter_m;
+}
+double length_mm(const Marker& marker) {
+  return 1e3 * marker.length_m();
+}
+
+// The three bands with their proximal upper corner at a point: x along the shaft, y from tau = 0 down to 2 pi.
+void draw_bands(Canvas& canvas, const Marker& marker, PointMm corner, double height_mm, double mm_per_m) {
+  double upper = 0, lower = 0;
+  for (std::size_t band = 0; band < 3; ++band) {
+    const double next_upper = upper + mm_per_m * marker.bands_upper_m[band],
+                 next_lower = lower + mm_per_m * marker.bands_lower_m[band];
+    canvas.polygon({{corner.x + upper, corner.y},
+                    {corner.x + next_upper, corner.y},
+                    {corner.x + next_lower, corner.y + height_mm},
+                    {corner.x + lower, corner.y + height_mm}},
+                   print_color(marker.hues_deg[band]));
+    upper = next_upper, lower = next_lower;
+  }
+}
+
+void draw_ruler(Canvas& canvas, PointMm from, int length, bool vertical) {
+  const auto at = [&](double along, double across) {
+    return vertical ? PointMm{from.x - across, from.y + along} : PointMm{from.x + along, from.y - across};
+  };
+  canvas.line({at(0, 0), at(length, 0)}, black, 0.2);
+  for (int mm = 0; mm <= length; ++mm)
+    canvas.line({at(mm, 0), at(mm, mm % 10 == 0 ? 4 : (mm % 5 == 0 ? 3 : 2))}, black, 0.15);
+  for (int mm = 0; mm <= length; mm += 10) {
+    const PointMm place = at(mm, 5);
+    canvas.text(std::to_string(mm), vertical ? PointMm{place.x - 1, place.y + 0.8} : place, 2,
+                vertical ? Anchor::right : Anchor::middle);
+  }
+}
+
+void draw_copy(Canvas& canvas, const Marker& marker, PointMm corner) {
+  const double length = length_mm(marker), width = width_mm(marker);
+  canvas.polygon({{corner.x, corner.y + width},
+                  {corner.x + length, corner.y + width},
+                  {corner.x + length, corner.y + width + tab_mm},
+                  {corner.x, corner.y + width + tab_mm}},
+                 pale);
+  draw_bands(canvas, marker, corner, width, 1e3);
+  canvas.line({corner,
+               {corner.x + length, corner.y},
+               {corner.x + length, corner.y + width + tab_mm},
+               {corner.x, corner.y + width + tab_mm},
+               corner},
+              grey, 0.1, true);
+  canvas.text("glue", {corner.x + length / 2, corner.y + width + 2.6}, 1.3, Anchor::middle);
+}
+
+struct Page {
+  double width, height;
+};
+Page page_of(Paper paper) {
+  return paper == Paper::a4 ? Page{210, 297} : Page{215.9, 279.4};
+}
+
+void draw_curve(Canvas& canvas, PointMm corner, double width, double height, const std::vector<double>& values,
+                const std::string& title, const std::string& format) {
+  const double low = *std::min_element(values.begin(), values.end()),
+               high = *std::max_element(values.begin(), values.end());
+  const double room = std::max(0.08 * (high - low), 1e-9 + 1e-3 * std::abs(high)), bottom = low - room,
+               top = high + room;
+  canvas.line({corner, {corner.x, corner.y + height}, {corner.x + width, corner.y + height}}, black, 0.2);
+  std::vector<PointMm> curve;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    curve.push_back({corner.x + width * static_cast<double>(i) / static_cast<double>(values.size() - 1),
+                     corner.y + height * (top - values[i]) / (top - bottom)});
+  canvas.line(curve, {0.1, 0.3, 0.7}, 0.4);
+  canvas.text(title, {corner.x, corner.y - 1.5}, 2.4);
+  for (const double value : {low, high})
+    canvas.text(fmt::format(fmt::runtime(format), value),
+                {corner.x - 1, corner.y + height * (top - value) / (top - bottom) + 0.8}, 2, Anchor::right);
+  for (int quarter = 0; quarter <= 4; ++quarter)
+    canvas.text(fmt::format("{} deg", 90 * quarter), {corner.x + width * quarter / 4, corner.y + height + 4}, 2,
+                Anchor::middle);
+}
+
+}  // namespace
+
+PrintColor print_color(double hue_deg) {
+  constexpr double saturation = 0.97, value = 0.85;
+  const auto channel = [&](double n) {
+    const double k = std::fmod(n + hue_deg / 60, 6.0);
+    return value - value * saturation * std::clamp(std::min(k, 4 - k), 0.0, 1.0);
+  };
+  return {channel(5), channel(3), channel(1)};
+}
+
+void write_print_sheet(const std::filesystem::path& path, const std::string& instrument, const Marker& marker,
+                       Paper paper, int copies) {
+  const Page page = page_of(paper);
+  const double length = length_mm(marker), width = width_mm(marker);
+  const double left = 25, top = 78;
+  const int columns = static_cast<int>((page.width - left - 15 + gap_mm) / (length + gap_mm));
+  const int rows = static_cast<int>((page.height - top - 15 + gap_mm) / (width + tab_mm + gap_mm));
+  if (columns < 1 || rows < 1)
+    throw InputError(path.string(),
+                     fmt::format("the marker of {:.0f} x {:.0f} mm does not fit on the paper", length, width));
+  Canvas canvas(path, page.width, page.height);
+  canvas.text(fmt::format("lapservo marker for {}", instrument), {left, 18}, 4.5);
+  canvas.text(
+      fmt::format(
+          "outer diameter {:.2f} mm, circumference {:.2f} mm, length {:.2f} mm; hues {:.0f}, {:.0f}, {:.0f} degrees",
+          1e3 * marker.diameter_m, width, length, marker.hues_deg[0], marker.hues_deg[1], marker.hues_deg[2]),
+      {left, 24}, 2.4);
+  const char* const steps[] = {
+      "1. Print at 100 % on matte paper or film. Measure both rulers: they must show 100 mm and 50 mm.",
+      "2. Cut along the dashed line. Wrap it around the shaft, print outside, arrow towards the tip.",
+      "3. Glue the upper edge onto the tab, edge on edge. Measure the outer diameter; put it into the rig."};
+  for (std::size_t i = 0; i < 3; ++i) canvas.text(steps[i], {left, 31 + 5 * static_cast<double>(i)}, 2.4);
+  draw_ruler(canvas, {left, 57}, 100, false);
+  draw_ruler(canvas, {15, top}, 50, true);
+  canvas.arrow({left, 66}, {left + 25, 66});
+  canvas.text("towards the tip", {left + 27, 67}, 2.4);
+  canvas.arrow({left + 75, 61}, {left + 75, 71});
+  canvas.text("tau grows this way (right-handed about the axis to the tip)", {left + 78, 67}, 2.4);
+  const int count = std::min(copies, columns * rows);
+  for (int i = 0; i < count; ++i)
+    draw_copy(canvas, marker,
+              {left + (i % columns) * (length + gap_mm), top + (i / columns) * (width + tab_mm + gap_mm)});
+  canvas.finish();
+}
+
+void write_marker_picture(const std::filesystem::path& path, const std::string& instrument, const Marker& marker,
+                          const Viewing& viewing) {
+  constexpr double page_width = 150, page_height = 200, left = 25, plot_width = 110, plot_height = 40;
+  Canvas canvas(path, page_width, page_height);
+  const double scale = 1e3 * std::min(plot_width / length_mm(marker), 70 / width_mm(marker));
+  const double length = scale * marker.length_m(), height = scale * pi * marker.diameter_m;
+  canvas.text(fmt::format("{}: the marker unrolled, print towards you, tip on the right", instrument), {left, 10}, 2.6);
+  draw_bands(canvas, marker, {left, 16}, height, scale);
+  canvas.line({{left, 16}, {left + length, 16}, {left + length, 16 + height}, {left, 16 + height}, {left, 16}}, black,
+              0.2);
+  for (int quarter = 0; quarter <= 4; ++quarter)
+    canvas.text(fmt::format("{} deg", 90 * quarter), {left - 1.5, 16 + height * quarter / 4 + 0.8}, 2, Anchor::right);
+  canvas.text("tau", {left - 14, 16 + height / 2}, 2.4, Anchor::middle, -90);
+  for (int mm = 0; mm <= static_cast<int>(length_mm(marker) + 0.01); mm += 5)
+    canvas.text(fmt::format("{}", mm), {left + 1e-3 * scale * mm, 16 + height + 3.5}, 2, Anchor::middle);
+  canvas.text("mm from the proximal end", {left + length / 2, 16 + height + 7}, 2.2, Anchor::middle);
+  std::vector<double> ratio, sigma;
+  for (int i = 0; i <= 180; ++i) {
+    const double tau_rad = two_pi * std::min(i / 180.0, 0.99999);
+    ratio.push_back(cross_ratio_at(marker, tau_rad));
+    sigma.push_back(1e3 * predicted_sigma_centre_line_rad(marker, tau_rad, viewing));
+  }
+  draw_curve(canvas, {left, 108}, plot_width, plot_height - 8, ratio, "cross-ratio over tau", "{:.3f}");
+  draw_curve(canvas, {left, 156}, plot_width, plot_height - 8, sigma,
+             fmt::format("predicted sigma, centre line alone [mrad]: {:.2f} px a boundary, f {:.0f} px, {:.0f} mm away",
+                         viewing.sigma_edge_px, viewing.focal_px, 1e3 * viewing.distance_m),
+             "{:.1f}");
+  canvas.finish();
+}
+
+}  // namespace lapservo

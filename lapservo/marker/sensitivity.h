@@ -1,0 +1,26 @@
+#pragma once
+
+#include "lapservo/marker/marker.h"
+
+namespace lapservo {
+
+/// How a camera sees a marker head on.
+struct Viewing {
+  double focal_px = 1100;
+  double distance_m = 0.11;
+  double sigma_edge_px = 0.1;  ///< standard deviation of one boundary on one line
+  double px_per_m() const { return focal_px / distance_m; }
+};
+
+/// d(cross-ratio)/d(tau), per radian.
+double cross_ratio_slope(const Marker& marker, double tau_rad);
+
+/// Standard deviation of tau from the centre line alone: four boundaries, their cross-ratio, eq. (18), to first order.
+double predicted_sigma_centre_line_rad(const Marker& marker, double tau_rad, const Viewing& viewing);
+
+/// Standard deviation of tau from all visible generatrices (a line per pixel over +-64 degrees) when the axis is known
+/// and the place along it is estimated too: the Cramer-Rao bound. Inner boundaries within 2.5 px of the seam do not
+/// count.
+double predicted_sigma_surface_rad(const Marker& marker, double tau_rad, const Viewing& viewing);
+
+}  // namespace lapservo
