@@ -1,0 +1,291 @@
+// The figures that lapservo promises, each as a test. docs/accuracy.md shows what is measured.
+
+#include <cmath>
+#include <map>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "acceptance/frame_sets.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/io/image_file.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/sim/tissue.h"
+
+namespace lapservo::acceptance {
+namespace {
+
+constexpr double mrad = 1e-3, mm = 1e-3;
+constexpr double steepest_rad = 0.35;
+
+#define NEED_SAMPLES() \
+  if (!sample_folder()) GTEST_SKIP() << "no ray-traced samples: set LAPSERVO_FRAMES"
+
+void expect_rotation_figures(const Score& score) {
+  EXPECT_EQ(score.found, score.expected);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_LE(std::abs(mean(score.psi_rad)), 1.5 * mrad);
+  EXPECT_LE(standard_deviation(score.psi_rad), 3 * mrad);
+  EXPECT_LE(largest(score.psi_rad), 12 * mrad);
+  EXPECT_LE(rms(score.theta_rad), 0.3 * mrad);
+  EXPECT_LE(rms(score.phi_rad), 0.3 * mrad);
+  EXPECT_LE(rms(score.rho_m), 0.03 * mm);
+  EXPECT_LE(rms(score.edge_px), 0.1);
+  EXPECT_GE(rms(score.psi_sigmas), 0.7);
+  EXPECT_LE(rms(score.psi_sigmas), 1.5);
+}
+
+void expect_found_within(const Score& score, double found_share, double psi_rms_rad) {
+  EXPECT_GE(score.found_share(), found_share);
+  EXPECT_LE(rms(score.psi_rad), psi_rms_rad);
+  EXPECT_EQ(score.wrong, 0);
+}
+
+// Mean distance of each point to its centroid over the intensities, the frames coming in groups of `intensities`.
+double illumination_spread_px(const Score& score, std::size_t intensities) {
+  std::vector<double> distances;
+  for (std::size_t group = 0; group + intensities <= score.edges.size(); group += intensities)
+    for (std::size_t k = 0; k < 4; ++k) {
+      Eigen::Vector2d centroid = Eigen::Vector2d::Zero();
+      for (std::size_t i = 0; i < intensities; ++i)
+        centroid += score.edges[group + i][k] / static_cast<double>(intensities);
+      for (std::size_t i = 0; i < intensities; ++i) distances.push_back((score.edges[group + i][k] - centroid).norm());
+    }
+  return mean(distances);
+}
+
+TEST(Samples, Rotation) {
+  NEED_SAMPLES();
+  expect_rotation_figures(score_single(sample_frames("rotation")));
+}
+
+TEST(Samples, Illumination) {
+  NEED_SAMPLES();
+  const Score score = score_single(sample_frames("illumination"));
+  EXPECT_EQ(score.found, score.expected);
+  EXPECT_LE(illumination_spread_px(score, 4), 0.15);
+}
+
+TEST(Samples, Stress) {
+  NEED_SAMPLES();
+  Score usual, hard;
+  for (const TrueFrame& frame : sample_frames("stress")) {
+    const std::string& condition = frame.truths[0].condition;
+    Tracker tracker(frame.rig);
+    (condition == "heavyblood" || condition == "cut" ? hard : usual).add(frame, tracker.track(frame.bgr));
+  }
+  expect_found_within(usual, 0.95, 15 * mrad);
+  expect_found_within(hard, 0.8, 15 * mrad);
+}
+
+TEST(Samples, TwoInstrumentsAreNeverSwapped) {
+  NEED_SAMPLES();
+  const Score score = score_single(sample_frames("two"));
+  expect_found_within(score, 1, 6 * mrad);
+  EXPECT_LE(rms(score.edge_px), 0.5);
+}
+
+TEST(Samples, TiltedAndDistorted) {
+  NEED_SAMPLES();
+  for (const char* set : {"tilt", "distorted"}) {
+    SCOPED_TRACE(set);
+    const Score score = score_single(sample_frames(set));
+    expect_found_within(score, 1, 12 * mrad);
+    EXPECT_LE(standard_deviation(score.psi_rad), 6 * mrad);
+  }
+}
+
+TEST(Samples, NothingIsFoundWhereNothingIs) {
+  NEED_SAMPLES();
+  Rig rig = load_rig(*sample_folder() / "two/rig.yaml");
+  for (const auto& entry : std::filesystem::directory_iterator(*sample_folder() / "negatives")) {
+    cv::Mat image = read_image(entry.path());
+    cv::resize(image, image, {rig.camera.width_px, rig.camera.height_px});
+    for (const Observation& o : Tracker(rig).track(image)) EXPECT_NE(o.status, Status::ok) << entry.path();
+  }
+}
+
+TEST(Samples, Video) {
+  NEED_SAMPLES();
+  auto frames = sample_frames("video");
+  const auto source = open_frame_source((*sample_folder() / "video/video.mp4").string(), 30);
+  Tracker tracker(frames[0].rig);
+  Score score;
+  for (TrueFrame& truth : frames) {
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    score.add(truth, tracker.track(frame->bgr));
+  }
+  EXPECT_EQ(score.found, score.expected);
+  EXPECT_EQ(score.wrong, 0);
+  EXPECT_LE(standard_deviation(score.psi_rad), 8 * mrad);
+}
+
+TEST(Samples, WithoutTheRcmTheFeaturesAreAsGood) {
+  NEED_SAMPLES();
+  std::vector<double> tau_rad, l_px, d_px;
+  for (const TrueFrame& frame : sample_frames("rotation")) {
+    Rig rig = frame.rig;
+    rig.instruments[0].camera_from_rcm.reset();
+    const Observation o = Tracker(rig).track(frame.bgr)[0];
+    ASSERT_EQ(o.status, Status::ok);
+    EXPECT_FALSE(o.rcm);
+    EXPECT_FALSE(o.features.r_px);
+    tau_rad.push_back(wrap_pi(o.tau_rad - frame.truths[0].tau_rad));
+    const auto& e = frame.truths[0].edges_raw_px;
+    l_px.push_back(o.features.l_px - (e[3] - e[0]).norm());
+    d_px.push_back(o.features.d_px - (e[2] - e[0]).norm());
+  }
+  EXPECT_LE(rms(tau_rad), 3 * mrad);
+  EXPECT_LE(rms(l_px), 0.1);
+  EXPECT_LE(rms(d_px), 0.1);
+}
+
+// A registration that is far off must not make up a rotation.
+TEST(Samples, AWrongRegistrationGivesFeaturesButNoRotation) {
+  NEED_SAMPLES();
+  for (const TrueFrame& frame : sample_frames("rotation")) {
+    Rig rig = frame.rig;
+    rig.instruments[0].camera_from_rcm->translation += Eigen::Vector3d(0.03, -0.02, 0.03);
+    const Observation o = Tracker(rig).track(frame.bgr)[0];
+    if (o.status != Status::ok) continue;
+    if (o.rcm) {
+      EXPECT_LE(std::abs(wrap_pi(o.rcm->q.psi_rad - frame.truths[0].q.psi_rad)),
+                5 * std::sqrt(o.rcm->covariance(3, 3)));
+    }
+    EXPECT_NEAR(o.features.d_px, (frame.truths[0].edges_raw_px[2] - frame.truths[0].edges_raw_px[0]).norm(), 1);
+  }
+}
+
+RenderedSet usual_set(std::uint64_t seed, int count = 16) {
+  RenderedSet set;
+  set.rig = example_rig();
+  set.configurations = random_configurations(set.rig, count, seed, steepest_rad);
+  set.seed = seed;
+  return set;
+}
+
+// A full turn, seam included.
+TEST(Rendered, Rotation) {
+  RenderedSet set = usual_set(11, 24);
+  for (std::size_t i = 0; i < set.configurations.size(); ++i)
+    set.configurations[i][0].psi_rad =
+        wrap_pi(two_pi * static_cast<double>(i) / static_cast<double>(set.configurations.size()));
+  expect_rotation_figures(score_single(rendered_frames(set)));
+}
+
+TEST(Rendered, Illumination) {
+  std::vector<std::vector<TrueFrame>> by_light;
+  for (const float light : {0.4F, 0.6F, 0.8F, 1.0F}) {
+    RenderedSet set = usual_set(12, 6);
+    set.options.sensor.gains = Light::Constant(light);
+    by_light.push_back(rendered_frames(set));
+  }
+  Score score;
+  for (std::size_t f = 0; f < by_light[0].size(); ++f)
+    for (const auto& frames : by_light) score.add(frames[f], Tracker(frames[f].rig).track(frames[f].bgr));
+  EXPECT_EQ(score.found, score.expected);
+  EXPECT_LE(illumination_spread_px(score, 4), 0.15);
+}
+
+TEST(Rendered, Stress) {
+  std::map<std::string, RenderedSet> sets;
+  for (const char* name : {"blood", "smoke", "dark", "bright", "defocus", "noise", "warm", "jpeg"})
+    sets[name] = usual_set(13 + sets.size(), 8);
+  sets["blood"].blood = 0.2;
+  sets["smoke"].options.smoke = 0.55F;
+  sets["dark"].options.sensor.gains = Light::Constant(0.15F);
+  sets["bright"].options.sensor.gains = Light::Constant(1.7F);
+  sets["defocus"].options.sensor.blur_px = 2.2;
+  sets["noise"].options.sensor.read_noise *= 4;
+  sets["warm"].options.sensor.gains = Light(0.8F, 1, 1.2F);
+  sets["jpeg"].after = [](const cv::Mat& image) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
+    return cv::imdecode(bytes, cv::IMREAD_COLOR);
+  };
+  Score all;
+  for (const auto& [name, set] : sets)
+    for (const TrueFrame& frame : rendered_frames(set)) all.add(frame, Tracker(frame.rig).track(frame.bgr));
+  expect_found_within(all, 0.95, 15 * mrad);
+}
+
+TEST(Rendered, HeavyBlood) {
+  RenderedSet set = usual_set(31, 15);
+  set.blood = 0.45;
+  expect_found_within(score_single(rendered_frames(set)), 0.8, 15 * mrad);
+}
+
+// The distal third beyond the border.
+TEST(Rendered, Cut) {
+  RenderedSet set = usual_set(32, 12);
+  auto frames = rendered_frames(set);
+  Score score;
+  for (TrueFrame& frame : frames) {
+    const Eigen::Vector2d keep =
+        frame.truths[0].edges_raw_px[0] + 0.7 * (frame.truths[0].edges_raw_px[3] - frame.truths[0].edges_raw_px[0]);
+    const bool to_right = frame.truths[0].edges_raw_px[3].x() > frame.truths[0].edges_raw_px[0].x();
+    if (!to_right || keep.x() < 200) continue;
+    frame.bgr = frame.bgr(cv::Rect(0, 0, static_cast<int>(keep.x()), frame.bgr.rows)).clone();
+    frame.rig.camera.width_px = frame.bgr.cols;
+    score.add(frame, Tracker(frame.rig).track(frame.bgr));
+  }
+  ASSERT_GE(score.expected, 5);
+  expect_found_within(score, 0.8, 15 * mrad);
+}
+
+TEST(Rendered, DistortedLens) {
+  RenderedSet set = usual_set(33, 10);
+  set.rig.camera.distortion = {-0.28, 0.09, 0.0006, -0.0004, 0};
+  const Score score = score_single(rendered_frames(set));
+  expect_found_within(score, 1, 6 * mrad);
+}
+
+TEST(Rendered, OtherDesignsResponsesAndSizes) {
+  RenderedSet set = usual_set(34, 8);
+  set.rig.camera.response = {Response::Kind::power, 2.2};
+  set.rig.instruments[0].marker.bands_upper_m = {0.005, 0.006, 0.013};
+  set.rig.instruments[0].marker.bands_lower_m = {0.011, 0.008, 0.005};
+  set.rig.instruments[0].marker.seam_rad = 1.3;
+  set.rig.instruments[0].marker.hues_deg = {150, 220, 285};
+  expect_found_within(score_single(rendered_frames(set)), 1, 6 * mrad);
+}
+
+TEST(Rendered, NothingIsFoundInTissue) {
+  const Rig rig = example_rig();
+  for (const std::uint64_t seed : {41, 42, 43, 44}) {
+    Renderer renderer(rig.camera, {}, make_tissue(rig.camera.width_px, rig.camera.height_px, seed));
+    EXPECT_NE(Tracker(rig).track(renderer.render({}, seed))[0].status, Status::ok) << seed;
+  }
+}
+
+// The marker of another order of colours is not taken for ours.
+TEST(Rendered, AnotherInstrumentIsNotOurs) {
+  RenderedSet set = usual_set(45, 6);
+  set.rig.instruments[0].marker.hues_deg = {180, 270, 90};
+  for (TrueFrame& frame : rendered_frames(set)) {
+    frame.rig.instruments[0].marker.hues_deg = {90, 180, 270};
+    EXPECT_NE(Tracker(frame.rig).track(frame.bgr)[0].status, Status::ok);
+  }
+}
+
+// Tracking agrees with looking at every frame anew, and costs no accuracy.
+TEST(Rendered, TrackingFollowsMotion) {
+  RenderedSet set = usual_set(46, 2);
+  const Eigen::Vector4d from = set.configurations[0][0].vector(), to = set.configurations[1][0].vector();
+  set.configurations.clear();
+  for (int i = 0; i < 40; ++i)
+    set.configurations.push_back(
+        {RcmCoordinates::from_vector(from + (to - from) * (0.5 - 0.5 * std::cos(pi * i / 39)))});
+  const auto frames = rendered_frames(set);
+  Tracker tracker(set.rig);
+  Score tracked;
+  for (const TrueFrame& frame : frames) tracked.add(frame, tracker.track(frame.bgr));
+  EXPECT_EQ(tracked.found, tracked.expected);
+  EXPECT_LE(rms(tracked.psi_rad), 3 * mrad);
+}
+
+}  // namespace
+}  // namespace lapservo::acceptance

@@ -1,0 +1,193 @@
+// The tool as its user meets it: exit codes, one line per complaint, nothing left half-written.
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "lapservo/core/csv.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+
+std::string read(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+class CommandLine : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("lapservo_cli_" + std::to_string(::getpid()) +
+                                           testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::create_directories(folder_ / "in");
+    fs::create_directories(folder_ / "out");
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  int run(const std::string& arguments) {
+    const std::string command = std::string(LAPSERVO_TOOL) + " " + arguments + " >" + (folder_ / "stdout").string() +
+                                " 2>" + (folder_ / "stderr").string() + " </dev/null";
+    const int status = std::system(command.c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  }
+  std::string errors() const { return read(folder_ / "stderr"); }
+  std::string output() const { return read(folder_ / "stdout"); }
+
+  // Exit code 2, one line that holds all the words, nothing in out/.
+  void expect_refused(const std::string& arguments, std::initializer_list<const char*> words) {
+    SCOPED_TRACE(arguments);
+    EXPECT_EQ(run(arguments), 2);
+    const std::string text = errors();
+    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+    for (const char* word : words) EXPECT_NE(text.find(word), std::string::npos) << "no '" << word << "' in: " << text;
+    EXPECT_TRUE(fs::is_empty(folder_ / "out")) << "left something behind";
+  }
+  std::string in(const std::string& name, const std::string& content = "") {
+    const fs::path path = folder_ / "in" / name;
+    if (!content.empty()) std::ofstream(path, std::ios::binary) << content;
+    return path.string();
+  }
+  std::string out(const std::string& name) const { return (folder_ / "out" / name).string(); }
+  std::string track(const std::string& input) const {
+    return "track " + input + " --rig " + rig_ + " --out " + out("obs.csv") + " --overlay " + out("overlay");
+  }
+
+  fs::path folder_;
+  const std::string rig_ = std::string(LAPSERVO_SOURCE_DIR) + "/configs/example.yaml";
+};
+
+TEST_F(CommandLine, RenderThenTrack) {
+  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("frames") + " --count 3 --seed 5"), 0) << errors();
+  for (const char* name : {"0000.png", "0002.png", "truth.csv", "rig.yaml"})
+    EXPECT_TRUE(fs::exists(out("frames") + "/" + name));
+  ASSERT_EQ(run("track " + out("frames") + " --out " + out("obs.csv") + " --overlay " + out("overlay")), 0) << errors();
+  const CsvTable observed = CsvTable::read(out("obs.csv")), truth = CsvTable::read(out("frames") + "/truth.csv");
+  ASSERT_EQ(observed.rows(), 3U);
+  for (std::size_t row = 0; row < 3; ++row) {
+    EXPECT_EQ(observed.text(row, "status"), "ok");
+    EXPECT_EQ(observed.text(row, "file"), truth.text(row, "file"));
+    EXPECT_NEAR(observed.number(row, "l_px"), truth.number(row, "l_px"), 0.2);
+    EXPECT_TRUE(fs::exists(out("overlay") + "/" + truth.text(row, "file")));
+  }
+}
+
+TEST_F(CommandLine, VideosAndTheBaseline) {
+  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("film") + " --count 6 --moving --video"), 0) << errors();
+  ASSERT_EQ(run("track " + out("film") + "/video.mp4 --out " + out("obs.csv") + " --overlay " + out("overlay.mp4")), 0)
+      << errors();
+  EXPECT_EQ(CsvTable::read(out("obs.csv")).rows(), 6U);
+  EXPECT_GT(fs::file_size(out("overlay.mp4")), 1000U);
+  ASSERT_EQ(run("track " + out("film") + "/video.mp4 --method centerline --out " + out("c.csv")), 0) << errors();
+}
+
+TEST_F(CommandLine, NothingFoundIsOne) {
+  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
+  EXPECT_EQ(run("track " + in("grey.png") + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
+  EXPECT_EQ(CsvTable::read(out("obs.csv")).text(0, "status"), "no_marker");
+}
+
+TEST_F(CommandLine, PicturesThatAreNone) {
+  cv::Mat noise(720, 1280, CV_8UC3);
+  cv::randu(noise, 0, 255);
+  cv::imwrite(in("whole.png"), noise);
+  cv::imwrite(in("whole.jpg"), noise);
+  cv::imwrite(in("small.png"), noise(cv::Rect(0, 0, 960, 540)));
+  const std::string png = read(in("whole.png")), jpg = read(in("whole.jpg"));
+  expect_refused(track(in("missing.png")), {"missing.png", "does not exist"});
+  expect_refused(track(in("half.png", png.substr(0, png.size() / 2))), {"half.png", "truncated"});
+  expect_refused(track(in("half.jpg", jpg.substr(0, jpg.size() / 2))), {"half.jpg", "truncated"});
+  expect_refused(track(in("text.png", "this is no picture")), {"text.png", "expected a picture"});
+  expect_refused(track(in("film.mp4", "this is no film")), {"film.mp4", "expected"});
+  expect_refused(track(in("small.png")), {"small.png", "960x540", "1280x720"});
+  std::ofstream(in("empty.png"));
+  expect_refused(track(in("empty.png")), {"empty.png", "is empty"});
+  fs::create_directories(folder_ / "in/folder");
+  expect_refused(track(in("folder")), {"folder", "no pictures"});
+}
+
+TEST_F(CommandLine, GreyDeepAndTransparentPicturesAreAccepted) {
+  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC1, cv::Scalar(90)));
+  cv::imwrite(in("deep.png"), cv::Mat(720, 1280, CV_16UC3, cv::Scalar(9000, 9000, 9000)));
+  cv::imwrite(in("alpha.png"), cv::Mat(720, 1280, CV_8UC4, cv::Scalar(90, 90, 90, 10)));
+  for (const char* name : {"grey.png", "deep.png", "alpha.png"})
+    EXPECT_EQ(run("track " + in(name) + " --rig " + rig_ + " --out " + out("obs.csv")), 1) << name;
+}
+
+TEST_F(CommandLine, RigsThatAreNone) {
+  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
+  const std::string good = read(rig_);
+  const auto with = [&](const std::string& what, const std::string& instead) {
+    std::string text = good;
+    text.replace(text.find(what), what.size(), instead);
+    return "track " + in("grey.png") + " --rig " + in("rig.yaml", text) + " --out " + out("obs.csv");
+  };
+  expect_refused("track " + in("grey.png") + " --rig " + in("none.yaml") + " --out " + out("obs.csv"), {"none.yaml"});
+  expect_refused(with("diameter_m: 0.0084", "diameter_m: -1"), {"rig.yaml", "diameter_m", "-1"});
+  expect_refused(with("diameter_m: 0.0084", "diameter_m: .nan"), {"rig.yaml", "diameter_m", ".nan"});
+  expect_refused(with("diameter_m: 0.0084", "diameter: 0.0084"), {"rig.yaml", "diameter_m", "missing"});
+  expect_refused(with("image_width: 1280", "image_width: wide"), {"rig.yaml", "image_width", "wide"});
+  expect_refused(with("[0.0095, 0.0095, 0.005]", "[0.0035, 0.0035, 0.017]"), {"rig.yaml", "marker", "decodable"});
+  expect_refused(with("camera:", "[[[[["), {"rig.yaml"});
+}
+
+TEST_F(CommandLine, OutputsThatCannotBe) {
+  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
+  expect_refused("track " + in("grey.png") + " --rig " + rig_ + " --out " + out("no/such/folder/obs.csv"),
+                 {"obs.csv", "can't be written"});
+  expect_refused("track " + in("grey.png") + " --rig " + rig_ + " --out " + in("grey.png"),
+                 {"grey.png", "the input itself"});
+  expect_refused("track " + in("grey.png") + " --rig " + rig_ + " --method guess --out " + out("obs.csv"), {"guess"});
+  unsetenv("DISPLAY");
+  unsetenv("WAYLAND_DISPLAY");
+  expect_refused("track " + in("grey.png") + " --rig " + rig_ + " --view --out " + out("obs.csv"),
+                 {"--view", "display"});
+}
+
+TEST_F(CommandLine, RenderingWhatCannotBe) {
+  std::string text = read(rig_);
+  text.erase(text.find("    camera_from_rcm"));
+  expect_refused("render --rig " + in("free.yaml", text) + " --out " + out("frames"),
+                 {"free.yaml", "camera_from_rcm", "missing"});
+  expect_refused("render --rig " + rig_ + " --poses " + in("q.csv", "theta_rad,phi_rad,rho_m,psi_rad\n0,1.5,nan,0\n") +
+                     " --out " + out("frames"),
+                 {"q.csv", "rho_m", "nan"});
+}
+
+TEST_F(CommandLine, Markers) {
+  EXPECT_EQ(run("marker design --diameter-mm 8.4 --out " + out("marker.yaml")), 0) << errors();
+  EXPECT_NE(read(out("marker.yaml")).find("bands_upper_m"), std::string::npos);
+  for (const char* name : {"sheet.pdf", "sheet.svg"}) {
+    EXPECT_EQ(run("marker print --rig " + rig_ + " --out " + out(name)), 0) << errors();
+    EXPECT_GT(fs::file_size(out(name)), 1000U);
+  }
+  EXPECT_EQ(run("marker show --rig " + rig_ + " --out " + out("marker.png")), 0) << errors();
+  EXPECT_NE(output().find("222"), std::string::npos);
+  fs::remove_all(folder_ / "out");
+  fs::create_directories(folder_ / "out");
+  expect_refused("marker design --bands-upper-mm 5,5,10 --bands-lower-mm 10,5,5", {"not decodable"});
+  expect_refused("marker design --diameter-mm 8 --length-mm 8", {"do not fit"});
+  expect_refused("marker print --rig " + rig_ + " --out " + out("sheet.txt"), {"sheet.txt"});
+  expect_refused("marker show --rig " + rig_ + " --instrument PSM9", {"PSM9"});
+}
+
+TEST_F(CommandLine, HelpShowsExamples) {
+  for (const char* command : {"track", "render", "marker", "marker design", "marker print", "marker show"}) {
+    EXPECT_EQ(run(std::string(command) + " --help"), 0);
+    EXPECT_NE(output().find("Example"), std::string::npos) << command;
+  }
+  EXPECT_EQ(run("fly"), 2);
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,204 @@
+#include "acceptance/frame_sets.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/io/image_file.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/sim/tissue.h"
+
+namespace lapservo::acceptance {
+namespace fs = std::filesystem;
+
+double mean(const std::vector<double>& values) {
+  return values.empty() ? 0 : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+double rms(const std::vector<double>& values) {
+  double squares = 0;
+  for (const double value : values) squares += value * value;
+  return values.empty() ? 0 : std::sqrt(squares / static_cast<double>(values.size()));
+}
+double standard_deviation(const std::vector<double>& values) {
+  const double middle = mean(values), square = rms(values);
+  return std::sqrt(std::max(0.0, square * square - middle * middle));
+}
+double largest(const std::vector<double>& values) {
+  double most = 0;
+  for (const double value : values) most = std::max(most, std::abs(value));
+  return most;
+}
+
+void Score::add(const TrueFrame& frame, const std::vector<Observation>& observations) {
+  for (const Truth& truth : frame.truths) {
+    const auto named = std::find_if(frame.rig.instruments.begin(), frame.rig.instruments.end(),
+                                    [&](const Instrument& i) { return i.name == truth.instrument; });
+    const Observation& o = observations.at(static_cast<std::size_t>(named - frame.rig.instruments.begin()));
+    ++expected;
+    if (o.status != Status::ok || !o.rcm) continue;
+    ++found;
+    const double error_rad = wrap_pi(o.rcm->q.psi_rad - truth.q.psi_rad);
+    wrong += std::abs(error_rad) > 0.1;
+    psi_rad.push_back(error_rad);
+    theta_rad.push_back(wrap_pi(o.rcm->q.theta_rad - truth.q.theta_rad));
+    phi_rad.push_back(o.rcm->q.phi_rad - truth.q.phi_rad);
+    rho_m.push_back(o.rcm->q.rho_m - truth.q.rho_m);
+    psi_sigmas.push_back(error_rad / std::sqrt(o.rcm->covariance(3, 3)));
+    for (std::size_t k = 0; k < 4; ++k) edge_px.push_back((o.edges_raw_px[k] - truth.edges_raw_px[k]).norm());
+    edges.push_back(o.edges_raw_px);
+  }
+}
+
+std::optional<fs::path> sample_folder() {
+  const char* named = std::getenv("LAPSERVO_FRAMES");
+  const fs::path folder = named ? fs::path(named) : fs::path(LAPSERVO_SOURCE_DIR) / "../shared/frames";
+  return fs::is_directory(folder) ? std::optional(folder) : std::nullopt;
+}
+
+std::vector<TrueFrame> sample_frames(const std::string& set) {
+  const fs::path all = sample_folder().value(), folder = all / set;
+  const CsvTable table = CsvTable::read(folder / "truth.csv");
+  std::vector<TrueFrame> frames;
+  std::string last_file;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::string file = table.text(row, "file");
+    if (file != last_file) {
+      const fs::path own = folder / fs::path(file).replace_extension(".rig.yaml");
+      TrueFrame frame;
+      frame.rig = load_rig(fs::exists(own) ? own : folder / "rig.yaml");
+      const auto rcm_px = projected_rcm_px(frame.rig.camera, frame.rig.instruments[0].camera_from_rcm.value());
+      const Eigen::Vector2d true_rcm_px(table.number(row, "rcm_u_px"), table.number(row, "rcm_v_px"));
+      if (!rcm_px || (*rcm_px - true_rcm_px).norm() > 1) frame.rig = load_rig(all / "rotation" / "rig.yaml");
+      if (fs::exists(folder / file)) frame.bgr = read_image(folder / file);
+      frames.push_back(std::move(frame));
+      last_file = file;
+    }
+    Truth truth{table.text(row, "instrument"), table.text(row, "condition"), {}, table.number(row, "tau_rad"), {}};
+    truth.q = {table.number(row, "theta_rad"), table.number(row, "phi_rad"), table.number(row, "rho_m"),
+               table.number(row, "psi_rad")};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::string e = "e" + std::to_string(k);
+      truth.edges_raw_px[k] = {table.number(row, e + "_u_px"), table.number(row, e + "_v_px")};
+    }
+    frames.back().truths.push_back(truth);
+  }
+  return frames;
+}
+
+Score score_single(const std::vector<TrueFrame>& frames) {
+  Score score;
+  for (const TrueFrame& frame : frames) {
+    Tracker tracker(frame.rig, {.method = Method::surface, .single = true});
+    score.add(frame, tracker.track(frame.bgr));
+  }
+  return score;
+}
+
+Rig example_rig() {
+  return load_rig(fs::path(LAPSERVO_SOURCE_DIR) / "configs/example.yaml");
+}
+
+namespace {
+
+std::vector<Blotch> blotches(const Marker& marker, double share, Random& random) {
+  std::vector<Blotch> discs;
+  for (double covered = 0; covered < share;) {
+    const double radius_m = random.uniform(0.08, 0.22) * marker.diameter_m;
+    discs.push_back({random.uniform(0, two_pi), random.uniform(0, marker.length_m()), radius_m});
+    covered += pi * radius_m * radius_m / (pi * marker.diameter_m * marker.length_m());
+  }
+  return discs;
+}
+
+Truth truth_of(const Rig& rig, std::size_t i, const RcmCoordinates& q) {
+  const Instrument& instrument = rig.instruments[i];
+  const auto line =
+      centre_line(rig.camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad).value();
+  Truth truth{instrument.name, "rendered", q, line.tau_rad, {}};
+  for (std::size_t k = 0; k < 4; ++k) truth.edges_raw_px[k] = rig.camera.raw_from_ideal(line.ideal_px[k]);
+  return truth;
+}
+
+}  // namespace
+
+std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
+  const Rig& rig = set.rig;
+  std::vector<TrueFrame> frames;
+  const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, set.seed);
+  Random random(set.seed);
+  std::vector<ShaftModel> shafts;
+  for (const Instrument& instrument : rig.instruments) {
+    ShaftModel shaft;
+    shaft.marker = instrument.marker;
+    shaft.blotches = blotches(instrument.marker, set.blood, random);
+    shafts.push_back(shaft);
+  }
+  Renderer renderer(rig.camera, shafts, tissue, set.options);
+  for (std::size_t f = 0; f < set.configurations.size(); ++f) {
+    TrueFrame frame{rig, {}, {}};
+    const auto& now = set.configurations[f];
+    const auto& next = set.configurations[std::min(f + 1, set.configurations.size() - 1)];
+    Exposure exposure;
+    const int moments = set.motion > 0 ? 9 : 1;
+    for (int m = 0; m < moments; ++m) {
+      const double share = moments > 1 ? set.motion * (m / (moments - 1.0) - 0.5) : 0;
+      std::vector<ShaftPlacement> placed;
+      for (std::size_t i = 0; i < now.size(); ++i) {
+        const auto q = RcmCoordinates::from_vector(now[i].vector() + share * (next[i].vector() - now[i].vector()));
+        placed.push_back({*rig.instruments[i].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad});
+      }
+      exposure.push_back(placed);
+    }
+    frame.bgr = renderer.render_exposure(exposure, set.seed * 1000 + f);
+    if (set.after) frame.bgr = set.after(frame.bgr);
+    for (std::size_t i = 0; i < now.size(); ++i) frame.truths.push_back(truth_of(rig, i, now[i]));
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
+std::vector<std::vector<RcmCoordinates>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
+                                                               double steepest_rad) {
+  Random random(seed);
+  const auto acceptable = [&](const Instrument& instrument, const RcmCoordinates& q) {
+    const Marker& marker = instrument.marker;
+    const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(q);
+    const auto view = view_cylinder(pose, marker.radius_m());
+    if (!view) return false;
+    const double beyond_m = pose.inverse().translation.z() - marker.length_m() / 2;
+    if (std::abs(std::atan2(beyond_m, view->camera_to_axis_m)) > steepest_rad) return false;
+    for (const double side : {-1.0, 1.0})
+      for (const double along_m : {0.0, marker.length_m()}) {
+        const Eigen::Vector3d point =
+            pose * surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
+        if (point.z() < 0.04 || !rig.camera.contains(rig.camera.ideal_from_point(point), 40)) return false;
+      }
+    return true;
+  };
+  std::vector<std::vector<RcmCoordinates>> configurations;
+  for (int frame = 0; frame < count; ++frame) {
+    std::vector<RcmCoordinates> of_frame;
+    for (const Instrument& instrument : rig.instruments) {
+      std::optional<RcmCoordinates> q;
+      for (int attempt = 0; attempt < 50000 && !q; ++attempt) {
+        const Eigen::Vector2d pixel(random.uniform(0, rig.camera.width_px), random.uniform(0, rig.camera.height_px));
+        q = configuration_through(*instrument.camera_from_rcm,
+                                  rig.camera.ray_from_ideal(pixel) * random.uniform(0.075, 0.12));
+        if (q) q->psi_rad = random.uniform(-pi, pi);
+        if (q && !acceptable(instrument, *q)) q.reset();
+      }
+      of_frame.push_back(q.value());
+    }
+    configurations.push_back(of_frame);
+  }
+  return configurations;
+}
+
+}  // namespace lapservo::acceptance

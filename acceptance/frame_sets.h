@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::acceptance {
+
+/// What is truly in a frame.
+struct Truth {
+  std::string instrument, condition;
+  RcmCoordinates q;
+  double tau_rad = 0;
+  std::array<Eigen::Vector2d, 4> edges_raw_px;
+};
+
+struct TrueFrame {
+  Rig rig;
+  cv::Mat bgr;
+  std::vector<Truth> truths;
+};
+
+/// Errors of observations against truth, over a set.
+struct Score {
+  int expected = 0, found = 0, wrong = 0;  ///< wrong: ok, and psi off by more than 0.1 rad
+  std::vector<double> psi_rad, theta_rad, phi_rad, rho_m, edge_px, psi_sigmas;
+  std::vector<std::array<Eigen::Vector2d, 4>> edges;  ///< of found ones, in order
+
+  void add(const TrueFrame& frame, const std::vector<Observation>& observations);
+  double found_share() const { return expected ? static_cast<double>(found) / expected : 1; }
+};
+
+double mean(const std::vector<double>& values);
+double rms(const std::vector<double>& values);
+double standard_deviation(const std::vector<double>& values);
+double largest(const std::vector<double>& values);
+
+/// The folder of ray-traced samples, when it is there: LAPSERVO_FRAMES or ../shared/frames.
+std::optional<std::filesystem::path> sample_folder();
+
+/// The frames of one of its sets, in order. A frame's rig is NNNN.rig.yaml or rig.yaml; where that contradicts the
+/// truth's projected RCM (as stress/rig.yaml does for most of its frames) it is the rig of the set `rotation`.
+std::vector<TrueFrame> sample_frames(const std::string& set);
+
+/// Every frame on its own.
+Score score_single(const std::vector<TrueFrame>& frames);
+
+/// Frames rendered in front of seeded tissue: what a set looks like in our own theatre.
+struct RenderedSet {
+  Rig rig;
+  std::vector<std::vector<RcmCoordinates>> configurations;  ///< per frame and instrument
+  RenderOptions options;
+  double blood = 0;   ///< share of the marker covered
+  double motion = 0;  ///< share of the step to the next frame
+  std::uint64_t seed = 1;
+  std::function<cv::Mat(const cv::Mat&)> after;  ///< what the recorder does, when given
+};
+std::vector<TrueFrame> rendered_frames(const RenderedSet& set);
+
+/// The rig of configs/example.yaml.
+Rig example_rig();
+
+/// Random configurations of it with the marker wholly in view, pointing at most `steepest` rad towards or away.
+std::vector<std::vector<RcmCoordinates>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
+                                                               double steepest_rad);
+
+}  // namespace lapservo::acceptance
