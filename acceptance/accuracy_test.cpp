@@ -246,8 +246,8 @@ TEST(Rendered, DistortedLens) {
 TEST(Rendered, OtherDesignsResponsesAndSizes) {
   RenderedSet set = usual_set(34, 8);
   set.rig.camera.response = {Response::Kind::power, 2.2};
-  set.rig.instruments[0].marker.bands_upper_m = {0.005, 0.006, 0.013};
-  set.rig.instruments[0].marker.bands_lower_m = {0.011, 0.008, 0.005};
+  set.rig.instruments[0].marker.bands_upper_m = {0.004, 0.004, 0.016};
+  set.rig.instruments[0].marker.bands_lower_m = {0.010, 0.008, 0.006};
   set.rig.instruments[0].marker.seam_rad = 1.3;
   set.rig.instruments[0].marker.hues_deg = {150, 220, 285};
   expect_found_within(score_single(rendered_frames(set)), 1, 6 * mrad);

@@ -20,9 +20,11 @@ constexpr int most_lines = 96, fewest_lines = 12, stations = 28;
 constexpr double line_reach = 0.9;  // of the visible half width: beyond, light and resolution are gone
 // What the model leaves out (shading across the blur, lens, print): of every single measurement, and of each boundary
 // and side as a whole.
-constexpr double single_floor_px = 0.05, common_boundary_px = 0.01, common_side_px = 0.02;
+constexpr double single_floor_px = 0.04, common_boundary_px = 0.008, common_side_px = 0.02;
 // And as a share of the blur beyond a lens's: motion and defocus do not blur like a Gaussian.
 constexpr double usual_blur_px = 1.2, common_share_of_blur = 0.05;
+// Where most of a marker is hidden, some of what was taken for its boundaries are the blood's.
+constexpr double usual_share = 0.7, doubt_of_hidden = 4;
 constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
 // Interpolated samples are smoother than the pixels are noisy.
 constexpr double interpolation_noise = 1.6;
@@ -30,7 +32,7 @@ constexpr double interpolation_noise = 1.6;
 // The film that carries the marker stands out from the shaft. Seen from beyond an end, its edge shows too and moves the
 // apparent end inwards (towards the axis) by the film's thickness, as far as the edge is lit compared with the outside:
 // diffusely from the camera, with some ambient light. The rig does not say how thick it is, so each fit estimates it.
-constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.05e-3;
+constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.04e-3;
 constexpr double ambient_share = 0.18, most_lit = 2;
 
 struct Measurement {
@@ -371,6 +373,11 @@ std::optional<UnknownMatrix> covariance_of(const std::vector<Measurement>& measu
 
 }  // namespace
 
+double FineFit::located_share() const {
+  const int located = used[0] + used[1] + used[2] + used[3];
+  return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
+}
+
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur) {
   constexpr std::array<Effort, 3> efforts{{{5, 3, 3}, {2, 2, 3}, {2, 1, 1}}};
   FineFit fit;
@@ -402,7 +409,8 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
   const auto covariance = covariance_of(pass.measurements, fit.unknowns.size(), fit.inlier_rms_sigmas, fit.blur);
   if (!covariance) return fit;
-  fit.covariance = *covariance;
+  const double doubt = 1 + doubt_of_hidden * std::max(0.0, usual_share - fit.located_share());
+  fit.covariance = doubt * doubt * *covariance;
   fit.converged = true;
   return fit;
 }

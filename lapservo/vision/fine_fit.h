@@ -24,6 +24,9 @@ struct FineFit {
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
   int sides_used = 0;
   double inlier_rms_sigmas = 0;  ///< of the boundaries' residuals
+
+  /// Of the boundary points that the image could show, the share that was located.
+  double located_share() const;
 };
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a

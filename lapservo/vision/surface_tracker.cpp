@@ -6,6 +6,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/vision/agreement_search.h"
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/light_image.h"
@@ -16,6 +17,8 @@ namespace {
 
 constexpr int grid_px = 8, least_samples = 8, most_blobs = 6;
 constexpr double least_rotation_score = 0.5, rival_ratio = 0.93;
+// To contradict camera_from_rcm, the marker must be seen well.
+constexpr double share_against_registration = 0.7;
 
 // Standard deviation of tau: gamma moves with the pose, psi is its last unknown.
 double sigma_tau(const Scene& scene, const FineFit& fit, double tau_rad) {
@@ -153,6 +156,20 @@ SurfaceTracker::Found SurfaceTracker::detect(const Scene& scene, const LightImag
   return best;
 }
 
+SurfaceTracker::Found SurfaceTracker::detect_occluded(const Scene& scene, const LightImage& light,
+                                                      const std::vector<Blob>& blobs,
+                                                      const Rigid3& camera_from_rcm) const {
+  Found best;
+  for (const Blob& blob : blobs)
+    for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm))
+      for (const PoseUnknowns& candidate : search_agreement(scene, start, camera_from_rcm)) {
+        const FineFit fit = fit_finely(scene, light, candidate, {});
+        if (judge(scene, fit) != Status::ok) continue;
+        if (!best.fit || fit.inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = {Status::ok, fit};
+      }
+  return best;
+}
+
 const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) {
   const ImageView image(image_bgr);
   const LightImage light(image, light_);
@@ -171,7 +188,12 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
       }
       found = detect(scene, light, *blobs, camera_from_rcm);
       if (!found.fit && camera_from_rcm)
-        if (Found free = detect(scene, light, *blobs, std::nullopt); free.fit) found = std::move(free);
+        if (Found occluded = detect_occluded(scene, light, *blobs, *camera_from_rcm); occluded.fit)
+          found = std::move(occluded);
+      if (!found.fit && camera_from_rcm)
+        if (Found free = detect(scene, light, *blobs, std::nullopt);
+            free.fit && free.fit->located_share() > share_against_registration)
+          found = std::move(free);
     }
     observations_[i] = {};
     observations_[i].status = found.status;

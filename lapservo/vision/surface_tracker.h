@@ -40,6 +40,8 @@ class SurfaceTracker {
   Found follow(const Scene& scene, const LightImage& light, const Memory& memory) const;
   Found detect(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
                const std::optional<Rigid3>& camera_from_rcm) const;
+  Found detect_occluded(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
+                        const Rigid3& camera_from_rcm) const;
   Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start) const;
   void remember(std::size_t instrument, const FineFit& fit);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;

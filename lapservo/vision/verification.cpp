@@ -1,27 +1,38 @@
 #include "lapservo/vision/verification.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 
 namespace lapservo {
 namespace {
 
-constexpr double largest_sigma_psi_rad = 0.03;
-constexpr double least_matching = 0.3, most_wrong = 0.12, most_beyond = 0.5;
+constexpr double largest_sigma_psi_rad = 0.02;  // five sigma: a tenth of a radian
+constexpr double least_matching = 0.3, most_wrong = 0.05, most_beyond = 0.5, most_beside = 0.2;
 constexpr double least_in_image = 0.25;
 
 }  // namespace
 
 ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
   constexpr int azimuths = 13, places = 40, margin = 5;
+  constexpr double beside_radii = 1.2;
   ColorAgreement agreement;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return agreement;
-  const double length_m = scene.marker.length_m(), guard_m = 0.02 * length_m;
-  int total = 0, inside = 0, matching = 0, wrong = 0, outer = 0, beyond = 0;
+  const double length_m = scene.marker.length_m(), guard_m = 0.02 * length_m, ring_m = 0.1 * length_m;
+  int total = 0, inside = 0, matching = 0, wrong = 0, outer = 0, beyond = 0, flank = 0, beside = 0;
+  std::array<int, 2> ring{}, spilled{};
+  const auto class_of = [&](double radius_m, double azimuth_rad, double along_m) {
+    const Eigen::Vector3d point = pose.camera_from_unrolled * surface_point(radius_m, azimuth_rad, along_m);
+    return point.z() > 1e-3 ? scene.class_at(scene.camera.raw_from_point(point)) : Scene::outside;
+  };
+  const auto is_ours = [&](std::uint8_t color) {
+    return color == scene.bands[0] || color == scene.bands[1] || color == scene.bands[2];
+  };
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = view->facing_azimuth_rad + 0.8 * view->half_visible_rad * (2.0 * i / (azimuths - 1) - 1);
     const auto ends_m = boundaries_m(scene.marker, azimuth_rad - pose.psi_rad - scene.marker.seam_rad);
@@ -33,12 +44,13 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
       const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin();
       const bool on_marker = band >= 1 && band <= 3;
       total += on_marker;
-      const Eigen::Vector3d point =
-          pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, along_m);
-      const std::uint8_t color = point.z() > 1e-3 ? scene.class_at(scene.camera.raw_from_point(point)) : Scene::outside;
+      const std::uint8_t color = class_of(scene.marker.radius_m(), azimuth_rad, along_m);
       if (color == Scene::outside) continue;
-      const bool ours = color == scene.bands[0] || color == scene.bands[1] || color == scene.bands[2];
+      const bool ours = is_ours(color);
       if (!on_marker) {
+        const std::size_t end = band < 1 ? 0 : 1;
+        const double past_m = end == 0 ? ends_m[0] - along_m : along_m - ends_m[3];
+        if (past_m < ring_m) ++ring[end], spilled[end] += color == scene.bands[2 * end];
         ++outer, beyond += ours;
         continue;
       }
@@ -47,33 +59,44 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
       matching += match, wrong += ours && !match;
     }
   }
+  for (const double side : {-1.0, 1.0})
+    for (int k = 0; k < places; ++k) {
+      const std::uint8_t color = class_of(beside_radii * scene.marker.radius_m(),
+                                          view->facing_azimuth_rad + side * pi / 2, length_m * (k + 0.5) / places);
+      if (color != Scene::outside) ++flank, beside += is_ours(color);
+    }
   const auto share = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
-  return {share(matching, inside), share(wrong, inside), share(inside, total), share(beyond, outer)};
+  return {share(matching, inside), share(wrong, inside),
+          share(inside, total),    share(beyond, outer),
+          share(beside, flank),    std::max(share(spilled[0], ring[0]), share(spilled[1], ring[1]))};
 }
 
 Status judge(const Scene& scene, const FineFit& fit) {
   if (!fit.converged) return Status::poor_fit;
   const ColorAgreement agreement = color_agreement(scene, fit.unknowns.pose());
   if (agreement.in_image < least_in_image) return Status::cut;
-  if (agreement.wrong > most_wrong || agreement.beyond > most_beyond) return Status::poor_fit;
+  if (agreement.wrong > most_wrong || agreement.beyond > most_beyond || agreement.beside > most_beside)
+    return Status::poor_fit;
   if (agreement.matching < least_matching) return Status::occluded;
   const int inner_used = fit.used[1] + fit.used[2], outer_used = fit.used[0] + fit.used[3];
   if (inner_used < std::max(6, fit.lines / 10) || outer_used < 4) return Status::occluded;
-  // Without the RCM, only both ends together fix the depth and with it everything else.
-  constexpr int fewest_of_an_end = 6;
-  if (!fit.unknowns.q() && std::min(fit.used[0], fit.used[3]) < fewest_of_an_end)
+  const double share = fit.located_share();
+  // Without the RCM, only both ends together fix the depth and with it everything else. With it they confirm what is
+  // left of a hidden marker.
+  constexpr double mostly_hidden = 0.5, partly_hidden = 0.7, most_spilled = 0.12;
+  const bool needs_both_ends = !fit.unknowns.q() || (share < mostly_hidden && agreement.in_image > 0.98);
+  if (needs_both_ends && std::min(fit.used[0], fit.used[3]) < std::max(6, fit.lines / 12))
     return agreement.in_image < 0.98 ? Status::cut : Status::occluded;
-  const int located = inner_used + outer_used;
-  const int expected = fit.in_image[0] + fit.in_image[1] + fit.in_image[2] + fit.in_image[3];
   // Wrong fits agree with few boundaries, and badly; blood leaves few, which agree well; compression leaves many,
   // noisy.
-  const double share = static_cast<double>(located) / std::max(1, expected);
-  if (share < 0.2 || fit.inlier_rms_sigmas > 1.2 + 1.5 * share) return Status::poor_fit;
-  // Smeared by motion across, the sides hold the shaft's place no more.
+  if (share < partly_hidden && agreement.spilled > most_spilled) return Status::poor_fit;
+  const double largest_rms_sigmas = 1.3 + 5.5 * std::clamp(share - 0.7, 0.0, 0.2);
+  if (share < 0.2 || fit.inlier_rms_sigmas > largest_rms_sigmas) return Status::poor_fit;
+  // Smeared by motion across, the sides hold the shaft's place no more; and few boundaries need the sides beside them.
   constexpr double smeared_px = 2.5;
   constexpr int fewest_sides = 8;
-  if (std::max(fit.blur.boundaries_px, fit.blur.sides_px) > smeared_px && fit.sides_used < fewest_sides)
-    return Status::uncertain;
+  const bool smeared = std::max(fit.blur.boundaries_px, fit.blur.sides_px) > smeared_px;
+  if ((smeared || share < mostly_hidden) && fit.sides_used < fewest_sides) return Status::uncertain;
   const Eigen::Index psi = fit.unknowns.size() - 1;
   if (!(std::sqrt(fit.covariance(psi, psi)) < largest_sigma_psi_rad)) return Status::uncertain;
   return Status::ok;

@@ -13,6 +13,8 @@ struct ColorAgreement {
   double wrong = 0;     ///< share that has another of the marker's colours
   double in_image = 0;  ///< share of the visible surface that lies inside the image
   double beyond = 0;    ///< share of the shaft just beyond both ends that has a marker's colour
+  double beside = 0;    ///< share of the places just outside both sides that has a marker's colour
+  double spilled = 0;   ///< share of the ring just beyond an end that has that end's colour, of both the larger
 };
 ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose);
 

@@ -1,0 +1,139 @@
+#include "lapservo/vision/agreement_search.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/cylinder.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double hidden = -0.35, wrong = -1, beside = -1, rightly_empty = 0.15;
+
+// Colours on the marker, beyond its ends and just outside its sides against what should be there.
+double agreement(const Scene& scene, const ShaftPose& pose) {
+  constexpr int lines = 9, places = 36, margin = 6;
+  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
+  if (!view) return -1e9;
+  const double length_m = scene.marker.length_m(), radius_m = scene.marker.radius_m();
+  const auto color_at = [&](double radius, double azimuth_rad, double along_m) {
+    const Eigen::Vector3d point = pose.camera_from_unrolled * surface_point(radius, azimuth_rad, along_m);
+    return point.z() > 1e-3 ? scene.class_at(scene.camera.raw_from_point(point)) : Scene::outside;
+  };
+  const auto ours = [&](std::uint8_t color) {
+    return color == scene.bands[0] || color == scene.bands[1] || color == scene.bands[2];
+  };
+  double score = 0;
+  const auto count_empty = [&](std::uint8_t color) {
+    if (color != Scene::outside) score += ours(color) ? beside : rightly_empty;
+  };
+  for (int i = 0; i < lines; ++i) {
+    const double azimuth_rad = view->facing_azimuth_rad + 0.85 * view->half_visible_rad * (2.0 * i / (lines - 1) - 1);
+    const auto ends_m = boundaries_m(scene.marker, azimuth_rad - pose.psi_rad - scene.marker.seam_rad);
+    for (int k = -margin; k < places + margin; ++k) {
+      const double along_m = length_m * (k + 0.5) / places;
+      const std::uint8_t color = color_at(radius_m, azimuth_rad, along_m);
+      if (color == Scene::outside) continue;
+      const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin();
+      if (band < 1 || band > 3) {
+        count_empty(color);
+      } else if (color == scene.bands[static_cast<std::size_t>(band - 1)]) {
+        score += 1;
+      } else {
+        score += ours(color) ? wrong : hidden;
+      }
+    }
+  }
+  for (const double side : {-1.0, 1.0})
+    for (const double radius : {1.08, 1.2})
+      for (int k = 0; k < places; ++k)
+        count_empty(
+            color_at(radius * radius_m, view->facing_azimuth_rad + side * pi / 2, length_m * (k + 0.5) / places));
+  return score;
+}
+
+// A configuration in the terms of the image: the shaft's direction turned across and along the line of sight.
+struct ImageTerms {
+  Rigid3 camera_from_rcm;
+  Eigen::Vector3d axis, across, away;  // in the camera
+  Eigen::Vector4d values;              // turns across and away [rad], rho [m], psi [rad]
+
+  std::optional<PoseUnknowns> unknowns(const Eigen::Vector4d& at) const {
+    const Eigen::Vector3d direction = (axis + at[0] * across + at[1] * away).normalized();
+    const auto q = configuration_through(camera_from_rcm, camera_from_rcm.translation + at[2] * direction);
+    if (!q) return std::nullopt;
+    return PoseUnknowns::rcm(camera_from_rcm, {q->theta_rad, q->phi_rad, q->rho_m, at[3]});
+  }
+};
+
+ImageTerms terms_of(const Rigid3& camera_from_rcm, const PoseUnknowns& start) {
+  const Eigen::Vector3d place = start.pose().camera_from_unrolled.translation;
+  ImageTerms terms{camera_from_rcm, (place - camera_from_rcm.translation).normalized(), {}, {}, {}};
+  terms.across = place.cross(terms.axis).normalized();
+  terms.away = terms.axis.cross(terms.across).normalized();
+  terms.values = {0, 0, (place - camera_from_rcm.translation).norm(), start.pose().psi_rad};
+  return terms;
+}
+
+// Tries the axes and random directions both ways, keeps what is better, and halves the steps when nothing is.
+double climb(const Scene& scene, ImageTerms& terms, Eigen::Vector4d steps, Random& random) {
+  constexpr int halvings = 5, directions = 14, most_moves = 8;
+  const auto score_at = [&](const Eigen::Vector4d& at) {
+    const auto unknowns = terms.unknowns(at);
+    return unknowns ? agreement(scene, unknowns->pose()) : -1e9;
+  };
+  double best = score_at(terms.values);
+  for (int halving = 0; halving < halvings; ++halving, steps /= 2) {
+    bool moved = true;
+    for (int move = 0; moved && move < most_moves; ++move) {
+      moved = false;
+      for (int i = 0; i < directions; ++i) {
+        Eigen::Vector4d direction = Eigen::Vector4d::Unit(i % 4);
+        if (i >= 4) direction = Eigen::Vector4d(random.normal(), random.normal(), random.normal(), random.normal());
+        for (const double sign : {1.0, -1.0}) {
+          const Eigen::Vector4d trial = terms.values + sign * steps.cwiseProduct(direction);
+          const double score = score_at(trial);
+          if (score <= best) continue;
+          best = score, terms.values = trial, moved = true;
+          break;
+        }
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<PoseUnknowns> search_agreement(const Scene& scene, const PoseUnknowns& start,
+                                           const Rigid3& camera_from_rcm) {
+  constexpr int rotations = 6;
+  struct Result {
+    double score;
+    PoseUnknowns unknowns;
+  };
+  std::vector<Result> results;
+  Random random(1);
+  for (int i = 0; i < rotations; ++i) {
+    ImageTerms terms = terms_of(camera_from_rcm, start);
+    terms.values[3] = two_pi * i / rotations;
+    const double score = climb(scene, terms, {0.03, 0.12, 0.006, 0.5}, random);
+    if (const auto unknowns = terms.unknowns(terms.values)) results.push_back({score, *unknowns});
+  }
+  std::sort(results.begin(), results.end(), [](const Result& a, const Result& b) { return a.score > b.score; });
+  std::vector<PoseUnknowns> best;
+  for (const Result& result : results) {
+    constexpr double same_rad = 0.2;
+    const bool known = std::any_of(best.begin(), best.end(), [&](const PoseUnknowns& other) {
+      return std::abs(wrap_pi(other.pose().psi_rad - result.unknowns.pose().psi_rad)) < same_rad;
+    });
+    if (!known && best.size() < 2) best.push_back(result.unknowns);
+  }
+  return best;
+}
+
+}  // namespace lapservo
