@@ -1,1 +1,53 @@
+#include "lapservo/core/angles.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
 #include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::uint64_t seed = 11;
+
+double angular_distance(double a_rad, double b_rad) {
+  return std::abs(std::remainder(a_rad - b_rad, two_pi));
+}
+
+TEST(Angles, WrappingKeepsTheAngleAndLandsInTheInterval) {
+  SCOPED_TRACE(seed);
+  Random random(seed);
+  for (int i = 0; i < 10000; ++i) {
+    const double angle_rad = random.uniform(-100, 100);
+    const double centred = wrap_pi(angle_rad), positive = wrap_two_pi(angle_rad);
+    ASSERT_GE(centred, -pi) << angle_rad;
+    ASSERT_LT(centred, pi) << angle_rad;
+    ASSERT_GE(positive, 0) << angle_rad;
+    ASSERT_LT(positive, two_pi) << angle_rad;
+    ASSERT_LT(angular_distance(centred, angle_rad), 1e-12) << angle_rad;
+    ASSERT_LT(angular_distance(positive, angle_rad), 1e-12) << angle_rad;
+    ASSERT_EQ(wrap_pi(centred), centred);
+    ASSERT_EQ(wrap_two_pi(positive), positive);
+  }
+}
+
+TEST(Angles, TheEndsOfTheIntervalsBelongToTheirBeginnings) {
+  EXPECT_EQ(wrap_pi(pi), -pi);
+  EXPECT_EQ(wrap_pi(-pi), -pi);
+  EXPECT_EQ(wrap_pi(3 * pi), -pi);
+  EXPECT_EQ(wrap_two_pi(two_pi), 0);
+  EXPECT_EQ(wrap_two_pi(-two_pi), 0);
+  EXPECT_LT(wrap_two_pi(-std::numeric_limits<double>::min()), two_pi);
+}
+
+TEST(Angles, DegreesAndRadiansAreInverse) {
+  EXPECT_DOUBLE_EQ(rad_from_deg(180), pi);
+  for (double angle_deg = -720; angle_deg <= 720; angle_deg += 7.5)
+    EXPECT_NEAR(deg_from_rad(rad_from_deg(angle_deg)), angle_deg, 1e-12);
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -18,7 +18,8 @@ fs::path temporary_name(const fs::path& path) {
 }
 
 AtomicFile::AtomicFile(fs::path path) : path_(std::move(path)), temporary_(temporary_name(path_)) {
-  if (fs::is_directory(path_)) throw InputError(path_.string(), "is a folder, expected a file to write");
+  std::error_code ignored;
+  if (fs::is_directory(path_, ignored)) throw InputError(path_.string(), "is a folder, expected a file to write");
   errno = 0;
   stream_.open(temporary_, std::ios::binary | std::ios::trunc);
   if (!stream_)

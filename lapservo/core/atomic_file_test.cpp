@@ -1,1 +1,86 @@
+#include "lapservo/core/atomic_file.h"
+
+#include <filesystem>
+#include <string>
+
 #include <gtest/gtest.h>
+
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+using testing::input_error;
+using testing::read_file;
+
+int files_in(const testing::TemporaryFolder& folder) {
+  return static_cast<int>(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()));
+}
+
+TEST(AtomicFile, AppearsWholeOnCommitAndNotBefore) {
+  const testing::TemporaryFolder folder;
+  const fs::path path = folder / "out.csv";
+  {
+    AtomicFile file(path);
+    file.stream() << "a,b\n";
+    file.stream().flush();
+    EXPECT_FALSE(fs::exists(path));
+    file.commit();
+    EXPECT_EQ(read_file(path), "a,b\n");
+  }
+  EXPECT_EQ(read_file(path), "a,b\n");
+  EXPECT_EQ(files_in(folder), 1);
+}
+
+TEST(AtomicFile, WithoutCommitWhatStoodThereStays) {
+  const testing::TemporaryFolder folder;
+  const fs::path path = folder / "out.csv";
+  testing::write_file(path, "old");
+  { AtomicFile(path).stream() << "new"; }
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(files_in(folder), 1);
+}
+
+TEST(AtomicFile, CommitReplacesWhatStoodThere) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "out.csv", "something longer");
+  AtomicFile file(folder / "out.csv");
+  file.stream() << "new";
+  file.commit();
+  EXPECT_EQ(read_file(folder / "out.csv"), "new");
+}
+
+TEST(AtomicFile, RefusesAFolderAndAMissingFolderAtConstruction) {
+  const testing::TemporaryFolder folder;
+  EXPECT_EQ(input_error([&] { AtomicFile(folder.path()); }),
+            folder.path().string() + ": is a folder, expected a file to write");
+  EXPECT_EQ(input_error([&] { AtomicFile(folder / "none/out.csv"); }),
+            (folder / "none/out.csv").string() + ": can't be written: No such file or directory");
+  EXPECT_EQ(files_in(folder), 0);
+}
+
+TEST(AtomicFile, RefusesANameThatNoFileCanHave) {
+  const testing::TemporaryFolder folder;
+  const std::string path = (folder / std::string(300, 'x')).string();
+  EXPECT_EQ(input_error([&] { AtomicFile file(path); }), path + ": can't be written: File name too long");
+}
+
+TEST(AtomicFile, ATornWriteIsAnErrorAndLeavesNothing) {
+  const testing::TemporaryFolder folder;
+  AtomicFile file(folder / "out.csv");
+  file.stream().setstate(std::ios::failbit);
+  EXPECT_EQ(input_error([&] { file.commit(); }),
+            (folder / "out.csv").string() + ": could not be written to its end (is the disk full?)");
+  EXPECT_FALSE(fs::exists(folder / "out.csv"));
+}
+
+TEST(TemporaryName, StandsBesideTheFileAndKeepsItsExtension) {
+  const fs::path name = temporary_name("results/run.avi");
+  EXPECT_EQ(name.parent_path(), "results");
+  EXPECT_EQ(name.extension(), ".avi");
+  EXPECT_NE(name, fs::path("results/run.avi"));
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <sstream>
+#include <system_error>
 #include <utility>
 
 #include "lapservo/core/error.h"
@@ -36,14 +37,15 @@ std::string at_line(const std::string& source, std::size_t line) {
 
 std::optional<double> parse_finite(std::string_view text) {
   double value = 0;
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);  // which from_chars refuses
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
   return value;
 }
 
 CsvTable CsvTable::read(const std::filesystem::path& path) {
-  if (std::filesystem::is_directory(path)) throw InputError(path.string(), "is a folder, expected a CSV file");
+  std::error_code ignored;
+  if (std::filesystem::is_directory(path, ignored)) throw InputError(path.string(), "is a folder, expected a CSV file");
   std::ifstream file(path, std::ios::binary);
   if (!file) throw InputError(path.string(), "can't be opened, expected a CSV file");
   std::ostringstream text;
@@ -53,6 +55,8 @@ CsvTable CsvTable::read(const std::filesystem::path& path) {
 
 CsvTable CsvTable::parse(std::string_view text, std::string source) {
   if (text.find('\0') != std::string_view::npos) throw InputError(source, "holds NUL bytes, expected CSV text");
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";  // spreadsheets write it
+  if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   CsvTable table;
   table.source_ = std::move(source);
   for (std::size_t line_number = 1; !text.empty(); ++line_number) {
@@ -66,8 +70,9 @@ CsvTable CsvTable::parse(std::string_view text, std::string source) {
       continue;
     }
     if (fields.size() != table.header_.size())
-      throw InputError(at_line(table.source_, line_number), "row", std::to_string(fields.size()) + " fields",
-                       std::to_string(table.header_.size()) + " as in the header");
+      throw InputError(at_line(table.source_, line_number),
+                       "has " + std::to_string(fields.size()) + " fields, expected " +
+                           std::to_string(table.header_.size()) + " as the header has");
     table.rows_.push_back(std::move(fields));
     table.line_numbers_.push_back(line_number);
   }

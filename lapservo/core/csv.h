@@ -9,7 +9,8 @@
 
 namespace lapservo {
 
-/// A comma-separated table with one header line, as all our files have: no quoting, CRLF tolerated. Every row has as
+/// A comma-separated table with one header line, as all our files have: no quoting; CRLF and a byte order mark are
+/// tolerated. Every row has as
 /// many fields as the header. Errors name the file, the line and the column.
 class CsvTable {
  public:

@@ -1,1 +1,103 @@
+#include "lapservo/core/csv.h"
+
+#include <cstdint>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
 #include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+using testing::input_error;
+
+std::string parse_error(std::string_view text) {
+  return input_error([&] { CsvTable::parse(text, "t.csv"); });
+}
+
+TEST(CsvTable, NumbersComeBackAsTheyWereWritten) {
+  constexpr std::uint64_t seed = 13;
+  Random random(seed);
+  std::vector<double> written;
+  std::ostringstream text;
+  text.precision(std::numeric_limits<double>::max_digits10);
+  text << "x,y\n";
+  for (int row = 0; row < 200; ++row) {
+    for (int column = 0; column < 2; ++column)
+      written.push_back(random.normal() * std::pow(10.0, random.uniform(-100, 100)));
+    text << written[written.size() - 2] << ',' << written.back() << '\n';
+  }
+  const CsvTable table = CsvTable::parse(text.view(), "t.csv");
+  ASSERT_EQ(table.rows(), 200U);
+  for (std::size_t row = 0; row < 200; ++row) {
+    EXPECT_EQ(table.number(row, "x"), written[2 * row]) << "seed " << seed;
+    EXPECT_EQ(table.number(row, "y"), written[2 * row + 1]) << "seed " << seed;
+  }
+}
+
+TEST(CsvTable, ToleratesCarriageReturnsBlanksEmptyLinesAByteOrderMarkAndNoLastNewline) {
+  const CsvTable table = CsvTable::parse(
+      "\xEF\xBB\xBF"
+      "name , x\r\n\r\nPSM1,\t1.5 \r\n\nPSM2,+2",
+      "t.csv");
+  ASSERT_EQ(table.rows(), 2U);
+  EXPECT_TRUE(table.has("name"));
+  EXPECT_TRUE(table.has("x"));
+  EXPECT_FALSE(table.has("y"));
+  EXPECT_EQ(table.text(0, "name"), "PSM1");
+  EXPECT_EQ(table.number(0, "x"), 1.5);
+  EXPECT_EQ(table.number(1, "x"), 2);
+}
+
+TEST(CsvTable, AnEmptyFieldIsUnknownNotZero) {
+  const CsvTable table = CsvTable::parse("a,b,c\n1,,\n", "t.csv");
+  EXPECT_EQ(table.number_or_empty(0, "a"), 1);
+  EXPECT_EQ(table.number_or_empty(0, "b"), std::nullopt);
+  EXPECT_EQ(table.number_or_empty(0, "c"), std::nullopt);
+  EXPECT_EQ(input_error([&] { table.number(0, "b"); }), "t.csv:2: b: is empty, expected a finite number");
+}
+
+TEST(CsvTable, ComplaintsNameFileLineColumnValueAndExpectation) {
+  EXPECT_EQ(parse_error(""), "t.csv: is empty, expected a CSV file with a header line");
+  EXPECT_EQ(parse_error("\n \r\n"), "t.csv: is empty, expected a CSV file with a header line");
+  EXPECT_EQ(parse_error("a,b\n1,2\n\n3\n"), "t.csv:4: has 1 fields, expected 2 as the header has");
+  EXPECT_EQ(parse_error("a,b\n1,2,3\n"), "t.csv:2: has 3 fields, expected 2 as the header has");
+  EXPECT_EQ(parse_error(std::string_view("a,b\n1,\0\n", 8)), "t.csv: holds NUL bytes, expected CSV text");
+  const CsvTable table = CsvTable::parse("a,b\n1,2\n\nfast,nan\n", "t.csv");
+  EXPECT_EQ(input_error([&] { table.number(1, "a"); }), "t.csv:4: a: is fast, expected a finite number");
+  EXPECT_EQ(input_error([&] { table.number_or_empty(1, "b"); }), "t.csv:4: b: is nan, expected a finite number");
+  EXPECT_EQ(input_error([&] { table.text(0, "c"); }), "t.csv: has no column 'c'");
+}
+
+TEST(CsvTable, AComplaintIsOnePrintableLineWhateverTheFieldHolds) {
+  const CsvTable table = CsvTable::parse("a\n\x1b[31m\v" + std::string(500, 'x') + "\n", "t.csv");
+  const std::string error = input_error([&] { table.number(0, "a"); });
+  EXPECT_LT(error.size(), 200U);
+  for (const char c : error) EXPECT_GE(static_cast<unsigned char>(c), ' ');
+}
+
+TEST(CsvTable, ReadsFilesAndNamesThoseItCannotRead) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "q.csv", "x\n4\n");
+  EXPECT_EQ(CsvTable::read(folder / "q.csv").number(0, "x"), 4);
+  const auto error = [&](const std::filesystem::path& path) { return input_error([&] { CsvTable::read(path); }); };
+  EXPECT_EQ(error(folder / "none.csv"), (folder / "none.csv").string() + ": can't be opened, expected a CSV file");
+  EXPECT_EQ(error(folder.path()), folder.path().string() + ": is a folder, expected a CSV file");
+  EXPECT_NE(error(folder / std::string(300, 'x')), "");
+}
+
+TEST(ParseFinite, TakesTheWholeTextAsOneFiniteNumberOrNothing) {
+  EXPECT_EQ(parse_finite("-1.5e-3"), -1.5e-3);
+  EXPECT_EQ(parse_finite("+7"), 7);
+  EXPECT_EQ(parse_finite("7."), 7);
+  for (const char* text : {"", "+", "-", "+-7", "++7", " 7", "7 ", "7m", "1,5", "0x10", "inf", "-inf", "nan", "1e999"})
+    EXPECT_EQ(parse_finite(text), std::nullopt) << "'" << text << "'";
+}
+
+}  // namespace
+}  // namespace lapservo

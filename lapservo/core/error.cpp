@@ -5,20 +5,27 @@
 namespace lapservo {
 namespace {
 
-// Values come from files that may hold anything: the message stays one printable line.
-std::string one_line(std::string_view text) {
+// Names and values come from files that may hold anything: the message stays one printable line.
+std::string printable(std::string text) {
+  const auto is_control = [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 0x7f; };
+  std::replace_if(text.begin(), text.end(), is_control, ' ');
+  return text;
+}
+
+// Not cut within a UTF-8 character, whose later bytes are 10xxxxxx.
+std::string shortened(std::string_view text) {
   constexpr std::size_t longest = 80;
-  std::string line(text.substr(0, longest));
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return static_cast<unsigned char>(c) < ' ' || c == 0x7f; }, ' ');
-  return text.size() > longest ? line + "..." : line;
+  if (text.size() <= longest) return std::string(text);
+  std::size_t end = longest;
+  while (end > longest - 4 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+  return std::string(text.substr(0, end)) + "...";
 }
 
 std::string message(std::string_view source, std::string_view field, std::string_view value,
                     std::string_view expected) {
   std::string text(source);
   if (!field.empty()) text.append(": ").append(field);
-  text.append(": is ").append(value.empty() ? "empty" : one_line(value)).append(", expected ").append(expected);
+  text.append(": is ").append(value.empty() ? "empty" : shortened(value)).append(", expected ").append(expected);
   return text;
 }
 
@@ -26,9 +33,9 @@ std::string message(std::string_view source, std::string_view field, std::string
 
 InputError::InputError(std::string_view source, std::string_view field, std::string_view value,
                        std::string_view expected)
-    : std::runtime_error(message(source, field, value, expected)) {}
+    : std::runtime_error(printable(message(source, field, value, expected))) {}
 
 InputError::InputError(std::string_view source, std::string_view problem)
-    : std::runtime_error(std::string(source).append(": ").append(problem)) {}
+    : std::runtime_error(printable(std::string(source).append(": ").append(problem))) {}
 
 }  // namespace lapservo

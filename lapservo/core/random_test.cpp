@@ -1,1 +1,80 @@
+#include "lapservo/core/random.h"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
 #include <gtest/gtest.h>
+
+namespace lapservo {
+namespace {
+
+constexpr std::uint64_t seed = 12;
+constexpr int draws = 200000;
+
+struct Moments {
+  double mean, variance, kurtosis;
+};
+
+template <typename Draw>
+Moments moments(const Draw& draw) {
+  double s1 = 0, s2 = 0, s4 = 0;
+  for (int i = 0; i < draws; ++i) {
+    const double x = draw();
+    s1 += x, s2 += x * x, s4 += x * x * x * x;
+  }
+  return {s1 / draws, s2 / draws, s4 / s2 / s2 * draws};
+}
+
+// The reference values for the seed 1234567: experiments that others repeat from a seed depend on them.
+TEST(Random, IsSplitmix64) {
+  Random random(1234567);
+  for (const std::uint64_t expected : {6457827717110365317ULL, 3203168211198807973ULL, 9817491932198370423ULL})
+    EXPECT_EQ(random.bits(), expected);
+}
+
+TEST(Random, TheSeedDecidesTheSequence) {
+  Random a(seed), same(seed), other(seed + 1);
+  bool all_equal = true;
+  for (int i = 0; i < 100; ++i) {
+    const double value = a.normal();
+    EXPECT_EQ(value, same.normal());
+    all_equal = all_equal && value == other.normal();
+  }
+  EXPECT_FALSE(all_equal);
+}
+
+TEST(Random, UniformFillsItsIntervalEvenly) {
+  Random random(seed);
+  std::array<int, 10> counts{};
+  for (int i = 0; i < draws; ++i) {
+    const double x = random.uniform(-2, 3);
+    ASSERT_GE(x, -2);
+    ASSERT_LT(x, 3);
+    ++counts.at(static_cast<std::size_t>((x + 2) * 2));
+  }
+  for (const int count : counts) EXPECT_NEAR(count, draws / 10, 6 * std::sqrt(draws * 0.1 * 0.9)) << "seed " << seed;
+}
+
+TEST(Random, NormalHasTheMomentsOfTheStandardNormal) {
+  Random random(seed);
+  const Moments m = moments([&] { return random.normal(); });
+  const double n = draws;
+  EXPECT_NEAR(m.mean, 0, 5 / std::sqrt(n)) << "seed " << seed;
+  EXPECT_NEAR(m.variance, 1, 5 * std::sqrt(2 / n)) << "seed " << seed;
+  EXPECT_NEAR(m.kurtosis, 3, 5 * std::sqrt(24 / n)) << "seed " << seed;
+}
+
+TEST(Random, SuccessiveNormalsAreUncorrelated) {
+  Random random(seed);
+  double last = random.normal(), sum = 0;
+  for (int i = 0; i < draws; ++i) {
+    const double next = random.normal();
+    sum += last * next;
+    last = next;
+  }
+  EXPECT_NEAR(sum / draws, 0, 5 / std::sqrt(draws)) << "seed " << seed;
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::testing {
+
+/// What the InputError that `call` throws says; another exception passes, and none gives an empty text.
+template <typename Call>
+std::string input_error(const Call& call) {
+  try {
+    call();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+}  // namespace lapservo::testing
