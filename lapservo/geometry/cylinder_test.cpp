@@ -1,1 +1,103 @@
+#include "lapservo/geometry/cylinder.h"
+
+#include <cmath>
+#include <cstdint>
+
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::uint64_t seed = 22;
+constexpr double radius_m = 0.0042;
+
+Eigen::Quaterniond random_rotation(Random& random) {
+  return Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized();
+}
+
+// A shaft somewhere before the camera, in any direction.
+Rigid3 random_shaft(Random& random) {
+  return {random_rotation(random),
+          {random.uniform(-0.05, 0.05), random.uniform(-0.05, 0.05), random.uniform(0.05, 0.2)}};
+}
+
+template <typename Law>
+void for_random_shafts(const Law& law) {
+  Random random(seed);
+  for (int i = 0; i < 300; ++i) {
+    SCOPED_TRACE("seed " + std::to_string(seed) + ", shaft " + std::to_string(i));
+    const Rigid3 camera_from_cylinder = random_shaft(random);
+    const auto view = view_cylinder(camera_from_cylinder, radius_m);
+    if (!view) continue;  // the camera sits inside the extended shaft
+    law(camera_from_cylinder, *view, random.uniform(-0.05, 0.05));
+  }
+}
+
+Eigen::Vector3d normal_in_camera(const Rigid3& camera_from_cylinder, double azimuth_rad) {
+  return camera_from_cylinder.rotation * surface_point(1, azimuth_rad, 0);
+}
+
+TEST(Cylinder, SilhouetteRaysAreTangent) {
+  for_random_shafts([](const Rigid3& pose, const CylinderView& view, double along_m) {
+    for (const double side : {-1, 1}) {
+      const double azimuth_rad = view.facing_azimuth_rad + side * view.half_visible_rad;
+      const Eigen::Vector3d point = pose * surface_point(radius_m, azimuth_rad, along_m);
+      EXPECT_NEAR(normal_in_camera(pose, azimuth_rad).dot(point.normalized()), 0, 1e-9);
+    }
+  });
+}
+
+TEST(Cylinder, AzimuthsBetweenTheSilhouettesFaceTheCameraAndOthersDoNot) {
+  for_random_shafts([](const Rigid3& pose, const CylinderView& view, double along_m) {
+    for (double offset_rad = -pi; offset_rad < pi; offset_rad += 0.05) {
+      if (std::abs(std::abs(offset_rad) - view.half_visible_rad) < 1e-6) continue;
+      const double azimuth_rad = view.facing_azimuth_rad + offset_rad;
+      const Eigen::Vector3d point = pose * surface_point(radius_m, azimuth_rad, along_m);
+      EXPECT_EQ(normal_in_camera(pose, azimuth_rad).dot(point) < 0, std::abs(offset_rad) < view.half_visible_rad);
+    }
+  });
+}
+
+TEST(Cylinder, TheFacingGeneratrixIsSeenOnTheAxis) {
+  for_random_shafts([](const Rigid3& pose, const CylinderView& view, double along_m) {
+    const Eigen::Vector3d facing = pose * surface_point(radius_m, view.facing_azimuth_rad, along_m);
+    const Eigen::Vector3d axis_plane = (pose * Eigen::Vector3d(0, 0, 0)).cross(pose * Eigen::Vector3d(0, 0, 0.1));
+    EXPECT_NEAR(facing.normalized().dot(axis_plane.normalized()), 0, 1e-9);
+    EXPECT_LT(normal_in_camera(pose, view.facing_azimuth_rad).dot(facing), 0);
+  });
+}
+
+TEST(Cylinder, TurningTheShaftAboutItsAxisTurnsOnlyTheAzimuth) {
+  for_random_shafts([](const Rigid3& pose, const CylinderView& view, double along_m) {
+    const double angle_rad = 40 * along_m;
+    const Rigid3 turn{Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitZ())), {0, 0, along_m}};
+    const auto turned = view_cylinder(pose * turn, radius_m);
+    ASSERT_TRUE(turned);
+    EXPECT_NEAR(wrap_pi(turned->facing_azimuth_rad + angle_rad - view.facing_azimuth_rad), 0, 1e-9);
+    EXPECT_NEAR(turned->camera_to_axis_m, view.camera_to_axis_m, 1e-12);
+    EXPECT_NEAR(turned->half_visible_rad, view.half_visible_rad, 1e-9);
+  });
+}
+
+TEST(Cylinder, ACameraInsideTheShaftSeesNothing) {
+  const Rigid3 along_the_view{Eigen::Quaterniond::Identity(), {0.004, 0, 0.1}};
+  EXPECT_FALSE(view_cylinder(along_the_view, radius_m));
+  EXPECT_TRUE(view_cylinder(along_the_view, 0.0039));
+}
+
+TEST(Rigid3, InverseAndProductFormAGroup) {
+  Random random(seed);
+  for (int i = 0; i < 100; ++i) {
+    const Rigid3 a_from_b = random_shaft(random), b_from_c = random_shaft(random);
+    const Eigen::Vector3d point(random.normal(), random.normal(), random.normal());
+    EXPECT_LT(((a_from_b * b_from_c) * point - a_from_b * (b_from_c * point)).norm(), 1e-12) << "seed " << seed;
+    EXPECT_LT((a_from_b.inverse() * (a_from_b * point) - point).norm(), 1e-12) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace lapservo
