@@ -57,9 +57,9 @@ std::string decoding_problem(const Marker& marker) {
   if (scale > 1e-6 * length_cubed && lowest_of_quadratic_on_unit_interval(c, sign) > 1e-6 * scale) return {};
   if (scale <= 1e-6 * length_cubed)
     return "the cross-ratio is the same at every rotation: the inner boundaries must slope";
-  const auto value = [&](double t) { return sign * (c[0] + t * (c[1] + t * c[2])); };
-  double turns_at = 0;
-  while (turns_at < 1 && value(turns_at) > 0) turns_at += 1.0 / 360;
+  const auto slope = [&](double t) { return c[0] + t * (c[1] + t * c[2]); };
+  double turns_at = 0;  // l1 l3 / l2 of positive lengths whose sum is constant has no minimum: it rises, then falls
+  while (turns_at < 1 && slope(turns_at) > 0) turns_at += 1.0 / 360;
   char text[160];
   std::snprintf(text, sizeof text,
                 "the cross-ratio turns back near tau = %.2f rad, so that two rotations look the same",

@@ -1,1 +1,246 @@
+#include "lapservo/marker/decoder.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <vector>
+
 #include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/marker/marker.h"
+#include "lapservo/testing/markers.h"
+
+namespace lapservo {
+namespace {
+using testing::marker_with;
+using testing::random_linear_marker;
+using testing::random_marker;
+
+constexpr std::uint64_t seed = 31;
+
+// Where the cross-ratio, sampled finely, first turns back.
+std::optional<double> first_turn_rad(const Marker& marker) {
+  const auto sample = [&](int i) { return cross_ratio_at(marker, (i + 0.5) / 2000 * two_pi); };
+  for (int i = 2; i < 2000; ++i)
+    if ((sample(i) > sample(i - 1)) != (sample(1) > sample(0))) return i / 2000.0 * two_pi;
+  return std::nullopt;
+}
+
+double tau_of(int i) {
+  return (i + 0.5) / 500 * two_pi;
+}
+
+TEST(Marker, BandsAreLinearBetweenTheEdgesOfThePrint) {
+  const Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  const auto upper = boundaries_m(marker, 0), middle = boundaries_m(marker, pi),
+             lower = boundaries_m(marker, two_pi - 1e-9);
+  const std::array<double, 4> at_upper{0, 0.0035, 0.007, 0.024}, at_lower{0, 0.0095, 0.019, 0.024};
+  const auto slopes = boundary_slopes_m(marker);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_NEAR(upper.at(k), at_upper.at(k), 1e-12);
+    EXPECT_NEAR(lower.at(k), at_lower.at(k), 1e-9);
+    EXPECT_NEAR(middle.at(k), (at_upper.at(k) + at_lower.at(k)) / 2, 1e-12);
+    EXPECT_NEAR(slopes.at(k), (at_lower.at(k) - at_upper.at(k)) / two_pi, 1e-12);
+  }
+}
+
+TEST(Marker, CrossRatioIsTheSameInEveryPerspectiveImage) {
+  Random random(seed);
+  for (int i = 0; i < 1000; ++i) {
+    const double l1 = random.uniform(0.1, 1), l2 = random.uniform(0.1, 1), l3 = random.uniform(0.1, 1);
+    const double a = random.uniform(0.5, 2), b = random.uniform(-1, 1), c = random.uniform(-0.2, 0.5);
+    const auto image = [&](double x) { return (a * x + b) / (c * x + 1); };
+    if (std::abs(a - b * c) < 0.1) continue;  // the line is seen end on
+    const std::array<double, 4> e{image(0), image(l1), image(l1 + l2), image(l1 + l2 + l3)};
+    EXPECT_NEAR(cross_ratio(std::abs(e[1] - e[0]), std::abs(e[2] - e[1]), std::abs(e[3] - e[2])),
+                cross_ratio(l1, l2, l3), 1e-9)
+        << "seed " << seed;
+  }
+}
+
+TEST(Marker, CrossRatioOfTheLinearFamilyIsLinearInTau) {
+  Random random(seed);
+  for (int i = 0; i < 50; ++i) {
+    const Marker marker = random_linear_marker(random);
+    const auto [u1, u2, u3] = marker.bands_upper_m;
+    const auto [w1, w2, w3] = marker.bands_lower_m;
+    const double at_upper = cross_ratio(u1, u2, u3), at_lower = cross_ratio(w1, w2, w3);
+    for (int k = 0; k < 500; ++k)
+      ASSERT_NEAR(cross_ratio_at(marker, tau_of(k)), at_upper + tau_of(k) / two_pi * (at_lower - at_upper), 1e-12)
+          << "seed " << seed;
+  }
+}
+
+double round_trip_rad(const Marker& marker, double tau_rad) {
+  return CrossRatioDecoder(marker).tau_rad(cross_ratio_at(marker, tau_rad));
+}
+
+// Just after the seam, all over the turn, and just before the seam again.
+std::vector<double> turn_from_seam_to_seam() {
+  std::vector<double> turn{0, 1e-6, 1e-4};
+  for (int i = 0; i < 500; ++i) turn.push_back(tau_of(i));
+  turn.insert(turn.end(), {two_pi - 1e-4, two_pi - 1e-6});
+  return turn;
+}
+
+TEST(CrossRatioDecoder, IsExactForTheLinearFamily) {
+  Random random(seed);
+  for (int i = 0; i < 50; ++i) {
+    const Marker marker = random_linear_marker(random);
+    const CrossRatioDecoder decoder(marker);
+    const double at_upper = cross_ratio_at(marker, 0), rise = cross_ratio_at(marker, two_pi - 1e-9) - at_upper;
+    for (const double tau_rad : turn_from_seam_to_seam()) {
+      ASSERT_NEAR(round_trip_rad(marker, tau_rad), tau_rad, 1e-10) << "seed " << seed << ", design " << i;
+      ASSERT_NEAR(decoder.tau_rad(at_upper + rise * tau_rad / two_pi), tau_rad, 1e-8) << "eq. (18), seed " << seed;
+    }
+  }
+}
+
+TEST(CrossRatioDecoder, InvertsEveryOtherDecodableDesign) {
+  Random random(seed);
+  int designs = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Marker marker = random_marker(random);
+    if (!decoding_problem(marker).empty()) continue;
+    ++designs;
+    for (const double tau_rad : turn_from_seam_to_seam())
+      ASSERT_NEAR(round_trip_rad(marker, tau_rad), tau_rad, 1e-7) << "seed " << seed << ", design " << i;
+  }
+  EXPECT_GT(designs, 50) << "too few decodable designs were drawn for the test to mean something";
+}
+
+// The straight line of eq. (18) would be off by 0.3 rad in this design.
+TEST(CrossRatioDecoder, DoesNotTakeANonLinearDesignForALinearOne) {
+  const Marker marker = marker_with({0.004, 0.012, 0.008}, {0.012, 0.004, 0.008});
+  const double middle = (cross_ratio_at(marker, 0) + cross_ratio_at(marker, two_pi - 1e-9)) / 2;
+  EXPECT_GT(std::abs(CrossRatioDecoder(marker).tau_rad(middle) - pi), 0.3);
+  EXPECT_NEAR(round_trip_rad(marker, 2), 2, 1e-10);
+}
+
+// With l1 constant the quadratic that is inverted loses its leading term.
+TEST(CrossRatioDecoder, InvertsADesignWhoseFirstBoundaryIsACircle) {
+  const std::array<double, 3> a{0.006, 0.004, 0.014}, b{0.006, 0.012, 0.006};
+  for (const Marker& marker : {marker_with(a, b), marker_with(b, a)})
+    for (const double tau_rad : turn_from_seam_to_seam()) ASSERT_NEAR(round_trip_rad(marker, tau_rad), tau_rad, 1e-10);
+}
+
+// Before the seam one turn ends, behind it the next one begins.
+TEST(CrossRatioDecoder, SeesTheSeamAsAWholeTurn) {
+  const Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  EXPECT_NEAR(round_trip_rad(marker, -0.01), two_pi - 0.01, 1e-10);
+  EXPECT_NEAR(round_trip_rad(marker, 0.01), 0.01, 1e-10);
+  EXPECT_NEAR(round_trip_rad(marker, two_pi + 0.01), 0.01, 1e-10);
+}
+
+TEST(CrossRatioDecoder, BeyondTheRangeGivesTheNearerEnd) {
+  const Marker rising = marker_with({0.0095, 0.0095, 0.005}, {0.0035, 0.0035, 0.017});
+  const Marker falling = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  for (const auto& [marker, at_lowest, at_highest] :
+       {std::tuple(rising, 0.0, two_pi), std::tuple(falling, two_pi, 0.0)}) {
+    const CrossRatioDecoder decoder(marker);
+    EXPECT_LT(decoder.lowest_cross_ratio(), decoder.highest_cross_ratio());
+    EXPECT_EQ(decoder.tau_rad(decoder.lowest_cross_ratio() - 0.1), at_lowest);
+    EXPECT_EQ(decoder.tau_rad(decoder.highest_cross_ratio() + 0.1), at_highest);
+    EXPECT_NEAR(decoder.tau_rad(decoder.lowest_cross_ratio() + 1e-9), at_lowest, 1e-6);
+    EXPECT_TRUE(std::isnan(decoder.tau_rad(std::nan(""))));
+    EXPECT_TRUE(std::isnan(decoder.tau_rad(std::numeric_limits<double>::infinity())));
+  }
+}
+
+TEST(DecodingProblem, RefusesExactlyTheDesignsWhoseCrossRatioTurnsBack) {
+  Random random(seed);
+  int refused = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Marker marker = random_marker(random);
+    const bool is_refused = !decoding_problem(marker).empty();
+    EXPECT_EQ(is_refused, first_turn_rad(marker).has_value()) << "seed " << seed << ", design " << i;
+    EXPECT_EQ(is_refused, [&] {
+      try {
+        const CrossRatioDecoder decoder(marker);
+        return false;
+      } catch (const std::invalid_argument&) {
+        return true;
+      }
+    }());
+    refused += is_refused;
+  }
+  EXPECT_GT(refused, 20);
+}
+
+// Text after `start`, as a number.
+double number_after(const std::string& text, const std::string& start) {
+  EXPECT_TRUE(text.starts_with(start)) << text;
+  return std::strtod(text.c_str() + std::min(start.size(), text.size()), nullptr);
+}
+
+TEST(DecodingProblem, SaysWhereTheCrossRatioTurnsBack) {
+  Random random(seed);
+  int ends_higher = 0, ends_lower = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Marker marker = random_marker(random);
+    const auto turn_rad = first_turn_rad(marker);
+    if (!turn_rad) continue;
+    ++(cross_ratio_at(marker, two_pi - 1e-6) > cross_ratio_at(marker, 0) ? ends_higher : ends_lower);
+    EXPECT_NEAR(number_after(decoding_problem(marker), "the cross-ratio turns back near tau = "), *turn_rad, 0.03)
+        << "seed " << seed << ", design " << i;
+  }
+  EXPECT_GT(ends_higher, 5);
+  EXPECT_GT(ends_lower, 5);
+}
+
+TEST(DecodingProblem, RefusesBandsThatDoNotChange) {
+  const std::array<double, 3> same{0.008, 0.007, 0.009};
+  EXPECT_EQ(decoding_problem(marker_with(same, same)),
+            "the cross-ratio is the same at every rotation: the inner boundaries must slope");
+}
+
+TEST(MarkerProblem, NamesTheFirstFieldThatMakesNoMarker) {
+  const Marker good = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  const auto problem = [&](const auto& change) {
+    Marker marker = good;
+    change(marker);
+    return marker_problem(marker);
+  };
+  EXPECT_EQ(marker_problem(good), "");
+  EXPECT_EQ(problem([](Marker& m) { m.diameter_m = -1; }), "diameter_m: is -1, expected 0.0005 to 0.1 (metres)");
+  EXPECT_EQ(problem([](Marker& m) { m.diameter_m = std::nan(""); }),
+            "diameter_m: is nan, expected 0.0005 to 0.1 (metres)");
+  EXPECT_EQ(problem([](Marker& m) { m.hues_deg[2] = 361; }), "hues_deg[2]: is 361, expected 0 to 360");
+  EXPECT_EQ(problem([](Marker& m) {
+              m.hues_deg = {350, 20, 200};
+            }),
+            "hues_deg[1]: is 20, expected hues at least 40 degrees apart");
+  EXPECT_EQ(problem([](Marker& m) {
+              m.hues_deg = {0, 120, 340};
+            }),
+            "hues_deg[0]: is 0, expected hues at least 40 degrees apart");
+  EXPECT_EQ(problem([](Marker& m) { m.bands_upper_m[1] = 0; }),
+            "bands_upper_m[1]: is 0, expected a length above 0, up to 0.5 (metres)");
+  EXPECT_EQ(problem([](Marker& m) { m.bands_lower_m[2] = 0.006; }),
+            "bands_lower_m: is a sum of 0.025000, expected the same sum as bands_upper_m (0.024000): both ends of the "
+            "marker are circles");
+  EXPECT_EQ(problem([](Marker& m) { m.seam_rad = std::nan(""); }), "seam_rad: is nan, expected an angle in radians");
+}
+
+TEST(SameColourOrder, CyclicOrdersDifferAndSmallShadesDoNot) {
+  Marker a, b;
+  EXPECT_TRUE(same_colour_order(a, b));
+  b.hues_deg = {95, 172, 268};
+  EXPECT_TRUE(same_colour_order(a, b));
+  b.hues_deg = {180, 270, 90};
+  EXPECT_FALSE(same_colour_order(a, b));
+  a.hues_deg = {359, 120, 240}, b.hues_deg = {1, 120, 240};
+  EXPECT_TRUE(same_colour_order(a, b));
+}
+
+}  // namespace
+}  // namespace lapservo

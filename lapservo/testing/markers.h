@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+
+#include "lapservo/core/random.h"
+#include "lapservo/marker/marker.h"
+
+namespace lapservo::testing {
+
+inline Marker marker_with(const std::array<double, 3>& upper_m, const std::array<double, 3>& lower_m) {
+  Marker marker;
+  marker.diameter_m = 0.0084;
+  marker.bands_upper_m = upper_m;
+  marker.bands_lower_m = lower_m;
+  return marker;
+}
+
+/// l1 : l2 constant: both inner boundaries, extended, meet on the proximal end.
+inline Marker random_linear_marker(Random& random) {
+  const double ratio = random.uniform(0.3, 3), length_m = random.uniform(0.01, 0.05);
+  const auto bands = [&](double proximal_share) {
+    const double proximal_m = proximal_share * length_m, l1 = proximal_m * ratio / (1 + ratio);
+    return std::array<double, 3>{l1, proximal_m - l1, length_m - proximal_m};
+  };
+  const double a = random.uniform(0.15, 0.45), b = random.uniform(0.55, 0.85);
+  return random.uniform() < 0.5 ? marker_with(bands(a), bands(b)) : marker_with(bands(b), bands(a));
+}
+
+inline std::array<double, 3> random_bands(double length_m, Random& random) {
+  const double a = random.uniform(0.1, 1), b = random.uniform(0.1, 1), c = random.uniform(0.1, 1);
+  const double scale = length_m / (a + b + c);
+  return {a * scale, b * scale, c * scale};
+}
+
+/// Any bands of equal sums; many are not decodable.
+inline Marker random_marker(Random& random) {
+  const double length_m = random.uniform(0.01, 0.05);
+  const auto upper_m = random_bands(length_m, random);
+  return marker_with(upper_m, random_bands(length_m, random));
+}
+
+}  // namespace lapservo::testing
