@@ -1,1 +1,248 @@
+#include "lapservo/kinematics/features.h"
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/random.h"
+#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/testing/sample_frames.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t seed = 41;
+
+Rig example_rig() {
+  return load_rig(testing::source_folder() / "configs/example.yaml");
+}
+
+RcmCoordinates random_configuration(Random& random) {
+  return {random.uniform(-0.3, 0.3), random.uniform(1.4, 1.7), random.uniform(0.08, 0.12), random.uniform(-4, 4)};
+}
+
+Rigid3 camera_from_unrolled(const Instrument& instrument, const RcmCoordinates& q) {
+  return *instrument.camera_from_rcm * rcm_from_unrolled(q);
+}
+
+template <typename Law>
+void for_random_configurations(const Law& law) {
+  const Rig rig = example_rig();
+  Random random(seed);
+  for (int i = 0; i < 300; ++i) {
+    const RcmCoordinates q = random_configuration(random);
+    SCOPED_TRACE("seed " + std::to_string(seed) + ", configuration " + std::to_string(i));
+    const Instrument& instrument = rig.instruments.front();
+    const auto line = centre_line(rig.camera, instrument.marker, camera_from_unrolled(instrument, q), q.psi_rad);
+    ASSERT_TRUE(line);
+    law(rig.camera, instrument, q, *line);
+  }
+}
+
+TEST(RcmCoordinates, TheAxisPointsFromTheRcmToTheMarker) {
+  Random random(seed);
+  for (int i = 0; i < 100; ++i) {
+    const RcmCoordinates q = random_configuration(random);
+    const Rigid3 pose = rcm_from_unrolled(q);
+    EXPECT_LT((pose * Eigen::Vector3d::Zero() - q.rho_m * shaft_axis_in_rcm(q)).norm(), 1e-12) << "seed " << seed;
+    EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitZ() - shaft_axis_in_rcm(q)).norm(), 1e-12) << "seed " << seed;
+    EXPECT_LT((pose * Eigen::Vector3d(0, 0, -q.rho_m)).norm(), 1e-12) << "the shaft passes through the RCM";
+  }
+}
+
+// Rz(theta) Ry(phi), written out.
+TEST(RcmCoordinates, TheUnrolledFrameIsRzRy) {
+  const RcmCoordinates q{0.3, 1.2, 0.1, 0};
+  const double ct = std::cos(0.3), st = std::sin(0.3), cp = std::cos(1.2), sp = std::sin(1.2);
+  const Eigen::Matrix3d expected{{ct * cp, -st, ct * sp}, {st * cp, ct, st * sp}, {-sp, 0, cp}};
+  EXPECT_LT((rcm_from_unrolled(q).rotation.toRotationMatrix() - expected).norm(), 1e-12);
+}
+
+TEST(RcmCoordinates, AConfigurationIsFoundThroughItsMarkersEnd) {
+  Random random(seed);
+  const Rigid3 camera_from_rcm = *example_rig().instruments.front().camera_from_rcm;
+  for (int i = 0; i < 100; ++i) {
+    const RcmCoordinates q = random_configuration(random);
+    const auto found = configuration_through(camera_from_rcm, (camera_from_rcm * rcm_from_unrolled(q)).translation);
+    ASSERT_TRUE(found);
+    const RcmCoordinates unrolled{q.theta_rad, q.phi_rad, q.rho_m, 0};
+    EXPECT_LT((found->vector() - unrolled.vector()).norm(), 1e-9) << "seed " << seed;
+  }
+  EXPECT_FALSE(configuration_through(camera_from_rcm, camera_from_rcm.translation));
+}
+
+TEST(CentreLine, LiesOnTheImageOfTheAxis) {
+  for_random_configurations(
+      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates& q, const CentreLine& line) {
+        const Rigid3 pose = camera_from_unrolled(instrument, q);
+        const Eigen::Vector3d plane = pose.translation.cross(pose * Eigen::Vector3d::UnitZ()).normalized();
+        for (const auto& ideal_px : line.ideal_px)
+          EXPECT_NEAR(plane.dot(camera.ray_from_ideal(ideal_px).normalized()), 0, 1e-9);
+      });
+}
+
+TEST(CentreLine, ItsPointsLieOnTheSurfaceWhereTheBandsEnd) {
+  for_random_configurations(
+      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates& q, const CentreLine& line) {
+        const Rigid3 unrolled_from_camera = camera_from_unrolled(instrument, q).inverse();
+        const auto along_m = boundaries_m(instrument.marker, line.tau_rad);
+        for (std::size_t k = 0; k < 4; ++k) {
+          const Eigen::Vector3d point = unrolled_from_camera * line.points_in_camera_m.at(k);
+          EXPECT_NEAR(point.head<2>().norm(), instrument.marker.radius_m(), 1e-9);
+          EXPECT_NEAR(point.z(), along_m.at(k), 1e-9);
+          EXPECT_LT((camera.ideal_from_point(line.points_in_camera_m.at(k)) - line.ideal_px.at(k)).norm(), 1e-9);
+        }
+      });
+}
+
+TEST(CentreLine, TurningTheInstrumentTurnsTauBackAndMovesNothingElse) {
+  for_random_configurations(
+      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates& q, const CentreLine& line) {
+        const double turn_rad = 1.1;
+        const auto turned =
+            centre_line(camera, instrument.marker, camera_from_unrolled(instrument, q), q.psi_rad + turn_rad);
+        ASSERT_TRUE(turned);
+        EXPECT_NEAR(wrap_pi(turned->tau_rad + turn_rad - line.tau_rad), 0, 1e-9);
+        EXPECT_EQ(turned->facing_azimuth_rad, line.facing_azimuth_rad);
+        EXPECT_LT((turned->ideal_px[0] - line.ideal_px[0]).norm(), 1e-9);
+        EXPECT_LT((turned->ideal_px[3] - line.ideal_px[3]).norm(), 1e-9);
+      });
+}
+
+TEST(CentreLine, ASeamShiftsTauAsARotationDoes) {
+  for_random_configurations(
+      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates& q, const CentreLine& line) {
+        Marker shifted = instrument.marker;
+        shifted.seam_rad += 0.7;
+        const auto other = centre_line(camera, shifted, camera_from_unrolled(instrument, q), q.psi_rad - 0.7);
+        ASSERT_TRUE(other);
+        EXPECT_NEAR(wrap_pi(other->tau_rad - line.tau_rad), 0, 1e-9);
+      });
+}
+
+// CONVENTIONS: 10 / 20 / 40 mm of lateral motion at 100 mm depth turn gamma by 5.7 / 11.3 / 21.8 degrees.
+TEST(CentreLine, LateralMotionTurnsTheFacingGeneratrix) {
+  const Rig rig = example_rig();
+  const Marker& marker = rig.instruments.front().marker;
+  const Eigen::Quaterniond along_v(Eigen::AngleAxisd(-pi / 2, Eigen::Vector3d::UnitX()));
+  const auto gamma_at = [&](double lateral_m) {
+    return centre_line(rig.camera, marker, {along_v, {lateral_m, -0.01, 0.1}}, 0)->facing_azimuth_rad;
+  };
+  for (const auto& [lateral_m, expected_deg] : {std::pair(0.01, 5.7), std::pair(0.02, 11.3), std::pair(0.04, 21.8)})
+    EXPECT_NEAR(std::abs(deg_from_rad(wrap_pi(gamma_at(lateral_m) - gamma_at(0)))), expected_deg, 0.05);
+}
+
+TEST(CentreLine, IsAbsentBehindTheCameraAndAroundIt) {
+  const Rig rig = example_rig();
+  const Marker& marker = rig.instruments.front().marker;
+  EXPECT_FALSE(centre_line(rig.camera, marker, {Eigen::Quaterniond::Identity(), {0.05, 0, -0.1}}, 0));
+  EXPECT_FALSE(centre_line(rig.camera, marker, {Eigen::Quaterniond::Identity(), {0.001, 0, 0.1}}, 0));
+}
+
+TEST(Features, CrossRatioInTheImageIsThatOnTheMarker) {
+  for_random_configurations(
+      [](const Camera&, const Instrument& instrument, const RcmCoordinates&, const CentreLine& line) {
+        EXPECT_NEAR(features_of(line.ideal_px, std::nullopt).cross_ratio,
+                    cross_ratio_at(instrument.marker, line.tau_rad), 1e-9);
+      });
+}
+
+TEST(Features, MeasureAnglesFromTheVerticalAndDistances) {
+  const std::array<Eigen::Vector2d, 4> down{{{10, 10}, {10, 20}, {10, 40}, {10, 70}}};
+  const Features f = features_of(down, Eigen::Vector2d(10, -20));
+  EXPECT_EQ(f.s_rad, 0);
+  EXPECT_EQ(f.r_px, 30);
+  EXPECT_EQ(f.l_px, 60);
+  EXPECT_EQ(f.d_px, 30);
+  EXPECT_DOUBLE_EQ(f.cross_ratio, 30.0 * 50 / (20 * 60));
+  const std::array<Eigen::Vector2d, 4> right{{{0, 0}, {10, 0}, {20, 0}, {40, 0}}};
+  const std::array<Eigen::Vector2d, 4> up_left{{{0, 0}, {-10, -10}, {-20, -20}, {-40, -40}}};
+  EXPECT_DOUBLE_EQ(features_of(right, std::nullopt).s_rad, pi / 2);
+  EXPECT_DOUBLE_EQ(features_of(up_left, std::nullopt).s_rad, -0.75 * pi);
+  EXPECT_FALSE(features_of(right, std::nullopt).r_px);
+}
+
+TEST(Features, TheProjectedRcmLiesOnTheCentreLineUnlessInTheFocalPlane) {
+  for_random_configurations(
+      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates&, const CentreLine& line) {
+        const auto rcm_px = projected_rcm_px(camera, *instrument.camera_from_rcm);
+        ASSERT_TRUE(rcm_px);
+        const Eigen::Vector2d along = (line.ideal_px[3] - line.ideal_px[0]).normalized();
+        const Eigen::Vector2d offset = *rcm_px - line.ideal_px[0];
+        EXPECT_NEAR(along.x() * offset.y() - along.y() * offset.x(), 0, 1e-6);
+      });
+  EXPECT_FALSE(projected_rcm_px(example_rig().camera, {Eigen::Quaterniond::Identity(), {0.1, 0, 0}}));
+}
+
+// Truth of the ray-traced samples, which another program wrote from the conventions alone.
+class SampleTruth : public ::testing::TestWithParam<const char*> {};
+
+const Instrument& instrument_of(const Rig& rig, const CsvTable& truth, std::size_t row) {
+  for (const Instrument& instrument : rig.instruments)
+    if (instrument.name == truth.text(row, "instrument")) return instrument;
+  throw std::runtime_error("the rig has no instrument " + truth.text(row, "instrument"));
+}
+
+double rcm_disagreement_px(const Rig& rig, const CsvTable& truth, std::size_t row) {
+  const auto rcm_px = projected_rcm_px(rig.camera, instrument_of(rig, truth, row).camera_from_rcm.value());
+  return (rcm_px.value() - Eigen::Vector2d(truth.number(row, "rcm_u_px"), truth.number(row, "rcm_v_px"))).norm();
+}
+
+// stress/rig.yaml is that of its first frame only; the others without a rig of their own were made with rotation's,
+// as their rows' projected RCM says.
+Rig rig_of(const fs::path& folder, const CsvTable& truth, std::size_t row) {
+  const fs::path own = folder / fs::path(truth.text(row, "file")).replace_extension(".rig.yaml");
+  if (fs::exists(own)) return load_rig(own);
+  const Rig rig = load_rig(folder / "rig.yaml");
+  return rcm_disagreement_px(rig, truth, row) < 1 ? rig : load_rig(folder / "../rotation/rig.yaml");
+}
+
+void expect_truth(const CsvTable& truth, std::size_t row, const Rig& rig) {
+  const Instrument& instrument = instrument_of(rig, truth, row);
+  const auto value = [&](const std::string& column) { return truth.number(row, column); };
+  const RcmCoordinates q{value("theta_rad"), value("phi_rad"), value("rho_m"), value("psi_rad")};
+  const auto line = centre_line(rig.camera, instrument.marker, camera_from_unrolled(instrument, q), q.psi_rad);
+  ASSERT_TRUE(line);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const std::string edge = "e" + std::to_string(k);
+    const Eigen::Vector2d expected_px(value(edge + "_u_px"), value(edge + "_v_px"));
+    EXPECT_LT((rig.camera.raw_from_ideal(line->ideal_px.at(k)) - expected_px).norm(), 0.02) << edge;
+  }
+  EXPECT_LT(rcm_disagreement_px(rig, truth, row), 0.02);
+  const Features f = features_of(line->ideal_px, projected_rcm_px(rig.camera, *instrument.camera_from_rcm));
+  EXPECT_NEAR(wrap_pi(line->tau_rad - value("tau_rad")), 0, 1e-5);
+  EXPECT_NEAR(wrap_pi(f.s_rad - value("s_rad")), 0, 1e-4);
+  EXPECT_NEAR(f.r_px.value(), value("r_px"), 0.02);
+  EXPECT_NEAR(f.l_px, value("l_px"), 0.02);
+  EXPECT_NEAR(f.d_px, value("d_px"), 0.02);
+}
+
+TEST_P(SampleTruth, IsWhatTheKinematicsSay) {
+  const auto folder = testing::sample_frames(GetParam());
+  if (!folder) GTEST_SKIP() << "the sample frames are not there";
+  const CsvTable truth = CsvTable::read(*folder / "truth.csv");
+  ASSERT_GT(truth.rows(), 0U);
+  for (std::size_t row = 0; row < truth.rows(); ++row) {
+    SCOPED_TRACE((*folder / truth.text(row, "file")).string());
+    expect_truth(truth, row, rig_of(*folder, truth, row));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Frames, SampleTruth,
+                         ::testing::Values("rotation", "illumination", "stress", "two", "tilt", "distorted", "video"),
+                         [](const auto& parameter) { return std::string(parameter.param); });
+
+}  // namespace
+}  // namespace lapservo
