@@ -1,1 +1,139 @@
+#include "lapservo/marker/sensitivity.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
 #include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/marker/decoder.h"
+#include "lapservo/marker/marker.h"
+#include "lapservo/testing/markers.h"
+
+namespace lapservo {
+namespace {
+using testing::marker_with;
+
+constexpr std::uint64_t seed = 43;
+
+const Marker linear = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+const Marker non_linear = marker_with({0.004, 0.012, 0.008}, {0.012, 0.004, 0.008});
+
+TEST(CrossRatioSlope, IsTheFiniteDifference) {
+  for (const Marker& marker : {linear, non_linear})
+    for (double tau_rad = 0.01; tau_rad < 6.27; tau_rad += 0.05) {
+      constexpr double step_rad = 1e-5;
+      const double difference = cross_ratio_at(marker, tau_rad + step_rad) - cross_ratio_at(marker, tau_rad - step_rad);
+      EXPECT_NEAR(cross_ratio_slope(marker, tau_rad), difference / (2 * step_rad), 1e-8) << "tau " << tau_rad;
+    }
+}
+
+// Root mean square of tau decoded from boundaries measured with noise.
+double decoded_sigma_rad(const Marker& marker, double tau_rad, const Viewing& viewing, Random& random) {
+  constexpr int draws = 20000;
+  const CrossRatioDecoder decoder(marker);
+  double sum = 0;
+  for (int i = 0; i < draws; ++i) {
+    auto e_px = boundaries_m(marker, tau_rad);
+    for (double& e : e_px) e = e * viewing.px_per_m() + viewing.sigma_edge_px * random.normal();
+    const double ratio = cross_ratio(e_px[1] - e_px[0], e_px[2] - e_px[1], e_px[3] - e_px[2]);
+    const double error_rad = decoder.tau_rad(ratio) - tau_rad;
+    sum += error_rad * error_rad;
+  }
+  return std::sqrt(sum / draws);
+}
+
+TEST(PredictedSigma, OfTheCentreLineIsTheSpreadOfWhatIsDecoded) {
+  Random random(seed);
+  const Viewing viewing{1100, 0.11, 0.05};
+  for (const Marker& marker : {linear, non_linear})
+    for (const double tau_rad : {0.5, 1.7, 3.1, 4.4, 5.8})
+      EXPECT_NEAR(decoded_sigma_rad(marker, tau_rad, viewing, random) /
+                      predicted_sigma_centre_line_rad(marker, tau_rad, viewing),
+                  1, 0.03)
+          << "tau " << tau_rad << ", seed " << seed;
+}
+
+// tau and a shift along the axis, fitted by least squares to all boundaries seen on lines one pixel apart, from the
+// lengths of the bands alone. An inner boundary whose place is within the seam's blur is left out.
+class SurfaceFit {
+ public:
+  SurfaceFit(const Marker& marker, double tau_rad, const Viewing& viewing) : sigma_px_(viewing.sigma_edge_px) {
+    px_per_m_ = viewing.px_per_m();
+    const double radius_px = marker.radius_m() * px_per_m_, reach_px = 0.9 * radius_px;
+    for (double offset_px = -reach_px + 0.5; offset_px < reach_px; offset_px += 1)
+      add_line(marker, wrap_two_pi(tau_rad + std::asin(offset_px / radius_px)), offset_px, radius_px);
+  }
+
+  // Error of the fitted tau for one draw of the noise: the map is linear between seam and seam.
+  double error_rad(Random& random) const {
+    double b_tau = 0, b_shift = 0;
+    for (const double slope : slopes_px_) {
+      const double noise_px = sigma_px_ * random.normal();
+      b_tau += slope * noise_px, b_shift += noise_px;
+    }
+    const double n = static_cast<double>(slopes_px_.size());
+    return (b_tau * n - b_shift * sum_) / (squares_ * n - sum_ * sum_);
+  }
+
+ private:
+  void add_line(const Marker& marker, double line_tau_rad, double offset_px, double radius_px) {
+    // Foreshortened: the seam's distance in the image.
+    const double cosine = std::sqrt(1 - offset_px * offset_px / (radius_px * radius_px));
+    const double seam_px = std::min(line_tau_rad, two_pi - line_tau_rad) * radius_px * cosine;
+    const double step_rad = line_tau_rad < pi ? 1e-3 : -1e-3;
+    const auto here = boundaries_m(marker, line_tau_rad), beside = boundaries_m(marker, line_tau_rad + step_rad);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const bool inner = k == 1 || k == 2;
+      if (inner && seam_px < 2.5) continue;
+      slopes_px_.push_back((beside[k] - here[k]) / step_rad * px_per_m_);
+      sum_ += slopes_px_.back(), squares_ += slopes_px_.back() * slopes_px_.back();
+    }
+  }
+
+  double sigma_px_, px_per_m_ = 0, sum_ = 0, squares_ = 0;
+  std::vector<double> slopes_px_;
+};
+
+TEST(PredictedSigma, OfTheSurfaceIsTheSpreadOfItsLeastSquaresFit) {
+  Random random(seed);
+  const Viewing viewing{1100, 0.11, 0.1};
+  for (const Marker& marker : {linear, non_linear})
+    for (const double tau_rad : {0.0, 0.4, 3.0, 5.9}) {
+      const SurfaceFit fit(marker, tau_rad, viewing);
+      constexpr int draws = 5000;
+      double sum = 0;
+      for (int i = 0; i < draws; ++i) sum += std::pow(fit.error_rad(random), 2);
+      EXPECT_NEAR(std::sqrt(sum / draws) / predicted_sigma_surface_rad(marker, tau_rad, viewing), 1, 0.04)
+          << "tau " << tau_rad << ", seed " << seed;
+    }
+}
+
+TEST(PredictedSigma, GrowsWithNoiseAndDistanceAndFallsWithFocalLength) {
+  const Viewing viewing{1100, 0.11, 0.1}, noisy{1100, 0.11, 0.3}, far_away{1100, 0.22, 0.1}, as_far{2200, 0.22, 0.1};
+  for (const double tau_rad : {0.3, 2.0, 5.0}) {
+    const double line = predicted_sigma_centre_line_rad(linear, tau_rad, viewing);
+    EXPECT_NEAR(predicted_sigma_centre_line_rad(linear, tau_rad, noisy), 3 * line, 1e-12);
+    EXPECT_NEAR(predicted_sigma_centre_line_rad(linear, tau_rad, far_away), 2 * line, 1e-12);
+    EXPECT_NEAR(predicted_sigma_centre_line_rad(linear, tau_rad, as_far), line, 1e-12);
+    const double surface = predicted_sigma_surface_rad(linear, tau_rad, viewing);
+    EXPECT_NEAR(predicted_sigma_surface_rad(linear, tau_rad, noisy), 3 * surface, 1e-12);
+    // Half the size and half the lines; more are lost to the seam.
+    EXPECT_NEAR(predicted_sigma_surface_rad(linear, tau_rad, far_away) / surface, 2 * std::sqrt(2), 0.2);
+    EXPECT_NEAR(predicted_sigma_surface_rad(linear, tau_rad, as_far), surface, 1e-12);
+  }
+}
+
+TEST(PredictedSigma, OfTheSurfaceIsManyTimesBetterThanTheCentreLine) {
+  for (double tau_rad = 0; tau_rad < two_pi; tau_rad += 0.1)
+    EXPECT_LT(8 * predicted_sigma_surface_rad(linear, tau_rad, {}),
+              predicted_sigma_centre_line_rad(linear, tau_rad, {}));
+}
+
+}  // namespace
+}  // namespace lapservo
