@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "lapservo/core/angles.h"
@@ -47,18 +48,19 @@ std::string millimetres(double length_m) {
   return text;
 }
 
-// Best of a grid around a choice.
-Choice search(const DesignSpec& spec, double length_m, double smallest_m, const Choice& centre, double share_reach,
-              double sum_reach_m) {
+// Best of a grid around a choice. The sums are rounded here, and not at the end, so that the limits hold after it and
+// the ratio l1 : l2, and with it the linear family, survives.
+std::optional<Choice> search(const DesignSpec& spec, double length_m, double smallest_m, const Choice& centre,
+                             double share_reach, double sum_reach_m) {
   constexpr int steps = 12;
-  Choice best = centre;
+  std::optional<Choice> best;
   double best_sigma = std::numeric_limits<double>::infinity();
   for (int i = -steps; i <= steps; ++i)
     for (int j = -steps; j <= steps; ++j)
       for (int k = -steps; k <= steps; ++k) {
-        const Choice choice{centre.share + share_reach * i / steps, centre.upper_m + sum_reach_m * j / steps,
-                            centre.lower_m + sum_reach_m * k / steps};
-        if (choice.share <= 0 || choice.share >= 1 || choice.lower_m - choice.upper_m < rounding_m) continue;
+        const Choice choice{centre.share + share_reach * i / steps, rounded(centre.upper_m + sum_reach_m * j / steps),
+                            rounded(centre.lower_m + sum_reach_m * k / steps)};
+        if (choice.share <= 0 || choice.share >= 1 || choice.lower_m - choice.upper_m < rounding_m / 2) continue;
         const Marker marker = marker_of(spec, length_m, choice);
         if (smallest_band(marker) < smallest_m - 1e-9) continue;
         const double sigma = worst_sigma_centre_line_rad(marker, spec.viewing);
@@ -85,17 +87,13 @@ bool in_linear_family(const Marker& marker) {
 Marker design_marker(const DesignSpec& spec) {
   const double length_m = spec.length_m.value_or(std::round(3e3 * spec.diameter_m) * 1e-3);
   const double smallest_m = spec.smallest_band_m.value_or(std::max(0.003, 12 / spec.viewing.px_per_m()));
-  if (!(length_m > 3 * smallest_m + rounding_m))
+  const double reach_m = (length_m - 3 * smallest_m) / 2, middle_m = (length_m + smallest_m) / 2;
+  const auto coarse = search(spec, length_m, smallest_m, {0.5, middle_m, middle_m}, 0.5, reach_m);
+  if (!coarse)
     throw InputError("length", "no marker: three bands of at least " + millimetres(smallest_m) +
                                    " that change over the turn do not fit into " + millimetres(length_m));
-  const Choice middle{0.5, (2 * smallest_m + length_m - smallest_m) / 2, (2 * smallest_m + length_m - smallest_m) / 2};
-  const double reach_m = (length_m - 3 * smallest_m) / 2;
-  Choice choice = search(spec, length_m, smallest_m, middle, 0.5, reach_m);
-  choice = search(spec, length_m, smallest_m, choice, 0.08, reach_m / 8);
-  // Rounded so that the ratio l1 : l2, and with it the linear family, survives.
-  choice.upper_m = rounded(choice.upper_m), choice.lower_m = rounded(choice.lower_m);
-  choice.lower_m = std::min(choice.lower_m, length_m - smallest_m);
-  Marker marker = marker_of(spec, length_m, choice);
+  const auto fine = search(spec, length_m, smallest_m, *coarse, 0.08, reach_m / 8);
+  const Marker marker = marker_of(spec, length_m, fine.value_or(*coarse));
   if (const std::string problem = marker_problem(marker); !problem.empty()) throw InputError("marker", problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
     throw InputError("marker", "not decodable: " + problem);

@@ -18,7 +18,7 @@ struct DesignSpec {
 
 /// The marker of the linear family (l1 : l2 constant) with the least worst-case predicted sigma of tau on the centre
 /// line. Its three free numbers (share of l1 in l1 + l2, and l1 + l2 at either edge) are searched on a grid and
-/// refined; lengths come out in tenths of a millimetre. Throws InputError when no such marker fits.
+/// refined; l1 + l2 comes out in tenths of a millimetre. Throws InputError when no such marker fits.
 Marker design_marker(const DesignSpec& spec);
 
 /// The largest predicted_sigma_centre_line_rad over the turn.

@@ -1,1 +1,127 @@
+#include "lapservo/marker/design.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/marker/decoder.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/markers.h"
+
+namespace lapservo {
+namespace {
+using testing::marker_with;
+
+constexpr std::uint64_t seed = 47;
+
+double smallest_band_m(const Marker& marker) {
+  double smallest = marker.bands_upper_m[0];
+  for (const auto& bands : {marker.bands_upper_m, marker.bands_lower_m})
+    smallest = std::min(smallest, *std::min_element(bands.begin(), bands.end()));
+  return smallest;
+}
+
+// A member of the linear family within the limits.
+Marker random_member(double length_m, double least_m, Random& random) {
+  for (;;) {
+    const double share = random.uniform(0.2, 0.8), a = random.uniform(0, length_m), b = random.uniform(0, length_m);
+    const auto bands = [&](double sum_m) {
+      return std::array<double, 3>{share * sum_m, (1 - share) * sum_m, length_m - sum_m};
+    };
+    const Marker marker = marker_with(bands(a), bands(b));
+    if (smallest_band_m(marker) >= least_m && std::abs(a - b) > 1e-4) return marker;
+  }
+}
+
+TEST(DesignMarker, KeepsToWhatWasAskedForAndCanBeDecodedByEquation18) {
+  Random random(seed);
+  for (int i = 0; i < 12; ++i) {
+    DesignSpec spec;
+    spec.diameter_m = random.uniform(0.004, 0.015);
+    spec.smallest_band_m = random.uniform(0.002, 0.005);
+    spec.length_m = *spec.smallest_band_m * 3 + random.uniform(0.0005, 0.02);
+    spec.hues_deg = {20, 140, 260};
+    const Marker marker = design_marker(spec);
+    SCOPED_TRACE("seed " + std::to_string(seed) + ", design " + std::to_string(i));
+    EXPECT_EQ(marker_problem(marker), "");
+    EXPECT_EQ(decoding_problem(marker), "");
+    EXPECT_TRUE(in_linear_family(marker));
+    EXPECT_EQ(marker.diameter_m, spec.diameter_m);
+    EXPECT_EQ(marker.hues_deg, spec.hues_deg);
+    EXPECT_NEAR(marker.length_m(), *spec.length_m, 1e-12);
+    EXPECT_GE(smallest_band_m(marker), *spec.smallest_band_m - 1e-9);
+    const double middle = (cross_ratio_at(marker, 0) + cross_ratio_at(marker, two_pi - 1e-9)) / 2;
+    EXPECT_NEAR(cross_ratio_at(marker, pi), middle, 1e-9);
+  }
+}
+
+TEST(DesignMarker, NoOtherMemberOfTheFamilyIsClearlyBetter) {
+  Random random(seed);
+  for (const Viewing& viewing : {Viewing{}, Viewing{700, 0.15, 0.2}}) {
+    DesignSpec spec;
+    spec.viewing = viewing;
+    const Marker marker = design_marker(spec);
+    const double best = worst_sigma_centre_line_rad(marker, viewing);
+    for (int i = 0; i < 3000; ++i)
+      EXPECT_GT(worst_sigma_centre_line_rad(random_member(marker.length_m(), 0.003, random), viewing), 0.99 * best)
+          << "seed " << seed;
+    EXPECT_LT(best,
+              worst_sigma_centre_line_rad(marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005}), viewing));
+  }
+}
+
+TEST(DesignMarker, IsThreeDiametersLongWithBandsThatTheCameraResolves) {
+  DesignSpec spec;
+  EXPECT_NEAR(design_marker(spec).length_m(), 0.025, 1e-12);
+  EXPECT_GE(smallest_band_m(design_marker(spec)), 0.003 - 1e-9);
+  spec.viewing = {600, 0.18, 0.1};  // 12 px are 3.6 mm
+  EXPECT_GE(smallest_band_m(design_marker(spec)), 0.0036 - 1e-9);
+}
+
+TEST(DesignMarker, RefusesALengthIntoWhichNoBandsFit) {
+  DesignSpec spec;
+  spec.length_m = 0.009;
+  EXPECT_EQ(testing::input_error([&] { design_marker(spec); }),
+            "length: no marker: three bands of at least 3.0 mm that change over the turn do not fit into 9.0 mm");
+}
+
+TEST(DesignMarker, RefusesWhatMakesNoMarker) {
+  DesignSpec wide, close;
+  wide.diameter_m = 0.2, wide.length_m = 0.03;
+  close.hues_deg = {90, 100, 270};
+  EXPECT_EQ(testing::input_error([&] { design_marker(wide); }),
+            "marker: diameter_m: is 0.2, expected 0.0005 to 0.1 (metres)");
+  EXPECT_EQ(testing::input_error([&] { design_marker(close); }),
+            "marker: hues_deg[1]: is 100, expected hues at least 40 degrees apart");
+}
+
+TEST(WorstSigma, IsTheLargestOverTheTurn) {
+  Random random(seed);
+  for (int i = 0; i < 20; ++i) {
+    const Marker marker = testing::random_linear_marker(random);
+    double largest = 0;
+    for (int k = 0; k < 2000; ++k)
+      largest = std::max(largest, predicted_sigma_centre_line_rad(marker, two_pi * (k + 0.5) / 2000, {}));
+    EXPECT_NEAR(worst_sigma_centre_line_rad(marker, {}) / largest, 1, 0.01) << "seed " << seed << ", design " << i;
+  }
+}
+
+TEST(InLinearFamily, MeansThatTheCrossRatioRunsStraight) {
+  Random random(seed);
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_TRUE(in_linear_family(testing::random_linear_marker(random))) << "seed " << seed;
+    const Marker any = testing::random_marker(random);
+    const double middle = (cross_ratio_at(any, 0) + cross_ratio_at(any, two_pi - 1e-9)) / 2;
+    EXPECT_EQ(in_linear_family(any), std::abs(cross_ratio_at(any, pi) - middle) < 1e-5) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace lapservo
