@@ -1,1 +1,324 @@
+#include "lapservo/marker/drawing.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <iterator>
+#include <regex>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+#include <zlib.h>
+
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/random.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/markers.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using testing::input_error;
+using testing::marker_with;
+using testing::TemporaryFolder;
+
+const Marker example = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+// Of cairo's fixed-point coordinates.
+constexpr double rounding_mm = 0.01;
+
+// A filled polygon on a page, millimetres from its top left corner, y down.
+struct Polygon {
+  Vector3d color;
+  std::vector<Vector2d> points_mm;
+
+  Eigen::AlignedBox2d box() const {
+    Eigen::AlignedBox2d box;
+    for (const Vector2d& p : points_mm) box.extend(p);
+    return box;
+  }
+  // Where a horizontal line enters and leaves it.
+  std::array<double, 2> across(double y_mm) const {
+    std::array<double, 2> span{1e9, -1e9};
+    for (std::size_t i = 0; i < points_mm.size(); ++i) {
+      const Vector2d &a = points_mm[i], &b = points_mm[(i + 1) % points_mm.size()];
+      if ((a.y() <= y_mm) == (b.y() <= y_mm)) continue;
+      const double x = a.x() + (y_mm - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+      span = {std::min(span[0], x), std::max(span[1], x)};
+    }
+    return span;
+  }
+};
+
+struct Page {
+  double width_mm, height_mm;
+  std::vector<Polygon> polygons;
+};
+
+double number(const std::string& text) {
+  const auto value = parse_finite(text);
+  if (!value) throw std::runtime_error("not a number: " + text);
+  return *value;
+}
+
+std::vector<std::smatch> matches(const std::string& text, const std::regex& pattern) {
+  return {std::sregex_iterator(text.begin(), text.end(), pattern), std::sregex_iterator()};
+}
+
+Page read_svg(const std::filesystem::path& path) {
+  const std::string text = testing::read_file(path);
+  static const std::regex header(R"re(width="([\d.]+)mm" height="([\d.]+)mm" viewBox="0 0 ([\d.]+) ([\d.]+)")re");
+  std::smatch size;
+  if (!std::regex_search(text, size, header)) throw std::runtime_error("the SVG has no size in millimetres");
+  Page page{number(size[1]), number(size[2]), {}};
+  const Vector2d mm_per_unit(page.width_mm / number(size[3]), page.height_mm / number(size[4]));
+  static const std::regex polygon(R"re(fill:rgb\(([\d.]+)%,([\d.]+)%,([\d.]+)%\)[^>]* d="(M [^C"]*?) Z)re");
+  static const std::regex point(R"re([ML] ([-\d.]+) ([-\d.]+))re");
+  for (const auto& match : matches(text, polygon)) {
+    page.polygons.push_back({Vector3d(number(match[1]), number(match[2]), number(match[3])) / 100, {}});
+    const std::string outline = match[4];
+    for (const auto& p : matches(outline, point))
+      page.polygons.back().points_mm.push_back(Vector2d(number(p[1]), number(p[2])).cwiseProduct(mm_per_unit));
+  }
+  return page;
+}
+
+std::string inflated(std::string_view deflated) {
+  std::string text(1 << 20, '\0');
+  uLongf size = text.size();
+  if (::uncompress(reinterpret_cast<Bytef*>(text.data()), &size, reinterpret_cast<const Bytef*>(deflated.data()),
+                   deflated.size()) != Z_OK)
+    throw std::runtime_error("the PDF's page can't be inflated");
+  text.resize(size);
+  return text;
+}
+
+// The first stream is the page's content: words in postfix order, in points of 1/72 inch, turned y down at its start.
+Page read_pdf(const std::filesystem::path& path) {
+  constexpr double mm_per_point = 25.4 / 72;
+  const std::string text = testing::read_file(path);
+  static const std::regex media_box(R"re(MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \])re");
+  std::smatch size;
+  if (!std::regex_search(text, size, media_box)) throw std::runtime_error("the PDF has no MediaBox");
+  Page page{mm_per_point * number(size[1]), mm_per_point * number(size[2]), {}};
+  const std::size_t begin = text.find("stream\n") + 7, end = text.find("\nendstream");
+  const std::string content = inflated(std::string_view(text).substr(begin, end - begin));
+  const std::string turned = "1 0 0 -1 0 " + size[2].str() + " cm";
+  if (!content.starts_with(turned)) throw std::runtime_error("the PDF's page is not turned y down");
+  std::istringstream words(content);
+  std::vector<double> stack;
+  Vector3d color = Vector3d::Zero();
+  std::vector<std::vector<Vector2d>> outlines;
+  for (std::string word; words >> word;) {
+    if (const auto value = parse_finite(word)) {
+      stack.push_back(*value);
+      continue;
+    }
+    const std::size_t n = stack.size();
+    const auto point = [&](std::size_t i) {
+      return Vector2d(mm_per_point * stack.at(n - i), mm_per_point * stack.at(n - i + 1));
+    };
+    if (word == "rg") color = {stack.at(n - 3), stack.at(n - 2), stack.at(n - 1)};
+    if (word == "m") outlines.push_back({point(2)});
+    if (word == "l") outlines.back().push_back(point(2));
+    if (word == "re") {
+      const Vector2d a = point(4), across = {point(2).x(), 0}, down = {0, point(2).y()};
+      outlines.push_back({a, a + across, a + across + down, a + down});
+    }
+    if (word == "f")
+      for (const auto& outline : outlines)
+        if (outline.size() > 2) page.polygons.push_back({color, outline});
+    if (word == "f" || word == "S" || word == "n") outlines.clear();
+    stack.clear();
+  }
+  return page;
+}
+
+// In the order in which they were drawn.
+std::vector<Polygon> polygons_of(const Page& page, const PrintColor& color) {
+  std::vector<Polygon> found;
+  for (const Polygon& polygon : page.polygons)
+    if ((polygon.color - Vector3d(color.r, color.g, color.b)).norm() < 1e-3) found.push_back(polygon);
+  return found;
+}
+
+std::vector<Polygon> bands_of(const Page& page, double hue_deg) {
+  return polygons_of(page, print_color(hue_deg));
+}
+
+// Rolls the sheet, which lies before the reader (x right, y down, z away), around a cylinder behind it whose axis
+// points right, the print outside. Height on the sheet, from its upper edge, of the point at an azimuth that grows
+// right-handed about the axis from the upper edge on.
+double height_on_sheet_mm(double radius_mm, double tau_rad) {
+  const Vector3d axis = Vector3d::UnitX(), to_reader = -Vector3d::UnitZ(), down = Vector3d::UnitY();
+  const Vector3d normal = Eigen::AngleAxisd(tau_rad, axis) * to_reader;
+  return radius_mm * wrap_two_pi(std::atan2(normal.dot(down), normal.dot(to_reader)));
+}
+
+void expect_wraps_into(const Page& page, const Marker& marker, double mm_per_mm) {
+  std::array<Polygon, 3> bands;
+  for (std::size_t i = 0; i < 3; ++i) {
+    ASSERT_FALSE(bands_of(page, marker.hues_deg.at(i)).empty()) << "band " << i;
+    bands.at(i) = bands_of(page, marker.hues_deg.at(i)).front();
+  }
+  const Vector2d corner = bands[0].box().min();
+  for (double tau_rad = 0.05; tau_rad < two_pi; tau_rad += 0.2) {
+    const auto along_m = boundaries_m(marker, tau_rad);
+    const double y_mm = corner.y() + mm_per_mm * height_on_sheet_mm(1e3 * marker.radius_m(), tau_rad);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto [proximal, distal] = bands.at(i).across(y_mm);
+      EXPECT_NEAR((proximal - corner.x()) / mm_per_mm, 1e3 * along_m.at(i), 2 * rounding_mm) << "tau " << tau_rad;
+      EXPECT_NEAR((distal - corner.x()) / mm_per_mm, 1e3 * along_m.at(i + 1), 2 * rounding_mm) << "tau " << tau_rad;
+    }
+  }
+}
+
+// Calls with the sheet read back from an SVG and from a PDF.
+void for_sheets(const Marker& marker, Paper paper, int copies, const std::function<void(const Page&)>& law) {
+  const TemporaryFolder folder;
+  for (const char* name : {"sheet.svg", "sheet.pdf"}) {
+    SCOPED_TRACE(name);
+    write_print_sheet(folder / name, "PSM1", marker, paper, copies);
+    law(std::string_view(name).ends_with("svg") ? read_svg(folder / name) : read_pdf(folder / name));
+  }
+}
+
+TEST(PrintSheet, WrappedAroundTheShaftGivesTheBoundariesThatTheMarkerPredicts) {
+  for_sheets(example, Paper::a4, 1, [](const Page& page) { expect_wraps_into(page, example, 1); });
+  constexpr std::uint64_t seed = 53;
+  Random random(seed);
+  for (int i = 0; i < 5; ++i) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Marker marker = testing::random_marker(random);
+    marker.diameter_m = random.uniform(0.004, 0.02);
+    marker.hues_deg = {30, 150, 270};
+    for_sheets(marker, Paper::letter, 1, [&](const Page& page) { expect_wraps_into(page, marker, 1); });
+  }
+}
+
+TEST(PrintSheet, IsAsWideAsTheShaftIsAround) {
+  for (const double diameter_m : {0.005, 0.0084, 0.012}) {
+    Marker marker = example;
+    marker.diameter_m = diameter_m;
+    for_sheets(marker, Paper::a4, 1, [&](const Page& page) {
+      for (const double hue_deg : marker.hues_deg)
+        EXPECT_NEAR(bands_of(page, hue_deg).at(0).box().sizes().y(), 1e3 * pi * diameter_m, rounding_mm);
+      const Eigen::AlignedBox2d first = bands_of(page, 90).at(0).box(), last = bands_of(page, 270).at(0).box();
+      EXPECT_NEAR(last.max().x() - first.min().x(), 24, rounding_mm);
+    });
+  }
+}
+
+TEST(PrintSheet, HasTheSizeOfItsPaper) {
+  for_sheets(example, Paper::a4, 1, [](const Page& page) {
+    EXPECT_NEAR(page.width_mm, 210, rounding_mm);
+    EXPECT_NEAR(page.height_mm, 297, rounding_mm);
+  });
+  for_sheets(example, Paper::letter, 1, [](const Page& page) {
+    EXPECT_NEAR(page.width_mm, 215.9, rounding_mm);
+    EXPECT_NEAR(page.height_mm, 279.4, rounding_mm);
+  });
+}
+
+TEST(PrintSheet, HasRulersOfOneHundredAndFiftyMillimetres) {
+  const TemporaryFolder folder;
+  write_print_sheet(folder / "sheet.svg", "PSM1", example, Paper::a4, 1);
+  const std::string text = testing::read_file(folder / "sheet.svg");
+  std::vector<Vector2d> lines;
+  for (const auto& match : matches(text, std::regex(R"re(d="M ([\d.]+) ([\d.]+) L ([\d.]+) ([\d.]+) ?")re")))
+    lines.emplace_back(number(match[3]) - number(match[1]), number(match[4]) - number(match[2]));
+  const auto drawn = [&](const Vector2d& line) {
+    return std::any_of(lines.begin(), lines.end(), [&](const Vector2d& l) { return (l - line).norm() < rounding_mm; });
+  };
+  EXPECT_TRUE(drawn({100, 0}));
+  EXPECT_TRUE(drawn({0, 50}));
+}
+
+TEST(PrintSheet, HoldsTheCopiesThatFitBesideOneAnother) {
+  for (const auto& [asked, expected] : {std::pair(1, 1), std::pair(7, 7), std::pair(1000, 25)})
+    for_sheets(example, Paper::a4, asked, [&, wanted = static_cast<std::size_t>(expected)](const Page& page) {
+      const auto first = bands_of(page, 90), last = bands_of(page, 270), tabs = polygons_of(page, {0.93, 0.93, 0.93});
+      ASSERT_EQ(first.size(), wanted);
+      ASSERT_EQ(last.size(), wanted);
+      ASSERT_EQ(tabs.size(), wanted);
+      std::vector<Eigen::AlignedBox2d> copies;
+      for (std::size_t i = 0; i < wanted; ++i) {
+        const Eigen::AlignedBox2d marker = first[i].box().merged(last[i].box());
+        EXPECT_NEAR(tabs[i].box().min().y(), marker.max().y(), rounding_mm) << "the tab continues the print";
+        const Eigen::AlignedBox2d copy = marker.merged(tabs[i].box());
+        EXPECT_TRUE(Eigen::AlignedBox2d(Vector2d(5, 5), Vector2d(205, 292)).contains(copy)) << "within the page";
+        for (const Eigen::AlignedBox2d& other : copies) EXPECT_GT(copy.exteriorDistance(other), 10) << "room to cut";
+        copies.push_back(copy);
+      }
+    });
+}
+
+TEST(PrintSheet, RefusesWhatDoesNotFitOrCanNotBeWrittenAndLeavesNothingBehind) {
+  const TemporaryFolder folder;
+  Marker huge = example;
+  huge.diameter_m = 0.07;
+  const auto refusal = [&](const std::string& name, const Marker& marker) {
+    return input_error([&] { write_print_sheet(folder / name, "PSM1", marker, Paper::a4, 1); });
+  };
+  const std::string place = folder.path().string() + "/";
+  EXPECT_EQ(refusal("sheet.svg", huge), place + "sheet.svg: the marker of 24 x 220 mm does not fit on the paper");
+  EXPECT_EQ(refusal("sheet.doc", example),
+            place + "sheet.doc: name: is .doc, expected one that ends in .svg, .pdf or .png");
+  EXPECT_EQ(refusal("sheet", example),
+            place + "sheet: name: is without an ending, expected one that ends in .svg, .pdf or .png");
+  for (const std::string name : {"none/sheet.svg", "none/sheet.pdf", "none/sheet.png"}) {
+    const std::string said = refusal(name, example);
+    EXPECT_TRUE(said.starts_with(place + name + ": can't be written")) << said;
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  std::filesystem::create_directory(folder / "taken.svg");
+  EXPECT_EQ(refusal("taken.svg", example), place + "taken.svg: can't be written");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the folder";
+}
+
+TEST(MarkerPicture, ShowsTheMarkerAsItIsWrapped) {
+  const TemporaryFolder folder;
+  for (const Marker& marker : {example, marker_with({0.004, 0.012, 0.008}, {0.012, 0.004, 0.008})}) {
+    write_marker_picture(folder / "marker.svg", "PSM1", marker, {});
+    const Page page = read_svg(folder / "marker.svg");
+    const double height = bands_of(page, 90).at(0).box().sizes().y();
+    expect_wraps_into(page, marker, height / (1e3 * pi * marker.diameter_m));
+  }
+}
+
+TEST(MarkerPicture, IsAlsoAPng) {
+  const TemporaryFolder folder;
+  write_marker_picture(folder / "marker.png", "PSM1", example, {});
+  const std::string bytes = testing::read_file(folder / "marker.png");
+  const std::string head("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x04\xb0\0\0\x06\x40", 24);  // 1200 x 1600
+  EXPECT_EQ(bytes.substr(0, head.size()), head);
+  EXPECT_NE(bytes.find("IEND"), std::string::npos);
+}
+
+double hue_of_deg(const PrintColor& c) {
+  return deg_from_rad(wrap_two_pi(std::atan2(std::sqrt(3.0) * (c.g - c.b), 2 * c.r - c.g - c.b)));
+}
+
+TEST(PrintColor, HasTheHueAndIsPrintable) {
+  // The hexagon's hue and the circle's agree at multiples of 30 degrees.
+  for (int hue_deg = 0; hue_deg < 360; hue_deg += 30) {
+    const PrintColor color = print_color(hue_deg);
+    EXPECT_NEAR(std::remainder(hue_of_deg(color) - hue_deg, 360), 0, 1e-6) << hue_deg;
+    for (const double value : {color.r, color.g, color.b}) EXPECT_TRUE(value >= 0 && value <= 1) << hue_deg;
+  }
+}
+
+}  // namespace
+}  // namespace lapservo
