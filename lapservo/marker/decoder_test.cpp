@@ -231,6 +231,19 @@ TEST(MarkerProblem, NamesTheFirstFieldThatMakesNoMarker) {
   EXPECT_EQ(problem([](Marker& m) { m.seam_rad = std::nan(""); }), "seam_rad: is nan, expected an angle in radians");
 }
 
+TEST(ReversedColourOrder, IsTheSameOrderSeenFromTheTip) {
+  Marker a, b;
+  EXPECT_FALSE(reversed_colour_order(a, b));
+  b.hues_deg = {265, 185, 95};
+  EXPECT_TRUE(reversed_colour_order(a, b));
+  EXPECT_TRUE(reversed_colour_order(b, a));
+  EXPECT_FALSE(same_colour_order(a, b));
+  for (const std::array<double, 3>& cyclic : {std::array{180.0, 270.0, 90.0}, std::array{270.0, 90.0, 180.0}}) {
+    b.hues_deg = cyclic;
+    EXPECT_FALSE(reversed_colour_order(a, b));
+  }
+}
+
 TEST(SameColourOrder, CyclicOrdersDifferAndSmallShadesDoNot) {
   Marker a, b;
   EXPECT_TRUE(same_colour_order(a, b));

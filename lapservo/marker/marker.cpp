@@ -82,4 +82,10 @@ bool same_colour_order(const Marker& a, const Marker& b) {
   return true;
 }
 
+bool reversed_colour_order(const Marker& a, const Marker& b) {
+  Marker turned = b;
+  std::reverse(turned.hues_deg.begin(), turned.hues_deg.end());
+  return same_colour_order(a, turned);
+}
+
 }  // namespace lapservo

@@ -38,4 +38,7 @@ std::string marker_problem(const Marker& marker);
 /// Two markers whose bands have the same hues in the same places can't be told apart by colour.
 bool same_colour_order(const Marker& a, const Marker& b);
 
+/// Nor can two whose orders are reversals of one another: each looks like the other turned end for end.
+bool reversed_colour_order(const Marker& a, const Marker& b);
+
 }  // namespace lapservo

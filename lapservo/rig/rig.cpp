@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -27,6 +28,8 @@ class Field {
   [[noreturn]] void fail(std::string_view value, std::string_view expected) const {
     throw InputError(source_, path_.empty() ? "file" : path_, value, expected);
   }
+  // For complaints that name value and expectation themselves, as "field: is value, expected ...".
+  [[noreturn]] void fail_within(const std::string& problem) const { throw InputError(source_, path_ + "." + problem); }
   std::string value_text() const {
     if (!node_.IsDefined() || node_.IsNull()) return "missing";
     if (node_.IsScalar()) return node_.Scalar().empty() ? "''" : node_.Scalar();
@@ -61,11 +64,12 @@ class Field {
     return value;
   }
   template <std::size_t N>
-  std::array<double, N> numbers(std::string_view expected) const {
+  std::array<double, N> numbers(std::string_view expected, double largest = std::numeric_limits<double>::infinity(),
+                                std::string_view item_expected = "a finite number") const {
     const auto items = list(expected);
     if (items.size() != N) fail(value_text(), expected);
     std::array<double, N> values{};
-    for (std::size_t i = 0; i < N; ++i) values[i] = items[i].number("a finite number");
+    for (std::size_t i = 0; i < N; ++i) values[i] = items[i].number_between(-largest, largest, item_expected);
     return values;
   }
   const std::string& source() const { return source_; }
@@ -185,21 +189,16 @@ Marker parse_marker(const Field& field) {
   marker.bands_upper_m = field["bands_upper_m"].numbers<3>("three lengths in metres");
   marker.bands_lower_m = field["bands_lower_m"].numbers<3>("three lengths in metres");
   if (const Field seam = field["seam_rad"]; seam.present()) marker.seam_rad = seam.number("an angle in radians");
-  if (const std::string problem = marker_problem(marker); !problem.empty()) {
-    const auto end = problem.find_first_of("[:");
-    field[problem.substr(0, end)].fail(problem.substr(problem.find(": is ") + 5), "a marker that can be made");
-  }
+  if (const std::string problem = marker_problem(marker); !problem.empty()) field.fail_within(problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
-    field.fail("not decodable: " + problem, "bands whose cross-ratio is monotonic over the rotation");
+    field.fail("not decodable", "bands whose cross-ratio is monotonic over the rotation: " + problem);
   return marker;
 }
 
 Rigid3 parse_transform(const Field& field) {
-  const auto t = field["translation_m"].numbers<3>("x y z in metres");
+  const auto t = field["translation_m"].numbers<3>("x y z in metres", 10, "a length within 10 m");
   const Field quaternion = field["quaternion_xyzw"];
   const auto q = quaternion.numbers<4>("x y z w of a unit quaternion");
-  for (const double value : t)
-    if (std::abs(value) > 10) field["translation_m"].fail(std::to_string(value), "less than 10 m");
   const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
   if (!(std::abs(rotation.norm() - 1) < 1e-2))
     quaternion.fail("of norm " + std::to_string(rotation.norm()), "x y z w of a unit quaternion");
@@ -226,6 +225,9 @@ void check_distinguishable(const std::vector<Instrument>& instruments, const std
       if (same_colour_order(instruments[i].marker, instruments[j].marker))
         fields[i]["marker"]["hues_deg"].fail("the order of " + instruments[j].name,
                                              "another order of colours: it is what names the instrument");
+      if (reversed_colour_order(instruments[i].marker, instruments[j].marker))
+        fields[i]["marker"]["hues_deg"].fail("the order of " + instruments[j].name + " reversed",
+                                             "another middle colour: turned end for end, the two look the same");
     }
 }
 

@@ -1,1 +1,382 @@
+#include "lapservo/rig/rig.h"
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
 #include <gtest/gtest.h>
+
+#include "lapservo/marker/decoder.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/sample_frames.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+using testing::input_error;
+
+const std::string good = R"(camera:
+  image_width: 1280
+  image_height: 720
+  distortion_model: plumb_bob
+  camera_matrix: {rows: 3, cols: 3, data: [1100, 0, 639.5, 0, 1090, 359.5, 0, 0, 1]}
+  distortion_coefficients: {rows: 1, cols: 5, data: [-0.1, 0.02, 0.001, -0.002, 0]}
+  response: gamma:2.2
+instruments:
+  - name: PSM1
+    marker:
+      diameter_m: 0.0084
+      hues_deg: [90, 180, 270]
+      bands_upper_m: [0.0035, 0.0036, 0.0169]
+      bands_lower_m: [0.0095, 0.0094, 0.0051]
+      seam_rad: 0.25
+    camera_from_rcm:
+      translation_m: [-0.0778, 0.0672, 0.0592]
+      quaternion_xyzw: [0, 0, 0.6, 0.8]
+)";
+
+std::string with(const std::string& old_text, const std::string& new_text) {
+  std::string yaml = good;
+  const std::size_t at = yaml.find(old_text);
+  EXPECT_NE(at, std::string::npos) << old_text;
+  return yaml.replace(at, old_text.size(), new_text);
+}
+
+std::string error_of(const std::string& yaml) {
+  return input_error([&] { parse_rig(yaml, "rig.yaml"); });
+}
+
+// Another instrument of these colours and this name.
+std::string second_instrument(const std::string& name, const std::string& hues_deg) {
+  return "  - name: " + name + "\n    marker:\n      diameter_m: 0.0084\n      hues_deg: " + hues_deg +
+         "\n      bands_upper_m: [0.0035, 0.0036, 0.0169]\n      bands_lower_m: [0.0095, 0.0094, 0.0051]\n";
+}
+
+TEST(Rig, HoldsWhatTheFileSays) {
+  const Rig rig = parse_rig(good, "rig.yaml");
+  EXPECT_EQ(rig.camera.width_px, 1280);
+  EXPECT_EQ(rig.camera.height_px, 720);
+  EXPECT_EQ(rig.camera.fx_px, 1100);
+  EXPECT_EQ(rig.camera.fy_px, 1090);
+  EXPECT_EQ(rig.camera.cx_px, 639.5);
+  EXPECT_EQ(rig.camera.cy_px, 359.5);
+  EXPECT_EQ(rig.camera.distortion, (std::array<double, 5>{-0.1, 0.02, 0.001, -0.002, 0}));
+  EXPECT_EQ(rig.camera.response.kind, Response::Kind::power);
+  EXPECT_EQ(rig.camera.response.gamma, 2.2);
+  ASSERT_EQ(rig.instruments.size(), 1U);
+  const Instrument& instrument = rig.instruments.front();
+  EXPECT_EQ(instrument.name, "PSM1");
+  EXPECT_EQ(instrument.marker.diameter_m, 0.0084);
+  EXPECT_EQ(instrument.marker.hues_deg, (std::array<double, 3>{90, 180, 270}));
+  EXPECT_EQ(instrument.marker.bands_upper_m, (std::array<double, 3>{0.0035, 0.0036, 0.0169}));
+  EXPECT_EQ(instrument.marker.bands_lower_m, (std::array<double, 3>{0.0095, 0.0094, 0.0051}));
+  EXPECT_EQ(instrument.marker.seam_rad, 0.25);
+  ASSERT_TRUE(instrument.camera_from_rcm);
+  EXPECT_EQ(instrument.camera_from_rcm->translation, Eigen::Vector3d(-0.0778, 0.0672, 0.0592));
+  // About z by 2 asin(0.6).
+  EXPECT_LT((instrument.camera_from_rcm->rotation * Eigen::Vector3d::UnitX() - Eigen::Vector3d(0.28, 0.96, 0)).norm(),
+            1e-12);
+}
+
+TEST(Rig, LeavesOutWhatIsOptional) {
+  const Rig rig = parse_rig(R"(
+camera: {image_width: 64, image_height: 48, camera_matrix: {data: [50, 0, 32, 0, 50, 24, 0, 0, 1]}}
+instruments:
+  - name: tool
+    marker: {diameter_m: 0.005, bands_upper_m: [0.003, 0.003, 0.009], bands_lower_m: [0.006, 0.006, 0.003]}
+)",
+                            "rig.yaml");
+  EXPECT_EQ(rig.camera.distortion, (std::array<double, 5>{}));
+  EXPECT_EQ(rig.camera.response.kind, Response::Kind::srgb);
+  EXPECT_EQ(rig.instruments[0].marker.hues_deg, (std::array<double, 3>{90, 180, 270}));
+  EXPECT_EQ(rig.instruments[0].marker.seam_rad, 0);
+  EXPECT_FALSE(rig.instruments[0].camera_from_rcm);
+}
+
+TEST(Rig, ReadsEveryResponse) {
+  const auto response = [](const std::string& text) {
+    return parse_rig(with("gamma:2.2", text), "rig.yaml").camera.response;
+  };
+  EXPECT_EQ(response("srgb").kind, Response::Kind::srgb);
+  EXPECT_EQ(response("linear").kind, Response::Kind::power);
+  EXPECT_EQ(response("linear").gamma, 1);
+  EXPECT_EQ(response("gamma:1.8").gamma, 1.8);
+}
+
+TEST(Rig, NormalisesARoundedQuaternion) {
+  const Rig rig = parse_rig(with("[0, 0, 0.6, 0.8]", "[0, 0, 0.601, 0.799]"), "rig.yaml");
+  EXPECT_NEAR(rig.instruments[0].camera_from_rcm->rotation.norm(), 1, 1e-12);
+}
+
+struct Complaint {
+  std::string name, yaml, expected;
+};
+
+void PrintTo(const Complaint& complaint, std::ostream* out) {
+  *out << complaint.expected;
+}
+
+class BadRig : public ::testing::TestWithParam<Complaint> {};
+
+TEST_P(BadRig, IsRefusedInOneLineNamingFileFieldValueAndExpectation) {
+  EXPECT_EQ(error_of(GetParam().yaml), "rig.yaml: " + GetParam().expected);
+}
+
+std::vector<Complaint> missing_keys() {
+  return {
+      {"Everything", " \n", "file: is missing, expected a map with 'camera'"},
+      {"Camera", "instruments: []", "camera: is missing, expected a map with 'image_width'"},
+      {"Instruments", good.substr(0, good.find("instruments")),
+       "instruments: is missing, expected a list of instruments"},
+      {"NoInstrument", good.substr(0, good.find("  - name")) + "  []\n",
+       "instruments: is a list of 0, expected one to eight instruments"},
+      {"ImageWidth", with("  image_width: 1280\n", ""),
+       "camera.image_width: is missing, expected a whole number of pixels, 16 to 16384"},
+      {"CameraMatrix",
+       with("  camera_matrix: {rows: 3, cols: 3, data: [1100, 0, 639.5, 0, 1090, 359.5, 0, 0, 1]}\n", ""),
+       "camera.camera_matrix: is missing, expected a map with 'data'"},
+      {"CameraMatrixData", with("data: [1100", "values: [1100"),
+       "camera.camera_matrix.data: is missing, expected nine numbers, fx 0 cx 0 fy cy 0 0 1"},
+      {"DistortionData", with("data: [-0.1", "values: [-0.1"),
+       "camera.distortion_coefficients.data: is missing, expected five numbers, k1 k2 p1 p2 k3"},
+      {"Name", with("- name: PSM1\n    marker", "- marker"), "instruments[0].name: is missing, expected a name"},
+      {"Marker", with("    marker:", "    band:"),
+       "instruments[0].marker: is missing, expected a map with 'diameter_m'"},
+      {"Diameter", with("      diameter_m: 0.0084\n", ""),
+       "instruments[0].marker.diameter_m: is missing, expected 0.0005 to 0.1 (metres)"},
+      {"BandsUpper", with("      bands_upper_m: [0.0035, 0.0036, 0.0169]\n", ""),
+       "instruments[0].marker.bands_upper_m: is missing, expected three lengths in metres"},
+      {"BandsLower", with("bands_lower_m", "bands_lover_m"),
+       "instruments[0].marker.bands_lower_m: is missing, expected three lengths in metres"},
+      {"Translation", with("      translation_m: [-0.0778, 0.0672, 0.0592]\n", ""),
+       "instruments[0].camera_from_rcm.translation_m: is missing, expected x y z in metres"},
+      {"Quaternion", with("      quaternion_xyzw: [0, 0, 0.6, 0.8]\n", ""),
+       "instruments[0].camera_from_rcm.quaternion_xyzw: is missing, expected x y z w of a unit quaternion"},
+  };
+}
+
+std::vector<Complaint> wrong_types() {
+  return {
+      {"RootIsAList", "[1, 2]", "file: is a list of 2, expected a map with 'camera'"},
+      {"RootIsAWord", "rig", "file: is rig, expected a map with 'camera'"},
+      {"CameraIsAList", with("camera:\n  image_width: 1280", "camera: [1]\nrest:\n  image_width: 1280"),
+       "camera: is a list of 1, expected a map with 'image_width'"},
+      {"WidthIsAWord", with("1280", "wide"),
+       "camera.image_width: is wide, expected a whole number of pixels, 16 to 16384"},
+      {"WidthIsAMap", with("1280", "{px: 1280}"),
+       "camera.image_width: is a map, expected a whole number of pixels, 16 to 16384"},
+      {"WidthHasAUnit", with("1280", "1280px"),
+       "camera.image_width: is 1280px, expected a whole number of pixels, 16 to 16384"},
+      {"WidthIsEmpty", with("1280", "''"), "camera.image_width: is '', expected a whole number of pixels, 16 to 16384"},
+      {"MatrixEntryIsAWord", with("639.5", "centre"),
+       "camera.camera_matrix.data[2]: is centre, expected a finite number"},
+      {"MatrixTooShort", with("0, 0, 1]}", "0, 0]}"),
+       "camera.camera_matrix.data: is a list of 8, expected nine numbers, fx 0 cx 0 fy cy 0 0 1"},
+      {"DistortionTooShort", with("[-0.1, ", "["),
+       "camera.distortion_coefficients.data: is a list of 4, expected five numbers, k1 k2 p1 p2 k3"},
+      {"ResponseIsAWord", with("gamma:2.2", "log"),
+       "camera.response: is log, expected srgb, linear or gamma:VALUE with a value of 0.2 to 5"},
+      {"ResponseIsAList", with("gamma:2.2", "[srgb]"),
+       "camera.response: is a list of 1, expected srgb, linear or gamma:VALUE with a value of 0.2 to 5"},
+      {"InstrumentsIsAMap", with("  - name: PSM1\n    marker:", "  PSM1:\n    marker:"),
+       "instruments: is a map, expected a list of instruments"},
+      {"NameIsAList", with("PSM1", "[PSM1]"), "instruments[0].name: is a list of 1, expected a name"},
+      {"HuesIsANumber", with("[90, 180, 270]", "90"),
+       "instruments[0].marker.hues_deg: is 90, expected three hues in degrees"},
+      {"TwoBands", with("[0.0035, 0.0036, 0.0169]", "[0.0035, 0.0205]"),
+       "instruments[0].marker.bands_upper_m: is a list of 2, expected three lengths in metres"},
+      {"FourBands", with("[0.0095, 0.0094, 0.0051]", "[0.0095, 0.0094, 0.0051, 0]"),
+       "instruments[0].marker.bands_lower_m: is a list of 4, expected three lengths in metres"},
+      {"SeamIsAWord", with("0.25", "left"), "instruments[0].marker.seam_rad: is left, expected an angle in radians"},
+      {"TransformIsANumber", with("camera_from_rcm:\n", "camera_from_rcm: 3\n    rest:\n"),
+       "instruments[0].camera_from_rcm: is 3, expected a map with 'translation_m'"},
+  };
+}
+
+std::vector<Complaint> non_finite_numbers() {
+  return {
+      {"WidthNan", with("1280", ".nan"), "camera.image_width: is .nan, expected a whole number of pixels, 16 to 16384"},
+      {"FocalInf", with("[1100", "[.inf"), "camera.camera_matrix.data[0]: is .inf, expected a finite number"},
+      {"FocalHuge", with("[1100", "[1e999"), "camera.camera_matrix.data[0]: is 1e999, expected a finite number"},
+      {"DistortionNan", with("[-0.1", "[nan"),
+       "camera.distortion_coefficients.data[0]: is nan, expected a finite number"},
+      {"GammaNan", with("gamma:2.2", "gamma:nan"),
+       "camera.response: is gamma:nan, expected srgb, linear or gamma:VALUE with a value of 0.2 to 5"},
+      {"DiameterInf", with("0.0084", "inf"),
+       "instruments[0].marker.diameter_m: is inf, expected 0.0005 to 0.1 (metres)"},
+      {"HueNan", with("180", "NaN"), "instruments[0].marker.hues_deg[1]: is NaN, expected a finite number"},
+      {"BandNan", with("0.0036", "nan"), "instruments[0].marker.bands_upper_m[1]: is nan, expected a finite number"},
+      {"SeamInf", with("0.25", "-.inf"), "instruments[0].marker.seam_rad: is -.inf, expected an angle in radians"},
+      {"TranslationNan", with("0.0672", "nan"),
+       "instruments[0].camera_from_rcm.translation_m[1]: is nan, expected a length within 10 m"},
+      {"QuaternionInf", with("0.6", "inf"),
+       "instruments[0].camera_from_rcm.quaternion_xyzw[2]: is inf, expected a finite number"},
+  };
+}
+
+std::vector<Complaint> impossible_cameras() {
+  return {
+      {"WidthZero", with("1280", "0"), "camera.image_width: is 0, expected a whole number of pixels, 16 to 16384"},
+      {"WidthBroken", with("1280", "1280.5"),
+       "camera.image_width: is 1280.5, expected a whole number of pixels, 16 to 16384"},
+      {"HeightHuge", with("720", "1e6"), "camera.image_height: is 1e6, expected a whole number of pixels, 16 to 16384"},
+      {"HeightNegative", with("720", "-720"),
+       "camera.image_height: is -720, expected a whole number of pixels, 16 to 16384"},
+      {"Fisheye", with("plumb_bob", "equidistant"), "camera.distortion_model: is equidistant, expected plumb_bob"},
+      {"FocalNegative", with("[1100", "[-1100"),
+       "camera.camera_matrix.data: is -1100 0 639.5 0 1090 359.5 0 0 1 , expected fx 0 cx 0 fy cy 0 0 1 with fx and fy "
+       "above 0 (pixels)"},
+      {"FocalTooLarge", with("1090", "1e7"),
+       "camera.camera_matrix.data: is 1100 0 639.5 0 1e+07 359.5 0 0 1 , expected fx 0 cx 0 fy cy 0 0 1 with fx and fy "
+       "above 0 (pixels)"},
+      {"Skew", with("[1100, 0,", "[1100, 2,"),
+       "camera.camera_matrix.data: is 1100 2 639.5 0 1090 359.5 0 0 1 , expected fx 0 cx 0 fy cy 0 0 1 with fx and fy "
+       "above 0 (pixels)"},
+      {"FoldingDistortion", with("-0.1", "-5"),
+       "camera.distortion_coefficients.data: is not invertible at the image's border, expected k1 k2 p1 p2 k3 of a "
+       "calibration that covers the image"},
+      {"GammaZero", with("gamma:2.2", "gamma:0"),
+       "camera.response: is gamma:0, expected srgb, linear or gamma:VALUE with a value of 0.2 to 5"},
+  };
+}
+
+std::vector<Complaint> impossible_instruments() {
+  return {
+      {"DiameterZero", with("0.0084", "0"), "instruments[0].marker.diameter_m: is 0, expected 0.0005 to 0.1 (metres)"},
+      {"DiameterInMillimetres", with("0.0084", "8.4"),
+       "instruments[0].marker.diameter_m: is 8.4, expected 0.0005 to 0.1 (metres)"},
+      {"HueTooLarge", with("270", "400"), "instruments[0].marker.hues_deg[2]: is 400, expected 0 to 360"},
+      {"HuesTooClose", with("[90, 180, 270]", "[90, 100, 270]"),
+       "instruments[0].marker.hues_deg[1]: is 100, expected hues at least 40 degrees apart"},
+      {"BandNegative", with("0.0036", "-0.0036"),
+       "instruments[0].marker.bands_upper_m[1]: is -0.0036, expected a length above 0, up to 0.5 (metres)"},
+      {"BandsInMillimetres", with("[0.0095, 0.0094, 0.0051]", "[9.5, 9.4, 5.1]"),
+       "instruments[0].marker.bands_lower_m[0]: is 9.5, expected a length above 0, up to 0.5 (metres)"},
+      {"SumsDiffer", with("0.0051", "0.0061"),
+       "instruments[0].marker.bands_lower_m: is a sum of 0.025000, expected the same sum as bands_upper_m (0.024000): "
+       "both ends of the marker are circles"},
+      {"SeamInDegreesAndTurns", with("0.25", "3600"),
+       "instruments[0].marker.seam_rad: is 3600, expected an angle in radians"},
+      {"NotSloping", with("[0.0095, 0.0094, 0.0051]", "[0.0035, 0.0036, 0.0169]"),
+       "instruments[0].marker: is not decodable, expected bands whose cross-ratio is monotonic over the rotation: the "
+       "cross-ratio is the same at every rotation: the inner boundaries must slope"},
+      {"TurningBack", with("[0.0095, 0.0094, 0.0051]", "[0.0165, 0.0036, 0.0039]"),
+       "instruments[0].marker: is not decodable, expected bands whose cross-ratio is monotonic over the rotation: the "
+       "cross-ratio turns back near tau = 3.25 rad, so that two rotations look the same"},
+      {"TranslationInMillimetres", with("0.0672", "67.2"),
+       "instruments[0].camera_from_rcm.translation_m[1]: is 67.2, expected a length within 10 m"},
+      {"QuaternionNotUnit", with("[0, 0, 0.6, 0.8]", "[0, 0, 0.6, 0.9]"),
+       "instruments[0].camera_from_rcm.quaternion_xyzw: is of norm 1.081665, expected x y z w of a unit quaternion"},
+      {"QuaternionZero", with("[0, 0, 0.6, 0.8]", "[0, 0, 0, 0]"),
+       "instruments[0].camera_from_rcm.quaternion_xyzw: is of norm 0.000000, expected x y z w of a unit quaternion"},
+      {"NameWithComma", with("PSM1", "'PSM,1'"),
+       "instruments[0].name: is PSM,1, expected a name without commas and control characters"},
+      {"NameWithNewline", with("PSM1", R"("PSM\n1")"),
+       "instruments[0].name: is PSM 1, expected a name without commas and control characters"},
+  };
+}
+
+std::vector<Complaint> confusable_instruments() {
+  std::string nine = good;
+  for (int i = 2; i <= 9; ++i) nine += second_instrument("PSM" + std::to_string(i), "[90, 180, 270]");
+  return {
+      {"SameName", good + second_instrument("PSM1", "[180, 270, 90]"),
+       "instruments[1].name: is PSM1, expected a name that no other instrument has"},
+      {"SameColours", good + second_instrument("PSM2", "[95, 175, 265]"),
+       "instruments[1].marker.hues_deg: is the order of PSM1, expected another order of colours: it is what names the "
+       "instrument"},
+      {"ReversedColours", good + second_instrument("PSM2", "[265, 185, 95]"),
+       "instruments[1].marker.hues_deg: is the order of PSM1 reversed, expected another middle colour: turned end for "
+       "end, the two look the same"},
+      {"TooMany", nine, "instruments: is a list of 9, expected one to eight instruments"},
+  };
+}
+
+std::string name_of(const ::testing::TestParamInfo<Complaint>& info) {
+  return info.param.name;
+}
+
+INSTANTIATE_TEST_SUITE_P(MissingKey, BadRig, ::testing::ValuesIn(missing_keys()), name_of);
+INSTANTIATE_TEST_SUITE_P(WrongType, BadRig, ::testing::ValuesIn(wrong_types()), name_of);
+INSTANTIATE_TEST_SUITE_P(NonFinite, BadRig, ::testing::ValuesIn(non_finite_numbers()), name_of);
+INSTANTIATE_TEST_SUITE_P(Impossible, BadRig, ::testing::ValuesIn(impossible_cameras()), name_of);
+INSTANTIATE_TEST_SUITE_P(ImpossibleInstrument, BadRig, ::testing::ValuesIn(impossible_instruments()), name_of);
+INSTANTIATE_TEST_SUITE_P(Confusable, BadRig, ::testing::ValuesIn(confusable_instruments()), name_of);
+
+TEST(Rig, TakesThreeInstrumentsOfCyclicColourOrders) {
+  const Rig rig = parse_rig(
+      good + second_instrument("PSM2", "[180, 270, 90]") + second_instrument("PSM3", "[270, 90, 180]"), "rig.yaml");
+  ASSERT_EQ(rig.instruments.size(), 3U);
+  EXPECT_EQ(rig.instruments[2].name, "PSM3");
+}
+
+// Wherever the file ends, there is a rig or a complaint of one line; nothing else is thrown.
+TEST(Rig, IsWholeOrRefusedWhereverTheFileIsCut) {
+  int whole = 0;
+  const std::size_t start = good.find("1280");  // before it, the camera is a word: the name of a file
+  for (std::size_t length = start; length <= good.size(); ++length) {
+    const std::string said = error_of(good.substr(0, length));
+    whole += said.empty();
+    EXPECT_TRUE(said.empty() || said.starts_with("rig.yaml: ")) << said;
+    EXPECT_EQ(said.find('\n'), std::string::npos) << said;
+  }
+  EXPECT_GT(whole, 0);
+  EXPECT_LT(whole, 100);
+}
+
+TEST(Rig, RefusesWhatIsNotYaml) {
+  EXPECT_TRUE(error_of("camera: [1, 2").starts_with("rig.yaml: is not YAML: "));
+  EXPECT_TRUE(error_of("a: b: c").starts_with("rig.yaml: is not YAML: "));
+  EXPECT_EQ(error_of(std::string(100000, '[')), "rig.yaml: nests more deeply than a rig file does");
+  EXPECT_EQ(error_of(std::string(3000, '-')), "rig.yaml: nests more deeply than a rig file does");
+  EXPECT_EQ(error_of(std::string(2 << 20, ' ')), "rig.yaml: is larger than 1 MiB, expected a rig file");
+}
+
+TEST(LoadRig, FindsTheCameraFileBesideTheRig) {
+  const testing::TemporaryFolder folder;
+  const std::size_t begin = good.find("  image_width"), end = good.find("instruments:");
+  std::string camera = good.substr(begin, end - begin);
+  for (std::size_t at = 0; (at = camera.find("  ", at)) != std::string::npos;) camera.erase(at, 2);
+  fs::create_directory(folder / "cameras");
+  testing::write_file(folder / "cameras/endoscope.yaml", camera);
+  testing::write_file(folder / "rig.yaml", "camera: cameras/endoscope.yaml\n" + good.substr(end));
+  const Rig rig = load_rig(folder / "rig.yaml");
+  EXPECT_EQ(rig.camera.width_px, 1280);
+  EXPECT_EQ(rig.camera.response.gamma, 2.2);
+
+  const std::string camera_path = (folder / "cameras/endoscope.yaml").string();
+  testing::write_file(camera_path, "image_width: wide");
+  EXPECT_EQ(input_error([&] { load_rig(folder / "rig.yaml"); }),
+            camera_path + ": image_width: is wide, expected a whole number of pixels, 16 to 16384");
+  fs::remove(camera_path);
+  EXPECT_EQ(input_error([&] { load_rig(folder / "rig.yaml"); }),
+            camera_path + ": can't be opened, expected a YAML file");
+}
+
+TEST(LoadRig, NamesTheFileThatCanNotBeRead) {
+  const testing::TemporaryFolder folder;
+  const auto said = [&](const fs::path& path) { return input_error([&] { load_rig(path); }); };
+  testing::write_file(folder / "empty.yaml", "");
+  EXPECT_EQ(said(folder / "none.yaml"), (folder / "none.yaml").string() + ": can't be opened, expected a YAML file");
+  EXPECT_EQ(said(folder / "empty.yaml"), (folder / "empty.yaml").string() + ": is empty, expected a YAML file");
+  EXPECT_EQ(said(folder.path()), folder.path().string() + ": is a folder, expected a YAML file");
+}
+
+TEST(LoadRig, TakesTheExamplesThatWeShip) {
+  int rigs = 0;
+  for (const auto& entry : fs::directory_iterator(testing::source_folder() / "configs")) {
+    if (entry.path().extension() != ".yaml") continue;
+    const Rig rig = load_rig(entry.path());
+    for (const Instrument& instrument : rig.instruments) EXPECT_EQ(decoding_problem(instrument.marker), "");
+    ++rigs;
+  }
+  EXPECT_GE(rigs, 2);
+}
+
+}  // namespace
+}  // namespace lapservo
