@@ -16,10 +16,10 @@
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/io/configuration_csv.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/kinematics/features.h"
 #include "lapservo/sim/renderer.h"
@@ -37,9 +37,6 @@ struct Options {
   bool moving = false, video = false, force = false;
   double fps = 30, light = 1, smoke = 0, blood = 0, noise = 1, blur_px = 0.8, motion = 0, film_mm = 0.1;
 };
-
-// One frame's configurations, an entry per instrument.
-using Configurations = std::vector<RcmCoordinates>;
 
 ShaftPlacement placement_of(const Instrument& instrument, const RcmCoordinates& q) {
   return {*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
@@ -102,29 +99,6 @@ std::vector<Configurations> random_configurations(const Rig& rig, const Options&
     path.push_back(std::move(frame));
   }
   return path;
-}
-
-// Columns theta_rad, phi_rad, rho_m, psi_rad and, for several instruments, instrument; a row per instrument and frame.
-std::vector<Configurations> read_configurations(const Rig& rig, const std::string& path) {
-  const CsvTable table = CsvTable::read(path);
-  const std::size_t instruments = rig.instruments.size();
-  if (table.rows() == 0 || table.rows() % instruments != 0)
-    throw InputError(path, "rows", std::to_string(table.rows()),
-                     "a row per frame and instrument (" + std::to_string(instruments) + ")");
-  std::vector<Configurations> frames(table.rows() / instruments, Configurations(instruments));
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    std::size_t index = row % instruments;
-    if (table.has("instrument")) {
-      const std::string& name = table.text(row, "instrument");
-      const auto found = std::find_if(rig.instruments.begin(), rig.instruments.end(),
-                                      [&](const Instrument& i) { return i.name == name; });
-      if (found == rig.instruments.end()) throw InputError(path, "instrument", name, "an instrument of the rig");
-      index = static_cast<std::size_t>(found - rig.instruments.begin());
-    }
-    frames[row / instruments][index] = {table.number(row, "theta_rad"), table.number(row, "phi_rad"),
-                                        table.number(row, "rho_m"), table.number(row, "psi_rad")};
-  }
-  return frames;
 }
 
 cv::Mat background_light(const Camera& camera, const Options& options) {
@@ -219,7 +193,7 @@ int run(const Options& options) {
       throw InputError(options.rig, "instruments." + instrument.name + ".camera_from_rcm", "missing",
                        "a transform: it says where the instrument is");
   const auto frames =
-      options.poses.empty() ? random_configurations(rig, options) : read_configurations(rig, options.poses);
+      options.poses.empty() ? random_configurations(rig, options) : read_configurations(options.poses, rig);
   Renderer renderer = make_renderer(rig, options);
   OutputFolder folder(options.out, options.force);
   TruthCsv truth(folder / "truth.csv");
