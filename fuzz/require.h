@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdio>
+#include <cstdlib>
+#include <string_view>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::fuzz {
+
+/// What must hold for any input. Aborts, which libFuzzer reports with the input that did it.
+inline void require(bool holds, const char* law) {
+  if (holds) return;
+  std::fprintf(stderr, "does not hold: %s\n", law);
+  std::abort();
+}
+
+/// A complaint is one printable line, however mad the value that it quotes.
+inline void require_one_line(const InputError& error) {
+  for (const char c : std::string_view(error.what()))
+    require(static_cast<unsigned char>(c) >= ' ' && c != 0x7f, "an error's text is one printable line");
+}
+
+}  // namespace lapservo::fuzz

@@ -1,0 +1,52 @@
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "fuzz/require.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/marker/decoder.h"
+#include "lapservo/rig/rig.h"
+
+// Any text is a rig that can be used over its whole image and every rotation, or an InputError.
+namespace {
+using namespace lapservo;
+using fuzz::require;
+
+void require_usable(const Camera& camera) {
+  constexpr int steps = 4;
+  for (int i = 0; i <= steps; ++i)
+    for (int j = 0; j <= steps; ++j) {
+      const Eigen::Vector2d raw((camera.width_px - 1.0) * i / steps, (camera.height_px - 1.0) * j / steps);
+      const auto ideal = camera.ideal_from_raw(raw);
+      require(ideal && ideal->allFinite(), "every pixel has a ray");
+      require((camera.raw_from_ideal(*ideal) - raw).norm() < 1e-3, "distortion and its inverse cancel");
+    }
+  for (const float light : camera.response.table()) require(light >= 0 && light <= 1, "light is between 0 and 1");
+}
+
+void require_usable(const Instrument& instrument) {
+  const CrossRatioDecoder decoder(instrument.marker);
+  for (const double tau_rad : {0.1, 2.0, 4.0, 6.2}) {
+    const double decoded_rad = decoder.tau_rad(cross_ratio_at(instrument.marker, tau_rad));
+    require(std::abs(decoded_rad - tau_rad) < 1e-3, "every rotation can be decoded");
+  }
+  if (!instrument.camera_from_rcm) return;
+  require(instrument.camera_from_rcm->translation.allFinite(), "the RCM is somewhere");
+  require(std::abs(instrument.camera_from_rcm->rotation.norm() - 1) < 1e-9, "the RCM frame is orthonormal");
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  try {
+    const Rig rig = parse_rig(text, "fuzz.yaml");
+    require(!rig.instruments.empty(), "a rig has an instrument");
+    require_usable(rig.camera);
+    for (const Instrument& instrument : rig.instruments) require_usable(instrument);
+  } catch (const InputError& error) {
+    fuzz::require_one_line(error);
+  }
+  return 0;
+}
