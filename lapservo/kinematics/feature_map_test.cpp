@@ -1,0 +1,141 @@
+#include "lapservo/kinematics/feature_map.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/kinematics/test_models.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double step_by_joint[4] = {1e-6, 1e-6, 1e-7, 1e-6};
+
+RcmCoordinates moved(const RcmCoordinates& q, Eigen::Index joint, double by) {
+  Eigen::Vector4d x = q.vector();
+  x[joint] += by;
+  return RcmCoordinates::from_vector(x);
+}
+
+double from_seam(double tau_rad) {
+  return std::abs(wrap_pi(tau_rad));
+}
+
+Eigen::Vector4d central_difference(const ImageModel& model, const RcmCoordinates& q, Eigen::Index joint) {
+  const double h = step_by_joint[joint];
+  const auto ahead = feature_map(model, moved(q, joint, h)), back = feature_map(model, moved(q, joint, -h));
+  Eigen::Vector4d df = ahead.point->f - back.point->f;
+  df[0] = wrap_pi(df[0]);
+  return df / (2 * h);
+}
+
+// Compares row by row: a row has one unit, but for the lever of each joint.
+void expect_jacobian(const ImageModel& model, const RcmCoordinates& q) {
+  const auto result = feature_map(model, q);
+  ASSERT_TRUE(result.point);
+  const Eigen::Matrix4d& jacobian = result.point->jacobian;
+  for (Eigen::Index joint = 0; joint < 4; ++joint) {
+    const Eigen::Vector4d numeric = central_difference(model, q, joint);
+    const double lever_m = joint == 2 ? 1 : q.rho_m;
+    for (Eigen::Index row = 0; row < 4; ++row) {
+      const double scale =
+          lever_m * jacobian.row(row).cwiseProduct(Eigen::RowVector4d(1 / q.rho_m, 1 / q.rho_m, 1, 1 / q.rho_m)).norm();
+      EXPECT_NEAR(jacobian(row, joint), numeric[row], 1e-5 * std::max(std::abs(numeric[row]), 0.05 * scale))
+          << "row " << row << ", joint " << joint << ", q " << q.vector().transpose();
+    }
+  }
+}
+
+TEST(FeatureMap, JacobianIsTheDerivative) {
+  constexpr std::uint64_t seed = 31;
+  Random random(seed);
+  int checked = 0;
+  for (const ImageModel& model : testing::image_models())
+    for (int trial = 0; trial < 400; ++trial) {
+      const RcmCoordinates q = testing::visible_configuration(model, random);
+      if (from_seam(feature_map(model, q).point->tau_rad) < 1e-3) continue;
+      SCOPED_TRACE(::testing::Message() << "seed " << seed << ", trial " << trial);
+      expect_jacobian(model, q);
+      if (HasFailure()) return;
+      ++checked;
+    }
+  EXPECT_GT(checked, 1000);
+}
+
+TEST(FeatureMap, ValueIsThatOfTheCentreLine) {
+  constexpr std::uint64_t seed = 32;
+  Random random(seed);
+  for (const ImageModel& model : testing::image_models())
+    for (int trial = 0; trial < 50; ++trial) {
+      const RcmCoordinates q = testing::visible_configuration(model, random);
+      const auto line =
+          centre_line(model.camera, model.marker, model.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+      const Features expected = features_of(line->ideal_px, projected_rcm_px(model.camera, model.camera_from_rcm));
+      const Eigen::Vector4d f = feature_map(model, q).point->f;
+      EXPECT_DOUBLE_EQ(f[0], expected.s_rad) << "seed " << seed;
+      EXPECT_DOUBLE_EQ(f[1], *expected.r_px) << "seed " << seed;
+      EXPECT_DOUBLE_EQ(f[2], expected.l_px) << "seed " << seed;
+      EXPECT_DOUBLE_EQ(f[3], expected.d_px) << "seed " << seed;
+    }
+}
+
+TEST(FeatureMap, CentreLinePassesThroughTheProjectedRcm) {
+  constexpr std::uint64_t seed = 33;
+  Random random(seed);
+  for (const ImageModel& model : testing::image_models()) {
+    const Eigen::Vector2d o = *projected_rcm_px(model.camera, model.camera_from_rcm);
+    for (int trial = 0; trial < 50; ++trial) {
+      const FeaturePoint point = *feature_map(model, testing::visible_configuration(model, random)).point;
+      const Eigen::Vector2d direction(std::sin(point.f[0]), std::cos(point.f[0]));
+      const Eigen::Vector2d arm = point.ideal_px[0] - o;
+      EXPECT_NEAR(direction.x() * arm.y() - direction.y() * arm.x(), 0, 1e-8 * arm.norm()) << "seed " << seed;
+    }
+  }
+}
+
+// At the seam only d jumps, by the step of the print there; on both sides the Jacobian is that side's derivative.
+TEST(FeatureMap, JumpsInDAtTheSeamAndNowhereElse) {
+  constexpr std::uint64_t seed = 34;
+  Random random(seed);
+  for (const ImageModel& model : testing::image_models())
+    for (int trial = 0; trial < 30; ++trial) {
+      RcmCoordinates q = testing::visible_configuration(model, random);
+      const double seam_psi_rad = q.psi_rad + feature_map(model, q).point->tau_rad;  // tau = 0 there
+      constexpr double beside = 1e-4;
+      q.psi_rad = seam_psi_rad - beside;
+      const FeaturePoint upper = *feature_map(model, q).point;  // tau = beside
+      expect_jacobian(model, q);
+      q.psi_rad = seam_psi_rad + beside;
+      const FeaturePoint lower = *feature_map(model, q).point;  // tau = 2 pi - beside
+      expect_jacobian(model, q);
+      EXPECT_NEAR(upper.tau_rad, beside, 1e-9);
+      EXPECT_NEAR(lower.tau_rad, two_pi - beside, 1e-9);
+      EXPECT_LT((upper.f - lower.f).head<3>().norm(), 1e-9) << "seed " << seed;
+      const double jump_m = model.marker.bands_upper_m[2] - model.marker.bands_lower_m[2];
+      EXPECT_GT((lower.f[3] - upper.f[3]) * jump_m, 0) << "seed " << seed;
+      EXPECT_LT((upper.jacobian - lower.jacobian).topRows<3>().norm(), 1e-6 * upper.jacobian.norm());
+      if (HasFailure()) return;
+    }
+}
+
+TEST(FeatureMap, SaysWhyItIsUndefined) {
+  const auto models = testing::image_models();
+  const ImageModel& model = models.front();
+  const RcmCoordinates q{0.05, 1.57, 0.065, -2};
+  ASSERT_EQ(feature_map(model, q).reason, Undefined::none);
+
+  EXPECT_EQ(feature_map(model, {std::numeric_limits<double>::quiet_NaN(), 1.57, 0.065, 0}).reason,
+            Undefined::bad_configuration);
+  const auto towards_camera = configuration_through(model.camera_from_rcm, {0, 0, 1e-4});
+  EXPECT_EQ(feature_map(model, *towards_camera).reason, Undefined::camera_inside_shaft);
+  const auto past_camera = configuration_through(model.camera_from_rcm, {0.02, 0, -0.02});
+  EXPECT_EQ(feature_map(model, *past_camera).reason, Undefined::behind_camera);
+  ImageModel beside = model;
+  beside.camera_from_rcm.translation.z() = 0;
+  EXPECT_EQ(feature_map(beside, q).reason, Undefined::rcm_in_focal_plane);
+}
+
+}  // namespace
+}  // namespace lapservo
