@@ -1,0 +1,235 @@
+#include "lapservo/rcm/projected_rcm.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::size_t fewest_for_outliers = 6;
+constexpr double outlier_sigmas = 3.5;
+
+using Lines = std::vector<LineObservation>;
+
+// How many of its own standard deviations a line passes by o, and how that moves with o.
+struct Miss {
+  double sigmas;
+  Eigen::Vector2d d_sigmas_d_o;
+};
+
+Miss miss(const LineObservation& line, const Eigen::Vector2d& o) {
+  const auto across = [](const Eigen::Vector2d& v) { return Eigen::Vector2d(v.y(), -v.x()); };
+  const Eigen::Vector2d along = line.to_px - line.from_px, arm = o - line.from_px;
+  Eigen::Vector4d h;
+  h << across(line.to_px - o), across(arm);
+  const double g = along.x() * arm.y() - along.y() * arm.x();
+  const Eigen::Vector4d weighted = line.covariance_px2 * h;
+  const double sigma = std::sqrt(std::max(h.dot(weighted), std::numeric_limits<double>::min()));
+  const double pull = g / (sigma * sigma);
+  // d(h)/d(o) maps v to [-across(v); across(v)], whose transpose acts on `weighted`.
+  const Eigen::Vector2d d_sigma2_half = across(weighted.head<2>() - weighted.tail<2>());
+  return {g / sigma, (-across(along) - pull * d_sigma2_half) / sigma};
+}
+
+double chi2_at(const Lines& lines, const Eigen::Vector2d& o) {
+  double chi2 = 0;
+  for (const LineObservation& line : lines) chi2 += std::pow(miss(line, o).sigmas, 2);
+  return chi2;
+}
+
+struct Fit {
+  bool converged = false;
+  Eigen::Vector2d point_px;
+  Eigen::Matrix2d information;
+  double chi2;
+};
+
+// Gauss-Newton; a step is halved until it helps.
+Fit fit(const Lines& lines, Eigen::Vector2d o) {
+  Fit result{false, o, Eigen::Matrix2d::Zero(), chi2_at(lines, o)};
+  for (int iteration = 0; iteration < 100; ++iteration) {
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+    for (const LineObservation& line : lines) {
+      const Miss m = miss(line, result.point_px);
+      information += m.d_sigmas_d_o * m.d_sigmas_d_o.transpose();
+      gradient += m.sigmas * m.d_sigmas_d_o;
+    }
+    result.information = information;
+    Eigen::Vector2d step = -information.ldlt().solve(gradient);
+    if (!step.allFinite()) return result;
+    const double rounding_px = 1e-9 * (1 + result.point_px.norm());
+    while (step.norm() > rounding_px && !(chi2_at(lines, result.point_px + step) < result.chi2)) step /= 2;
+    if (step.norm() <= rounding_px) {
+      result.converged = true;
+      return result;
+    }
+    result.point_px += step;
+    result.chi2 = chi2_at(lines, result.point_px);
+  }
+  return result;
+}
+
+struct Start {
+  Eigen::Vector2d point_px;
+  double median_sigmas;
+};
+
+// Over all pairs, or as many random ones as make it sure to meet two good lines.
+std::optional<Start> least_median_start(const Lines& lines) {
+  constexpr std::size_t most_pairs = 600;
+  std::optional<Start> best;
+  std::vector<double> misses(lines.size());
+  const auto consider = [&](std::size_t i, std::size_t k) {
+    const auto o = intersection_px(lines[i], lines[k]);
+    if (!o) return;
+    for (std::size_t n = 0; n < lines.size(); ++n) misses[n] = std::abs(miss(lines[n], *o).sigmas);
+    const auto middle = misses.begin() + static_cast<std::ptrdiff_t>(std::min(lines.size() / 2 + 1, lines.size() - 1));
+    std::nth_element(misses.begin(), middle, misses.end());
+    if (!best || *middle < best->median_sigmas) best = Start{*o, *middle};
+  };
+  if (lines.size() * (lines.size() - 1) / 2 <= most_pairs) {
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      for (std::size_t k = i + 1; k < lines.size(); ++k) consider(i, k);
+    return best;
+  }
+  constexpr std::uint64_t seed = 1;
+  Random random(seed);
+  for (std::size_t pair = 0; pair < most_pairs; ++pair)
+    consider(random.bits() % lines.size(), random.bits() % lines.size());
+  return best;
+}
+
+// The same standard deviation of the misses, from their median (Rousseeuw and Leroy 1987, with their small-sample
+// factor).
+double first_scale(const Start& start, std::size_t lines) {
+  return 1.4826 * (1 + 5 / static_cast<double>(lines - 2)) * start.median_sigmas;
+}
+
+double scale_of(double chi2, std::size_t lines) {
+  return lines > 2 ? std::sqrt(chi2 / static_cast<double>(lines - 2)) : 1;
+}
+
+struct RobustFit {
+  Fit fit;
+  std::vector<bool> used;  // per line
+};
+
+// Refits to what lies within the limit, which follows the scale, until the choice stays the same.
+RobustFit fit_robustly(const Lines& lines, const Start& start, NoiseScale scale) {
+  constexpr double least_scale = 1e-6;  // lines that meet to rounding have no noise to judge by
+  RobustFit robust{{false, start.point_px, Eigen::Matrix2d::Zero(), 0}, std::vector<bool>(lines.size(), true)};
+  if (lines.size() < fewest_for_outliers) {
+    robust.fit = fit(lines, start.point_px);
+    return robust;
+  }
+  double scale_now = std::max(first_scale(start, lines.size()), scale == NoiseScale::known ? 1 : least_scale);
+  for (int round = 0; round < 20; ++round) {
+    const std::vector<bool> before = std::exchange(robust.used, {});
+    Lines inside;
+    for (const LineObservation& line : lines) {
+      robust.used.push_back(std::abs(miss(line, robust.fit.point_px).sigmas) <= outlier_sigmas * scale_now);
+      if (robust.used.back()) inside.push_back(line);
+    }
+    if (inside.size() < 2 || (round > 0 && robust.used == before)) return robust;
+    robust.fit = fit(inside, robust.fit.point_px);
+    if (!robust.fit.converged) return robust;
+    scale_now = scale == NoiseScale::known ? 1 : std::max(scale_of(robust.fit.chi2, inside.size()), least_scale);
+  }
+  return robust;
+}
+
+double direction_spread_rad(const Lines& lines) {
+  Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
+  for (const LineObservation& line : lines) {
+    const Eigen::Vector2d along = (line.to_px - line.from_px).normalized();
+    mean += along * along.transpose() / static_cast<double>(lines.size());
+  }
+  const double across = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(mean, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  return std::asin(std::sqrt(std::clamp(across, 0.0, 1.0)));
+}
+
+// From the observed points to o; within the image of the shafts their length stands in.
+double lever_px(const Lines& lines, const Eigen::Vector2d& o) {
+  Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+  double length_px = 0;
+  for (const LineObservation& line : lines) {
+    middle += (line.from_px + line.to_px) / 2 / static_cast<double>(lines.size());
+    length_px += (line.to_px - line.from_px).norm() / static_cast<double>(lines.size());
+  }
+  return std::max((o - middle).norm(), length_px);
+}
+
+double larger_sigma(const Eigen::Matrix2d& covariance) {
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly).eigenvalues()[1]);
+}
+
+}  // namespace
+
+std::string_view rcm_status_word(RcmStatus status) {
+  switch (status) {
+    case RcmStatus::ok:
+      return "ok";
+    case RcmStatus::too_few_lines:
+      return "too_few_lines";
+    case RcmStatus::parallel:
+      return "parallel";
+    case RcmStatus::not_converged:
+      return "not_converged";
+  }
+  return "not_converged";
+}
+
+RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, NoiseScale scale) {
+  RcmEstimate estimate;
+  estimate.used.assign(given.size(), false);
+  Lines lines;
+  std::vector<std::size_t> place;  // of each usable line among those given
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    if (!is_usable(given[i])) continue;
+    lines.push_back(given[i]);
+    place.push_back(i);
+  }
+  estimate.lines = lines.size();
+  if (lines.size() < 2) return estimate;
+  const auto start = least_median_start(lines);
+  if (!start) {
+    estimate.status = RcmStatus::parallel;
+    return estimate;
+  }
+  const auto [best, used] = fit_robustly(lines, *start, scale);
+  const Eigen::Matrix2d as_given = best.information.inverse();
+  if (!best.converged || !best.point_px.allFinite() || !as_given.allFinite()) {
+    estimate.status = RcmStatus::not_converged;
+    return estimate;
+  }
+  Lines inside;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (!used[i]) continue;
+    estimate.used[place[i]] = true;
+    inside.push_back(lines[i]);
+  }
+  estimate.outliers = lines.size() - inside.size();
+  estimate.point_px = best.point_px;
+  estimate.chi2 = best.chi2;
+  estimate.degrees_of_freedom = static_cast<int>(inside.size()) - 2;
+  estimate.direction_spread_rad = direction_spread_rad(inside);
+  if (scale == NoiseScale::estimated) estimate.noise_factor = scale_of(best.chi2, inside.size());
+  if (scale == NoiseScale::known || estimate.degrees_of_freedom > 0)
+    estimate.covariance_px2 = estimate.noise_factor * estimate.noise_factor * as_given;
+  const double share =
+      estimate.covariance_px2 ? larger_sigma(*estimate.covariance_px2) / lever_px(inside, best.point_px) : 0;
+  estimate.near_parallel = estimate.direction_spread_rad < near_parallel_rad || share > near_parallel_share;
+  estimate.status = share < 1 ? RcmStatus::ok : RcmStatus::parallel;
+  return estimate;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,229 @@
+#include "lapservo/rcm/projected_rcm.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "lapservo/rcm/pairwise_mean.h"
+#include "lapservo/rcm/test_lines.h"
+
+namespace lapservo {
+namespace {
+
+using Lines = std::vector<LineObservation>;
+constexpr double fan_rad = 0.9;
+
+// Lines of very different quality, with correlated end points.
+Lines uneven_lines(const Eigen::Vector2d& point, std::size_t count, Random& random) {
+  Lines lines = testing::fan_of_lines(point, count, fan_rad, random);
+  for (LineObservation& line : lines) {
+    Eigen::Matrix4d root;
+    for (double& entry : root.reshaped()) entry = random.normal();
+    line.covariance_px2 = std::pow(random.uniform(0.05, 0.5), 2) * (root * root.transpose() / 4);
+    line.covariance_px2.diagonal().array() += 1e-4;
+  }
+  return lines;
+}
+
+Lines with_errors(Lines lines, double factor, Random& random) {
+  for (LineObservation& line : lines) line = testing::with_error(line, factor, random);
+  return lines;
+}
+
+// Moved across itself by 50 to 200 standard deviations.
+void spoil(LineObservation& line, Random& random) {
+  const Eigen::Vector2d along = (line.to_px - line.from_px).normalized();
+  const double side = random.uniform() < 0.5 ? -1 : 1;
+  const Eigen::Vector2d aside =
+      side * random.uniform(50, 200) * std::sqrt(line.covariance_px2.trace()) * Eigen::Vector2d(-along.y(), along.x());
+  line.from_px += aside, line.to_px += aside;
+}
+
+double mahalanobis2(const RcmEstimate& estimate, const Eigen::Vector2d& truth) {
+  const Eigen::Vector2d error = estimate.point_px - truth;
+  return error.dot(estimate.covariance_px2->llt().solve(error));
+}
+
+TEST(ProjectedRcm, IsExactWithoutNoise) {
+  constexpr std::uint64_t seed = 71;
+  Random random(seed);
+  for (std::size_t count = 2; count < 40; ++count) {
+    const Eigen::Vector2d point(random.uniform(-2000, 2000), random.uniform(-2000, 2000));
+    for (const NoiseScale scale : {NoiseScale::known, NoiseScale::estimated}) {
+      const auto estimate = estimate_projected_rcm(uneven_lines(point, count, random), scale);
+      ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed << ", " << count << " lines";
+      EXPECT_LT((estimate.point_px - point).norm(), 1e-4) << "seed " << seed;
+      EXPECT_LT(estimate.chi2, 1e-8);
+      EXPECT_EQ(estimate.degrees_of_freedom, static_cast<int>(count) - 2);
+      EXPECT_EQ(estimate.outliers, 0u);
+      EXPECT_EQ(estimate.covariance_px2.has_value(), scale == NoiseScale::known || count > 2);
+    }
+  }
+}
+
+// The picture turned, scaled and moved: the estimate and its covariance follow.
+TEST(ProjectedRcm, FollowsASimilarity) {
+  constexpr std::uint64_t seed = 72;
+  Random random(seed);
+  for (int trial = 0; trial < 30; ++trial) {
+    const Lines lines = with_errors(uneven_lines({-300, 200}, 15, random), 1, random);
+    const Eigen::Matrix2d a = random.uniform(0.2, 4) * Eigen::Rotation2Dd(random.uniform(-pi, pi)).toRotationMatrix();
+    const Eigen::Vector2d b(random.uniform(-900, 900), random.uniform(-900, 900));
+    Eigen::Matrix4d both = Eigen::Matrix4d::Zero();
+    both.topLeftCorner<2, 2>() = both.bottomRightCorner<2, 2>() = a;
+    Lines moved = lines;
+    for (LineObservation& line : moved)
+      line = {a * line.from_px + b, a * line.to_px + b, both * line.covariance_px2 * both.transpose()};
+    const auto here = estimate_projected_rcm(lines, NoiseScale::known),
+               there = estimate_projected_rcm(moved, NoiseScale::known);
+    EXPECT_LT((there.point_px - (a * here.point_px + b)).norm(), 1e-5) << "seed " << seed;
+    EXPECT_LT((*there.covariance_px2 - a * *here.covariance_px2 * a.transpose()).norm(),
+              1e-5 * there.covariance_px2->norm());
+    EXPECT_NEAR(there.chi2, here.chi2, 1e-6 * here.chi2);
+    EXPECT_NEAR(there.direction_spread_rad, here.direction_spread_rad, 1e-9);
+  }
+}
+
+TEST(ProjectedRcm, DoesNotCareWhichEndComesFirstNorForTheOrder) {
+  constexpr std::uint64_t seed = 73;
+  Random random(seed);
+  const Lines lines = with_errors(uneven_lines({-300, 200}, 15, random), 1, random);
+  Eigen::Matrix4d swap = Eigen::Matrix4d::Zero();
+  swap.topRightCorner<2, 2>() = swap.bottomLeftCorner<2, 2>() = Eigen::Matrix2d::Identity();
+  Lines swapped;
+  for (const LineObservation& line : lines)
+    swapped.push_back({line.to_px, line.from_px, swap * line.covariance_px2 * swap.transpose()});
+  std::reverse(swapped.begin(), swapped.end());
+  const auto here = estimate_projected_rcm(lines, NoiseScale::known),
+             there = estimate_projected_rcm(swapped, NoiseScale::known);
+  EXPECT_LT((here.point_px - there.point_px).norm(), 1e-6);
+  EXPECT_LT((*here.covariance_px2 - *there.covariance_px2).norm(), 1e-6 * here.covariance_px2->norm());
+}
+
+TEST(ProjectedRcm, AWorthlessLineIsAsGoodAsNone) {
+  constexpr std::uint64_t seed = 74;
+  Random random(seed);
+  Lines lines = with_errors(uneven_lines({-300, 200}, 12, random), 1, random);
+  const auto without = estimate_projected_rcm(lines, NoiseScale::known);
+  lines.push_back(line_between({0, 0}, {500, -100}, 1e5));
+  const auto with = estimate_projected_rcm(lines, NoiseScale::known);
+  EXPECT_LT((with.point_px - without.point_px).norm(), 1e-3);
+  EXPECT_LT((*with.covariance_px2 - *without.covariance_px2).norm(), 1e-3 * without.covariance_px2->norm());
+}
+
+// Errors over sigma of unit spread, no bias, and chi2 as it should be.
+TEST(ProjectedRcm, CovarianceIsHonest) {
+  constexpr std::uint64_t seed = 75;
+  Random random(seed);
+  const Eigen::Vector2d truth(-120, -240);
+  constexpr int trials = 1500;
+  for (const double noise_factor : {1.0, 3.0}) {
+    const NoiseScale scale = noise_factor == 1 ? NoiseScale::known : NoiseScale::estimated;
+    double spread = 0, chi2_share = 0, factor = 0;
+    Eigen::Vector2d bias_sigmas = Eigen::Vector2d::Zero();
+    for (int trial = 0; trial < trials; ++trial) {
+      const auto estimate =
+          estimate_projected_rcm(with_errors(uneven_lines(truth, 20, random), noise_factor, random), scale);
+      ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed;
+      spread += mahalanobis2(estimate, truth) / 2 / trials;
+      const Eigen::Matrix2d root = estimate.covariance_px2->llt().matrixL();
+      bias_sigmas += root.inverse() * (estimate.point_px - truth) / trials;
+      chi2_share += estimate.chi2 / estimate.degrees_of_freedom / trials;
+      factor += estimate.noise_factor / trials;
+    }
+    EXPECT_NEAR(std::sqrt(spread), scale == NoiseScale::known ? 1 : 1.06, 0.06) << "seed " << seed;  // Student's t
+    EXPECT_LT(bias_sigmas.norm(), 0.1) << "seed " << seed;
+    EXPECT_NEAR(std::sqrt(chi2_share), noise_factor, 0.05 * noise_factor) << "seed " << seed;
+    EXPECT_NEAR(factor, scale == NoiseScale::known ? 1 : noise_factor, 0.05 * noise_factor) << "seed " << seed;
+  }
+}
+
+// A fan so narrow, and noise so large, that lines weighted where they seem to be pull the estimate towards themselves.
+TEST(ProjectedRcm, IsUnbiasedInANarrowFan) {
+  constexpr std::uint64_t seed = 76;
+  Random random(seed);
+  const Eigen::Vector2d truth(-120, -240), along(std::cos(0.3), std::sin(0.3));
+  constexpr int trials = 600;
+  double bias_px = 0, sigma_px = 0, spread = 0, mean_bias_px = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    Lines lines = testing::fan_of_lines(truth, 60, 0.12, random);
+    for (LineObservation& line : lines) line.covariance_px2 *= 25;
+    lines = with_errors(lines, 1, random);
+    const auto estimate = estimate_projected_rcm(lines, NoiseScale::known);
+    ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed;
+    EXPECT_TRUE(estimate.near_parallel);
+    bias_px += (estimate.point_px - truth).dot(along) / trials;
+    sigma_px += std::sqrt(along.dot(*estimate.covariance_px2 * along)) / trials;
+    spread += mahalanobis2(estimate, truth) / 2 / trials;
+    mean_bias_px += (mean_of_intersections(lines)->point_px - truth).dot(along) / trials;
+  }
+  EXPECT_LT(std::abs(bias_px), 0.2 * sigma_px) << "seed " << seed;
+  EXPECT_GT(std::abs(mean_bias_px), 5 * std::abs(bias_px)) << "seed " << seed;
+  EXPECT_NEAR(std::sqrt(spread), 1, 0.1) << "seed " << seed;
+}
+
+TEST(ProjectedRcm, LeavesOutOutliersAndNamesThem) {
+  constexpr std::uint64_t seed = 77;
+  Random random(seed);
+  const Eigen::Vector2d truth(-120, -240);
+  constexpr int trials = 300, spoiled = 5;
+  double spread = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    Lines lines = with_errors(uneven_lines(truth, 20, random), 1, random);
+    for (std::size_t i = 0; i < spoiled; ++i) spoil(lines[3 * i], random);
+    const auto estimate = estimate_projected_rcm(lines, trial % 2 ? NoiseScale::known : NoiseScale::estimated);
+    ASSERT_EQ(estimate.status, RcmStatus::ok);
+    for (std::size_t i = 0; i < spoiled; ++i) EXPECT_FALSE(estimate.used[3 * i]) << "seed " << seed << ", " << trial;
+    EXPECT_LE(estimate.outliers, spoiled + 4u) << "seed " << seed << ", " << trial;
+    spread += mahalanobis2(estimate, truth) / 2 / trials;
+  }
+  EXPECT_NEAR(std::sqrt(spread), 1.06, 0.14) << "seed " << seed;
+}
+
+TEST(ProjectedRcm, BeatsTheMeanOfIntersections) {
+  constexpr std::uint64_t seed = 78;
+  Random random(seed);
+  const Eigen::Vector2d truth(-120, -240);
+  double ours = 0, papers = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    const Lines lines = with_errors(testing::fan_of_lines(truth, 20, fan_rad, random), 1, random);
+    ours += (estimate_projected_rcm(lines, NoiseScale::estimated).point_px - truth).norm();
+    papers += (mean_of_intersections(lines)->point_px - truth).norm();
+  }
+  EXPECT_LT(ours, 0.7 * papers) << "seed " << seed;
+}
+
+TEST(ProjectedRcm, WarnsOfNearlyParallelLines) {
+  constexpr std::uint64_t seed = 79;
+  Random random(seed);
+  const Eigen::Vector2d truth(-120, -240);
+  const auto of_fan = [&](double fan, double factor) {
+    return estimate_projected_rcm(with_errors(testing::fan_of_lines(truth, 20, fan, random), factor, random),
+                                  NoiseScale::estimated);
+  };
+  for (int trial = 0; trial < 20; ++trial) {
+    EXPECT_FALSE(of_fan(0.9, 1).near_parallel) << "seed " << seed;
+    EXPECT_TRUE(of_fan(0.05, 0.01).near_parallel) << "seed " << seed;  // by their directions
+    EXPECT_TRUE(of_fan(0.3, 60).near_parallel) << "seed " << seed;     // by what the noise makes of them
+  }
+}
+
+TEST(ProjectedRcm, SaysWhyThereIsNone) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(estimate_projected_rcm({}, NoiseScale::known).status, RcmStatus::too_few_lines);
+  const LineObservation one = line_between({0, 0}, {100, 0}, 0.3), broken = line_between({nan, 0}, {1, 1}, 1);
+  EXPECT_EQ(estimate_projected_rcm(Lines{one, broken}, NoiseScale::known).status, RcmStatus::too_few_lines);
+  EXPECT_EQ(estimate_projected_rcm(Lines{one, line_between({0, 9}, {100, 9}, 0.3)}, NoiseScale::known).status,
+            RcmStatus::parallel);
+  EXPECT_EQ(estimate_projected_rcm(Lines{one, line_between({0, 9}, {100, 9.1}, 0.3)}, NoiseScale::known).status,
+            RcmStatus::parallel);
+  EXPECT_EQ(estimate_projected_rcm(Lines{one, broken, line_between({0, 9}, {100, 80}, 0.3)}, NoiseScale::known).status,
+            RcmStatus::ok);
+}
+
+}  // namespace
+}  // namespace lapservo
