@@ -39,8 +39,11 @@ class LightImage {
     }
     return sample;
   }
+  /// Whether at() can sample there. A place that rounds onto the last pixel in single precision counts as outside.
   bool contains(const Eigen::Vector2d& raw_px) const {
-    return raw_px.x() >= 0 && raw_px.y() >= 0 && raw_px.x() < image_.width_px - 1 && raw_px.y() < image_.height_px - 1;
+    constexpr double rounding_px = 0.01;
+    return raw_px.x() >= 0 && raw_px.y() >= 0 && raw_px.x() < image_.width_px - 1 - rounding_px &&
+           raw_px.y() < image_.height_px - 1 - rounding_px;
   }
 
  private:
