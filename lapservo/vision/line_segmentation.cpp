@@ -3,20 +3,13 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "lapservo/vision/scene.h"
+#include "lapservo/vision/line_reward.h"
 
 namespace lapservo {
 namespace {
 
 constexpr std::size_t max_samples = 512;
 constexpr std::size_t states = 5;  // shaft, band 0, 1, 2, shaft
-
-float reward(std::size_t state, std::uint8_t color, const std::array<std::uint8_t, 3>& bands) {
-  if (color == Scene::outside) return 0;
-  if (state == 0 || state == states - 1) return color == 0 ? 0.3F : -0.7F;
-  if (color == bands[state - 1]) return 1;
-  return color == 0 ? -0.35F : -1;
-}
 
 // What a boundary needs on each of its sides to count as seen.
 bool supported(std::span<const std::uint8_t> classes, std::size_t boundary, std::size_t k,
@@ -40,7 +33,7 @@ LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::
     for (std::size_t state = states; state-- > 0;) {
       entered[i][state] = state > 0 && best[state - 1] > best[state];
       if (entered[i][state]) best[state] = best[state - 1];
-      best[state] += reward(state, classes[i], bands);
+      best[state] += line_reward(state, classes[i], bands);
     }
 
   LineSegmentation segmentation;
