@@ -164,7 +164,8 @@ std::optional<Candidate> measure_boundary(const Frame& frame, double azimuth_rad
   Candidate candidate;
   candidate.edge = fit_step(*profile, static_cast<float>(line_blur_px), effort.iterations);
   if (!candidate.edge.converged) return std::nullopt;
-  candidate.colors_agree = colors_agree(frame, k, image.point_px, along, candidate.edge.offset_px + 0.8 * reach);
+  const Eigen::Vector2d located_px = image.point_px + candidate.edge.offset_px * along;
+  candidate.colors_agree = colors_agree(frame, k, located_px, along, 0.8 * reach);
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   candidate.measurement.row = frame.unknowns.row(point, pull);
   candidate.measurement.row[candidate.measurement.row.size() - 1] = -slope_m * pull.dot(frame.axes.col(2));

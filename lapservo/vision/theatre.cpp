@@ -1,0 +1,107 @@
+#include "lapservo/vision/theatre.h"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/sim/tissue.h"
+
+namespace lapservo::theatre {
+namespace {
+
+struct Port {
+  std::array<double, 3> hues_deg;
+  Eigen::Vector3d rcm_m, marker_m;  // in the camera
+};
+const std::array<Port, 3> ports{{{{90, 180, 270}, {-0.078, 0.067, 0.059}, {-0.02, 0.01, 0.1}},
+                                 {{180, 270, 90}, {0.103, 0.019, 0.063}, {0.04, 0.0, 0.1}},
+                                 {{270, 90, 180}, {-0.02, -0.1, 0.06}, {0.006, -0.03, 0.1}}}};
+
+constexpr double steepest_rad = 0.35, border_px = 30;
+
+bool wholly_in_view(const Rig& rig, const Marker& marker, const Rigid3& pose) {
+  const auto view = view_cylinder(pose, marker.radius_m());
+  if (!view) return false;
+  const double beyond_m = pose.inverse().translation.z() - marker.length_m() / 2;
+  if (std::abs(std::atan2(beyond_m, view->camera_to_axis_m)) > steepest_rad) return false;
+  for (const double side : {-1.0, 1.0})
+    for (const double along_m : {0.0, marker.length_m()}) {
+      const Eigen::Vector3d point =
+          pose * surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
+      if (point.z() < 0.04 || !rig.camera.contains(rig.camera.ideal_from_point(point), border_px)) return false;
+    }
+  return true;
+}
+
+}  // namespace
+
+Rig usual_rig(std::size_t instruments) {
+  Rig rig;
+  rig.camera.width_px = 960, rig.camera.height_px = 540;
+  rig.camera.fx_px = rig.camera.fy_px = 825;
+  rig.camera.cx_px = 474.3, rig.camera.cy_px = 272.8;
+  for (std::size_t i = 0; i < instruments; ++i) {
+    const Port& port = ports.at(i);
+    const Marker marker{0.0084, port.hues_deg, {0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005}, 0.4};
+    // The RCM frame's x axis points to the work space: phi is near pi/2 there.
+    const Rigid3 camera_from_rcm{
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), port.marker_m - port.rcm_m), port.rcm_m};
+    rig.instruments.push_back({"PSM" + std::to_string(i + 1), marker, camera_from_rcm});
+  }
+  return rig;
+}
+
+RcmCoordinates random_configuration(const Rig& rig, std::size_t i, Random& random) {
+  const Instrument& instrument = rig.instruments[i];
+  for (int attempt = 0; attempt < 50000; ++attempt) {
+    const Eigen::Vector2d pixel(random.uniform(0, rig.camera.width_px), random.uniform(0, rig.camera.height_px));
+    auto q = configuration_through(*instrument.camera_from_rcm,
+                                   rig.camera.ray_from_ideal(pixel) * random.uniform(0.075, 0.115));
+    if (!q || !wholly_in_view(rig, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(*q))) continue;
+    q->psi_rad = random.uniform(-pi, pi);
+    return *q;
+  }
+  throw std::logic_error("no configuration of this instrument is wholly in view");
+}
+
+ShaftPose pose_of(const Rig& rig, std::size_t i, const RcmCoordinates& q) {
+  return {*rig.instruments[i].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
+}
+
+cv::Mat render(const Rig& rig, const std::vector<RcmCoordinates>& configurations, std::uint64_t seed,
+               const RenderOptions& options) {
+  static const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
+  std::vector<ShaftModel> shafts;
+  std::vector<ShaftPlacement> placements;
+  for (std::size_t i = 0; i < configurations.size(); ++i) {
+    ShaftModel shaft;
+    shaft.marker = rig.instruments[i].marker;
+    shafts.push_back(shaft);
+    const ShaftPose pose = pose_of(rig, i, configurations[i]);
+    placements.push_back({pose.camera_from_unrolled, pose.psi_rad});
+  }
+  return Renderer(rig.camera, shafts, tissue, options).render(placements, seed);
+}
+
+cv::Mat render_nothing(const Rig& rig, std::uint64_t seed) {
+  return Renderer(rig.camera, {}, make_tissue(rig.camera.width_px, rig.camera.height_px, seed)).render({}, seed);
+}
+
+Sight::Sight(const Rig& rig, const cv::Mat& bgr)
+    : rig_(rig),
+      bgr_(bgr),
+      view_(bgr_),
+      classes_(rig_.instruments),
+      table_(rig_.camera.response.table()),
+      light_(view_, table_) {}
+
+Scene Sight::scene(std::size_t i) const {
+  return {view_,
+          rig_.camera,
+          classes_,
+          rig_.instruments[i].marker,
+          {classes_.of_band(i, 0), classes_.of_band(i, 1), classes_.of_band(i, 2)}};
+}
+
+}  // namespace lapservo::theatre

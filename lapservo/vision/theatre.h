@@ -1,0 +1,54 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "lapservo/core/random.h"
+#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/scene.h"
+#include "lapservo/vision/shaft_pose.h"
+
+/// Rendered frames with known truth, for this folder's tests only.
+namespace lapservo::theatre {
+
+/// 960x540, up to three instruments through ports left, right and above; their markers share colours in other orders.
+Rig usual_rig(std::size_t instruments = 1);
+
+/// The marker wholly in view (a lens's distortion neglected), at most 0.35 rad from facing the camera.
+RcmCoordinates random_configuration(const Rig& rig, std::size_t instrument, Random& random);
+
+ShaftPose pose_of(const Rig& rig, std::size_t instrument, const RcmCoordinates& q);
+
+/// All instruments of the rig in front of tissue; `configurations` in the rig's order. The seed is that of the noise.
+cv::Mat render(const Rig& rig, const std::vector<RcmCoordinates>& configurations, std::uint64_t seed,
+               const RenderOptions& options = {});
+
+/// Tissue alone.
+cv::Mat render_nothing(const Rig& rig, std::uint64_t seed);
+
+/// A frame and all that looking at it borrows.
+class Sight {
+ public:
+  Sight(const Rig& rig, const cv::Mat& bgr);
+  Sight(const Sight&) = delete;
+  Sight& operator=(const Sight&) = delete;
+
+  Scene scene(std::size_t instrument = 0) const;
+  const LightImage& light() const { return light_; }
+  const ImageView& view() const { return view_; }
+  const ColorClasses& classes() const { return classes_; }
+
+ private:
+  Rig rig_;
+  cv::Mat bgr_;
+  ImageView view_;
+  ColorClasses classes_;
+  std::array<float, 256> table_;
+  LightImage light_;
+};
+
+}  // namespace lapservo::theatre
