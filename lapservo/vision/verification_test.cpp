@@ -1,0 +1,137 @@
+#include "lapservo/vision/verification.h"
+
+#include <cmath>
+#include <map>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/vision/theatre.h"
+
+namespace lapservo {
+namespace {
+
+using theatre::Sight;
+
+struct Shot {
+  Rig rig = theatre::usual_rig();
+  RcmCoordinates q;
+  Sight sight;
+
+  /// Rendered once.
+  static const Shot& of(std::uint64_t seed) {
+    static std::map<std::uint64_t, Shot> shots;
+    return shots.try_emplace(seed, seed).first->second;
+  }
+  explicit Shot(std::uint64_t seed) : q(configuration(rig, seed)), sight(rig, theatre::render(rig, {q}, seed)) {}
+  PoseUnknowns truth() const { return PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q); }
+  FineFit fit_from(const PoseUnknowns& start) const { return fit_finely(sight.scene(), sight.light(), start, {}); }
+  FineFit fit() const { return fit_from(truth()); }
+
+ private:
+  static RcmCoordinates configuration(const Rig& rig, std::uint64_t seed) {
+    Random random(seed);
+    return theatre::random_configuration(rig, 0, random);
+  }
+};
+
+UnknownVector change(double theta_rad, double phi_rad, double rho_m, double psi_rad) {
+  return Eigen::Vector4d(theta_rad, phi_rad, rho_m, psi_rad);
+}
+
+TEST(Verification, ARightPoseIsOk) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = Shot::of(seed);
+    EXPECT_EQ(judge(shot.sight.scene(), shot.fit()), Status::ok);
+    const ColorAgreement agreement = color_agreement(shot.sight.scene(), theatre::pose_of(shot.rig, 0, shot.q));
+    EXPECT_GT(agreement.matching, 0.85);
+    EXPECT_LT(agreement.wrong, 0.02);
+    EXPECT_EQ(agreement.in_image, 1);
+    EXPECT_LT(agreement.beyond, 0.05);
+  }
+}
+
+// Started wrong, a fit may find back; what is called ok is right.
+TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
+  int judged_not_ok = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = Shot::of(seed);
+    for (const UnknownVector& wrong :
+         {change(0, 0, 0, 0.5), change(0, 0, 0, -0.5), change(0, 0, 0, 1.5), change(0, 0, 0, -1.5), change(0, 0, 0, pi),
+          change(0, 0, 2e-3, 0), change(0, 0, -2e-3, 0), change(0, 0, 6e-3, 0), change(0.03, 0, 0, 0),
+          change(0.15, 0, 0, 0), change(0, 0.03, 0, 0), change(0, -0.15, 0, 0)}) {
+      const FineFit fit = shot.fit_from(shot.truth().changed_by(wrong));
+      if (judge(shot.sight.scene(), fit) != Status::ok) {
+        ++judged_not_ok;
+        continue;
+      }
+      const UnknownVector error = fit.unknowns.q()->vector() - shot.q.vector();
+      EXPECT_LT(std::abs(wrap_pi(error[3])), 0.1) << wrong.transpose();
+      EXPECT_LT(std::abs(error[2]), 0.2e-3) << wrong.transpose();
+    }
+  }
+  EXPECT_GT(judged_not_ok, 8 * 6);
+}
+
+// Even when all else about the fit looks well.
+TEST(Verification, APoseThatTheColoursContradictIsNotOk) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = Shot::of(seed);
+    const Scene scene = shot.sight.scene();
+    const FineFit right = shot.fit();
+    const double matching = color_agreement(scene, right.unknowns.pose()).matching;
+    for (const UnknownVector& wrong : {change(0, 0, 0, 2.5), change(0, 0, 8e-3, 0), change(0, 0, -8e-3, 0),
+                                       change(0.3, 0, 0, 0), change(-0.3, 0, 0, 0)}) {
+      FineFit fit = right;
+      fit.unknowns = right.unknowns.changed_by(wrong);
+      EXPECT_NE(judge(scene, fit), Status::ok) << wrong.transpose();
+      EXPECT_LT(color_agreement(scene, fit.unknowns.pose()).matching, matching - 0.1) << wrong.transpose();
+    }
+  }
+}
+
+TEST(Verification, AFitWithoutSupportIsNotOk) {
+  const Shot& shot = Shot::of(1);
+  const FineFit right = shot.fit();
+  const Scene scene = shot.sight.scene();
+  ASSERT_EQ(judge(scene, right), Status::ok);
+  FineFit fit = right;
+  fit.converged = false;
+  EXPECT_EQ(judge(scene, fit), Status::poor_fit);
+  fit = right;
+  fit.used[1] = fit.used[2] = 0;
+  EXPECT_EQ(judge(scene, fit), Status::occluded);
+  fit = right;
+  fit.used[0] = fit.used[3] = 0;
+  EXPECT_EQ(judge(scene, fit), Status::occluded);
+  fit = right;
+  fit.covariance(3, 3) = 0.01;
+  EXPECT_EQ(judge(scene, fit), Status::uncertain);
+  fit = right;
+  fit.inlier_rms_sigmas = 4;
+  EXPECT_EQ(judge(scene, fit), Status::poor_fit);
+}
+
+TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
+  const Shot& shot = Shot::of(1);
+  FineFit fit = shot.fit();
+  ShaftPose aside = fit.unknowns.pose();
+  aside.camera_from_unrolled.translation.x() += 0.2;
+  fit.unknowns = PoseUnknowns::free(aside);
+  EXPECT_EQ(judge(shot.sight.scene(), fit), Status::cut);
+  EXPECT_EQ(color_agreement(shot.sight.scene(), aside).in_image, 0);
+}
+
+TEST(Verification, TissueIsNotOk) {
+  const Shot& shot = Shot::of(1);
+  const Sight empty(shot.rig, theatre::render_nothing(shot.rig, 2));
+  EXPECT_NE(judge(empty.scene(), shot.fit()), Status::ok);
+  EXPECT_LT(color_agreement(empty.scene(), theatre::pose_of(shot.rig, 0, shot.q)).matching, 0.05);
+}
+
+}  // namespace
+}  // namespace lapservo
