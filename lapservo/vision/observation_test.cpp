@@ -1,0 +1,159 @@
+#include "lapservo/vision/observation.h"
+
+#include <cmath>
+#include <set>
+#include <string>
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/vision/theatre.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo {
+namespace {
+
+struct Shot {
+  Rig rig = theatre::usual_rig();
+  RcmCoordinates q;
+  Observation observation;
+
+  explicit Shot(std::uint64_t seed, bool with_rcm = true) {
+    Random random(seed);
+    rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
+    q = theatre::random_configuration(rig, 0, random);
+    const cv::Mat image = theatre::render(rig, {q}, seed);
+    if (!with_rcm) rig.instruments[0].camera_from_rcm.reset();
+    observation = Tracker(rig).track(image)[0];
+  }
+  std::optional<CentreLine> line() const {
+    return centre_line(rig.camera, rig.instruments[0].marker, observation.camera_from_unrolled, observation.psi_rad);
+  }
+};
+
+bool all_finite(const Observation& o) {
+  bool finite = std::isfinite(o.tau_rad) && std::isfinite(o.sigma_tau_rad) && std::isfinite(o.psi_rad) &&
+                o.camera_from_unrolled.translation.allFinite() && o.camera_from_unrolled.rotation.coeffs().allFinite();
+  for (std::size_t k = 0; k < 4; ++k)
+    finite = finite && o.edges_ideal_px[k].allFinite() && o.edges_raw_px[k].allFinite();
+  if (o.rcm) finite = finite && o.rcm->q.vector().allFinite() && o.rcm->covariance.allFinite();
+  if (o.status == Status::ok)
+    finite = finite && std::isfinite(o.features.s_rad) && std::isfinite(o.features.r_px.value_or(0)) &&
+             std::isfinite(o.features.l_px) && std::isfinite(o.features.d_px) && std::isfinite(o.features.cross_ratio);
+  return finite;
+}
+
+TEST(Observation, EveryStatusHasAWordOfItsOwn) {
+  std::set<std::string_view> words;
+  for (const Status status : {Status::ok, Status::no_marker, Status::cut, Status::occluded, Status::ambiguous,
+                              Status::poor_fit, Status::uncertain}) {
+    const std::string_view word = status_word(status);
+    EXPECT_FALSE(word.empty());
+    EXPECT_EQ(word.find_first_of(" ,\"\n"), std::string_view::npos) << word;
+    EXPECT_TRUE(words.insert(word).second) << word;
+  }
+}
+
+// Pose, centre line, edges, features and tau tell the same.
+TEST(Observation, ItsPartsAgree) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed)
+    for (const bool with_rcm : {true, false}) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + (with_rcm ? " with the RCM" : " without"));
+      const Shot shot(seed, with_rcm);
+      const Observation& o = shot.observation;
+      ASSERT_EQ(o.status, Status::ok);
+      const auto line = shot.line();
+      ASSERT_TRUE(line);
+      EXPECT_NEAR(wrap_pi(line->tau_rad - o.tau_rad), 0, 1e-9);
+      EXPECT_GE(o.tau_rad, 0);
+      EXPECT_LT(o.tau_rad, two_pi);
+      for (std::size_t k = 0; k < 4; ++k) {
+        EXPECT_LT((line->ideal_px[k] - o.edges_ideal_px[k]).norm(), 1e-9);
+        EXPECT_LT((shot.rig.camera.raw_from_ideal(o.edges_ideal_px[k]) - o.edges_raw_px[k]).norm(), 1e-9);
+      }
+      const auto& e = o.edges_ideal_px;
+      EXPECT_NEAR(o.features.l_px, (e[3] - e[0]).norm(), 1e-9);
+      EXPECT_NEAR(o.features.d_px, (e[2] - e[0]).norm(), 1e-9);
+      // A cross-ratio is the same in every perspective image: here that of the print at tau.
+      EXPECT_NEAR(o.features.cross_ratio, cross_ratio_at(shot.rig.instruments[0].marker, o.tau_rad), 1e-9);
+      EXPECT_EQ(o.features.r_px.has_value(), with_rcm);
+      ASSERT_EQ(o.rcm.has_value(), with_rcm);
+      if (!with_rcm) continue;
+      const ShaftPose pose = theatre::pose_of(shot.rig, 0, o.rcm->q);
+      EXPECT_LT((pose.camera_from_unrolled.translation - o.camera_from_unrolled.translation).norm(), 1e-12);
+      EXPECT_NEAR(wrap_pi(pose.psi_rad - o.psi_rad), 0, 1e-12);
+      EXPECT_LT(std::abs(o.rcm->q.psi_rad), pi + 1e-12);
+    }
+}
+
+// sigma_tau is the covariance of q carried through the centre line: against samples of q.
+TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot shot(seed);
+    const Observation& o = shot.observation;
+    ASSERT_EQ(o.status, Status::ok);
+    const Eigen::Matrix4d root = o.rcm->covariance.llt().matrixL();
+    EXPECT_TRUE(o.rcm->covariance.isApprox(o.rcm->covariance.transpose()));
+    Random random(seed);
+    constexpr int samples = 20000;
+    double squares = 0;
+    for (int i = 0; i < samples; ++i) {
+      const Eigen::Vector4d deviate(random.normal(), random.normal(), random.normal(), random.normal());
+      const auto q = RcmCoordinates::from_vector(o.rcm->q.vector() + root * deviate);
+      const ShaftPose pose = theatre::pose_of(shot.rig, 0, q);
+      const auto line =
+          centre_line(shot.rig.camera, shot.rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad);
+      ASSERT_TRUE(line);
+      squares += std::pow(wrap_pi(line->tau_rad - o.tau_rad), 2);
+    }
+    EXPECT_NEAR(o.sigma_tau_rad, std::sqrt(squares / samples), 0.03 * o.sigma_tau_rad);
+  }
+}
+
+// Whatever is shown: a status, and nothing that is not a number.
+TEST(Observation, IsFiniteForEveryStatus) {
+  const Rig rig = theatre::usual_rig(3);
+  Random random(1);
+  std::vector<RcmCoordinates> q;
+  for (std::size_t i = 0; i < 3; ++i) q.push_back(theatre::random_configuration(rig, i, random));
+  const cv::Mat usual = theatre::render(rig, q, 1);
+  const cv::Size size = usual.size();
+  std::vector<cv::Mat> images{cv::Mat::zeros(size, CV_8UC3), cv::Mat(size, CV_8UC3, cv::Scalar::all(255)),
+                              cv::Mat(size, CV_8UC3, cv::Scalar(20, 200, 110)), usual};
+  cv::Mat noise(size, CV_8UC3);
+  for (int v = 0; v < size.height; ++v)
+    for (int i = 0; i < 3 * size.width; ++i) noise.ptr(v)[i] = static_cast<std::uint8_t>(random.uniform(0, 256));
+  images.push_back(noise);
+  // Markers partly covered, from ever further on either side.
+  for (int covered = 100; covered < size.width; covered += 170) {
+    cv::Mat left = usual.clone(), right = usual.clone(), below = usual.clone();
+    left(cv::Rect(0, 0, covered, size.height)) = cv::Scalar(30, 30, 120);
+    right(cv::Rect(covered, 0, size.width - covered, size.height)) = cv::Scalar(30, 30, 120);
+    below(cv::Rect(0, covered / 2, size.width, size.height - covered / 2)) = cv::Scalar(30, 30, 120);
+    images.insert(images.end(), {left, right, below});
+  }
+  // Bands without a shaft: flat stripes of the colours.
+  cv::Mat stripes = cv::Mat::zeros(size, CV_8UC3);
+  stripes(cv::Rect(200, 200, 60, 80)) = cv::Scalar(20, 200, 110);
+  stripes(cv::Rect(260, 200, 60, 80)) = cv::Scalar(200, 200, 20);
+  stripes(cv::Rect(320, 200, 60, 80)) = cv::Scalar(200, 20, 110);
+  images.push_back(stripes);
+  std::set<Status> seen;
+  for (const Method method : {Method::surface, Method::centerline}) {
+    Tracker tracker(rig, {.method = method, .single = true});
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      const auto& observations = tracker.track(images[i]);
+      ASSERT_EQ(observations.size(), 3U);
+      for (const Observation& o : observations) {
+        EXPECT_TRUE(all_finite(o)) << "image " << i;
+        seen.insert(o.status);
+      }
+    }
+  }
+  EXPECT_GE(seen.size(), 4U);
+}
+
+}  // namespace
+}  // namespace lapservo

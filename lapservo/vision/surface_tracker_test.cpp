@@ -1,0 +1,217 @@
+#include "lapservo/vision/surface_tracker.h"
+
+#include <cmath>
+#include <string>
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/error.h"
+#include "lapservo/vision/theatre.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo {
+namespace {
+
+Eigen::Vector4d q_error(const RcmCoordinates& seen, const RcmCoordinates& expected) {
+  Eigen::Vector4d error = seen.vector() - expected.vector();
+  error[0] = wrap_pi(error[0]), error[3] = wrap_pi(error[3]);
+  return error;
+}
+
+// Mean square of the error in sigmas.
+double normalised_square(const Eigen::Vector4d& error, const Eigen::Matrix4d& covariance) {
+  return error.dot(covariance.ldlt().solve(error)) / 4;
+}
+
+void expect_right(const Observation& o, const RcmCoordinates& truth) {
+  ASSERT_EQ(o.status, Status::ok) << status_word(o.status);
+  ASSERT_TRUE(o.rcm);
+  EXPECT_LT(normalised_square(q_error(o.rcm->q, truth), o.rcm->covariance), 4);
+  EXPECT_LT(std::abs(wrap_pi(o.rcm->q.psi_rad - truth.psi_rad)), 0.01);
+}
+
+// Instruments that cross would hide one another: apart by a hand's breadth in the image.
+std::vector<RcmCoordinates> apart(const Rig& rig, Random& random) {
+  for (;;) {
+    std::vector<RcmCoordinates> all;
+    std::vector<Eigen::Vector2d> centres;
+    for (std::size_t i = 0; i < rig.instruments.size(); ++i) {
+      all.push_back(theatre::random_configuration(rig, i, random));
+      const Rigid3 pose = theatre::pose_of(rig, i, all.back()).camera_from_unrolled;
+      centres.push_back(rig.camera.ideal_from_point(pose * Eigen::Vector3d(0, 0, 0.012)));
+    }
+    bool clear = true;
+    for (std::size_t i = 0; i < all.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) clear = clear && (centres[i] - centres[j]).norm() > 320;
+    if (clear) return all;
+  }
+}
+
+std::vector<RcmCoordinates> slow_motion(const Rig& rig, std::uint64_t seed, int frames) {
+  Random random(seed);
+  const RcmCoordinates start = theatre::random_configuration(rig, 0, random);
+  std::vector<RcmCoordinates> motion;
+  for (int i = 0; i < frames; ++i) {
+    RcmCoordinates q = start;
+    q.theta_rad += 0.004 * i, q.phi_rad -= 0.003 * i, q.rho_m += 0.3e-3 * i, q.psi_rad += 0.03 * i;
+    motion.push_back(q);
+  }
+  return motion;
+}
+
+TEST(SurfaceTracker, FindsAnInstrumentAnew) {
+  const Rig rig = theatre::usual_rig();
+  SurfaceTracker tracker(rig, true);
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const RcmCoordinates q = theatre::random_configuration(rig, 0, random);
+    expect_right(tracker.track(theatre::render(rig, {q}, seed))[0], q);
+  }
+}
+
+// The camera turned upside down sees the picture upside down, and the instrument where it was.
+TEST(SurfaceTracker, ATurnedCameraSeesTheSame) {
+  Rig rig = theatre::usual_rig();
+  rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
+  Rig turned = rig;
+  turned.camera.cx_px = rig.camera.width_px - 1 - rig.camera.cx_px;
+  turned.camera.cy_px = rig.camera.height_px - 1 - rig.camera.cy_px;
+  turned.camera.distortion[2] *= -1, turned.camera.distortion[3] *= -1;
+  const Rigid3 half_turn{Eigen::Quaterniond(Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero()};
+  turned.instruments[0].camera_from_rcm = half_turn * *rig.instruments[0].camera_from_rcm;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const RcmCoordinates q = theatre::random_configuration(rig, 0, random);
+    const cv::Mat image = theatre::render(rig, {q}, seed);
+    cv::Mat image_turned(image.size(), image.type());
+    for (int v = 0; v < image.rows; ++v)
+      for (int u = 0; u < image.cols; ++u)
+        image_turned.at<cv::Vec3b>(image.rows - 1 - v, image.cols - 1 - u) = image.at<cv::Vec3b>(v, u);
+    const Observation a = Tracker(rig).track(image)[0], b = Tracker(turned).track(image_turned)[0];
+    expect_right(a, q);
+    expect_right(b, q);
+    EXPECT_LT(normalised_square(q_error(b.rcm->q, a.rcm->q), a.rcm->covariance), 0.01);
+    EXPECT_NEAR(b.sigma_tau_rad, a.sigma_tau_rad, 0.02 * a.sigma_tau_rad);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const Eigen::Vector2d back(image.cols - 1 - b.edges_raw_px[k].x(), image.rows - 1 - b.edges_raw_px[k].y());
+      EXPECT_LT((back - a.edges_raw_px[k]).norm(), 0.02);
+    }
+  }
+}
+
+TEST(SurfaceTracker, FollowingTellsTheSameAsLookingAnew) {
+  const Rig rig = theatre::usual_rig();
+  SurfaceTracker following(rig, false), anew(rig, true);
+  const auto motion = slow_motion(rig, 4, 12);
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    SCOPED_TRACE("seed 4, frame " + std::to_string(i));
+    const cv::Mat image = theatre::render(rig, {motion[i]}, i);
+    const Observation followed = following.track(image)[0], found = anew.track(image)[0];
+    expect_right(followed, motion[i]);
+    expect_right(found, motion[i]);
+    EXPECT_LT(normalised_square(q_error(followed.rcm->q, found.rcm->q), found.rcm->covariance), 0.05);
+  }
+}
+
+TEST(SurfaceTracker, FindsTheInstrumentAgainAfterItWasHidden) {
+  const Rig rig = theatre::usual_rig();
+  const cv::Mat hidden = theatre::render_nothing(rig, 2);
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const RcmCoordinates before = theatre::random_configuration(rig, 0, random),
+                         after = theatre::random_configuration(rig, 0, random);
+    SurfaceTracker tracker(rig, false);
+    expect_right(tracker.track(theatre::render(rig, {before}, seed))[0], before);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(tracker.track(hidden)[0].status, Status::no_marker);
+    expect_right(tracker.track(theatre::render(rig, {after}, seed))[0], after);
+    // A jump without a gap, and after a reset.
+    expect_right(tracker.track(theatre::render(rig, {before}, seed))[0], before);
+    tracker.reset();
+    expect_right(tracker.track(theatre::render(rig, {after}, seed))[0], after);
+  }
+}
+
+TEST(SurfaceTracker, InstrumentsKeepTheirNamesInAnyOrderOfTheRig) {
+  const Rig rig = theatre::usual_rig(3);
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const auto q = apart(rig, random);
+    const cv::Mat image = theatre::render(rig, q, seed);
+    for (const std::array<std::size_t, 3>& order : {std::array<std::size_t, 3>{0, 1, 2}, {2, 0, 1}, {1, 0, 2}}) {
+      Rig shuffled = rig;
+      for (std::size_t i = 0; i < 3; ++i) shuffled.instruments[i] = rig.instruments[order[i]];
+      const auto observations = SurfaceTracker(shuffled, true).track(image);
+      for (std::size_t i = 0; i < 3; ++i) expect_right(observations[i], q[order[i]]);
+    }
+    // One of them gone: its place stays empty, whatever the others show.
+    const cv::Mat without = theatre::render(rig, {q[0], q[1]}, seed);
+    const auto observations = SurfaceTracker(rig, true).track(without);
+    expect_right(observations[0], q[0]);
+    expect_right(observations[1], q[1]);
+    EXPECT_NE(observations[2].status, Status::ok);
+  }
+}
+
+// The camera was moved after registration, or this is another theatre's rig: what is said of q says how far to trust
+// it, or is not said; what needs no registration stays right.
+TEST(SurfaceTracker, AWrongRegistrationIsNoWrongRotation) {
+  const Rig rig = theatre::usual_rig();
+  int with_q = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const RcmCoordinates q = theatre::random_configuration(rig, 0, random);
+    const ShaftPose truth = theatre::pose_of(rig, 0, q);
+    const auto line = centre_line(rig.camera, rig.instruments[0].marker, truth.camera_from_unrolled, truth.psi_rad);
+    const cv::Mat image = theatre::render(rig, {q}, seed);
+    for (const double shift_m : {0.01, 0.04}) {
+      Rig moved = rig;
+      const Eigen::Vector3d away = Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+      moved.instruments[0].camera_from_rcm->translation += shift_m * away;
+      const Observation o = Tracker(moved).track(image)[0];
+      if (o.status != Status::ok) continue;
+      EXPECT_LT(std::abs(wrap_pi(o.tau_rad - line->tau_rad)), std::max(0.02, 5 * o.sigma_tau_rad)) << shift_m;
+      EXPECT_LT((o.edges_ideal_px[0] - line->ideal_px[0]).norm(), 1.5) << shift_m;
+      EXPECT_LT((o.edges_ideal_px[3] - line->ideal_px[3]).norm(), 1.5) << shift_m;
+      with_q += o.rcm.has_value();
+    }
+  }
+  EXPECT_LT(with_q, 20);
+}
+
+TEST(SurfaceTracker, AMirroredPictureOrAnotherInstrumentIsNotOurs) {
+  const Rig rig = theatre::usual_rig();
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Random random(seed);
+    const RcmCoordinates q = theatre::random_configuration(rig, 0, random);
+    const cv::Mat image = theatre::render(rig, {q}, seed);
+    for (const std::array<double, 3>& hues_deg : {std::array<double, 3>{180, 270, 90}, {270, 90, 180}}) {
+      Rig other = rig;
+      other.instruments[0].marker.hues_deg = hues_deg;
+      EXPECT_NE(Tracker(other).track(image)[0].status, Status::ok) << hues_deg[0];
+    }
+    cv::Mat mirrored(image.size(), image.type());
+    for (int v = 0; v < image.rows; ++v)
+      for (int u = 0; u < image.cols; ++u) mirrored.at<cv::Vec3b>(v, image.cols - 1 - u) = image.at<cv::Vec3b>(v, u);
+    EXPECT_NE(Tracker(rig).track(mirrored)[0].status, Status::ok);
+  }
+}
+
+TEST(Tracker, RefusesOtherImagesThanTheRigs) {
+  const Rig rig = theatre::usual_rig();
+  Tracker tracker(rig);
+  EXPECT_THROW(tracker.track(cv::Mat::zeros(540, 961, CV_8UC3)), InputError);
+  EXPECT_THROW(tracker.track(cv::Mat::zeros(541, 960, CV_8UC3)), InputError);
+  EXPECT_THROW(tracker.track(cv::Mat::zeros(540, 960, CV_8UC1)), InputError);
+  EXPECT_THROW(tracker.track(cv::Mat()), InputError);
+}
+
+}  // namespace
+}  // namespace lapservo
