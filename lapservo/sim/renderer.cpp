@@ -1,166 +1,80 @@
 #include "lapservo/sim/renderer.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstddef>
-#include <set>
 #include <utility>
-
-#include <opencv2/imgproc.hpp>
 
 namespace lapservo {
 namespace {
 
-constexpr int tile_px = 32;
-constexpr int samples_at_edges = 32;
-
-// A rank-1 lattice: every sample has a row and a column of its own, so edges along the axes are as fine as any.
-constexpr std::array<std::array<float, 2>, samples_at_edges> make_lattice() {
-  std::array<std::array<float, 2>, samples_at_edges> lattice{};
-  for (int i = 0; i < samples_at_edges; ++i)
-    lattice[static_cast<std::size_t>(i)] = {
-        (static_cast<float>(i) + 0.5F) / samples_at_edges - 0.5F,
-        (static_cast<float>((i * 19 + 7) % samples_at_edges) + 0.5F) / samples_at_edges - 0.5F};
-  return lattice;
-}
-constexpr auto lattice = make_lattice();
-
-int margin_px(double blur_px) {
-  return static_cast<int>(std::ceil(4 * blur_px)) + 1;
-}
-
-void blur(const cv::Mat& in, cv::Mat& out, double blur_px) {
-  if (blur_px <= 0) {
-    in.copyTo(out);
-    return;
-  }
-  const int size = 2 * margin_px(blur_px) - 1;
-  cv::GaussianBlur(in, out, {size, size}, blur_px, blur_px, cv::BORDER_REPLICATE);
-}
-
-// Nearest shaft on a ray.
-std::pair<ShaftCaster::Hit, const ShaftCaster*> nearest(const std::vector<ShaftCaster>& casters,
-                                                        const Eigen::Vector3d& ray) {
-  std::pair<ShaftCaster::Hit, const ShaftCaster*> best{{}, nullptr};
-  for (const ShaftCaster& caster : casters) {
-    const ShaftCaster::Hit hit = caster.cast(ray);
-    if (hit.part && hit.depth_m < best.first.depth_m) best = {hit, &caster};
-  }
-  return best;
-}
-
-// Image of the shaft's outline, generously: the tiles within its width of its axis.
-void tiles_near(const Camera& camera, const ShaftModel& model, const ShaftPlacement& placement, double extra_px,
-                std::set<std::pair<int, int>>& tiles) {
-  const double from_m = -model.shaft_before_m,
-               to_m = model.marker.length_m() + model.shaft_beyond_m + 1.2 * model.marker.radius_m();
-  double along_m = from_m;
-  while (along_m < to_m) {
-    const Eigen::Vector3d point = placement.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
-    const double z_m = point.z();
-    along_m += std::max(0.0005, 0.3 * tile_px * std::max(z_m, 0.01) / camera.fx_px);
-    if (z_m < 2 * model.marker.radius_m()) continue;
-    const Eigen::Vector2d centre = camera.raw_from_point(point);
-    const double reach_px =
-        1.6 * model.marker.radius_m() * camera.fx_px / (z_m - model.marker.radius_m()) + extra_px + tile_px;
-    if (!camera.contains(centre, -2 * reach_px)) continue;
-    const auto tile = [](double x) { return static_cast<int>(std::floor(x / tile_px)); };
-    for (int r = tile(centre.y() - reach_px); r <= tile(centre.y() + reach_px); ++r)
-      for (int c = tile(centre.x() - reach_px); c <= tile(centre.x() + reach_px); ++c) tiles.emplace(r, c);
-  }
-}
+constexpr float smoke_light = 0.35F;
+constexpr float far_m = 1e9F;
 
 }  // namespace
 
 Renderer::Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background,
                    RenderOptions options)
-    : camera_(camera), shafts_(std::move(shafts)), options_(options), encoder_(camera.response, options.sensor) {
+    : camera_(camera),
+      half_field_rad_(half_field_rad(camera)),
+      shafts_(std::move(shafts)),
+      options_(options),
+      optics_(options.sensor.blur_px),
+      encoder_(camera.response, options.sensor),
+      rays_(camera) {
   CV_Assert(background.type() == CV_32FC3 && background.cols == camera.width_px && background.rows == camera.height_px);
-  sharp_ = background * (1 - options_.smoke) + cv::Scalar::all(0.35 * options_.smoke);
-  light_ = sharp_.clone();
-  cv::Mat blurred;
-  blur(sharp_, blurred, options_.sensor.blur_px);
-  background_ = encoder_.allocate(sharp_.size());
-  encoder_.encode(blurred, background_.value, background_.sigma);
-  frame_ = {background_.value.clone(), background_.sigma.clone()};
-  if (!camera_.distorted()) return;
-  rays_.create(camera.height_px, camera.width_px, CV_64FC2);
-  for (int v = 0; v < rays_.rows; ++v)
-    for (int u = 0; u < rays_.cols; ++u) {
-      const auto ideal = camera_.ideal_from_raw({u, v});
-      const Eigen::Vector3d direction = camera_.ray_from_ideal(ideal.value_or(Eigen::Vector2d(u, v)));
-      rays_.at<cv::Vec2d>(v, u) = {direction.x(), direction.y()};
-    }
-}
-
-Eigen::Vector3d Renderer::ray(double u, double v) const {
-  if (rays_.empty()) return camera_.ray_from_ideal({u, v});
-  // Bilinear: the rays of neighbouring pixels differ by nearly the same everywhere.
-  const int iu = std::clamp(static_cast<int>(std::floor(u)), 0, rays_.cols - 2),
-            iv = std::clamp(static_cast<int>(std::floor(v)), 0, rays_.rows - 2);
-  const double fu = u - iu, fv = v - iv;
-  const cv::Vec2d top = rays_.at<cv::Vec2d>(iv, iu) * (1 - fu) + rays_.at<cv::Vec2d>(iv, iu + 1) * fu;
-  const cv::Vec2d bottom = rays_.at<cv::Vec2d>(iv + 1, iu) * (1 - fu) + rays_.at<cv::Vec2d>(iv + 1, iu + 1) * fu;
-  const cv::Vec2d direction = top * (1 - fv) + bottom * fv;
-  return {direction[0], direction[1], 1};
-}
-
-void Renderer::draw_tile(const std::vector<ShaftCaster>& casters, const cv::Rect& tile, float share) {
-  constexpr int side = tile_px + 2;
-  std::array<std::uint16_t, side * side> parts{};
-  std::array<Light, side * side> colors;
-  const float clear = 1 - options_.smoke;
-  const Light veil = Light::Constant(0.35F * options_.smoke);
-  for (int v = -1; v <= tile.height; ++v)
-    for (int u = -1; u <= tile.width; ++u) {
-      const auto [hit, caster] = nearest(casters, ray(tile.x + u, tile.y + v));
-      const auto index = static_cast<std::size_t>((v + 1) * side + u + 1);
-      parts[index] = hit.part ? static_cast<std::uint16_t>(hit.part + 64 * (caster - casters.data())) : 0;
-      if (hit.part) colors[index] = caster->shade(hit);
-    }
-  for (int v = 0; v < tile.height; ++v)
-    for (int u = 0; u < tile.width; ++u) {
-      const auto index = static_cast<std::size_t>((v + 1) * side + u + 1);
-      const std::uint16_t part = parts[index];
-      bool edge = false;
-      for (int dv = -1; dv <= 1; ++dv)
-        for (int du = -1; du <= 1; ++du) edge |= parts[index + static_cast<std::size_t>(dv * side + du)] != part;
-      if (!edge && !part) continue;
-      Light sum = Light::Zero();
-      float covered = 1;
-      if (!edge) {
-        sum = colors[index];
-      } else {
-        int hits = 0;
-        for (const auto& offset : lattice) {
-          const auto [hit, caster] = nearest(casters, ray(tile.x + u + offset[0], tile.y + v + offset[1]));
-          if (!hit.part) continue;
-          sum += caster->shade(hit);
-          ++hits;
-        }
-        sum /= samples_at_edges;
-        covered = static_cast<float>(hits) / samples_at_edges;
-      }
-      const auto& behind = sharp_.at<cv::Vec3f>(tile.y + v, tile.x + u);
-      auto& pixel = light_.at<cv::Vec3f>(tile.y + v, tile.x + u);
-      for (int c = 0; c < 3; ++c) pixel[c] += share * (clear * sum[c] + covered * (veil[c] - behind[c]));
-    }
-}
-
-void Renderer::draw(const std::vector<ShaftPlacement>& placements, float share, std::vector<cv::Rect>& touched) {
-  std::vector<ShaftCaster> casters;
-  std::set<std::pair<int, int>> tiles;
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    casters.emplace_back(shafts_.at(i), placements[i], options_.lighting);
-    tiles_near(camera_, shafts_[i], placements[i], margin_px(options_.sensor.blur_px), tiles);
+  background_light_ = background.clone();
+  canvas_.light = background.clone();
+  if (shafts_.size() > 1) {
+    canvas_.depth_m = cv::Mat(background.size(), CV_32F, cv::Scalar(far_m));
+    canvas_.cover = cv::Mat(background.size(), CV_32F, cv::Scalar(0));
   }
-  const cv::Rect whole(0, 0, camera_.width_px, camera_.height_px);
-  for (const auto& [row, column] : tiles) {
-    const cv::Rect tile = cv::Rect(column * tile_px, row * tile_px, tile_px, tile_px) & whole;
-    if (tile.empty()) continue;
-    draw_tile(casters, tile, share);
-    touched.push_back(tile);
+  background_ = encoder_.allocate(background.size());
+  const cv::Rect whole(0, 0, background.cols, background.rows);
+  develop(background_light_, whole, background_);
+  frame_ = {background_.value.clone(), background_.sigma.clone()};
+}
+
+// Blurs, veils and encodes a part. A veil is even: it may come after the blur.
+void Renderer::develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded) {
+  const float clear = 1 - options_.smoke, veil = smoke_light * options_.smoke;
+  veiled_.resize(static_cast<std::size_t>(3 * part.width));
+  for (int v = part.y; v < part.y + part.height; ++v) {
+    const float* row = optics_.row(light, v, part.x, part.x + part.width);
+    if (options_.smoke > 0) {
+      for (std::size_t i = 0; i < veiled_.size(); ++i) veiled_[i] = clear * row[i] + veil;
+      row = veiled_.data();
+    }
+    encoder_.encode(row, part.width, v, part.x, encoded);
+  }
+}
+
+std::vector<cv::Rect> Renderer::draw(const std::vector<ShaftPlacement>& placements) {
+  std::vector<cv::Rect> drawn;
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    const ShaftModel& shaft = shafts_.at(i);
+    const Eigen::Vector3d tip =
+        placements[i].camera_from_unrolled * Eigen::Vector3d(0, 0, shaft.marker.length_m() + shaft.shaft_beyond_m);
+    ShaftPainter painter(shaft, placements[i], options_.lighting,
+                         disc_around_ball(camera_, half_field_rad_, tip, shaft.tip_radius_m()));
+    const auto bands = outline(camera_, half_field_rad_, shaft, placements[i], optics_.reach_px() + 1);
+    for (std::size_t b = 0; b < bands.size(); ++b) {
+      if (bands[b].empty()) continue;
+      const int top = static_cast<int>(b) * band_rows;
+      const cv::Rect part(bands[b].begin, top, bands[b].end - bands[b].begin,
+                          std::min(band_rows, camera_.height_px - top));
+      painter.paint(rays_, part, background_light_, canvas_);
+      drawn.push_back(part);
+    }
+  }
+  return drawn;
+}
+
+void Renderer::clear(const std::vector<cv::Rect>& drawn) {
+  for (const cv::Rect& part : drawn) {
+    background_light_(part).copyTo(canvas_.light(part));
+    if (canvas_.cover.empty()) continue;
+    canvas_.depth_m(part).setTo(far_m);
+    canvas_.cover(part).setTo(0);
   }
 }
 
@@ -169,23 +83,26 @@ cv::Mat Renderer::render(const std::vector<ShaftPlacement>& placements, std::uin
 }
 
 cv::Mat Renderer::render_exposure(const Exposure& exposure, std::uint64_t seed) {
-  std::vector<cv::Rect> tiles;
-  for (const auto& moment : exposure) draw(moment, 1.0F / static_cast<float>(exposure.size()), tiles);
-  const int margin = margin_px(options_.sensor.blur_px);
-  const cv::Rect whole(0, 0, camera_.width_px, camera_.height_px);
-  cv::Mat blurred;
-  for (const cv::Rect& tile : tiles) {
-    const cv::Rect around =
-        cv::Rect(tile.x - margin, tile.y - margin, tile.width + 2 * margin, tile.height + 2 * margin) & whole;
-    blur(light_(around), blurred, options_.sensor.blur_px);
-    encoder_.encode(blurred(tile - around.tl()), frame_.value(tile), frame_.sigma(tile));
+  std::vector<cv::Rect> drawn;
+  if (exposure.size() == 1) {
+    drawn = draw(exposure.front());
+    for (const cv::Rect& part : drawn) develop(canvas_.light, part, frame_);
+    clear(drawn);
+  } else {
+    exposed_.create(background_light_.size(), CV_32FC3);
+    exposed_.setTo(0);
+    for (const auto& moment : exposure) {
+      const std::vector<cv::Rect> now = draw(moment);
+      exposed_ += canvas_.light * (1.0 / static_cast<double>(exposure.size()));
+      clear(now);
+      drawn.insert(drawn.end(), now.begin(), now.end());
+    }
+    for (const cv::Rect& part : drawn) develop(exposed_, part, frame_);
   }
-  cv::Mat image;
-  encoder_.expose(frame_, seed, image);
-  for (const cv::Rect& tile : tiles) {
-    sharp_(tile).copyTo(light_(tile));
-    background_.value(tile).copyTo(frame_.value(tile));
-    background_.sigma(tile).copyTo(frame_.sigma(tile));
+  const cv::Mat image = encoder_.expose(frame_, seed);
+  for (const cv::Rect& part : drawn) {
+    background_.value(part).copyTo(frame_.value(part));
+    background_.sigma(part).copyTo(frame_.sigma(part));
   }
   return image;
 }

@@ -6,9 +6,11 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/geometry/camera.h"
+#include "lapservo/sim/optics.h"
+#include "lapservo/sim/outline.h"
 #include "lapservo/sim/scene.h"
 #include "lapservo/sim/sensor.h"
-#include "lapservo/sim/shaft_caster.h"
+#include "lapservo/sim/shaft_painter.h"
 
 namespace lapservo {
 
@@ -22,8 +24,9 @@ struct RenderOptions {
 using Exposure = std::vector<std::vector<ShaftPlacement>>;
 
 /// Renders shafts with markers in front of a background, from physical geometry: rays against cylinders, area-sampled
-/// at every edge (32 rays a pixel), shaded and blurred in linear light, then the sensor. Never through the vision code
-/// or the cross-ratio. Positions of edges are right to 0.02 px.
+/// at every edge, shaded and blurred in linear light, then the sensor. Never through the vision code or the
+/// cross-ratio. Positions of edges are right to 0.01 px.
+/// The background is blurred and encoded once; a frame costs its shafts and the noise.
 class Renderer {
  public:
   /// `background`: linear light, CV_32FC3, of the camera's size.
@@ -34,16 +37,21 @@ class Renderer {
   cv::Mat render_exposure(const Exposure& exposure, std::uint64_t seed);
 
  private:
-  void draw(const std::vector<ShaftPlacement>& placements, float share, std::vector<cv::Rect>& tiles);
-  void draw_tile(const std::vector<ShaftCaster>& casters, const cv::Rect& tile, float share);
-  Eigen::Vector3d ray(double u, double v) const;
+  std::vector<cv::Rect> draw(const std::vector<ShaftPlacement>& placements);
+  void clear(const std::vector<cv::Rect>& drawn);
+  void develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded);
 
   Camera camera_;
+  double half_field_rad_;
   std::vector<ShaftModel> shafts_;
   RenderOptions options_;
+  Optics optics_;
   SensorEncoder encoder_;
-  cv::Mat sharp_, light_, rays_;  // background; the frame being drawn; ideal rays when distorted
-  SensorEncoder::Encoded background_, frame_;
+  PixelRays rays_;
+  Canvas canvas_;  // the frame being drawn
+  cv::Mat background_light_, exposed_;         // sharp; the mean over an exposure's moments
+  SensorEncoder::Encoded background_, frame_;  // blurred and encoded
+  std::vector<float> veiled_;
 };
 
 }  // namespace lapservo

@@ -37,6 +37,8 @@ struct ShaftModel {
   double shaft_before_m = 0.3;    ///< length of shaft shown on the proximal side
   double shaft_beyond_m = 0.012;  ///< and on the distal side, before the tip
   std::vector<Blotch> blotches;
+
+  double tip_radius_m() const { return 1.05 * marker.radius_m(); }
 };
 
 /// Where one instrument is.

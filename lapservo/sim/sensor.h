@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -10,28 +11,32 @@
 
 namespace lapservo {
 
-/// Turns linear light into encoded 8-bit pixels with noise. The noise is drawn from a table of normal deviates, read
-/// from a fresh place for every row of every frame; it is added to the encoded value with the slope of the response
-/// there.
+/// Turns linear light into encoded 8-bit pixels with noise. The noise is drawn from a table of normal deviates (cut at
+/// four sigma), read from a fresh place for every row of every frame; it is added to the encoded value with the slope
+/// of the response there.
 class SensorEncoder {
  public:
   SensorEncoder(const Response& response, const Sensor& sensor);
 
-  /// Encoded value and its noise's sigma, as fixed-point numbers with 6 bits after the point (CV_16SC3 each).
+  /// Encoded values in 64ths and the noise's sigma in 512ths (CV_16SC3 each), before noise and rounding.
   struct Encoded {
     cv::Mat value, sigma;
   };
   Encoded allocate(cv::Size size) const { return {cv::Mat(size, CV_16SC3), cv::Mat(size, CV_16SC3)}; }
-  /// Encodes a part: `light` CV_32FC3; writes to the same-sized parts `value` and `sigma`.
-  void encode(const cv::Mat& light, cv::Mat value, cv::Mat sigma) const;
+  /// Encodes pixels of `light` (three floats each) to row v of `encoded`, from column `begin` on.
+  void encode(const float* light, int pixels, int v, int begin, Encoded& encoded);
   /// Adds noise and rounds to 8 bits.
-  void expose(const Encoded& encoded, std::uint64_t seed, cv::Mat& image) const;
+  cv::Mat expose(const Encoded& encoded, std::uint64_t seed) const;
 
  private:
   static constexpr int levels = 8192;
-  std::vector<std::int16_t> value_, sigma_;  // by light
-  std::vector<std::int16_t> deviates_;       // of sigma 1024
-  Light gains_;
+  struct Level {
+    std::int16_t value, sigma;
+  };
+  std::vector<Level> by_level_;
+  std::vector<std::int16_t> deviates_;  // of sigma 8192
+  std::array<float, 12> gains_;         // of four pixels
+  std::vector<std::int32_t> row_;
 };
 
 }  // namespace lapservo

@@ -1,0 +1,75 @@
+#include "lapservo/sim/outline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace lapservo {
+namespace {
+
+constexpr double step_px = 4;
+
+void widen(std::vector<Span>& bands, const Disc& disc, int width_px) {
+  const double radius2 = disc.radius_px * disc.radius_px;
+  const auto count = static_cast<double>(bands.size());
+  const double first = std::clamp(std::floor((disc.centre_px.y() - disc.radius_px) / band_rows), 0.0, count);
+  const double last = std::clamp(std::floor((disc.centre_px.y() + disc.radius_px) / band_rows), -1.0, count - 1);
+  for (int b = static_cast<int>(first); b <= static_cast<int>(last); ++b) {
+    const double above = b * band_rows - disc.centre_px.y(), below = disc.centre_px.y() - ((b + 1) * band_rows - 1);
+    const double off = std::max({0.0, above, below});
+    if (off * off >= radius2) continue;
+    const double half = std::sqrt(radius2 - off * off);
+    const int begin = static_cast<int>(std::clamp(std::floor(disc.centre_px.x() - half), 0.0, 1.0 * width_px));
+    const int end = static_cast<int>(std::clamp(std::ceil(disc.centre_px.x() + half) + 1, 0.0, 1.0 * width_px));
+    if (begin >= end) continue;
+    Span& span = bands[static_cast<std::size_t>(b)];
+    span = span.empty() ? Span{begin, end} : Span{std::min(span.begin, begin), std::max(span.end, end)};
+  }
+}
+
+}  // namespace
+
+double half_field_rad(const Camera& camera) {
+  double widest = 0;
+  for (const double u : {-0.5, camera.width_px - 0.5})
+    for (const double v : {-0.5, camera.height_px - 0.5}) {
+      const Eigen::Vector2d corner(u, v);
+      const Eigen::Vector3d ray = camera.ray_from_ideal(camera.ideal_from_raw(corner).value_or(corner));
+      widest = std::max(widest, std::atan(ray.head<2>().norm()));
+    }
+  return widest;
+}
+
+Disc disc_around_ball(const Camera& camera, double half_field_rad, const Eigen::Vector3d& centre, double radius_m) {
+  if (centre.z() < 1.5 * radius_m) return {};
+  const double off_axis_rad = std::atan2(centre.head<2>().norm(), centre.z());
+  if (off_axis_rad - std::asin(radius_m / centre.norm()) > half_field_rad) return {};
+  // Off the axis a ball's image is stretched outwards; a lens with pincushion distortion stretches it further.
+  const Eigen::Vector2d middle(camera.cx_px, camera.cy_px), ideal = camera.ideal_from_point(centre);
+  const Eigen::Vector2d raw = camera.raw_from_ideal(ideal);
+  const double lens = std::max(1.0, (raw - middle).norm() / std::max(1.0, (ideal - middle).norm()));
+  const double stretch = lens * centre.norm() / centre.z();
+  const double per_m = std::max(camera.fx_px, camera.fy_px) / std::sqrt(centre.z() * centre.z() - radius_m * radius_m);
+  return {raw, radius_m * per_m * stretch * stretch};
+}
+
+std::vector<Span> outline(const Camera& camera, double half_field_rad, const ShaftModel& model,
+                          const ShaftPlacement& placement, double margin_px) {
+  std::vector<Span> bands(static_cast<std::size_t>((camera.height_px + band_rows - 1) / band_rows));
+  const double radius_m = model.tip_radius_m();
+  const double end_m = model.marker.length_m() + model.shaft_beyond_m;
+  for (double along_m = -model.shaft_before_m; along_m <= end_m;) {
+    const Eigen::Vector3d point = placement.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
+    Disc disc = disc_around_ball(camera, half_field_rad, point, radius_m);
+    if (disc.radius_px > 0) {
+      disc.radius_px += margin_px + 1;
+      widen(bands, disc, camera.width_px);
+    }
+    const double next_m = along_m + std::max(1e-4, step_px * std::max(point.z(), 0.01) / camera.fx_px);
+    if (along_m == end_m) break;
+    along_m = std::min(next_m, end_m);
+  }
+  return bands;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,165 @@
+#include "lapservo/sim/shaft_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lapservo/core/angles.h"
+
+namespace lapservo {
+namespace {
+
+constexpr float nearest_m = 1e-3F;
+constexpr float full_turn = static_cast<float>(two_pi);
+
+// Arc tangent of |x| <= 1 to 2e-7: minimax polynomial, free of branches and library calls so that loops vectorise.
+inline float arc_tangent(float x) {
+  const float s = x * x;
+  return x * (0.999999911F +
+              s * (-0.333320935F +
+                   s * (0.19971375F +
+                        s * (-0.140294192F +
+                             s * (0.0994275745F + s * (-0.0599046919F + s * (0.0245571074F + s * -0.00478045053F)))))));
+}
+
+}  // namespace
+
+void RayRow::resize(std::size_t count) {
+  for (auto* column : {&x, &y, &azimuth_rad, &along_m, &depth_m}) column->resize(count);
+  part.resize(count);
+}
+
+ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placement) : blotches_(model.blotches) {
+  const Marker& marker = model.marker;
+  const Rigid3 unrolled_from_camera = placement.camera_from_unrolled.inverse();
+  const Eigen::Vector3d camera = unrolled_from_camera.translation;
+  const double facing_rad = std::atan2(camera.y(), camera.x());
+  const Rigid3 facing_from_unrolled{
+      Eigen::Quaterniond(Eigen::AngleAxisd(-facing_rad, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero()};
+  facing_from_camera_ = facing_from_unrolled * unrolled_from_camera;
+  rotation_ = facing_from_camera_.rotation.toRotationMatrix().cast<float>();
+  camera_ = Eigen::Vector3d(camera.head<2>().norm(), 0, camera.z()).cast<float>();
+  outer_m_ = static_cast<float>(marker.radius_m());
+  inner_m_ = static_cast<float>(marker.radius_m() - model.film_m);
+  tip_m_ = static_cast<float>(model.tip_radius_m());
+  length_m_ = static_cast<float>(marker.length_m());
+  shaft_start_m_ = static_cast<float>(-model.shaft_before_m);
+  shaft_end_m_ = static_cast<float>(marker.length_m() + model.shaft_beyond_m);
+  tau_facing_ = static_cast<float>(wrap_two_pi(facing_rad - placement.psi_rad - marker.seam_rad));
+  const auto at_seam = boundaries_m(marker, 0), slopes = boundary_slopes_m(marker);
+  e1_m_ = static_cast<float>(at_seam[1]);
+  e2_m_ = static_cast<float>(at_seam[2]);
+  e1_slope_m_ = static_cast<float>(slopes[1]);
+  e2_slope_m_ = static_cast<float>(slopes[2]);
+  visible_ = camera_.x() > 1.01F * outer_m_;
+}
+
+void ShaftTracer::trace(RayRow& rays, bool with_tip) const {
+  const Eigen::Matrix3f& m = rotation_;
+  const float cx = camera_.x(), cz = camera_.z();
+  const float outer2 = outer_m_ * outer_m_, inner2 = inner_m_ * inner_m_;
+  const float* __restrict ray_x = rays.x.data();
+  const float* __restrict ray_y = rays.y.data();
+  float* __restrict azimuths = rays.azimuth_rad.data();
+  float* __restrict alongs = rays.along_m.data();
+  float* __restrict depths = rays.depth_m.data();
+  Part* __restrict parts = rays.part.data();
+  const std::size_t count = rays.size();
+  const float m00 = m(0, 0), m01 = m(0, 1), m02 = m(0, 2), m10 = m(1, 0), m11 = m(1, 1), m12 = m(1, 2), m20 = m(2, 0),
+              m21 = m(2, 1), m22 = m(2, 2);
+  const float length = length_m_, start = shaft_start_m_, end = shaft_end_m_, tau_facing = tau_facing_;
+  const float e1 = e1_m_, e2 = e2_m_, e1_slope = e1_slope_m_, e2_slope = e2_slope_m_;
+  const float per_outer = 1 / outer_m_, per_inner = 1 / inner_m_;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float dx = m00 * ray_x[i] + m01 * ray_y[i] + m02;
+    const float dy = m10 * ray_x[i] + m11 * ray_y[i] + m12;
+    const float dz = m20 * ray_x[i] + m21 * ray_y[i] + m22;
+    // The camera lies at (cx, 0, cz): |d x c| = cx |dy|, without the cancellation of b^2 - a c.
+    const float a = dx * dx + dy * dy, cross2 = cx * cx * dy * dy;
+    const float per_a = 1 / a, closest = -cx * dx;
+    const float outer_root2 = outer2 * a - cross2, inner_root2 = inner2 * a - cross2;
+    const float outer_root = std::sqrt(std::max(outer_root2, 0.0F)), inner_root = std::sqrt(std::max(inner_root2, 0.0F));
+    const float outer_depth = (closest - outer_root) * per_a, inner_depth = (closest - inner_root) * per_a;
+    const float outer_along = cz + outer_depth * dz, inner_along = cz + inner_depth * dz;
+    const int meets_outer = (outer_root2 > 0) & (outer_depth > nearest_m);
+    const int meets_inner = (inner_root2 > 0) & (inner_depth > nearest_m);
+    const int on_film = meets_outer & (outer_along >= 0) & (outer_along <= length);
+    // Through an end face of the film: in at one side of its plane, at the shaft (or out again) on the other.
+    const float leaving = inner_root2 > 0 ? inner_along : cz + (closest + outer_root) * per_a * dz;
+    const int through_end = meets_outer & (((outer_along > length) & (leaving < length)) | ((outer_along < 0) & (leaving > 0)));
+    const int on_shaft = meets_inner & (inner_along > start) & (inner_along < end);
+
+    const float depth = on_film ? outer_depth : inner_depth;
+    const float per_radius = on_film ? per_outer : per_inner;
+    const float along = cz + depth * dz;
+    const float cosine = (cx + depth * dx) * per_radius, sine = depth * dy * per_radius;
+    const float azimuth = 2 * arc_tangent(std::min(1.0F, std::max(-1.0F, sine / (1 + std::max(cosine, 0.0F)))));
+    float tau = tau_facing + azimuth;
+    tau += tau < 0 ? full_turn : 0.0F;
+    tau -= tau >= full_turn ? full_turn : 0.0F;
+    const int band = 1 + (along > e1 + e1_slope * tau) + (along > e2 + e2_slope * tau);
+    constexpr int shaft = static_cast<int>(Part::shaft), film_edge = static_cast<int>(Part::film_edge);
+    const int part = on_film ? band : (through_end ? film_edge : (on_shaft ? shaft : 0));
+    azimuths[i] = azimuth;
+    alongs[i] = along;
+    depths[i] = depth;
+    parts[i] = static_cast<Part>(part);
+  }
+  if (with_tip) trace_tip(rays);
+  if (!blotches_.empty()) stain(rays);
+}
+
+void ShaftTracer::trace_tip(RayRow& rays) const {
+  const Eigen::Vector3f from = camera_ - tip_centre();
+  const float c = from.squaredNorm() - tip_m_ * tip_m_;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Eigen::Vector3f ray = rotation_ * Eigen::Vector3f(rays.x[i], rays.y[i], 1);
+    const float a = ray.squaredNorm(), b = from.dot(ray), root2 = b * b - a * c;
+    if (!(root2 > 0)) continue;
+    const float depth_m = (-b - std::sqrt(root2)) / a;
+    if (depth_m < nearest_m || (rays.part[i] != Part::nothing && rays.depth_m[i] < depth_m)) continue;
+    rays.part[i] = Part::tip;
+    rays.depth_m[i] = depth_m;
+  }
+}
+
+void ShaftTracer::stain(RayRow& rays) const {
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!is_band(rays.part[i])) continue;
+    const double tau = tau_rad(rays.azimuth_rad[i]);
+    for (const Blotch& blotch : blotches_) {
+      const double beside_m = rays.along_m[i] - blotch.along_m;
+      if (std::abs(beside_m) > blotch.radius_m) continue;
+      const double around_m = wrap_pi(tau - blotch.azimuth_rad) * outer_m_;
+      if (around_m * around_m + beside_m * beside_m >= blotch.radius_m * blotch.radius_m) continue;
+      rays.part[i] = Part::blood;
+      break;
+    }
+  }
+}
+
+float ShaftTracer::outside_silhouette(float x, float y, Part part) const {
+  const Eigen::Vector3f ray = rotation_ * Eigen::Vector3f(x, y, 1);
+  const float radius_m = is_band(part) || part == Part::blood ? outer_m_ : inner_m_;
+  return camera_.x() * std::abs(ray.y()) - radius_m * ray.head<2>().norm();
+}
+
+float ShaftTracer::tau_rad(float azimuth_rad) const {
+  float tau = tau_facing_ + azimuth_rad;
+  if (tau < 0) tau += full_turn;
+  return tau >= full_turn ? tau - full_turn : tau;
+}
+
+float ShaftTracer::beyond_boundary_m(std::size_t index, float azimuth_rad, float along_m) const {
+  const float tau = tau_rad(azimuth_rad);
+  return along_m - (index == 1 ? e1_m_ + e1_slope_m_ * tau : e2_m_ + e2_slope_m_ * tau);
+}
+
+Eigen::Vector3f ShaftTracer::in_facing_frame(const Eigen::Vector3d& point_in_camera) const {
+  return (facing_from_camera_ * point_in_camera).cast<float>();
+}
+
+Eigen::Vector3f ShaftTracer::point_on_ray(float x, float y, float depth_m) const {
+  return camera_ + depth_m * (rotation_ * Eigen::Vector3f(x, y, 1));
+}
+
+}  // namespace lapservo
