@@ -9,7 +9,7 @@
 namespace lapservo {
 
 Light printed_color(double hue_deg) {
-  constexpr double saturation = 0.97, value = 0.83;
+  constexpr double saturation = 0.91, value = 0.84;
   const auto channel = [&](double n) {
     const double k = std::fmod(n + hue_deg / 60, 6.0);
     return value - value * saturation * std::clamp(std::min(k, 4 - k), 0.0, 1.0);
@@ -51,8 +51,7 @@ Lit ShaftLighting::at(const Eigen::Vector3f& point, const Eigen::Vector3f& norma
     const Eigen::Vector3f to_lamp = lamp - point;
     const float distance_m = to_lamp.norm(), facing = normal.dot(to_lamp) / distance_m;
     if (!(facing > 0)) continue;
-    const float ratio = reference_m / std::max(distance_m, 0.5F * reference_m);
-    const float falloff = 0.5F * ratio * ratio;
+    const float ratio = distance_m / reference_m, falloff = 1 / (1 + ratio * ratio);
     lit.matt += lighting_.diffuse * falloff * facing;
     const float half = normal.dot((to_lamp / distance_m + to_camera).normalized());
     if (half > 0) lit.gloss += lighting_.specular * falloff * std::pow(half, lighting_.specular_exponent);

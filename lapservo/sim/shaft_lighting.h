@@ -42,7 +42,7 @@ class ShaftLighting {
 /// Reflectance in linear light of each Part of a shaft.
 std::array<Light, 8> reflectances(const Marker& marker);
 
-/// Reflectance in linear light of a printed hue: HSV(hue, 0.97, 0.83) in sRGB values, b g r.
+/// Reflectance in linear light of a printed hue: HSV(hue, 0.91, 0.84) in sRGB values, b g r.
 Light printed_color(double hue_deg);
 
 }  // namespace lapservo
