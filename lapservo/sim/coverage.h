@@ -6,7 +6,7 @@ namespace lapservo {
 
 /// The part of a pixel where a function is negative.
 struct Coverage {
-  float share = 0;               ///< of the pixel's area
+  float share = 0;                   ///< of the pixel's area
   float centre_x = 0, centre_y = 0;  ///< centroid, from the pixel's first corner, in [0, 1]; the middle when empty
 };
 
@@ -21,7 +21,8 @@ inline Coverage negative_part(const std::array<float, 4>& f) {
     if (f[i] < 0) polygon[n++] = corner[i];
     if ((f[i] < 0) != (f[j] < 0)) {
       const float t = f[i] / (f[i] - f[j]);
-      polygon[n++] = {corner[i][0] + t * (corner[j][0] - corner[i][0]), corner[i][1] + t * (corner[j][1] - corner[i][1])};
+      polygon[n++] = {corner[i][0] + t * (corner[j][0] - corner[i][0]),
+                      corner[i][1] + t * (corner[j][1] - corner[i][1])};
     }
   }
   float twice_area = 0, x = 0, y = 0;

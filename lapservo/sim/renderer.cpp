@@ -10,6 +10,20 @@ namespace {
 constexpr float smoke_light = 0.35F;
 constexpr float far_m = 1e9F;
 
+// The same pixels without overlap; the parts of a band of rows share their top and height.
+std::vector<cv::Rect> without_overlap(std::vector<cv::Rect> parts) {
+  std::sort(parts.begin(), parts.end(),
+            [](const cv::Rect& a, const cv::Rect& b) { return a.y != b.y ? a.y < b.y : a.x < b.x; });
+  std::vector<cv::Rect> apart;
+  for (const cv::Rect& part : parts) {
+    if (!apart.empty() && apart.back().y == part.y && part.x <= apart.back().br().x)
+      apart.back().width = std::max(apart.back().br().x, part.br().x) - apart.back().x;
+    else
+      apart.push_back(part);
+  }
+  return apart;
+}
+
 }  // namespace
 
 Renderer::Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background,
@@ -66,7 +80,7 @@ std::vector<cv::Rect> Renderer::draw(const std::vector<ShaftPlacement>& placemen
       drawn.push_back(part);
     }
   }
-  return drawn;
+  return without_overlap(std::move(drawn));
 }
 
 void Renderer::clear(const std::vector<cv::Rect>& drawn) {
@@ -89,15 +103,16 @@ cv::Mat Renderer::render_exposure(const Exposure& exposure, std::uint64_t seed) 
     for (const cv::Rect& part : drawn) develop(canvas_.light, part, frame_);
     clear(drawn);
   } else {
-    exposed_.create(background_light_.size(), CV_32FC3);
-    exposed_.setTo(0);
+    cv::Mat exposed = background_light_.clone();
+    const double share = 1.0 / static_cast<double>(exposure.size());
     for (const auto& moment : exposure) {
       const std::vector<cv::Rect> now = draw(moment);
-      exposed_ += canvas_.light * (1.0 / static_cast<double>(exposure.size()));
+      for (const cv::Rect& part : now) exposed(part) += (canvas_.light(part) - background_light_(part)) * share;
       clear(now);
       drawn.insert(drawn.end(), now.begin(), now.end());
     }
-    for (const cv::Rect& part : drawn) develop(exposed_, part, frame_);
+    drawn = without_overlap(std::move(drawn));
+    for (const cv::Rect& part : drawn) develop(exposed, part, frame_);
   }
   const cv::Mat image = encoder_.expose(frame_, seed);
   for (const cv::Rect& part : drawn) {

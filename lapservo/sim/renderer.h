@@ -48,8 +48,8 @@ class Renderer {
   Optics optics_;
   SensorEncoder encoder_;
   PixelRays rays_;
-  Canvas canvas_;  // the frame being drawn
-  cv::Mat background_light_, exposed_;         // sharp; the mean over an exposure's moments
+  Canvas canvas_;                              // the frame being drawn
+  cv::Mat background_light_;                   // sharp
   SensorEncoder::Encoded background_, frame_;  // blurred and encoded
   std::vector<float> veiled_;
 };

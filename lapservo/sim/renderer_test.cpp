@@ -1,1 +1,188 @@
+#include "lapservo/sim/renderer.h"
+
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
 #include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/sim/edge_probe.h"
+#include "lapservo/sim/tissue.h"
+
+namespace lapservo {
+namespace {
+
+Camera small_camera() {
+  Camera camera;
+  camera.width_px = 480;
+  camera.height_px = 320;
+  camera.fx_px = camera.fy_px = 700;
+  camera.cx_px = 239.5;
+  camera.cy_px = 159.5;
+  return camera;
+}
+
+Marker marker() {
+  return {0.0084, {90, 180, 270}, {0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005}, 0.4};
+}
+
+// All of it in view, so that its whole light can be weighed.
+ShaftModel short_shaft() {
+  ShaftModel model;
+  model.marker = marker();
+  model.shaft_before_m = 0.008;
+  model.shaft_beyond_m = 0.006;
+  return model;
+}
+
+ShaftPlacement across_the_view(double turn_rad, double psi_rad, double depth_m = 0.1) {
+  const Eigen::Quaterniond rotation = Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()) *
+                                      Eigen::AngleAxisd(pi / 2 - 0.15, Eigen::Vector3d::UnitY());
+  return {{rotation, Eigen::Vector3d(0, 0, depth_m) + rotation * Eigen::Vector3d(0, 0, -0.012)}, psi_rad};
+}
+
+RenderOptions quiet(float gain = 0.5F) {
+  RenderOptions options;
+  options.sensor.read_noise = options.sensor.shot_noise = 0;
+  options.sensor.gains = Light::Constant(gain);
+  return options;
+}
+
+cv::Mat even_background(const Camera& camera, float light) {
+  return {camera.height_px, camera.width_px, CV_32FC3, cv::Scalar::all(light)};
+}
+
+double largest_difference(const cv::Mat& a, const cv::Mat& b) {
+  return cv::norm(a, b, cv::NORM_INF);
+}
+
+TEST(Renderer, BoundariesLieWhereKinematicsSays) {
+  Random random(5);
+  for (const bool distorted : {false, true}) {
+    Camera camera = small_camera();
+    if (distorted) camera.distortion = {-0.28, 0.09, 0.0006, -0.0004, 0};
+    Renderer renderer(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
+    for (int trial = 0; trial < 30; ++trial) {
+      const ShaftPlacement placement = across_the_view(random.uniform(-pi, pi), random.uniform(-pi, pi));
+      const auto line = centre_line(camera, marker(), placement.camera_from_unrolled, placement.psi_rad).value();
+      if (std::abs(wrap_pi(line.tau_rad)) < 0.15) continue;  // the seam runs beside the line
+      const cv::Mat light = light_of(renderer.render({placement}, 1), camera.response);
+      for (std::size_t k = 0; k < 4; ++k) {
+        const Eigen::Vector2d at = camera.raw_from_ideal(line.ideal_px[k]);
+        const Eigen::Vector2d direction =
+            (camera.raw_from_ideal(line.ideal_px[3]) - camera.raw_from_ideal(line.ideal_px[0])).normalized();
+        const auto off_px = crossing_px(light, at, direction);
+        ASSERT_TRUE(off_px) << "trial " << trial << " boundary " << k;
+        // The ends are seen slantwise over the film's edge, and the light falls off along them.
+        EXPECT_NEAR(*off_px, 0, k == 0 || k == 3 ? 0.15 : 0.06) << "trial " << trial << " boundary " << k;
+      }
+    }
+  }
+}
+
+TEST(Renderer, AFullTurnChangesNothing) {
+  const Camera camera = small_camera();
+  Renderer renderer(camera, {short_shaft()}, make_tissue(camera.width_px, camera.height_px, 3));
+  Random random(6);
+  for (int trial = 0; trial < 5; ++trial) {
+    const double turn_rad = random.uniform(-pi, pi), psi_rad = random.uniform(-pi, pi);
+    const cv::Mat once = renderer.render({across_the_view(turn_rad, psi_rad)}, 1);
+    const cv::Mat again = renderer.render({across_the_view(turn_rad, psi_rad + two_pi)}, 1);
+    const cv::Mat other = renderer.render({across_the_view(turn_rad, psi_rad + 0.3)}, 1);
+    EXPECT_LE(largest_difference(once, again), 2);
+    EXPECT_GE(largest_difference(once, other), 50);
+  }
+}
+
+// No aliasing: a shift of any part of a pixel moves the picture's centre of light by as much.
+TEST(Renderer, ASubPixelShiftMovesTheLightByAsMuch) {
+  Camera camera = small_camera();
+  camera.response = {Response::Kind::power, 1};
+  const auto centre_of_light = [&](const Eigen::Vector2d& shift_px, double turn_rad) {
+    Camera moved = camera;
+    moved.cx_px += shift_px.x();
+    moved.cy_px += shift_px.y();
+    Renderer renderer(moved, {short_shaft()}, even_background(moved, 0), quiet());
+    const cv::Mat light = light_of(renderer.render({across_the_view(turn_rad, 0.8)}, 1), camera.response);
+    Eigen::Vector2d moment = Eigen::Vector2d::Zero();
+    double weight = 0;
+    for (int v = 0; v < light.rows; ++v)
+      for (int u = 0; u < light.cols; ++u) {
+        const auto& pixel = light.at<cv::Vec3f>(v, u);
+        const double sum = pixel[0] + pixel[1] + pixel[2];
+        moment += sum * Eigen::Vector2d(u, v);
+        weight += sum;
+      }
+    return Eigen::Vector2d(moment / weight);
+  };
+  // Shafts along the pixel grid are shifted along themselves, as the rounding of whole dark rows to 8 bits would count.
+  const std::vector<std::pair<double, Eigen::Vector2d>> cases{
+      {0, {1, 0}}, {0.4, {-0.3, 1}}, {0.7, {1, -0.5}}, {1.3, {0.2, 1}}, {pi / 2, {0, 1}}};
+  for (const auto& [turn_rad, direction] : cases) {
+    const Eigen::Vector2d still = centre_of_light({0, 0}, turn_rad);
+    for (const double shift_px : {0.1, 0.25, 0.5, 0.7, 1.0}) {
+      const Eigen::Vector2d moved = centre_of_light(shift_px * direction, turn_rad) - still;
+      EXPECT_LT((moved - shift_px * direction).norm(), 0.015) << turn_rad << ' ' << shift_px;
+    }
+  }
+}
+
+TEST(Renderer, IsDeterministicAndForgetsTheFrameBefore) {
+  const Camera camera = small_camera();
+  const cv::Mat tissue = make_tissue(camera.width_px, camera.height_px, 3);
+  Renderer renderer(camera, {short_shaft()}, tissue), fresh(camera, {short_shaft()}, tissue);
+  const cv::Mat first = renderer.render({across_the_view(0.3, 1)}, 7);
+  const cv::Mat other = renderer.render({across_the_view(-1.2, 2)}, 8);
+  EXPECT_GT(largest_difference(first, other), 20);
+  EXPECT_EQ(largest_difference(renderer.render({across_the_view(0.3, 1)}, 7), first), 0);
+  EXPECT_EQ(largest_difference(fresh.render({across_the_view(0.3, 1)}, 7), first), 0);
+  EXPECT_GT(largest_difference(renderer.render({across_the_view(0.3, 1)}, 9), first), 0);
+}
+
+TEST(Renderer, EveryResponseShowsTheSameLight) {
+  Camera camera = small_camera();
+  std::vector<cv::Mat> lights;
+  for (const Response& response :
+       {Response{}, Response{Response::Kind::power, 1}, Response{Response::Kind::power, 2.2}}) {
+    camera.response = response;
+    Renderer renderer(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
+    lights.push_back(light_of(renderer.render({across_the_view(0.3, 1)}, 7), response));
+  }
+  EXPECT_LT(largest_difference(lights[0], lights[1]), 0.008);  // half a level of the coarser at white
+  EXPECT_LT(largest_difference(lights[0], lights[2]), 0.008);
+}
+
+TEST(Renderer, MotionBlurIsTheMeanOfItsMoments) {
+  Camera camera = small_camera();
+  camera.response = {Response::Kind::power, 1};
+  const cv::Mat tissue = make_tissue(camera.width_px, camera.height_px, 3);
+  Renderer renderer(camera, {short_shaft(), short_shaft()}, tissue, quiet());
+  const auto moment = [](double turn_rad) {
+    return std::vector{across_the_view(turn_rad, 1), across_the_view(turn_rad + 2, 2, 0.13)};
+  };
+  const cv::Mat a = renderer.render(moment(0.2), 1), b = renderer.render(moment(0.5), 1);
+  cv::Mat mean;
+  cv::addWeighted(a, 0.5, b, 0.5, 0, mean);
+  EXPECT_LE(largest_difference(renderer.render_exposure({moment(0.2), moment(0.5)}, 1), mean), 1);
+  EXPECT_LE(largest_difference(renderer.render_exposure({moment(0.2), moment(0.2)}, 1), a), 1);
+}
+
+TEST(Renderer, TheNearerShaftHidesTheFarther) {
+  const Camera camera = small_camera();
+  const ShaftPlacement near = across_the_view(0.2, 1, 0.08), far = across_the_view(1.6, 2, 0.13);
+  Renderer both(camera, {short_shaft(), short_shaft()}, even_background(camera, 0.1F), quiet());
+  const cv::Mat a = both.render({near, far}, 1), b = both.render({far, near}, 1);
+  Renderer alone(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
+  const cv::Mat only_near = alone.render({near}, 1);
+  const cv::Rect middle(230, 150, 20, 20);
+  EXPECT_LE(largest_difference(a(middle), only_near(middle)), 1);
+  EXPECT_LE(largest_difference(b(middle), only_near(middle)), 1);
+  EXPECT_GT(largest_difference(a, only_near), 50);
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -30,9 +30,8 @@ SensorEncoder::SensorEncoder(const Response& response, const Sensor& sensor) {
     const double low = std::max(0.0, light - noise), high = std::min(1.0, light + noise);
     const double slope =
         high > low ? (response.value_from_light(high) - response.value_from_light(low)) / (high - low) : 0;
-    by_level_.push_back(
-        {static_cast<std::int16_t>(std::lround(255 * value_unit * response.value_from_light(light))),
-         static_cast<std::int16_t>(std::lround(std::min(most, 255 * sigma_unit * slope * noise)))});
+    by_level_.push_back({static_cast<std::int16_t>(std::lround(255 * value_unit * response.value_from_light(light))),
+                         static_cast<std::int16_t>(std::lround(std::min(most, 255 * sigma_unit * slope * noise)))});
   }
   Random random(deviate_seed);
   deviates_.resize(deviate_count);

@@ -26,7 +26,7 @@ std::array<Light, 8> reflectances(const Marker& marker) {
   set(Part::band_0, printed_color(marker.hues_deg[0]));
   set(Part::band_1, printed_color(marker.hues_deg[1]));
   set(Part::band_2, printed_color(marker.hues_deg[2]));
-  set(Part::shaft, Light::Constant(0.03F));
+  set(Part::shaft, Light::Constant(0.023F));
   set(Part::film_edge, Light::Zero());  // that of the band there
   set(Part::tip, Light::Constant(0.2F));
   set(Part::blood, Light(0.012F, 0.008F, 0.11F));

@@ -23,14 +23,23 @@ constexpr std::array<std::array<float, 2>, samples_a_pixel> make_lattice() {
 }
 constexpr auto lattice = make_lattice();
 
-float mean(const std::array<float, 4>& values) { return 0.25F * (values[0] + values[1] + values[2] + values[3]); }
+float mean(const std::array<float, 4>& values) {
+  return 0.25F * (values[0] + values[1] + values[2] + values[3]);
+}
 
 float within(const std::array<float, 4>& corner, float u, float v) {
   const float top = corner[0] + u * (corner[1] - corner[0]), bottom = corner[3] + u * (corner[2] - corner[3]);
   return top + v * (bottom - top);
 }
 
-bool on_side(Part part) { return is_band(part) || part == Part::shaft || part == Part::blood; }
+// Bare plastic reflects less than the film.
+float polish(Part part) {
+  return part == Part::shaft ? 0.8F : 1.0F;
+}
+
+bool on_side(Part part) {
+  return is_band(part) || part == Part::shaft || part == Part::blood;
+}
 
 }  // namespace
 
@@ -135,7 +144,7 @@ ShaftPainter::Paint ShaftPainter::paint_pixel(const Corners& at) {
 
 ShaftPainter::Paint ShaftPainter::of_side(Part part, float azimuth_rad, float along_m) {
   const Lit lit = lighting_.on_side(azimuth_rad, along_m);
-  return {reflectances_[static_cast<std::size_t>(part)] * lit.matt + Light::Constant(lit.gloss), 1};
+  return {reflectances_[static_cast<std::size_t>(part)] * lit.matt + Light::Constant(polish(part) * lit.gloss), 1};
 }
 
 const Light& ShaftPainter::reflectance(Part part, float along_m) const {
@@ -193,9 +202,9 @@ bool ShaftPainter::boundary(const Corners& at, Part proximal, Part distal, Paint
   }
   const float share = negative_part(beyond_m).share;
   const float azimuth_rad = mean(at.azimuth_rad), along_m = mean(at.along_m);
-  paint = {share * of_side(proximal, azimuth_rad, along_m).light +
-               (1 - share) * of_side(distal, azimuth_rad, along_m).light,
-           1};
+  paint = {
+      share * of_side(proximal, azimuth_rad, along_m).light + (1 - share) * of_side(distal, azimuth_rad, along_m).light,
+      1};
   return true;
 }
 
@@ -209,7 +218,7 @@ ShaftPainter::Paint ShaftPainter::sampled(const Corners& at) {
   // The light falls on each surface within the pixel nearly evenly: worked out once for each.
   std::optional<Lit> on_tip, on_edge;
   Light side = Light::Zero(), other = Light::Zero();
-  float side_count = 0, count = 0, azimuth_rad = 0, along_m = 0;
+  float side_count = 0, side_polish = 0, count = 0, azimuth_rad = 0, along_m = 0;
   for (std::size_t i = 0; i < samples_a_pixel; ++i) {
     const Part part = samples_.part[i];
     if (part == Part::nothing) continue;
@@ -217,6 +226,7 @@ ShaftPainter::Paint ShaftPainter::sampled(const Corners& at) {
     const Light& light = reflectance(part, samples_.along_m[i]);
     if (on_side(part)) {
       ++side_count;
+      side_polish += polish(part);
       azimuth_rad += samples_.azimuth_rad[i];
       along_m += samples_.along_m[i];
       side += light;
@@ -229,7 +239,7 @@ ShaftPainter::Paint ShaftPainter::sampled(const Corners& at) {
   Paint paint;
   if (side_count > 0) {
     const Lit lit = lighting_.on_side(azimuth_rad / side_count, along_m / side_count);
-    paint.light = side * lit.matt + Light::Constant(side_count * lit.gloss);
+    paint.light = side * lit.matt + Light::Constant(side_polish * lit.gloss);
   }
   paint.light = (paint.light + other) / samples_a_pixel;
   paint.cover = count / samples_a_pixel;

@@ -33,8 +33,8 @@ ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placemen
   const Rigid3 unrolled_from_camera = placement.camera_from_unrolled.inverse();
   const Eigen::Vector3d camera = unrolled_from_camera.translation;
   const double facing_rad = std::atan2(camera.y(), camera.x());
-  const Rigid3 facing_from_unrolled{
-      Eigen::Quaterniond(Eigen::AngleAxisd(-facing_rad, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero()};
+  const Rigid3 facing_from_unrolled{Eigen::Quaterniond(Eigen::AngleAxisd(-facing_rad, Eigen::Vector3d::UnitZ())),
+                                    Eigen::Vector3d::Zero()};
   facing_from_camera_ = facing_from_unrolled * unrolled_from_camera;
   rotation_ = facing_from_camera_.rotation.toRotationMatrix().cast<float>();
   camera_ = Eigen::Vector3d(camera.head<2>().norm(), 0, camera.z()).cast<float>();
@@ -57,18 +57,21 @@ void ShaftTracer::trace(RayRow& rays, bool with_tip) const {
   const Eigen::Matrix3f& m = rotation_;
   const float cx = camera_.x(), cz = camera_.z();
   const float outer2 = outer_m_ * outer_m_, inner2 = inner_m_ * inner_m_;
-  const float* __restrict ray_x = rays.x.data();
-  const float* __restrict ray_y = rays.y.data();
-  float* __restrict azimuths = rays.azimuth_rad.data();
-  float* __restrict alongs = rays.along_m.data();
-  float* __restrict depths = rays.depth_m.data();
-  Part* __restrict parts = rays.part.data();
+  const float* ray_x = rays.x.data();
+  const float* ray_y = rays.y.data();
+  float* azimuths = rays.azimuth_rad.data();
+  float* alongs = rays.along_m.data();
+  float* depths = rays.depth_m.data();
+  Part* parts = rays.part.data();
   const std::size_t count = rays.size();
   const float m00 = m(0, 0), m01 = m(0, 1), m02 = m(0, 2), m10 = m(1, 0), m11 = m(1, 1), m12 = m(1, 2), m20 = m(2, 0),
               m21 = m(2, 1), m22 = m(2, 2);
   const float length = length_m_, start = shaft_start_m_, end = shaft_end_m_, tau_facing = tau_facing_;
   const float e1 = e1_m_, e2 = e2_m_, e1_slope = e1_slope_m_, e2_slope = e2_slope_m_;
   const float per_outer = 1 / outer_m_, per_inner = 1 / inner_m_;
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC ivdep  // the columns never overlap
+#endif
   for (std::size_t i = 0; i < count; ++i) {
     const float dx = m00 * ray_x[i] + m01 * ray_y[i] + m02;
     const float dy = m10 * ray_x[i] + m11 * ray_y[i] + m12;
@@ -77,7 +80,8 @@ void ShaftTracer::trace(RayRow& rays, bool with_tip) const {
     const float a = dx * dx + dy * dy, cross2 = cx * cx * dy * dy;
     const float per_a = 1 / a, closest = -cx * dx;
     const float outer_root2 = outer2 * a - cross2, inner_root2 = inner2 * a - cross2;
-    const float outer_root = std::sqrt(std::max(outer_root2, 0.0F)), inner_root = std::sqrt(std::max(inner_root2, 0.0F));
+    const float outer_root = std::sqrt(std::max(outer_root2, 0.0F)),
+                inner_root = std::sqrt(std::max(inner_root2, 0.0F));
     const float outer_depth = (closest - outer_root) * per_a, inner_depth = (closest - inner_root) * per_a;
     const float outer_along = cz + outer_depth * dz, inner_along = cz + inner_depth * dz;
     const int meets_outer = (outer_root2 > 0) & (outer_depth > nearest_m);
@@ -85,7 +89,8 @@ void ShaftTracer::trace(RayRow& rays, bool with_tip) const {
     const int on_film = meets_outer & (outer_along >= 0) & (outer_along <= length);
     // Through an end face of the film: in at one side of its plane, at the shaft (or out again) on the other.
     const float leaving = inner_root2 > 0 ? inner_along : cz + (closest + outer_root) * per_a * dz;
-    const int through_end = meets_outer & (((outer_along > length) & (leaving < length)) | ((outer_along < 0) & (leaving > 0)));
+    const int through_end =
+        meets_outer & (((outer_along > length) & (leaving < length)) | ((outer_along < 0) & (leaving > 0)));
     const int on_shaft = meets_inner & (inner_along > start) & (inner_along < end);
 
     const float depth = on_film ? outer_depth : inner_depth;

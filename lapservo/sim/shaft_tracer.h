@@ -13,7 +13,9 @@ namespace lapservo {
 /// What a camera ray meets first on a shaft. `film_edge` is the face of the film at the marker's two ends.
 enum class Part : std::uint8_t { nothing, band_0, band_1, band_2, shaft, film_edge, tip, blood };
 
-constexpr bool is_band(Part part) { return part == Part::band_0 || part == Part::band_1 || part == Part::band_2; }
+constexpr bool is_band(Part part) {
+  return part == Part::band_0 || part == Part::band_1 || part == Part::band_2;
+}
 
 /// Rays in the camera frame (z = 1) and, after ShaftTracer::trace, what they meet. Columns, for the compiler to
 /// vectorise over; a buffer to be used again and again.
@@ -66,8 +68,8 @@ class ShaftTracer {
   Eigen::Vector3f camera_;
   float outer_m_, inner_m_, tip_m_;
   float length_m_, shaft_start_m_, shaft_end_m_;
-  float tau_facing_;              // tau on the facing generatrix, in [0, 2 pi)
-  float e1_m_, e2_m_;             // at tau = 0
+  float tau_facing_;               // tau on the facing generatrix, in [0, 2 pi)
+  float e1_m_, e2_m_;              // at tau = 0
   float e1_slope_m_, e2_slope_m_;  // per radian
   std::vector<Blotch> blotches_;
 };
