@@ -7,7 +7,6 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/response.h"
-#include "lapservo/sim/shaft_caster.h"
 
 namespace lapservo {
 namespace {
