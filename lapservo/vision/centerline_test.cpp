@@ -12,34 +12,25 @@
 namespace lapservo {
 namespace {
 
-struct Shot {
-  Rig rig = theatre::usual_rig();
-  RcmCoordinates q;
-  CentreLine line;
-  cv::Mat image;
+using theatre::Shot;
+using theatre::usual_shot;
 
-  explicit Shot(std::uint64_t seed) {
-    Random random(seed);
-    q = theatre::random_configuration(rig, 0, random);
-    const ShaftPose pose = theatre::pose_of(rig, 0, q);
-    line = centre_line(rig.camera, rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad).value();
-    image = theatre::render(rig, {q}, seed);
-  }
-  // Where tau wraps, so does the cross-ratio: a pixel's noise may take the reading to the other end.
-  bool near_the_seam() const { return std::abs(wrap_pi(line.tau_rad)) < 0.5; }
-};
+// Where tau wraps, so does the cross-ratio: a pixel's noise may take the reading to the other end.
+bool near_the_seam(const Shot& shot) {
+  return std::abs(wrap_pi(shot.line().tau_rad)) < 0.5;
+}
 
 TEST(Centerline, FindsTheBoundariesToThePixelAndTauToItsSigma) {
   double squares = 0;
   int count = 0;
-  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const Shot shot(seed);
-    if (shot.near_the_seam()) continue;
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
+    const Shot& shot = usual_shot(seed);
+    if (near_the_seam(shot)) continue;
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Observation o = CenterlineMethod(shot.rig).observe(shot.image)[0];
+    const Observation o = CenterlineMethod(shot.rig).observe(shot.bgr)[0];
     ASSERT_EQ(o.status, Status::ok);
-    for (std::size_t k = 0; k < 4; ++k) EXPECT_LT((o.edges_ideal_px[k] - shot.line.ideal_px[k]).norm(), 3.5) << k;
-    const double sigmas = wrap_pi(o.tau_rad - shot.line.tau_rad) / o.sigma_tau_rad;
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_LT((o.edges_ideal_px[k] - shot.line().ideal_px[k]).norm(), 3.5) << k;
+    const double sigmas = wrap_pi(o.tau_rad - shot.line().tau_rad) / o.sigma_tau_rad;
     EXPECT_LT(std::abs(sigmas), 5);
     squares += sigmas * sigmas;
     ++count;
@@ -55,11 +46,11 @@ TEST(Centerline, FindsTheBoundariesToThePixelAndTauToItsSigma) {
 }
 
 TEST(Centerline, WithoutTheRcmTellsTauAlone) {
-  const Shot shot(2);
+  const Shot& shot = usual_shot(2);
   Rig rig = shot.rig;
   rig.instruments[0].camera_from_rcm.reset();
-  const Observation with = CenterlineMethod(shot.rig).observe(shot.image)[0],
-                    without = CenterlineMethod(rig).observe(shot.image)[0];
+  const Observation with = CenterlineMethod(shot.rig).observe(shot.bgr)[0],
+                    without = CenterlineMethod(rig).observe(shot.bgr)[0];
   ASSERT_EQ(without.status, Status::ok);
   EXPECT_FALSE(without.rcm);
   EXPECT_FALSE(without.features.r_px);
@@ -67,9 +58,9 @@ TEST(Centerline, WithoutTheRcmTellsTauAlone) {
 }
 
 TEST(Centerline, KnowsInstrumentsByTheirOrderOfColours) {
-  const Shot shot(2);
+  const Shot& shot = usual_shot(2);
   Rig rig = theatre::usual_rig(3);
-  const auto observations = CenterlineMethod(rig).observe(shot.image);
+  const auto observations = CenterlineMethod(rig).observe(shot.bgr);
   EXPECT_EQ(observations[0].status, Status::ok);
   EXPECT_NE(observations[1].status, Status::ok);
   EXPECT_NE(observations[2].status, Status::ok);

@@ -1,7 +1,6 @@
 #include "lapservo/vision/coarse_fit.h"
 
 #include <cmath>
-#include <map>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -14,43 +13,19 @@
 namespace lapservo {
 namespace {
 
+using theatre::Shot;
 using theatre::Sight;
+using theatre::usual_shot;
 
-struct Shot {
-  Rig rig = theatre::usual_rig();
-  RcmCoordinates q;
-  cv::Mat image;
-  Sight sight;
-
-  /// Rendered once.
-  static const Shot& of(std::uint64_t seed) {
-    static std::map<std::uint64_t, Shot> shots;
-    return shots.try_emplace(seed, seed).first->second;
-  }
-  explicit Shot(std::uint64_t seed)
-      : q(configuration(rig, seed)), image(theatre::render(rig, {q}, seed)), sight(rig, image) {}
-  PoseUnknowns truth(bool rcm) const {
-    return rcm ? PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q)
-               : PoseUnknowns::free(theatre::pose_of(rig, 0, q));
-  }
-  // Farthest that a boundary on the centre line lies from its true place.
-  double miss_px(const ShaftPose& pose) const {
-    const ShaftPose truth_pose = theatre::pose_of(rig, 0, q);
-    const auto seen = centre_line(rig.camera, rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad);
-    const auto expected =
-        centre_line(rig.camera, rig.instruments[0].marker, truth_pose.camera_from_unrolled, truth_pose.psi_rad);
-    double farthest = seen ? 0 : 1e9;
-    for (std::size_t k = 0; seen && k < 4; ++k)
-      farthest = std::max(farthest, (seen->ideal_px[k] - expected->ideal_px[k]).norm());
-    return farthest;
-  }
-
- private:
-  static RcmCoordinates configuration(const Rig& rig, std::uint64_t seed) {
-    Random random(seed);
-    return theatre::random_configuration(rig, 0, random);
-  }
-};
+// Farthest that a boundary on the centre line lies from its true place.
+double miss_px(const Shot& shot, const ShaftPose& pose) {
+  const auto seen =
+      centre_line(shot.rig.camera, shot.rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad);
+  double farthest = seen ? 0 : 1e9;
+  for (std::size_t k = 0; seen && k < 4; ++k)
+    farthest = std::max(farthest, (seen->ideal_px[k] - shot.line().ideal_px[k]).norm());
+  return farthest;
+}
 
 // Some tens of pixels.
 UnknownVector large_offset(Random& random, int unknowns) {
@@ -68,12 +43,12 @@ TEST(CoarseFit, AlignsAPoseToAboutAPixelWhateverItsRotation) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed)
     for (const bool rcm : {true, false}) {
       SCOPED_TRACE("seed " + std::to_string(seed) + (rcm ? " through the RCM" : " free"));
-      const Shot& shot = Shot::of(seed);
+      const Shot& shot = usual_shot(seed);
       Random random(seed + 50);
       const PoseUnknowns truth = shot.truth(rcm);
       const CoarseFit fit = fit_coarsely(shot.sight.scene(), truth.changed_by(large_offset(random, truth.size())), {});
       ASSERT_TRUE(fit.found);
-      EXPECT_LT(shot.miss_px(fit.unknowns.pose()), 2.5);
+      EXPECT_LT(miss_px(shot, fit.unknowns.pose()), 2.5);
       EXPECT_LT(std::abs(wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad)), 0.1);
       EXPECT_GT(fit.rotation_score, 0.85);
       EXPECT_LT(fit.rival_score, 0.9 * fit.rotation_score);
@@ -83,7 +58,7 @@ TEST(CoarseFit, AlignsAPoseToAboutAPixelWhateverItsRotation) {
 TEST(CoarseFit, KeepsAGivenRotationWhenNotAskedToSearch) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = Shot::of(seed);
+    const Shot& shot = usual_shot(seed);
     UnknownVector offset(4);
     offset << 0.004, -0.003, 1e-3, 0.05;
     CoarseFitOptions options;
@@ -91,13 +66,13 @@ TEST(CoarseFit, KeepsAGivenRotationWhenNotAskedToSearch) {
     options.rounds = 1;
     const CoarseFit fit = fit_coarsely(shot.sight.scene(), shot.truth(true).changed_by(offset), options);
     ASSERT_TRUE(fit.found);
-    EXPECT_LT(shot.miss_px(fit.unknowns.pose()), 3);
+    EXPECT_LT(miss_px(shot, fit.unknowns.pose()), 3);
     EXPECT_EQ(fit.rotation_score, 0);
   }
 }
 
 TEST(CoarseFit, FindsNothingInTissueNorFarFromTheMarker) {
-  const Shot& shot = Shot::of(2);
+  const Shot& shot = usual_shot(2);
   const Sight empty(shot.rig, theatre::render_nothing(shot.rig, 3));
   EXPECT_FALSE(fit_coarsely(empty.scene(), shot.truth(true), {}).found);
   UnknownVector offset = UnknownVector::Zero(6);
@@ -108,10 +83,10 @@ TEST(CoarseFit, FindsNothingInTissueNorFarFromTheMarker) {
 // Another instrument's bands leave some of the boundaries, but no rotation explains the colours.
 TEST(CoarseFit, AnotherOrderOfTheColoursAgreesWithNoRotation) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const Shot& shot = Shot::of(seed);
+    const Shot& shot = usual_shot(seed);
     Rig other = shot.rig;
     other.instruments[0].marker.hues_deg = {180, 270, 90};
-    const Sight sight(other, shot.image);
+    const Sight sight(other, shot.bgr);
     const CoarseFit fit = fit_coarsely(sight.scene(), shot.truth(true), {});
     EXPECT_TRUE(!fit.found || fit.rotation_score < 0.3) << "seed " << seed;
   }
@@ -121,7 +96,7 @@ TEST(InitialPoses, LieNearTheTruth) {
   for (const bool rcm : {true, false})
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
       SCOPED_TRACE("seed " + std::to_string(seed) + (rcm ? " through the RCM" : " free"));
-      const Shot& shot = Shot::of(seed);
+      const Shot& shot = usual_shot(seed);
       const auto blobs = find_blobs(shot.sight.view(), shot.sight.classes(), 8, 8);
       ASSERT_FALSE(blobs.empty());
       const auto camera_from_rcm = rcm ? shot.rig.instruments[0].camera_from_rcm : std::nullopt;
@@ -145,7 +120,7 @@ TEST(InitialPoses, LieNearTheTruth) {
 }
 
 TEST(InitialPoses, AreNoneForABlobWithoutTheMarkersColoursInTheirOrder) {
-  const Shot& shot = Shot::of(1);
+  const Shot& shot = usual_shot(1);
   Blob blob;  // of one colour only
   blob.grid_px = 8;
   for (int i = 0; i < 30; ++i) blob.samples.push_back({300 + 8 * (i % 6), 200 + 8 * (i / 6), 1});

@@ -1,7 +1,6 @@
 #include "lapservo/vision/fine_fit.h"
 
 #include <cmath>
-#include <map>
 #include <string>
 
 #include <Eigen/Cholesky>
@@ -13,32 +12,13 @@
 namespace lapservo {
 namespace {
 
+using theatre::Shot;
 using theatre::Sight;
+using theatre::usual_shot;
 
-struct Shot {
-  Rig rig = theatre::usual_rig();
-  RcmCoordinates q;
-  Sight sight;
-
-  /// Rendered once.
-  static const Shot& of(std::uint64_t seed) {
-    static std::map<std::uint64_t, Shot> shots;
-    return shots.try_emplace(seed, seed).first->second;
-  }
-  explicit Shot(std::uint64_t seed, const RenderOptions& options = {})
-      : q(configuration(rig, seed)), sight(rig, theatre::render(rig, {q}, seed, options)) {}
-  PoseUnknowns truth(bool rcm) const {
-    return rcm ? PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q)
-               : PoseUnknowns::free(theatre::pose_of(rig, 0, q));
-  }
-  FineFit fit(const PoseUnknowns& start) const { return fit_finely(sight.scene(), sight.light(), start, {}); }
-
- private:
-  static RcmCoordinates configuration(const Rig& rig, std::uint64_t seed) {
-    Random random(seed);
-    return theatre::random_configuration(rig, 0, random);
-  }
-};
+FineFit fit_from(const Shot& shot, const PoseUnknowns& start) {
+  return fit_finely(shot.sight.scene(), shot.sight.light(), start, {});
+}
 
 // As far off as a coarse fit may leave it: up to three pixels.
 UnknownVector random_offset(Random& random, int unknowns) {
@@ -79,10 +59,10 @@ void expect_honest(bool rcm) {
   double squares = 0, psi_squares = 0, psi_sum = 0;
   for (std::uint64_t seed = 1; seed <= frames; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = Shot::of(seed);
+    const Shot& shot = usual_shot(seed);
     Random random(seed + 100);
     const PoseUnknowns truth = shot.truth(rcm);
-    const FineFit fit = shot.fit(truth.changed_by(random_offset(random, truth.size())));
+    const FineFit fit = fit_from(shot, truth.changed_by(random_offset(random, truth.size())));
     ASSERT_TRUE(fit.converged);
     const UnknownVector error = difference(truth, fit.unknowns);
     const Eigen::Index psi = error.size() - 1;
@@ -110,14 +90,14 @@ TEST(FineFit, ForgetsItsStart) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed)
     for (const bool rcm : {true, false}) {
       SCOPED_TRACE("seed " + std::to_string(seed) + (rcm ? " through the RCM" : " free"));
-      const Shot& shot = Shot::of(seed);
+      const Shot& shot = usual_shot(seed);
       Random random(seed + 200);
       const PoseUnknowns truth = shot.truth(rcm);
-      const FineFit from_truth = shot.fit(truth);
+      const FineFit from_truth = fit_from(shot, truth);
       ASSERT_TRUE(from_truth.converged);
       const UnknownVector offset = random_offset(random, truth.size());
       for (const double side : {-1.0, 1.0}) {
-        const FineFit fit = shot.fit(truth.changed_by(side * offset));
+        const FineFit fit = fit_from(shot, truth.changed_by(side * offset));
         ASSERT_TRUE(fit.converged);
         EXPECT_LT(normalised_square(difference(from_truth.unknowns, fit.unknowns), from_truth.covariance), 0.02);
       }
@@ -128,11 +108,11 @@ TEST(FineFit, ForgetsItsStart) {
 TEST(FineFit, FindsBackAlongTheShaftFromEitherSide) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = Shot::of(seed);
+    const Shot& shot = usual_shot(seed);
     const PoseUnknowns truth = shot.truth(true);
     const double px_per_m = shot.rig.camera.fx_px / truth.pose().camera_from_unrolled.translation.z();
     for (const double off_px : {-4.5, 4.5}) {
-      const FineFit fit = shot.fit(truth.changed_by(off_px / px_per_m * UnknownVector::Unit(4, 2)));
+      const FineFit fit = fit_from(shot, truth.changed_by(off_px / px_per_m * UnknownVector::Unit(4, 2)));
       ASSERT_TRUE(fit.converged) << off_px;
       EXPECT_LT(normalised_square(difference(truth, fit.unknowns), fit.covariance), 4) << off_px;
     }
@@ -144,7 +124,7 @@ TEST(FineFit, FindsTheBlurOfTheCamera) {
     RenderOptions options;
     options.sensor.blur_px = blur_px;
     const Shot shot(3, options);
-    const FineFit fit = shot.fit(shot.truth(true));
+    const FineFit fit = fit_from(shot, shot.truth(true));
     ASSERT_TRUE(fit.converged) << blur_px;
     // A pixel's own area, and the interpolation between pixels, blur too.
     const double expected_px = std::sqrt(blur_px * blur_px + 1 / 12.0 + 1 / 6.0);
@@ -158,9 +138,9 @@ TEST(FineFit, SigmasGrowWithTheNoise) {
   noisy.sensor.read_noise *= 12;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& clear = Shot::of(seed);
+    const Shot& clear = usual_shot(seed);
     const Shot rough(seed, noisy);
-    const FineFit in_clear = clear.fit(clear.truth(true)), in_rough = rough.fit(rough.truth(true));
+    const FineFit in_clear = fit_from(clear, clear.truth(true)), in_rough = fit_from(rough, rough.truth(true));
     ASSERT_TRUE(in_clear.converged && in_rough.converged);
     EXPECT_GT(in_rough.covariance(3, 3), 1.5 * in_clear.covariance(3, 3));
   }

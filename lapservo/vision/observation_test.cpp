@@ -14,23 +14,20 @@
 namespace lapservo {
 namespace {
 
-struct Shot {
-  Rig rig = theatre::usual_rig();
-  RcmCoordinates q;
-  Observation observation;
+using theatre::Shot;
+using theatre::usual_shot;
 
-  explicit Shot(std::uint64_t seed, bool with_rcm = true) {
-    Random random(seed);
-    rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
-    q = theatre::random_configuration(rig, 0, random);
-    const cv::Mat image = theatre::render(rig, {q}, seed);
-    if (!with_rcm) rig.instruments[0].camera_from_rcm.reset();
-    observation = Tracker(rig).track(image)[0];
-  }
-  std::optional<CentreLine> line() const {
-    return centre_line(rig.camera, rig.instruments[0].marker, observation.camera_from_unrolled, observation.psi_rad);
-  }
-};
+Observation observe(const Shot& shot, bool with_rcm) {
+  Rig rig = shot.rig;
+  if (!with_rcm) rig.instruments[0].camera_from_rcm.reset();
+  return Tracker(rig).track(shot.bgr)[0];
+}
+
+Shot distorted_shot(std::uint64_t seed) {
+  Rig rig = theatre::usual_rig();
+  rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
+  return Shot(seed, {}, rig);
+}
 
 bool all_finite(const Observation& o) {
   bool finite = std::isfinite(o.tau_rad) && std::isfinite(o.sigma_tau_rad) && std::isfinite(o.psi_rad) &&
@@ -56,48 +53,53 @@ TEST(Observation, EveryStatusHasAWordOfItsOwn) {
 }
 
 // Pose, centre line, edges, features and tau tell the same.
+void expect_consistent(const Shot& shot, bool with_rcm) {
+  const Observation o = observe(shot, with_rcm);
+  ASSERT_EQ(o.status, Status::ok);
+  const auto line = centre_line(shot.rig.camera, shot.rig.instruments[0].marker, o.camera_from_unrolled, o.psi_rad);
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(wrap_pi(line->tau_rad - o.tau_rad), 0, 1e-9);
+  EXPECT_GE(o.tau_rad, 0);
+  EXPECT_LT(o.tau_rad, two_pi);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_LT((line->ideal_px[k] - o.edges_ideal_px[k]).norm(), 1e-9);
+    EXPECT_LT((shot.rig.camera.raw_from_ideal(o.edges_ideal_px[k]) - o.edges_raw_px[k]).norm(), 1e-9);
+  }
+  const auto& e = o.edges_ideal_px;
+  EXPECT_NEAR(o.features.l_px, (e[3] - e[0]).norm(), 1e-9);
+  EXPECT_NEAR(o.features.d_px, (e[2] - e[0]).norm(), 1e-9);
+  // A cross-ratio is the same in every perspective image: here that of the print at tau.
+  EXPECT_NEAR(o.features.cross_ratio, cross_ratio_at(shot.rig.instruments[0].marker, o.tau_rad), 1e-9);
+  EXPECT_EQ(o.features.r_px.has_value(), with_rcm);
+  ASSERT_EQ(o.rcm.has_value(), with_rcm);
+  if (!with_rcm) return;
+  const ShaftPose pose = theatre::pose_of(shot.rig, 0, o.rcm->q);
+  EXPECT_LT((pose.camera_from_unrolled.translation - o.camera_from_unrolled.translation).norm(), 1e-12);
+  EXPECT_NEAR(wrap_pi(pose.psi_rad - o.psi_rad), 0, 1e-12);
+  EXPECT_LT(std::abs(o.rcm->q.psi_rad), pi + 1e-12);
+}
+
 TEST(Observation, ItsPartsAgree) {
-  for (std::uint64_t seed = 1; seed <= 5; ++seed)
-    for (const bool with_rcm : {true, false}) {
-      SCOPED_TRACE("seed " + std::to_string(seed) + (with_rcm ? " with the RCM" : " without"));
-      const Shot shot(seed, with_rcm);
-      const Observation& o = shot.observation;
-      ASSERT_EQ(o.status, Status::ok);
-      const auto line = shot.line();
-      ASSERT_TRUE(line);
-      EXPECT_NEAR(wrap_pi(line->tau_rad - o.tau_rad), 0, 1e-9);
-      EXPECT_GE(o.tau_rad, 0);
-      EXPECT_LT(o.tau_rad, two_pi);
-      for (std::size_t k = 0; k < 4; ++k) {
-        EXPECT_LT((line->ideal_px[k] - o.edges_ideal_px[k]).norm(), 1e-9);
-        EXPECT_LT((shot.rig.camera.raw_from_ideal(o.edges_ideal_px[k]) - o.edges_raw_px[k]).norm(), 1e-9);
-      }
-      const auto& e = o.edges_ideal_px;
-      EXPECT_NEAR(o.features.l_px, (e[3] - e[0]).norm(), 1e-9);
-      EXPECT_NEAR(o.features.d_px, (e[2] - e[0]).norm(), 1e-9);
-      // A cross-ratio is the same in every perspective image: here that of the print at tau.
-      EXPECT_NEAR(o.features.cross_ratio, cross_ratio_at(shot.rig.instruments[0].marker, o.tau_rad), 1e-9);
-      EXPECT_EQ(o.features.r_px.has_value(), with_rcm);
-      ASSERT_EQ(o.rcm.has_value(), with_rcm);
-      if (!with_rcm) continue;
-      const ShaftPose pose = theatre::pose_of(shot.rig, 0, o.rcm->q);
-      EXPECT_LT((pose.camera_from_unrolled.translation - o.camera_from_unrolled.translation).norm(), 1e-12);
-      EXPECT_NEAR(wrap_pi(pose.psi_rad - o.psi_rad), 0, 1e-12);
-      EXPECT_LT(std::abs(o.rcm->q.psi_rad), pi + 1e-12);
-    }
+  const Shot distorted = distorted_shot(1);
+  for (const bool with_rcm : {true, false}) {
+    SCOPED_TRACE(with_rcm ? "with the RCM" : "without");
+    expect_consistent(usual_shot(1), with_rcm);
+    expect_consistent(usual_shot(2), with_rcm);
+    expect_consistent(distorted, with_rcm);
+  }
 }
 
 // sigma_tau is the covariance of q carried through the centre line: against samples of q.
 TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
-  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot shot(seed);
-    const Observation& o = shot.observation;
+    const Shot& shot = usual_shot(seed);
+    const Observation o = observe(shot, true);
     ASSERT_EQ(o.status, Status::ok);
     const Eigen::Matrix4d root = o.rcm->covariance.llt().matrixL();
     EXPECT_TRUE(o.rcm->covariance.isApprox(o.rcm->covariance.transpose()));
     Random random(seed);
-    constexpr int samples = 20000;
+    constexpr int samples = 10000;
     double squares = 0;
     for (int i = 0; i < samples; ++i) {
       const Eigen::Vector4d deviate(random.normal(), random.normal(), random.normal(), random.normal());
@@ -108,7 +110,7 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
       ASSERT_TRUE(line);
       squares += std::pow(wrap_pi(line->tau_rad - o.tau_rad), 2);
     }
-    EXPECT_NEAR(o.sigma_tau_rad, std::sqrt(squares / samples), 0.03 * o.sigma_tau_rad);
+    EXPECT_NEAR(o.sigma_tau_rad, std::sqrt(squares / samples), 0.04 * o.sigma_tau_rad);
   }
 }
 
@@ -127,7 +129,7 @@ TEST(Observation, IsFiniteForEveryStatus) {
     for (int i = 0; i < 3 * size.width; ++i) noise.ptr(v)[i] = static_cast<std::uint8_t>(random.uniform(0, 256));
   images.push_back(noise);
   // Markers partly covered, from ever further on either side.
-  for (int covered = 100; covered < size.width; covered += 170) {
+  for (int covered = 100; covered < size.width; covered += 250) {
     cv::Mat left = usual.clone(), right = usual.clone(), below = usual.clone();
     left(cv::Rect(0, 0, covered, size.height)) = cv::Scalar(30, 30, 120);
     right(cv::Rect(covered, 0, size.width - covered, size.height)) = cv::Scalar(30, 30, 120);

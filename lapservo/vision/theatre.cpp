@@ -1,6 +1,7 @@
 #include "lapservo/vision/theatre.h"
 
 #include <cmath>
+#include <map>
 #include <stdexcept>
 #include <string>
 
@@ -102,6 +103,33 @@ Scene Sight::scene(std::size_t i) const {
           classes_,
           rig_.instruments[i].marker,
           {classes_.of_band(i, 0), classes_.of_band(i, 1), classes_.of_band(i, 2)}};
+}
+
+namespace {
+
+RcmCoordinates configuration_of_seed(const Rig& rig, std::uint64_t seed) {
+  Random random(seed);
+  return random_configuration(rig, 0, random);
+}
+
+}  // namespace
+
+Shot::Shot(std::uint64_t seed, const RenderOptions& options, const Rig& of_rig)
+    : rig(of_rig), q(configuration_of_seed(rig, seed)), bgr(render(rig, {q}, seed, options)), sight(rig, bgr) {}
+
+PoseUnknowns Shot::truth(bool through_rcm) const {
+  return through_rcm ? PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q)
+                     : PoseUnknowns::free(pose_of(rig, 0, q));
+}
+
+CentreLine Shot::line() const {
+  const ShaftPose pose = pose_of(rig, 0, q);
+  return centre_line(rig.camera, rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad).value();
+}
+
+const Shot& usual_shot(std::uint64_t seed) {
+  static std::map<std::uint64_t, Shot> shots;
+  return shots.try_emplace(seed, seed).first->second;
 }
 
 }  // namespace lapservo::theatre

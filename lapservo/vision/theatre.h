@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "lapservo/core/random.h"
+#include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
@@ -50,5 +51,20 @@ class Sight {
   std::array<float, 256> table_;
   LightImage light_;
 };
+
+/// One instrument somewhere before the usual rig's camera.
+struct Shot {
+  Rig rig;
+  RcmCoordinates q;
+  cv::Mat bgr;
+  Sight sight;
+
+  explicit Shot(std::uint64_t seed, const RenderOptions& options = {}, const Rig& of_rig = usual_rig());
+  PoseUnknowns truth(bool through_rcm) const;
+  CentreLine line() const;  ///< the true one
+};
+
+/// The shot of a seed, rendered once for all who ask.
+const Shot& usual_shot(std::uint64_t seed);
 
 }  // namespace lapservo::theatre

@@ -1,7 +1,6 @@
 #include "lapservo/vision/verification.h"
 
 #include <cmath>
-#include <map>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -12,29 +11,16 @@
 namespace lapservo {
 namespace {
 
+using theatre::Shot;
 using theatre::Sight;
+using theatre::usual_shot;
 
-struct Shot {
-  Rig rig = theatre::usual_rig();
-  RcmCoordinates q;
-  Sight sight;
-
-  /// Rendered once.
-  static const Shot& of(std::uint64_t seed) {
-    static std::map<std::uint64_t, Shot> shots;
-    return shots.try_emplace(seed, seed).first->second;
-  }
-  explicit Shot(std::uint64_t seed) : q(configuration(rig, seed)), sight(rig, theatre::render(rig, {q}, seed)) {}
-  PoseUnknowns truth() const { return PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q); }
-  FineFit fit_from(const PoseUnknowns& start) const { return fit_finely(sight.scene(), sight.light(), start, {}); }
-  FineFit fit() const { return fit_from(truth()); }
-
- private:
-  static RcmCoordinates configuration(const Rig& rig, std::uint64_t seed) {
-    Random random(seed);
-    return theatre::random_configuration(rig, 0, random);
-  }
-};
+FineFit fit_from(const Shot& shot, const PoseUnknowns& start) {
+  return fit_finely(shot.sight.scene(), shot.sight.light(), start, {});
+}
+FineFit fit_from_truth(const Shot& shot) {
+  return fit_from(shot, shot.truth(true));
+}
 
 UnknownVector change(double theta_rad, double phi_rad, double rho_m, double psi_rad) {
   return Eigen::Vector4d(theta_rad, phi_rad, rho_m, psi_rad);
@@ -43,8 +29,8 @@ UnknownVector change(double theta_rad, double phi_rad, double rho_m, double psi_
 TEST(Verification, ARightPoseIsOk) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = Shot::of(seed);
-    EXPECT_EQ(judge(shot.sight.scene(), shot.fit()), Status::ok);
+    const Shot& shot = usual_shot(seed);
+    EXPECT_EQ(judge(shot.sight.scene(), fit_from_truth(shot)), Status::ok);
     const ColorAgreement agreement = color_agreement(shot.sight.scene(), theatre::pose_of(shot.rig, 0, shot.q));
     EXPECT_GT(agreement.matching, 0.85);
     EXPECT_LT(agreement.wrong, 0.02);
@@ -58,12 +44,12 @@ TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
   int judged_not_ok = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = Shot::of(seed);
+    const Shot& shot = usual_shot(seed);
     for (const UnknownVector& wrong :
          {change(0, 0, 0, 0.5), change(0, 0, 0, -0.5), change(0, 0, 0, 1.5), change(0, 0, 0, -1.5), change(0, 0, 0, pi),
           change(0, 0, 2e-3, 0), change(0, 0, -2e-3, 0), change(0, 0, 6e-3, 0), change(0.03, 0, 0, 0),
           change(0.15, 0, 0, 0), change(0, 0.03, 0, 0), change(0, -0.15, 0, 0)}) {
-      const FineFit fit = shot.fit_from(shot.truth().changed_by(wrong));
+      const FineFit fit = fit_from(shot, shot.truth(true).changed_by(wrong));
       if (judge(shot.sight.scene(), fit) != Status::ok) {
         ++judged_not_ok;
         continue;
@@ -80,9 +66,9 @@ TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
 TEST(Verification, APoseThatTheColoursContradictIsNotOk) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Shot& shot = Shot::of(seed);
+    const Shot& shot = usual_shot(seed);
     const Scene scene = shot.sight.scene();
-    const FineFit right = shot.fit();
+    const FineFit right = fit_from_truth(shot);
     const double matching = color_agreement(scene, right.unknowns.pose()).matching;
     for (const UnknownVector& wrong : {change(0, 0, 0, 2.5), change(0, 0, 8e-3, 0), change(0, 0, -8e-3, 0),
                                        change(0.3, 0, 0, 0), change(-0.3, 0, 0, 0)}) {
@@ -95,8 +81,8 @@ TEST(Verification, APoseThatTheColoursContradictIsNotOk) {
 }
 
 TEST(Verification, AFitWithoutSupportIsNotOk) {
-  const Shot& shot = Shot::of(1);
-  const FineFit right = shot.fit();
+  const Shot& shot = usual_shot(1);
+  const FineFit right = fit_from_truth(shot);
   const Scene scene = shot.sight.scene();
   ASSERT_EQ(judge(scene, right), Status::ok);
   FineFit fit = right;
@@ -117,8 +103,8 @@ TEST(Verification, AFitWithoutSupportIsNotOk) {
 }
 
 TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
-  const Shot& shot = Shot::of(1);
-  FineFit fit = shot.fit();
+  const Shot& shot = usual_shot(1);
+  FineFit fit = fit_from_truth(shot);
   ShaftPose aside = fit.unknowns.pose();
   aside.camera_from_unrolled.translation.x() += 0.2;
   fit.unknowns = PoseUnknowns::free(aside);
@@ -127,9 +113,9 @@ TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
 }
 
 TEST(Verification, TissueIsNotOk) {
-  const Shot& shot = Shot::of(1);
+  const Shot& shot = usual_shot(1);
   const Sight empty(shot.rig, theatre::render_nothing(shot.rig, 2));
-  EXPECT_NE(judge(empty.scene(), shot.fit()), Status::ok);
+  EXPECT_NE(judge(empty.scene(), fit_from_truth(shot)), Status::ok);
   EXPECT_LT(color_agreement(empty.scene(), theatre::pose_of(shot.rig, 0, shot.q)).matching, 0.05);
 }
 
