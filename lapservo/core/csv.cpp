@@ -19,11 +19,36 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-std::vector<std::string> split_fields(std::string_view line) {
+// Takes a field in double quotes, "" within standing for one, off the front; nullopt when it isn't closed or more than
+// blanks follow before the comma.
+std::optional<std::string> take_quoted(std::string_view& line) {
+  std::string field;
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    if (line[i] != '"') {
+      field += line[i];
+    } else if (line.substr(i).starts_with(R"("")")) {
+      field += line[i++];
+    } else {
+      line.remove_prefix(i + 1);
+      if (!trimmed(line.substr(0, line.find(','))).empty()) return std::nullopt;
+      return field;
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<std::vector<std::string>> split_fields(std::string_view line) {
   std::vector<std::string> fields;
   while (true) {
+    line.remove_prefix(std::min(line.find_first_not_of(" \t\r"), line.size()));
+    if (line.starts_with('"')) {
+      auto field = take_quoted(line);
+      if (!field) return std::nullopt;
+      fields.push_back(std::move(*field));
+    } else {
+      fields.emplace_back(trimmed(line.substr(0, line.find(','))));
+    }
     const auto comma = line.find(',');
-    fields.emplace_back(trimmed(line.substr(0, comma)));
     if (comma == std::string_view::npos) return fields;
     line.remove_prefix(comma + 1);
   }
@@ -41,6 +66,16 @@ std::optional<double> parse_finite(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
   return value;
+}
+
+std::string csv_field(std::string_view text) {
+  if (text.find_first_of(std::string_view("\n\r\0", 3)) != std::string_view::npos)
+    throw InputError("CSV", "field", text, "text without line ends and NUL bytes");
+  if (trimmed(text).size() == text.size() && text.find_first_of(",\"") == std::string_view::npos)
+    return std::string(text);
+  std::string field = "\"";
+  for (const char c : text) field.append(c == '"' ? 2 : 1, c);
+  return field += '"';
 }
 
 CsvTable CsvTable::read(const std::filesystem::path& path) {
@@ -64,7 +99,9 @@ CsvTable CsvTable::parse(std::string_view text, std::string source) {
     const std::string_view line = text.substr(0, end);
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (trimmed(line).empty()) continue;
-    auto fields = split_fields(line);
+    auto split = split_fields(line);
+    if (!split) throw InputError(at_line(table.source_, line_number), "has a quote that does not end with its field");
+    std::vector<std::string> fields = std::move(*split);
     if (table.header_.empty()) {
       table.header_ = std::move(fields);
       continue;

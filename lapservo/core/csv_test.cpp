@@ -54,6 +54,32 @@ TEST(CsvTable, ToleratesCarriageReturnsBlanksEmptyLinesAByteOrderMarkAndNoLastNe
   EXPECT_EQ(table.number(1, "x"), 2);
 }
 
+TEST(CsvTable, TextsComeBackAsTheyWereWritten) {
+  constexpr std::uint64_t seed = 17;
+  constexpr std::string_view letters = "a,\" \t.";
+  Random random(seed);
+  for (int i = 0; i < 2000; ++i) {
+    std::string first, second;
+    for (std::string* text : {&first, &second})
+      for (double length = random.uniform(0, 6); length > 0; --length) *text += letters[random.bits() % letters.size()];
+    const CsvTable table = CsvTable::parse("x,y,z\n" + csv_field(first) + "," + csv_field(second) + ",end\n", "t.csv");
+    EXPECT_EQ(table.text(0, "x"), first) << "seed " << seed;
+    EXPECT_EQ(table.text(0, "y"), second) << "seed " << seed;
+    EXPECT_EQ(table.text(0, "z"), "end") << "seed " << seed;
+  }
+  EXPECT_EQ(csv_field("0001.png"), "0001.png");
+  EXPECT_EQ(input_error([] { csv_field("a\nb"); }),
+            "CSV: field: is a b, expected text without line ends and NUL bytes");
+  EXPECT_EQ(csv_field("left, \"new\".png"), "\"left, \"\"new\"\".png\"");
+  EXPECT_EQ(CsvTable::parse("x,y\n \"a,b\" , 2\r\n", "t.csv").text(0, "x"), "a,b");
+}
+
+TEST(CsvTable, AQuoteEndsWithItsField) {
+  for (const char* row : {"\"a,2", "\"a\"b,2", "1,\"", "1,\"\"\"", "1,\"2\" 3"})
+    EXPECT_EQ(parse_error(std::string("x,y\n") + row + "\n"), "t.csv:2: has a quote that does not end with its field")
+        << row;
+}
+
 TEST(CsvTable, AnEmptyFieldIsUnknownNotZero) {
   const CsvTable table = CsvTable::parse("a,b,c\n1,,\n", "t.csv");
   EXPECT_EQ(table.number_or_empty(0, "a"), 1);
