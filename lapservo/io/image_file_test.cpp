@@ -1,1 +1,177 @@
+#include "lapservo/io/image_file.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <iterator>
+#include <span>
+#include <string>
+#include <vector>
+
 #include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "lapservo/core/random.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+using Bytes = std::vector<std::uint8_t>;
+using testing::input_error;
+using testing::TemporaryFolder;
+
+constexpr std::uint64_t seed = 61;
+
+template <typename Value>
+cv::Mat random_image(int rows, int columns, int type, Random& random) {
+  cv::Mat image(rows, columns, type);
+  for (int v = 0; v < rows; ++v)
+    for (int i = 0; i < columns * image.channels(); ++i) image.ptr<Value>(v)[i] = static_cast<Value>(random.bits());
+  return image;
+}
+
+bool same(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
+}
+
+Bytes encoded(const cv::Mat& image, const std::string& extension) {
+  Bytes bytes;
+  EXPECT_TRUE(cv::imencode(extension, image, bytes));
+  return bytes;
+}
+
+std::string refusal(std::span<const std::uint8_t> bytes) {
+  return input_error([&] { decode_image(bytes, "p"); });
+}
+
+TEST(Image, ComesBackAsItWasWritten) {
+  Random random(seed);
+  const TemporaryFolder folder;
+  for (const char* name : {"a.png", "a.bmp", "a.tif", "a.ppm"}) {
+    const cv::Mat image = random_image<std::uint8_t>(17, 23, CV_8UC3, random);
+    write_image(folder / name, image);
+    EXPECT_TRUE(same(read_image(folder / name), image)) << name << ", seed " << seed;
+  }
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 4) << "nothing temporary is left";
+}
+
+TEST(Image, GreyIsRepeatedOverTheChannels) {
+  Random random(seed);
+  const cv::Mat grey = random_image<std::uint8_t>(9, 7, CV_8UC1, random);
+  const cv::Mat bgr = decode_image(encoded(grey, ".png"), "p");
+  ASSERT_EQ(bgr.type(), CV_8UC3);
+  for (int channel = 0; channel < 3; ++channel) {
+    cv::Mat plane;
+    cv::extractChannel(bgr, plane, channel);
+    EXPECT_TRUE(same(plane, grey)) << "channel " << channel;
+  }
+}
+
+TEST(Image, AlphaIsDroppedNotMultiplied) {
+  Random random(seed);
+  const cv::Mat bgra = random_image<std::uint8_t>(9, 7, CV_8UC4, random);
+  const cv::Mat bgr = decode_image(encoded(bgra, ".png"), "p");
+  ASSERT_EQ(bgr.type(), CV_8UC3);
+  for (int v = 0; v < 9; ++v)
+    for (int u = 0; u < 7; ++u)
+      for (int c = 0; c < 3; ++c) EXPECT_EQ(bgr.at<cv::Vec3b>(v, u)[c], bgra.at<cv::Vec4b>(v, u)[c]);
+}
+
+TEST(Image, SixteenBitsAreRoundedToEight) {
+  Random random(seed);
+  const cv::Mat deep = random_image<std::uint16_t>(20, 20, CV_16UC3, random);
+  const cv::Mat bgr = decode_image(encoded(deep, ".png"), "p");
+  ASSERT_EQ(bgr.type(), CV_8UC3);
+  for (int v = 0; v < 20; ++v)
+    for (int u = 0; u < 20; ++u)
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(bgr.at<cv::Vec3b>(v, u)[c], deep.at<cv::Vec3w>(v, u)[c] / 257.0, 0.5001) << "seed " << seed;
+}
+
+// The camera's calibration refers to the pixels as stored.
+TEST(Image, ExifDoesNotTurnIt) {
+  const cv::Mat wide(16, 48, CV_8UC3, cv::Scalar(20, 120, 220));
+  Bytes jpeg = encoded(wide, ".jpg");
+  // APP1 after the start marker: TIFF, one entry, orientation (0x0112) 6: to be turned by 90 degrees.
+  const Bytes exif{0xff, 0xe1, 0,    34,   'E', 'x', 'i', 'f', 0, 0, 'M', 'M', 0, 42, 0, 0, 0, 8,
+                   0,    1,    0x01, 0x12, 0,   3,   0,   0,   0, 1, 0,   6,   0, 0,  0, 0, 0, 0};
+  jpeg.insert(jpeg.begin() + 2, exif.begin(), exif.end());
+  ASSERT_EQ(cv::imdecode(jpeg, cv::IMREAD_COLOR).cols, 16) << "the test's own EXIF block is not understood";
+  EXPECT_EQ(decode_image(jpeg, "p").size(), wide.size());
+}
+
+TEST(Image, IsRefusedWhereverTheFileIsCut) {
+  Random random(seed);
+  const cv::Mat image = random_image<std::uint8_t>(12, 12, CV_8UC3, random);
+  // What tells the format; and the checksum after a PNG's last chunk, without which the picture is whole.
+  struct Format {
+    std::string extension, name;
+    std::size_t signature, dispensable;
+  };
+  for (const Format& format : {Format{".png", "PNG", 8, 4}, Format{".jpg", "JPEG", 2, 0}}) {
+    const Bytes whole = encoded(image, format.extension);
+    EXPECT_EQ(refusal(whole), "");
+    for (std::size_t size = 1; size < whole.size() - format.dispensable; ++size)
+      EXPECT_EQ(refusal(std::span(whole).first(size)),
+                size < format.signature ? "p: can't be decoded, expected a picture"
+                                        : "p: is a truncated " + format.name + ", expected a whole picture")
+          << size << " of " << whole.size() << " bytes";
+  }
+}
+
+TEST(Image, IsRefusedWhenItIsSomethingElse) {
+  const std::string text = "frame,time_s\n0,0\n";
+  EXPECT_EQ(refusal(Bytes(text.begin(), text.end())), "p: can't be decoded, expected a picture");
+  EXPECT_EQ(refusal({}), "p: is empty, expected a picture");
+  const cv::Mat floating(4, 4, CV_32FC3, cv::Scalar(0.5, 0.5, 0.5));
+  EXPECT_EQ(refusal(encoded(floating, ".tiff")),
+            "p: pixel type: is floating point or signed, expected 8 or 16 bits a channel");
+  EXPECT_EQ(input_error([] { bgr8_from(cv::Mat(4, 4, CV_8UC2, cv::Scalar(1, 2)), "p"); }),
+            "p: channels: is 2, expected 1 (grey), 3 or 4 (alpha)");
+}
+
+// A file of some bytes must not ask for gigabytes.
+TEST(Image, IsRefusedWhenItClaimsToBeEnormous) {
+  Bytes png = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(7)), ".png");
+  png[17] = 1;  // the width's second byte: 65540
+  EXPECT_EQ(refusal(png), "p: size: is 65540x4, expected at most 16384 pixels a side");
+}
+
+TEST(Image, TheFileThatCanNotBeReadIsNamed) {
+  const TemporaryFolder folder;
+  const auto said = [&](const std::filesystem::path& path) { return input_error([&] { read_image(path); }); };
+  testing::write_file(folder / "empty.png", "");
+  EXPECT_EQ(said(folder / "empty.png"), (folder / "empty.png").string() + ": is empty, expected a picture");
+  EXPECT_EQ(said(folder / "none.png"), (folder / "none.png").string() + ": can't be opened, expected a picture");
+  EXPECT_EQ(said(folder.path()), folder.path().string() + ": is a folder, expected a picture");
+}
+
+TEST(Image, ThatCanNotBeWrittenIsNamedAndLeavesNothing) {
+  const TemporaryFolder folder;
+  const cv::Mat image(4, 4, CV_8UC3, cv::Scalar::all(7));
+  std::filesystem::create_directory(folder / "taken.png");
+  for (const char* name : {"none/a.png", "a.xyz", "a", "taken.png"}) {
+    const std::string path = (folder / name).string();
+    EXPECT_EQ(input_error([&] { write_image(path, image); }), path + ": can't be written as a picture");
+  }
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the folder";
+}
+
+TEST(Image, AFailedWriteKeepsWhatWasThere) {
+  const TemporaryFolder folder;
+  const cv::Mat image(4, 4, CV_8UC3, cv::Scalar::all(7));
+  write_image(folder / "a.png", image);
+  EXPECT_NE(input_error([&] { write_image(folder / "a.png", cv::Mat()); }), "");
+  EXPECT_TRUE(same(read_image(folder / "a.png"), image));
+}
+
+TEST(HasImageExtension, GoesByTheNamesEndInAnyCase) {
+  for (const char* name : {"a.png", "a.PNG", "dir.x/a.jpeg", "a.b.Tif", "a.jpg", "a.bmp", "a.tiff", "a.webp", "a.ppm"})
+    EXPECT_TRUE(has_image_extension(name)) << name;
+  for (const char* name : {"a", "png", ".png", "a.mp4", "a.png.txt", "a.pngx", "dir.png/a", ""})
+    EXPECT_FALSE(has_image_extension(name)) << name;
+}
+
+}  // namespace
+}  // namespace lapservo
