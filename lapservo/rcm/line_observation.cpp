@@ -9,8 +9,9 @@ LineObservation line_between(const Eigen::Vector2d& from_px, const Eigen::Vector
 }
 
 bool is_usable(const LineObservation& line) {
-  return line.from_px.allFinite() && line.to_px.allFinite() && line.covariance_px2.allFinite() &&
-         (line.to_px - line.from_px).norm() > 1e-6;
+  constexpr double farthest_px = 1e9, least_length_px = 1e-6;
+  return line.from_px.norm() < farthest_px && line.to_px.norm() < farthest_px && line.covariance_px2.allFinite() &&
+         (line.to_px - line.from_px).norm() > least_length_px;
 }
 
 std::optional<Eigen::Vector2d> intersection_px(const LineObservation& a, const LineObservation& b) {

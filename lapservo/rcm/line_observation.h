@@ -14,13 +14,13 @@ namespace lapservo {
 /// only observations that were fitted without knowing the RCM say anything about it.
 struct LineObservation {
   Eigen::Vector2d from_px = Eigen::Vector2d::Zero(), to_px = Eigen::Vector2d::Zero();
-  Eigen::Matrix4d covariance_px2 = Eigen::Matrix4d::Identity();  ///< of [from; to]
+  Eigen::Matrix4d covariance_px2 = Eigen::Matrix4d::Identity();  ///< of [from; to], positive definite
 };
 
 /// With independent errors of one standard deviation in every coordinate of both points.
 LineObservation line_between(const Eigen::Vector2d& from_px, const Eigen::Vector2d& to_px, double sigma_px);
 
-/// Everything finite and the points apart.
+/// Everything finite, the points apart and no farther away than pixels can be (1e9).
 bool is_usable(const LineObservation& line);
 
 /// Where the extended lines meet; nullopt when they are parallel to rounding.

@@ -32,6 +32,7 @@ TEST(LineObservation, ToldApartFromWhatIsNone) {
   EXPECT_TRUE(is_usable(line_between({0, 0}, {100, 50}, 1)));
   EXPECT_FALSE(is_usable(line_between({7, 7}, {7, 7}, 1)));
   EXPECT_FALSE(is_usable(line_between({nan, 0}, {100, 50}, 1)));
+  EXPECT_FALSE(is_usable(line_between({0, 0}, {1e200, 50}, 1)));
   EXPECT_FALSE(is_usable(line_between({0, 0}, {100, 50}, nan)));
 }
 

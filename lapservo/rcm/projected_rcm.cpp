@@ -19,10 +19,12 @@ constexpr double outlier_sigmas = 3.5;
 
 using Lines = std::vector<LineObservation>;
 
-// How many of its own standard deviations a line passes by o, and how that moves with o.
+// How many of its own standard deviations a line passes by o, and how that moves with o and, per pixel across the line,
+// with its two ends.
 struct Miss {
   double sigmas;
   Eigen::Vector2d d_sigmas_d_o;
+  Eigen::Vector2d d_sigmas_d_ends;
 };
 
 Miss miss(const LineObservation& line, const Eigen::Vector2d& o) {
@@ -36,7 +38,10 @@ Miss miss(const LineObservation& line, const Eigen::Vector2d& o) {
   const double pull = g / (sigma * sigma);
   // d(h)/d(o) maps v to [-across(v); across(v)], whose transpose acts on `weighted`.
   const Eigen::Vector2d d_sigma2_half = across(weighted.head<2>() - weighted.tail<2>());
-  return {g / sigma, (-across(along) - pull * d_sigma2_half) / sigma};
+  const Eigen::Vector2d normal = across(along).normalized();
+  return {g / sigma,
+          (-across(along) - pull * d_sigma2_half) / sigma,
+          {h.head<2>().dot(normal) / sigma, h.tail<2>().dot(normal) / sigma}};
 }
 
 double chi2_at(const Lines& lines, const Eigen::Vector2d& o) {
@@ -147,6 +152,17 @@ RobustFit fit_robustly(const Lines& lines, const Start& start, NoiseScale scale)
   return robust;
 }
 
+// Of the estimate, from an error of one pixel that the lines share at their first ends, and one at their second.
+Eigen::Matrix2d common_covariance(const Lines& lines, const Eigen::Vector2d& o, const Eigen::Matrix2d& covariance) {
+  Eigen::Matrix2d pull = Eigen::Matrix2d::Zero();
+  for (const LineObservation& line : lines) {
+    const Miss m = miss(line, o);
+    pull += m.d_sigmas_d_o * m.d_sigmas_d_ends.transpose();
+  }
+  const Eigen::Matrix2d shift = covariance * pull;
+  return shift * shift.transpose();
+}
+
 double direction_spread_rad(const Lines& lines) {
   Eigen::Matrix2d mean = Eigen::Matrix2d::Zero();
   for (const LineObservation& line : lines) {
@@ -188,7 +204,7 @@ std::string_view rcm_status_word(RcmStatus status) {
   return "not_converged";
 }
 
-RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, NoiseScale scale) {
+RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const RcmOptions& options) {
   RcmEstimate estimate;
   estimate.used.assign(given.size(), false);
   Lines lines;
@@ -205,7 +221,7 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, Noise
     estimate.status = RcmStatus::parallel;
     return estimate;
   }
-  const auto [best, used] = fit_robustly(lines, *start, scale);
+  const auto [best, used] = fit_robustly(lines, *start, options.scale);
   const Eigen::Matrix2d as_given = best.information.inverse();
   if (!best.converged || !best.point_px.allFinite() || !as_given.allFinite()) {
     estimate.status = RcmStatus::not_converged;
@@ -222,9 +238,11 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, Noise
   estimate.chi2 = best.chi2;
   estimate.degrees_of_freedom = static_cast<int>(inside.size()) - 2;
   estimate.direction_spread_rad = direction_spread_rad(inside);
-  if (scale == NoiseScale::estimated) estimate.noise_factor = scale_of(best.chi2, inside.size());
-  if (scale == NoiseScale::known || estimate.degrees_of_freedom > 0)
-    estimate.covariance_px2 = estimate.noise_factor * estimate.noise_factor * as_given;
+  if (options.scale == NoiseScale::estimated) estimate.noise_factor = scale_of(best.chi2, inside.size());
+  if (options.scale == NoiseScale::known || estimate.degrees_of_freedom > 0)
+    estimate.covariance_px2 =
+        estimate.noise_factor * estimate.noise_factor * as_given +
+        options.common_px * options.common_px * common_covariance(inside, best.point_px, as_given);
   const double share =
       estimate.covariance_px2 ? larger_sigma(*estimate.covariance_px2) / lever_px(inside, best.point_px) : 0;
   estimate.near_parallel = estimate.direction_spread_rad < near_parallel_rad || share > near_parallel_share;

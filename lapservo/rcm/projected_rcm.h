@@ -18,6 +18,13 @@ enum class NoiseScale {
   estimated,  ///< one factor for all is estimated from how badly the lines meet
 };
 
+struct RcmOptions {
+  NoiseScale scale = NoiseScale::estimated;
+  /// One sigma of an error that all lines share: of their from ends together, and of their to ends, across the lines.
+  /// It does not average out and does not show in how well the lines meet (the light, the lens, the print).
+  double common_px = 0;
+};
+
 enum class RcmStatus {
   ok,
   too_few_lines,  ///< fewer than two usable lines
@@ -58,7 +65,8 @@ inline constexpr double near_parallel_share = 0.05;
 ///
 /// Robust from six lines up: starts at the pair's intersection with the least median residual (least median of squares,
 /// Rousseeuw 1984), then leaves out lines farther off than 3.5 standard deviations; up to about a third may be wrong.
-/// The covariance assumes errors independent from line to line: consecutive frames of a shaft at rest are one line.
-RcmEstimate estimate_projected_rcm(std::span<const LineObservation> lines, NoiseScale scale);
+/// The covariance takes errors, but for the common one, as independent from line to line: consecutive frames of a shaft
+/// at rest are one line.
+RcmEstimate estimate_projected_rcm(std::span<const LineObservation> lines, const RcmOptions& options = {});
 
 }  // namespace lapservo

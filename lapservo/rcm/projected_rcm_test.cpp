@@ -54,7 +54,7 @@ TEST(ProjectedRcm, IsExactWithoutNoise) {
   for (std::size_t count = 2; count < 40; ++count) {
     const Eigen::Vector2d point(random.uniform(-2000, 2000), random.uniform(-2000, 2000));
     for (const NoiseScale scale : {NoiseScale::known, NoiseScale::estimated}) {
-      const auto estimate = estimate_projected_rcm(uneven_lines(point, count, random), scale);
+      const auto estimate = estimate_projected_rcm(uneven_lines(point, count, random), {scale});
       ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed << ", " << count << " lines";
       EXPECT_LT((estimate.point_px - point).norm(), 1e-4) << "seed " << seed;
       EXPECT_LT(estimate.chi2, 1e-8);
@@ -78,8 +78,8 @@ TEST(ProjectedRcm, FollowsASimilarity) {
     Lines moved = lines;
     for (LineObservation& line : moved)
       line = {a * line.from_px + b, a * line.to_px + b, both * line.covariance_px2 * both.transpose()};
-    const auto here = estimate_projected_rcm(lines, NoiseScale::known),
-               there = estimate_projected_rcm(moved, NoiseScale::known);
+    const auto here = estimate_projected_rcm(lines, {NoiseScale::known}),
+               there = estimate_projected_rcm(moved, {NoiseScale::known});
     EXPECT_LT((there.point_px - (a * here.point_px + b)).norm(), 1e-5) << "seed " << seed;
     EXPECT_LT((*there.covariance_px2 - a * *here.covariance_px2 * a.transpose()).norm(),
               1e-5 * there.covariance_px2->norm());
@@ -98,8 +98,8 @@ TEST(ProjectedRcm, DoesNotCareWhichEndComesFirstNorForTheOrder) {
   for (const LineObservation& line : lines)
     swapped.push_back({line.to_px, line.from_px, swap * line.covariance_px2 * swap.transpose()});
   std::reverse(swapped.begin(), swapped.end());
-  const auto here = estimate_projected_rcm(lines, NoiseScale::known),
-             there = estimate_projected_rcm(swapped, NoiseScale::known);
+  const auto here = estimate_projected_rcm(lines, {NoiseScale::known}),
+             there = estimate_projected_rcm(swapped, {NoiseScale::known});
   EXPECT_LT((here.point_px - there.point_px).norm(), 1e-6);
   EXPECT_LT((*here.covariance_px2 - *there.covariance_px2).norm(), 1e-6 * here.covariance_px2->norm());
 }
@@ -108,9 +108,9 @@ TEST(ProjectedRcm, AWorthlessLineIsAsGoodAsNone) {
   constexpr std::uint64_t seed = 74;
   Random random(seed);
   Lines lines = with_errors(uneven_lines({-300, 200}, 12, random), 1, random);
-  const auto without = estimate_projected_rcm(lines, NoiseScale::known);
+  const auto without = estimate_projected_rcm(lines, {NoiseScale::known});
   lines.push_back(line_between({0, 0}, {500, -100}, 1e5));
-  const auto with = estimate_projected_rcm(lines, NoiseScale::known);
+  const auto with = estimate_projected_rcm(lines, {NoiseScale::known});
   EXPECT_LT((with.point_px - without.point_px).norm(), 1e-3);
   EXPECT_LT((*with.covariance_px2 - *without.covariance_px2).norm(), 1e-3 * without.covariance_px2->norm());
 }
@@ -127,7 +127,7 @@ TEST(ProjectedRcm, CovarianceIsHonest) {
     Eigen::Vector2d bias_sigmas = Eigen::Vector2d::Zero();
     for (int trial = 0; trial < trials; ++trial) {
       const auto estimate =
-          estimate_projected_rcm(with_errors(uneven_lines(truth, 20, random), noise_factor, random), scale);
+          estimate_projected_rcm(with_errors(uneven_lines(truth, 20, random), noise_factor, random), {scale});
       ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed;
       spread += mahalanobis2(estimate, truth) / 2 / trials;
       const Eigen::Matrix2d root = estimate.covariance_px2->llt().matrixL();
@@ -142,6 +142,31 @@ TEST(ProjectedRcm, CovarianceIsHonest) {
   }
 }
 
+// By finite differences: an error that all lines share moves the estimate as far as the covariance says.
+TEST(ProjectedRcm, CovarianceCoversWhatTheLinesShare) {
+  constexpr std::uint64_t seed = 80;
+  Random random(seed);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Lines lines = uneven_lines({-120, -240}, 20, random);
+    const auto moved_by = [&](double from_px, double to_px) {
+      Lines moved = lines;
+      for (LineObservation& line : moved) {
+        const Eigen::Vector2d along = (line.to_px - line.from_px).normalized(), across(-along.y(), along.x());
+        line.from_px += from_px * across, line.to_px += to_px * across;
+      }
+      return estimate_projected_rcm(moved, {NoiseScale::known}).point_px;
+    };
+    constexpr double step_px = 1e-3, common_px = 0.3;
+    const Eigen::Vector2d by_from = (moved_by(step_px, 0) - moved_by(-step_px, 0)) / (2 * step_px);
+    const Eigen::Vector2d by_to = (moved_by(0, step_px) - moved_by(0, -step_px)) / (2 * step_px);
+    const Eigen::Matrix2d expected =
+        common_px * common_px * (by_from * by_from.transpose() + by_to * by_to.transpose());
+    const Eigen::Matrix2d added = *estimate_projected_rcm(lines, {NoiseScale::known, common_px}).covariance_px2 -
+                                  *estimate_projected_rcm(lines, {NoiseScale::known}).covariance_px2;
+    EXPECT_LT((added - expected).norm(), 1e-3 * expected.norm()) << "seed " << seed << ", trial " << trial;
+  }
+}
+
 // A fan so narrow, and noise so large, that lines weighted where they seem to be pull the estimate towards themselves.
 TEST(ProjectedRcm, IsUnbiasedInANarrowFan) {
   constexpr std::uint64_t seed = 76;
@@ -153,7 +178,7 @@ TEST(ProjectedRcm, IsUnbiasedInANarrowFan) {
     Lines lines = testing::fan_of_lines(truth, 60, 0.12, random);
     for (LineObservation& line : lines) line.covariance_px2 *= 25;
     lines = with_errors(lines, 1, random);
-    const auto estimate = estimate_projected_rcm(lines, NoiseScale::known);
+    const auto estimate = estimate_projected_rcm(lines, {NoiseScale::known});
     ASSERT_EQ(estimate.status, RcmStatus::ok) << "seed " << seed;
     EXPECT_TRUE(estimate.near_parallel);
     bias_px += (estimate.point_px - truth).dot(along) / trials;
@@ -175,7 +200,7 @@ TEST(ProjectedRcm, LeavesOutOutliersAndNamesThem) {
   for (int trial = 0; trial < trials; ++trial) {
     Lines lines = with_errors(uneven_lines(truth, 20, random), 1, random);
     for (std::size_t i = 0; i < spoiled; ++i) spoil(lines[3 * i], random);
-    const auto estimate = estimate_projected_rcm(lines, trial % 2 ? NoiseScale::known : NoiseScale::estimated);
+    const auto estimate = estimate_projected_rcm(lines, {trial % 2 ? NoiseScale::known : NoiseScale::estimated});
     ASSERT_EQ(estimate.status, RcmStatus::ok);
     for (std::size_t i = 0; i < spoiled; ++i) EXPECT_FALSE(estimate.used[3 * i]) << "seed " << seed << ", " << trial;
     EXPECT_LE(estimate.outliers, spoiled + 4u) << "seed " << seed << ", " << trial;
@@ -191,7 +216,7 @@ TEST(ProjectedRcm, BeatsTheMeanOfIntersections) {
   double ours = 0, papers = 0;
   for (int trial = 0; trial < 200; ++trial) {
     const Lines lines = with_errors(testing::fan_of_lines(truth, 20, fan_rad, random), 1, random);
-    ours += (estimate_projected_rcm(lines, NoiseScale::estimated).point_px - truth).norm();
+    ours += (estimate_projected_rcm(lines, {NoiseScale::estimated}).point_px - truth).norm();
     papers += (mean_of_intersections(lines)->point_px - truth).norm();
   }
   EXPECT_LT(ours, 0.7 * papers) << "seed " << seed;
@@ -203,7 +228,7 @@ TEST(ProjectedRcm, WarnsOfNearlyParallelLines) {
   const Eigen::Vector2d truth(-120, -240);
   const auto of_fan = [&](double fan, double factor) {
     return estimate_projected_rcm(with_errors(testing::fan_of_lines(truth, 20, fan, random), factor, random),
-                                  NoiseScale::estimated);
+                                  {NoiseScale::estimated});
   };
   for (int trial = 0; trial < 20; ++trial) {
     EXPECT_FALSE(of_fan(0.9, 1).near_parallel) << "seed " << seed;
@@ -214,15 +239,16 @@ TEST(ProjectedRcm, WarnsOfNearlyParallelLines) {
 
 TEST(ProjectedRcm, SaysWhyThereIsNone) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(estimate_projected_rcm({}, NoiseScale::known).status, RcmStatus::too_few_lines);
+  EXPECT_EQ(estimate_projected_rcm({}, {NoiseScale::known}).status, RcmStatus::too_few_lines);
   const LineObservation one = line_between({0, 0}, {100, 0}, 0.3), broken = line_between({nan, 0}, {1, 1}, 1);
-  EXPECT_EQ(estimate_projected_rcm(Lines{one, broken}, NoiseScale::known).status, RcmStatus::too_few_lines);
-  EXPECT_EQ(estimate_projected_rcm(Lines{one, line_between({0, 9}, {100, 9}, 0.3)}, NoiseScale::known).status,
+  EXPECT_EQ(estimate_projected_rcm(Lines{one, broken}, {NoiseScale::known}).status, RcmStatus::too_few_lines);
+  EXPECT_EQ(estimate_projected_rcm(Lines{one, line_between({0, 9}, {100, 9}, 0.3)}, {NoiseScale::known}).status,
             RcmStatus::parallel);
-  EXPECT_EQ(estimate_projected_rcm(Lines{one, line_between({0, 9}, {100, 9.1}, 0.3)}, NoiseScale::known).status,
+  EXPECT_EQ(estimate_projected_rcm(Lines{one, line_between({0, 9}, {100, 9.1}, 0.3)}, {NoiseScale::known}).status,
             RcmStatus::parallel);
-  EXPECT_EQ(estimate_projected_rcm(Lines{one, broken, line_between({0, 9}, {100, 80}, 0.3)}, NoiseScale::known).status,
-            RcmStatus::ok);
+  EXPECT_EQ(
+      estimate_projected_rcm(Lines{one, broken, line_between({0, 9}, {100, 80}, 0.3)}, {NoiseScale::known}).status,
+      RcmStatus::ok);
 }
 
 }  // namespace
