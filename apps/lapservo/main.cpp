@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
   lapservo::app::add_track(app, run);
   lapservo::app::add_render(app, run);
   lapservo::app::add_marker(app, run);
+  lapservo::app::add_estimate_rcm(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {
