@@ -1,0 +1,47 @@
+#include <benchmark/benchmark.h>
+
+#include "lapservo/control/test_theatre.h"
+
+namespace lapservo {
+namespace {
+
+/// One step of the controller with an image in it, the model included: the exact map with its Jacobian by differences,
+/// which costs more than an analytic one.
+void BM_ControlStep(benchmark::State& state, ControlMode mode, bool delay_known) {
+  testing::Flaws flaws;
+  flaws.delay_known = delay_known;
+  ControllerConfig config = testing::test_config(flaws);
+  config.mode = mode;
+  const testing::TestRig rig;
+  VisualController controller(config, testing::model_of(rig));
+  testing::Theatre theatre(rig, flaws, {0.05, 1.57, 0.064, 1}, 1);
+  const Trajectory trajectory = sinusoids(testing::paper_sinusoids());
+  theatre.run(controller, trajectory, 10);
+  double time_s = 20;
+  const Eigen::Vector4d q = controller.path().end().position;
+  const FeatureState seen = exact_map(rig, q).value();
+  ImageMeasurement image;
+  image.found = true;
+  image.features = seen.features;
+  image.ends_px = seen.ends_px;
+  image.covariance = Eigen::Vector4d(1e-7, 0.02, 0.02, 0.02).asDiagonal();
+  const DesiredFeatures desired = trajectory.at(time_s);
+  for (auto _ : state) {
+    time_s += config.period_s;
+    image.time_s = time_s;
+    benchmark::DoNotOptimize(controller.step(time_s, q, image, desired));
+  }
+}
+BENCHMARK_CAPTURE(BM_ControlStep, default_known_delay, ControlMode::fused, true);
+BENCHMARK_CAPTURE(BM_ControlStep, default_estimated_delay, ControlMode::fused, false);
+BENCHMARK_CAPTURE(BM_ControlStep, paper, ControlMode::paper, true);
+BENCHMARK_CAPTURE(BM_ControlStep, uncalibrated, ControlMode::uncalibrated, false);
+
+void BM_ExactMapByDifferences(benchmark::State& state) {
+  const testing::TestRig rig;
+  for (auto _ : state) benchmark::DoNotOptimize(exact_map(rig, {0.05, 1.57, 0.064, 1}));
+}
+BENCHMARK(BM_ExactMapByDifferences);
+
+}  // namespace
+}  // namespace lapservo

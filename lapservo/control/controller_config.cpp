@@ -1,0 +1,124 @@
+#include "lapservo/control/controller_config.h"
+
+#include <cmath>
+#include <string>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+
+void require(bool good, const std::string& field, double value, const char* expected) {
+  if (!good) throw InputError("controller", field, std::to_string(value), expected);
+}
+
+void require_positive(const std::string& field, double value) {
+  require(std::isfinite(value) && value > 0, field, value, "a number above 0");
+}
+
+std::string element(const char* field, int i) {
+  return std::string(field) + "[" + std::to_string(i) + "]";
+}
+
+void require_positive(const char* field, const Eigen::Vector4d& values) {
+  for (int i = 0; i < 4; ++i) require_positive(element(field, i), values[i]);
+}
+
+void check_gains(const ControllerConfig& config) {
+  for (int i = 0; i < 4; ++i) {
+    const double gain = config.gains.per_s[i];
+    require(std::isfinite(gain) && gain >= 0, element("gains.per_s", i), gain, "0 or more per second");
+    require(gain * config.period_s < 1, element("gains.per_s", i), gain, "less than one per control period");
+  }
+}
+
+void check_limits(const JointLimits& limits, double period_s) {
+  require_positive("limits.rate", limits.rate);
+  require_positive("limits.acceleration", limits.acceleration);
+  for (int i = 0; i < 4; ++i) {
+    require(std::isfinite(limits.lower[i]), element("limits.lower", i), limits.lower[i], "a finite number");
+    require(std::isfinite(limits.upper[i]) && limits.upper[i] > limits.lower[i], element("limits.upper", i),
+            limits.upper[i], "a number above the lower limit");
+  }
+  require(period_s <= 2 * stopping_time_s(limits), "period_s", period_s, "at most twice the joints' stopping time");
+}
+
+void check_window(const ImageWindow& window) {
+  require(window.u_max_px > window.u_min_px, "window.u_max_px", window.u_max_px, "a number above u_min_px");
+  require(window.v_max_px > window.v_min_px, "window.v_max_px", window.v_max_px, "a number above v_min_px");
+}
+
+void check_observer(const ObserverConfig& observer) {
+  constexpr double longest_s = DelayEstimator::step_s * (DelayEstimator::candidates - 1);
+  const auto check_delay = [](const std::string& field, double delay_s) {
+    require(delay_s >= 0 && delay_s <= longest_s, field, delay_s, "0 to 0.3 seconds");
+  };
+  if (observer.delay_s) check_delay("observer.delay_s", *observer.delay_s);
+  check_delay("observer.initial_delay_s", observer.initial_delay_s);
+  require_positive("observer.bandwidth_rad_s", observer.bandwidth_rad_s);
+  require_positive("observer.offset_walk", observer.offset_walk);
+  require_positive("observer.largest_offset", observer.largest_offset);
+  require(observer.offset_per_motion >= 0, "observer.offset_per_motion", observer.offset_per_motion, "0 or more");
+  require_positive("observer.gate_chi2", observer.gate_chi2);
+  require(observer.reacquire_after >= 1, "observer.reacquire_after", observer.reacquire_after, "1 or more");
+}
+
+void check_learning(const ControllerConfig& config) {
+  require_positive("jacobian.noise", config.jacobian.noise);
+  require_positive("jacobian.bend", config.jacobian.bend);
+  require_positive("jacobian.gate_chi2", config.jacobian.gate_chi2);
+  require(config.jacobian.walk >= 0, "jacobian.walk", config.jacobian.walk, "0 or more");
+  require(config.jacobian.slack >= 0, "jacobian.slack", config.jacobian.slack, "0 or more");
+  require(config.jacobian.reacquire_after >= 1, "jacobian.reacquire_after", config.jacobian.reacquire_after,
+          "1 or more");
+  require_positive("probing.distance", config.probing.distance);
+  require_positive("probing.joint_time_s", config.probing.joint_time_s);
+}
+
+}  // namespace
+
+std::string_view mode_word(ControlMode mode) {
+  switch (mode) {
+    case ControlMode::fused:
+      return "default";
+    case ControlMode::paper:
+      return "paper";
+    case ControlMode::uncalibrated:
+      return "uncalibrated";
+  }
+  return "";
+}
+
+std::optional<ControlMode> mode_from_word(std::string_view word) {
+  if (word == "default" || word == "fused") return ControlMode::fused;
+  if (word == "paper") return ControlMode::paper;
+  if (word == "uncalibrated") return ControlMode::uncalibrated;
+  return std::nullopt;
+}
+
+ControllerConfig paper_controller(double period_s) {
+  ControllerConfig config;
+  config.mode = ControlMode::paper;
+  config.period_s = period_s;
+  config.gains = paper_gains(period_s);
+  return config;
+}
+
+ControllerConfig checked(const ControllerConfig& config) {
+  require_positive("period_s", config.period_s);
+  check_gains(config);
+  check_limits(config.limits, config.period_s);
+  if (config.window) check_window(*config.window);
+  require_positive("scales.features", config.scales.features);
+  require_positive("scales.joints", config.scales.joints);
+  check_observer(config.observer);
+  check_learning(config);
+  require_positive("damping_threshold", config.damping_threshold);
+  require(config.least_singular_value >= 0, "least_singular_value", config.least_singular_value, "0 or more");
+  require_positive("stale_after_s", config.stale_after_s);
+  require_positive("largest_image_age_s", config.largest_image_age_s);
+  require_positive("largest_following_error", config.largest_following_error);
+  return config;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/joint_history.h"
+
+namespace lapservo {
+
+struct DelayEstimate {
+  double delay_s = 0;
+  double sigma_s = 0;
+};
+
+struct DelayEstimatorConfig {
+  double forgetting_s = 20;        ///< time constant by which old frames lose weight
+  double offset_time_s = 2;        ///< time constant of the mean that is removed: slower differences don't count
+  double least_time_s = 1;         ///< no estimate before this much has been seen
+  double largest_sigma_s = 0.005;  ///< nor one less certain than this: then there was too little motion
+  /// Disagreement between readings and the true joints that is not noise: theta_rad, phi_rad, rho_m, psi_rad. Backlash
+  /// looks like additional delay, so insertion and roll count little.
+  Eigen::Vector4d reading_sigma{2e-4, 2e-4, 1e-3, 2e-2};
+};
+
+/// How old the image is, from the data: the image's joint positions are compared with the readings at each of a grid of
+/// delays. The offset between both is removed as a running mean; what remains is, for each candidate, a sum of squares,
+/// and the lowest sum is the likeliest delay, refined by a parabola through its neighbours. Its curvature is the
+/// information: without motion all candidates are alike, sigma is large and there is no estimate.
+class DelayEstimator {
+ public:
+  static constexpr double step_s = 0.005;
+  static constexpr std::size_t candidates = 61;  ///< 0 to 300 ms
+
+  explicit DelayEstimator(const DelayEstimatorConfig& config = {}) : config_(config) {}
+
+  /// One image, stamped `stamp_s`, that shows joint positions `q_image` (with the covariance of their noise). Ignored
+  /// while the history does not reach back to the longest delay.
+  void add(double stamp_s, const Eigen::Vector4d& q_image, const Eigen::Matrix4d& covariance,
+           const JointHistory& history);
+
+  /// The image stamped t shows the joints at t - delay.
+  std::optional<DelayEstimate> estimate() const;
+
+ private:
+  struct Candidate {
+    Eigen::Vector4d mean = Eigen::Vector4d::Zero();  ///< of q_image - q_joint
+    double squares = 0;
+  };
+  DelayEstimatorConfig config_;
+  std::array<Candidate, candidates> grid_;
+  double last_stamp_s_ = 0;
+  double seen_s_ = 0;
+  double weight_ = 0;  ///< number of frames, forgotten likewise
+  bool started_ = false;
+};
+
+}  // namespace lapservo

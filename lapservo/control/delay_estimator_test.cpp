@@ -1,0 +1,81 @@
+#include "lapservo/control/delay_estimator.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+/// Slow motion of all joints, as a trajectory or an approach makes it.
+Eigen::Vector4d joints_at(double time_s) {
+  return {0.05 * std::sin(0.7 * time_s), 1.57 + 0.04 * std::sin(0.5 * time_s + 1),
+          0.064 + 0.003 * std::sin(0.6 * time_s), 0.5 * std::sin(0.4 * time_s)};
+}
+
+struct Scene {
+  double delay_s = 0.1;
+  double play_rad = 0;  ///< of psi
+  double play_m = 0;    ///< of rho
+  bool moving = true;
+  double jitter_s = 0;  ///< of the images' stamps, one standard deviation
+};
+
+std::optional<DelayEstimate> estimate_after(const Scene& scene, double duration_s, std::uint64_t seed) {
+  Random random(seed);
+  const Eigen::Vector4d offset(0.035, -0.035, 0.003, 0.035), noise(3e-4, 3e-4, 2e-4, 1e-3);
+  DelayEstimator estimator;
+  JointHistory history;
+  const auto truth = [&](double t) { return scene.moving ? joints_at(t) : joints_at(0); };
+  for (int k = 0; k < 60 * duration_s; ++k) {
+    const double t = k / 60.0;
+    Eigen::Vector4d reading = truth(t);
+    for (int i = 0; i < 4; ++i) reading[i] += 1e-5 * random.normal();
+    history.push(t, reading);
+    Eigen::Vector4d seen = truth(t - scene.delay_s + scene.jitter_s * random.normal()) + offset;
+    const Eigen::Vector4d ahead = truth(t - scene.delay_s + 1e-3) - truth(t - scene.delay_s);
+    seen[2] -= std::copysign(scene.play_m / 2, ahead[2]);
+    seen[3] -= std::copysign(scene.play_rad / 2, ahead[3]);
+    for (int i = 0; i < 4; ++i) seen[i] += noise[i] * random.normal();
+    estimator.add(t, seen, noise.cwiseAbs2().asDiagonal(), history);
+  }
+  return estimator.estimate();
+}
+
+TEST(DelayEstimator, FindsTheDelayWithinHalfAFrame) {
+  std::uint64_t seed = 0;
+  for (const double delay_s : {0.0, 0.017, 0.06, 0.08, 0.15, 0.2, 0.25}) {
+    for (const double play : {0.0, 1.0}) {
+      SCOPED_TRACE(++seed);
+      const auto found = estimate_after({delay_s, 0.02 * play, 0.0002 * play, true, 0.003}, 20, seed);
+      ASSERT_TRUE(found);
+      EXPECT_NEAR(found->delay_s, delay_s, 0.5 / 60);
+    }
+  }
+}
+
+TEST(DelayEstimator, ErrorsMatchItsSigma) {
+  double squares = 0;
+  constexpr int runs = 40;
+  for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+    const auto found = estimate_after({0.083}, 6, seed);
+    ASSERT_TRUE(found) << "seed " << seed;
+    squares += std::pow((found->delay_s - 0.083) / found->sigma_s, 2);
+  }
+  // Honest to cautious: what it takes for persistent misfit is margin here, where noise is white.
+  EXPECT_LT(std::sqrt(squares / runs), 1.5);
+  EXPECT_GT(std::sqrt(squares / runs), 0.1);
+}
+
+TEST(DelayEstimator, SaysNothingWithoutMotion) {
+  Scene still;
+  still.moving = false;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) EXPECT_FALSE(estimate_after(still, 10, seed)) << "seed " << seed;
+  EXPECT_FALSE(DelayEstimator().estimate());
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "lapservo/control/affine_fit.h"
+#include "lapservo/control/feature_model.h"
+#include "lapservo/control/probing.h"
+
+namespace lapservo {
+
+struct JacobianEstimatorConfig {
+  double noise = 0.3;       ///< of an image, in feature scales
+  double walk = 0.3;        ///< of the features at rest, in feature scales per square root of a second
+  double bend = 12;         ///< how much J changes along a joint scale of motion, in scales: forgetting by distance
+  double slack = 3;         ///< features' change that motion doesn't explain (backlash), per joint scale moved
+  double gate_chi2 = 60;    ///< of four features; curvature adds to noise, so wider than noise alone would need
+  int reacquire_after = 5;  ///< so many outliers in a row are the truth
+};
+
+/// Learns image and Jacobian online from joint readings and features alone: no camera, marker or registration. The
+/// model is y(q) = y0 + G (q - q0) about the latest image's joints q0; y0 and the rows of G follow random walks whose
+/// steps grow with the motion since the image before, so old motion is forgotten by distance, not by time, and nothing
+/// is forgotten at rest (no wind-up, and no noise is learnt). It is recursive least squares, in the form of a Kalman
+/// filter with one 5x5 covariance shared by all eight outputs, since their regressors and scaled noise are the same;
+/// with no memory (bend -> infinity) it becomes Broyden's rank-one update.
+/// Compare Jagersand, Fuentes and Nelson 1997, Hosoda and Asada 1994.
+class JacobianEstimator {
+ public:
+  JacobianEstimator(const JacobianEstimatorConfig& config, const Scales& scales) : config_(config), scales_(scales) {}
+
+  void start(const ProbedModel& model);
+
+  enum class Update { accepted, outlier };
+  /// An image taken at joints `q_then`, `interval_s` after the one before.
+  Update update(const Eigen::Vector4d& q_then, const Eigen::Vector4d& features, const Eigen::Vector4d& ends_px,
+                double interval_s);
+
+  /// The model at q; the Jacobian is the same everywhere.
+  FeatureState at(const Eigen::Vector4d& q) const;
+  /// Variance of a feature at q in feature scales, from noise and what the walk adds up to there.
+  double variance_at(const Eigen::Vector4d& q) const;
+
+ private:
+  void move_to(const Eigen::Vector4d& q, double interval_s);
+
+  JacobianEstimatorConfig config_;
+  Scales scales_;
+  Eigen::Vector4d q_ = Eigen::Vector4d::Zero();                                   ///< q0
+  Eigen::Matrix<double, 5, 8> parameters_ = Eigen::Matrix<double, 5, 8>::Zero();  ///< y0 and G^T, in scales
+  Eigen::Matrix<double, 5, 5> covariance_ = Eigen::Matrix<double, 5, 5>::Identity();
+  int outliers_ = 0;
+};
+
+}  // namespace lapservo

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include <Eigen/Core>
+
+namespace lapservo {
+
+/// The latest joint readings in order of time, so that an image can be compared with where the joints were when it was
+/// taken. A ring of fixed size: 1 s at 1 kHz; no allocation.
+class JointHistory {
+ public:
+  static constexpr std::size_t capacity = 1024;
+
+  /// Readings that are not newer than the last one are ignored.
+  void push(double time_s, const Eigen::Vector4d& q);
+  void clear() { size_ = 0; }
+
+  std::size_t size() const { return size_; }
+  double oldest_s() const { return entry(0).time_s; }          ///< only when size() > 0
+  double newest_s() const { return entry(size_ - 1).time_s; }  ///< only when size() > 0
+
+  /// Linear interpolation; the newest reading for times after it, nullopt for times before the oldest.
+  std::optional<Eigen::Vector4d> at(double time_s) const;
+
+ private:
+  struct Entry {
+    double time_s = 0;
+    Eigen::Vector4d q = Eigen::Vector4d::Zero();
+  };
+  const Entry& entry(std::size_t age_rank) const { return ring_[(first_ + age_rank) % capacity]; }
+
+  std::array<Entry, capacity> ring_;
+  std::size_t first_ = 0, size_ = 0;
+};
+
+}  // namespace lapservo

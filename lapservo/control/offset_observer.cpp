@@ -1,0 +1,154 @@
+#include "lapservo/control/offset_observer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "lapservo/control/newton_inverse.h"
+#include "lapservo/control/tracking_law.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double shortest_interval_s = 1e-3;
+constexpr double longest_interval_s = 0.2;  // after a longer gap the gain grows through the covariance instead
+
+/// Image noise that gives the steady-state gain 1 - exp(-bandwidth T) for a random walk of variance `walk` per image:
+/// with k = P/(P + R) and P = walk / k before each update, R = walk (1 - k) / k^2.
+Eigen::Vector4d noise_for_bandwidth(const Eigen::Vector4d& walk, double bandwidth_rad_s, double interval_s) {
+  const double gain = -std::expm1(-bandwidth_rad_s * interval_s);
+  return walk * ((1 - gain) / (gain * gain));
+}
+
+}  // namespace
+
+Eigen::Vector4d OffsetObserver::walk_variance(double interval_s, const Eigen::Vector4d& moved) const {
+  const double distance = moved.cwiseQuotient(scales_.joints).norm();
+  return config_.offset_walk.cwiseAbs2() * interval_s +
+         (config_.offset_per_motion * distance * scales_.joints).cwiseAbs2();
+}
+
+Update OffsetObserver::update(const FeatureModel& model, const JointHistory& history, const ImageMeasurement& image) {
+  if (!image.features.allFinite() || !image.covariance.allFinite() || !image.ends_px.allFinite() ||
+      !std::isfinite(image.time_s) || (image.q && !image.q->allFinite())) {
+    return Update::non_finite;
+  }
+  const auto q_then = history.at(image.time_s - delay_s_);
+  if (!q_then) return Update::no_history;
+  if (!started_) return start(model, *q_then, image);
+  const auto state = model(*q_then + offset_);
+  if (!state) return start(model, *q_then, image);
+
+  const Eigen::Vector4d residual = feature_error(image.features, state->features + feature_offset_);
+  const Eigen::Matrix4d inverse = damped_inverse(state->jacobian, scales_).inverse;
+  const Eigen::Vector4d innovation = inverse * residual;
+  const double since_s = std::max(0.0, image.time_s - updated_s_);
+  const double interval_s = std::clamp(since_s, shortest_interval_s, longest_interval_s);
+  const Eigen::Matrix4d seen_noise = inverse * image.covariance * inverse.transpose();
+  const Eigen::Matrix4d noise =
+      seen_noise + Eigen::Matrix4d(noise_for_bandwidth(config_.offset_walk.cwiseAbs2() * interval_s,
+                                                       config_.bandwidth_rad_s, interval_s)
+                                       .asDiagonal());
+  const Eigen::Matrix4d predicted =
+      covariance_ + Eigen::Matrix4d(walk_variance(since_s, *q_then - q_joint_then_).asDiagonal());
+  const Eigen::Matrix4d innovation_covariance = predicted + noise;
+  const Eigen::LLT<Eigen::Matrix4d> factor(innovation_covariance);
+  const double chi2 = innovation.dot(factor.solve(innovation));
+  if (!std::isfinite(chi2)) return Update::non_finite;
+  if (chi2 > config_.gate_chi2) {
+    if (!agrees_with_last_outlier(offset_ + innovation, innovation_covariance)) return Update::outlier;
+    return start(model, *q_then, image);
+  }
+  outliers_ = 0;
+  const Eigen::Matrix4d gain = factor.solve(predicted).transpose();  // both symmetric
+  offset_ += gain * innovation;
+  covariance_ = predicted - gain * predicted;
+  covariance_ = (0.5 * (covariance_ + covariance_.transpose())).eval();
+  limit_offset(state->jacobian);
+  ends_offset_px_ +=
+      -std::expm1(-config_.bandwidth_rad_s * interval_s) * (image.ends_px - state->ends_px - ends_offset_px_);
+  delay_estimator_.add(image.time_s, *q_then + offset_ + innovation - gain * innovation, seen_noise, history);
+  updated_s_ = image.time_s;
+  q_joint_then_ = *q_then;
+  follow_delay(interval_s);
+  return Update::accepted;
+}
+
+Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q_then, const ImageMeasurement& image) {
+  // From where the image says, then from where the readings say.
+  std::optional<NewtonInverse> found;
+  if (image.q) found = newton_inverse(model, image.features, *image.q, scales_);
+  if (!found || !found->converged) {
+    const auto other = newton_inverse(model, image.features, q_then + offset_, scales_);
+    if (!found || (other && other->converged)) found = other;
+  }
+  if (!found) return Update::not_modelled;
+  offset_ = found->q - q_then;
+  feature_offset_.setZero();
+  const auto state = model(found->q);
+  if (!state) return Update::not_modelled;
+  limit_offset(state->jacobian);
+  const auto limited = model(q_then + offset_);
+  if (!limited) return Update::not_modelled;
+  feature_offset_ = feature_error(image.features, limited->features);
+  ends_offset_px_ = image.ends_px - limited->ends_px;
+  const Eigen::Matrix4d inverse = damped_inverse(limited->jacobian, scales_).inverse;
+  covariance_ =
+      inverse * image.covariance * inverse.transpose() +
+      Eigen::Matrix4d(
+          noise_for_bandwidth(config_.offset_walk.cwiseAbs2() / 60, config_.bandwidth_rad_s, 1.0 / 60).asDiagonal());
+  updated_s_ = image.time_s;
+  q_joint_then_ = q_then;
+  outliers_ = 0;
+  started_ = true;
+  return Update::reacquired;
+}
+
+bool OffsetObserver::agrees_with_last_outlier(const Eigen::Vector4d& seen_offset,
+                                              const Eigen::Matrix4d& innovation_covariance) {
+  const Eigen::Vector4d apart = seen_offset - last_outlier_;
+  const bool agrees = outliers_ > 0 && apart.dot(innovation_covariance.ldlt().solve(apart)) < config_.gate_chi2;
+  outliers_ = agrees ? outliers_ + 1 : 1;
+  last_outlier_ = seen_offset;
+  return outliers_ >= config_.reacquire_after;
+}
+
+void OffsetObserver::limit_offset(const Eigen::Matrix4d& jacobian) {
+  const Eigen::Vector4d within = offset_.cwiseMax(-config_.largest_offset).cwiseMin(config_.largest_offset);
+  feature_offset_ += jacobian * (offset_ - within);
+  offset_ = within;
+}
+
+void OffsetObserver::follow_delay(double interval_s) {
+  if (config_.delay_s) return;
+  const auto seen = delay_estimator_.estimate();
+  if (!seen) return;
+  constexpr double fastest = 0.1;  // seconds of delay per second, so that the prediction does not jump
+  delay_s_ += std::clamp(seen->delay_s - delay_s_, -fastest * interval_s, fastest * interval_s);
+}
+
+std::optional<DelayEstimate> OffsetObserver::delay_estimate() const {
+  if (config_.delay_s) return std::nullopt;
+  return delay_estimator_.estimate();
+}
+
+std::optional<Estimate> OffsetObserver::estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint,
+                                                 double time_s) const {
+  if (!started_) return std::nullopt;
+  Estimate now;
+  now.q = q_joint + offset_;
+  const auto state = model(now.q);
+  if (!state) return std::nullopt;
+  const double age_s = std::max(0.0, time_s - updated_s_) + delay_s_;
+  now.q_covariance = covariance_ + Eigen::Matrix4d(walk_variance(age_s, q_joint - q_joint_then_).asDiagonal());
+  now.features = state->features + feature_offset_;
+  now.jacobian = state->jacobian;
+  now.covariance = feature_covariance(*state, now.q_covariance);
+  now.ends_px = state->ends_px + ends_offset_px_;
+  now.ends_jacobian = state->ends_jacobian;
+  return now;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,115 @@
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/delay_estimator.h"
+#include "lapservo/control/feature_model.h"
+#include "lapservo/control/joint_history.h"
+
+namespace lapservo {
+
+/// What one frame tells the controller. The image stamped `time_s` shows the scene at time_s - delay: stamp it when it
+/// arrives and the delay is the whole chain's, or when it was exposed and the delay is zero.
+struct ImageMeasurement {
+  bool found = false;  ///< false: the marker was not seen; nothing else counts then
+  double time_s = 0;
+  Eigen::Vector4d features = Eigen::Vector4d::Zero();        ///< s_rad, r_px, l_px, d_px on ideal pixels
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< of the features
+  Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();         ///< e0 u, v, e3 u, v
+  std::optional<Eigen::Vector4d> q;                          ///< a start for the first frame, when known
+};
+
+/// Covariance of features from that of q.
+inline Eigen::Matrix4d feature_covariance(const FeatureState& state, const Eigen::Matrix4d& q_covariance) {
+  return state.jacobian * q_covariance * state.jacobian.transpose();
+}
+
+struct ObserverConfig {
+  std::optional<double> delay_s;  ///< known delay; absent: estimated from the data
+  double initial_delay_s = 0.1;   ///< until there is an estimate
+  double bandwidth_rad_s = 8;     ///< how fast the offset follows the image
+  /// Random walk of the offset between readings and truth, per square root of a second: theta, phi, rho, psi.
+  Eigen::Vector4d offset_walk{0.002, 0.002, 0.0003, 0.008};
+  /// The offset changes with motion too (backlash, a wrong camera model): by about this share of the distance moved.
+  double offset_per_motion = 0.3;
+  /// How far the offset may move the model's configuration from the readings; what a wrong model needs beyond that is
+  /// put into the features instead.
+  Eigen::Vector4d largest_offset{0.35, 0.35, 0.03, 0.8};
+  double gate_chi2 = 28.5;  ///< innovations beyond it are outliers: 1 in 100000 of 4 degrees of freedom
+  int reacquire_after = 5;  ///< so many outliers in a row that agree with each other are the truth
+  DelayEstimatorConfig delay_estimator;
+};
+
+enum class Update {
+  accepted,
+  outlier,       ///< beyond the gate: ignored
+  reacquired,    ///< the first one, or the last of several outliers that agree: started anew from it
+  no_history,    ///< there are no readings from the time when the image was taken
+  not_modelled,  ///< the model sees nothing where the instrument should be
+  non_finite,
+};
+
+/// The instrument now.
+struct Estimate {
+  Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< readings plus offset
+  Eigen::Matrix4d q_covariance = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d features = Eigen::Vector4d::Zero();  ///< unbiased in the image even if the model is wrong
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  Eigen::Matrix4d jacobian = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();
+  Eigen::Matrix4d ends_jacobian = Eigen::Matrix4d::Zero();
+};
+
+/// Fuses joint readings, which are fast and smooth but off (kinematic offsets, backlash), with the image, which is
+/// right but late. The state is the offset b such that the model at q_joint(t - delay) + b shows the features seen at
+/// t: a slowly varying random walk, estimated by a Kalman filter with full covariance. Then the features now are those
+/// of the model at q_joint(now) + b, so the delay does not enter the loop except through changes of b.
+///
+/// The innovation is the difference in *features*, carried to q by the damped inverse of the model's Jacobian. The
+/// filter rests only where that difference is zero on average, so in steady state the features are unbiased whatever is
+/// wrong with the model: a wrong model only changes how fast b follows. With M = J_true J_model^-1 the loop is stable
+/// for every delay and bandwidth when all eigenvalues of M lie within 1 of 1 (small gain), and for bandwidths well
+/// below 1 / delay when they have positive real parts.
+class OffsetObserver {
+ public:
+  OffsetObserver(const ObserverConfig& config, const Scales& scales) : config_(config), scales_(scales) {
+    delay_s_ = config.delay_s.value_or(config.initial_delay_s);
+    delay_estimator_ = DelayEstimator(config.delay_estimator);
+  }
+
+  Update update(const FeatureModel& model, const JointHistory& history, const ImageMeasurement& image);
+
+  /// nullopt before the first image and where the model sees nothing.
+  std::optional<Estimate> estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint, double time_s) const;
+
+  double delay_s() const { return delay_s_; }
+  /// What the data say; nullopt when the delay is given or there was too little motion.
+  std::optional<DelayEstimate> delay_estimate() const;
+  const Eigen::Vector4d& offset() const { return offset_; }
+  bool started() const { return started_; }
+
+ private:
+  Update start(const FeatureModel& model, const Eigen::Vector4d& q_then, const ImageMeasurement& image);
+  bool agrees_with_last_outlier(const Eigen::Vector4d& seen_offset, const Eigen::Matrix4d& innovation_covariance);
+  void limit_offset(const Eigen::Matrix4d& jacobian);
+  void follow_delay(double interval_s);
+  Eigen::Vector4d walk_variance(double interval_s, const Eigen::Vector4d& moved) const;
+
+  ObserverConfig config_;
+  Scales scales_;
+  DelayEstimator delay_estimator_;
+  double delay_s_ = 0;
+  bool started_ = false;
+  double updated_s_ = 0;                                      ///< stamp of the last accepted image
+  Eigen::Vector4d q_joint_then_ = Eigen::Vector4d::Zero();    ///< readings at that image
+  Eigen::Vector4d offset_ = Eigen::Vector4d::Zero();          ///< b
+  Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero();      ///< of b
+  Eigen::Vector4d feature_offset_ = Eigen::Vector4d::Zero();  ///< what b can't explain
+  Eigen::Vector4d ends_offset_px_ = Eigen::Vector4d::Zero();
+  int outliers_ = 0;
+  Eigen::Vector4d last_outlier_ = Eigen::Vector4d::Zero();  ///< the offset it would have meant
+};
+
+}  // namespace lapservo

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/affine_fit.h"
+#include "lapservo/control/feature_model.h"
+#include "lapservo/control/joint_history.h"
+#include "lapservo/control/motion_limits.h"
+
+namespace lapservo {
+
+struct ProbingConfig {
+  /// How far each joint goes, one after the other, and comes back: theta_rad, phi_rad, rho_m, psi_rad.
+  Eigen::Vector4d distance{0.03, 0.03, 0.004, 0.16};
+  double joint_time_s = 0.7;  ///< there and back
+};
+
+/// The small motion by which an uncalibrated controller learns what its joints do in the image: x(t) = distance / 2
+/// (1 - cos(2 pi t / T)), joint after joint, away from the nearer joint limit; then rest until the last of it has
+/// been seen.
+class ProbingMotion {
+ public:
+  ProbingMotion() = default;
+  ProbingMotion(const ProbingConfig& config, const JointLimits& limits, const Eigen::Vector4d& q_joint);
+
+  Eigen::Vector4d velocity(double time_s) const;
+  double duration_s() const;
+
+ private:
+  Eigen::Vector4d distance_ = Eigen::Vector4d::Zero();  ///< signed
+  double joint_time_s_ = 1;
+};
+
+/// An affine image model learnt from a probing motion, together with the delay.
+struct ProbedModel {
+  Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< where x = 0
+  AffineFit::Solution fit;                      ///< in scales, x = (q - this->q) / joint scales
+  double delay_s = 0;
+};
+
+/// Fits the model at each of a grid of delays at once: the right one leaves the smallest residuals.
+class ProbingFit {
+ public:
+  static constexpr double step_s = 0.01;
+  static constexpr std::size_t candidates = 31;  ///< 0 to 300 ms
+
+  /// With a known delay, only that one is fitted.
+  ProbingFit(const Scales& scales, std::optional<double> delay_s) : scales_(scales), known_delay_s_(delay_s) {}
+
+  /// Ignored while the history does not reach back to the longest delay.
+  void add(double stamp_s, const Eigen::Vector4d& features, const Eigen::Vector4d& ends_px,
+           const JointHistory& history);
+  /// nullopt when the motion was too small or the delay lies beyond the grid.
+  std::optional<ProbedModel> solve() const;
+
+ private:
+  double candidate_s(std::size_t i) const { return known_delay_s_ ? *known_delay_s_ : step_s * static_cast<double>(i); }
+  std::size_t used() const { return known_delay_s_ ? 1 : candidates; }
+
+  Scales scales_;
+  std::optional<double> known_delay_s_;
+  bool started_ = false;
+  Eigen::Vector4d first_q_ = Eigen::Vector4d::Zero();
+  Eigen::Vector4d first_features_ = Eigen::Vector4d::Zero();
+  Eigen::Vector4d first_ends_px_ = Eigen::Vector4d::Zero();
+  std::array<AffineFit, candidates> fits_;
+};
+
+}  // namespace lapservo

@@ -1,0 +1,64 @@
+#include "lapservo/control/setpoint_interpolator.h"
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double period_s = 1.0 / 60;
+
+Eigen::Vector4d random_vector(Random& random) {
+  return {random.normal(), random.normal(), random.normal(), random.normal()};
+}
+
+TEST(SetpointInterpolator, PathIsSmoothAtTheArmsRate) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    Random random(seed);
+    SetpointInterpolator path;
+    path.reset(0, random_vector(random));
+    constexpr double tick_s = 0.0005;
+    MotionState before = path.at(0);
+    for (int k = 0; k < 60; ++k) {
+      const Eigen::Vector4d velocity = random_vector(random), last = path.end().velocity;
+      path.ramp_to(k * period_s, velocity, period_s);
+      const double largest_rate = velocity.cwiseAbs().cwiseMax(last.cwiseAbs()).maxCoeff();
+      for (double t = k * period_s + tick_s; t < (k + 1) * period_s; t += tick_s) {
+        const MotionState now = path.at(t);
+        EXPECT_LE(now.velocity.cwiseAbs().maxCoeff(), largest_rate + 1e-12);
+        // The velocity is the position's derivative, and both are continuous.
+        const Eigen::Vector4d mean = (now.velocity + before.velocity) / 2;
+        EXPECT_LT((now.position - before.position).cwiseAbs().maxCoeff(), 1.5 * tick_s * (largest_rate + 0.1));
+        if (t > k * period_s + 1.5 * tick_s) {
+          EXPECT_LT(((now.position - before.position) / tick_s - mean).norm(), 1e-6);
+        }
+        before = now;
+      }
+      EXPECT_TRUE(path.end().velocity.isApprox(velocity, 1e-12));
+    }
+  }
+}
+
+TEST(SetpointInterpolator, CoversTheMeanVelocityTimesThePeriod) {
+  SetpointInterpolator path;
+  path.reset(1, Eigen::Vector4d::Zero());
+  path.ramp_to(1, Eigen::Vector4d::Ones(), 0.1);
+  EXPECT_NEAR(path.end().position[0], 0.05, 1e-12);
+  path.ramp_to(1.1, Eigen::Vector4d::Zero(), 0.1);
+  EXPECT_NEAR(path.end().position[0], 0.1, 1e-12);
+}
+
+TEST(SetpointInterpolator, StaysAtTheEndWhenTheControllerIsLate) {
+  SetpointInterpolator path;
+  path.reset(0, Eigen::Vector4d::Zero());
+  path.ramp_to(0, Eigen::Vector4d::Ones(), 0.1);
+  EXPECT_EQ(path.at(0.1).position, path.at(5).position);
+  path.ramp_to(5, Eigen::Vector4d::Zero(), 0.1);
+  EXPECT_EQ(path.at(5).position, path.at(0.2).position);
+  EXPECT_NEAR(path.end().position[0], 0.1, 1e-12);
+}
+
+}  // namespace
+}  // namespace lapservo

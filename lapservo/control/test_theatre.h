@@ -1,0 +1,205 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "lapservo/control/newton_inverse.h"
+#include "lapservo/control/visual_controller.h"
+#include "lapservo/core/random.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/rcm_coordinates.h"
+
+namespace lapservo::testing {
+
+/// A rig for tests: the one of the paper's trajectory.
+struct TestRig {
+  Camera camera{1280, 720, 1100, 1100, 639.5, 359.5, {}, {}};
+  Marker marker = paper_marker();
+  Rigid3 camera_from_rcm{
+      Eigen::Quaterniond(0.647311937403, 0.683756495442, 0.180213914393, 0.284582599073).normalized(),
+      {-0.0623, -0.0494, 0.09}};
+
+  static Marker paper_marker() {
+    Marker marker;
+    marker.diameter_m = 0.0084;
+    marker.bands_upper_m = {0.005, 0.005, 0.025};
+    marker.bands_lower_m = {0.014, 0.014, 0.007};
+    return marker;
+  }
+};
+
+struct SeenFeatures {
+  Eigen::Matrix<double, 8, 1> values;  ///< s, r, l, d, ends
+  double tau_rad;
+};
+
+inline std::optional<SeenFeatures> seen_at(const TestRig& rig, const Eigen::Vector4d& q) {
+  const auto coordinates = RcmCoordinates::from_vector(q);
+  const auto line =
+      centre_line(rig.camera, rig.marker, rig.camera_from_rcm * rcm_from_unrolled(coordinates), coordinates.psi_rad);
+  if (!line) return std::nullopt;
+  const Features f = features_of(line->ideal_px, projected_rcm_px(rig.camera, rig.camera_from_rcm));
+  SeenFeatures seen;
+  seen.values << f.s_rad, f.r_px.value(), f.l_px, f.d_px, line->ideal_px[0], line->ideal_px[3];
+  seen.tau_rad = line->tau_rad;
+  return seen;
+}
+
+/// Exact map with a Jacobian by differences, one-sided next to the seam.
+inline std::optional<FeatureState> exact_map(const TestRig& rig, const Eigen::Vector4d& q) {
+  const auto here = seen_at(rig, q);
+  if (!here) return std::nullopt;
+  Eigen::Matrix<double, 8, 4> jacobian;
+  for (int i = 0; i < 4; ++i) {
+    constexpr double h = 1e-6;
+    auto plus = seen_at(rig, q + h * Eigen::Vector4d::Unit(i)), minus = seen_at(rig, q - h * Eigen::Vector4d::Unit(i));
+    if (!plus || !minus) return std::nullopt;
+    double width = 2 * h;
+    if (std::abs(plus->tau_rad - here->tau_rad) > 1) {
+      plus = here;
+      width = h;
+    } else if (std::abs(minus->tau_rad - here->tau_rad) > 1) {
+      minus = here;
+      width = h;
+    }
+    Eigen::Matrix<double, 8, 1> change = plus->values - minus->values;
+    change[0] = wrap_pi(change[0]);
+    jacobian.col(i) = change / width;
+  }
+  return FeatureState{here->values.head<4>(), jacobian.topRows<4>(), here->values.tail<4>(), jacobian.bottomRows<4>()};
+}
+
+inline FeatureModel model_of(const TestRig& rig) {
+  return [rig](const Eigen::Vector4d& q) { return exact_map(rig, q); };
+}
+
+/// What is wrong between the controller and the instrument.
+struct Flaws {
+  double latency_s = 0.08;
+  bool delay_known = true;
+  Eigen::Vector4d offset = Eigen::Vector4d::Zero();    ///< true joints minus readings
+  Eigen::Vector4d backlash = Eigen::Vector4d::Zero();  ///< full play, joint by joint
+  double lag_s = 0;                                    ///< of the arm, first order
+  Eigen::Vector4d resolution{1e-5, 1e-5, 2e-6, 1e-4};  ///< of the readings
+  Eigen::Vector4d noise{4e-4, 0.15, 0.15, 0.15};       ///< of the image
+  std::function<bool(double time_s)> hidden = [](double) { return false; };
+  std::function<ImageMeasurement(const ImageMeasurement&)> spoil = [](const ImageMeasurement& m) { return m; };
+};
+
+struct Moment {
+  double time_s = 0;
+  Eigen::Vector4d error = Eigen::Vector4d::Zero();  ///< true features minus desired
+  Eigen::Vector4d q_true = Eigen::Vector4d::Zero();
+  FeatureState truth;
+  ControlStep step;
+};
+
+/// An arm with lag, offsets and play before a camera with latency; 60 periods and frames a second.
+class Theatre {
+ public:
+  Theatre(const TestRig& rig, const Flaws& flaws, const Eigen::Vector4d& q_readings, std::uint64_t seed)
+      : rig_(rig), flaws_(flaws), random_(seed), motor_(q_readings), played_(q_readings) {}
+
+  Eigen::Vector4d readings() const {
+    return (motor_.cwiseQuotient(flaws_.resolution)).array().round().matrix().cwiseProduct(flaws_.resolution);
+  }
+  Eigen::Vector4d q_true() const { return played_ + flaws_.offset; }
+
+  std::vector<Moment> run(VisualController& controller, const Trajectory& trajectory, double duration_s) {
+    std::vector<Moment> moments;
+    const double period_s = controller.config().period_s;
+    const auto periods = static_cast<long>(duration_s / period_s);
+    for (long k = 0; k < periods; ++k) {
+      const double time_s = start_s_ + static_cast<double>(k) * period_s;
+      Moment moment;
+      moment.time_s = time_s;
+      moment.q_true = q_true();
+      moment.truth = exact_map(rig_, q_true()).value();
+      const DesiredFeatures desired = trajectory.at(time_s);
+      moment.error = feature_error(moment.truth.features, desired.features);
+      expose(time_s, moment.truth);
+      moment.step = controller.step(time_s, readings(), arrived(time_s), desired);
+      move(controller, time_s, period_s);
+      moments.push_back(moment);
+    }
+    start_s_ += static_cast<double>(periods) * period_s;
+    return moments;
+  }
+
+ private:
+  void expose(double time_s, const FeatureState& truth) {
+    ImageMeasurement image;
+    image.time_s = time_s + flaws_.latency_s;
+    image.found = !flaws_.hidden(time_s);
+    for (int i = 0; i < 4; ++i) image.features[i] = truth.features[i] + flaws_.noise[i] * random_.normal();
+    for (int i = 0; i < 4; ++i) image.ends_px[i] = truth.ends_px[i] + 0.15 * random_.normal();
+    image.covariance = flaws_.noise.cwiseMax(1e-9).cwiseAbs2().asDiagonal();
+    on_the_way_.push_back(flaws_.spoil(image));
+  }
+  std::optional<ImageMeasurement> arrived(double time_s) {
+    std::optional<ImageMeasurement> latest;
+    while (!on_the_way_.empty() && on_the_way_.front().time_s <= time_s + 1e-9) {
+      latest = on_the_way_.front();
+      on_the_way_.pop_front();
+    }
+    return latest;
+  }
+  void move(const VisualController& controller, double time_s, double period_s) {
+    constexpr int parts = 8;
+    for (int i = 1; i <= parts; ++i) {
+      const Eigen::Vector4d setpoint = controller.path().at(time_s + period_s * i / parts).position;
+      const double share = flaws_.lag_s > 0 ? -std::expm1(-period_s / parts / flaws_.lag_s) : 1.0;
+      motor_ += share * (setpoint - motor_);
+      played_ = played_.cwiseMax(motor_ - flaws_.backlash / 2).cwiseMin(motor_ + flaws_.backlash / 2);
+    }
+  }
+
+  TestRig rig_;
+  Flaws flaws_;
+  Random random_;
+  Eigen::Vector4d motor_, played_;
+  std::deque<ImageMeasurement> on_the_way_;
+  double start_s_ = 0;
+};
+
+/// The paper's trajectory, V-D, with periods of our own.
+inline Sinusoids paper_sinusoids() {
+  Sinusoids f;
+  f.offset = {0.9, 795, 365, 212};
+  f.amplitude = {0.05, 60, 30, 37};
+  f.period_s = {12, 10, 14, 9};
+  return f;
+}
+
+inline ControllerConfig test_config(const Flaws& flaws) {
+  ControllerConfig config;
+  config.window = ImageWindow{20, 1259, 20, 699};
+  if (flaws.delay_known) config.observer.delay_s = flaws.latency_s;
+  return config;
+}
+
+/// Readings within the joint limits at which the true instrument shows well inside the window.
+inline Eigen::Vector4d random_start(const TestRig& rig, const ControllerConfig& config, const Flaws& flaws,
+                                    Random& random, double margin_px = 30) {
+  const ImageWindow& w = config.window.value();
+  while (true) {
+    const Eigen::Vector4d q(random.uniform(-0.25, 0.35), random.uniform(1.35, 1.8), random.uniform(0.05, 0.085),
+                            random.uniform(-3, 3));
+    const auto state = exact_map(rig, q + flaws.offset);
+    if (!state || state->features[2] < 80) continue;
+    const Eigen::Vector4d& e = state->ends_px;
+    const bool inside = std::min(e[0], e[2]) > w.u_min_px + margin_px &&
+                        std::max(e[0], e[2]) < w.u_max_px - margin_px &&
+                        std::min(e[1], e[3]) > w.v_min_px + margin_px && std::max(e[1], e[3]) < w.v_max_px - margin_px;
+    const auto tau = seen_at(rig, q + flaws.offset)->tau_rad;
+    if (!inside || tau < 0.5 || tau > two_pi - 0.5) continue;
+    const auto goal = newton_inverse(model_of(rig), paper_sinusoids().offset, q + flaws.offset, config.scales);
+    if (goal->converged && std::abs(goal->q[3]) < 2.5) return q;
+  }
+}
+
+}  // namespace lapservo::testing

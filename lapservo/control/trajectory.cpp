@@ -1,0 +1,176 @@
+#include "lapservo/control/trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::array<const char*, 4> feature_names{"s_rad", "r_px", "l_px", "d_px"};
+
+void require_finite(const char* what, const Eigen::Vector4d& values) {
+  for (int i = 0; i < 4; ++i) {
+    if (!std::isfinite(values[i])) {
+      throw InputError("trajectory", std::string(what) + "." + feature_names[static_cast<std::size_t>(i)],
+                       std::to_string(values[i]), "a finite number");
+    }
+  }
+}
+
+void require_positive(const char* what, const Eigen::Vector4d& values) {
+  require_finite(what, values);
+  for (int i = 0; i < 4; ++i) {
+    if (!(values[i] > 0)) {
+      throw InputError("trajectory", std::string(what) + "." + feature_names[static_cast<std::size_t>(i)],
+                       std::to_string(values[i]), "a number above 0");
+    }
+  }
+}
+
+/// Rests before `start` and after `end` of what it is given.
+Trajectory between(double start_s, double end_s, std::function<DesiredFeatures(double)> at) {
+  return {end_s, [start_s, end_s, inner = std::move(at)](double time_s) {
+            DesiredFeatures desired = inner(std::clamp(time_s, start_s, end_s));
+            if (time_s < start_s || time_s > end_s) {
+              desired.rate.setZero();
+              desired.acceleration.setZero();
+            }
+            return desired;
+          }};
+}
+
+struct Segment {
+  double start_s = 0, duration_s = 0;
+  Eigen::Vector4d from = Eigen::Vector4d::Zero(), change = Eigen::Vector4d::Zero();
+};
+
+DesiredFeatures minimum_jerk(const Segment& segment, double time_s) {
+  if (segment.duration_s <= 0) return {segment.from + segment.change, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+  const double x = std::clamp((time_s - segment.start_s) / segment.duration_s, 0.0, 1.0);
+  const double position = x * x * x * (10 + x * (6 * x - 15));
+  const double rate = 30 * x * x * (1 - x) * (1 - x) / segment.duration_s;
+  const double acceleration = 60 * x * (1 - x) * (1 - 2 * x) / (segment.duration_s * segment.duration_s);
+  return {segment.from + segment.change * position, segment.change * rate, segment.change * acceleration};
+}
+
+struct Spline {
+  std::vector<double> times_s;
+  std::vector<Eigen::Vector4d> values, curvatures;  ///< second derivatives at the knots
+};
+
+/// Natural end conditions; the tridiagonal system by Thomas' algorithm.
+Spline natural_spline(std::vector<double> times_s, std::vector<Eigen::Vector4d> values) {
+  const std::size_t n = times_s.size();
+  std::vector<Eigen::Vector4d> curvatures(n, Eigen::Vector4d::Zero());
+  std::vector<double> ratio(n, 0.0);
+  for (std::size_t i = 1; i + 1 < n; ++i) {
+    const double before_s = times_s[i] - times_s[i - 1], after_s = times_s[i + 1] - times_s[i];
+    const Eigen::Vector4d bend = 6 * ((values[i + 1] - values[i]) / after_s - (values[i] - values[i - 1]) / before_s);
+    const double pivot = 2 * (before_s + after_s) - before_s * ratio[i - 1];
+    ratio[i] = after_s / pivot;
+    curvatures[i] = (bend - before_s * curvatures[i - 1]) / pivot;
+  }
+  for (std::size_t i = n - 1; i-- > 1;) curvatures[i] -= ratio[i] * curvatures[i + 1];
+  return {std::move(times_s), std::move(values), std::move(curvatures)};
+}
+
+DesiredFeatures spline_at(const Spline& spline, double time_s) {
+  const auto above = std::upper_bound(spline.times_s.begin() + 1, spline.times_s.end() - 1, time_s);
+  const auto i = static_cast<std::size_t>(above - spline.times_s.begin()) - 1;
+  const double h = spline.times_s[i + 1] - spline.times_s[i];
+  const double b = (time_s - spline.times_s[i]) / h, a = 1 - b;
+  const Eigen::Vector4d &y0 = spline.values[i], &y1 = spline.values[i + 1];
+  const Eigen::Vector4d &m0 = spline.curvatures[i], &m1 = spline.curvatures[i + 1];
+  return {a * y0 + b * y1 + ((a * a * a - a) * m0 + (b * b * b - b) * m1) * (h * h / 6),
+          (y1 - y0) / h + ((3 * b * b - 1) * m1 - (3 * a * a - 1) * m0) * (h / 6), a * m0 + b * m1};
+}
+
+Trajectory from_table(const CsvTable& table, const std::string& source) {
+  if (table.rows() < 2) throw InputError(source, "expected at least two rows of time_s,s_rad,r_px,l_px,d_px");
+  std::vector<double> times_s;
+  std::vector<Eigen::Vector4d> values;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double time_s = table.number(row, "time_s");
+    Eigen::Vector4d value;
+    for (int i = 0; i < 4; ++i) value[i] = table.number(row, feature_names[static_cast<std::size_t>(i)]);
+    if (!times_s.empty()) {
+      if (!(time_s > times_s.back())) {
+        throw InputError(source, "row " + std::to_string(row + 1) + ".time_s", std::to_string(time_s),
+                         "a time after " + std::to_string(times_s.back()));
+      }
+      value[0] = values.back()[0] + wrap_pi(value[0] - values.back()[0]);
+    }
+    times_s.push_back(time_s);
+    values.push_back(value);
+  }
+  const double start_s = times_s.front(), end_s = times_s.back();
+  return between(start_s, end_s, [spline = natural_spline(std::move(times_s), std::move(values))](double time_s) {
+    return spline_at(spline, time_s);
+  });
+}
+
+}  // namespace
+
+Trajectory set_point(const Eigen::Vector4d& features) {
+  require_finite("set_point", features);
+  return {0, [features](double) {
+            return DesiredFeatures{features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+          }};
+}
+
+Trajectory sinusoids(const Sinusoids& sinusoids) {
+  require_finite("offset", sinusoids.offset);
+  require_finite("amplitude", sinusoids.amplitude);
+  require_finite("phase_rad", sinusoids.phase_rad);
+  require_positive("period_s", sinusoids.period_s);
+  return {0, [sinusoids](double time_s) {
+            const Eigen::Array4d frequency = two_pi * sinusoids.period_s.array().inverse();
+            const Eigen::Array4d angle = frequency * time_s + sinusoids.phase_rad.array();
+            const Eigen::Array4d amplitude = sinusoids.amplitude.array();
+            return DesiredFeatures{sinusoids.offset + (amplitude * angle.sin()).matrix(),
+                                   amplitude * frequency * angle.cos(),
+                                   -amplitude * frequency * frequency * angle.sin()};
+          }};
+}
+
+Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& largest_rate, double dwell_s) {
+  if (points.size() < 2) throw InputError("trajectory", "points", std::to_string(points.size()), "two points or more");
+  require_positive("largest_rate", largest_rate);
+  if (!(dwell_s >= 0)) throw InputError("trajectory", "dwell_s", std::to_string(dwell_s), "0 or more seconds");
+  constexpr double peak_rate = 1.875;  // of the minimum-jerk motion over unit distance in unit time
+  std::vector<Segment> segments;
+  Eigen::Vector4d from = points.front();
+  double start_s = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    require_finite("points", points[i - 1]);
+    require_finite("points", points[i]);
+    Eigen::Vector4d change = points[i] - from;
+    change[0] = wrap_pi(change[0]);
+    const double duration_s = peak_rate * change.cwiseAbs().cwiseQuotient(largest_rate).maxCoeff();
+    segments.push_back({start_s, duration_s, from, change});
+    from += change;
+    start_s += duration_s + dwell_s;
+  }
+  return between(0, start_s - dwell_s, [segments](double time_s) {
+    const auto next = std::upper_bound(segments.begin() + 1, segments.end(), time_s,
+                                       [](double t, const Segment& segment) { return t < segment.start_s; });
+    return minimum_jerk(*(next - 1), time_s);
+  });
+}
+
+Trajectory trajectory_from_csv(const std::filesystem::path& path) {
+  return from_table(CsvTable::read(path), path.string());
+}
+
+Trajectory trajectory_from_csv_text(std::string_view text, const std::string& source) {
+  return from_table(CsvTable::parse(text, source), source);
+}
+
+}  // namespace lapservo

@@ -1,0 +1,70 @@
+#include "lapservo/control/trajectory_check.h"
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "lapservo/control/newton_inverse.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::array<const char*, 4> joint_names{"theta_rad", "phi_rad", "rho_m", "psi_rad"};
+constexpr std::array<const char*, 4> end_names{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
+
+std::string bound_text(const char* limit, const char* name, double bound, double needed) {
+  std::array<char, 128> text{};
+  std::snprintf(text.data(), text.size(), "%s %s %.4g: needs %.4g", limit, name, bound, needed);
+  return text.data();
+}
+
+std::optional<std::string> broken_joint_limit(const JointLimits& limits, const Eigen::Vector4d& q,
+                                              const Eigen::Vector4d& velocity) {
+  for (int i = 0; i < 4; ++i) {
+    const char* name = joint_names[static_cast<std::size_t>(i)];
+    if (q[i] < limits.lower[i]) return bound_text("limits.lower", name, limits.lower[i], q[i]);
+    if (q[i] > limits.upper[i]) return bound_text("limits.upper", name, limits.upper[i], q[i]);
+    if (std::abs(velocity[i]) > limits.rate[i]) return bound_text("limits.rate", name, limits.rate[i], velocity[i]);
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> outside_window(const ImageWindow& window, const Eigen::Vector4d& ends_px) {
+  const Eigen::Vector4d lower(window.u_min_px, window.v_min_px, window.u_min_px, window.v_min_px);
+  const Eigen::Vector4d upper(window.u_max_px, window.v_max_px, window.u_max_px, window.v_max_px);
+  for (int i = 0; i < 4; ++i) {
+    const char* name = end_names[static_cast<std::size_t>(i)];
+    if (ends_px[i] < lower[i]) return bound_text("field of view: least", name, lower[i], ends_px[i]);
+    if (ends_px[i] > upper[i]) return bound_text("field of view: largest", name, upper[i], ends_px[i]);
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> broken_limit(const ControllerConfig& config, const FeatureState& state,
+                                        const Eigen::Vector4d& q, const Eigen::Vector4d& rate) {
+  const DampedInverse inverse = damped_inverse(state.jacobian, config.scales, config.damping_threshold);
+  if (inverse.smallest_singular_value < config.least_singular_value) return "the Jacobian is singular";
+  if (auto broken = broken_joint_limit(config.limits, q, inverse.inverse * rate)) return broken;
+  if (config.window) return outside_window(*config.window, state.ends_px);
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
+                                          const ControllerConfig& config, const Eigen::Vector4d& q_start,
+                                          double step_s) {
+  Eigen::Vector4d q = q_start;
+  const auto steps = static_cast<long>(std::ceil(duration_s / step_s));
+  for (long i = 0; i <= steps; ++i) {
+    const double time_s = step_s * static_cast<double>(i);
+    const DesiredFeatures desired = trajectory.at(time_s);
+    const auto found = newton_inverse(model, desired.features, q, config.scales);
+    if (!found || !found->converged) return Infeasible{time_s, "no configuration shows these features"};
+    q = found->q;
+    if (auto broken = broken_limit(config, *model(q), q, desired.rate)) return Infeasible{time_s, *broken};
+  }
+  return std::nullopt;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,151 @@
+#include "lapservo/control/trajectory.h"
+
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/control/test_theatre.h"
+#include "lapservo/control/trajectory_check.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+/// rate is the derivative of features and acceleration that of rate, at times that are no corners.
+void expect_consistent(const Trajectory& trajectory, double start_s, double end_s) {
+  Random random(5);
+  for (int i = 0; i < 200; ++i) {
+    const double t = random.uniform(start_s, end_s);
+    constexpr double h = 1e-5;
+    const auto before = trajectory.at(t - h), now = trajectory.at(t), after = trajectory.at(t + h);
+    const Eigen::Vector4d rate = (after.features - before.features) / (2 * h);
+    const Eigen::Vector4d acceleration = (after.rate - before.rate) / (2 * h);
+    EXPECT_LT((now.rate - rate).norm(), 1e-5 * (1 + rate.norm())) << t;
+    EXPECT_LT((now.acceleration - acceleration).norm(), 1e-3 * (1 + acceleration.norm())) << t;
+  }
+}
+
+TEST(Trajectory, SinusoidsAreThePapersWithTheirDerivatives) {
+  const Sinusoids f{{0.9, 795, 365, 212}, {0.05, 60, 30, 37}, {12, 10, 14, 9}, {0, 0.5, 1, 1.5}};
+  const Trajectory trajectory = sinusoids(f);
+  expect_consistent(trajectory, 0, 40);
+  for (int i = 0; i < 4; ++i) {
+    const double expected = f.offset[i] + f.amplitude[i] * std::sin(two_pi * 3.3 / f.period_s[i] + f.phase_rad[i]);
+    EXPECT_NEAR(trajectory.at(3.3).features[i], expected, 1e-9);
+  }
+}
+
+TEST(Trajectory, SetPointRests) {
+  const auto desired = set_point({1, 2, 3, 4}).at(17);
+  EXPECT_EQ(desired.features, Eigen::Vector4d(1, 2, 3, 4));
+  EXPECT_TRUE(desired.rate.isZero() && desired.acceleration.isZero());
+}
+
+TEST(Trajectory, ViaPointsAreReachedWithinTheLargestRate) {
+  const std::vector<Eigen::Vector4d> points{{3, 700, 300, 200}, {-3, 800, 350, 180}, {-2.8, 780, 350, 240}};
+  const Eigen::Vector4d largest_rate(0.1, 50, 20, 30);
+  const Trajectory trajectory = via_points(points, largest_rate, 0.5);
+  expect_consistent(trajectory, 1e-3, trajectory.duration_s - 1e-3);
+  double fastest = 0;
+  for (double t = 0; t <= trajectory.duration_s; t += 0.001) {
+    fastest = std::max(fastest, trajectory.at(t).rate.cwiseAbs().cwiseQuotient(largest_rate).maxCoeff());
+  }
+  EXPECT_LE(fastest, 1 + 1e-9);
+  EXPECT_GT(fastest, 0.999);
+  EXPECT_NEAR(trajectory.at(0).features[0], 3, 1e-12);
+  const auto last = trajectory.at(trajectory.duration_s);
+  EXPECT_NEAR(wrap_pi(last.features[0] + 2.8), 0, 1e-9);
+  EXPECT_NEAR(last.features[3], 240, 1e-9);
+  EXPECT_LT(last.rate.norm(), 1e-6);
+  // s goes from 3 to -3 through pi, not through 0.
+  EXPECT_GT(trajectory.at(1).features[0], 3 - 1e-9);
+}
+
+TEST(Trajectory, CsvIsASmoothCurveThroughItsRows) {
+  std::string text = "time_s,s_rad,r_px,l_px,d_px\n";
+  const Sinusoids f{{3.1, 795, 365, 212}, {0.3, 60, 30, 37}, {12, 10, 14, 9}, {0, 0.5, 1, 1.5}};
+  const Trajectory source = sinusoids(f);
+  for (int i = 0; i <= 100; ++i) {
+    const auto row = source.at(0.1 * i).features;
+    text += std::to_string(0.1 * i) + "," + std::to_string(wrap_pi(row[0])) + "," + std::to_string(row[1]) + "," +
+            std::to_string(row[2]) + "," + std::to_string(row[3]) + "\n";
+  }
+  const Trajectory trajectory = trajectory_from_csv_text(text, "path.csv");
+  EXPECT_NEAR(trajectory.duration_s, 10, 1e-9);
+  expect_consistent(trajectory, 0.01, 9.99);
+  for (double t = 1; t < 9; t += 0.037) {
+    EXPECT_NEAR(trajectory.at(t).features[0], source.at(t).features[0], 1e-4);
+    EXPECT_LT((trajectory.at(t).features - source.at(t).features).norm(), 2e-3);
+    EXPECT_LT((trajectory.at(t).rate - source.at(t).rate).norm(), 0.05);
+  }
+  EXPECT_EQ(trajectory.at(99).features, trajectory.at(10).features);
+  EXPECT_TRUE(trajectory.at(99).rate.isZero());
+}
+
+TEST(Trajectory, BadInputIsNamed) {
+  const auto message = [](const std::string& text) -> std::string {
+    try {
+      trajectory_from_csv_text(text, "path.csv");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::string header = "time_s,s_rad,r_px,l_px,d_px\n";
+  EXPECT_NE(message(header + "0,1,2,3,4\n0,1,2,3,4\n").find("time_s"), std::string::npos);
+  EXPECT_NE(message(header + "0,1,2,3,4\n1,1,2,x,4\n").find("l_px"), std::string::npos);
+  EXPECT_NE(message("time_s,s_rad\n0,1\n1,1\n").find("r_px"), std::string::npos);
+  EXPECT_NE(message(header + "0,1,2,3,4\n").find("two rows"), std::string::npos);
+  EXPECT_THROW(sinusoids({Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero(), {1, 0, 1, 1}, Eigen::Vector4d::Zero()}),
+               InputError);
+  EXPECT_THROW(via_points({Eigen::Vector4d::Zero()}, Eigen::Vector4d::Ones()), InputError);
+  EXPECT_THROW(set_point(Eigen::Vector4d::Constant(NAN)), InputError);
+}
+
+class TrajectoryCheck : public ::testing::Test {
+ protected:
+  testing::TestRig rig;
+  FeatureModel model = testing::model_of(rig);
+  ControllerConfig config = testing::test_config({});
+  Eigen::Vector4d start{0.05, 1.57, 0.064, 1};
+};
+
+TEST_F(TrajectoryCheck, AcceptsThePapersTrajectory) {
+  const auto problem = find_infeasible(sinusoids(testing::paper_sinusoids()), 30, model, config, start);
+  EXPECT_FALSE(problem) << problem->what << " at " << problem->time_s;
+}
+
+TEST_F(TrajectoryCheck, NamesTimeAndLimit) {
+  auto far = testing::paper_sinusoids();
+  far.amplitude[1] = 600;  // off the image
+  const auto outside = find_infeasible(sinusoids(far), 30, model, config, start);
+  ASSERT_TRUE(outside);
+  EXPECT_GT(outside->time_s, 0);
+
+  auto fast = testing::paper_sinusoids();
+  fast.period_s[1] = 0.5;
+  const auto rate = find_infeasible(sinusoids(fast), 30, model, config, start);
+  ASSERT_TRUE(rate);
+  EXPECT_NE(rate->what.find("limits.rate"), std::string::npos) << rate->what;
+
+  ControllerConfig narrow = config;
+  narrow.limits.upper[2] = 0.066;
+  const auto joint = find_infeasible(sinusoids(testing::paper_sinusoids()), 30, model, narrow, start);
+  ASSERT_TRUE(joint);
+  EXPECT_NE(joint->what.find("limits.upper rho_m 0.066"), std::string::npos) << joint->what;
+
+  narrow = config;
+  narrow.window = ImageWindow{20, 800, 20, 699};
+  const auto window = find_infeasible(sinusoids(testing::paper_sinusoids()), 30, model, narrow, start);
+  ASSERT_TRUE(window);
+  EXPECT_NE(window->what.find("field of view"), std::string::npos) << window->what;
+
+  const auto none = find_infeasible(set_point({0.9, 795, 365, 900}), 1, model, config, start);
+  ASSERT_TRUE(none);
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,412 @@
+#include "lapservo/control/visual_controller.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/control/test_theatre.h"
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+
+using testing::Flaws;
+using testing::Moment;
+using testing::TestRig;
+using testing::Theatre;
+
+const Eigen::Vector4d close_enough{0.005, 1, 1, 1};
+
+/// Kinematic offsets of 2 degrees and 3 mm, a lagging arm.
+Flaws usual_flaws() {
+  Flaws flaws;
+  flaws.offset = {0.035, -0.035, 0.003, 0.035};
+  flaws.lag_s = 0.02;
+  return flaws;
+}
+
+struct Run {
+  std::vector<Moment> moments;
+  double delay_s = 0;
+};
+
+Run run(const ControllerConfig& config, const FeatureModel& model, const Flaws& flaws, const Trajectory& trajectory,
+        double duration_s, std::uint64_t seed) {
+  Random random(seed);
+  const TestRig rig;
+  VisualController controller(config, model);
+  Theatre theatre(rig, flaws, testing::random_start(rig, config, flaws, random), seed);
+  Run result{theatre.run(controller, trajectory, duration_s), 0};
+  result.delay_s = controller.delay_s();
+  return result;
+}
+
+/// When the features came close for good.
+double settled_s(const std::vector<Moment>& moments) {
+  double last_s = 0;
+  for (const Moment& m : moments) {
+    if ((m.error.cwiseAbs() - close_enough).maxCoeff() > 0) last_s = m.time_s;
+  }
+  return last_s;
+}
+
+Eigen::Vector4d rms_after(const std::vector<Moment>& moments, double time_s) {
+  Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+  int samples = 0;
+  for (const Moment& m : moments) {
+    if (m.time_s < time_s) continue;
+    squares += m.error.cwiseAbs2();
+    ++samples;
+  }
+  return (squares / samples).cwiseSqrt();
+}
+
+Eigen::Vector4d mean_after(const std::vector<Moment>& moments, double time_s) {
+  Eigen::Vector4d sum = Eigen::Vector4d::Zero();
+  int samples = 0;
+  for (const Moment& m : moments) {
+    if (m.time_s < time_s) continue;
+    sum += m.error;
+    ++samples;
+  }
+  return sum / samples;
+}
+
+void expect_limits_kept(const std::vector<Moment>& moments, const JointLimits& limits, double period_s) {
+  MotionState before{moments.front().step.setpoint.position, Eigen::Vector4d::Zero()};
+  for (const Moment& m : moments) {
+    const MotionState& now = m.step.setpoint;
+    ASSERT_TRUE(now.position.allFinite() && now.velocity.allFinite()) << m.time_s;
+    ASSERT_LE((now.position - limits.upper).maxCoeff(), 1e-9) << m.time_s;
+    ASSERT_LE((limits.lower - now.position).maxCoeff(), 1e-9) << m.time_s;
+    ASSERT_LE((now.velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-9) << m.time_s;
+    const Eigen::Vector4d change = (now.velocity - before.velocity).cwiseAbs();
+    ASSERT_LE((change - limits.acceleration * period_s).maxCoeff(), 1e-9) << m.time_s;
+    before = now;
+  }
+}
+
+void expect_in_image(const std::vector<Moment>& moments) {
+  for (const Moment& m : moments) {
+    const Eigen::Vector4d& e = m.truth.ends_px;
+    ASSERT_GE(e.minCoeff(), 0) << m.time_s;
+    ASSERT_LE(std::max(e[0], e[2]), 1279) << m.time_s;
+    ASSERT_LE(std::max(e[1], e[3]), 719) << m.time_s;
+  }
+}
+
+void expect_all_limits_kept(const Run& done, const ControllerConfig& config) {
+  expect_limits_kept(done.moments, config.limits, config.period_s);
+  expect_in_image(done.moments);
+}
+
+/// Eq. (22): with the true model and no latency every component of the error decays as exp(-K t).
+TEST(PaperLaw, ErrorDecaysAtRateK) {
+  Flaws flaws;
+  flaws.latency_s = 0;
+  flaws.noise.setZero();
+  for (const double gain_per_s : {0.048, 0.8}) {
+    ControllerConfig config = testing::test_config(flaws);
+    config.mode = ControlMode::paper;
+    config.gains.per_s.setConstant(gain_per_s);
+    const double duration_s = 2 / gain_per_s;
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      SCOPED_TRACE(seed);
+      const auto done =
+          run(config, testing::model_of({}), flaws, set_point(testing::paper_sinusoids().offset), duration_s + 2, seed);
+      const auto from = static_cast<std::size_t>(1.5 / config.period_s);
+      const auto to = from + static_cast<std::size_t>(duration_s / config.period_s) - 1;
+      for (int i = 0; i < 4; ++i) {
+        const Moment &a = done.moments[from], &b = done.moments[std::min(to, done.moments.size() - 1)];
+        if (std::abs(a.error[i]) < close_enough[i] || a.step.limited) continue;
+        const double rate = std::log(a.error[i] / b.error[i]) / (b.time_s - a.time_s);
+        EXPECT_NEAR(rate, gain_per_s, 0.05 * gain_per_s) << "feature " << i;
+      }
+    }
+  }
+}
+
+TEST(PaperLaw, GainsPerPeriodAreAReadyConfiguration) {
+  const auto config = paper_controller(0.001);
+  EXPECT_EQ(config.mode, ControlMode::paper);
+  EXPECT_NEAR(config.gains.per_s[2], 0.8, 1e-12);
+  EXPECT_NO_THROW(checked(config));
+}
+
+TEST(VisualController, TracksThePapersTrajectoryFromRandomStarts) {
+  const Flaws flaws = usual_flaws();
+  const ControllerConfig config = testing::test_config(flaws);
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    const auto done = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 12, seed);
+    EXPECT_LT(settled_s(done.moments), 5);
+    const Eigen::Vector4d rms = rms_after(done.moments, 6), mean = mean_after(done.moments, 6);
+    EXPECT_LT(rms[0], 5e-4);
+    EXPECT_LT(rms.tail<3>().maxCoeff(), 0.3);
+    EXPECT_LT(std::abs(mean[0]), 1.7e-4);
+    EXPECT_LT(mean.tail<3>().cwiseAbs().maxCoeff(), 0.1);
+    expect_all_limits_kept(done, config);
+  }
+}
+
+TEST(VisualController, IsStableAtAnyLatencyKnownOrEstimated) {
+  Eigen::Vector4d rms_at_zero = Eigen::Vector4d::Zero();
+  for (const bool known : {true, false}) {
+    for (const double latency_s : {0.0, 0.05, 0.1, 0.15, 0.2, 0.25}) {
+      SCOPED_TRACE(std::string(known ? "known " : "estimated ") + std::to_string(latency_s));
+      Flaws flaws = usual_flaws();
+      flaws.latency_s = latency_s;
+      flaws.delay_known = known;
+      const ControllerConfig config = testing::test_config(flaws);
+      const auto done = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 30, 7);
+      EXPECT_LT(settled_s(done.moments), 5);
+      EXPECT_NEAR(done.delay_s, latency_s, 0.5 / 60);
+      const Eigen::Vector4d rms = rms_after(done.moments, 10);
+      if (latency_s == 0) rms_at_zero = rms;
+      if (latency_s <= 0.15) {
+        EXPECT_LT(rms.cwiseQuotient(rms_at_zero).maxCoeff(), 1.2);
+      }
+      expect_all_limits_kept(done, config);
+    }
+  }
+}
+
+TEST(VisualController, BacklashLeavesNoBias) {
+  Flaws flaws = usual_flaws();
+  flaws.backlash = {0, 0, 0.0002, 0.035};
+  for (const bool known : {true, false}) {
+    flaws.delay_known = known;
+    const ControllerConfig config = testing::test_config(flaws);
+    const auto still = run(config, testing::model_of({}), flaws, set_point(testing::paper_sinusoids().offset), 20, 3);
+    EXPECT_LT(rms_after(still.moments, 8)[0], 5e-4);
+    EXPECT_LT(rms_after(still.moments, 8).tail<3>().maxCoeff(), 0.3);
+    EXPECT_LT(mean_after(still.moments, 8).tail<3>().cwiseAbs().maxCoeff(), 0.1);
+    const auto moving = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 65, 3);
+    EXPECT_LT(std::abs(mean_after(moving.moments, 5)[0]), 1.7e-4);
+    EXPECT_LT(mean_after(moving.moments, 5).tail<3>().cwiseAbs().maxCoeff(), 0.1);
+    EXPECT_NEAR(moving.delay_s, flaws.latency_s, 0.5 / 60);
+  }
+}
+
+TestRig wrong_rig(Random& random) {
+  TestRig rig;
+  const double focal = random.uniform(0.8, 1.2);
+  rig.camera.fx_px *= focal;
+  rig.camera.fy_px *= focal;
+  rig.marker.diameter_m *= random.uniform(0.95, 1.05);
+  const Eigen::Vector3d axis(random.normal(), random.normal(), random.normal());
+  rig.camera_from_rcm.rotation =
+      rig.camera_from_rcm.rotation * Eigen::AngleAxisd(rad_from_deg(random.uniform(-10, 10)), axis.normalized());
+  for (int i = 0; i < 3; ++i) rig.camera_from_rcm.translation[i] += random.uniform(-0.01, 0.01);
+  return rig;
+}
+
+TEST(VisualController, ConvergesInTheImageWithAWrongModel) {
+  for (std::uint64_t seed = 1; seed <= 200; ++seed) {
+    SCOPED_TRACE(seed);
+    Flaws flaws = usual_flaws();
+    flaws.delay_known = seed % 2 == 0;
+    const ControllerConfig config = testing::test_config(flaws);
+    Random random(1000 + seed);
+    const auto done = run(config, testing::model_of(wrong_rig(random)), flaws,
+                          set_point(testing::paper_sinusoids().offset), 10, seed);
+    EXPECT_LT(settled_s(done.moments), 8);
+    expect_all_limits_kept(done, config);
+  }
+}
+
+TEST(VisualController, ConvergesUncalibratedFromRandomStarts) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    SCOPED_TRACE(seed);
+    Flaws flaws = usual_flaws();
+    flaws.backlash = {0, 0, 0.0001, 0.02};
+    flaws.delay_known = seed % 2 == 0;
+    flaws.latency_s = 0.02 * static_cast<double>(seed % 10);
+    ControllerConfig config = testing::test_config(flaws);
+    config.mode = ControlMode::uncalibrated;
+    const auto done = run(config, {}, flaws, set_point(testing::paper_sinusoids().offset), 12, seed);
+    EXPECT_LT(settled_s(done.moments), 9);
+    EXPECT_NEAR(done.delay_s, flaws.latency_s, 0.5 / 60);
+    expect_all_limits_kept(done, config);
+  }
+}
+
+TEST(VisualController, TracksUncalibrated) {
+  const Flaws flaws = usual_flaws();
+  ControllerConfig config = testing::test_config(flaws);
+  config.mode = ControlMode::uncalibrated;
+  const auto done = run(config, {}, flaws, sinusoids(testing::paper_sinusoids()), 40, 2);
+  EXPECT_LT(rms_after(done.moments, 10)[0], 2e-3);
+  EXPECT_LT(rms_after(done.moments, 10).tail<3>().maxCoeff(), 1);
+  expect_all_limits_kept(done, config);
+}
+
+class Holding : public ::testing::TestWithParam<ControlMode> {
+ protected:
+  ControllerConfig config_for(const Flaws& flaws) const {
+    ControllerConfig config = testing::test_config(flaws);
+    config.mode = GetParam();
+    if (config.mode == ControlMode::paper) config.gains.per_s.setConstant(0.8);
+    return config;
+  }
+};
+
+TEST_P(Holding, WithinAPeriodWhenTheMarkerIsHiddenAndResumesWithoutAJump) {
+  Flaws flaws = usual_flaws();
+  flaws.hidden = [](double t) { return t > 8 && t < 10; };
+  const ControllerConfig config = config_for(flaws);
+  const auto done = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 25, 4);
+  expect_all_limits_kept(done, config);
+  const double period_s = config.period_s;
+  for (const Moment& m : done.moments) {
+    const double shown_s = m.time_s - flaws.latency_s;
+    if (shown_s > 8 + 1.1 * period_s && shown_s < 10 - 0.1 * period_s) {
+      ASSERT_EQ(m.step.action, ControlAction::hold) << m.time_s;
+      ASSERT_EQ(m.step.reason, HoldReason::marker_lost) << m.time_s;
+      if (shown_s > 8.3) {
+        ASSERT_TRUE(m.step.velocity.isZero()) << m.time_s;
+      }
+    }
+    if (shown_s > 10.2) {
+      ASSERT_EQ(m.step.action, ControlAction::track) << m.time_s;
+    }
+  }
+  if (GetParam() == ControlMode::fused) {
+    EXPECT_LT(settled_s(done.moments), 15);
+  }
+}
+
+TEST_P(Holding, NamesEveryReason) {
+  const Flaws flaws;
+  const ControllerConfig config = config_for(flaws);
+  const TestRig rig;
+  const Eigen::Vector4d q(0.05, 1.57, 0.064, 1);
+  const FeatureState state = exact_map(rig, q).value();
+  const DesiredFeatures desired{state.features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+  VisualController controller(config, testing::model_of(rig));
+  double t = 0;
+  const auto image_at = [&](double stamp_s) {
+    ImageMeasurement image;
+    image.found = true;
+    image.time_s = stamp_s;
+    image.features = state.features;
+    image.ends_px = state.ends_px;
+    image.covariance = Eigen::Vector4d(1e-7, 0.02, 0.02, 0.02).asDiagonal();
+    return image;
+  };
+  const auto step = [&](const std::optional<ImageMeasurement>& image) {
+    t += config.period_s;
+    const auto result = controller.step(t, q, image, desired);
+    EXPECT_EQ(result.action == ControlAction::hold, result.reason != HoldReason::none);
+    EXPECT_TRUE(result.velocity.allFinite());
+    return result.reason;
+  };
+  const auto good = [&] { return step(image_at(t + config.period_s)); };
+
+  EXPECT_EQ(step({}), HoldReason::no_image_yet);
+  for (int k = 0; k < 30; ++k) step(image_at(t));
+  EXPECT_EQ(good(), HoldReason::none);
+  EXPECT_EQ(step({}), HoldReason::none) << "one frame without news is no reason";
+  ImageMeasurement lost = image_at(t);
+  lost.found = false;
+  EXPECT_EQ(step(lost), HoldReason::marker_lost);
+  EXPECT_EQ(step({}), HoldReason::marker_lost) << "until the next image";
+  EXPECT_EQ(good(), HoldReason::none);
+  ImageMeasurement bad = image_at(t);
+  bad.features[2] = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(step(bad), HoldReason::non_finite);
+  EXPECT_EQ(good(), HoldReason::none);
+  EXPECT_EQ(step(image_at(t - 5)), HoldReason::stale_image);
+  EXPECT_EQ(good(), HoldReason::none);
+  for (int k = 0; k < 4; ++k) step({});
+  EXPECT_EQ(step({}), HoldReason::none);
+  EXPECT_EQ(step({}), HoldReason::stale_image);
+  EXPECT_EQ(good(), HoldReason::none);
+  if (GetParam() == ControlMode::fused) {
+    ImageMeasurement outlier = image_at(t);
+    outlier.features[2] += 80;
+    EXPECT_EQ(step(outlier), HoldReason::outlier);
+    EXPECT_EQ(good(), HoldReason::none);
+  }
+
+  const auto reason_for = [&](double time_s, const Eigen::Vector4d& joints, const DesiredFeatures& wanted) {
+    return controller.step(time_s, joints, {}, wanted).reason;
+  };
+  EXPECT_EQ(reason_for(t, q, desired), HoldReason::bad_time);
+  EXPECT_EQ(reason_for(t - 1, q, desired), HoldReason::bad_time);
+  EXPECT_EQ(reason_for(NAN, q, desired), HoldReason::non_finite);
+  EXPECT_EQ(reason_for(t += config.period_s, Eigen::Vector4d::Constant(NAN), desired), HoldReason::non_finite);
+  EXPECT_EQ(reason_for(t += config.period_s, q, set_point(q).at(0)), HoldReason::none);
+  DesiredFeatures wild = desired;
+  wild.rate[1] = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(reason_for(t += config.period_s, q, wild), HoldReason::non_finite);
+  EXPECT_EQ(reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.5, 0, 0), desired), HoldReason::not_following);
+  controller.reset(t, q);
+  EXPECT_EQ(good(), HoldReason::none);
+}
+
+INSTANTIATE_TEST_SUITE_P(Modes, Holding, ::testing::Values(ControlMode::fused, ControlMode::paper),
+                         [](const auto& mode) { return std::string(mode_word(mode.param)); });
+
+TEST(VisualController, NothingMakesItLeaveItsLimits) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const ControlMode mode : {ControlMode::fused, ControlMode::paper, ControlMode::uncalibrated}) {
+    for (std::uint64_t seed = 1; seed <= 15; ++seed) {
+      SCOPED_TRACE(std::string(mode_word(mode)) + " seed " + std::to_string(seed));
+      Random chance(seed);
+      Flaws flaws = usual_flaws();
+      flaws.hidden = [&](double) { return chance.uniform() < 0.1; };
+      flaws.spoil = [&](ImageMeasurement image) {
+        const double what = chance.uniform();
+        if (what < 0.03) image.features[static_cast<int>(chance.uniform(0, 4))] = nan;
+        if (what > 0.03 && what < 0.06) image.features *= chance.uniform(-3, 3);
+        if (what > 0.06 && what < 0.08) image.covariance.setZero();
+        if (what > 0.08 && what < 0.1) image.covariance.setConstant(nan);
+        if (what > 0.1 && what < 0.12) image.ends_px[0] = 1e9;
+        return image;
+      };
+      ControllerConfig config = testing::test_config(flaws);
+      config.mode = mode;
+      config.gains.per_s.setConstant(chance.uniform(0.5, 10));
+      Sinusoids wild = testing::paper_sinusoids();
+      wild.amplitude *= 20;
+      const auto done = run(config, testing::model_of({}), flaws, sinusoids(wild), 15, seed);
+      expect_limits_kept(done.moments, config.limits, config.period_s);
+    }
+  }
+}
+
+TEST(VisualController, SaysWhatIsWrongWithAConfiguration) {
+  const auto message = [](const ControllerConfig& config) -> std::string {
+    try {
+      VisualController controller(config, testing::model_of({}));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  ControllerConfig config;
+  EXPECT_EQ(message(config), "");
+  config.gains.per_s[2] = -1;
+  EXPECT_NE(message(config).find("gains.per_s[2]: is -1"), std::string::npos) << message(config);
+  config = {};
+  config.limits.rate[0] = 0;
+  EXPECT_NE(message(config).find("limits.rate[0]"), std::string::npos);
+  config = {};
+  config.limits.upper[1] = config.limits.lower[1];
+  EXPECT_NE(message(config).find("limits.upper[1]"), std::string::npos);
+  config = {};
+  config.period_s = 0;
+  EXPECT_NE(message(config).find("period_s"), std::string::npos);
+  config = {};
+  config.observer.delay_s = 1;
+  EXPECT_NE(message(config).find("observer.delay_s"), std::string::npos);
+  EXPECT_THROW(VisualController({}, {}), InputError) << "a model is needed";
+  EXPECT_EQ(mode_from_word("default"), ControlMode::fused);
+  EXPECT_FALSE(mode_from_word("magic"));
+}
+
+}  // namespace
+}  // namespace lapservo
