@@ -49,7 +49,7 @@ TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
     LinearCamera camera;
     camera.centre = (limits.lower + limits.upper) / 2;
     camera.jacobian = random_matrix(random) * Eigen::Vector4d(900, 900, 8000, 20).asDiagonal();
-    SetpointInterpolator path;
+    SetpointInterpolator path(limits);
     path.reset(0, camera.centre);
     Eigen::Vector4d wanted = Eigen::Vector4d::Zero();
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();

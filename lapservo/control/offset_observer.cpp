@@ -69,7 +69,9 @@ Update OffsetObserver::update(const FeatureModel& model, const JointHistory& his
   limit_offset(state->jacobian);
   ends_offset_px_ +=
       -std::expm1(-config_.bandwidth_rad_s * interval_s) * (image.ends_px - state->ends_px - ends_offset_px_);
-  delay_estimator_.add(image.time_s, *q_then + offset_ + innovation - gain * innovation, seen_noise, history);
+  if (!config_.delay_s) {
+    delay_estimator_.add(image.time_s, *q_then + offset_ + innovation - gain * innovation, seen_noise, history);
+  }
   updated_s_ = image.time_s;
   q_joint_then_ = *q_then;
   follow_delay(interval_s);

@@ -29,7 +29,7 @@ inline Eigen::Matrix4d feature_covariance(const FeatureState& state, const Eigen
 struct ObserverConfig {
   std::optional<double> delay_s;  ///< known delay; absent: estimated from the data
   double initial_delay_s = 0.1;   ///< until there is an estimate
-  double bandwidth_rad_s = 8;     ///< how fast the offset follows the image
+  double bandwidth_rad_s = 12;    ///< how fast the offset follows the image
   /// Random walk of the offset between readings and truth, per square root of a second: theta, phi, rho, psi.
   Eigen::Vector4d offset_walk{0.002, 0.002, 0.0003, 0.008};
   /// The offset changes with motion too (backlash, a wrong camera model): by about this share of the distance moved.

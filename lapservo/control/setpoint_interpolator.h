@@ -7,24 +7,27 @@
 namespace lapservo {
 
 /// Turns the controller's velocities into a smooth path for an arm that takes positions. Over each period the velocity
-/// ramps linearly from the last one to the new one, so the path is continuously differentiable, its rate never exceeds
-/// the larger of both velocities and its acceleration is their difference over the period.
+/// ramps linearly from where it is to the new one, so the path is continuously differentiable, its rate never exceeds
+/// the larger of both velocities and its acceleration is their difference over the period. When no new velocity comes
+/// in time the path brakes to rest, all joints in step, within the acceleration limits: a controller that is late or
+/// gone leaves no jump and no runaway.
 class SetpointInterpolator {
  public:
+  explicit SetpointInterpolator(const JointLimits& limits) : acceleration_(limits.acceleration) {}
+
   /// At rest there, from `time_s` on.
   void reset(double time_s, const Eigen::Vector4d& position);
 
-  /// Starts the next period at the end of the one before (or at `time_s`, when that is later: in between the arm holds
-  /// at the last velocity's end position), reaching `velocity` after `period_s`.
+  /// From the path's state at `time_s` to `velocity` after `period_s`.
   void ramp_to(double time_s, const Eigen::Vector4d& velocity, double period_s);
 
-  /// The path at any time, for an arm faster than the controller; before the current period its start, after it its
-  /// end.
+  /// The path at any time from the start of the current period on, for an arm faster than the controller.
   MotionState at(double time_s) const;
   /// At the end of the current period.
   MotionState end() const { return at(start_s_ + period_s_); }
 
  private:
+  Eigen::Vector4d acceleration_;
   MotionState start_;
   Eigen::Vector4d end_velocity_ = Eigen::Vector4d::Zero();
   double start_s_ = 0;

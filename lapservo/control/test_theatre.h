@@ -86,6 +86,9 @@ struct Flaws {
   double lag_s = 0;                                    ///< of the arm, first order
   Eigen::Vector4d resolution{1e-5, 1e-5, 2e-6, 1e-4};  ///< of the readings
   Eigen::Vector4d noise{4e-4, 0.15, 0.15, 0.15};       ///< of the image
+  long frame_every = 1;                                ///< control periods a frame
+  double dropped = 0;                                  ///< share of frames that never come
+  double jitter_s = 0;                                 ///< of the steps' times, at most
   std::function<bool(double time_s)> hidden = [](double) { return false; };
   std::function<ImageMeasurement(const ImageMeasurement&)> spoil = [](const ImageMeasurement& m) { return m; };
 };
@@ -114,16 +117,16 @@ class Theatre {
     const double period_s = controller.config().period_s;
     const auto periods = static_cast<long>(duration_s / period_s);
     for (long k = 0; k < periods; ++k) {
-      const double time_s = start_s_ + static_cast<double>(k) * period_s;
+      const double time_s = start_s_ + static_cast<double>(k) * period_s + flaws_.jitter_s * random_.uniform();
       Moment moment;
       moment.time_s = time_s;
       moment.q_true = q_true();
       moment.truth = exact_map(rig_, q_true()).value();
       const DesiredFeatures desired = trajectory.at(time_s);
       moment.error = feature_error(moment.truth.features, desired.features);
-      expose(time_s, moment.truth);
+      if (k % flaws_.frame_every == 0 && random_.uniform() >= flaws_.dropped) expose(time_s, moment.truth);
       moment.step = controller.step(time_s, readings(), arrived(time_s), desired);
-      move(controller, time_s, period_s);
+      move(controller, std::max(time_s, moved_s_), start_s_ + static_cast<double>(k + 1) * period_s);
       moments.push_back(moment);
     }
     start_s_ += static_cast<double>(periods) * period_s;
@@ -148,14 +151,16 @@ class Theatre {
     }
     return latest;
   }
-  void move(const VisualController& controller, double time_s, double period_s) {
+  /// Up to the earliest time of the next step.
+  void move(const VisualController& controller, double from_s, double to_s) {
     constexpr int parts = 8;
     for (int i = 1; i <= parts; ++i) {
-      const Eigen::Vector4d setpoint = controller.path().at(time_s + period_s * i / parts).position;
-      const double share = flaws_.lag_s > 0 ? -std::expm1(-period_s / parts / flaws_.lag_s) : 1.0;
+      const Eigen::Vector4d setpoint = controller.path().at(from_s + (to_s - from_s) * i / parts).position;
+      const double share = flaws_.lag_s > 0 ? -std::expm1(-(to_s - from_s) / parts / flaws_.lag_s) : 1.0;
       motor_ += share * (setpoint - motor_);
       played_ = played_.cwiseMax(motor_ - flaws_.backlash / 2).cwiseMin(motor_ + flaws_.backlash / 2);
     }
+    moved_s_ = to_s;
   }
 
   TestRig rig_;
@@ -163,7 +168,7 @@ class Theatre {
   Random random_;
   Eigen::Vector4d motor_, played_;
   std::deque<ImageMeasurement> on_the_way_;
-  double start_s_ = 0;
+  double start_s_ = 0, moved_s_ = 0;
 };
 
 /// The paper's trajectory, V-D, with periods of our own.

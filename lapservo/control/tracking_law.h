@@ -8,7 +8,7 @@ namespace lapservo {
 
 /// K of eq. (21), per second, for s, r, l, d.
 struct TrackingGains {
-  Eigen::Vector4d per_s{3, 3, 3, 3};
+  Eigen::Vector4d per_s{5, 5, 5, 5};
 };
 
 /// The paper's gains. Of the four only K_l = 0.0008 is known to us, without its unit: per second it would mean a time

@@ -95,6 +95,7 @@ VisualController::VisualController(const ControllerConfig& config, FeatureModel 
       observer_(config.observer, config.scales),
       jacobian_(config.jacobian, config.scales),
       arm_lag_(config.scales),
+      path_(config.limits),
       probing_fit_(config.scales, config.observer.delay_s) {
   if (!model_ && config.mode != ControlMode::uncalibrated) {
     throw InputError("controller", "mode", std::string(mode_word(config.mode)), "a model (camera_from_rcm in the rig)");
@@ -116,8 +117,9 @@ double VisualController::delay_s() const {
 ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint,
                                    const std::optional<ImageMeasurement>& image, const DesiredFeatures& desired) {
   ControlStep step;
+  const bool timed = std::isfinite(time_s) && (!started_ || time_s > now_s_);
   step.reason = read(time_s, q_joint, desired);
-  const bool readable = step.reason != HoldReason::non_finite && step.reason != HoldReason::bad_time;
+  const bool readable = timed && q_joint.allFinite();
   if (readable && image) image_reason_ = look(time_s, *image);
   if (readable && time_s - usable_s_ > config_.stale_after_s && image_reason_ == HoldReason::none) {
     image_reason_ = HoldReason::stale_image;
@@ -130,7 +132,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   if (step.reason == HoldReason::none) step.reason = law.reason;
   if (!law.velocity.allFinite() || !law.weight.allFinite()) step.reason = HoldReason::non_finite;
 
-  const MotionState motion = path_.end();
+  const MotionState motion = path_.at(now_s_);
   step.velocity = brake(config_.limits, motion.velocity, config_.period_s);
   if (step.reason == HoldReason::none) {
     std::optional<EndPoints> ends;
@@ -150,7 +152,9 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
     }
   }
   if (step.action == ControlAction::probe) probed_s_ += config_.period_s;
-  if (started_) path_.ramp_to(now_s_, step.velocity, config_.period_s);
+  // Without a time to start from, the path is left to brake by itself when the period before ends.
+  if (timed && started_) path_.ramp_to(now_s_, step.velocity, config_.period_s);
+  step.has_setpoint = started_;
   step.setpoint = path_.end();
   if (step.estimate && all_finite(desired)) step.error = feature_error(step.estimate->features, desired.features);
   step.delay_s = delay_s();
@@ -158,8 +162,12 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
 }
 
 HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired) {
-  if (!std::isfinite(time_s) || !q_joint.allFinite()) return HoldReason::non_finite;
+  if (!std::isfinite(time_s)) return HoldReason::non_finite;
   if (started_ && !(time_s > now_s_)) return HoldReason::bad_time;
+  if (!q_joint.allFinite()) {
+    now_s_ = time_s;
+    return HoldReason::non_finite;
+  }
   if (!started_) reset(time_s, q_joint);
   const MotionState setpoint = path_.at(time_s);
   arm_lag_.add(setpoint, q_joint, time_s - now_s_);
