@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done, 1 found nothing or did not converge, 2 bad input.");
   lapservo::app::Run run;
   lapservo::app::add_track(app, run);
+  lapservo::app::add_experiment(app, run);
   lapservo::app::add_render(app, run);
   lapservo::app::add_marker(app, run);
   lapservo::app::add_estimate_rcm(app, run);

@@ -1,0 +1,32 @@
+#include "lapservo/experiments/data_file.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+namespace lapservo {
+
+Field::Field(double number) : text_(std::isfinite(number) ? fmt::format("{:.9g}", number) : "") {}
+
+DataFile::DataFile(const std::filesystem::path& path, std::initializer_list<const char*> header)
+    : file_(path), columns_(header.size()) {
+  const char* separator = "";
+  for (const char* name : header) {
+    file_.stream() << separator << name;
+    separator = ",";
+  }
+  file_.stream() << '\n';
+}
+
+void DataFile::row(std::initializer_list<Field> fields) {
+  if (fields.size() != columns_) throw std::logic_error("a row of another length than the header");
+  const char* separator = "";
+  for (const Field& field : fields) {
+    file_.stream() << separator << field.text();
+    separator = ",";
+  }
+  file_.stream() << '\n';
+}
+
+}  // namespace lapservo

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/experiments/svg_plot.h"
+
+namespace lapservo {
+
+/// A figure of the paper's beside ours.
+struct Comparison {
+  std::string what, paper, centerline, surface;  ///< with units; empty where there is none
+};
+
+struct Table {
+  std::string caption;
+  std::vector<std::string> header;
+  std::vector<std::vector<std::string>> rows;  ///< each as long as the header
+};
+
+/// 8-bit BGR.
+struct Picture {
+  std::string title;
+  cv::Mat bgr;
+};
+
+struct Figure {
+  std::variant<Plot, Picture> content;
+  std::string caption;
+};
+
+/// One experiment. All text is plain.
+struct ReportSection {
+  std::string id;  ///< a word: the link to it
+  std::string title;
+  std::vector<std::string> text;
+  std::vector<Comparison> comparisons;  ///< the first stands in the report's summary too
+  std::vector<Figure> figures;
+  std::vector<Table> tables;
+  std::vector<std::string> notes;  ///< how to read it, what departs from the paper
+  std::string command;             ///< that makes it again
+  std::vector<std::string> files;  ///< CSVs beside the report
+};
+
+struct Report {
+  std::string title;
+  std::vector<std::string> text;
+  std::vector<ReportSection> sections;
+};
+
+/// One HTML file that needs nothing else: no network, figures as SVG, pictures within. Well-formed as XML too. The same
+/// report gives the same bytes.
+std::string html_from(const Report& report);
+
+/// Appears whole or not at all. Throws InputError when it can't be written.
+void write_report(const std::filesystem::path& path, const Report& report);
+
+}  // namespace lapservo

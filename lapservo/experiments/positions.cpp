@@ -1,0 +1,81 @@
+#include "lapservo/experiments/positions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/error.h"
+#include "lapservo/geometry/cylinder.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double nearest_m = 0.06, farthest_m = 0.13, steepest_rad = 0.35, border_px = 30;
+constexpr int most_attempts = 20000, candidates = 12;
+
+RcmCoordinates random_position(const Rig& rig, Random& random) {
+  const Instrument& instrument = rig.instruments[0];
+  const Camera& camera = rig.camera;
+  for (int attempt = 0; attempt < most_attempts; ++attempt) {
+    const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
+    auto q = configuration_through(*instrument.camera_from_rcm,
+                                   camera.ray_from_ideal(pixel) * random.uniform(nearest_m, farthest_m));
+    if (!q || q->rho_m < 0.02 || std::sin(q->phi_rad) < 0.1) continue;
+    q->psi_rad = random.uniform(-pi, pi);
+    if (marker_well_in_view(camera, instrument, *q)) return *q;
+  }
+  throw InputError("rig", "instrument " + instrument.name +
+                              " is hardly ever wholly in view between 60 and 130 mm: check camera_from_rcm");
+}
+
+}  // namespace
+
+bool marker_well_in_view(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q) {
+  const Marker& marker = instrument.marker;
+  const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(q);
+  const auto view = view_cylinder(pose, marker.radius_m());
+  if (!view) return false;
+  const double beyond_m = pose.inverse().translation.z() - marker.length_m() / 2;
+  if (std::abs(std::atan2(beyond_m, view->camera_to_axis_m)) > steepest_rad) return false;
+  for (const double side : {-1.0, 0.0, 1.0})
+    for (const double along_m : {0.0, marker.length_m()}) {
+      const Eigen::Vector3d point =
+          pose * surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
+      if (point.z() < 0.02 || !camera.contains(camera.raw_from_point(point), border_px)) return false;
+      // Beyond the lens's own field raw_from_point folds back.
+      if (!camera.contains(camera.ideal_from_point(point), -0.5 * camera.width_px)) return false;
+    }
+  return true;
+}
+
+Eigen::Vector2d marker_middle_px(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q) {
+  const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(q);
+  return camera.raw_from_point(pose * Eigen::Vector3d(0, 0, instrument.marker.length_m() / 2));
+}
+
+std::vector<RcmCoordinates> spread_positions(const Rig& rig, int count, Random& random) {
+  std::vector<RcmCoordinates> chosen;
+  std::vector<Eigen::Vector2d> places;
+  const auto distance_to_chosen = [&places](const Eigen::Vector2d& place) {
+    double least = HUGE_VAL;
+    for (const Eigen::Vector2d& other : places) least = std::min(least, (place - other).norm());
+    return least;
+  };
+  for (int i = 0; i < count; ++i) {
+    RcmCoordinates best;
+    Eigen::Vector2d place = Eigen::Vector2d::Zero();
+    double farthest = -1;
+    for (int k = 0; k < (i == 0 ? 1 : candidates); ++k) {
+      const RcmCoordinates q = random_position(rig, random);
+      const Eigen::Vector2d at = marker_middle_px(rig.camera, rig.instruments[0], q);
+      if (const double distance = distance_to_chosen(at); distance > farthest)
+        best = q, place = at, farthest = distance;
+    }
+    chosen.push_back(best);
+    places.push_back(place);
+  }
+  return chosen;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "lapservo/experiments/parallel.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo {
+
+/// What every experiment is given.
+struct ExperimentSetup {
+  Rig rig;  ///< one instrument, with camera_from_rcm: see single_instrument()
+  std::uint64_t seed = 1;
+  std::vector<Method> methods{Method::centerline, Method::surface};
+  KeepGoing keep_going = [](int, int) { return true; };
+  std::string options;  ///< of the command line, for "how to make it again": begins with a space when not empty
+};
+
+/// The rig of configs/paper.yaml, on which the paper's trajectory is feasible.
+Rig paper_rig();
+
+/// The rig with its first instrument only, which the experiments use. Throws InputError naming `source` when that has
+/// no camera_from_rcm.
+Rig single_instrument(Rig rig, const std::string& source);
+
+/// "the paper's method" or "the default", and the word of the command line.
+std::string method_title(Method method);
+std::string method_word(Method method);
+/// The colour of a method's series in every plot.
+int method_color(Method method);
+
+}  // namespace lapservo

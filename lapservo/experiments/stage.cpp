@@ -1,0 +1,37 @@
+#include "lapservo/experiments/stage.h"
+
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+
+Stage::Stage(const Rig& rig, cv::Mat tissue) : rig_(rig), tissue_(std::move(tissue)) {}
+
+cv::Mat Stage::render(const RcmCoordinates& q, double light, std::uint64_t seed) {
+  const Instrument& instrument = rig_.instruments[0];
+  if (!renderer_ || light != light_) {
+    ShaftModel shaft;
+    shaft.marker = instrument.marker;
+    RenderOptions options;
+    options.sensor.gains = Light::Constant(static_cast<float>(light));
+    renderer_ = std::make_unique<Renderer>(rig_.camera, std::vector{shaft}, tissue_, options);
+    light_ = light;
+  }
+  return renderer_->render({{*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad}}, seed);
+}
+
+Eyes::Eyes(const Rig& rig, const std::vector<Method>& methods) {
+  for (const Method method : methods) trackers_.emplace_back(rig, TrackerOptions{method, true});
+}
+
+std::vector<Observation> Eyes::observe(const cv::Mat& frame) {
+  std::vector<Observation> observations;
+  for (Tracker& tracker : trackers_) observations.push_back(tracker.track(frame)[0]);
+  return observations;
+}
+
+std::uint64_t frame_seed(std::uint64_t experiment_seed, int frame) {
+  Random random(experiment_seed);
+  return random.bits() + static_cast<std::uint64_t>(frame);
+}
+
+}  // namespace lapservo

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo {
+
+/// The built-in theatre for one thread: the first instrument of a rig before seeded tissue, with the usual sensor.
+class Stage {
+ public:
+  /// `tissue`: make_tissue() of the camera's size, shared by the stages of an experiment.
+  Stage(const Rig& rig, cv::Mat tissue);
+
+  /// `light`: exposure, 1 is normal. The same arguments give the same picture.
+  cv::Mat render(const RcmCoordinates& q, double light, std::uint64_t seed);
+
+ private:
+  Rig rig_;
+  cv::Mat tissue_;
+  double light_ = 0;
+  std::unique_ptr<Renderer> renderer_;  // of that light
+};
+
+/// The eyes: one tracker per method, each frame on its own.
+class Eyes {
+ public:
+  Eyes(const Rig& rig, const std::vector<Method>& methods);
+  /// One observation per method.
+  std::vector<Observation> observe(const cv::Mat& frame);
+
+ private:
+  std::vector<Tracker> trackers_;
+};
+
+/// The seed of a frame's noise: differs for every frame of every experiment.
+std::uint64_t frame_seed(std::uint64_t experiment_seed, int frame);
+
+}  // namespace lapservo

@@ -1,0 +1,463 @@
+#include "lapservo/experiments/svg_plot.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include <fmt/format.h>
+
+namespace lapservo {
+namespace {
+
+constexpr double width_px = 480, height_px = 320, font_px = 14, character_px = 7.4;
+constexpr double right_px = 14, bottom_px = 46, legend_row_px = 20;
+constexpr std::size_t most_hover_points = 150;
+
+struct Range {
+  double low, high;
+};
+
+// From axis values to the drawing.
+struct Scale {
+  Range range;
+  bool logarithmic;
+  double at_low_px, at_high_px;
+
+  double value(double v) const { return logarithmic ? std::log10(v) : v; }
+  double operator()(double v) const {
+    const double low = value(range.low), share = (value(v) - low) / (value(range.high) - low);
+    return at_low_px + share * (at_high_px - at_low_px);
+  }
+  bool drawable(double v) const { return std::isfinite(v) && (!logarithmic || v > 0); }
+};
+
+struct Layout {
+  double left_px, top_px;
+  Scale x, y;
+};
+
+void extend(Range& range, double value, bool logarithmic) {
+  if (!std::isfinite(value) || (logarithmic && value <= 0)) return;
+  range.low = std::min(range.low, value);
+  range.high = std::max(range.high, value);
+}
+
+// With some room about the data; never empty.
+Range padded(Range range, const Axis& axis) {
+  if (range.low > range.high) range = axis.logarithmic ? Range{0.1, 10} : Range{0, 1};
+  if (axis.logarithmic) {
+    const double room = std::pow(10, std::max(0.15, 0.05 * std::log10(range.high / range.low)));
+    range = {range.low / room, range.high * room};
+  } else {
+    const double span = range.high - range.low, size = std::max(std::abs(range.low), std::abs(range.high));
+    const double room = span > 1e-9 * size ? 0.05 * span : size > 0 ? 0.5 * size : 1;
+    range = {range.low - room, range.high + room};
+  }
+  return {axis.low.value_or(range.low), axis.high.value_or(range.high)};
+}
+
+Range x_range(const Plot& plot) {
+  Range range{HUGE_VAL, -HUGE_VAL};
+  for (const Series& series : plot.series)
+    for (const double x : series.x) extend(range, x, plot.x.logarithmic);
+  return padded(range, plot.x);
+}
+
+Range y_range(const Plot& plot) {
+  Range range{HUGE_VAL, -HUGE_VAL};
+  for (const Series& series : plot.series)
+    for (std::size_t i = 0; i < series.y.size(); ++i) {
+      const double sigma = series.sigma.empty() ? 0 : series.sigma[i];
+      extend(range, series.y[i] - sigma, plot.y.logarithmic);
+      extend(range, series.y[i] + sigma, plot.y.logarithmic);
+    }
+  for (const ReferenceLine& line : plot.references) extend(range, line.y, plot.y.logarithmic);
+  return padded(range, plot.y);
+}
+
+std::vector<double> ticks_of(const Scale& scale, int most) {
+  return scale.logarithmic ? nice_logarithmic_ticks(scale.range.low, scale.range.high)
+                           : nice_ticks(scale.range.low, scale.range.high, most);
+}
+
+// Characters, not bytes.
+std::size_t length_of(const std::string& text) {
+  return static_cast<std::size_t>(
+      std::count_if(text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; }));
+}
+
+std::string with_unit(const Axis& axis) {
+  return axis.unit.empty() ? axis.label : axis.label + " [" + axis.unit + "]";
+}
+
+std::string number(double value) {
+  return fmt::format("{:.4g}", value);
+}
+
+std::string color_class(int color) {
+  return color < 0 ? "grey" : fmt::format("c{}", color % 5);
+}
+
+// A point's mark, of about the same area for every shape.
+std::string shape_path(int color, double x, double y, double size) {
+  switch (color < 0 ? 0 : color % 5) {
+    case 1:
+      return fmt::format("M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z", x - 0.9 * size, y - 0.9 * size, 1.8 * size, 1.8 * size,
+                         -1.8 * size);
+    case 2:
+      return fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}h{:.1f}z", x, y - 1.2 * size, 1.2 * size, 2.1 * size,
+                         -2.4 * size);
+    case 3:
+      return fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}l{:.1f} {:.1f}l{:.1f} {:.1f}z", x, y - 1.3 * size, 1.3 * size,
+                         1.3 * size, -1.3 * size, 1.3 * size, -1.3 * size, -1.3 * size);
+    case 4:
+      return fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}h{:.1f}z", x, y + 1.2 * size, 1.2 * size, -2.1 * size,
+                         -2.4 * size);
+    default:
+      return fmt::format("M{:.1f} {:.1f}a{:.1f} {:.1f} 0 1 0 {:.1f} 0a{:.1f} {:.1f} 0 1 0 {:.1f} 0z", x - size, y, size,
+                         size, 2 * size, size, size, -2 * size);
+  }
+}
+
+bool has_line(Draw draw) {
+  return draw != Draw::points;
+}
+bool has_points(Draw draw) {
+  return draw == Draw::points || draw == Draw::line_and_points;
+}
+
+bool drawable(const Layout& layout, const Series& series, std::size_t i) {
+  return layout.x.drawable(series.x[i]) && layout.y.drawable(series.y[i]);
+}
+
+std::string line_path(const Layout& layout, const Series& series) {
+  std::string path;
+  bool down = false;
+  for (std::size_t i = 0; i < series.x.size(); ++i) {
+    const bool here = drawable(layout, series, i);
+    if (here) path += fmt::format("{}{:.1f} {:.1f}", down ? 'L' : 'M', layout.x(series.x[i]), layout.y(series.y[i]));
+    down = here;
+  }
+  return path;
+}
+
+// y - sigma to y + sigma, over the points that are there.
+std::string band_path(const Layout& layout, const Series& series) {
+  std::string there, back;
+  for (std::size_t i = 0; i < series.x.size(); ++i) {
+    const double low = series.y[i] - series.sigma[i], high = series.y[i] + series.sigma[i];
+    if (!layout.x.drawable(series.x[i]) || !layout.y.drawable(low) || !layout.y.drawable(high)) continue;
+    const double x = layout.x(series.x[i]);
+    there += fmt::format("{}{:.1f} {:.1f}", there.empty() ? 'M' : 'L', x, layout.y(high));
+    back = fmt::format("L{:.1f} {:.1f}", x, layout.y(low)) + back;
+  }
+  return there.empty() ? "" : there + back + "z";
+}
+
+std::string hover_text(const Plot& plot, const Series& series, std::size_t i) {
+  const auto part = [](const Axis& axis, double value) {
+    return fmt::format("{} {}{}{}", axis.label, number(value), axis.unit.empty() ? "" : " ", axis.unit);
+  };
+  std::string text = series.name.empty() ? "" : series.name + ": ";
+  text += part(plot.x, series.x[i]) + ", " + part(plot.y, series.y[i]);
+  if (!series.sigma.empty()) text += " \u00b1 " + number(series.sigma[i]);
+  return escaped(text);
+}
+
+std::string error_bar(const Layout& layout, const Series& series, std::size_t i) {
+  const double low = series.y[i] - series.sigma[i], high = series.y[i] + series.sigma[i];
+  if (!layout.y.drawable(low) || !layout.y.drawable(high)) return "";
+  return fmt::format("<path class=\"bar s-{}\" d=\"M{:.1f} {:.1f}V{:.1f}\"/>", color_class(series.color),
+                     layout.x(series.x[i]), layout.y(low), layout.y(high));
+}
+
+std::string points_of(const Plot& plot, const Layout& layout, const Series& series) {
+  const double size = series.x.size() > 300 ? 2 : series.x.size() > 100 ? 2.6 : 3.6;
+  std::string text;
+  for (std::size_t i = 0; i < series.x.size(); ++i) {
+    if (!drawable(layout, series, i)) continue;
+    if (!series.sigma.empty()) text += error_bar(layout, series, i);
+    text += fmt::format("<path class=\"point f-{}\" d=\"{}\"><title>{}</title></path>\n", color_class(series.color),
+                        shape_path(series.color, layout.x(series.x[i]), layout.y(series.y[i]), size),
+                        hover_text(plot, series, i));
+  }
+  return text;
+}
+
+// A line's points have no marks, but tell their numbers all the same.
+std::string hover_points_of(const Plot& plot, const Layout& layout, const Series& series) {
+  std::string text;
+  const std::size_t step = std::max<std::size_t>(1, (series.x.size() + most_hover_points - 1) / most_hover_points);
+  for (std::size_t i = 0; i < series.x.size(); i += step)
+    if (drawable(layout, series, i))
+      text += fmt::format("<circle class=\"hover\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"7\"><title>{}</title></circle>\n",
+                          layout.x(series.x[i]), layout.y(series.y[i]), hover_text(plot, series, i));
+  return text;
+}
+
+std::string drawn(const Plot& plot, const Layout& layout, const Series& given) {
+  const bool many = has_line(given.draw) && given.x.size() > 2000;
+  const Series series = many ? thinned(given, static_cast<int>(width_px)) : given;
+  std::string text;
+  if (has_line(series.draw)) {
+    if (!series.sigma.empty() && !has_points(series.draw))
+      text +=
+          fmt::format("<path class=\"band f-{}\" d=\"{}\"/>\n", color_class(series.color), band_path(layout, series));
+    text += fmt::format("<path class=\"line s-{}{}\" d=\"{}\"/>\n", color_class(series.color),
+                        series.draw == Draw::dashed ? " dashed" : "", line_path(layout, series));
+  }
+  return text + (has_points(series.draw) ? points_of(plot, layout, series) : hover_points_of(plot, layout, series));
+}
+
+// Where each entry of the legend goes: rows above the plot.
+struct LegendEntry {
+  const Series* series;  // null for a reference line
+  std::string name;
+  double x_px, y_px;
+};
+std::vector<LegendEntry> legend_of(const Plot& plot) {
+  std::vector<LegendEntry> entries;
+  double x = 8, y = 40;
+  const auto add = [&](const Series* series, const std::string& name) {
+    const double needed = 38 + character_px * static_cast<double>(length_of(name));
+    if (x > 8 && x + needed > width_px) x = 8, y += legend_row_px;
+    entries.push_back({series, name, x, y});
+    x += needed;
+  };
+  for (const Series& series : plot.series)
+    if (!series.name.empty()) add(&series, series.name);
+  for (const ReferenceLine& line : plot.references) add(nullptr, line.name);
+  return entries;
+}
+
+std::string drawn(const LegendEntry& entry) {
+  std::string text;
+  const double middle = entry.y_px - 4.5;
+  const int color = entry.series ? entry.series->color : -1;
+  if (!entry.series || has_line(entry.series->draw))
+    text += fmt::format("<path class=\"line s-{}{}\" d=\"M{:.1f} {:.1f}h22\"/>", color_class(color),
+                        !entry.series || entry.series->draw == Draw::dashed ? " dashed" : "", entry.x_px, middle);
+  if (entry.series && has_points(entry.series->draw))
+    text += fmt::format("<path class=\"point f-{}\" d=\"{}\"/>", color_class(color),
+                        shape_path(color, entry.x_px + 11, middle, 4));
+  return text +
+         fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", entry.x_px + 28, entry.y_px, escaped(entry.name));
+}
+
+// Widens the axis that has more room than one common scale needs.
+void make_isotropic(Layout& layout) {
+  const auto px_per_unit = [](const Scale& s) {
+    return std::abs(s.at_high_px - s.at_low_px) / (s.range.high - s.range.low);
+  };
+  const double common = std::min(px_per_unit(layout.x), px_per_unit(layout.y));
+  for (Scale* scale : {&layout.x, &layout.y}) {
+    const double middle = (scale->range.low + scale->range.high) / 2;
+    const double half = std::abs(scale->at_high_px - scale->at_low_px) / common / 2;
+    scale->range = {middle - half, middle + half};
+  }
+}
+
+Layout layout_of(const Plot& plot, double top_px, double bottom_edge_px) {
+  Layout layout{0,
+                top_px,
+                {x_range(plot), plot.x.logarithmic, 0, width_px - right_px},
+                {y_range(plot), plot.y.logarithmic, bottom_edge_px, top_px}};
+  if (plot.image_plane) std::swap(layout.y.at_low_px, layout.y.at_high_px);
+  const auto place_left = [&layout] {
+    std::size_t widest = 1;
+    for (const std::string& label : tick_labels(ticks_of(layout.y, 6))) widest = std::max(widest, length_of(label));
+    layout.left_px = 30 + character_px * static_cast<double>(widest);
+    layout.x.at_low_px = layout.left_px;
+  };
+  place_left();
+  if (plot.image_plane) {
+    make_isotropic(layout);
+    place_left();
+    make_isotropic(layout);
+  }
+  return layout;
+}
+
+std::string axes(const Plot& plot, const Layout& layout, double bottom_edge_px) {
+  std::string text;
+  const auto x_ticks = ticks_of(layout.x, 7), y_ticks = ticks_of(layout.y, 6);
+  const auto x_labels = tick_labels(x_ticks), y_labels = tick_labels(y_ticks);
+  for (std::size_t i = 0; i < x_ticks.size(); ++i) {
+    const double x = layout.x(x_ticks[i]);
+    text += fmt::format("<path class=\"grid\" d=\"M{:.1f} {:.1f}V{:.1f}\"/>", x, layout.top_px, bottom_edge_px);
+    text += fmt::format("<text class=\"middle\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", x, bottom_edge_px + 17,
+                        x_labels[i]);
+  }
+  for (std::size_t i = 0; i < y_ticks.size(); ++i) {
+    const double y = layout.y(y_ticks[i]);
+    text += fmt::format("<path class=\"grid\" d=\"M{:.1f} {:.1f}H{:.1f}\"/>", layout.left_px, y, width_px - right_px);
+    text += fmt::format("<text class=\"end\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", layout.left_px - 5, y + 5,
+                        y_labels[i]);
+  }
+  text += fmt::format("<path class=\"frame\" d=\"M{:.1f} {:.1f}V{:.1f}H{:.1f}\"/>\n", layout.left_px, layout.top_px,
+                      bottom_edge_px, width_px - right_px);
+  text += fmt::format("<text class=\"middle\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
+                      (layout.left_px + width_px - right_px) / 2, bottom_edge_px + 38, escaped(with_unit(plot.x)));
+  const double middle = (layout.top_px + bottom_edge_px) / 2;
+  text += fmt::format("<text class=\"middle\" transform=\"translate(15 {:.1f}) rotate(-90)\">{}</text>\n", middle,
+                      escaped(with_unit(plot.y)));
+  return text;
+}
+
+// The same plot always has the same name, and different ones differ: clip paths are shared by the whole page.
+std::string clip_name(const std::string& content) {
+  std::uint64_t hash = 0xcbf29ce484222325ULL;  // FNV-1a
+  for (const char c : content) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
+  return fmt::format("clip-{:016x}", hash);
+}
+
+}  // namespace
+
+std::vector<double> nice_ticks(double low, double high, int most) {
+  const double rough = (high - low) / most;
+  double power = std::pow(10, std::floor(std::log10(rough)));
+  for (;; power *= 10)
+    for (const double factor : {1.0, 2.0, 5.0}) {
+      const double step = factor * power, slack = 1e-9;
+      const double first = std::ceil(low / step - slack), last = std::floor(high / step + slack);
+      if (last - first + 1 > most) continue;
+      std::vector<double> ticks;
+      for (double i = first; i <= last; ++i) ticks.push_back(i == 0 ? 0.0 : i * step);
+      return ticks;
+    }
+}
+
+std::vector<double> nice_logarithmic_ticks(double low, double high) {
+  const auto ticks_with = [&](const std::vector<double>& factors, int every) {
+    std::vector<double> ticks;
+    for (int power = static_cast<int>(std::floor(std::log10(low))); power <= std::ceil(std::log10(high)); ++power) {
+      if (power % every != 0) continue;
+      for (const double factor : factors) {
+        const double tick = factor * std::pow(10, power);
+        if (tick >= low * (1 - 1e-9) && tick <= high * (1 + 1e-9)) ticks.push_back(tick);
+      }
+    }
+    return ticks;
+  };
+  const double decades = std::log10(high / low);
+  if (decades < 1) return nice_ticks(low, high, 6);
+  if (decades < 2.5) return ticks_with({1, 2, 5}, 1);
+  return ticks_with({1}, std::max(1, static_cast<int>(std::ceil(decades / 7))));
+}
+
+std::vector<std::string> tick_labels(const std::vector<double>& ticks) {
+  std::vector<std::string> labels;
+  double least = HUGE_VAL, most = 0;
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    if (i > 0) least = std::min(least, std::abs(ticks[i] - ticks[i - 1]));
+    most = std::max(most, std::abs(ticks[i]));
+  }
+  const double wanted = std::isfinite(least) && least > 0 ? -std::floor(std::log10(least) + 1e-9) : 3;
+  const bool plain = wanted <= 6 && most < 1e6;
+  const bool even = ticks.size() < 3 || ticks.back() - ticks[ticks.size() - 2] < 1.5 * (ticks[1] - ticks[0]);
+  for (const double tick : ticks) {
+    if (plain && even) {
+      labels.push_back(fmt::format("{:.{}f}", tick, static_cast<int>(std::max(0.0, wanted))));
+    } else {
+      const int digits = even ? static_cast<int>(std::max(1.0, std::floor(std::log10(most)) + wanted + 1)) : 6;
+      labels.push_back(fmt::format("{:.{}g}", tick, digits));
+    }
+  }
+  return labels;
+}
+
+Series thinned(const Series& series, int columns) {
+  if (series.x.empty() || series.x.size() <= 4 * static_cast<std::size_t>(columns)) return series;
+  Series thin = series;
+  thin.x.clear(), thin.y.clear(), thin.sigma.clear();
+  const double low = series.x.front(), span = series.x.back() - low;
+  const auto column_of = [&](std::size_t i) {
+    return span > 0 ? std::min(columns - 1, static_cast<int>((series.x[i] - low) / span * columns)) : 0;
+  };
+  for (std::size_t first = 0; first < series.x.size();) {
+    std::size_t last = first, lowest = first, highest = first;
+    for (std::size_t i = first; i < series.x.size() && column_of(i) == column_of(first); ++i) {
+      last = i;
+      if (!(series.y[i] >= series.y[lowest])) lowest = i;
+      if (!(series.y[i] <= series.y[highest])) highest = i;
+    }
+    std::array<std::size_t, 4> kept{first, lowest, highest, last};
+    std::sort(kept.begin(), kept.end());
+    const auto end = std::unique(kept.begin(), kept.end());
+    for (auto i = kept.begin(); i != end; ++i) {
+      thin.x.push_back(series.x[*i]), thin.y.push_back(series.y[*i]);
+      if (!series.sigma.empty()) thin.sigma.push_back(series.sigma[*i]);
+    }
+    first = last + 1;
+  }
+  return thin;
+}
+
+std::string escaped(const std::string& text) {
+  std::string safe;
+  for (const char c : text) switch (c) {
+      case '&':
+        safe += "&amp;";
+        break;
+      case '<':
+        safe += "&lt;";
+        break;
+      case '>':
+        safe += "&gt;";
+        break;
+      case '"':
+        safe += "&quot;";
+        break;
+      case '\'':
+        safe += "&#39;";
+        break;
+      default:
+        if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') safe += c;  // others are not HTML
+    }
+  return safe;
+}
+
+std::string svg_from(const Plot& plot) {
+  const auto legend = legend_of(plot);
+  const double top = legend.empty() ? 32 : legend.back().y_px + 14;
+  const double total = height_px + (plot.image_plane ? 40 : 0) + std::max(0.0, top - 54);
+  const double bottom_edge = total - bottom_px;
+  const Layout layout = layout_of(plot, top, bottom_edge);
+
+  std::string content;
+  for (const ReferenceLine& line : plot.references)
+    content +=
+        fmt::format("<path class=\"line s-grey dashed\" d=\"M{:.1f} {:.1f}H{:.1f}\"><title>{}: {}</title></path>\n",
+                    layout.left_px, layout.y(line.y), width_px - right_px, escaped(line.name), number(line.y));
+  for (const Series& series : plot.series) content += drawn(plot, layout, series);
+  std::string text = fmt::format("<svg class=\"plot\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n",
+                                 width_px, total, escaped(plot.title));
+  text += fmt::format("<text class=\"title\" x=\"8\" y=\"{:.0f}\">{}</text>\n", font_px + 4, escaped(plot.title));
+  for (const LegendEntry& entry : legend) text += drawn(entry);
+  text += axes(plot, layout, bottom_edge);
+  const std::string clip = clip_name(text + content);
+  text += fmt::format(
+      "<clipPath id=\"{}\"><rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/></clipPath>\n", clip,
+      layout.left_px, top, width_px - right_px - layout.left_px, bottom_edge - top);
+  return text + fmt::format("<g clip-path=\"url(#{})\">\n", clip) + content + "</g>\n</svg>\n";
+}
+
+std::string plot_css() {
+  std::string css =
+      ":root{--c0:#0072b2;--c1:#d55e00;--c2:#00855f;--c3:#b0478a;--c4:#a67200;--grey:#6b7280;--grid:#e3e6ea;"
+      "--ink:#1c2127;--page:#fbfbfa;--card:#fff;--edge:#d9dde3;--soft:#4d5661}\n"
+      "@media(prefers-color-scheme:dark){:root{--c0:#56b4e9;--c1:#f0883e;--c2:#3fc99b;--c3:#e29ac6;--c4:#e6b422;"
+      "--grey:#9aa4b0;--grid:#2d333b;--ink:#e8eaed;--page:#14171b;--card:#1c2026;--edge:#343b44;--soft:#b3bcc6}}\n"
+      ".plot{display:block;width:100%;height:auto;font:14px system-ui,sans-serif;fill:var(--ink)}\n"
+      ".plot .title{font-weight:600}.plot .middle{text-anchor:middle}.plot .end{text-anchor:end}\n"
+      ".plot .grid{stroke:var(--grid);fill:none}.plot .frame{stroke:var(--grey);fill:none}\n"
+      ".plot .line{fill:none;stroke-width:1.8;stroke-linejoin:round}.plot .dashed{stroke-dasharray:6 4}\n"
+      ".plot .band{opacity:.2}.plot .bar{stroke-width:1.4;opacity:.6}.plot .hover{fill:transparent}\n"
+      ".plot .point{fill-opacity:.8}.plot .point:hover,.plot .hover:hover{stroke:var(--ink);stroke-width:1.5}\n";
+  for (const char* name : {"c0", "c1", "c2", "c3", "c4", "grey"})
+    css += fmt::format(".s-{0}{{stroke:var(--{0})}}.f-{0}{{fill:var(--{0})}}\n", name);
+  return css;
+}
+
+}  // namespace lapservo

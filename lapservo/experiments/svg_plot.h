@@ -1,0 +1,66 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace lapservo {
+
+/// How a series is drawn. Its colour and the shape of its points follow from `Series::color`.
+enum class Draw { line, dashed, points, line_and_points };
+
+/// A run of points, in the units of the axes. Points that are not finite leave a gap.
+struct Series {
+  std::string name;
+  std::vector<double> x, y;
+  std::vector<double> sigma;  ///< empty, or one a point: a band about a line, a bar at a point
+  Draw draw = Draw::line;
+  int color = 0;  ///< 0 to 4, of the report's palette; -1 grey
+};
+
+struct Axis {
+  std::string label, unit;
+  std::optional<double> low, high;  ///< else from the data
+  bool logarithmic = false;         ///< then values of 0 and below are not drawn
+};
+
+/// A horizontal line to compare with.
+struct ReferenceLine {
+  std::string name;
+  double y;
+};
+
+struct Plot {
+  std::string title;
+  Axis x, y;
+  std::vector<Series> series;
+  std::vector<ReferenceLine> references;
+  bool image_plane = false;  ///< one scale for both axes, y down
+};
+
+/// The plot as an <svg> element for an HTML page that has plot_css(). Made to be read at 340 px of width; every point
+/// tells its numbers when pointed at. Lines of many points are thinned to what can be seen.
+std::string svg_from(const Plot& plot);
+
+/// The style rules that the elements of svg_from() need, and the palette for light and dark (Okabe and Ito's, told
+/// apart by the colour-blind).
+std::string plot_css();
+
+/// Round numbers (1, 2 or 5 times a power of ten apart) in [low, high], at most `most` (5 or more) and at least two.
+/// Needs finite low < high.
+std::vector<double> nice_ticks(double low, double high, int most);
+
+/// The same for a logarithmic axis, low > 0: powers of ten, with 2 and 5 times them where few powers fit.
+std::vector<double> nice_logarithmic_ticks(double low, double high);
+
+/// Labels of ticks, as short as tells them apart.
+std::vector<std::string> tick_labels(const std::vector<double>& ticks);
+
+/// A line with at most four points for each of `columns` parts of its x range (first, lowest, highest, last): looks the
+/// same. Needs x that does not decrease.
+Series thinned(const Series& series, int columns);
+
+/// Text for HTML and SVG, in elements and in quoted attributes.
+std::string escaped(const std::string& text);
+
+}  // namespace lapservo
