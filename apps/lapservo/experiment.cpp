@@ -15,6 +15,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/html_report.h"
 #include "lapservo/experiments/illumination.h"
+#include "lapservo/experiments/rcm.h"
 #include "lapservo/experiments/rotation.h"
 #include "lapservo/rig/rig.h"
 
@@ -44,6 +45,7 @@ struct Named {
 const std::vector<Named>& experiments() {
   static const std::vector<Named> all{
       {"illumination", run_experiment<measure_illumination>},
+      {"rcm", run_experiment<measure_rcm>},
       {"rotation", run_experiment<measure_rotation>},
   };
   return all;

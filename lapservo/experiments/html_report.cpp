@@ -1,8 +1,10 @@
 #include "lapservo/experiments/html_report.h"
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
+#include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
@@ -38,7 +40,11 @@ dialog.near>div{width:300%;cursor:zoom-out}
 dialog .plot{max-height:98vh}dialog.near .plot,dialog.near img{max-height:none}dialog img{width:100%}
 dialog button{position:fixed;top:8px;right:8px;width:44px;height:44px;border-radius:22px;border:1px solid var(--edge);
 background:var(--card);color:var(--ink);font-size:20px}
-@media(max-width:600px){body{font-size:15px}main{padding:10px}th,td{padding:.3rem .45rem;font-size:.9rem}}
+@media(max-width:600px){body{font-size:15px}main{padding:10px}th,td{padding:.3rem .45rem;font-size:.9rem}
+.words,.words tbody{display:block}.words thead{display:none}
+.words tr{display:grid;grid-template-columns:repeat(3,1fr);border-bottom:1px solid var(--edge);padding:.4rem 0}
+.words td{border:0;padding:.1rem .4rem .1rem 0}.words td:first-child{grid-column:1/-1;font-weight:600}
+.words td:not(:first-child)::before{content:attr(data-of);display:block;font-size:.75rem;color:var(--soft)}}
 @media print{nav,dialog{display:none}figure{break-inside:avoid}}
 )";
 
@@ -96,8 +102,8 @@ std::string row_of(const std::vector<std::string>& cells, const char* tag) {
   return text + "</tr>\n";
 }
 
-std::string html_from(const Table& table, const char* kind = "numbers") {
-  std::string text = fmt::format("<div class=\"scroll\"><table class=\"{}\">\n", kind);
+std::string html_from(const Table& table) {
+  std::string text = "<div class=\"scroll\"><table>\n";
   if (!table.caption.empty()) text += fmt::format("<caption>{}</caption>\n", escaped(table.caption));
   text += "<thead>" + row_of(table.header, "th") + "</thead>\n<tbody>\n";
   for (const auto& row : table.rows) text += row_of(row, "td");
@@ -109,10 +115,16 @@ std::string or_dash(const std::string& text) {
 }
 
 std::string html_from(const std::vector<Comparison>& comparisons) {
-  Table table{"", {"", "the paper", "the paper\u2019s method here", "the default here"}, {}};
-  for (const Comparison& c : comparisons)
-    table.rows.push_back({c.what, or_dash(c.paper), or_dash(c.centerline), or_dash(c.surface)});
-  return html_from(table, "words");
+  const std::array<const char*, 3> who{"the paper", "the paper\u2019s method here", "the default here"};
+  std::string text = "<div class=\"scroll\"><table class=\"words\">\n<thead>";
+  text += row_of({"", who[0], who[1], who[2]}, "th") + "</thead>\n<tbody>\n";
+  for (const Comparison& c : comparisons) {
+    text += "<tr><td>" + escaped(c.what) + "</td>";
+    for (const auto& [name, value] : {std::pair{who[0], c.paper}, {who[1], c.centerline}, {who[2], c.surface}})
+      text += fmt::format("<td data-of=\"{}\">{}</td>", name, escaped(or_dash(value)));
+    text += "</tr>\n";
+  }
+  return text + "</tbody></table></div>\n";
 }
 
 std::string paragraphs(const std::vector<std::string>& text) {

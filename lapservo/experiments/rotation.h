@@ -11,7 +11,7 @@ namespace lapservo {
 
 /// The paper's section V-C: ten trials, each a pure rotation by a full turn from its own initial rotation.
 struct RotationResult {
-  static constexpr int trials = 10, steps = 48;  ///< a trial passes the seam of the marker once
+  static constexpr int trials = 10, steps = 40;  ///< a trial passes the seam of the marker once
   static constexpr double first_rad = -3.5, last_rad = -1.25;
 
   struct Sample {

@@ -10,7 +10,7 @@
 namespace lapservo {
 namespace {
 
-constexpr double width_px = 480, height_px = 320, font_px = 14, character_px = 7.4;
+constexpr double width_px = 480, height_px = 320, font_px = 14, character_px = 7.9;
 constexpr double right_px = 14, bottom_px = 46, legend_row_px = 20;
 constexpr std::size_t most_hover_points = 150;
 
