@@ -92,6 +92,13 @@ Report report_of(std::vector<ReportSection> sections, const Options& options) {
       std::move(sections)};
 }
 
+// The library knows the rig, but not its file.
+[[noreturn]] void rethrow_with_rig(const InputError& error, const Options& options) {
+  const std::string text = error.what();
+  if (text.starts_with("rig: ") && !options.rig.empty()) throw InputError(options.rig, text.substr(5));
+  throw error;
+}
+
 int run(const Options& options) {
   ExperimentSetup setup = setup_of(options);
   const fs::path folder = options.out;
@@ -112,6 +119,8 @@ int run(const Options& options) {
     } catch (const Interrupted&) {
       stopped_in = name;
       break;
+    } catch (const InputError& error) {
+      rethrow_with_rig(error, options);
     }
   }
   if (!stopped_in.empty()) std::printf("stopped in %s\n", stopped_in.c_str());

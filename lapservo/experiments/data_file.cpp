@@ -9,17 +9,17 @@ namespace lapservo {
 
 Field::Field(double number) : text_(std::isfinite(number) ? fmt::format("{:.9g}", number) : "") {}
 
-DataFile::DataFile(const std::filesystem::path& path, std::initializer_list<const char*> header)
+DataFile::DataFile(const std::filesystem::path& path, const std::vector<std::string>& header)
     : file_(path), columns_(header.size()) {
   const char* separator = "";
-  for (const char* name : header) {
+  for (const std::string& name : header) {
     file_.stream() << separator << name;
     separator = ",";
   }
   file_.stream() << '\n';
 }
 
-void DataFile::row(std::initializer_list<Field> fields) {
+void DataFile::row(const std::vector<Field>& fields) {
   if (fields.size() != columns_) throw std::logic_error("a row of another length than the header");
   const char* separator = "";
   for (const Field& field : fields) {

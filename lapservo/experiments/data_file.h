@@ -2,9 +2,9 @@
 
 #include <cmath>
 #include <filesystem>
-#include <initializer_list>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "lapservo/core/atomic_file.h"
 
@@ -28,9 +28,9 @@ class Field {
 class DataFile {
  public:
   /// Throws InputError at once when `path` can't be written.
-  DataFile(const std::filesystem::path& path, std::initializer_list<const char*> header);
+  DataFile(const std::filesystem::path& path, const std::vector<std::string>& header);
   /// Throws std::logic_error when there are not as many fields as columns.
-  void row(std::initializer_list<Field> fields);
+  void row(const std::vector<Field>& fields);
   void commit() { file_.commit(); }
 
  private:

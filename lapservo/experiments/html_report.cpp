@@ -1,6 +1,5 @@
 #include "lapservo/experiments/html_report.h"
 
-#include <array>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
@@ -115,12 +114,12 @@ std::string or_dash(const std::string& text) {
 }
 
 std::string html_from(const std::vector<Comparison>& comparisons) {
-  const std::array<const char*, 3> who{"the paper", "the paper\u2019s method here", "the default here"};
   std::string text = "<div class=\"scroll\"><table class=\"words\">\n<thead>";
-  text += row_of({"", who[0], who[1], who[2]}, "th") + "</thead>\n<tbody>\n";
+  text += row_of({"", "the paper", "the paper\u2019s method here", "the default here"}, "th") + "</thead>\n<tbody>\n";
   for (const Comparison& c : comparisons) {
     text += "<tr><td>" + escaped(c.what) + "</td>";
-    for (const auto& [name, value] : {std::pair{who[0], c.paper}, {who[1], c.centerline}, {who[2], c.surface}})
+    for (const auto& [name, value] :
+         {std::pair{"the paper", c.paper}, {"its method here", c.centerline}, {"the default here", c.surface}})
       text += fmt::format("<td data-of=\"{}\">{}</td>", name, escaped(or_dash(value)));
     text += "</tr>\n";
   }

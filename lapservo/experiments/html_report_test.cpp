@@ -1,0 +1,116 @@
+#include "lapservo/experiments/html_report.h"
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "lapservo/core/error.h"
+#include "lapservo/experiments/test_markup.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+
+Report sample_report(const std::string& word = "word") {
+  ReportSection section;
+  section.id = "one";
+  section.title = word;
+  section.text = {word, word};
+  section.comparisons = {{word, "1.49 px", "0.2 px", ""}, {word, "", "", "1"}};
+  Plot plot{word, {"time", "s", {}, {}}, {word, "px", {}, {}}, {}, {}, false};
+  plot.series.push_back({word, {0, 1, 2}, {1, 3, 2}, {}, Draw::line_and_points, 0});
+  section.figures.push_back({plot, word});
+  cv::Mat picture(40, 60, CV_8UC3, cv::Scalar(200, 40, 20));
+  section.figures.push_back({Picture{word, picture}, word});
+  section.tables = {{word, {word, "b"}, {{"1", word}, {"2", "3"}}}};
+  section.notes = {word};
+  section.command = "lapservo experiment " + word;
+  section.files = {"one.csv"};
+  return {word, {word}, {section}};
+}
+
+// Style and script are not markup.
+std::string without(std::string html, const std::string& tag) {
+  const std::size_t begin = html.find("<" + tag + ">"), end = html.find("</" + tag + ">");
+  EXPECT_NE(begin, std::string::npos);
+  return html.erase(begin, end + tag.size() + 3 - begin);
+}
+
+TEST(HtmlReport, IsWellFormedWhateverTheTexts) {
+  const std::string html = html_from(sample_report("<b>\"quoted\" & 'single'</b><script>alert(1)</script>"));
+  EXPECT_EQ(testing::markup_problem(without(without(html, "style"), "script")), "");
+  EXPECT_EQ(html.find("alert(1)</script>"), std::string::npos);
+  EXPECT_EQ(html.find("<b>"), std::string::npos);
+  // As XML too: the script and the style have no markup of their own.
+  EXPECT_EQ(testing::markup_problem(html), "");
+}
+
+TEST(HtmlReport, NeedsNothingButItself) {
+  const std::string html = html_from(sample_report());
+  for (const char* elsewhere :
+       {"http:", "https:", "src=\"/", "<link", "@import", "<iframe", "url(h", "url(/", "url(\""})
+    EXPECT_EQ(html.find(elsewhere), std::string::npos) << elsewhere;
+  for (std::size_t at = html.find("src="); at != std::string::npos; at = html.find("src=", at + 1))
+    EXPECT_EQ(html.compare(at, 10, "src=\"data:"), 0) << html.substr(at, 40);
+  for (std::size_t at = html.find("href="); at != std::string::npos; at = html.find("href=", at + 1))
+    EXPECT_EQ(html.compare(at, 7, "href=\"#"), 0) << html.substr(at, 40);
+}
+
+TEST(HtmlReport, SaysEverythingOnceAndTheFirstComparisonInTheSummaryToo) {
+  Report report = sample_report();
+  report.sections[0].comparisons[0].paper = "the-papers-figure";
+  report.sections[0].comparisons[1].surface = "our-figure";
+  report.sections[0].notes = {"a-note"};
+  const std::string html = html_from(report);
+  const auto count = [&html](const std::string& what) {
+    int n = 0;
+    for (std::size_t at = html.find(what); at != std::string::npos; at = html.find(what, at + 1)) ++n;
+    return n;
+  };
+  EXPECT_EQ(count("the-papers-figure"), 2);
+  EXPECT_EQ(count("our-figure"), 1);
+  EXPECT_EQ(count("a-note"), 1);
+  EXPECT_EQ(count("one.csv"), 1);
+  EXPECT_EQ(html, html_from(report)) << "the same report, the same bytes";
+}
+
+// The picture comes back out of the page.
+TEST(HtmlReport, EmbedsPictures) {
+  const std::string html = html_from(sample_report()), start = "data:image/jpeg;base64,";
+  const std::size_t begin = html.find(start) + start.size(), end = html.find('"', begin);
+  const std::string text = html.substr(begin, end - begin);
+  ASSERT_EQ(text.size() % 4, 0U);
+  const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::vector<std::uint8_t> bytes;
+  std::uint32_t bits = 0;
+  int held = 0;
+  for (const char c : text) {
+    if (c == '=') break;
+    ASSERT_NE(digits.find(c), std::string::npos);
+    bits = bits << 6 | static_cast<std::uint32_t>(digits.find(c));
+    if ((held += 6) >= 8) bytes.push_back(static_cast<std::uint8_t>(bits >> (held -= 8)));
+  }
+  const cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_COLOR);
+  ASSERT_EQ(picture.size(), cv::Size(60, 40));
+  EXPECT_NEAR(picture.at<cv::Vec3b>(20, 30)[0], 200, 6);
+  EXPECT_NEAR(picture.at<cv::Vec3b>(20, 30)[2], 20, 6);
+}
+
+TEST(HtmlReport, AppearsWholeOrNotAtAll) {
+  const fs::path folder = fs::temp_directory_path() / ("lapservo_report_" + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  write_report(folder / "report.html", sample_report());
+  std::ifstream file(folder / "report.html");
+  std::stringstream text;
+  text << file.rdbuf();
+  EXPECT_EQ(text.str(), html_from(sample_report()));
+  EXPECT_THROW(write_report(folder / "missing" / "report.html", sample_report()), InputError);
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace lapservo

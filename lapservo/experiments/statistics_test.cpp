@@ -1,0 +1,59 @@
+#include "lapservo/experiments/statistics.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::uint64_t seed = 72;
+
+TEST(Spread, OfKnownNumbers) {
+  const Spread spread = spread_of({2, 4, 4, 4, 5, 5, 7, -9});
+  EXPECT_EQ(spread.count, 8U);
+  EXPECT_DOUBLE_EQ(spread.mean, 2.75);
+  EXPECT_DOUBLE_EQ(spread.median, 4);
+  EXPECT_DOUBLE_EQ(spread.largest, 9);
+  EXPECT_NEAR(spread.rms, std::sqrt(232.0 / 8), 1e-12);
+  EXPECT_NEAR(spread.deviation, std::sqrt((232 - 8 * 2.75 * 2.75) / 7), 1e-12);
+  EXPECT_EQ(spread_of({}).count, 0U);
+  EXPECT_EQ(spread_of({}).rms, 0);
+  EXPECT_EQ(spread_of({3}).deviation, 0);
+}
+
+// A shift moves mean and median, a scale scales everything; the order does not count.
+TEST(Spread, FollowsShiftAndScale) {
+  Random random(seed);
+  std::vector<double> values, changed;
+  for (int i = 0; i < 101; ++i) values.push_back(random.normal());
+  for (auto value = values.rbegin(); value != values.rend(); ++value) changed.push_back(-3 * *value + 10);
+  const Spread a = spread_of(values), b = spread_of(changed);
+  EXPECT_NEAR(b.mean, 10 - 3 * a.mean, 1e-12) << "seed " << seed;
+  EXPECT_NEAR(b.median, 10 - 3 * a.median, 1e-12);
+  EXPECT_NEAR(b.deviation, 3 * a.deviation, 1e-12);
+  EXPECT_NEAR(b.rms * b.rms, b.mean * b.mean + b.deviation * b.deviation * 100 / 101, 1e-9);
+}
+
+// The mean distance of four points with noise sigma in u and v to their centroid is sigma sqrt(3/4) sqrt(pi/2).
+TEST(DistancesToCentroid, MeasureTheNoiseWhereverThePointsAre) {
+  Random random(seed);
+  std::vector<double> distances;
+  for (int i = 0; i < 20000; ++i) {
+    const Eigen::Vector2d at(random.uniform(0, 1280), random.uniform(0, 720));
+    std::vector<Eigen::Vector2d> points;
+    for (int light = 0; light < 4; ++light)
+      points.push_back(at + 0.3 * Eigen::Vector2d(random.normal(), random.normal()));
+    for (const double distance : distances_to_centroid(points)) distances.push_back(distance);
+  }
+  EXPECT_EQ(distances.size(), 80000U);
+  EXPECT_NEAR(spread_of(distances).mean, 0.3 * std::sqrt(0.75) * std::sqrt(std::acos(-1.0) / 2), 2e-3)
+      << "seed " << seed;
+  EXPECT_EQ(distances_to_centroid({{3, 4}}), std::vector<double>{0});
+  EXPECT_TRUE(distances_to_centroid({}).empty());
+}
+
+}  // namespace
+}  // namespace lapservo
