@@ -109,9 +109,10 @@ int run(const Options& options) {
   std::string stopped_in;
   for (const auto& [name, experiment] : experiments()) {
     if (options.name != "all" && options.name != name) continue;
-    Progress progress(std::nullopt);
+    std::optional<Progress> progress;
     setup.keep_going = [&progress, &label = name](int done, int total) {
-      progress.show(done, fmt::format(" of {} ({})", total, label));
+      if (!progress) progress.emplace(total);
+      progress->show(done, " (" + label + ")");
       return !interrupted();
     };
     try {

@@ -146,7 +146,7 @@ std::string html_from(const ReportSection& section) {
     for (const std::string& note : section.notes) html += "<li>" + escaped(note) + "</li>\n";
     html += "</ul>\n";
   }
-  html += "<h3>Again</h3>\n<pre>" + escaped(section.command) + "</pre>\n";
+  html += "<h3>To make it again</h3>\n<pre>" + escaped(section.command) + "</pre>\n";
   std::string files;
   for (const std::string& file : section.files) files += (files.empty() ? "" : ", ") + file;
   if (!files.empty()) html += "<p>The data behind it, beside this file: " + escaped(files) + "</p>\n";

@@ -43,12 +43,14 @@ void add_position(Result::OfMethod& of_method, const Sightings& sightings, std::
   }
 }
 
-// The box around the marker with some room, in a common shape.
-cv::Mat crop(const cv::Mat& picture, const Eigen::Vector2d& middle_px) {
-  const int width = std::min(picture.cols, 640), height = std::min(picture.rows, 400);
+// Three quarters of the frame about the marker, 640 px wide.
+cv::Mat tile_of(const cv::Mat& picture, const Eigen::Vector2d& middle_px) {
+  const int width = 3 * picture.cols / 4, height = 3 * picture.rows / 4;
   const int left = std::clamp(static_cast<int>(middle_px.x()) - width / 2, 0, picture.cols - width);
   const int top = std::clamp(static_cast<int>(middle_px.y()) - height / 2, 0, picture.rows - height);
-  return picture(cv::Rect(left, top, width, height));
+  cv::Mat tile;
+  cv::resize(picture(cv::Rect(left, top, width, height)), tile, {640, 640 * height / width}, 0, 0, cv::INTER_AREA);
+  return tile;
 }
 
 cv::Mat example(const ExperimentSetup& setup, Stage& stage, const RcmCoordinates& q) {
@@ -57,7 +59,7 @@ cv::Mat example(const ExperimentSetup& setup, Stage& stage, const RcmCoordinates
   std::array<cv::Mat, 4> tiles;
   for (std::size_t light = 0; light < tiles.size(); ++light) {
     const cv::Mat frame = stage.render(q, Result::lights[light], frame_seed(setup.seed, 0));
-    tiles[light] = crop(draw_overlay(frame, setup.rig, eyes.observe(frame)), middle);
+    tiles[light] = tile_of(draw_overlay(frame, setup.rig, eyes.observe(frame)), middle);
   }
   cv::Mat upper, lower, both;
   cv::hconcat(tiles[0], tiles[1], upper);
@@ -191,7 +193,7 @@ ReportSection section_of(const IlluminationResult& result, const ExperimentSetup
        "Mean over the four points and four lights of one position."});
   section.figures.push_back(
       {distance_plot("Distance to the centroid, by light", {"light", "%", 30, 110}, result, by_light),
-       "Mean over all positions and points: the darkest and the brightest frames pull apart."});
+       "Mean over all positions and points."});
   section.figures.push_back({map_of_points(result.methods.back(), setup.rig.camera),
                              "All positions under 40 % of the light: they cover the field of view."});
   section.figures.push_back(

@@ -232,7 +232,8 @@ ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) 
   section.notes = {
       "The trackers do not know camera_from_rcm in this experiment: the default fits the shaft freely.",
       "The sigma of the mean of intersections is a jackknife over the lines, that of the least squares comes from the "
-      "fit, with the noise of the lines estimated from how well they meet."};
+      "fit, with the noise of the lines estimated from how well they meet. An error that all lines share is in "
+      "neither."};
   section.command = "lapservo experiment rcm --out DIR" + setup.options;
   section.files = {"rcm.csv", "rcm_lines.csv"};
   return section;
