@@ -7,6 +7,7 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/response.h"
+#include "lapservo/sim/shaft_lighting.h"
 
 namespace lapservo {
 namespace {
