@@ -42,10 +42,20 @@ Renderer::Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const c
     canvas_.depth_m = cv::Mat(background.size(), CV_32F, cv::Scalar(far_m));
     canvas_.cover = cv::Mat(background.size(), CV_32F, cv::Scalar(0));
   }
-  background_ = encoder_.allocate(background.size());
-  const cv::Rect whole(0, 0, background.cols, background.rows);
-  develop(background_light_, whole, background_);
+  develop_background();
+}
+
+void Renderer::develop_background() {
+  background_ = encoder_.allocate(background_light_.size());
+  develop(background_light_, cv::Rect({0, 0}, background_light_.size()), background_);
   frame_ = {background_.value.clone(), background_.sigma.clone()};
+}
+
+void Renderer::set_gains(const Light& gains) {
+  if (gains == options_.sensor.gains) return;
+  options_.sensor.gains = gains;
+  encoder_.set_gains(gains);
+  develop_background();
 }
 
 // Blurs, veils and encodes a part. A veil is even: it may come after the blur.

@@ -31,12 +31,20 @@ class Renderer {
  public:
   /// `background`: linear light, CV_32FC3, of the camera's size.
   Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background, RenderOptions options = {});
+  Renderer(Renderer&&) = default;
+  Renderer& operator=(Renderer&&) = default;
 
   /// One placement per shaft. The same seed gives the same noise.
   cv::Mat render(const std::vector<ShaftPlacement>& placements, std::uint64_t seed);
   cv::Mat render_exposure(const Exposure& exposure, std::uint64_t seed);
 
+  /// Exposure and white balance of the frames to come; a change costs about a frame.
+  void set_gains(const Light& gains);
+  /// One that shares nothing with this, for another thread.
+  Renderer clone() const { return Renderer(camera_, shafts_, background_light_, options_); }
+
  private:
+  void develop_background();
   std::vector<cv::Rect> draw(const std::vector<ShaftPlacement>& placements);
   void clear(const std::vector<cv::Rect>& drawn);
   void develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded);

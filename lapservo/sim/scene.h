@@ -46,6 +46,7 @@ struct ShaftModel {
 struct ShaftPlacement {
   Rigid3 camera_from_unrolled;  ///< z along the axis, origin at the marker's proximal end
   double psi_rad = 0;
+  bool covered = false;  ///< something dark lies over the whole marker
 };
 
 /// What the camera's chip adds, in linear light with 1 at white.

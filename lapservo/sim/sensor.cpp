@@ -21,7 +21,7 @@ constexpr double most = 32767;
 }  // namespace
 
 SensorEncoder::SensorEncoder(const Response& response, const Sensor& sensor) {
-  for (std::size_t i = 0; i < gains_.size(); ++i) gains_[i] = sensor.gains[static_cast<Eigen::Index>(i % 3)];
+  set_gains(sensor.gains);
   for (int i = 0; i <= levels; ++i) {
     // Squared spacing: the response is steep near black.
     const double light = std::pow(static_cast<double>(i) / levels, 2);
@@ -37,6 +37,10 @@ SensorEncoder::SensorEncoder(const Response& response, const Sensor& sensor) {
   deviates_.resize(deviate_count);
   for (auto& deviate : deviates_)
     deviate = static_cast<std::int16_t>(std::lround(std::clamp(random.normal() * deviate_unit, -most, most)));
+}
+
+void SensorEncoder::set_gains(const Light& gains) {
+  for (std::size_t i = 0; i < gains_.size(); ++i) gains_[i] = gains[static_cast<Eigen::Index>(i % 3)];
 }
 
 void SensorEncoder::encode(const float* light, int pixels, int v, int begin, Encoded& encoded) {

@@ -18,6 +18,8 @@ class SensorEncoder {
  public:
   SensorEncoder(const Response& response, const Sensor& sensor);
 
+  void set_gains(const Light& gains);
+
   /// Encoded values in 64ths and the noise's sigma in 512ths (CV_16SC3 each), before noise and rounding.
   struct Encoded {
     cv::Mat value, sigma;

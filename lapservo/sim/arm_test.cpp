@@ -1,0 +1,149 @@
+#include "lapservo/sim/arm.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+const Eigen::Vector4d start(0.1, 1.5, 0.1, 0);
+
+ArmConfig ideal() {
+  ArmConfig config;
+  config.lag_s = 0;
+  config.resolution = config.backlash = config.joint_offset = Eigen::Vector4d::Zero();
+  return config;
+}
+
+TEST(Arm, FollowsASmallStepWithItsTimeConstant) {
+  ArmConfig config = ideal();
+  config.lag_s = 0.03;
+  Arm arm(config, start);
+  const Eigen::Vector4d step = 0.5 * config.lag_s * config.rate;  // too small to reach the largest speed
+  arm.servo_jp(start + step);
+  for (int k = 1; k <= 100; ++k) {
+    arm.step(0.001);
+    const Eigen::Vector4d left = (start + step - arm.measured_jp()).cwiseQuotient(step);
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(left[i], std::exp(-0.001 * k / config.lag_s), 1e-9);
+  }
+}
+
+TEST(Arm, LagsBehindARampByItsTimeConstant) {
+  ArmConfig config = ideal();
+  config.lag_s = 0.02;
+  Arm arm(config, start);
+  const double speed = 0.5, period_s = 1e-4;
+  double goal = start[0];
+  for (int k = 0; k < 5000; ++k) {
+    goal += speed * period_s;
+    arm.servo_jp({goal, start[1], start[2], start[3]});
+    arm.step(period_s);
+  }
+  EXPECT_NEAR(goal - arm.measured_jp()[0], speed * config.lag_s, speed * period_s);
+}
+
+TEST(Arm, NeverExceedsItsRatesOrItsLimits) {
+  const std::uint64_t seed = 4;
+  Random random(seed);
+  for (const double lag_s : {0.0, 0.02, 0.2}) {
+    ArmConfig config = ideal();
+    config.lag_s = lag_s;
+    Arm arm(config, start);
+    Eigen::Vector4d before = arm.measured_jp();
+    for (int k = 0; k < 3000; ++k) {
+      if (k % 20 == 0)
+        arm.servo_jp({random.uniform(-3, 3), random.uniform(-1, 4), random.uniform(-0.2, 0.5), random.uniform(-9, 9)});
+      const double dt_s = random.uniform(1e-4, 0.02);
+      arm.step(dt_s);
+      const Eigen::Vector4d now = arm.measured_jp();
+      for (int i = 0; i < 4; ++i) {
+        ASSERT_LE(std::abs(now[i] - before[i]), config.rate[i] * dt_s * (1 + 1e-9))
+            << "seed " << seed << " joint " << i;
+        ASSERT_GE(now[i], config.lower[i]);
+        ASSERT_LE(now[i], config.upper[i]);
+      }
+      before = now;
+    }
+    EXPECT_GT(arm.setpoints_beyond_limits(), 0);
+  }
+}
+
+TEST(Arm, MovesAlikeHoweverFinelyItIsStepped) {
+  ArmConfig config;
+  config.resolution.setZero();
+  Arm coarse(config, start), fine(config, start);
+  for (const double away : {0.3, -0.2, 0.01}) {
+    const Eigen::Vector4d goal = start + away * Eigen::Vector4d(1, 1, 0.1, 4);
+    coarse.servo_jp(goal);
+    fine.servo_jp(goal);
+    coarse.step(0.1);
+    for (int k = 0; k < 37; ++k) fine.step(0.1 / 37);
+    EXPECT_LT((coarse.true_jp() - fine.true_jp()).norm(), 1e-12);
+  }
+}
+
+// Driven to and fro, the instrument stands apart by the whole play at the same reading.
+TEST(Arm, PlayIsAsWideAsConfigured) {
+  ArmConfig config = ideal();
+  config.backlash = {0.001, 0.002, 1e-4, 0.02};
+  Arm arm(config, start);
+  const auto come_from = [&](double side) {
+    arm.servo_jp(start + side * 5 * config.backlash);
+    arm.step(1);
+    arm.servo_jp(start);
+    arm.step(1);
+    return arm.true_jp();
+  };
+  const Eigen::Vector4d from_above = come_from(1), from_below = come_from(-1);
+  EXPECT_LT((from_above - from_below - config.backlash).norm(), 1e-12);
+  // Within the play the instrument stays.
+  arm.servo_jp(start - 0.9 * config.backlash);
+  arm.step(1);
+  EXPECT_LT((arm.true_jp() - from_below).norm(), 1e-12);
+}
+
+TEST(Arm, ReadsInWholeStepsOfItsEncodersAndStandsOffByItsOffsets) {
+  ArmConfig config;
+  config.backlash.setZero();
+  Arm arm(config, start);
+  Random random(8);
+  for (int k = 0; k < 100; ++k) {
+    arm.servo_jp(start + Eigen::Vector4d(random.uniform(), random.uniform(), 0.1 * random.uniform(), random.uniform()));
+    arm.step(0.013);
+    const Eigen::Vector4d reading = arm.measured_jp(), steps = reading.cwiseQuotient(config.resolution);
+    for (int i = 0; i < 4; ++i) EXPECT_NEAR(steps[i], std::round(steps[i]), 1e-6);
+    const Eigen::Vector4d rounding = arm.true_jp() - reading - config.joint_offset;
+    for (int i = 0; i < 4; ++i) EXPECT_LE(std::abs(rounding[i]), 0.5001 * config.resolution[i]);
+  }
+}
+
+TEST(Arm, ANonFiniteSetpointStopsItUntilItRecovers) {
+  Arm arm(ideal(), start);
+  arm.servo_jp(start + Eigen::Vector4d::Constant(0.05));
+  arm.step(0.01);
+  const Eigen::Vector4d there = arm.measured_jp();
+  arm.servo_jp({std::numeric_limits<double>::quiet_NaN(), 1.5, 0.1, 0});
+  EXPECT_TRUE(arm.faulted());
+  arm.servo_jp(start);
+  arm.step(1);
+  EXPECT_EQ(arm.measured_jp(), there);
+  arm.recover();
+  arm.servo_jp(start);
+  arm.step(1);
+  EXPECT_LT((arm.measured_jp() - start).norm(), 1e-12);
+}
+
+TEST(Arm, RefusesNonsense) {
+  ArmConfig config;
+  config.rate[2] = 0;
+  EXPECT_THROW(Arm(config, start), InputError);
+  EXPECT_THROW(Arm(ArmConfig{}, {9, 1.5, 0.1, 0}), InputError);
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,82 @@
+#include "lapservo/sim/endoscope.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+// Moments that are equal but for rounding.
+constexpr double same_s = 1e-9;
+
+void check(bool right, const char* field, double value, const char* expected) {
+  if (!right) throw InputError("endoscope", field, fmt::format("{}", value), expected);
+}
+
+}  // namespace
+
+const EndoscopeConfig& EndoscopeConfig::checked() const {
+  check(frame_rate_hz >= 1 && frame_rate_hz <= 1000, "frame_rate_hz", frame_rate_hz, "1 to 1000");
+  check(exposure_s >= 0 && exposure_s <= 1 / frame_rate_hz, "exposure_s", exposure_s, "0 to the time between frames");
+  check(exposure_moments >= 2 && exposure_moments <= 100, "exposure_moments", exposure_moments, "2 to 100");
+  check(latency_s >= exposure_s / 2 && latency_s <= 10, "latency_s", latency_s, "half the exposure to 10");
+  check(jitter_s >= 0 && jitter_s <= 1, "jitter_s", jitter_s, "0 to 1");
+  check(dropped_share >= 0 && dropped_share <= 1, "dropped_share", dropped_share, "0 to 1");
+  check(render_threads >= 0 && render_threads <= 64, "render_threads", render_threads, "0 to 64");
+  return *this;
+}
+
+Endoscope::Endoscope(const Camera& camera, const std::vector<ShaftModel>& shafts, const cv::Mat& background,
+                     const RenderOptions& options, const EndoscopeConfig& config, std::uint64_t seed)
+    : config_(config.checked()), gains_(options.sensor.gains), seed_(seed) {
+  if (config.pictures)
+    queue_ = std::make_unique<RenderQueue>(Renderer(camera, shafts, background, options), config.render_threads);
+}
+
+std::vector<double> Endoscope::next_moments_s() const {
+  const double opens_s = static_cast<double>(next_) / config_.frame_rate_hz;
+  if (config_.exposure_s <= 0) return {opens_s};
+  std::vector<double> moments_s;
+  for (int m = 0; m < config_.exposure_moments; ++m)
+    moments_s.push_back(opens_s + config_.exposure_s * (m + 0.5) / config_.exposure_moments);
+  return moments_s;
+}
+
+void Endoscope::expose(const Exposure& shafts) {
+  // A generator for each frame: what one frame draws doesn't change another.
+  Random random(seed_ + 0x632be59bd9b4e019ULL * static_cast<std::uint64_t>(next_ + 1));
+  const bool dropped = random.uniform() < config_.dropped_share;
+  const double jitter_s = random.uniform(-config_.jitter_s, config_.jitter_s);
+  const std::uint64_t noise_seed = random.bits();
+  Picture picture;
+  picture.index = next_;
+  picture.exposed_s = static_cast<double>(next_) / config_.frame_rate_hz + config_.exposure_s / 2;
+  const double closes_s = picture.exposed_s + config_.exposure_s / 2;
+  ++next_;
+  if (dropped) return;
+  // Frames don't overtake one another, nor arrive before they are taken.
+  picture.stamp_s = std::max({picture.exposed_s + config_.latency_s + jitter_s, closes_s, last_stamp_s_});
+  last_stamp_s_ = picture.stamp_s;
+  std::future<cv::Mat> rendered;
+  if (queue_) rendered = queue_->render({shafts, noise_seed, light_ * gains_});
+  on_the_way_.push_back({std::move(picture), std::move(rendered)});
+}
+
+std::vector<Picture> Endoscope::arrived(double time_s) {
+  std::vector<Picture> pictures;
+  while (!on_the_way_.empty() && on_the_way_.front().picture.stamp_s <= time_s + same_s) {
+    OnTheWay& first = on_the_way_.front();
+    if (first.rendered.valid()) first.picture.bgr = first.rendered.get();
+    pictures.push_back(std::move(first.picture));
+    on_the_way_.pop_front();
+  }
+  return pictures;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/sim/renderer.h"
+
+namespace lapservo {
+
+struct RenderJob {
+  Exposure exposure;
+  std::uint64_t seed = 0;
+  Light gains = Light(1, 1, 1);
+};
+
+/// Renders in the background, in whichever thread is free. A picture depends on its job alone.
+class RenderQueue {
+ public:
+  /// Every thread renders with a copy of `renderer`. Without threads a job is done when its result is asked for.
+  RenderQueue(Renderer renderer, int threads);
+  ~RenderQueue();
+  RenderQueue(const RenderQueue&) = delete;
+  RenderQueue& operator=(const RenderQueue&) = delete;
+
+  /// Results that nobody waits for are thrown away; those asked for must be taken before the queue goes.
+  std::future<cv::Mat> render(RenderJob job);
+
+ private:
+  using Task = std::packaged_task<cv::Mat(Renderer&)>;
+  void work(Renderer& renderer);
+
+  std::vector<Renderer> renderers_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Task> tasks_;
+  bool closing_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace lapservo
