@@ -38,11 +38,15 @@ Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 
-const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr) {
+const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr) & {
   check_image(image_bgr, state_->camera);
   if (state_->method == Method::surface) return state_->surface.track(image_bgr);
   state_->observations = state_->centerline.observe(image_bgr);
   return state_->observations;
+}
+
+std::vector<Observation> Tracker::track(const cv::Mat& image_bgr) && {
+  return track(image_bgr);  // the overload above: *this is an lvalue here
 }
 
 void Tracker::reset() {

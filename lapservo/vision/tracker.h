@@ -30,7 +30,9 @@ class Tracker {
 
   /// `image_bgr`: 8-bit, 3 channels, of the rig's size, else InputError. One observation per instrument of the rig, in
   /// its order.
-  const std::vector<Observation>& track(const cv::Mat& image_bgr);
+  const std::vector<Observation>& track(const cv::Mat& image_bgr) &;
+  /// Of a tracker that is gone after the expression, as in `Tracker(rig).track(image)`: by value.
+  std::vector<Observation> track(const cv::Mat& image_bgr) &&;
 
   /// Forgets the frame before: the next one is searched anew.
   void reset();
