@@ -18,10 +18,7 @@ void silence_libraries() {
   setenv("OPENCV_VIDEOIO_DEBUG", "0", 0);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  silence_libraries();
+int parse_and_run(int argc, char** argv) {
   CLI::App app{"See and steer a laparoscopic instrument by its camera.", "lapservo"};
   app.require_subcommand(1);
   app.footer(
@@ -41,8 +38,15 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "lapservo: %s (try --help)\n", error.what());
     return bad_input;
   }
+  return run();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  silence_libraries();
   try {
-    return run();
+    return parse_and_run(argc, argv);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "lapservo: %s\n", error.what());
     return bad_input;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "lapservo/core/angles.h"
@@ -247,7 +248,7 @@ RotationSearch search_rotation(const Scene& scene, const SampledSurface& surface
 CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOptions& options) {
   constexpr int steps_per_round = 4;
   CoarseFit fit;
-  fit.unknowns = start;
+  fit.unknowns = std::move(start);
   bool rotation_known = !options.search_rotation;
   for (int round = 0; round < options.rounds; ++round) {
     const auto view = view_cylinder(fit.unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
