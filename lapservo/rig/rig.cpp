@@ -23,8 +23,8 @@ constexpr std::size_t largest_file_bytes = 1 << 20;
 // A node with where it stands, so that every complaint can name file and field.
 class Field {
  public:
-  Field(std::string source, std::string path, YAML::Node node)
-      : source_(std::move(source)), path_(std::move(path)), node_(std::move(node)) {}
+  Field(std::string source, std::string path, const YAML::Node& node)
+      : source_(std::move(source)), path_(std::move(path)), node_(node) {}
 
   [[noreturn]] void fail(std::string_view value, std::string_view expected) const {
     throw InputError(source_, path_.empty() ? "file" : path_, value, expected);
