@@ -23,6 +23,8 @@ namespace lapservo::app {
 namespace {
 namespace fs = std::filesystem;
 
+constexpr std::uintmax_t needed_bytes = 16 << 20;
+
 struct Options {
   std::string name, out, rig, method = "both";
   std::uint64_t seed = 1;
@@ -77,6 +79,10 @@ void check_folder(const fs::path& folder) {
     throw InputError(folder.string(),
                      "can't be made a folder" + (error ? ": " + error.message() : std::string(", is a file")));
   AtomicFile probe(folder / "report.html");
+  const fs::space_info space = fs::space(folder, error);
+  if (!error && space.available < needed_bytes)
+    throw InputError(folder.string(), fmt::format("has {} MB of room left, expected {} for the report and its data",
+                                                  space.available >> 20, needed_bytes >> 20));
 }
 
 Report report_of(std::vector<ReportSection> sections, const Options& options) {
