@@ -135,7 +135,8 @@ TEST_F(EstimateRcm, GivesEveryInstrumentItsOwn) {
   const Camera camera = load_rig(paper_rig).camera;
   const std::string observations =
       write("obs.csv", header + observed_lines(camera, "left", {-300, 900}, 0.02, random) +
-                           observed_lines(camera, "right", {1600, 800}, 0.02, random) + "20,lost,no_marker,,,,\n");
+                           observed_lines(camera, "\"right, second\"", {1600, 800}, 0.02, random) +
+                           "20,lost,no_marker,,,,\n");
   ASSERT_EQ(run("estimate-rcm " + observations + " --sigma-px 0.02 --out " + path("rcm.csv")), 0);
   const CsvTable report = CsvTable::read(path("rcm.csv"));
   ASSERT_EQ(report.rows(), 6U);
@@ -143,6 +144,7 @@ TEST_F(EstimateRcm, GivesEveryInstrumentItsOwn) {
   EXPECT_EQ(report.text(2, "instrument"), "lost");
   EXPECT_EQ(report.text(2, "status"), "too_few_lines");
   EXPECT_EQ(report.text(2, "rcm_u_px"), "");
+  EXPECT_EQ(report.text(4, "instrument"), "right, second");
   EXPECT_NEAR(report.number(4, "rcm_v_px"), 800, 2);
   EXPECT_NEAR(report.number(4, "chi2"), 18, 18);
   ASSERT_EQ(run("estimate-rcm " + observations + " --sigma-px 0.02 --common-px 1 --out " + path("wide.csv")), 0);

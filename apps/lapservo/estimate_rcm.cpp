@@ -150,7 +150,7 @@ void write_report(const fs::path& path, const std::vector<Result>& results) {
     };
     const auto u = [](const Eigen::Vector2d& p) { return p.x(); };
     const auto v = [](const Eigen::Vector2d& p) { return p.y(); };
-    std::string row = fmt::format("{},{},{},{},{}", r.instrument, r.method, r.status, r.lines, r.outliers);
+    std::string row = fmt::format("{},{},{},{},{}", csv_field(r.instrument), r.method, r.status, r.lines, r.outliers);
     const auto correlation = [](const Eigen::Matrix2d& c) {
       const double scale = std::sqrt(c(0, 0) * c(1, 1));
       return scale > 0 ? c(0, 1) / scale : 0;
