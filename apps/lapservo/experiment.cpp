@@ -17,6 +17,7 @@
 #include "lapservo/experiments/illumination.h"
 #include "lapservo/experiments/rcm.h"
 #include "lapservo/experiments/rotation.h"
+#include "lapservo/experiments/tracking.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
@@ -49,6 +50,7 @@ const std::vector<Named>& experiments() {
       {"illumination", run_experiment<measure_illumination>},
       {"rcm", run_experiment<measure_rcm>},
       {"rotation", run_experiment<measure_rotation>},
+      {"tracking", run_experiment<measure_tracking>},
   };
   return all;
 }

@@ -15,6 +15,7 @@ void add_estimate_rcm(CLI::App& app, Run& run);
 void add_experiment(CLI::App& app, Run& run);
 void add_marker(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);
+void add_servo(CLI::App& app, Run& run);
 void add_track(CLI::App& app, Run& run);
 
 }  // namespace lapservo::app

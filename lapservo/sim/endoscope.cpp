@@ -54,7 +54,7 @@ void Endoscope::expose(const Exposure& shafts) {
   const bool dropped = random.uniform() < config_.dropped_share;
   const double jitter_s = random.uniform(-config_.jitter_s, config_.jitter_s);
   const std::uint64_t noise_seed = random.bits();
-  Picture picture;
+  EndoscopePicture picture;
   picture.index = next_;
   picture.exposed_s = static_cast<double>(next_) / config_.frame_rate_hz + config_.exposure_s / 2;
   const double closes_s = picture.exposed_s + config_.exposure_s / 2;
@@ -68,8 +68,8 @@ void Endoscope::expose(const Exposure& shafts) {
   on_the_way_.push_back({std::move(picture), std::move(rendered)});
 }
 
-std::vector<Picture> Endoscope::arrived(double time_s) {
-  std::vector<Picture> pictures;
+std::vector<EndoscopePicture> Endoscope::arrived(double time_s) {
+  std::vector<EndoscopePicture> pictures;
   while (!on_the_way_.empty() && on_the_way_.front().picture.stamp_s <= time_s + same_s) {
     OnTheWay& first = on_the_way_.front();
     if (first.rendered.valid()) first.picture.bgr = first.rendered.get();

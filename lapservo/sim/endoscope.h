@@ -29,7 +29,7 @@ struct EndoscopeConfig {
 };
 
 /// A frame as it arrives.
-struct Picture {
+struct EndoscopePicture {
   long index = 0;        ///< of all frames exposed, those dropped included
   double exposed_s = 0;  ///< the middle of the exposure, which no real program knows
   double stamp_s = 0;    ///< when it arrived
@@ -48,14 +48,14 @@ class Endoscope {
   /// Takes the next frame, the shafts standing so at those moments.
   void expose(const Exposure& shafts);
   /// Frames that have arrived since the last call, in order of their exposure.
-  std::vector<Picture> arrived(double time_s);
+  std::vector<EndoscopePicture> arrived(double time_s);
 
   /// Light on the scene for frames to come: 1 is usual.
   void set_light(float light) { light_ = light; }
 
  private:
   struct OnTheWay {
-    Picture picture;
+    EndoscopePicture picture;
     std::future<cv::Mat> rendered;
   };
 

@@ -17,7 +17,7 @@ EndoscopeConfig without_pictures() {
   return config;
 }
 
-std::vector<Picture> taken(const EndoscopeConfig& config, std::uint64_t seed, int count) {
+std::vector<EndoscopePicture> taken(const EndoscopeConfig& config, std::uint64_t seed, int count) {
   Endoscope endoscope({}, {}, {}, {}, config, seed);
   for (int k = 0; k < count; ++k) endoscope.expose({});
   return endoscope.arrived(std::numeric_limits<double>::infinity());
@@ -49,7 +49,7 @@ TEST(Endoscope, JitterIsEvenWithinItsBoundsAndKeepsTheOrder) {
   config.jitter_s = 0.004;
   const auto pictures = taken(config, 3, 4000);
   double sum = 0, squares = 0, last_s = 0;
-  for (const Picture& picture : pictures) {
+  for (const EndoscopePicture& picture : pictures) {
     const double late_s = picture.stamp_s - picture.exposed_s - config.latency_s;
     EXPECT_LE(std::abs(late_s), 0.004 + 1e-12);
     EXPECT_GE(picture.stamp_s, last_s);
@@ -61,7 +61,7 @@ TEST(Endoscope, JitterIsEvenWithinItsBoundsAndKeepsTheOrder) {
   EXPECT_NEAR(std::sqrt(squares / 4000), 0.004 / std::sqrt(3), 1e-4);
   config.jitter_s = 0.1;  // frames would overtake one another
   last_s = 0;
-  for (const Picture& picture : taken(config, 3, 500)) {
+  for (const EndoscopePicture& picture : taken(config, 3, 500)) {
     EXPECT_GE(picture.stamp_s, std::max(last_s, picture.exposed_s));
     last_s = picture.stamp_s;
   }

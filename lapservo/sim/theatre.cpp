@@ -70,7 +70,7 @@ void Theatre::step(double dt_s) {
 
 std::vector<TheatreFrame> Theatre::arrived() {
   std::vector<TheatreFrame> frames;
-  for (Picture& picture : endoscope_.arrived(time_s_)) {
+  for (EndoscopePicture& picture : endoscope_.arrived(time_s_)) {
     const RcmCoordinates q = truth_.at(picture.index);
     truth_.erase(truth_.begin(), truth_.upper_bound(picture.index));
     frames.push_back({std::move(picture), q});

@@ -28,7 +28,7 @@ struct Interval {
 
 /// A frame with its truth.
 struct TheatreFrame {
-  Picture picture;
+  EndoscopePicture picture;
   RcmCoordinates q;  ///< of the instrument in the middle of the exposure, for evaluation
 };
 
@@ -49,6 +49,7 @@ class Theatre {
   std::vector<TheatreFrame> arrived();
 
   Arm& arm() { return arm_; }
+  const Arm& arm() const { return arm_; }
   /// Light on the scene from now on: 1 is usual.
   void set_light(float light) { endoscope_.set_light(light); }
   /// Something lies over the whole marker then.

@@ -74,7 +74,7 @@ TEST(Theatre, IsTheSameBitForBitWhateverThreadsRender) {
   for (const std::size_t other : {1, 2}) {
     ASSERT_EQ(runs[other].frames.size(), runs[0].frames.size());
     for (std::size_t k = 0; k < runs[0].frames.size(); ++k) {
-      const Picture &a = runs[0].frames[k].picture, &b = runs[other].frames[k].picture;
+      const EndoscopePicture &a = runs[0].frames[k].picture, &b = runs[other].frames[k].picture;
       EXPECT_EQ(a.stamp_s, b.stamp_s);
       EXPECT_EQ(cv::norm(a.bgr, b.bgr, cv::NORM_INF), 0) << k;
       EXPECT_EQ(runs[0].frames[k].q.vector(), runs[other].frames[k].q.vector());

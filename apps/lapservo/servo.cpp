@@ -1,0 +1,303 @@
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <opencv2/highgui.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/progress.h"
+#include "apps/lapservo/subcommands.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+#include "lapservo/experiments/setup.h"
+#include "lapservo/io/overlay.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/servo/controller_file.h"
+#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/paper_trajectory.h"
+#include "lapservo/servo/servo_log.h"
+#include "lapservo/servo/servo_run.h"
+#include "lapservo/servo/theatre_site.h"
+#include "lapservo/servo/theatre_start.h"
+
+namespace lapservo::app {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr double window_margin_px = 20;
+constexpr double close_px = 1, close_rad = 5e-3;  // what "converged" means
+
+struct Options {
+  std::string rig, robot, trajectory = "paper", method = "default", controller, delay = "estimate", out, replay;
+  std::vector<double> set_point, start, rcm_px, hide;
+  double duration_s = 20, latency_ms = 80, fps = 60;
+  std::uint64_t seed = 1;
+  bool view = false;
+};
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Eigen::Vector4d four(const std::vector<double>& values) {
+  return Eigen::Vector4d(values.data());
+}
+
+ControllerConfig controller_of(const Options& options, const Rig& rig) {
+  ControllerConfig config;
+  const auto mode = mode_from_word(options.method);
+  if (!mode) throw InputError("--method", "is " + options.method + ", expected default, paper or uncalibrated");
+  if (*mode == ControlMode::paper) config = paper_controller(1 / options.fps);
+  config.mode = *mode;
+  config.period_s = 1 / options.fps;
+  config.window = image_window(rig.camera, window_margin_px);
+  if (options.delay != "estimate") {
+    const auto delay_ms = parse_finite(options.delay);
+    if (!delay_ms) throw InputError("--delay-ms", "is " + options.delay + ", expected milliseconds or `estimate`");
+    config.observer.delay_s = *delay_ms / 1000;
+  }
+  if (!options.controller.empty()) config = load_controller(options.controller, config);
+  return checked(config);
+}
+
+Trajectory trajectory_of(const Options& options) {
+  if (!options.set_point.empty()) return set_point(four(options.set_point));
+  if (options.trajectory == "paper") return sinusoids(paper_sinusoids());
+  return trajectory_from_csv(options.trajectory);
+}
+
+// The uncalibrated mode gets to know no more of the RCM than its image.
+void forget_registration(ServoRunConfig& run, const Options& options) {
+  Instrument& instrument = run.rig.instruments.front();
+  if (!options.rcm_px.empty()) {
+    run.rcm_px = Eigen::Vector2d(options.rcm_px[0], options.rcm_px[1]);
+  } else if (instrument.camera_from_rcm) {
+    run.rcm_px = projected_rcm_px(run.rig.camera, *instrument.camera_from_rcm);
+  }
+  if (!run.rcm_px)
+    throw InputError("--rcm-px", "is missing and " + options.rig +
+                                     " has no camera_from_rcm, expected the RCM's image: see lapservo estimate-rcm");
+  instrument.camera_from_rcm.reset();
+}
+
+ServoRunConfig run_config_of(const Options& options) {
+  ServoRunConfig run;
+  run.rig = single_instrument(load_rig(options.rig), options.rig);
+  run.controller = controller_of(options, run.rig);
+  run.true_rig = run.rig;
+  if (run.controller.mode == ControlMode::uncalibrated) forget_registration(run, options);
+  return run;
+}
+
+RcmCoordinates readings_at_start(const Options& options, const Trajectory& trajectory, const ServoRunConfig& run,
+                                 const TheatreConfig& theatre) {
+  const std::string source = options.set_point.empty() ? options.trajectory : "--set-point";
+  if (options.start.empty()) {
+    Random random(options.seed);
+    return random_start(trajectory, options.duration_s, *run.true_rig, run.controller, theatre.arm, random, source);
+  }
+  const RcmCoordinates readings = RcmCoordinates::from_vector(four(options.start));
+  refuse_infeasible(trajectory, options.duration_s, *run.true_rig, run.controller, readings, source);
+  return readings;
+}
+
+class RunFolder {
+ public:
+  RunFolder(const Options& options, const ServoRunConfig& run) : path_(options.out) {
+    std::error_code error;
+    fs::create_directories(path_, error);
+    if (!fs::is_directory(path_))
+      throw InputError(path_.string(), "can't be made a folder" + (error ? ": " + error.message() : ""));
+    write("rig.yaml", text_of(options.rig));
+    write("controller.yaml", controller_yaml(run.controller));
+    log_.emplace(path_ / "log.csv");
+  }
+  ServoLog& log() { return *log_; }
+  fs::path path() const { return path_; }
+
+ private:
+  void write(const char* name, const std::string& text) const {
+    AtomicFile file(path_ / name);
+    file.stream() << text;
+    file.commit();
+  }
+  fs::path path_;
+  std::optional<ServoLog> log_;
+};
+
+// What the run came to, for the last lines.
+class Summary {
+ public:
+  void add(const ServoRecord& record) {
+    ++periods_;
+    if (record.decision.control.action == ControlAction::hold) ++held_[std::string(record.decision.reason)];
+    const Eigen::Vector4d error = record.true_features
+                                      ? feature_error(*record.true_features, record.input.desired.features)
+                                      : record.decision.control.error;
+    const bool close = std::abs(error[0]) <= close_rad && error.tail<3>().cwiseAbs().maxCoeff() <= close_px &&
+                       record.decision.control.action == ControlAction::track;
+    if (!close) close_since_s_.reset(), squares_.setZero(), count_ = 0;
+    if (!close) return;
+    if (!close_since_s_) close_since_s_ = record.input.time_s;
+    squares_ += error.cwiseAbs2(), ++count_;
+  }
+  bool converged() const { return close_since_s_.has_value(); }
+  std::string text() const {
+    std::string text;
+    if (close_since_s_) {
+      const Eigen::Vector4d rms = (squares_ / count_).cwiseSqrt();
+      text = fmt::format(
+          "within 1 px and 5 mrad since {:.2f} s; rms since then: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px",
+          *close_since_s_, 1000 * rms[0], rms[1], rms[2], rms[3]);
+    } else {
+      text = "not within 1 px and 5 mrad at the end";
+    }
+    for (const auto& [reason, count] : held_)
+      text += fmt::format("\nheld for {} of {} periods: {}", count, periods_, reason);
+    return text;
+  }
+
+ private:
+  long periods_ = 0, count_ = 0;
+  std::map<std::string, long> held_;
+  std::optional<double> close_since_s_;
+  Eigen::Vector4d squares_ = Eigen::Vector4d::Zero();
+};
+
+bool show(const ServoRecord& record, const Rig& rig, const cv::Mat& frame, const std::vector<Observation>& seen) {
+  if (frame.empty()) return true;
+  cv::Mat picture = draw_overlay(frame, rig, seen);
+  const std::string label =
+      fmt::format("{:.2f} s  {} {}", record.input.time_s, action_word(record.decision.control.action),
+                  record.decision.reason == "none" ? "" : record.decision.reason);
+  cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
+  cv::imshow("lapservo servo (q to quit)", picture);
+  const int key = cv::waitKey(1) & 0xff;
+  return key != 'q' && key != 27;
+}
+
+int simulate(const Options& options) {
+  if (options.view && !std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
+    throw InputError("--view", "needs a display and there is none");
+  const ServoRunConfig run = run_config_of(options);
+  const Trajectory trajectory = trajectory_of(options);
+  TheatreConfig theatre;
+  theatre.seed = options.seed;
+  theatre.endoscope.latency_s = options.latency_ms / 1000;
+  theatre.endoscope.frame_rate_hz = options.fps;
+  const RcmCoordinates start = readings_at_start(options, trajectory, run, theatre);
+  TheatreSite site(*run.true_rig, theatre, start);
+  if (!options.hide.empty()) site.theatre().cover_marker({options.hide[0], options.hide[1]});
+  std::optional<RunFolder> folder;
+  if (!options.out.empty()) folder.emplace(options, run);
+  watch_for_interrupts();
+
+  Summary summary;
+  {
+    Progress progress(static_cast<int>(options.duration_s / run.controller.period_s + 0.5));
+    int done = 0;
+    run_servo(site, run, trajectory, options.duration_s,
+              [&](const ServoRecord& record, const cv::Mat& frame, const std::vector<Observation>& seen) {
+                summary.add(record);
+                if (folder) folder->log().add(record);
+                progress.show(++done, fmt::format(" ({})", action_word(record.decision.control.action)));
+                return !interrupted() && (!options.view || show(record, run.rig, frame, seen));
+              });
+  }
+  std::printf("%s\n", summary.text().c_str());
+  if (folder) {
+    folder->log().commit();
+    std::printf("log, rig and controller: %s\n", folder->path().c_str());
+  }
+  return summary.converged() ? 0 : 1;
+}
+
+int replay_log(const Options& options) {
+  const fs::path log = options.replay, folder = log.parent_path();
+  ServoRunConfig run;
+  run.rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
+  run.controller = load_controller(folder / "controller.yaml", {});
+  const auto periods = read_servo_log(log);
+  const auto difference = replay(periods, run);
+  if (!difference) {
+    std::printf("%zu periods reproduced bit for bit\n", periods.size());
+    return 0;
+  }
+  std::fprintf(stderr, "lapservo: %s: period %zu: %s was %s and is %s now\n", log.c_str(), difference->period,
+               difference->column.c_str(), difference->logged.c_str(), difference->replayed.c_str());
+  return 1;
+}
+
+int run(const Options& options) {
+  if (!options.replay.empty()) return replay_log(options);
+  if (options.rig.empty())
+    throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
+  if (options.robot != "sim")
+    throw InputError("--robot",
+                     options.robot.empty() ? "is missing, expected sim" : "is " + options.robot + ", expected sim");
+  return simulate(options);
+}
+
+}  // namespace
+
+void add_servo(CLI::App& app, Run& run_later) {
+  auto options = std::make_shared<Options>();
+  CLI::App* command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
+  command->add_option("--rig", options->rig, "Camera, marker and camera_from_rcm");
+  command->add_option("--robot", options->robot, "sim: the built-in theatre");
+  command
+      ->add_option("--trajectory", options->trajectory,
+                   "paper: section V-D's sinusoids; or a CSV of time_s,s_rad,r_px,l_px,d_px")
+      ->capture_default_str();
+  command->add_option("--set-point", options->set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
+      ->delimiter(',')
+      ->expected(4);
+  command->add_option("--duration", options->duration_s, "Seconds")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 36000.0));
+  command
+      ->add_option(
+          "--method", options->method,
+          "default: readings and images fused; paper: its law and gains as they stand; uncalibrated: learns the "
+          "Jacobian")
+      ->capture_default_str();
+  command->add_option("--controller", options->controller, "YAML: gains_per_s, limits, window, delay_s ...");
+  command->add_option("--delay-ms", options->delay, "The images' age, or `estimate`")->capture_default_str();
+  command->add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
+      ->delimiter(',')
+      ->expected(2);
+  command->add_option("--out", options->out, "Folder for log.csv, rig.yaml and controller.yaml");
+  command->add_flag("--view", options->view, "Show it live");
+  command->add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
+  command->add_option("--start", options->start, "sim: readings to start from, theta,phi,rho,psi; else random")
+      ->delimiter(',')
+      ->expected(4);
+  command->add_option("--seed", options->seed, "sim: of start, tissue, noise, jitter")->capture_default_str();
+  command->add_option("--latency-ms", options->latency_ms, "sim: from exposure to arrival")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
+  command->add_option("--fps", options->fps, "Control periods, and frames in sim, a second")
+      ->capture_default_str()
+      ->check(CLI::Range(5.0, 500.0));
+  command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")->delimiter(',')->expected(2);
+  command->footer(
+      "Examples:\n"
+      "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
+      "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,5 --view\n"
+      "  lapservo servo --replay run/log.csv");
+  command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/controller_config.h"
+#include "lapservo/experiments/html_report.h"
+#include "lapservo/experiments/setup.h"
+#include "lapservo/experiments/time_series.h"
+
+namespace lapservo {
+
+/// One run of the closed loop in the theatre.
+struct TrackingScenario {
+  std::string id;     ///< a word, for the file's name
+  std::string title;  ///< of the figures
+  ControlMode mode = ControlMode::fused;
+  Method method = Method::surface;
+  double latency_s = 0.08;
+  double duration_s = 20;
+  std::optional<double> hidden_from_s, hidden_to_s;  ///< the marker is covered then
+};
+
+struct TrackingRun {
+  TrackingScenario scenario;
+  TimeTable table;                    ///< what tracking_ID.csv holds
+  std::optional<double> converged_s;  ///< from then on true errors are within 1 px and 5 mrad, but for a hidden marker
+  Eigen::Vector4d steady_rms = Eigen::Vector4d::Zero();   ///< of the true errors over the last third: s_rad, r, l, d px
+  Eigen::Vector4d steady_mean = Eigen::Vector4d::Zero();  ///< likewise
+  double delay_s = 0;                                     ///< as believed at the end
+  double rate_share = 0;                                  ///< largest setpoint rate as a share of its limit
+  std::optional<double> held_s, resumed_s;                ///< after the marker was hidden, after it was back
+  bool left_image = false;                                ///< an end of the marker left the image
+};
+
+/// The paper's section V-D: from a random start in the field of view the instrument tracks the trajectory of its
+/// features, steered by what the simulated endoscope sees (60 frames/s, 80 ms late, sensor noise, an arm with lag,
+/// backlash and 3 mm and 2 degrees of kinematic offsets).
+struct TrackingResult {
+  std::vector<TrackingRun> runs;
+  Eigen::Vector2d estimated_rcm_px = Eigen::Vector2d::Zero();  ///< what the uncalibrated run goes by
+};
+
+TrackingResult measure_tracking(const ExperimentSetup& setup);
+
+/// tracking_ID.csv: every period of a run.
+void write_data(const TrackingResult& result, const std::filesystem::path& folder);
+
+ReportSection section_of(const TrackingResult& result, const ExperimentSetup& setup);
+
+}  // namespace lapservo

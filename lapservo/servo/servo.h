@@ -1,0 +1,46 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "lapservo/control/visual_controller.h"
+#include "lapservo/robot/arm_port.h"
+
+namespace lapservo {
+
+/// All that one step of the loop goes by.
+struct ServoInput {
+  double time_s = 0;
+  ArmReading arm;
+  std::optional<ImageMeasurement> image;  ///< the newest frame since the step before, if any
+  DesiredFeatures desired;                ///< at time_s
+};
+
+/// What one step decides.
+struct ServoDecision {
+  ControlStep control;
+  bool send = false;             ///< the arm is to follow path(); else it is left alone and holds by itself
+  std::string_view reason = "";  ///< why it holds; "none" when it doesn't
+};
+
+/// The loop's one step, the same for a real arm, a simulated one and a replay: it goes by nothing but its inputs.
+class Servo {
+ public:
+  /// Throws InputError for a configuration that can't work.
+  Servo(const ControllerConfig& config, FeatureModel model);
+
+  ServoDecision step(const ServoInput& input);
+
+  /// The setpoints until the next step.
+  const SetpointInterpolator& path() const { return controller_.path(); }
+  const VisualController& controller() const { return controller_; }
+
+ private:
+  void start_anew_when_at_rest(const ServoInput& input, HoldReason reason);
+
+  VisualController controller_;
+  std::optional<double> not_following_since_s_;
+  Eigen::Vector4d q_then_ = Eigen::Vector4d::Zero();
+};
+
+}  // namespace lapservo

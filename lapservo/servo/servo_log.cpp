@@ -1,0 +1,215 @@
+#include "lapservo/servo/servo_log.h"
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::array features{"s_rad", "r_px", "l_px", "d_px"};
+constexpr std::array rates{"s_rad_s", "r_px_s", "l_px_s", "d_px_s"};
+constexpr std::array accelerations{"s_rad_s2", "r_px_s2", "l_px_s2", "d_px_s2"};
+constexpr std::array joints{"theta_rad", "phi_rad", "rho_m", "psi_rad"};
+constexpr std::array joint_rates{"theta_rad_s", "phi_rad_s", "rho_m_s", "psi_rad_s"};
+constexpr std::array ends{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
+
+using Names = std::array<const char*, 4>;
+
+void name(std::vector<std::string>& columns, const char* prefix, const Names& names) {
+  for (const char* each : names) columns.push_back(std::string(prefix) + each);
+}
+
+// The shortest text that reads back as the same number.
+void write(std::vector<std::string>& fields, double number) {
+  fields.push_back(fmt::format("{}", number));
+}
+void write(std::vector<std::string>& fields, const Eigen::Vector4d& numbers) {
+  for (const double number : numbers) write(fields, number);
+}
+void leave_empty(std::vector<std::string>& fields, int count) {
+  fields.resize(fields.size() + static_cast<std::size_t>(count));
+}
+
+std::string covariance_column(int row, int column) {
+  return fmt::format("seen_cov_{}{}", row, column);
+}
+
+std::vector<std::string> make_input_columns() {
+  std::vector<std::string> columns{"time_s", "arm_state"};
+  name(columns, "joint_", joints);
+  columns.insert(columns.end(), {"image", "image_time_s"});
+  name(columns, "seen_", features);
+  for (int i = 0; i < 4; ++i)
+    for (int j = i; j < 4; ++j) columns.push_back(covariance_column(i, j));
+  name(columns, "seen_", ends);
+  name(columns, "seen_", joints);
+  name(columns, "desired_", features);
+  name(columns, "desired_", rates);
+  name(columns, "desired_", accelerations);
+  return columns;
+}
+
+const std::vector<std::string>& input_columns() {
+  static const std::vector<std::string> columns = make_input_columns();
+  return columns;
+}
+
+std::vector<std::string> make_decision_columns() {
+  std::vector<std::string> columns{"action", "reason", "send", "limited", "delay_s"};
+  name(columns, "velocity_", joint_rates);
+  name(columns, "setpoint_", joints);
+  name(columns, "setpoint_", joint_rates);
+  name(columns, "estimated_", features);
+  name(columns, "estimated_", joints);
+  name(columns, "error_", features);
+  return columns;
+}
+
+void write_image(std::vector<std::string>& fields, const std::optional<ImageMeasurement>& image) {
+  constexpr int numbers = 4 + 10 + 4 + 4;
+  fields.emplace_back(!image ? "none" : image->found ? "found" : "lost");
+  if (!image) return leave_empty(fields, 1 + numbers);
+  write(fields, image->time_s);
+  if (!image->found) return leave_empty(fields, numbers);
+  write(fields, image->features);
+  for (int i = 0; i < 4; ++i)
+    for (int j = i; j < 4; ++j) write(fields, image->covariance(i, j));
+  write(fields, image->ends_px);
+  image->q ? write(fields, *image->q) : leave_empty(fields, 4);
+}
+
+std::vector<std::string> input_fields(const ServoInput& input) {
+  std::vector<std::string> fields;
+  write(fields, input.time_s);
+  fields.emplace_back(state_word(input.arm.state));
+  write(fields, input.arm.q_joint);
+  write_image(fields, input.image);
+  write(fields, input.desired.features);
+  write(fields, input.desired.rate);
+  write(fields, input.desired.acceleration);
+  return fields;
+}
+
+// Fields of one row by name, non-finite numbers included: they are what the loop has to cope with.
+class Row {
+ public:
+  Row(const CsvTable& table, std::size_t row, std::string source)
+      : table_(table), row_(row), source_(std::move(source)) {}
+
+  const std::string& text(const std::string& column) const { return table_.text(row_, column); }
+  double number(const std::string& column) const {
+    const std::string& field = text(column);
+    char* end = nullptr;
+    const double value = std::strtod(field.c_str(), &end);
+    if (field.empty() || *end) complain(column, "a number");
+    return value;
+  }
+  Eigen::Vector4d numbers(const char* prefix, const Names& names) const {
+    Eigen::Vector4d values;
+    for (int i = 0; i < 4; ++i) values[i] = number(std::string(prefix) + names[static_cast<std::size_t>(i)]);
+    return values;
+  }
+  [[noreturn]] void complain(const std::string& column, const char* expected) const {
+    throw InputError(source_, fmt::format("period {}, {}", row_, column), text(column), expected);
+  }
+
+ private:
+  const CsvTable& table_;
+  std::size_t row_;
+  std::string source_;
+};
+
+std::optional<ImageMeasurement> read_image(const Row& row) {
+  const std::string& word = row.text("image");
+  if (word == "none") return std::nullopt;
+  if (word != "found" && word != "lost") row.complain("image", "none, lost or found");
+  ImageMeasurement image;
+  image.found = word == "found";
+  image.time_s = row.number("image_time_s");
+  if (!image.found) return image;
+  image.features = row.numbers("seen_", features);
+  for (int i = 0; i < 4; ++i)
+    for (int j = i; j < 4; ++j) image.covariance(i, j) = image.covariance(j, i) = row.number(covariance_column(i, j));
+  image.ends_px = row.numbers("seen_", ends);
+  if (!row.text("seen_theta_rad").empty()) image.q = row.numbers("seen_", joints);
+  return image;
+}
+
+ServoInput read_input(const Row& row) {
+  ServoInput input;
+  input.time_s = row.number("time_s");
+  input.arm.q_joint = row.numbers("joint_", joints);
+  const auto state = state_from_word(row.text("arm_state"));
+  if (!state) row.complain("arm_state", "DISABLED, ENABLED, PAUSED or FAULT");
+  input.arm.state = *state;
+  input.image = read_image(row);
+  input.desired.features = row.numbers("desired_", features);
+  input.desired.rate = row.numbers("desired_", rates);
+  input.desired.acceleration = row.numbers("desired_", accelerations);
+  return input;
+}
+
+std::string joined(const std::vector<std::string>& fields) {
+  return fmt::format("{}", fmt::join(fields, ","));
+}
+
+}  // namespace
+
+const std::vector<std::string>& decision_columns() {
+  static const std::vector<std::string> columns = make_decision_columns();
+  return columns;
+}
+
+std::vector<std::string> decision_fields(const ServoDecision& decision) {
+  const ControlStep& control = decision.control;
+  std::vector<std::string> fields{std::string(action_word(control.action)), std::string(decision.reason),
+                                  decision.send ? "1" : "0", control.limited ? "1" : "0"};
+  write(fields, control.delay_s);
+  write(fields, control.velocity);
+  write(fields, control.setpoint.position);
+  write(fields, control.setpoint.velocity);
+  if (control.estimate) {
+    write(fields, control.estimate->features);
+    write(fields, control.estimate->q);
+    write(fields, control.error);
+  } else {
+    leave_empty(fields, 12);
+  }
+  return fields;
+}
+
+ServoLog::ServoLog(const std::filesystem::path& path) : file_(path) {
+  std::vector<std::string> truth;
+  name(truth, "true_", joints);
+  name(truth, "true_", features);
+  file_.stream() << "period," << joined(input_columns()) << ',' << joined(decision_columns()) << ',' << joined(truth)
+                 << '\n';
+}
+
+void ServoLog::add(const ServoRecord& record) {
+  std::vector<std::string> truth;
+  record.true_q ? write(truth, *record.true_q) : leave_empty(truth, 4);
+  record.true_features ? write(truth, *record.true_features) : leave_empty(truth, 4);
+  file_.stream() << period_++ << ',' << joined(input_fields(record.input)) << ','
+                 << joined(decision_fields(record.decision)) << ',' << joined(truth) << '\n';
+}
+
+std::vector<LoggedPeriod> read_servo_log(const std::filesystem::path& path) {
+  const CsvTable table = CsvTable::read(path);
+  std::vector<LoggedPeriod> periods;
+  for (std::size_t i = 0; i < table.rows(); ++i) {
+    LoggedPeriod period{read_input(Row(table, i, path.string())), {}};
+    for (const std::string& column : decision_columns()) period.decision.push_back(table.text(i, column));
+    periods.push_back(std::move(period));
+  }
+  return periods;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,62 @@
+#include "lapservo/servo/theatre_start.h"
+
+#include <algorithm>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "lapservo/control/trajectory_check.h"
+#include "lapservo/core/error.h"
+#include "lapservo/servo/image_features.h"
+
+namespace lapservo {
+namespace {
+
+bool in_view(const FeatureModel& model, const ImageWindow& window, const Eigen::Vector4d& q) {
+  const auto state = model(q);
+  if (!state) return false;
+  const Eigen::Vector4d& e = state->ends_px;
+  constexpr double shortest_px = 60;
+  return std::min(e[0], e[2]) > window.u_min_px && std::max(e[0], e[2]) < window.u_max_px &&
+         std::min(e[1], e[3]) > window.v_min_px && std::max(e[1], e[3]) < window.v_max_px &&
+         state->features[2] > shortest_px;
+}
+
+Eigen::Vector4d anywhere(const JointLimits& limits, Random& random) {
+  Eigen::Vector4d q;
+  for (int i = 0; i < 4; ++i) q[i] = random.uniform(limits.lower[i], limits.upper[i]);
+  return q;
+}
+
+}  // namespace
+
+void refuse_infeasible(const Trajectory& trajectory, double duration_s, const Rig& rig,
+                       const ControllerConfig& controller, const RcmCoordinates& readings, const std::string& source) {
+  const FeatureModel model = feature_model(rig);
+  if (!model) return;
+  if (const auto problem = find_infeasible(trajectory, duration_s, model, controller, readings.vector()))
+    throw InputError(source, fmt::format("can't be followed at {:.2f} s: {}", problem->time_s, problem->what));
+}
+
+RcmCoordinates random_start(const Trajectory& trajectory, double duration_s, const Rig& rig,
+                            const ControllerConfig& controller, const ArmConfig& arm, Random& random,
+                            const std::string& source) {
+  constexpr int most_places = 100000, most_starts = 30;
+  constexpr double check_every_s = 0.1;
+  const FeatureModel model = feature_model(rig);
+  if (!model) throw InputError("rig", "instruments[0].camera_from_rcm is missing, expected it for a random start");
+  std::string why = "no place in view lies within the joint limits";
+  int starts = 0;
+  for (int i = 0; i < most_places && starts < most_starts; ++i) {
+    const Eigen::Vector4d readings = anywhere(controller.limits, random);
+    if (!in_view(model, controller.window.value(), readings + arm.joint_offset)) continue;
+    ++starts;
+    const auto problem = find_infeasible(trajectory, duration_s, model, controller, readings, check_every_s);
+    if (!problem) return RcmCoordinates::from_vector(readings);
+    why = fmt::format("can't be followed at {:.2f} s: {}", problem->time_s, problem->what);
+  }
+  throw InputError(source, why);
+}
+
+}  // namespace lapservo
