@@ -5,8 +5,7 @@
 namespace lapservo {
 namespace {
 
-/// One step of the controller with an image in it, the model included: the exact map with its Jacobian by differences,
-/// which costs more than an analytic one.
+/// One step of the controller with an image in it, the model (feature_map) included.
 void BM_ControlStep(benchmark::State& state, ControlMode mode, bool delay_known) {
   testing::Flaws flaws;
   flaws.delay_known = delay_known;
@@ -36,12 +35,6 @@ BENCHMARK_CAPTURE(BM_ControlStep, default_known_delay, ControlMode::fused, true)
 BENCHMARK_CAPTURE(BM_ControlStep, default_estimated_delay, ControlMode::fused, false);
 BENCHMARK_CAPTURE(BM_ControlStep, paper, ControlMode::paper, true);
 BENCHMARK_CAPTURE(BM_ControlStep, uncalibrated, ControlMode::uncalibrated, false);
-
-void BM_ExactMapByDifferences(benchmark::State& state) {
-  const testing::TestRig rig;
-  for (auto _ : state) benchmark::DoNotOptimize(exact_map(rig, {0.05, 1.57, 0.064, 1}));
-}
-BENCHMARK(BM_ExactMapByDifferences);
 
 }  // namespace
 }  // namespace lapservo

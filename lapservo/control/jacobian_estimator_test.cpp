@@ -17,6 +17,13 @@ double relative_error(const Eigen::Matrix4d& found, const Eigen::Matrix4d& truth
   return (scaled(found) - scaled(truth)).norm() / scaled(truth).norm();
 }
 
+ImageVector seen_at(const TestRig& rig, const Eigen::Vector4d& q) {
+  const FeatureState state = exact_map(rig, q).value();
+  ImageVector seen;
+  seen << state.features, state.ends_px;
+  return seen;
+}
+
 struct Probed {
   std::optional<ProbedModel> model;
   Eigen::Vector4d q_end;
@@ -37,7 +44,7 @@ Probed probe(const TestRig& rig, const Eigen::Vector4d& start, double delay_s, s
     history.push(t, q);
     if (k % 10 == 0) {
       const auto then = static_cast<std::size_t>(std::max(0.0, std::round((t - delay_s) / tick_s)));
-      auto seen = seen_at(rig, path[then])->values;
+      auto seen = seen_at(rig, path[then]);
       for (int i = 0; i < 8; ++i) seen[i] += (i == 0 ? 5e-4 : 0.15) * random.normal();
       fit.add(t, seen.head<4>(), seen.tail<4>(), history);
     }
@@ -107,7 +114,7 @@ class JacobianEstimatorOnTheWay : public ::testing::Test {
     q = probed.q_end;
   }
   JacobianEstimator::Update see(const Eigen::Vector4d& noise_scale = {5e-4, 0.15, 0.15, 0.15}) {
-    auto seen = seen_at(rig, q)->values;
+    auto seen = seen_at(rig, q);
     for (int i = 0; i < 4; ++i) seen[i] += noise_scale[i] * random.normal();
     return estimator.update(q, seen.head<4>(), seen.tail<4>(), 1.0 / 60);
   }

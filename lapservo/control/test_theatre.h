@@ -10,67 +10,28 @@
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/visual_controller.h"
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/features.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/feature_map.h"
 
 namespace lapservo::testing {
 
 /// A rig for tests: the one of the paper's trajectory.
-struct TestRig {
-  Camera camera{1280, 720, 1100, 1100, 639.5, 359.5, {}, {}};
-  Marker marker = paper_marker();
-  Rigid3 camera_from_rcm{
-      Eigen::Quaterniond(0.647311937403, 0.683756495442, 0.180213914393, 0.284582599073).normalized(),
-      {-0.0623, -0.0494, 0.09}};
-
-  static Marker paper_marker() {
-    Marker marker;
+struct TestRig : ImageModel {
+  TestRig() {
+    camera = {1280, 720, 1100, 1100, 639.5, 359.5, {}, {}};
     marker.diameter_m = 0.0084;
     marker.bands_upper_m = {0.005, 0.005, 0.025};
     marker.bands_lower_m = {0.014, 0.014, 0.007};
-    return marker;
+    camera_from_rcm = {Eigen::Quaterniond(0.647311937403, 0.683756495442, 0.180213914393, 0.284582599073).normalized(),
+                       {-0.0623, -0.0494, 0.09}};
   }
 };
 
-struct SeenFeatures {
-  Eigen::Matrix<double, 8, 1> values;  ///< s, r, l, d, ends
-  double tau_rad;
-};
-
-inline std::optional<SeenFeatures> seen_at(const TestRig& rig, const Eigen::Vector4d& q) {
-  const auto coordinates = RcmCoordinates::from_vector(q);
-  const auto line =
-      centre_line(rig.camera, rig.marker, rig.camera_from_rcm * rcm_from_unrolled(coordinates), coordinates.psi_rad);
-  if (!line) return std::nullopt;
-  const Features f = features_of(line->ideal_px, projected_rcm_px(rig.camera, rig.camera_from_rcm));
-  SeenFeatures seen;
-  seen.values << f.s_rad, f.r_px.value(), f.l_px, f.d_px, line->ideal_px[0], line->ideal_px[3];
-  seen.tau_rad = line->tau_rad;
-  return seen;
-}
-
-/// Exact map with a Jacobian by differences, one-sided next to the seam.
-inline std::optional<FeatureState> exact_map(const TestRig& rig, const Eigen::Vector4d& q) {
-  const auto here = seen_at(rig, q);
-  if (!here) return std::nullopt;
-  Eigen::Matrix<double, 8, 4> jacobian;
-  for (int i = 0; i < 4; ++i) {
-    constexpr double h = 1e-6;
-    auto plus = seen_at(rig, q + h * Eigen::Vector4d::Unit(i)), minus = seen_at(rig, q - h * Eigen::Vector4d::Unit(i));
-    if (!plus || !minus) return std::nullopt;
-    double width = 2 * h;
-    if (std::abs(plus->tau_rad - here->tau_rad) > 1) {
-      plus = here;
-      width = h;
-    } else if (std::abs(minus->tau_rad - here->tau_rad) > 1) {
-      minus = here;
-      width = h;
-    }
-    Eigen::Matrix<double, 8, 1> change = plus->values - minus->values;
-    change[0] = wrap_pi(change[0]);
-    jacobian.col(i) = change / width;
-  }
-  return FeatureState{here->values.head<4>(), jacobian.topRows<4>(), here->values.tail<4>(), jacobian.bottomRows<4>()};
+inline std::optional<FeatureState> exact_map(const ImageModel& rig, const Eigen::Vector4d& q) {
+  const auto point = feature_map(rig, RcmCoordinates::from_vector(q)).point;
+  if (!point) return std::nullopt;
+  FeatureState state{point->f, point->jacobian, {}, point->ends_jacobian};
+  state.ends_px << point->ideal_px[0], point->ideal_px[3];
+  return state;
 }
 
 inline FeatureModel model_of(const TestRig& rig) {
@@ -200,7 +161,7 @@ inline Eigen::Vector4d random_start(const TestRig& rig, const ControllerConfig& 
     const bool inside = std::min(e[0], e[2]) > w.u_min_px + margin_px &&
                         std::max(e[0], e[2]) < w.u_max_px - margin_px &&
                         std::min(e[1], e[3]) > w.v_min_px + margin_px && std::max(e[1], e[3]) < w.v_max_px - margin_px;
-    const auto tau = seen_at(rig, q + flaws.offset)->tau_rad;
+    const double tau = feature_map(rig, RcmCoordinates::from_vector(q + flaws.offset)).point->tau_rad;
     if (!inside || tau < 0.5 || tau > two_pi - 0.5) continue;
     const auto goal = newton_inverse(model_of(rig), paper_sinusoids().offset, q + flaws.offset, config.scales);
     if (goal->converged && std::abs(goal->q[3]) < 2.5) return q;

@@ -107,6 +107,7 @@ FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q) {
   point.jacobian.row(1) = length_rate(from_rcm, rates[0]);
   point.jacobian.row(2) = length_rate(whole, whole_rate);
   point.jacobian.row(3) = length_rate(inner, rates[2] - rates[0]);
+  point.ends_jacobian << rates[0], rates[3];
   point.tau_rad = line->tau_rad;
   point.facing_azimuth_rad = line->facing_azimuth_rad;
   point.points_in_camera_m = line->points_in_camera_m;

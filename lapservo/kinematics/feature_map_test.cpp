@@ -64,6 +64,27 @@ TEST(FeatureMap, JacobianIsTheDerivative) {
   EXPECT_GT(checked, 1000);
 }
 
+TEST(FeatureMap, EndsJacobianIsTheDerivativeOfTheEnds) {
+  constexpr std::uint64_t seed = 33;
+  Random random(seed);
+  const auto ends = [](const FeaturePoint& point) {
+    return Eigen::Vector4d(point.ideal_px[0].x(), point.ideal_px[0].y(), point.ideal_px[3].x(), point.ideal_px[3].y());
+  };
+  for (const ImageModel& model : testing::image_models())
+    for (int trial = 0; trial < 50; ++trial) {
+      const RcmCoordinates q = testing::visible_configuration(model, random);
+      const auto here = feature_map(model, q);
+      for (Eigen::Index joint = 0; joint < 4; ++joint) {
+        const double h = step_by_joint[joint];
+        const auto ahead = feature_map(model, moved(q, joint, h)), back = feature_map(model, moved(q, joint, -h));
+        const Eigen::Vector4d numeric = (ends(*ahead.point) - ends(*back.point)) / (2 * h);
+        const double scale = here.point->ends_jacobian.col(joint).norm();
+        EXPECT_LT((here.point->ends_jacobian.col(joint) - numeric).norm(), 1e-5 * (1 + scale))
+            << "seed " << seed << ", trial " << trial << ", joint " << joint;
+      }
+    }
+}
+
 TEST(FeatureMap, ValueIsThatOfTheCentreLine) {
   constexpr std::uint64_t seed = 32;
   Random random(seed);
