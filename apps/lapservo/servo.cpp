@@ -24,6 +24,7 @@
 #include "lapservo/io/overlay.h"
 #include "lapservo/kinematics/features.h"
 #include "lapservo/servo/controller_file.h"
+#include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/paper_trajectory.h"
 #include "lapservo/servo/servo_log.h"
@@ -36,7 +37,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double window_margin_px = 20;
-constexpr double close_px = 1, close_rad = 5e-3;  // what "converged" means
 
 struct Options {
   std::string rig, robot, trajectory = "paper", method = "default", controller, delay = "estimate", out, replay;
@@ -146,23 +146,16 @@ class Summary {
     const Eigen::Vector4d error = record.true_features
                                       ? feature_error(*record.true_features, record.input.desired.features)
                                       : record.decision.control.error;
-    const bool close = std::abs(error[0]) <= close_rad && error.tail<3>().cwiseAbs().maxCoeff() <= close_px &&
-                       record.decision.control.action == ControlAction::track;
-    if (!close) close_since_s_.reset(), squares_.setZero(), count_ = 0;
-    if (!close) return;
-    if (!close_since_s_) close_since_s_ = record.input.time_s;
-    squares_ += error.cwiseAbs2(), ++count_;
+    convergence_.add(record.input.time_s, error);
   }
-  bool converged() const { return close_since_s_.has_value(); }
+  bool converged() const { return convergence_.reached_s().has_value(); }
   std::string text() const {
-    std::string text;
-    if (close_since_s_) {
-      const Eigen::Vector4d rms = (squares_ / count_).cwiseSqrt();
+    std::string text = "not within 1 px and 5 mrad for a second";
+    if (const auto reached_s = convergence_.reached_s()) {
+      const Eigen::Vector4d rms = convergence_.rms_since();
       text = fmt::format(
-          "within 1 px and 5 mrad since {:.2f} s; rms since then: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px",
-          *close_since_s_, 1000 * rms[0], rms[1], rms[2], rms[3]);
-    } else {
-      text = "not within 1 px and 5 mrad at the end";
+          "within 1 px and 5 mrad from {:.2f} s on; rms since: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px",
+          *reached_s, 1000 * rms[0], rms[1], rms[2], rms[3]);
     }
     for (const auto& [reason, count] : held_)
       text += fmt::format("\nheld for {} of {} periods: {}", count, periods_, reason);
@@ -170,10 +163,9 @@ class Summary {
   }
 
  private:
-  long periods_ = 0, count_ = 0;
+  long periods_ = 0;
   std::map<std::string, long> held_;
-  std::optional<double> close_since_s_;
-  Eigen::Vector4d squares_ = Eigen::Vector4d::Zero();
+  Convergence convergence_;
 };
 
 bool show(const ServoRecord& record, const Rig& rig, const cv::Mat& frame, const std::vector<Observation>& seen) {

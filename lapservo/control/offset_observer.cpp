@@ -8,6 +8,7 @@
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
+#include "lapservo/core/angles.h"
 
 namespace lapservo {
 namespace {
@@ -88,6 +89,7 @@ Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q
   }
   if (!found) return Update::not_modelled;
   offset_ = found->q - q_then;
+  offset_[3] = wrap_pi(offset_[3]);  // the image knows no turns of psi
   feature_offset_.setZero();
   const auto state = model(found->q);
   if (!state) return Update::not_modelled;

@@ -161,6 +161,26 @@ TEST(OffsetObserver, RejectsAnOutlierAndReacquires) {
   EXPECT_LT((world.observer.offset() - world.offset).norm(), 0.02);
 }
 
+// An image tells the rotation within one turn, the readings count turns.
+TEST(OffsetObserver, TakesTheTurnOfTheReadings) {
+  const TestRig rig;
+  const Scales scales;
+  OffsetObserver observer(ObserverConfig{}, scales);
+  JointHistory history;
+  const Eigen::Vector4d q_joint(0.05, 1.57, 0.064, 3.12), offset(0.01, -0.01, 0.001, 0.04);
+  for (int i = 0; i < 60; ++i) history.push(i * period_s, q_joint);
+  const FeatureState state = exact_map(rig, q_joint + offset).value();
+  ImageMeasurement image;
+  image.found = true;
+  image.time_s = 59 * period_s;
+  image.features = state.features;
+  image.covariance = 1e-4 * Eigen::Matrix4d::Identity();
+  image.ends_px = state.ends_px;
+  image.q = q_joint + offset - Eigen::Vector4d(0, 0, 0, two_pi);
+  EXPECT_EQ(observer.update(testing::model_of(rig), history, image), Update::reacquired);
+  EXPECT_LT((observer.offset() - offset).norm(), 1e-6);
+}
+
 TEST(OffsetObserver, RefusesWhatIsNotANumber) {
   Observed world(known(0), TestRig{}, 0, 9);
   for (int k = 0; k < 100; ++k) world.advance();

@@ -10,6 +10,7 @@
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/rcm/projected_rcm.h"
+#include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/paper_trajectory.h"
 #include "lapservo/servo/servo_run.h"
@@ -21,7 +22,7 @@ namespace lapservo {
 namespace {
 
 constexpr double period_s = 1.0 / 60, window_margin_px = 20;
-constexpr double close_px = 1, close_rad = 5e-3, settle_after_hidden_s = 3;
+constexpr double settle_after_hidden_s = 3;
 constexpr std::array features{"s_rad", "r_px", "l_px", "d_px"};
 constexpr std::array joints{"theta_rad", "phi_rad", "rho_m", "psi_rad"};
 
@@ -125,19 +126,19 @@ bool excused(const TrackingScenario& scenario, double time_s) {
 void sum_up(TrackingRun& run) {
   const TimeTable& table = run.table;
   const std::size_t count = table.time_s.size(), steady_from = 2 * count / 3;
+  Convergence convergence;
+  double counted = 0;
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector4d error = error_at(table, i);
-    const bool close = std::abs(error[0]) <= close_rad && error.tail<3>().cwiseAbs().maxCoeff() <= close_px;
-    if (close && !run.converged_s) run.converged_s = table.time_s[i];
-    if (!close && !excused(run.scenario, table.time_s[i])) run.converged_s.reset();
+    convergence.add(table.time_s[i], error);
     if (i < steady_from || excused(run.scenario, table.time_s[i])) continue;
     run.steady_rms += error.cwiseAbs2();
     run.steady_mean += error;
+    ++counted;
   }
-  std::size_t counted = 0;
-  for (std::size_t i = steady_from; i < count; ++i) counted += !excused(run.scenario, table.time_s[i]);
-  run.steady_rms = (run.steady_rms / static_cast<double>(std::max<std::size_t>(1, counted))).cwiseSqrt();
-  run.steady_mean /= static_cast<double>(std::max<std::size_t>(1, counted));
+  run.converged_s = convergence.reached_s();
+  run.steady_rms = (run.steady_rms / std::max(1.0, counted)).cwiseSqrt();
+  run.steady_mean /= std::max(1.0, counted);
 }
 
 TrackingRun run_scenario(const TrackingScenario& scenario, const ExperimentSetup& setup, const Eigen::Vector2d& rcm_px,

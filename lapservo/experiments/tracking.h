@@ -28,7 +28,7 @@ struct TrackingScenario {
 struct TrackingRun {
   TrackingScenario scenario;
   TimeTable table;                    ///< what tracking_ID.csv holds
-  std::optional<double> converged_s;  ///< from then on true errors are within 1 px and 5 mrad, but for a hidden marker
+  std::optional<double> converged_s;  ///< true errors get within 1 px and 5 mrad and stay there for a second
   Eigen::Vector4d steady_rms = Eigen::Vector4d::Zero();   ///< of the true errors over the last third: s_rad, r, l, d px
   Eigen::Vector4d steady_mean = Eigen::Vector4d::Zero();  ///< likewise
   double delay_s = 0;                                     ///< as believed at the end

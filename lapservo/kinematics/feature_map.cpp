@@ -112,7 +112,6 @@ FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q) {
   point.facing_azimuth_rad = line->facing_azimuth_rad;
   point.points_in_camera_m = line->points_in_camera_m;
   point.ideal_px = e;
-  point.ideal_px_jacobian = rates;
   return {Undefined::none, point};
 }
 

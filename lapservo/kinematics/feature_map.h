@@ -44,7 +44,6 @@ struct FeaturePoint {
   double facing_azimuth_rad = 0;                        ///< gamma
   std::array<Eigen::Vector3d, 4> points_in_camera_m{};  ///< e0..e3 on the facing generatrix
   std::array<Eigen::Vector2d, 4> ideal_px{};
-  std::array<Eigen::Matrix<double, 2, 4>, 4> ideal_px_jacobian{};  ///< of ideal_px by q
 };
 
 struct FeatureMapResult {

@@ -34,7 +34,7 @@ FeatureModel feature_model(const Rig& rig) {
     state.features = point->f;
     state.jacobian = point->jacobian;
     state.ends_px = both_ends(point->ideal_px[0], point->ideal_px[3]);
-    state.ends_jacobian << point->ideal_px_jacobian[0], point->ideal_px_jacobian[3];
+    state.ends_jacobian = point->ends_jacobian;
     return state;
   };
 }
