@@ -77,6 +77,8 @@ ImageMeasurement measurement_of(const Observation& observation, const FeatureMod
   if (const auto state = model ? model(*measurement.q) : std::nullopt) {
     measurement.covariance = feature_covariance(*state, observation.rcm->covariance);
     measurement.covariance += least_sigma.cwiseAbs2().asDiagonal();
+    // Symmetric to the last bit: a log holds one half of it.
+    measurement.covariance = (0.5 * (measurement.covariance + measurement.covariance.transpose())).eval();
   }
   return measurement;
 }

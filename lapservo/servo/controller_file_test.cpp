@@ -1,0 +1,81 @@
+#include "lapservo/servo/controller_file.h"
+
+#include <fstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+
+ControllerConfig unusual() {
+  ControllerConfig config;
+  config.mode = ControlMode::paper;
+  config.period_s = 1.0 / 47;
+  config.gains.per_s = {1.0 / 3, 0.1, 0.2, 0.7};
+  config.observer.delay_s = 0.123456789012345678;
+  config.limits.lower = {-0.1, 0.9, 0.04, -3.3};
+  config.limits.acceleration = {1, 1.1, 0.3, 7};
+  config.window = ImageWindow{1.5, 700.25, 3, 1.0 / 7 + 400};
+  return config;
+}
+
+class File {
+ public:
+  explicit File(const std::string& text) { std::ofstream(path()) << text; }
+  std::filesystem::path path() const { return folder_ / "controller.yaml"; }
+  std::string complaint() const {
+    return testing::input_error([&] { load_controller(path(), {}); });
+  }
+
+ private:
+  testing::TemporaryFolder folder_;
+};
+
+TEST(ControllerFile, ReadsBackToTheLastBit) {
+  const ControllerConfig config = unusual(), read = load_controller(File(controller_yaml(config)).path(), {});
+  EXPECT_EQ(read.mode, config.mode);
+  EXPECT_EQ(read.period_s, config.period_s);
+  EXPECT_EQ(read.gains.per_s, config.gains.per_s);
+  EXPECT_EQ(read.observer.delay_s, config.observer.delay_s);
+  EXPECT_EQ(read.limits.lower, config.limits.lower);
+  EXPECT_EQ(read.limits.upper, config.limits.upper);
+  EXPECT_EQ(read.limits.rate, config.limits.rate);
+  EXPECT_EQ(read.limits.acceleration, config.limits.acceleration);
+  ASSERT_TRUE(read.window);
+  EXPECT_EQ(read.window->u_max_px, config.window->u_max_px);
+  EXPECT_EQ(read.window->v_max_px, config.window->v_max_px);
+}
+
+TEST(ControllerFile, WhatIsMissingStays) {
+  const ControllerConfig read = load_controller(File("delay_s: estimate\n").path(), unusual());
+  EXPECT_FALSE(read.observer.delay_s);
+  EXPECT_EQ(read.gains.per_s, unusual().gains.per_s);
+  EXPECT_EQ(read.mode, ControlMode::paper);
+}
+
+TEST(ControllerFile, NamesFileFieldValueAndExpectation) {
+  for (const auto& [text, expected] : {std::pair<const char*, const char*>{"gain: 3\n", "gain"},
+                                       {"gains_per_s: [1, 2, 3]\n", "gains_per_s"},
+                                       {"gains_per_s: [1, 2, 3, x]\n", "gains_per_s[3]"},
+                                       {"gains_per_s: [1, 2, 3, .nan]\n", "gains_per_s[3]"},
+                                       {"mode: fast\n", "default, paper or uncalibrated"},
+                                       {"limits: {rates: [1, 1, 1, 1]}\n", "limits.rates"},
+                                       {"limits: 4\n", "limits"},
+                                       {"window: {u_min_px: wide}\n", "window.u_min_px"},
+                                       {"period_s: [1]\n", "period_s"},
+                                       {"- 1\n", "controller"},
+                                       {"a: [\n", "YAML"}}) {
+    const File file(text);
+    const std::string complaint = file.complaint();
+    EXPECT_NE(complaint.find(file.path().string()), std::string::npos) << text << complaint;
+    EXPECT_NE(complaint.find(expected), std::string::npos) << text << complaint;
+    EXPECT_EQ(complaint.find('\n'), std::string::npos) << text;
+  }
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,129 @@
+#include "lapservo/servo/servo_log.h"
+
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::uint64_t seed = 5;
+
+Eigen::Vector4d any(Random& random) {
+  return {random.normal(), 1e-7 * random.normal(), 1e5 * random.normal(), random.uniform()};
+}
+
+ServoRecord any_record(Random& random, int kind) {
+  ServoRecord record;
+  record.input.time_s = random.uniform(0, 100);
+  record.input.arm = {any(random), kind % 2 ? ArmState::enabled : ArmState::fault};
+  record.input.desired = {any(random), any(random), any(random)};
+  if (kind % 3) {
+    ImageMeasurement image;
+    image.found = kind % 3 == 1;
+    image.time_s = random.uniform();
+    if (image.found) {
+      image.features = any(random);
+      const Eigen::Matrix4d root = any(random) * any(random).transpose();
+      image.covariance = root * root.transpose();
+      image.covariance = (image.covariance + image.covariance.transpose()).eval();
+      image.ends_px = any(random);
+      if (kind % 2) image.q = any(random);
+    }
+    record.input.image = image;
+  }
+  record.decision.reason = "none";
+  record.decision.control.velocity = any(random);
+  if (kind % 2) record.true_q = any(random);
+  return record;
+}
+
+void expect_same_bits(const ServoInput& a, const ServoInput& b) {
+  EXPECT_EQ(a.time_s, b.time_s);
+  EXPECT_EQ(a.arm.q_joint, b.arm.q_joint);
+  EXPECT_EQ(a.arm.state, b.arm.state);
+  EXPECT_EQ(a.desired.features, b.desired.features);
+  EXPECT_EQ(a.desired.rate, b.desired.rate);
+  EXPECT_EQ(a.desired.acceleration, b.desired.acceleration);
+  ASSERT_EQ(a.image.has_value(), b.image.has_value());
+  if (!a.image) return;
+  EXPECT_EQ(a.image->found, b.image->found);
+  EXPECT_EQ(a.image->time_s, b.image->time_s);
+  if (!a.image->found) return;
+  EXPECT_EQ(a.image->features, b.image->features);
+  EXPECT_EQ(a.image->covariance, b.image->covariance);
+  EXPECT_EQ(a.image->ends_px, b.image->ends_px);
+  EXPECT_EQ(a.image->q, b.image->q);
+}
+
+std::string text_of(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::stringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+TEST(ServoLog, ReadsBackToTheLastBit) {
+  const testing::TemporaryFolder folder;
+  Random random(seed);
+  std::vector<ServoRecord> records;
+  ServoLog log(folder / "log.csv");
+  for (int i = 0; i < 60; ++i) {
+    records.push_back(any_record(random, i));
+    log.add(records.back());
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "log.csv"));
+  log.commit();
+  const auto periods = read_servo_log(folder / "log.csv");
+  ASSERT_EQ(periods.size(), records.size());
+  for (std::size_t i = 0; i < periods.size(); ++i) {
+    SCOPED_TRACE(i);
+    expect_same_bits(records[i].input, periods[i].input);
+    EXPECT_EQ(periods[i].decision, decision_fields(records[i].decision));
+  }
+}
+
+TEST(ServoLog, KeepsWhatIsNotANumber) {
+  const testing::TemporaryFolder folder;
+  ServoRecord record;
+  record.decision.reason = "non_finite";
+  record.input.arm.q_joint << std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 0,
+      -0.0;
+  ServoLog log(folder / "log.csv");
+  log.add(record);
+  log.commit();
+  const Eigen::Vector4d q = read_servo_log(folder / "log.csv")[0].input.arm.q_joint;
+  EXPECT_TRUE(std::isnan(q[0]));
+  EXPECT_EQ(q[1], std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(std::signbit(q[3]));
+}
+
+TEST(ServoLog, NamesWhatIsWrong) {
+  const testing::TemporaryFolder folder;
+  Random random(seed);
+  ServoLog log(folder / "log.csv");
+  log.add(any_record(random, 1));
+  log.commit();
+  const std::string good = text_of(folder / "log.csv");
+  const auto complaint = [&](const std::string& from, const std::string& to) {
+    std::string bad = good;
+    bad.replace(bad.find(from), from.size(), to);
+    std::ofstream(folder / "bad.csv") << bad;
+    return testing::input_error([&] { read_servo_log(folder / "bad.csv"); });
+  };
+  EXPECT_NE(complaint("ENABLED", "SLEEPY").find("arm_state"), std::string::npos);
+  EXPECT_NE(complaint(",found,", ",maybe,").find("none, lost or found"), std::string::npos);
+  EXPECT_NE(complaint("joint_theta_rad", "joint_kappa_rad").find("joint_theta_rad"), std::string::npos);
+  EXPECT_FALSE(testing::input_error([&] { read_servo_log(folder / "none.csv"); }).empty());
+}
+
+}  // namespace
+}  // namespace lapservo

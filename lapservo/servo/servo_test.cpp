@@ -1,0 +1,143 @@
+#include "lapservo/servo/servo.h"
+
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/test_rig.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double period_s = 1.0 / 60;
+const Eigen::Vector4d start(0.05, 1.57, 0.064, 1.2);
+
+// A loop whose arm goes where it is told at once and whose camera sees at once.
+class PerfectWorld {
+ public:
+  PerfectWorld() : model_(feature_model(testing::paper_test_rig())), servo_(config(), model_) {
+    desired_.features = model_(start + Eigen::Vector4d(0.03, 0.02, 0.004, 0.2)).value().features;
+  }
+  static ControllerConfig config() {
+    ControllerConfig config;
+    config.observer.delay_s = 0;
+    return config;
+  }
+
+  ServoDecision step() {
+    ServoInput input{time_s_, {q_, state}, std::nullopt, desired_};
+    if (sees) {
+      const FeatureState state_now = model_(q_).value();
+      input.image = ImageMeasurement{visible,           time_s_, state_now.features, 1e-4 * Eigen::Matrix4d::Identity(),
+                                     state_now.ends_px, q_};
+    }
+    if (broken_reading) input.arm.q_joint[1] = std::numeric_limits<double>::quiet_NaN();
+    time_s_ += period_s;
+    const ServoDecision decision = servo_.step(input);
+    if (decision.send && !stuck) q_ = decision.control.setpoint.position;
+    return decision;
+  }
+  ServoDecision steps(int count) {
+    ServoDecision last;
+    for (int i = 0; i < count; ++i) last = step();
+    return last;
+  }
+
+  ArmState state = ArmState::enabled;
+  bool sees = true, visible = true, broken_reading = false, stuck = false;
+  const Eigen::Vector4d& q() const { return q_; }
+  void push(const Eigen::Vector4d& by) { q_ += by; }
+
+ private:
+  FeatureModel model_;
+  Servo servo_;
+  DesiredFeatures desired_;
+  Eigen::Vector4d q_ = start;
+  double time_s_ = 0;
+};
+
+TEST(Servo, Tracks) {
+  PerfectWorld world;
+  const ServoDecision last = world.steps(240);
+  EXPECT_EQ(last.control.action, ControlAction::track);
+  EXPECT_EQ(last.reason, "none");
+  EXPECT_LT(last.control.error.norm(), 0.01);
+}
+
+TEST(Servo, HoldsWithinAPeriodWhenTheMarkerIsLostAndGoesOnWithoutAJump) {
+  PerfectWorld world;
+  world.steps(10);
+  world.visible = false;
+  ServoDecision decision = world.step();
+  EXPECT_EQ(decision.control.action, ControlAction::hold);
+  EXPECT_EQ(decision.reason, "marker_lost");
+  decision = world.steps(60);
+  EXPECT_EQ(decision.control.velocity, Eigen::Vector4d::Zero());
+  world.visible = true;
+  const Eigen::Vector4d before = world.q();
+  decision = world.step();
+  EXPECT_EQ(decision.control.action, ControlAction::track);
+  const JointLimits limits;
+  EXPECT_TRUE(
+      ((world.q() - before).cwiseAbs().array() <= 0.5 * limits.acceleration.array() * period_s * period_s + 1e-12)
+          .all());
+}
+
+TEST(Servo, SendsNothingToAnArmThatIsNotEnabledAndStartsAnewWhereItIs) {
+  PerfectWorld world;
+  world.steps(20);
+  for (const ArmState state : {ArmState::disabled, ArmState::paused, ArmState::fault}) {
+    world.state = state;
+    const ServoDecision decision = world.step();
+    EXPECT_FALSE(decision.send);
+    EXPECT_EQ(decision.control.action, ControlAction::hold);
+    EXPECT_EQ(decision.reason, "arm_not_enabled");
+  }
+  world.push({0.05, -0.05, 0.002, 0.3});  // somebody moves it meanwhile
+  world.step();
+  const Eigen::Vector4d there = world.q();
+  world.state = ArmState::enabled;
+  world.step();
+  EXPECT_LT((world.q() - there).norm(), 0.01);
+  EXPECT_LT(world.steps(300).control.error.norm(), 0.05);
+}
+
+TEST(Servo, AReadingThatIsNotANumberLeavesEverythingFinite) {
+  PerfectWorld world;
+  world.steps(10);
+  world.broken_reading = true;
+  for (int i = 0; i < 30; ++i) {
+    const ServoDecision decision = world.step();
+    EXPECT_EQ(decision.control.action, ControlAction::hold);
+    EXPECT_EQ(decision.reason, "non_finite");
+    EXPECT_TRUE(decision.control.setpoint.position.allFinite());
+    EXPECT_TRUE(decision.control.velocity.allFinite());
+  }
+  world.broken_reading = false;
+  EXPECT_LT(world.steps(300).control.error.norm(), 0.01);
+}
+
+// An arm that is held back: no wind-up, and it goes on once it has stood still and is free.
+TEST(Servo, AnArmThatDoesNotFollowIsLeftAloneUntilItRests) {
+  PerfectWorld world;
+  world.steps(3);
+  world.push({0.3, 0, 0, 0});
+  world.stuck = true;
+  EXPECT_EQ(world.step().reason, "not_following");
+  world.stuck = false;
+  EXPECT_LT(world.steps(400).control.error.norm(), 0.05);
+}
+
+TEST(Servo, WithoutImagesItHolds) {
+  PerfectWorld world;
+  world.sees = false;
+  EXPECT_EQ(world.steps(5).reason, "no_image_yet");
+  world.sees = true;
+  EXPECT_EQ(world.steps(30).control.action, ControlAction::track);
+  world.sees = false;
+  EXPECT_EQ(world.steps(30).reason, "stale_image");
+}
+
+}  // namespace
+}  // namespace lapservo
