@@ -1,11 +1,13 @@
 #include "lapservo/servo/theatre_start.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 
 #include <fmt/format.h>
 
+#include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 #include "lapservo/servo/image_features.h"
@@ -21,6 +23,17 @@ bool in_view(const FeatureModel& model, const ImageWindow& window, const Eigen::
   return std::min(e[0], e[2]) > window.u_min_px && std::max(e[0], e[2]) < window.u_max_px &&
          std::min(e[1], e[3]) > window.v_min_px && std::max(e[1], e[3]) < window.v_max_px &&
          state->features[2] > shortest_px;
+}
+
+// d jumps where the marker's seam passes the centre line: image features can't lead across it.
+bool seam_lies_between(const FeatureModel& model, const Eigen::Vector4d& from, const Eigen::Vector4d& to) {
+  constexpr int steps = 100;
+  constexpr double jump = 0.08;  // of l
+  for (int i = 0; i < steps; ++i) {
+    const auto here = model(from + (to - from) * i / steps), next = model(from + (to - from) * (i + 1) / steps);
+    if (!here || !next || std::abs(next->features[3] - here->features[3]) > jump * here->features[2]) return true;
+  }
+  return false;
 }
 
 Eigen::Vector4d anywhere(const JointLimits& limits, Random& random) {
@@ -42,7 +55,7 @@ void refuse_infeasible(const Trajectory& trajectory, double duration_s, const Ri
 RcmCoordinates random_start(const Trajectory& trajectory, double duration_s, const Rig& rig,
                             const ControllerConfig& controller, const ArmConfig& arm, Random& random,
                             const std::string& source) {
-  constexpr int most_places = 100000, most_starts = 30;
+  constexpr int most_places = 100000, most_starts = 60;
   constexpr double check_every_s = 0.1;
   const FeatureModel model = feature_model(rig);
   if (!model) throw InputError("rig", "instruments[0].camera_from_rcm is missing, expected it for a random start");
@@ -53,7 +66,13 @@ RcmCoordinates random_start(const Trajectory& trajectory, double duration_s, con
     if (!in_view(model, controller.window.value(), readings + arm.joint_offset)) continue;
     ++starts;
     const auto problem = find_infeasible(trajectory, duration_s, model, controller, readings, check_every_s);
-    if (!problem) return RcmCoordinates::from_vector(readings);
+    if (!problem) {
+      const auto goal = newton_inverse(model, trajectory.at(0).features, readings, controller.scales);
+      if (goal && goal->converged && !seam_lies_between(model, readings, goal->q))
+        return RcmCoordinates::from_vector(readings);
+      why = "the marker's seam lies between every start and the trajectory";
+      continue;
+    }
     why = fmt::format("can't be followed at {:.2f} s: {}", problem->time_s, problem->what);
   }
   throw InputError(source, why);
