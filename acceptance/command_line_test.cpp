@@ -181,8 +181,60 @@ TEST_F(CommandLine, Markers) {
   expect_refused("marker show --rig " + rig_ + " --instrument PSM9", {"PSM9"});
 }
 
+TEST_F(CommandLine, ServoRunsAndReplays) {
+  const std::string paper = std::string(LAPSERVO_SOURCE_DIR) + "/configs/paper.yaml";
+  ASSERT_EQ(run("servo --rig " + paper + " --robot sim --duration 6 --seed 2 --out " + out("run")), 0) << errors();
+  EXPECT_NE(output().find("within 1 px and 5 mrad from"), std::string::npos) << output();
+  for (const char* name : {"log.csv", "rig.yaml", "controller.yaml"}) EXPECT_TRUE(fs::exists(out("run") + "/" + name));
+  EXPECT_EQ(CsvTable::read(out("run") + "/log.csv").rows(), 360U);
+  EXPECT_EQ(run("servo --replay " + out("run") + "/log.csv"), 0) << errors();
+  EXPECT_NE(output().find("360 periods reproduced bit for bit"), std::string::npos) << output();
+
+  const std::string controller = read(out("run") + "/controller.yaml");
+  std::ofstream(out("run") + "/controller.yaml")
+      << "gains_per_s: [4, 5, 5, 5]\n"
+      << controller.substr(0, controller.find("gains")) << controller.substr(controller.find("delay_s"));
+  EXPECT_EQ(run("servo --replay " + out("run") + "/log.csv"), 1);
+  EXPECT_NE(errors().find("period"), std::string::npos);
+  // It has not converged after half a second.
+  EXPECT_EQ(run("servo --rig " + paper + " --robot sim --duration 0.5"), 1);
+}
+
+TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
+  const std::string servo =
+      "servo --rig " + std::string(LAPSERVO_SOURCE_DIR) + "/configs/paper.yaml --out " + out("run");
+  expect_refused(servo, {"--robot", "sim"});
+  expect_refused(servo + " --robot psm9", {"--robot", "psm9", "sim"});
+  expect_refused(servo + " --robot sim --set-point 0.9,795,365,900", {"--set-point", "can't be followed at 0.00 s"});
+  expect_refused(servo + " --robot sim --set-point 0.9,795", {"--set-point"});
+  expect_refused(servo + " --robot sim --via 1,2,3", {"--via", "four"});
+  expect_refused(servo + " --robot sim --method fast", {"--method", "fast", "uncalibrated"});
+  expect_refused(servo + " --robot sim --delay-ms soon", {"--delay-ms", "soon"});
+  expect_refused(servo + " --robot sim --fps 1", {"--fps"});
+  expect_refused(servo + " --robot sim --trajectory " + in("none.csv"), {"none.csv"});
+  expect_refused(servo + " --robot sim --trajectory " +
+                     in("fast.csv", "time_s,s_rad,r_px,l_px,d_px\n0,0.9,795,365,212\n0.1,0.9,855,365,212\n"),
+                 {"fast.csv", "limits.rate"});
+  expect_refused(servo + " --robot sim --controller " + in("gains.yaml", "gains_per_s: [1, 2, 3, -4]\n"),
+                 {"gains", "-4"});
+  expect_refused("servo --replay " + in("log.csv"), {"rig.yaml"});
+  expect_refused(
+      "servo --rig " + std::string(LAPSERVO_SOURCE_DIR) + "/configs/paper.yaml --robot sim --out /proc/nowhere",
+      {"/proc/nowhere", "folder"});
+}
+
+TEST_F(CommandLine, ExperimentsWriteAReport) {
+  ASSERT_EQ(run("experiment rcm --method surface --seed 3 --out " + out("report")), 0) << errors();
+  EXPECT_TRUE(fs::exists(out("report") + "/report.html"));
+  EXPECT_GT(CsvTable::read(out("report") + "/rcm.csv").rows(), 0U);
+  fs::remove_all(out("report"));
+  expect_refused("experiment cooking --out " + out("report"), {"cooking"});
+  expect_refused("experiment rcm --out /proc/nowhere", {"/proc/nowhere"});
+}
+
 TEST_F(CommandLine, HelpShowsExamples) {
-  for (const char* command : {"track", "render", "marker", "marker design", "marker print", "marker show"}) {
+  for (const char* command : {"track", "render", "marker", "marker design", "marker print", "marker show", "servo",
+                              "experiment", "estimate-rcm"}) {
     EXPECT_EQ(run(std::string(command) + " --help"), 0);
     EXPECT_NE(output().find("Example"), std::string::npos) << command;
   }

@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
-#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/html_report.h"
 #include "lapservo/experiments/illumination.h"
@@ -73,20 +73,6 @@ ExperimentSetup setup_of(const Options& options) {
   return setup;
 }
 
-// Said now, not after the work.
-void check_folder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!fs::is_directory(folder))
-    throw InputError(folder.string(),
-                     "can't be made a folder" + (error ? ": " + error.message() : std::string(", is a file")));
-  AtomicFile probe(folder / "report.html");
-  const fs::space_info space = fs::space(folder, error);
-  if (!error && space.available < needed_bytes)
-    throw InputError(folder.string(), fmt::format("has {} MB of room left, expected {} for the report and its data",
-                                                  space.available >> 20, needed_bytes >> 20));
-}
-
 Report report_of(std::vector<ReportSection> sections, const Options& options) {
   return {
       "lapservo: the experiments of the paper",
@@ -110,7 +96,7 @@ Report report_of(std::vector<ReportSection> sections, const Options& options) {
 int run(const Options& options) {
   ExperimentSetup setup = setup_of(options);
   const fs::path folder = options.out;
-  check_folder(folder);
+  prepare_output_folder(folder, needed_bytes);
   watch_for_interrupts();
 
   std::vector<ReportSection> sections;

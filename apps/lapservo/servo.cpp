@@ -14,6 +14,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/atomic_file.h"
@@ -36,11 +37,12 @@ namespace lapservo::app {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr double window_margin_px = 20;
+constexpr double window_margin_px = 20, via_dwell_s = 1;
+const Eigen::Vector4d via_rate(0.05, 60, 40, 40);  // s_rad, r, l, d px a second
 
 struct Options {
   std::string rig, robot, trajectory = "paper", method = "default", controller, delay = "estimate", out, replay;
-  std::vector<double> set_point, start, rcm_px, hide;
+  std::vector<double> set_point, via, start, rcm_px, hide;
   double duration_s = 20, latency_ms = 80, fps = 60;
   std::uint64_t seed = 1;
   bool view = false;
@@ -72,8 +74,24 @@ ControllerConfig controller_of(const Options& options, const Rig& rig) {
   return checked(config);
 }
 
+std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
+  if (numbers.size() % 4 != 0)
+    throw InputError("--via",
+                     fmt::format("holds {} numbers, expected four (s_rad,r_px,l_px,d_px) a point", numbers.size()));
+  std::vector<Eigen::Vector4d> points;
+  for (std::size_t i = 0; i < numbers.size(); i += 4) points.emplace_back(numbers.data() + i);
+  return points;
+}
+
+// What the trajectory is called in complaints.
+std::string trajectory_name(const Options& options) {
+  if (!options.set_point.empty()) return "--set-point";
+  return options.via.empty() ? options.trajectory : "--via";
+}
+
 Trajectory trajectory_of(const Options& options) {
   if (!options.set_point.empty()) return set_point(four(options.set_point));
+  if (!options.via.empty()) return via_points(points_of(options.via), via_rate, via_dwell_s);
   if (options.trajectory == "paper") return sinusoids(paper_sinusoids());
   return trajectory_from_csv(options.trajectory);
 }
@@ -103,7 +121,7 @@ ServoRunConfig run_config_of(const Options& options) {
 
 RcmCoordinates readings_at_start(const Options& options, const Trajectory& trajectory, const ServoRunConfig& run,
                                  const TheatreConfig& theatre) {
-  const std::string source = options.set_point.empty() ? options.trajectory : "--set-point";
+  const std::string source = trajectory_name(options);
   if (options.start.empty()) {
     Random random(options.seed);
     return random_start(trajectory, options.duration_s, *run.true_rig, run.controller, theatre.arm, random, source);
@@ -116,10 +134,9 @@ RcmCoordinates readings_at_start(const Options& options, const Trajectory& traje
 class RunFolder {
  public:
   RunFolder(const Options& options, const ServoRunConfig& run) : path_(options.out) {
-    std::error_code error;
-    fs::create_directories(path_, error);
-    if (!fs::is_directory(path_))
-      throw InputError(path_.string(), "can't be made a folder" + (error ? ": " + error.message() : ""));
+    constexpr std::uintmax_t bytes_a_period = 2000;
+    prepare_output_folder(path_,
+                          bytes_a_period * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20));
     write("rig.yaml", text_of(options.rig));
     write("controller.yaml", controller_yaml(run.controller));
     log_.emplace(path_ / "log.csv");
@@ -256,6 +273,10 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--set-point", options->set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
       ->delimiter(',')
       ->expected(4);
+  command
+      ->add_option("--via", options->via,
+                   "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
+      ->delimiter(',');
   command->add_option("--duration", options->duration_s, "Seconds")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 36000.0));
