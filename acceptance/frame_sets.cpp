@@ -68,7 +68,7 @@ std::vector<TrueFrame> sample_frames(const std::string& set) {
   std::vector<TrueFrame> frames;
   std::string last_file;
   for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string file = table.text(row, "file");
+    const std::string& file = table.text(row, "file");
     if (file != last_file) {
       const fs::path own = folder / fs::path(file).replace_extension(".rig.yaml");
       TrueFrame frame;

@@ -57,7 +57,7 @@ Eigen::Vector2d read_ideal_point(const CsvTable& table, std::size_t row, const c
                                  const std::optional<Rig>& rig) {
   const double u_px = table.number(row, fmt::format("{}_u_px", edge));
   const double v_px = table.number(row, fmt::format("{}_v_px", edge));
-  const Eigen::Vector2d raw(u_px, v_px);
+  Eigen::Vector2d raw(u_px, v_px);
   if (!rig) return raw;
   const auto ideal = rig->camera.ideal_from_raw(raw);
   if (!ideal)

@@ -215,7 +215,7 @@ int simulate(const Options& options) {
 
   Summary summary;
   {
-    Progress progress(static_cast<int>(options.duration_s / run.controller.period_s + 0.5));
+    Progress progress(static_cast<int>(std::lround(options.duration_s / run.controller.period_s)));
     int done = 0;
     run_servo(site, run, trajectory, options.duration_s,
               [&](const ServoRecord& record, const cv::Mat& frame, const std::vector<Observation>& seen) {

@@ -26,8 +26,7 @@ namespace fs = std::filesystem;
 
 struct Options {
   std::string input, rig, out = "obs.csv", overlay;
-  std::map<std::string, Method> methods{{"surface", Method::surface}, {"centerline", Method::centerline}};
-  Method method = Method::surface;
+  std::string method = "surface";
   bool single = false, view = false;
   double fps = 30;
 };
@@ -65,7 +64,8 @@ class RigByFrame {
   void use(const fs::path& path) {
     rig_ = load_rig(path);
     path_ = path;
-    tracker_.emplace(rig_, TrackerOptions{options_.method, options_.single});
+    tracker_.emplace(
+        rig_, TrackerOptions{options_.method == "centerline" ? Method::centerline : Method::surface, options_.single});
   }
 
   const Options& options_;
@@ -188,8 +188,8 @@ void add_track(CLI::App& app, Run& run_later) {
                       "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
   command->add_option("--out", options->out, "CSV of observations to write")->capture_default_str();
   command->add_option("--method", options->method, "surface: all visible lines; centerline: the paper's Algorithm 1")
-      ->transform(CLI::CheckedTransformer(options->methods, CLI::ignore_case))
-      ->default_str("surface");
+      ->capture_default_str()
+      ->check(CLI::IsMember({"surface", "centerline"}));
   command->add_flag("--single", options->single,
                     "Treat every frame on its own, without tracking from the frame before");
   command->add_option("--overlay", options->overlay,

@@ -200,7 +200,7 @@ TrackingRun run_scenario(const TrackingScenario& scenario, const ExperimentSetup
 }
 
 int periods_of(const TrackingScenario& scenario) {
-  return static_cast<int>(scenario.duration_s / period_s + 0.5);
+  return static_cast<int>(std::lround(scenario.duration_s / period_s));
 }
 
 const TrackingRun& run_of(const TrackingResult& result, const std::string& id) {

@@ -26,7 +26,7 @@ constexpr std::uint64_t seed = 59;
 Observation random_observation(Random& random) {
   Observation o;
   o.status = Status::ok;
-  o.rcm.emplace();
+  o.rcm = Observation::Rcm{};
   o.rcm->q = {random.uniform(-pi, pi), random.uniform(0, pi), random.uniform(0.05, 0.2), random.uniform(-pi, pi)};
   for (Eigen::Index i = 0; i < 4; ++i) o.rcm->covariance(i, i) = std::pow(10.0, random.uniform(-12, -4));
   o.tau_rad = random.uniform(0, two_pi);

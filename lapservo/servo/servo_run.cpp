@@ -1,5 +1,7 @@
 #include "lapservo/servo/servo_run.h"
 
+#include <cmath>
+
 #include "lapservo/servo/image_features.h"
 
 namespace lapservo {
@@ -20,7 +22,7 @@ void run_servo(Site& site, const ServoRunConfig& config, const Trajectory& traje
   const double period_s = config.controller.period_s, start_s = site.now_s();
   Servo servo(config.controller, model);
   Tracker tracker(config.rig, config.tracker);
-  const auto periods = static_cast<long>(duration_s / period_s + 0.5);
+  const auto periods = std::lround(duration_s / period_s);
   for (long k = 0; k < periods; ++k) {
     ServoRecord record;
     record.input.time_s = site.now_s();
