@@ -136,12 +136,13 @@ void ShaftPainter::paint(const PixelRays& rays, const cv::Rect& part, const cv::
 }
 
 ShaftPainter::Paint ShaftPainter::paint_pixel(const Corners& at) {
-  const auto [low, high] = std::minmax_element(at.part.begin(), at.part.end());
-  if (*low == *high && (on_side(*low) || *low == Part::tip)) return inside(at);
-  const bool two_parts = std::all_of(at.part.begin(), at.part.end(), [&](Part p) { return p == *low || p == *high; });
+  const Part low = *std::min_element(at.part.begin(), at.part.end());
+  const Part high = *std::max_element(at.part.begin(), at.part.end());
+  if (low == high && (on_side(low) || low == Part::tip)) return inside(at);
+  const bool two_parts = std::all_of(at.part.begin(), at.part.end(), [&](Part p) { return p == low || p == high; });
   Paint paint;
-  if (two_parts && *low == Part::nothing && on_side(*high) && silhouette(at, *high, paint)) return paint;
-  if (two_parts && is_band(*low) && is_band(*high) && boundary(at, *low, *high, paint)) return paint;
+  if (two_parts && low == Part::nothing && on_side(high) && silhouette(at, high, paint)) return paint;
+  if (two_parts && is_band(low) && is_band(high) && boundary(at, low, high, paint)) return paint;
   return sampled(at);
 }
 
