@@ -61,6 +61,10 @@ void check_observer(const ObserverConfig& observer) {
   require(observer.offset_per_motion >= 0, "observer.offset_per_motion", observer.offset_per_motion, "0 or more");
   require_positive("observer.gate_chi2", observer.gate_chi2);
   require(observer.reacquire_after >= 1, "observer.reacquire_after", observer.reacquire_after, "1 or more");
+  for (int i = 0; i < 4; ++i) {
+    const double largest = observer.backlash.largest[i];
+    require(std::isfinite(largest) && largest >= 0, element("observer.backlash.largest", i), largest, "0 or more");
+  }
 }
 
 void check_learning(const ControllerConfig& config) {

@@ -25,6 +25,14 @@ class JointHistory {
   /// Linear interpolation; the newest reading for times after it, nullopt for times before the oldest.
   std::optional<Eigen::Vector4d> at(double time_s) const;
 
+  /// Calls visit(q) for the readings from after `from_s` up to `to_s`, in order.
+  template <class Visit>
+  void visit(double from_s, double to_s, const Visit& visit) const {
+    std::size_t first = size_;
+    while (first > 0 && entry(first - 1).time_s > from_s) --first;
+    for (; first < size_ && entry(first).time_s <= to_s; ++first) visit(entry(first).q);
+  }
+
  private:
   struct Entry {
     double time_s = 0;

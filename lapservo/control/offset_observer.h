@@ -1,12 +1,15 @@
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include <Eigen/Core>
 
+#include "lapservo/control/backlash_estimator.h"
 #include "lapservo/control/delay_estimator.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/joint_history.h"
+#include "lapservo/control/play.h"
 
 namespace lapservo {
 
@@ -32,7 +35,8 @@ struct ObserverConfig {
   double bandwidth_rad_s = 12;    ///< how fast the offset follows the image
   /// Random walk of the offset between readings and truth, per square root of a second: theta, phi, rho, psi.
   Eigen::Vector4d offset_walk{0.002, 0.002, 0.0003, 0.008};
-  /// The offset changes with motion too (backlash, a wrong camera model): by about this share of the distance moved.
+  /// The offset changes with motion too (a wrong camera model, backlash not learnt): by about this share of the
+  /// distance moved.
   double offset_per_motion = 0.3;
   /// How far the offset may move the model's configuration from the readings; what a wrong model needs beyond that is
   /// put into the features instead.
@@ -40,6 +44,7 @@ struct ObserverConfig {
   double gate_chi2 = 28.5;  ///< innovations beyond it are outliers: 1 in 100000 of 4 degrees of freedom
   int reacquire_after = 5;  ///< so many outliers in a row that agree with each other are the truth
   DelayEstimatorConfig delay_estimator;
+  BacklashEstimatorConfig backlash;
 };
 
 enum class Update {
@@ -51,9 +56,16 @@ enum class Update {
   non_finite,
 };
 
+/// Where the joints are in their gaps, as believed.
+struct GapState {
+  Eigen::Vector4d width = Eigen::Vector4d::Zero();  ///< full play of each joint
+  Eigen::Vector4d shift = Eigen::Vector4d::Zero();  ///< what it adds to the readings: -width/2 to width/2
+};
+
 /// The instrument now.
 struct Estimate {
-  Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< readings plus offset
+  Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< readings through their play, plus offset
+  GapState gap;
   Eigen::Matrix4d q_covariance = Eigen::Matrix4d::Zero();
   Eigen::Vector4d features = Eigen::Vector4d::Zero();  ///< unbiased in the image even if the model is wrong
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
@@ -63,9 +75,11 @@ struct Estimate {
 };
 
 /// Fuses joint readings, which are fast and smooth but off (kinematic offsets, backlash), with the image, which is
-/// right but late. The state is the offset b such that the model at q_joint(t - delay) + b shows the features seen at
-/// t: a slowly varying random walk, estimated by a Kalman filter with full covariance. Then the features now are those
-/// of the model at q_joint(now) + b, so the delay does not enter the loop except through changes of b.
+/// right but late. The state is the offset b such that the model at p(t - delay) + b shows the features seen at t: a
+/// slowly varying random walk, estimated by a Kalman filter with full covariance. Then the features now are those of
+/// the model at p(now) + b, so the delay does not enter the loop except through changes of b. Here p are the readings
+/// through a play as wide as BacklashEstimator has found it: nothing at first. When the width changes b changes against
+/// it, so that the estimate does not jump.
 ///
 /// The innovation is the difference in *features*, carried to q by the damped inverse of the model's Jacobian. The
 /// filter rests only where that difference is zero on average, so in steady state the features are unbiased whatever is
@@ -74,7 +88,8 @@ struct Estimate {
 /// below 1 / delay when they have positive real parts.
 class OffsetObserver {
  public:
-  OffsetObserver(const ObserverConfig& config, const Scales& scales) : config_(config), scales_(scales) {
+  OffsetObserver(const ObserverConfig& config, const Scales& scales)
+      : config_(config), scales_(scales), backlash_estimator_(config.backlash, scales) {
     delay_s_ = config.delay_s.value_or(config.initial_delay_s);
     delay_estimator_ = DelayEstimator(config.delay_estimator);
   }
@@ -88,22 +103,33 @@ class OffsetObserver {
   /// What the data say; nullopt when the delay is given or there was too little motion.
   std::optional<DelayEstimate> delay_estimate() const;
   const Eigen::Vector4d& offset() const { return offset_; }
+  /// Full play between readings and instrument, joint by joint, as far as it has been learnt.
+  const Eigen::Vector4d& backlash() const { return backlash_; }
   bool started() const { return started_; }
 
  private:
-  Update start(const FeatureModel& model, const Eigen::Vector4d& q_then, const ImageMeasurement& image);
+  using Plays = std::array<Play, 4>;
+
+  Update start(const FeatureModel& model, const Eigen::Vector4d& played_then, const ImageMeasurement& image);
   bool agrees_with_last_outlier(const Eigen::Vector4d& seen_offset, const Eigen::Matrix4d& innovation_covariance);
   void limit_offset(const Eigen::Matrix4d& jacobian);
   void follow_delay(double interval_s);
+  void follow_readings(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then);
+  void follow_backlash(double interval_s);
+  bool delay_is_right() const;
   Eigen::Vector4d walk_variance(double interval_s, const Eigen::Vector4d& moved) const;
 
   ObserverConfig config_;
   Scales scales_;
   DelayEstimator delay_estimator_;
+  BacklashEstimator backlash_estimator_;
+  Eigen::Vector4d backlash_ = Eigen::Vector4d::Zero();
+  Plays plays_then_, plays_;  ///< at the last image, at the last reading before it came
+  double followed_s_ = 0;     ///< the time of plays_then_
   double delay_s_ = 0;
   bool started_ = false;
   double updated_s_ = 0;                                      ///< stamp of the last accepted image
-  Eigen::Vector4d q_joint_then_ = Eigen::Vector4d::Zero();    ///< readings at that image
+  Eigen::Vector4d played_then_ = Eigen::Vector4d::Zero();     ///< readings through their play at that image
   Eigen::Vector4d offset_ = Eigen::Vector4d::Zero();          ///< b
   Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero();      ///< of b
   Eigen::Vector4d feature_offset_ = Eigen::Vector4d::Zero();  ///< what b can't explain

@@ -26,6 +26,7 @@ class Observed {
   Update advance() {
     ++tick_;
     const double t = now_s();
+    for (int i = 0; i < 4; ++i) plays_[static_cast<std::size_t>(i)].follow(readings_at(t)[i], backlash[i]);
     for (int i = 0; i < 4; ++i) offset[i] += walk[i] * std::sqrt(period_s) * random_.normal();
     const FeatureState state = exact_map(rig, q_true()).value();
     ImageMeasurement image;
@@ -43,7 +44,11 @@ class Observed {
     return observer.update(model, history, latest);
   }
   double now_s() const { return tick_ * period_s; }
-  Eigen::Vector4d q_true() const { return readings_at(now_s()) + offset; }
+  Eigen::Vector4d q_true() const {
+    Eigen::Vector4d q = offset;
+    for (int i = 0; i < 4; ++i) q[i] += plays_[static_cast<std::size_t>(i)].instrument(backlash[i]);
+    return q;
+  }
   Estimate estimate() const { return observer.estimate(model, readings_at(now_s()), now_s()).value(); }
 
   TestRig rig;
@@ -52,12 +57,14 @@ class Observed {
   JointHistory history;
   Eigen::Vector4d offset{0.035, -0.035, 0.003, 0.035};
   Eigen::Vector4d walk = Eigen::Vector4d::Zero();
+  Eigen::Vector4d backlash = Eigen::Vector4d::Zero();
 
  private:
   double delay_s_;
   Random random_;
   std::deque<ImageMeasurement> images_;
   int tick_ = -1;
+  std::array<Play, 4> plays_;
 };
 
 ObserverConfig known(double delay_s) {
@@ -137,6 +144,32 @@ TEST(OffsetObserver, PredictionDoesNotLagBehindTheMotion) {
       worst = std::max(worst, error.cwiseQuotient(Scales{}.features).cwiseAbs().maxCoeff());
     }
     EXPECT_LT(worst, 0.5) << delay_s;  // a motion of up to 60 px/s would be 15 px behind after 0.25 s
+  }
+}
+
+/// The worst error of the prediction after the first 20 s, in feature scales.
+double worst_prediction(Observed& world) {
+  double worst = 0;
+  for (int k = 0; k < 3600; ++k) {
+    world.advance();
+    if (k < 1200) continue;
+    const auto error = feature_error(world.estimate().features, exact_map(world.rig, world.q_true())->features);
+    worst = std::max(worst, error.cwiseQuotient(Scales{}.features).cwiseAbs().maxCoeff());
+  }
+  return worst;
+}
+
+TEST(OffsetObserver, PredictsReversalsOnceBacklashIsLearnt) {
+  for (const double delay_s : {0.1, 0.25}) {
+    SCOPED_TRACE(delay_s);
+    ObserverConfig not_learning = known(delay_s);
+    not_learning.backlash.largest.setZero();
+    Observed learnt(known(delay_s), TestRig{}, delay_s, 7), unlearnt(not_learning, TestRig{}, delay_s, 7);
+    learnt.backlash = unlearnt.backlash = {0, 0, 2e-4, 0.03};
+    EXPECT_LT(worst_prediction(learnt), 0.5 * worst_prediction(unlearnt));
+    for (const int i : {2, 3})
+      EXPECT_NEAR(learnt.observer.backlash()[i], learnt.backlash[i], 0.15 * learnt.backlash[i]) << i;
+    EXPECT_TRUE(unlearnt.observer.backlash().isZero());
   }
 }
 

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/feature_model.h"
+#include "lapservo/control/play.h"
+
+namespace lapservo {
+
+struct BacklashEstimate {
+  double width = 0;  ///< full play, rad or m
+  double sigma = 0;
+};
+
+struct BacklashEstimatorConfig {
+  /// The widest gap looked for: theta_rad, phi_rad, rho_m, psi_rad; 0 where there is none.
+  Eigen::Vector4d largest{0, 0, 5e-4, 0.1};
+  double forgetting_s = 60;  ///< time constant by which old frames lose weight
+  double offset_time_s = 2;  ///< time constant of the mean that is removed: slower differences don't count
+  double model_error = 0.3;  ///< what a wrong model makes of motion, a share of it: one sigma
+  double delay_error_s = 0.01;
+  double largest_sigma = 0.03;  ///< share of the largest width: estimates less certain don't count
+};
+
+/// How wide the gaps between motors and instrument are, from the data. What the image shows beyond the readings is
+/// compared with what each of a grid of widths would have done to the readings so far; the lowest sum of squares is the
+/// likeliest width, refined by a parabola. Other things make image and readings differ too, so each sum is the least
+/// over what they can explain: an offset (a running mean is removed from everything alike), a wrong model (it adds
+/// multiples of the joints' positions) and a wrong delay (of the joint's velocity, which looks like backlash but for
+/// its shape). Readings that never reverse make all widths alike: then there is no estimate.
+class BacklashEstimator {
+ public:
+  static constexpr std::size_t candidates = 21;  ///< 0 to the largest
+
+  BacklashEstimator(const BacklashEstimatorConfig& config, const Scales& scales);
+
+  /// Readings, in order of time, up to those of the image in add().
+  void follow(const Eigen::Vector4d& q_joint);
+  /// An image that shows `q_image` (with the covariance of its noise) when the readings were the last ones followed and
+  /// changed at `rate`.
+  void add(double time_s, const Eigen::Vector4d& rate, const Eigen::Vector4d& q_image,
+           const Eigen::Matrix4d& covariance);
+  /// The offset jumped, or readings are missing: keeps what is known, but compares nothing across.
+  void interrupt();
+
+  std::optional<BacklashEstimate> estimate(int joint) const;
+
+ private:
+  /// What may differ without backlash: the joints' positions and the joint's own velocity.
+  using Nuisance = Eigen::Matrix<double, 5, 1>;
+  struct Candidate {
+    Play play;
+    double mean = 0;                    ///< of what image and this play differ by
+    double squares = 0;                 ///< of the rest
+    Nuisance mixed = Nuisance::Zero();  ///< the rest by nuisances
+  };
+  struct Joint {
+    std::array<Candidate, candidates> grid;
+    bool pressed = false;  ///< far enough in one direction that every candidate's side is known
+    double lowest = 0, highest = 0;
+    Nuisance mean = Nuisance::Zero();
+    Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Zero();
+    double since = 0;   ///< frames since the last interruption
+    double weight = 0;  ///< number of frames, forgotten likewise
+    double last_s = 0;
+  };
+
+  double width(int joint, std::size_t candidate) const {
+    return config_.largest[joint] * static_cast<double>(candidate) / (candidates - 1);
+  }
+  void follow(int joint, double reading);
+
+  BacklashEstimatorConfig config_;
+  Scales scales_;
+  std::array<Joint, 4> joints_;
+  Eigen::Vector4d q_joint_ = Eigen::Vector4d::Zero();
+  bool followed_ = false;
+};
+
+}  // namespace lapservo

@@ -1,0 +1,122 @@
+#include "lapservo/control/backlash_estimator.h"
+
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double period_s = 1.0 / 60;
+
+/// Readings, and images of what the instrument does with them: play, offsets, and what else may be wrong.
+struct World {
+  Eigen::Vector4d backlash{0, 0, 1e-4, 0.02};
+  Eigen::Vector4d noise{3e-4, 3e-4, 2e-5, 3e-3};
+  Eigen::Matrix4d model_error = Eigen::Matrix4d::Zero();  ///< in joint scales
+  double delay_error_s = 0;
+  std::function<Eigen::Vector4d(double)> readings = [](double t) {
+    return Eigen::Vector4d(0.05 * std::sin(0.7 * t), 0.03 * std::sin(0.5 * t), 0.006 * std::sin(two_pi / 10 * t),
+                           0.7 * std::sin(two_pi / 12 * t + 1));
+  };
+
+  BacklashEstimator watched(double duration_s, std::uint64_t seed) const {
+    const Scales scales;
+    BacklashEstimator estimator({}, scales);
+    Random random(seed);
+    std::array<Play, 4> plays;
+    for (int i = 0; i < 4; ++i) plays[static_cast<std::size_t>(i)] = Play(readings(0)[i]);
+    for (double t = 0; t < duration_s; t += period_s) {
+      const Eigen::Vector4d q = readings(t), then = readings(t - delay_error_s);
+      Eigen::Vector4d seen(0.035, -0.035, 0.003, 0.035);
+      for (int i = 0; i < 4; ++i) {
+        Play& play = plays[static_cast<std::size_t>(i)];
+        play.follow(then[i], backlash[i]);
+        seen[i] += play.instrument(backlash[i]) + noise[i] * random.normal();
+      }
+      seen += scales.joints.cwiseProduct(model_error * then.cwiseQuotient(scales.joints));
+      estimator.follow(q);
+      estimator.add(t, (q - readings(t - 0.05)) / 0.05, seen, noise.cwiseAbs2().asDiagonal());
+    }
+    return estimator;
+  }
+};
+
+TEST(BacklashEstimator, FindsTheWidthsFromSinusoids) {
+  for (const double times : {0.5, 1.0, 2.5}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      SCOPED_TRACE(std::to_string(times) + " seed " + std::to_string(seed));
+      World world;
+      world.backlash *= times;
+      const BacklashEstimator estimator = world.watched(20, seed);
+      for (const int i : {2, 3}) {
+        const auto found = estimator.estimate(i);
+        ASSERT_TRUE(found);
+        EXPECT_NEAR(found->width, world.backlash[i], 0.15 * world.backlash[i]) << i;
+        EXPECT_NEAR(found->width, world.backlash[i], 4 * found->sigma) << i;
+        EXPECT_LT(found->sigma, 0.03 * BacklashEstimatorConfig{}.largest[i]) << i;
+      }
+    }
+  }
+}
+
+TEST(BacklashEstimator, FindsNoneWhereThereIsNone) {
+  World world;
+  world.backlash.setZero();
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE(seed);
+    const BacklashEstimator estimator = world.watched(20, seed);
+    EXPECT_FALSE(estimator.estimate(0));
+    for (const int i : {2, 3}) EXPECT_LT(estimator.estimate(i)->width, 0.02 * BacklashEstimatorConfig{}.largest[i]);
+  }
+}
+
+TEST(BacklashEstimator, IsSureOfNothingWithoutReversals) {
+  World world;
+  world.readings = [](double t) -> Eigen::Vector4d { return Eigen::Vector4d(0.01, 0.01, 0.001, 0.1) * t; };
+  const BacklashEstimator estimator = world.watched(20, 3);
+  for (const int i : {2, 3}) {
+    const auto found = estimator.estimate(i);
+    if (found) EXPECT_GT(found->sigma, BacklashEstimatorConfig{}.largest[i]);
+  }
+}
+
+TEST(BacklashEstimator, IsNotFooledByAWrongDelayOrModel) {
+  for (const double backlash : {0.0, 1.0}) {
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      for (const double delay_error_s : {-0.008, 0.008}) {
+        SCOPED_TRACE(std::to_string(backlash) + " seed " + std::to_string(seed));
+        World world;
+        world.backlash *= backlash;
+        world.delay_error_s = delay_error_s;
+        Random random(seed);
+        for (int i = 0; i < 4; ++i)
+          for (int k = 0; k < 4; ++k) world.model_error(i, k) = 0.15 * random.normal();
+        const BacklashEstimator estimator = world.watched(40, seed);
+        for (const int i : {2, 3}) {
+          EXPECT_NEAR(estimator.estimate(i)->width, world.backlash[i], 0.06 * BacklashEstimatorConfig{}.largest[i]);
+        }
+      }
+    }
+  }
+}
+
+TEST(BacklashEstimator, KeepsWhatItKnowsThroughAnInterruption) {
+  BacklashEstimator estimator = World{}.watched(20, 1);
+  const double before = estimator.estimate(3)->width;
+  estimator.interrupt();
+  Eigen::Vector4d q(0, 0, 0.05, 3);
+  for (int k = 0; k < 600; ++k) {
+    estimator.follow(q);
+    estimator.add(30 + k * period_s, Eigen::Vector4d::Zero(), q + Eigen::Vector4d(1, 1, 0.01, 1),
+                  1e-6 * Eigen::Matrix4d::Identity());
+  }
+  EXPECT_NEAR(estimator.estimate(3)->width, before, 1e-3);
+}
+
+}  // namespace
+}  // namespace lapservo
