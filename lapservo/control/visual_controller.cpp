@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "lapservo/control/gap_crossing.h"
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/core/error.h"
@@ -140,12 +141,17 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
       ends = {step.estimate->ends_px + step.estimate->ends_jacobian * (motion.position - q_joint),
               step.estimate->ends_jacobian};
     }
-    const Eigen::Vector4d wanted = slow_to_rate(law.velocity);
+    const Eigen::Vector4d slowed = slow_to_rate(law.velocity);
+    Eigen::Vector4d wanted = slowed;
+    if (step.estimate) {
+      wanted =
+          cross_gaps(config_.limits, motion, step.estimate->gap, q_joint, law.feed_forward, slowed, config_.period_s);
+    }
     const auto limited =
         limit_velocity(config_.limits, config_.window, motion, ends, wanted, law.weight, config_.period_s);
     if (limited.velocity.allFinite()) {
       step.velocity = limited.velocity;
-      step.limited = limited.limited || wanted != law.velocity;
+      step.limited = limited.limited || slowed != law.velocity;
       step.action = probing() ? ControlAction::probe : ControlAction::track;
     } else {
       step.reason = HoldReason::non_finite;
@@ -281,20 +287,18 @@ VisualController::Law VisualController::law(const std::optional<Estimate>& estim
     law.reason = HoldReason::singular;
     return law;
   }
-  law.velocity = law_velocity(*estimate, damped.inverse, desired);
   law.weight = deviation_weight(estimate->jacobian);
-  return law;
-}
-
-Eigen::Vector4d VisualController::law_velocity(const Estimate& estimate, const Eigen::Matrix4d& inverse,
-                                               const DesiredFeatures& desired) const {
   if (config_.mode == ControlMode::paper) {
-    return paper_velocity(estimate.jacobian, config_.gains, estimate.features, desired.features, desired.rate);
+    law.velocity =
+        paper_velocity(estimate->jacobian, config_.gains, estimate->features, desired.features, desired.rate);
+    return law;
   }
   // The velocity is reached when the period ends, and by the arm a little later: feed forward what is desired then.
   const double lead_s = config_.period_s + arm_lag_.seconds();
-  return inverse * wanted_feature_rate(exact_gains_, estimate.features, desired.features,
-                                       desired.rate + lead_s * desired.acceleration);
+  const Eigen::Vector4d rate = desired.rate + lead_s * desired.acceleration;
+  law.velocity = damped.inverse * wanted_feature_rate(exact_gains_, estimate->features, desired.features, rate);
+  law.feed_forward = damped.inverse * rate;
+  return law;
 }
 
 VisualController::Law VisualController::probing_law() const {

@@ -81,7 +81,8 @@ class VisualController {
   struct Law {
     HoldReason reason = HoldReason::none;
     Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
-    Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();  ///< of deviations from it
+    Eigen::Vector4d feed_forward = Eigen::Vector4d::Zero();  ///< what of it the desired motion alone asks for
+    Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();    ///< of deviations from it
   };
 
   HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired);
@@ -92,8 +93,6 @@ class VisualController {
   std::optional<Estimate> estimate(double time_s, const Eigen::Vector4d& q_joint) const;
   Law law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   Law probing_law() const;
-  Eigen::Vector4d law_velocity(const Estimate& estimate, const Eigen::Matrix4d& inverse,
-                               const DesiredFeatures& desired) const;
   Eigen::Matrix4d deviation_weight(const Eigen::Matrix4d& jacobian) const;
   Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity) const;
   bool probing() const { return config_.mode == ControlMode::uncalibrated && !learnt_; }

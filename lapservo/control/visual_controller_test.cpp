@@ -257,6 +257,79 @@ TEST(VisualController, ConvergesInTheImageWithAWrongModel) {
   }
 }
 
+TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
+  for (const bool known : {true, false}) {
+    Eigen::Vector4d rms_at_zero = Eigen::Vector4d::Zero();
+    for (const double latency_s : {0.0, 0.08, 0.15, 0.25}) {
+      SCOPED_TRACE(std::string(known ? "known " : "estimated ") + std::to_string(latency_s));
+      Flaws flaws = usual_flaws();
+      flaws.backlash = {0, 0, 0.0001, 0.02};
+      flaws.latency_s = latency_s;
+      flaws.delay_known = known;
+      const ControllerConfig config = testing::test_config(flaws);
+      ControllerConfig unlearnt = config;
+      unlearnt.observer.backlash.largest.setZero();
+      const auto trajectory = sinusoids(testing::paper_sinusoids());
+      const auto done = run(config, testing::model_of({}), flaws, trajectory, 40, 3);
+      const auto before = run(unlearnt, testing::model_of({}), flaws, trajectory, 40, 3);
+      const Eigen::Vector4d width = done.moments.back().step.estimate->gap.width;
+      for (const int i : {2, 3}) EXPECT_NEAR(width[i], flaws.backlash[i], 0.15 * flaws.backlash[i]) << i;
+      EXPECT_TRUE(width.head<2>().isZero());
+      const Eigen::Vector4d rms = rms_after(done.moments, 15);
+      const Eigen::Vector4d rms_unlearnt = rms_after(before.moments, 15);
+      EXPECT_LT(rms[1], rms_unlearnt[1] / 4);
+      EXPECT_LT(rms[3], rms_unlearnt[3] / 3);
+      if (latency_s == 0) rms_at_zero = rms;
+      if (latency_s <= 0.15) {
+        EXPECT_LT(rms.cwiseQuotient(rms_at_zero).maxCoeff(), 1.2);
+      }
+      expect_all_limits_kept(done, config);
+    }
+  }
+}
+
+/// The widest gap ever believed in, in shares of what is there: rho's and psi's.
+Eigen::Vector2d widest_gap(const std::vector<Moment>& moments, const Eigen::Vector2d& unit) {
+  Eigen::Vector2d widest = Eigen::Vector2d::Zero();
+  for (const Moment& m : moments) {
+    if (m.step.estimate) widest = widest.cwiseMax(m.step.estimate->gap.width.tail<2>().cwiseQuotient(unit));
+  }
+  return widest;
+}
+
+TEST(VisualController, IsNotFooledIntoBacklashByAWrongModel) {
+  const Eigen::Vector2d usual(0.0001, 0.02);
+  for (const double times : {0.0, 1.0}) {
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      SCOPED_TRACE(std::to_string(times) + " seed " + std::to_string(seed));
+      Flaws flaws = usual_flaws();
+      flaws.backlash.tail<2>() = times * usual;
+      flaws.delay_known = seed % 2 == 0;
+      const ControllerConfig config = testing::test_config(flaws);
+      Random random(2000 + seed);
+      const TestRig rig = seed <= 5 ? TestRig{} : wrong_rig(random);
+      const auto done = run(config, testing::model_of(rig), flaws, sinusoids(testing::paper_sinusoids()), 30, seed);
+      EXPECT_LT(widest_gap(done.moments, usual).maxCoeff(), times + 0.6);
+      expect_all_limits_kept(done, config);
+    }
+  }
+}
+
+TEST(VisualController, ConvergesInTheImageWithAWrongModelAndBacklash) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    SCOPED_TRACE(seed);
+    Flaws flaws = usual_flaws();
+    flaws.backlash = {0, 0, 0.0002, 0.03};
+    flaws.delay_known = seed % 2 == 0;
+    const ControllerConfig config = testing::test_config(flaws);
+    Random random(1000 + seed);
+    const auto done = run(config, testing::model_of(wrong_rig(random)), flaws,
+                          set_point(testing::paper_sinusoids().offset), 12, seed);
+    EXPECT_LT(settled_s(done.moments), 9);
+    expect_all_limits_kept(done, config);
+  }
+}
+
 TEST(VisualController, ConvergesUncalibratedFromRandomStarts) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);

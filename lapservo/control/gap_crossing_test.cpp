@@ -1,0 +1,85 @@
+#include "lapservo/control/gap_crossing.h"
+
+#include <gtest/gtest.h>
+
+#include "lapservo/control/play.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double period_s = 1.0 / 60;
+
+/// Psi asked to fall at a slow, steady rate after it rose: motor and instrument, without noise or lag.
+struct Crossing {
+  double width = 0.02, motor = 1, velocity = 0;
+  Play play{1, 1};
+  JointLimits limits;
+
+  double instrument() const { return play.instrument(width); }
+  void advance(double wanted) {
+    GapState gap;
+    gap.width[3] = width;
+    gap.shift[3] = instrument() - motor;
+    Eigen::Vector4d q(0, 1, 0.1, motor), v(0, 0, 0, velocity), asked(0, 0, 0, wanted);
+    const double next = cross_gaps(limits, {q, v}, gap, q, asked, asked, period_s)[3];
+    ASSERT_LE(std::abs(next - velocity), limits.acceleration[3] * period_s + 1e-12);
+    ASSERT_LE(std::abs(next), limits.rate[3]);
+    motor += (velocity + next) / 2 * period_s;
+    velocity = next;
+    play.follow(motor, width);
+  }
+};
+
+TEST(CrossGaps, CrossesTheGapFastAndEndsSoftly) {
+  Crossing world;
+  const double wanted = -0.02;
+  double crossed_s = 0;
+  for (int k = 1; k <= 60; ++k) {
+    world.advance(wanted);
+    if (world.instrument() > 0.9899) crossed_s = k * period_s;
+    // Once pressed, the instrument does not run ahead of what is asked.
+    EXPECT_GT(world.instrument(), 0.99 + wanted * k * period_s - 0.001) << k;
+  }
+  EXPECT_LT(crossed_s, 0.25);  // one second by the wanted motion alone
+  EXPECT_NEAR(world.velocity, wanted, 1e-3);
+}
+
+TEST(CrossGaps, LeavesAloneWhatHasNoDirection) {
+  GapState gap;
+  gap.width << 0, 0, 1e-4, 0.02;
+  const JointLimits limits;
+  const Eigen::Vector4d q(0, 1, 0.1, 0);
+  Random random(4);
+  for (int k = 0; k < 100; ++k) {
+    Eigen::Vector4d noise;
+    for (int i = 0; i < 4; ++i) noise[i] = 0.01 * random.normal();
+    const MotionState rest{q, Eigen::Vector4d::Zero()};
+    EXPECT_EQ(cross_gaps(limits, rest, gap, q, Eigen::Vector4d::Zero(), noise, period_s), noise) << "a set-point";
+    EXPECT_EQ(cross_gaps(limits, rest, GapState{}, q, noise, noise, period_s), noise) << "no gap";
+    EXPECT_EQ(cross_gaps(limits, rest, gap, q, -noise, noise, period_s), noise) << "an error that goes against it";
+  }
+}
+
+TEST(CrossGaps, StaysWithinRateAndAcceleration) {
+  const JointLimits limits;
+  const Eigen::Vector4d q(0, 1, 0.1, 0);
+  Random random(5);
+  for (int k = 0; k < 1000; ++k) {
+    GapState gap;
+    Eigen::Vector4d v, asked;
+    for (int i = 0; i < 4; ++i) {
+      gap.width[i] = random.uniform(0, limits.rate[i]);
+      gap.shift[i] = random.uniform(-0.5, 0.5) * gap.width[i];
+      v[i] = random.uniform(-1, 1) * limits.rate[i];
+      const double change = limits.acceleration[i] * period_s;
+      asked[i] = std::clamp(v[i] + random.uniform(-1, 1) * change, -limits.rate[i], limits.rate[i]);
+    }
+    const Eigen::Vector4d velocity = cross_gaps(limits, {q, v}, gap, q, asked, asked, period_s);
+    EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
+    EXPECT_LE(((velocity - v).cwiseAbs() - limits.acceleration * period_s).maxCoeff(), 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace lapservo
