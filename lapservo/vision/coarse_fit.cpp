@@ -5,10 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <utility>
-#include <vector>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/inplace_vector.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/vision/line_segmentation.h"
 #include "lapservo/vision/normal_equations.h"
@@ -21,6 +22,7 @@ constexpr double line_reach = 0.74;  // of the visible half angle: beyond, bands
 constexpr double side_sigma_px = 2.0, boundary_sigma_px = 1.5;
 constexpr double limb_inset_px = 1.0;  // the limb is dark, its colour ends inside the true silhouette
 constexpr int smallest_boundary_count = 10;
+constexpr int most_reach = 200;  // samples on each side of a section's middle
 
 // Measured image points that lie on the marker's outline or boundaries, attached to where they belong on its surface.
 struct SidePoint {
@@ -34,6 +36,9 @@ struct BoundaryPoint {
   std::size_t boundary;
 };
 
+using SidePoints = InplaceVector<SidePoint, 2 * station_count>;
+using BoundaryPoints = InplaceVector<BoundaryPoint, 4 * line_count>;
+
 Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azimuth_rad, double along_m) {
   return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
 }
@@ -42,7 +47,7 @@ Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azi
 struct Stretch {
   int first = 0, last = -1;
 };
-Stretch most_colorful_stretch(const std::vector<std::uint8_t>& classes, const std::array<std::uint8_t, 3>& bands) {
+Stretch most_colorful_stretch(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands) {
   Stretch best, current{0, -1};
   float best_sum = 0, sum = 0;
   for (int i = 0; i < static_cast<int>(classes.size()); ++i) {
@@ -61,10 +66,9 @@ Stretch most_colorful_stretch(const std::vector<std::uint8_t>& classes, const st
 }
 
 // Sections across the shaft: where its colours begin and end.
-std::vector<SidePoint> measure_sides(const Scene& scene, const ShaftPose& pose, const CylinderView& view,
-                                     double reach_px) {
-  std::vector<SidePoint> points;
-  std::vector<std::uint8_t> classes;
+SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double reach_px) {
+  SidePoints points;
+  InplaceVector<std::uint8_t, 2 * most_reach + 1> classes;
   for (int station = 0; station < station_count; ++station) {
     const double along_m = scene.marker.length_m() * (0.04 + 0.92 * station / (station_count - 1));
     const auto silhouette = [&](double side) {
@@ -76,7 +80,7 @@ std::vector<SidePoint> measure_sides(const Scene& scene, const ShaftPose& pose, 
     if (!(half_px > 2) || half_px > 4000) continue;
     const Eigen::Vector2d across = (right - left) / (2 * half_px);
     const double step_px = std::max(1.0, half_px / 40);
-    const int reach = static_cast<int>((half_px + reach_px) / step_px);
+    const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), most_reach);
     classes.clear();
     for (int i = -reach; i <= reach; ++i) classes.push_back(scene.class_at(middle + i * step_px * across));
     const Stretch stretch = most_colorful_stretch(classes, scene.bands);
@@ -124,9 +128,8 @@ SampledSurface sample_surface(const Scene& scene, const ShaftPose& pose, const C
   return surface;
 }
 
-std::vector<BoundaryPoint> measure_boundaries(const Scene& scene, const ShaftPose& pose,
-                                              const SampledSurface& surface) {
-  std::vector<BoundaryPoint> points;
+BoundaryPoints measure_boundaries(const Scene& scene, const ShaftPose& pose, const SampledSurface& surface) {
+  BoundaryPoints points;
   for (const SampledLine& line : surface.lines) {
     const LineSegmentation split = segment_line(line.classes, scene.bands);
     for (std::size_t k = 0; k < 4; ++k) {
@@ -157,9 +160,8 @@ void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const 
 }
 
 // One Gauss-Newton step on measured points. Inner boundaries count only once the rotation is known.
-std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unknowns,
-                                    const std::vector<SidePoint>& sides, const std::vector<BoundaryPoint>& boundaries,
-                                    bool with_rotation) {
+std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unknowns, std::span<const SidePoint> sides,
+                                    std::span<const BoundaryPoint> boundaries, bool with_rotation) {
   const ShaftPose& pose = unknowns.pose();
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return std::nullopt;

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
-#include <vector>
+#include <span>
 
 #include <Eigen/LU>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/inplace_vector.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/vision/edge_profile.h"
 #include "lapservo/vision/normal_equations.h"
@@ -44,8 +45,10 @@ struct Measurement {
 };
 constexpr std::size_t groups = 6;
 
+constexpr std::size_t most_measurements = 4 * most_lines + 2 * stations;
+
 struct Pass {
-  std::vector<Measurement> measurements;
+  InplaceVector<Measurement, most_measurements> measurements;
   std::array<int, 4> in_image{};
   int lines = 0;
   struct BlurEvidence {
@@ -176,7 +179,8 @@ std::optional<Candidate> measure_boundary(const Frame& frame, double azimuth_rad
   return candidate;
 }
 
-float median(std::vector<float>& values) {
+// Reorders the values.
+float median(std::span<float> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -184,9 +188,9 @@ float median(std::vector<float>& values) {
 
 // Keeps the candidates of one boundary whose change of light is what most see where the colours agree; gives each its
 // sigma from the noise that the lines show.
-void trust(std::vector<Candidate>& candidates, Pass& pass) {
+void trust(std::span<Candidate> candidates, Pass& pass) {
   std::array<float, 3> typical{};
-  std::vector<float> values;
+  InplaceVector<float, most_lines> values;
   for (std::size_t c = 0; c < 3; ++c) {
     values.clear();
     for (const Candidate& candidate : candidates)
@@ -220,7 +224,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
   pass.lines = std::max(fewest_lines, std::min(static_cast<int>(1.8 * radius_px), most_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
-  std::array<std::vector<Candidate>, 4> candidates;
+  std::array<InplaceVector<Candidate, most_lines>, 4> candidates;
   for (int i = 0; i < pass.lines; ++i) {
     const double sine = line_reach * (2.0 * (i + 0.5) / pass.lines - 1) * std::sin(frame.view.half_visible_rad);
     const double azimuth_rad = frame.view.facing_azimuth_rad + std::asin(sine);
@@ -232,7 +236,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px
       if (inner && seam_px < 2.5 * blur_px + 1.5) continue;
       if (auto candidate =
               measure_boundary(frame, azimuth_rad, k, along_m, slopes_m[k], effort, blur_px, pass.in_image[k]))
-        candidates[k].push_back(std::move(*candidate));
+        candidates[k].push_back(*candidate);
     }
   }
   for (auto& of_boundary : candidates) trust(of_boundary, pass);
@@ -253,12 +257,12 @@ bool one_band(const Frame& frame, double azimuth_a_rad, double azimuth_b_rad, do
 
 void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Pass& pass) {
   const double length_m = frame.marker().length_m();
-  std::vector<float> variances;
+  InplaceVector<float, 2 * stations> variances;
   struct Side {
     Measurement measurement;
     EdgeFit edge;
   };
-  std::vector<Side> sides;
+  InplaceVector<Side, 2 * stations> sides;
   const int count = stations / effort.thinning;
   for (int station = 0; station < count; ++station) {
     const double along_m = length_m * (station + 0.5) / count;
@@ -287,7 +291,7 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Pas
       measured.measurement.residual_px = measured.edge.offset_px;
       measured.measurement.group = side < 0 ? 4 : 5;
       variances.push_back(measured.edge.residual_variance);
-      sides.push_back(std::move(measured));
+      sides.push_back(measured);
     }
   }
   if (sides.size() < 4) return;
@@ -327,7 +331,7 @@ UnknownVector extended_row(const Measurement& m) {
 
 // Minimises the robust cost of linearised measurements: iteratively reweighted. `film_prior` is what the film's
 // thickness lies below its expected one, in sigmas.
-UnknownVector solve(const std::vector<Measurement>& measurements, int unknowns, double film_prior) {
+UnknownVector solve(std::span<const Measurement> measurements, int unknowns, double film_prior) {
   constexpr int iterations = 4;
   UnknownVector step = UnknownVector::Zero(unknowns + 1);
   for (int i = 0; i < iterations; ++i) {
@@ -343,7 +347,7 @@ UnknownVector solve(const std::vector<Measurement>& measurements, int unknowns, 
 }
 
 // Inverse information, widened by what each boundary and side as a whole may be off.
-std::optional<UnknownMatrix> covariance_of(const std::vector<Measurement>& measurements, int unknowns,
+std::optional<UnknownMatrix> covariance_of(std::span<const Measurement> measurements, int unknowns,
                                            double residual_rms_sigmas, const EdgeBlur& blur) {
   NormalEquations equations(unknowns + 1);
   equations.add(UnknownVector::Unit(unknowns + 1, unknowns), 0, 1);
