@@ -4,9 +4,8 @@
 
 namespace lapservo::bench {
 
-// Argument: image width.
 void render(benchmark::State& state) {
-  const Rig rig = scaled_rig(static_cast<int>(state.range(0)), 1);
+  const Rig rig = scaled_rig(size_argument(state), static_cast<int>(state.range(2)));
   Renderer renderer = make_renderer(rig);
   int index = 0;
   for (auto _ : state) {
@@ -14,6 +13,6 @@ void render(benchmark::State& state) {
     ++index;
   }
 }
-BENCHMARK(render)->Arg(640)->Arg(1280)->Arg(1920)->Unit(benchmark::kMillisecond);
+BENCHMARK(render)->Apply(every_size_and_number);
 
 }  // namespace lapservo::bench

@@ -12,7 +12,7 @@ namespace lapservo::bench {
 // A frame period (1/60 s) of the whole simulated theatre with tracking: rendering runs beside it while frames are on
 // their way. Argument: threads that render. `x_real_time` is simulated time per real time.
 void theatre_period(benchmark::State& state) {
-  const Rig rig = scaled_rig(1280, 1);
+  const Rig rig = scaled_rig({1280, 720}, 1);
   TheatreConfig config;
   config.arm.joint_offset.setZero();
   config.endoscope.render_threads = static_cast<int>(state.range(0));

@@ -1,7 +1,7 @@
 #include <benchmark/benchmark.h>
-#include <opencv2/imgproc.hpp>
 
 #include "bench/frames.h"
+#include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::bench {
@@ -13,61 +13,72 @@ int found_in(const std::vector<Observation>& observations) {
   return found;
 }
 
-void measure(benchmark::State& state, bool single) {
-  const Rig rig = scaled_rig(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
-  const auto frames = moving_frames(rig, 16);
+void measure(benchmark::State& state, const Rig& rig, bool single) {
+  const auto& frames = moving_frames(rig);
   Tracker tracker(rig, {.method = Method::surface, .single = single});
   tracker.track(frames[0]);
   std::size_t index = 0;
-  int found = 0, frames_seen = 0;
-  for (auto _ : state) {
-    // Back and forth: no jump for the tracker.
-    const std::size_t place = index % 30;
-    found += found_in(tracker.track(frames[place < 16 ? place : 30 - place]));
-    ++index, ++frames_seen;
-  }
-  state.counters["found"] = static_cast<double>(found) / (frames_seen * static_cast<double>(rig.instruments.size()));
+  int found = 0;
+  for (auto _ : state) found += found_in(tracker.track(moving_frame(frames, index++)));
+  state.counters["found"] = static_cast<double>(found) / static_cast<double>(index * rig.instruments.size());
+}
+
+Rig rig_of(const benchmark::State& state) {
+  return scaled_rig(size_argument(state), static_cast<int>(state.range(2)));
 }
 
 }  // namespace
 
-// Arguments: image width, instruments.
 void cold(benchmark::State& state) {
-  measure(state, true);
+  measure(state, rig_of(state), true);
 }
+BENCHMARK(cold)->Apply(every_size_and_number);
+
 void tracked(benchmark::State& state) {
-  measure(state, false);
+  measure(state, rig_of(state), false);
 }
-BENCHMARK(cold)->ArgsProduct({{640, 1280, 1920, 3840}, {1, 2, 3}})->Unit(benchmark::kMillisecond);
-BENCHMARK(tracked)->ArgsProduct({{640, 1280, 1920, 3840}, {1, 2, 3}})->Unit(benchmark::kMillisecond);
+BENCHMARK(tracked)->Apply(every_size_and_number);
+
+void cold_fixed_marker(benchmark::State& state) {
+  measure(state, fixed_marker_rig(size_argument(state)), true);
+}
+BENCHMARK(cold_fixed_marker)->Apply(every_size);
+
+void tracked_fixed_marker(benchmark::State& state) {
+  measure(state, fixed_marker_rig(size_argument(state)), false);
+}
+BENCHMARK(tracked_fixed_marker)->Apply(every_size);
 
 void search_without_marker(benchmark::State& state) {
-  const Rig rig = scaled_rig(static_cast<int>(state.range(0)), 1);
-  const cv::Mat frame = empty_frame(rig);
+  const Rig rig = scaled_rig(size_argument(state), 1);
+  const cv::Mat& frame = empty_frame(rig);
   Tracker tracker(rig);
-  for (auto _ : state) benchmark::DoNotOptimize(tracker.track(frame));
+  int found = 0;
+  for (auto _ : state) found += found_in(tracker.track(frame));
+  state.counters["found"] = found;
 }
-BENCHMARK(search_without_marker)->Arg(1280)->Arg(1920)->Unit(benchmark::kMillisecond);
+BENCHMARK(search_without_marker)->Apply(every_size);
 
-void copy_frame(benchmark::State& state) {
-  const cv::Mat frame = empty_frame(scaled_rig(static_cast<int>(state.range(0)), 1));
-  cv::Mat copy(frame.size(), frame.type());
-  for (auto _ : state) {
-    frame.copyTo(copy);
-    benchmark::DoNotOptimize(copy.data);
-  }
+// The fit to all generatrices alone, from a start some pixels off.
+void fit(benchmark::State& state) {
+  const Rig rig = scaled_rig(size_argument(state), 1);
+  const Instrument& instrument = rig.instruments[0];
+  const ImageView image(moving_frames(rig)[0]);
+  const auto table = rig.camera.response.table();
+  const LightImage light(image, table);
+  const ColorClasses classes(rig.instruments);
+  const Scene scene{image,
+                    rig.camera,
+                    classes,
+                    instrument.marker,
+                    {classes.of_band(0, 0), classes.of_band(0, 1), classes.of_band(0, 2)}};
+  RcmCoordinates q = configurations(rig, 0)[0];
+  q.theta_rad += 1e-3, q.phi_rad -= 1e-3, q.rho_m += 2e-4, q.psi_rad += 0.01;
+  const PoseUnknowns start = PoseUnknowns::rcm(*instrument.camera_from_rcm, q);
+  bool converged = true;
+  for (auto _ : state) converged &= fit_finely(scene, light, start, {}).converged;
+  state.counters["found"] = converged;
 }
-BENCHMARK(copy_frame)->Arg(640)->Arg(1280)->Arg(1920)->Arg(3840)->Unit(benchmark::kMillisecond);
-
-void hsv_of_frame(benchmark::State& state) {
-  cv::setNumThreads(1);
-  const cv::Mat frame = empty_frame(scaled_rig(static_cast<int>(state.range(0)), 1));
-  cv::Mat hsv;
-  for (auto _ : state) {
-    cv::cvtColor(frame, hsv, cv::COLOR_BGR2HSV);
-    benchmark::DoNotOptimize(hsv.data);
-  }
-}
-BENCHMARK(hsv_of_frame)->Arg(1280)->Arg(1920)->Unit(benchmark::kMillisecond);
+BENCHMARK(fit)->Apply(every_size);
 
 }  // namespace lapservo::bench

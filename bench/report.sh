@@ -1,0 +1,115 @@
+#!/usr/bin/env bash
+# report.sh BENCH.json: writes the medians of a run of lapservo_bench into docs/performance.md (between its marks) and
+# draws docs/performance.svg. Needs jq and gnuplot. CPU times of one run, so that ratios mean something.
+set -euo pipefail
+json=$1
+page=$(dirname "$0")/../docs/performance.md figure=$(dirname "$0")/../docs/performance.svg
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+# name, width, height, instruments, milliseconds, share found: one line a benchmark.
+jq -r '
+  def ms: .cpu_time * {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}[.time_unit];
+  def argument(key): (.run_name | capture("/" + key + ":(?<v>[0-9]+)") // {v: "-"}).v;
+  .benchmarks[] | select(.aggregate_name == "median")
+  | [(.run_name | sub("/width:.*"; "")), argument("width"), argument("height"), argument("instruments"), ms, (.found // "-")]
+  | @tsv' "$json" > "$scratch/medians"
+[ -s "$scratch/medians" ] || { echo "report.sh: $json holds no medians; run with --benchmark_repetitions" >&2; exit 2; }
+
+awk -F'\t' '
+  function cell(name, width, instruments) { return (name, width, instruments) in ms ? ms[name, width, instruments] : "" }
+  function shown(x) { return x == "" ? "" : sprintf(x < 0.1 ? "%.3f" : x < 10 ? "%.2f" : "%.0f", x) }
+  function row(title, name, instruments,   i, line) {
+    line = "| " title " |"
+    for (i = 1; i <= sizes; ++i) line = line " " shown(cell(name, width[i], instruments)) " |"
+    print line
+  }
+  function required(title, value, bound, unit, least) {
+    if (value == "") return
+    printf "| %s | %s%s | %s %s%s | %s |\n", title, shown(value), unit, least ? ">=" : "<=", bound, unit,
+           (least ? value >= bound : value <= bound) ? "yes" : "**no**"
+  }
+  { ms[$1, $2, $4] = $5; if ($2 != "-" && !($2 in seen)) { seen[$2] = $3; width[++sizes] = $2 } }
+  END {
+    for (i = 1; i <= sizes; ++i)
+      for (j = i + 1; j <= sizes; ++j)
+        if (width[j] + 0 < width[i] + 0) { w = width[i]; width[i] = width[j]; width[j] = w }
+    copy = cell("copy_frame", 1920, "-"); one = cell("cold", 1920, 1)
+    print "| At 1920x1080, one instrument | Measured | Required | Met |\n| --- | --- | --- | --- |"
+    if (copy != "") {
+      required("Cold detection and fit / memcpy of the frame", one / copy, 2, "")
+      required("Search of a frame without a marker / memcpy", cell("search_without_marker", 1920, "-") / copy, 1, "")
+      required("Tracked frame / memcpy", cell("tracked", 1920, 1) / copy, 0.5, "")
+    }
+    first = width[1]; last = width[sizes]
+    pixels = (last * seen[last]) / (first * seen[first])
+    if (cell("cold_fixed_marker", last, "-") != "" && pixels > 1) {
+      required("Cold, fixed marker, widest / narrowest image (pixels: " shown(pixels) ")",
+               cell("cold_fixed_marker", last, "-") / cell("cold_fixed_marker", first, "-"), pixels, "")
+      required("Tracked, fixed marker, widest / narrowest image",
+               cell("tracked_fixed_marker", last, "-") / cell("tracked_fixed_marker", first, "-"), 1.1, "")
+    }
+    if (cell("apriltag/decimate_2", 1920, "-") != "" && one != "")
+      required("AprilTag (decimate 2) / cold", cell("apriltag/decimate_2", 1920, "-") / one, 30, "", 1)
+    control = cell("BM_ControlStep/default_estimated_delay", "-", "-")
+    if (control != "") required("Control step", 1000 * control, 20, " us")
+
+    printf "\n| Milliseconds |"
+    for (i = 1; i <= sizes; ++i) printf " %sx%s |", width[i], seen[width[i]]
+    printf "\n| --- |"
+    for (i = 1; i <= sizes; ++i) printf " ---: |"
+    print ""
+    for (n = 1; n <= 3; ++n) row("Cold detection and fit, " n, "cold", n)
+    for (n = 1; n <= 3; ++n) row("Tracked frame, " n, "tracked", n)
+    row("Cold, marker of fixed size in pixels", "cold_fixed_marker", "-")
+    row("Tracked, marker of fixed size in pixels", "tracked_fixed_marker", "-")
+    row("Search without a marker", "search_without_marker", "-")
+    row("Fit alone", "fit", "-")
+    for (n = 1; n <= 3; ++n) row("Renderer, " n, "render", n)
+    row("memcpy of the frame", "copy_frame", "-")
+    row("BGR to HSV (OpenCV)", "hsv_of_frame", "-")
+    row("HSV, three ranges, opening, components (OpenCV)", "textbook", "-")
+    row("aruco (OpenCV)", "aruco", "-")
+    row("AprilTag, decimate 2", "apriltag/decimate_2", "-")
+    row("AprilTag, decimate 1", "apriltag/decimate_1", "-")
+  }' "$scratch/medians" > "$scratch/table"
+
+jq -r '.context | "Measured \(.date | .[0:10]) on \(.num_cpus) x \(.mhz_per_cpu) MHz, load \(.load_avg[0] // "unknown"); medians of CPU time."' \
+  "$json" > "$scratch/when"
+awk -v table="$scratch/table" -v when="$scratch/when" '
+  function insert(file,   line) { while ((getline line < file) > 0) print line; close(file) }
+  /^<!-- measured -->$/ { print; insert(when); print ""; insert(table); skipping = 1 }
+  /^<!-- \/measured -->$/ { skipping = 0 }
+  !skipping' "$page" > "$scratch/page"
+cp "$scratch/page" "$page"
+
+series() { awk -F'\t' -v name="$1" -v n="$2" '$1 == name && $4 == n {print $2 * $3 / 1e6, $5}' "$scratch/medians" | sort -g; }
+plot=()
+while IFS='|' read -r name instruments title style; do
+  series "$name" "$instruments" > "$scratch/${name//\//_}"
+  [ -s "$scratch/${name//\//_}" ] && plot+=("'$scratch/${name//\//_}' using 1:2 with linespoints $style title '$title'")
+done <<'SERIES'
+apriltag/decimate_1|-|AprilTag, decimate 1|lc rgb '#c44e52' pt 5 dt 2
+apriltag/decimate_2|-|AprilTag, decimate 2|lc rgb '#c44e52' pt 5
+textbook|-|HSV, ranges, opening, components|lc rgb '#dd8452' pt 9
+aruco|-|aruco|lc rgb '#937860' pt 11
+hsv_of_frame|-|BGR to HSV|lc rgb '#8c8c8c' pt 13
+copy_frame|-|memcpy of the frame|lc rgb '#000000' pt 1
+cold|1|lapservo, cold|lc rgb '#4c72b0' pt 7 lw 2
+tracked|1|lapservo, tracked|lc rgb '#55a868' pt 7 lw 2
+search_without_marker|-|lapservo, no marker in view|lc rgb '#64b5cd' pt 6
+SERIES
+joined=$(printf ', %s' "${plot[@]}")
+gnuplot <<GNUPLOT
+set terminal svg size 760,520 dynamic background rgb 'white' font 'sans-serif,13'
+set output '$scratch/figure.svg'
+set logscale xy
+set xlabel 'Image, megapixels'
+set ylabel 'CPU time a frame, ms'
+set xrange [0.27:9.5]
+set xtics ('640x480' 0.3072, '1280x720' 0.9216, '1920x1080' 2.0736, '3840x2160' 8.2944)
+set grid ytics lc rgb '#dddddd'
+set key outside right top Left reverse
+plot ${joined:2}
+GNUPLOT
+cp "$scratch/figure.svg" "$figure"
