@@ -1,6 +1,5 @@
 #include "lapservo/geometry/camera.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include <Eigen/LU>
@@ -32,7 +31,8 @@ Distorted distort(const std::array<double, 5>& k, const Eigen::Vector2d& x) {
 }  // namespace
 
 bool Camera::distorted() const {
-  return std::any_of(distortion.begin(), distortion.end(), [](double k) { return k != 0; });
+  const auto& k = distortion;  // asked for every sample: no branches
+  return (k[0] != 0) | (k[1] != 0) | (k[2] != 0) | (k[3] != 0) | (k[4] != 0);
 }
 
 bool Camera::contains(const Eigen::Vector2d& raw_px, double margin_px) const {
