@@ -23,8 +23,9 @@ Eigen::Vector4d cross_gaps(const JointLimits& limits, const MotionState& motion,
   for (int i = 0; i < 4; ++i) {
     const double side = feed_forward[i] > 0 ? 1 : -1;
     if (side * feed_forward[i] * slow_s <= gap.width[i] || side * wanted[i] <= 0) continue;
-    // From the setpoint, ahead of the readings by the arm's lag, to where the motor presses again.
-    const double left = gap.width[i] / 2 + side * (gap.shift[i] - (motion.position[i] - q_joint[i]));
+    // To where the motor presses again: from the setpoint, which leads the motor; nothing if the motor presses already.
+    const double from_motor = gap.width[i] / 2 + side * gap.shift[i];
+    const double left = from_motor - std::max(0.0, side * (motion.position[i] - q_joint[i]));
     if (!(left > 0)) continue;
     const double fastest = std::min(limits.rate[i], side * motion.velocity[i] + limits.acceleration[i] * period_s);
     const double crossing = std::min(side * wanted[i] + crossing_speed(left, limits.acceleration[i]), fastest);

@@ -56,7 +56,11 @@ TEST(CrossGaps, LeavesAloneWhatHasNoDirection) {
     for (int i = 0; i < 4; ++i) noise[i] = 0.01 * random.normal();
     const MotionState rest{q, Eigen::Vector4d::Zero()};
     EXPECT_EQ(cross_gaps(limits, rest, gap, q, Eigen::Vector4d::Zero(), noise, period_s), noise) << "a set-point";
-    EXPECT_EQ(cross_gaps(limits, rest, GapState{}, q, noise, noise, period_s), noise) << "no gap";
+    const MotionState elsewhere{q - noise, Eigen::Vector4d::Zero()};
+    EXPECT_EQ(cross_gaps(limits, elsewhere, GapState{}, q, noise, noise, period_s), noise) << "no gap";
+    GapState pressed = gap;
+    for (int i = 0; i < 4; ++i) pressed.shift[i] = noise[i] > 0 ? -gap.width[i] / 2 : gap.width[i] / 2;
+    EXPECT_EQ(cross_gaps(limits, elsewhere, pressed, q, noise, noise, period_s), noise) << "crossed";
     EXPECT_EQ(cross_gaps(limits, rest, gap, q, -noise, noise, period_s), noise) << "an error that goes against it";
   }
 }
