@@ -106,16 +106,19 @@ TEST(BacklashEstimator, IsNotFooledByAWrongDelayOrModel) {
 }
 
 TEST(BacklashEstimator, KeepsWhatItKnowsThroughAnInterruption) {
-  BacklashEstimator estimator = World{}.watched(20, 1);
-  const double before = estimator.estimate(3)->width;
+  const World world;
+  BacklashEstimator estimator = world.watched(20, 1);
+  const BacklashEstimate before = estimator.estimate(3).value();
   estimator.interrupt();
-  Eigen::Vector4d q(0, 0, 0.05, 3);
-  for (int k = 0; k < 600; ++k) {
+  for (double t = 20; t < 25; t += period_s) {
+    const Eigen::Vector4d q = world.readings(t);
     estimator.follow(q);
-    estimator.add(30 + k * period_s, Eigen::Vector4d::Zero(), q + Eigen::Vector4d(1, 1, 0.01, 1),
-                  1e-6 * Eigen::Matrix4d::Identity());
+    estimator.add(t, Eigen::Vector4d::Zero(), q + Eigen::Vector4d(0.3, 0.3, 0.01, 0.3),
+                  world.noise.cwiseAbs2().asDiagonal());
   }
-  EXPECT_NEAR(estimator.estimate(3)->width, before, 1e-3);
+  const BacklashEstimate after = estimator.estimate(3).value();
+  EXPECT_NEAR(after.width, before.width, 1e-3);
+  EXPECT_LT(after.sigma, 1.5 * before.sigma);
 }
 
 }  // namespace

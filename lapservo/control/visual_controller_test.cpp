@@ -288,6 +288,24 @@ TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
   }
 }
 
+TEST(VisualController, RestsAtASetPointWithBacklashLearnt) {
+  Flaws flaws = usual_flaws();
+  flaws.backlash = {0, 0, 0.0001, 0.02};
+  const ControllerConfig config = testing::test_config(flaws);
+  const TestRig rig;
+  Random random(3);
+  VisualController controller(config, testing::model_of(rig));
+  Theatre theatre(rig, flaws, testing::random_start(rig, config, flaws, random), 3);
+  theatre.run(controller, sinusoids(testing::paper_sinusoids()), 30);
+  const auto still = theatre.run(controller, set_point(testing::paper_sinusoids().offset), 30);
+  EXPECT_GT(still.back().step.estimate->gap.width[3], 0.015);
+  EXPECT_LT(rms_after(still, 40).tail<3>().maxCoeff(), 0.1);
+  // Motors don't go to and fro through their gaps: in 20 s psi travels less than a few widths.
+  double travel = 0;
+  for (std::size_t k = 600; k < still.size(); ++k) travel += std::abs(still[k].step.velocity[3]) * config.period_s;
+  EXPECT_LT(travel, 10 * flaws.backlash[3]);
+}
+
 /// The widest gap ever believed in, in shares of what is there: rho's and psi's.
 Eigen::Vector2d widest_gap(const std::vector<Moment>& moments, const Eigen::Vector2d& unit) {
   Eigen::Vector2d widest = Eigen::Vector2d::Zero();
