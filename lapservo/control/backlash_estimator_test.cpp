@@ -81,7 +81,9 @@ TEST(BacklashEstimator, IsSureOfNothingWithoutReversals) {
   const BacklashEstimator estimator = world.watched(20, 3);
   for (const int i : {2, 3}) {
     const auto found = estimator.estimate(i);
-    if (found) EXPECT_GT(found->sigma, BacklashEstimatorConfig{}.largest[i]);
+    if (found) {
+      EXPECT_GT(found->sigma, BacklashEstimatorConfig{}.largest[i]);
+    }
   }
 }
 
