@@ -101,15 +101,15 @@ search_without_marker|-|lapservo, no marker in view|lc rgb '#64b5cd' pt 6
 SERIES
 joined=$(printf ', %s' "${plot[@]}")
 gnuplot <<GNUPLOT
-set terminal svg size 760,520 dynamic background rgb 'white' font 'sans-serif,13'
+set terminal svg size 760,560 dynamic background rgb 'white' font 'sans-serif,13'
 set output '$scratch/figure.svg'
 set logscale xy
-set xlabel 'Image, megapixels'
+set xlabel 'Image (scaled by its pixels)'
 set ylabel 'CPU time a frame, ms'
 set xrange [0.27:9.5]
 set xtics ('640x480' 0.3072, '1280x720' 0.9216, '1920x1080' 2.0736, '3840x2160' 8.2944)
 set grid ytics lc rgb '#dddddd'
-set key outside right top Left reverse
+set key below center maxrows 3 Left reverse
 plot ${joined:2}
 GNUPLOT
 cp "$scratch/figure.svg" "$figure"
