@@ -5,17 +5,20 @@
 namespace lapservo {
 namespace {
 
-TEST(InplaceVector, holds_what_was_pushed_in_order) {
+TEST(InplaceVector, HoldsWhatWasPushedInOrder) {
   InplaceVector<int, 5> values;
   EXPECT_TRUE(values.empty());
   for (int i = 0; i < 5; ++i) values.push_back(10 * i);
   ASSERT_EQ(values.size(), 5U);
   int expected = 0;
-  for (const int value : values) EXPECT_EQ(value, expected), expected += 10;
+  for (const int value : values) {
+    EXPECT_EQ(value, expected);
+    expected += 10;
+  }
   EXPECT_EQ(values[3], 30);
 }
 
-TEST(InplaceVector, throws_when_full_and_keeps_its_elements) {
+TEST(InplaceVector, ThrowsWhenFullAndKeepsItsElements) {
   InplaceVector<int, 2> values;
   values.push_back(1), values.push_back(2);
   EXPECT_THROW(values.push_back(3), std::length_error);
@@ -23,7 +26,7 @@ TEST(InplaceVector, throws_when_full_and_keeps_its_elements) {
   EXPECT_EQ(values[1], 2);
 }
 
-TEST(InplaceVector, copies_share_nothing) {
+TEST(InplaceVector, CopiesShareNothing) {
   InplaceVector<int, 4> values;
   values.push_back(1), values.push_back(2);
   InplaceVector<int, 4> copy = values;
