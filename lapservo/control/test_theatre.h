@@ -153,8 +153,11 @@ inline Eigen::Vector4d random_start(const TestRig& rig, const ControllerConfig& 
                                     Random& random, double margin_px = 30) {
   const ImageWindow& w = config.window.value();
   while (true) {
-    const Eigen::Vector4d q(random.uniform(-0.25, 0.35), random.uniform(1.35, 1.8), random.uniform(0.05, 0.085),
-                            random.uniform(-3, 3));
+    Eigen::Vector4d q;  // a statement each: arguments have no order
+    q[3] = random.uniform(-3, 3);
+    q[2] = random.uniform(0.05, 0.085);
+    q[1] = random.uniform(1.35, 1.8);
+    q[0] = random.uniform(-0.25, 0.35);
     const auto state = exact_map(rig, q + flaws.offset);
     if (!state || state->features[2] < 80) continue;
     const Eigen::Vector4d& e = state->ends_px;

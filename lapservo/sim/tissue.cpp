@@ -37,10 +37,15 @@ void add_highlights(cv::Mat& light, Random& random) {
     const double u = random.uniform(0.15, 0.85) * light.cols, v = random.uniform(0.1, 0.9) * light.rows;
     const int count = static_cast<int>(random.uniform(5, 40));
     for (int i = 0; i < count; ++i) {
-      const cv::Point at(static_cast<int>(u + random.normal() * light.cols / 40),
-                         static_cast<int>(v + random.normal() * light.rows / 30));
-      const cv::Size size(static_cast<int>(random.uniform(1, 7)), static_cast<int>(random.uniform(1, 4)));
-      cv::ellipse(glints, at, size, random.uniform(0, 180), 0, 360, cv::Scalar(random.uniform(0.4, 1.2)), cv::FILLED);
+      // One number a statement: the order of arguments is the compiler's.
+      const double y = v + random.normal() * light.rows / 30;
+      const double x = u + random.normal() * light.cols / 40;
+      const int width = static_cast<int>(random.uniform(1, 4));
+      const int length = static_cast<int>(random.uniform(1, 7));
+      const double brightness = random.uniform(0.4, 1.2);
+      const double angle_deg = random.uniform(0, 180);
+      cv::ellipse(glints, {static_cast<int>(x), static_cast<int>(y)}, {length, width}, angle_deg, 0, 360,
+                  cv::Scalar(brightness), cv::FILLED);
     }
   }
   cv::GaussianBlur(glints, glints, {0, 0}, 0.8);

@@ -93,7 +93,8 @@ double climb(const Scene& scene, ImageTerms& terms, Eigen::Vector4d steps, Rando
       moved = false;
       for (int i = 0; i < directions; ++i) {
         Eigen::Vector4d direction = Eigen::Vector4d::Unit(i % 4);
-        if (i >= 4) direction = Eigen::Vector4d(random.normal(), random.normal(), random.normal(), random.normal());
+        if (i >= 4)
+          for (double& part : direction) part = random.normal();
         for (const double sign : {1.0, -1.0}) {
           const Eigen::Vector4d trial = terms.values + sign * steps.cwiseProduct(direction);
           const double score = score_at(trial);

@@ -188,12 +188,12 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
       }
       found = detect(scene, light, *blobs, camera_from_rcm);
       if (!found.fit && camera_from_rcm)
-        if (Found occluded = detect_occluded(scene, light, *blobs, *camera_from_rcm); occluded.fit)
-          found = std::move(occluded);
-      if (!found.fit && camera_from_rcm)
         if (Found free = detect(scene, light, *blobs, std::nullopt);
             free.fit && free.fit->located_share() > share_against_registration)
           found = std::move(free);
+      if (!found.fit && camera_from_rcm)
+        if (Found occluded = detect_occluded(scene, light, *blobs, *camera_from_rcm); occluded.fit)
+          found = std::move(occluded);
     }
     observations_[i] = {};
     observations_[i].status = found.status;

@@ -56,7 +56,8 @@ Rig usual_rig(std::size_t instruments) {
 RcmCoordinates random_configuration(const Rig& rig, std::size_t i, Random& random) {
   const Instrument& instrument = rig.instruments[i];
   for (int attempt = 0; attempt < 50000; ++attempt) {
-    const Eigen::Vector2d pixel(random.uniform(0, rig.camera.width_px), random.uniform(0, rig.camera.height_px));
+    const double v_px = random.uniform(0, rig.camera.height_px);  // a statement each: arguments have no order
+    const Eigen::Vector2d pixel(random.uniform(0, rig.camera.width_px), v_px);
     auto q = configuration_through(*instrument.camera_from_rcm,
                                    rig.camera.ray_from_ideal(pixel) * random.uniform(0.075, 0.115));
     if (!q || !wholly_in_view(rig, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(*q))) continue;

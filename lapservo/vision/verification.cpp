@@ -14,6 +14,17 @@ namespace {
 constexpr double largest_sigma_psi_rad = 0.02;  // five sigma: a tenth of a radian
 constexpr double least_matching = 0.3, most_wrong = 0.05, most_beyond = 0.5, most_beside = 0.2;
 constexpr double least_in_image = 0.25;
+constexpr double blurred_px = 1.5;  // colours mix so far on both sides of a boundary
+
+// Of the marker; at least a pixel.
+double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
+  const auto px = [&](double along_m) {
+    return scene.camera.raw_from_point(pose.camera_from_unrolled *
+                                       surface_point(scene.marker.radius_m(), azimuth_rad, along_m));
+  };
+  const double length_px = (px(scene.marker.length_m()) - px(0)).norm();
+  return std::isfinite(length_px) ? std::max(1.0, length_px) : 1.0;
+}
 
 }  // namespace
 
@@ -23,7 +34,9 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
   ColorAgreement agreement;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return agreement;
-  const double length_m = scene.marker.length_m(), guard_m = 0.02 * length_m, ring_m = 0.1 * length_m;
+  const double length_m = scene.marker.length_m(), ring_m = 0.1 * length_m;
+  const double guard_m =
+      length_m * std::max(0.02, blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
   int total = 0, inside = 0, matching = 0, wrong = 0, outer = 0, beyond = 0, flank = 0, beside = 0;
   std::array<int, 2> ring{}, spilled{};
   const auto class_of = [&](double radius_m, double azimuth_rad, double along_m) {
