@@ -32,20 +32,54 @@ std::uint32_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
          std::uint32_t{bytes[at + 3]};
 }
 
-// Decoders return half a picture for half a file: ask for the end themselves.
+struct PictureSize {
+  std::uint32_t width_px = 0, height_px = 0;
+};
+
+PictureSize png_size(std::span<const std::uint8_t> bytes) {
+  return {big_endian(bytes, 16), big_endian(bytes, 20)};
+}
+
+// Of the first frame header (SOF); zero without one. Steps over garbage between segments as decoders do.
+PictureSize jpeg_size(std::span<const std::uint8_t> bytes) {
+  const auto two_at = [&](std::size_t at) { return std::uint32_t{bytes[at]} << 8 | std::uint32_t{bytes[at + 1]}; };
+  std::size_t at = 2;
+  while (at + 9 <= bytes.size()) {
+    const std::uint8_t marker = bytes[at + 1];
+    const bool stands_alone = marker == 0x01 || (marker >= 0xd0 && marker <= 0xd8);
+    if (bytes[at] != 0xff || marker == 0 || marker == 0xff) {
+      ++at;
+    } else if (stands_alone) {
+      at += 2;
+    } else if (marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc) {
+      return {two_at(at + 7), two_at(at + 5)};
+    } else {
+      at += 2 + std::max<std::size_t>(two_at(at + 2), 2);
+    }
+  }
+  return {};
+}
+
+void check_size(const PictureSize& size, const std::string& source) {
+  if (size.width_px > largest_side_px || size.height_px > largest_side_px)
+    throw InputError(source, "size", std::to_string(size.width_px) + "x" + std::to_string(size.height_px),
+                     "at most 16384 pixels a side");
+}
+
+// Decoders return half a picture for half a file, and fill gigabytes for a few bytes: ask for end and size beforehand.
 void check_whole(std::span<const std::uint8_t> bytes, const std::string& source) {
   using namespace std::string_view_literals;
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (starts_with(bytes, "\x89PNG\r\n\x1a\n"sv)) {
     if (bytes.size() < 33 || text.rfind("IEND"sv) == std::string_view::npos)
       throw InputError(source, "is a truncated PNG, expected a whole picture");
-    if (big_endian(bytes, 16) > largest_side_px || big_endian(bytes, 20) > largest_side_px)
-      throw InputError(source, "size",
-                       std::to_string(big_endian(bytes, 16)) + "x" + std::to_string(big_endian(bytes, 20)),
-                       "at most 16384 pixels a side");
+    check_size(png_size(bytes), source);
   }
-  if (starts_with(bytes, "\xff\xd8"sv) && text.rfind("\xff\xd9"sv) == std::string_view::npos)
-    throw InputError(source, "is a truncated JPEG, expected a whole picture");
+  if (starts_with(bytes, "\xff\xd8"sv)) {
+    if (text.rfind("\xff\xd9"sv) == std::string_view::npos)
+      throw InputError(source, "is a truncated JPEG, expected a whole picture");
+    check_size(jpeg_size(bytes), source);
+  }
 }
 
 }  // namespace

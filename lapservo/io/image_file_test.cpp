@@ -136,6 +136,20 @@ TEST(Image, IsRefusedWhenItClaimsToBeEnormous) {
   Bytes png = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(7)), ".png");
   png[17] = 1;  // the width's second byte: 65540
   EXPECT_EQ(refusal(png), "p: size: is 65540x4, expected at most 16384 pixels a side");
+
+  // An application segment whose contents look like a frame header, and garbage behind it, hide nothing.
+  Bytes jpeg = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(7)), ".jpg");
+  const Bytes application{0xff, 0xe5, 0, 11, 0xff, 0xc0, 0, 8, 8, 255, 255, 255, 255, 0x12, 0x34};
+  jpeg.insert(jpeg.begin() + 2, application.begin(), application.end());
+  EXPECT_EQ(refusal(jpeg), "");
+  for (const std::uint8_t frame : {0xc0, 0xc1, 0xc2}) {
+    Bytes huge = jpeg;
+    const Bytes baseline{0xff, 0xc0, 0, 17};
+    const auto at = std::search(huge.begin(), huge.end(), baseline.begin(), baseline.end());
+    ASSERT_NE(at, huge.end());
+    at[1] = frame, at[7] = 0xff, at[8] = 0xf0;
+    EXPECT_EQ(refusal(huge), "p: size: is 65520x4, expected at most 16384 pixels a side");
+  }
 }
 
 TEST(Image, TheFileThatCanNotBeReadIsNamed) {
