@@ -1,5 +1,6 @@
 #include <benchmark/benchmark.h>
 
+#include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/test_theatre.h"
 
 namespace lapservo {
@@ -14,7 +15,7 @@ void BM_ControlStep(benchmark::State& state, ControlMode mode, bool delay_known)
   const testing::TestRig rig;
   VisualController controller(config, testing::model_of(rig));
   testing::Theatre theatre(rig, flaws, {0.05, 1.57, 0.064, 1}, 1);
-  const Trajectory trajectory = sinusoids(testing::paper_sinusoids());
+  const Trajectory trajectory = sinusoids(paper_sinusoids());
   theatre.run(controller, trajectory, 10);
   double time_s = 20;
   const Eigen::Vector4d q = controller.path().end().position;

@@ -108,9 +108,7 @@ int run_design(const DesignOptions& options) {
       in_linear_family(marker) ? ", and linear: eq. (18) is exact" : " (not linear: decoded by the rational inverse)");
   std::fputs(yaml_of(marker).c_str(), stdout);
   if (!options.out.empty()) {
-    AtomicFile file(options.out);
-    file.stream() << yaml_of(marker);
-    file.commit();
+    write_file(options.out, yaml_of(marker));
     std::printf("\nwritten: %s\n", options.out.c_str());
   }
   return 0;

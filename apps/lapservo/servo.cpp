@@ -1,6 +1,5 @@
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -10,13 +9,14 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <opencv2/highgui.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/live_view.h"
 #include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
+#include "lapservo/control/paper_trajectory.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
@@ -27,7 +27,6 @@
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/paper_trajectory.h"
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/servo/servo_run.h"
 #include "lapservo/servo/theatre_site.h"
@@ -137,19 +136,14 @@ class RunFolder {
     constexpr std::uintmax_t bytes_a_period = 2000;
     prepare_output_folder(path_,
                           bytes_a_period * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20));
-    write("rig.yaml", text_of(options.rig));
-    write("controller.yaml", controller_yaml(run.controller));
+    write_file(path_ / "rig.yaml", text_of(options.rig));
+    write_file(path_ / "controller.yaml", controller_yaml(run.controller));
     log_.emplace(path_ / "log.csv");
   }
   ServoLog& log() { return *log_; }
   fs::path path() const { return path_; }
 
  private:
-  void write(const char* name, const std::string& text) const {
-    AtomicFile file(path_ / name);
-    file.stream() << text;
-    file.commit();
-  }
   fs::path path_;
   std::optional<ServoLog> log_;
 };
@@ -185,21 +179,20 @@ class Summary {
   Convergence convergence_;
 };
 
-bool show(const ServoRecord& record, const Rig& rig, const cv::Mat& frame, const std::vector<Observation>& seen) {
+bool show(LiveView& view, const ServoRecord& record, const Rig& rig, const cv::Mat& frame,
+          const std::vector<Observation>& seen) {
   if (frame.empty()) return true;
   cv::Mat picture = draw_overlay(frame, rig, seen);
   const std::string label =
       fmt::format("{:.2f} s  {} {}", record.input.time_s, action_word(record.decision.control.action),
                   record.decision.reason == "none" ? "" : record.decision.reason);
   cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
-  cv::imshow("lapservo servo (q to quit)", picture);
-  const int key = cv::waitKey(1) & 0xff;
-  return key != 'q' && key != 27;
+  return view.show(picture);
 }
 
 int simulate(const Options& options) {
-  if (options.view && !std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
-    throw InputError("--view", "needs a display and there is none");
+  std::optional<LiveView> view;
+  if (options.view) view.emplace("servo", "use --out to write a log instead");
   const ServoRunConfig run = run_config_of(options);
   const Trajectory trajectory = trajectory_of(options);
   TheatreConfig theatre;
@@ -222,7 +215,7 @@ int simulate(const Options& options) {
                 summary.add(record);
                 if (folder) folder->log().add(record);
                 progress.show(++done, fmt::format(" ({})", action_word(record.decision.control.action)));
-                return !interrupted() && (!options.view || show(record, run.rig, frame, seen));
+                return !interrupted() && (!view || show(*view, record, run.rig, frame, seen));
               });
   }
   std::printf("%s\n", summary.text().c_str());

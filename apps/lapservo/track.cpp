@@ -8,9 +8,9 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <opencv2/highgui.hpp>
 
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/live_view.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
@@ -75,23 +75,6 @@ class RigByFrame {
   bool warned_ = false;
 };
 
-// Tells whether the user closed the window or pressed q or Esc.
-class View {
- public:
-  View() {
-    if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY"))
-      throw InputError("--view", "needs a display and there is none: use --overlay to write pictures instead");
-  }
-  bool show(const cv::Mat& picture) {
-    cv::imshow(title, picture);
-    const int key = cv::waitKey(1) & 0xff;
-    return key != 'q' && key != 27;
-  }
-
- private:
-  static constexpr auto title = "lapservo track (q to quit)";
-};
-
 struct Tally {
   int frames = 0;
   std::map<std::string, int> found;
@@ -129,8 +112,8 @@ int run(const Options& options) {
   check_output(options);
   RigByFrame rigs(options);
   const auto source = open_frame_source(options.input, options.fps);
-  std::optional<View> view;
-  if (options.view) view.emplace();
+  std::optional<LiveView> view;
+  if (options.view) view.emplace("track", "use --overlay to write pictures instead");
   ObservationCsv csv(options.out);
   const auto overlay = options.overlay.empty() ? nullptr : open_overlay_writer(options.overlay, *source);
   watch_for_interrupts();

@@ -1,6 +1,5 @@
 #include <cmath>
 #include <cstdio>
-
 #include <lapservo/io/image_file.h>
 #include <lapservo/vision/tracker.h>
 

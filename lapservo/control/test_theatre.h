@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "lapservo/control/newton_inverse.h"
+#include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/visual_controller.h"
 #include "lapservo/core/random.h"
 #include "lapservo/kinematics/feature_map.h"
@@ -131,15 +132,6 @@ class Theatre {
   std::deque<ImageMeasurement> on_the_way_;
   double start_s_ = 0, moved_s_ = 0;
 };
-
-/// The paper's trajectory, V-D, with periods of our own.
-inline Sinusoids paper_sinusoids() {
-  Sinusoids f;
-  f.offset = {0.9, 795, 365, 212};
-  f.amplitude = {0.05, 60, 30, 37};
-  f.period_s = {12, 10, 14, 9};
-  return f;
-}
 
 inline ControllerConfig test_config(const Flaws& flaws) {
   ControllerConfig config;

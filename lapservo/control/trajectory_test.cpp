@@ -114,18 +114,18 @@ class TrajectoryCheck : public ::testing::Test {
 };
 
 TEST_F(TrajectoryCheck, AcceptsThePapersTrajectory) {
-  const auto problem = find_infeasible(sinusoids(testing::paper_sinusoids()), 30, model, config, start);
+  const auto problem = find_infeasible(sinusoids(paper_sinusoids()), 30, model, config, start);
   EXPECT_FALSE(problem) << problem->what << " at " << problem->time_s;
 }
 
 TEST_F(TrajectoryCheck, NamesTimeAndLimit) {
-  auto far = testing::paper_sinusoids();
+  auto far = paper_sinusoids();
   far.amplitude[1] = 600;  // off the image
   const auto outside = find_infeasible(sinusoids(far), 30, model, config, start);
   ASSERT_TRUE(outside);
   EXPECT_GT(outside->time_s, 0);
 
-  auto fast = testing::paper_sinusoids();
+  auto fast = paper_sinusoids();
   fast.period_s[1] = 0.5;
   const auto rate = find_infeasible(sinusoids(fast), 30, model, config, start);
   ASSERT_TRUE(rate);
@@ -133,13 +133,13 @@ TEST_F(TrajectoryCheck, NamesTimeAndLimit) {
 
   ControllerConfig narrow = config;
   narrow.limits.upper[2] = 0.066;
-  const auto joint = find_infeasible(sinusoids(testing::paper_sinusoids()), 30, model, narrow, start);
+  const auto joint = find_infeasible(sinusoids(paper_sinusoids()), 30, model, narrow, start);
   ASSERT_TRUE(joint);
   EXPECT_NE(joint->what.find("limits.upper rho_m 0.066"), std::string::npos) << joint->what;
 
   narrow = config;
   narrow.window = ImageWindow{20, 800, 20, 699};
-  const auto window = find_infeasible(sinusoids(testing::paper_sinusoids()), 30, model, narrow, start);
+  const auto window = find_infeasible(sinusoids(paper_sinusoids()), 30, model, narrow, start);
   ASSERT_TRUE(window);
   EXPECT_NE(window->what.find("field of view"), std::string::npos) << window->what;
 

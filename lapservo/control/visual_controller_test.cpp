@@ -115,7 +115,7 @@ TEST(PaperLaw, ErrorDecaysAtRateK) {
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
       SCOPED_TRACE(seed);
       const auto done =
-          run(config, testing::model_of({}), flaws, set_point(testing::paper_sinusoids().offset), duration_s + 2, seed);
+          run(config, testing::model_of({}), flaws, set_point(paper_sinusoids().offset), duration_s + 2, seed);
       const auto from = static_cast<std::size_t>(1.5 / config.period_s);
       const auto to = from + static_cast<std::size_t>(duration_s / config.period_s) - 1;
       for (int i = 0; i < 4; ++i) {
@@ -140,7 +140,7 @@ TEST(VisualController, TracksThePapersTrajectoryFromRandomStarts) {
   const ControllerConfig config = testing::test_config(flaws);
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
-    const auto done = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 12, seed);
+    const auto done = run(config, testing::model_of({}), flaws, sinusoids(paper_sinusoids()), 12, seed);
     EXPECT_LT(settled_s(done.moments), 5);
     const Eigen::Vector4d rms = rms_after(done.moments, 6), mean = mean_after(done.moments, 6);
     EXPECT_LT(rms[0], 5e-4);
@@ -160,7 +160,7 @@ TEST(VisualController, IsStableAtAnyLatencyKnownOrEstimated) {
       flaws.latency_s = latency_s;
       flaws.delay_known = known;
       const ControllerConfig config = testing::test_config(flaws);
-      const auto done = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 30, 7);
+      const auto done = run(config, testing::model_of({}), flaws, sinusoids(paper_sinusoids()), 30, 7);
       EXPECT_LT(settled_s(done.moments), 5);
       EXPECT_NEAR(done.delay_s, latency_s, 0.5 / 60);
       const Eigen::Vector4d rms = rms_after(done.moments, 10);
@@ -182,7 +182,7 @@ TEST(VisualController, CopesWithDroppedFramesFastStepsAndTheirJitter) {
     flaws.delay_known = known;
     ControllerConfig config = testing::test_config(flaws);
     config.period_s = 1.0 / 240;
-    const auto done = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 15, 5);
+    const auto done = run(config, testing::model_of({}), flaws, sinusoids(paper_sinusoids()), 15, 5);
     EXPECT_LT(settled_s(done.moments), 5);
     EXPECT_LT(rms_after(done.moments, 6).tail<3>().maxCoeff(), 0.3);
     expect_limits_kept(done.moments, config.limits, config.period_s + flaws.jitter_s);
@@ -208,7 +208,7 @@ TEST(VisualController, BrakesByItselfWhenNoStepComes) {
   VisualController controller(config, testing::model_of(rig));
   Random random(3);
   Theatre theatre(rig, flaws, testing::random_start(rig, config, flaws, random), 3);
-  const auto moments = theatre.run(controller, sinusoids(testing::paper_sinusoids()), 1);
+  const auto moments = theatre.run(controller, sinusoids(paper_sinusoids()), 1);
   ASSERT_GT(moments.back().step.velocity.norm(), 0);
   EXPECT_TRUE(controller.path().at(moments.back().time_s + 1).velocity.isZero());
 }
@@ -219,11 +219,11 @@ TEST(VisualController, BacklashLeavesNoBias) {
   for (const bool known : {true, false}) {
     flaws.delay_known = known;
     const ControllerConfig config = testing::test_config(flaws);
-    const auto still = run(config, testing::model_of({}), flaws, set_point(testing::paper_sinusoids().offset), 20, 3);
+    const auto still = run(config, testing::model_of({}), flaws, set_point(paper_sinusoids().offset), 20, 3);
     EXPECT_LT(rms_after(still.moments, 8)[0], 5e-4);
     EXPECT_LT(rms_after(still.moments, 8).tail<3>().maxCoeff(), 0.3);
     EXPECT_LT(mean_after(still.moments, 8).tail<3>().cwiseAbs().maxCoeff(), 0.1);
-    const auto moving = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 65, 3);
+    const auto moving = run(config, testing::model_of({}), flaws, sinusoids(paper_sinusoids()), 65, 3);
     EXPECT_LT(std::abs(mean_after(moving.moments, 5)[0]), 1.7e-4);
     EXPECT_LT(mean_after(moving.moments, 5).tail<3>().cwiseAbs().maxCoeff(), 0.1);
     EXPECT_NEAR(moving.delay_s, flaws.latency_s, 0.5 / 60);
@@ -250,8 +250,8 @@ TEST(VisualController, ConvergesInTheImageWithAWrongModel) {
     flaws.delay_known = seed % 2 == 0;
     const ControllerConfig config = testing::test_config(flaws);
     Random random(1000 + seed);
-    const auto done = run(config, testing::model_of(wrong_rig(random)), flaws,
-                          set_point(testing::paper_sinusoids().offset), 10, seed);
+    const auto done =
+        run(config, testing::model_of(wrong_rig(random)), flaws, set_point(paper_sinusoids().offset), 10, seed);
     EXPECT_LT(settled_s(done.moments), 8);
     expect_all_limits_kept(done, config);
   }
@@ -269,7 +269,7 @@ TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
       const ControllerConfig config = testing::test_config(flaws);
       ControllerConfig unlearnt = config;
       unlearnt.observer.backlash.largest.setZero();
-      const auto trajectory = sinusoids(testing::paper_sinusoids());
+      const auto trajectory = sinusoids(paper_sinusoids());
       const auto done = run(config, testing::model_of({}), flaws, trajectory, 40, 3);
       const auto before = run(unlearnt, testing::model_of({}), flaws, trajectory, 40, 3);
       const Eigen::Vector4d width = done.moments.back().step.estimate->gap.width;
@@ -296,8 +296,8 @@ TEST(VisualController, RestsAtASetPointWithBacklashLearnt) {
   Random random(3);
   VisualController controller(config, testing::model_of(rig));
   Theatre theatre(rig, flaws, testing::random_start(rig, config, flaws, random), 3);
-  theatre.run(controller, sinusoids(testing::paper_sinusoids()), 30);
-  const auto still = theatre.run(controller, set_point(testing::paper_sinusoids().offset), 30);
+  theatre.run(controller, sinusoids(paper_sinusoids()), 30);
+  const auto still = theatre.run(controller, set_point(paper_sinusoids().offset), 30);
   EXPECT_GT(still.back().step.estimate->gap.width[3], 0.015);
   EXPECT_LT(rms_after(still, 40).tail<3>().maxCoeff(), 0.1);
   // Motors don't go to and fro through their gaps: in 20 s psi travels less than a few widths.
@@ -326,7 +326,7 @@ TEST(VisualController, IsNotFooledIntoBacklashByAWrongModel) {
       const ControllerConfig config = testing::test_config(flaws);
       Random random(2000 + seed);
       const TestRig rig = seed <= 5 ? TestRig{} : wrong_rig(random);
-      const auto done = run(config, testing::model_of(rig), flaws, sinusoids(testing::paper_sinusoids()), 30, seed);
+      const auto done = run(config, testing::model_of(rig), flaws, sinusoids(paper_sinusoids()), 30, seed);
       EXPECT_LT(widest_gap(done.moments, usual).maxCoeff(), times + 0.6);
       expect_all_limits_kept(done, config);
     }
@@ -341,8 +341,8 @@ TEST(VisualController, ConvergesInTheImageWithAWrongModelAndBacklash) {
     flaws.delay_known = seed % 2 == 0;
     const ControllerConfig config = testing::test_config(flaws);
     Random random(1000 + seed);
-    const auto done = run(config, testing::model_of(wrong_rig(random)), flaws,
-                          set_point(testing::paper_sinusoids().offset), 12, seed);
+    const auto done =
+        run(config, testing::model_of(wrong_rig(random)), flaws, set_point(paper_sinusoids().offset), 12, seed);
     EXPECT_LT(settled_s(done.moments), 9);
     expect_all_limits_kept(done, config);
   }
@@ -357,7 +357,7 @@ TEST(VisualController, ConvergesUncalibratedFromRandomStarts) {
     flaws.latency_s = 0.02 * static_cast<double>(seed % 10);
     ControllerConfig config = testing::test_config(flaws);
     config.mode = ControlMode::uncalibrated;
-    const auto done = run(config, {}, flaws, set_point(testing::paper_sinusoids().offset), 12, seed);
+    const auto done = run(config, {}, flaws, set_point(paper_sinusoids().offset), 12, seed);
     EXPECT_LT(settled_s(done.moments), 9);
     EXPECT_NEAR(done.delay_s, flaws.latency_s, 0.5 / 60);
     expect_all_limits_kept(done, config);
@@ -368,7 +368,7 @@ TEST(VisualController, TracksUncalibrated) {
   const Flaws flaws = usual_flaws();
   ControllerConfig config = testing::test_config(flaws);
   config.mode = ControlMode::uncalibrated;
-  const auto done = run(config, {}, flaws, sinusoids(testing::paper_sinusoids()), 40, 2);
+  const auto done = run(config, {}, flaws, sinusoids(paper_sinusoids()), 40, 2);
   EXPECT_LT(rms_after(done.moments, 10)[0], 2e-3);
   EXPECT_LT(rms_after(done.moments, 10).tail<3>().maxCoeff(), 1);
   expect_all_limits_kept(done, config);
@@ -388,7 +388,7 @@ TEST_P(Holding, WithinAPeriodWhenTheMarkerIsHiddenAndResumesWithoutAJump) {
   Flaws flaws = usual_flaws();
   flaws.hidden = [](double t) { return t > 8 && t < 10; };
   const ControllerConfig config = config_for(flaws);
-  const auto done = run(config, testing::model_of({}), flaws, sinusoids(testing::paper_sinusoids()), 25, 4);
+  const auto done = run(config, testing::model_of({}), flaws, sinusoids(paper_sinusoids()), 25, 4);
   expect_all_limits_kept(done, config);
   const double period_s = config.period_s;
   for (const Moment& m : done.moments) {
@@ -501,7 +501,7 @@ TEST(VisualController, NothingMakesItLeaveItsLimits) {
       ControllerConfig config = testing::test_config(flaws);
       config.mode = mode;
       config.gains.per_s.setConstant(chance.uniform(0.5, 10));
-      Sinusoids wild = testing::paper_sinusoids();
+      Sinusoids wild = paper_sinusoids();
       wild.amplitude *= 20;
       const auto done = run(config, testing::model_of({}), flaws, sinusoids(wild), 15, seed);
       expect_limits_kept(done.moments, config.limits, config.period_s);

@@ -42,4 +42,10 @@ void AtomicFile::commit() {
   temporary_.clear();
 }
 
+void write_file(const std::filesystem::path& path, const std::string& text) {
+  AtomicFile file(path);
+  file.stream() << text;
+  file.commit();
+}
+
 }  // namespace lapservo

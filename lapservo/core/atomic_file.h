@@ -24,6 +24,9 @@ class AtomicFile {
   std::ofstream stream_;
 };
 
+/// Writes the whole text in that way.
+void write_file(const std::filesystem::path& path, const std::string& text);
+
 /// The temporary name beside `path` under which a result is written before it is renamed. Keeps the extension, which
 /// writers of pictures and videos go by.
 std::filesystem::path temporary_name(const std::filesystem::path& path);

@@ -181,9 +181,7 @@ std::string html_from(const Report& report) {
 }
 
 void write_report(const std::filesystem::path& path, const Report& report) {
-  AtomicFile file(path);
-  file.stream() << html_from(report);
-  file.commit();
+  write_file(path, html_from(report));
 }
 
 }  // namespace lapservo

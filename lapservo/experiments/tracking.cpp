@@ -6,13 +6,13 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/control/paper_trajectory.h"
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/paper_trajectory.h"
 #include "lapservo/servo/servo_run.h"
 #include "lapservo/servo/theatre_site.h"
 #include "lapservo/servo/theatre_start.h"
@@ -181,16 +181,9 @@ TrackingRun run_scenario(const TrackingScenario& scenario, const ExperimentSetup
   }
   int done = done_before;
   bool stopped = false;
-  const FeatureModel model = feature_model(setup.rig);
   run_servo(site, config, trajectory, scenario.duration_s,
             [&](const ServoRecord& record, const cv::Mat&, const std::vector<Observation>&) {
               recorder.add(record, config.controller.limits);
-              if (const auto state = model(*record.true_q)) {
-                const Eigen::Vector4d& e = state->ends_px;
-                const double right = setup.rig.camera.width_px - 1, bottom = setup.rig.camera.height_px - 1;
-                run.left_image |= std::min(e[0], e[2]) < 0 || std::max(e[0], e[2]) > right ||
-                                  std::min(e[1], e[3]) < 0 || std::max(e[1], e[3]) > bottom;
-              }
               stopped = !setup.keep_going(++done, total);
               return !stopped;
             });

@@ -34,7 +34,6 @@ struct TrackingRun {
   double delay_s = 0;                                     ///< as believed at the end
   double rate_share = 0;                                  ///< largest setpoint rate as a share of its limit
   std::optional<double> held_s, resumed_s;                ///< after the marker was hidden, after it was back
-  bool left_image = false;                                ///< an end of the marker left the image
 };
 
 /// The paper's section V-D: from a random start in the field of view the instrument tracks the trajectory of its

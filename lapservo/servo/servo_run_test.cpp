@@ -5,9 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/control/paper_trajectory.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/paper_trajectory.h"
 #include "lapservo/servo/test_rig.h"
 #include "lapservo/servo/theatre_site.h"
 #include "lapservo/servo/theatre_start.h"

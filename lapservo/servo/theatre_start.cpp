@@ -29,9 +29,11 @@ bool in_view(const FeatureModel& model, const ImageWindow& window, const Eigen::
 bool seam_lies_between(const FeatureModel& model, const Eigen::Vector4d& from, const Eigen::Vector4d& to) {
   constexpr int steps = 100;
   constexpr double jump = 0.08;  // of l
-  for (int i = 0; i < steps; ++i) {
-    const auto here = model(from + (to - from) * i / steps), next = model(from + (to - from) * (i + 1) / steps);
+  auto here = model(from);
+  for (int i = 1; i <= steps; ++i) {
+    const auto next = model(from + (to - from) * i / steps);
     if (!here || !next || std::abs(next->features[3] - here->features[3]) > jump * here->features[2]) return true;
+    here = next;
   }
   return false;
 }

@@ -21,15 +21,11 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
   if (!view) return -1e9;
   const double length_m = scene.marker.length_m(), radius_m = scene.marker.radius_m();
   const auto color_at = [&](double radius, double azimuth_rad, double along_m) {
-    const Eigen::Vector3d point = pose.camera_from_unrolled * surface_point(radius, azimuth_rad, along_m);
-    return point.z() > 1e-3 ? scene.class_at(scene.camera.raw_from_point(point)) : Scene::outside;
-  };
-  const auto ours = [&](std::uint8_t color) {
-    return color == scene.bands[0] || color == scene.bands[1] || color == scene.bands[2];
+    return scene.class_at_point(pose.camera_from_unrolled * surface_point(radius, azimuth_rad, along_m));
   };
   double score = 0;
   const auto count_empty = [&](std::uint8_t color) {
-    if (color != Scene::outside) score += ours(color) ? beside : rightly_empty;
+    if (color != Scene::outside) score += scene.is_ours(color) ? beside : rightly_empty;
   };
   for (int i = 0; i < lines; ++i) {
     const double azimuth_rad = view->facing_azimuth_rad + 0.85 * view->half_visible_rad * (2.0 * i / (lines - 1) - 1);
@@ -44,7 +40,7 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
       } else if (color == scene.bands[static_cast<std::size_t>(band - 1)]) {
         score += 1;
       } else {
-        score += ours(color) ? wrong : hidden;
+        score += scene.is_ours(color) ? wrong : hidden;
       }
     }
   }

@@ -25,6 +25,12 @@ struct Scene {
     if (!(u >= 0 && v >= 0 && u < image.width_px && v < image.height_px)) return outside;
     return classes(image.pixel(static_cast<int>(u), static_cast<int>(v)));
   }
+  /// The same at a point before the camera, [m] in its frame; `outside` when it lies behind.
+  std::uint8_t class_at_point(const Eigen::Vector3d& point_in_camera) const {
+    return point_in_camera.z() > 1e-3 ? class_at(camera.raw_from_point(point_in_camera)) : outside;
+  }
+  /// Whether it is the class of one of the marker's bands.
+  bool is_ours(std::uint8_t color) const { return color == bands[0] || color == bands[1] || color == bands[2]; }
 };
 
 }  // namespace lapservo

@@ -40,11 +40,7 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
   int total = 0, inside = 0, matching = 0, wrong = 0, outer = 0, beyond = 0, flank = 0, beside = 0;
   std::array<int, 2> ring{}, spilled{};
   const auto class_of = [&](double radius_m, double azimuth_rad, double along_m) {
-    const Eigen::Vector3d point = pose.camera_from_unrolled * surface_point(radius_m, azimuth_rad, along_m);
-    return point.z() > 1e-3 ? scene.class_at(scene.camera.raw_from_point(point)) : Scene::outside;
-  };
-  const auto is_ours = [&](std::uint8_t color) {
-    return color == scene.bands[0] || color == scene.bands[1] || color == scene.bands[2];
+    return scene.class_at_point(pose.camera_from_unrolled * surface_point(radius_m, azimuth_rad, along_m));
   };
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = view->facing_azimuth_rad + 0.8 * view->half_visible_rad * (2.0 * i / (azimuths - 1) - 1);
@@ -59,7 +55,7 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
       total += on_marker;
       const std::uint8_t color = class_of(scene.marker.radius_m(), azimuth_rad, along_m);
       if (color == Scene::outside) continue;
-      const bool ours = is_ours(color);
+      const bool ours = scene.is_ours(color);
       if (!on_marker) {
         const std::size_t end = band < 1 ? 0 : 1;
         const double past_m = end == 0 ? ends_m[0] - along_m : along_m - ends_m[3];
@@ -76,7 +72,7 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
     for (int k = 0; k < places; ++k) {
       const std::uint8_t color = class_of(beside_radii * scene.marker.radius_m(),
                                           view->facing_azimuth_rad + side * pi / 2, length_m * (k + 0.5) / places);
-      if (color != Scene::outside) ++flank, beside += is_ours(color);
+      if (color != Scene::outside) ++flank, beside += scene.is_ours(color);
     }
   const auto share = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
   return {share(matching, inside), share(wrong, inside),
