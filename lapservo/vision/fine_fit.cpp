@@ -27,6 +27,9 @@ constexpr double usual_blur_px = 1.2, common_share_of_blur = 0.05;
 // Where most of a marker is hidden, some of what was taken for its boundaries are the blood's.
 constexpr double usual_share = 0.7, doubt_of_hidden = 4;
 constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
+// A fit has settled when a pass moves no point and no smear (unsettled_px) farther than this.
+constexpr double settled_px = 1.5;
+constexpr int most_passes = 3;
 // Interpolated samples are smoother than the pixels are noisy.
 constexpr double interpolation_noise = 1.6;
 
@@ -376,6 +379,14 @@ std::optional<UnknownMatrix> covariance_of(std::span<const Measurement> measurem
   return of_pose.allFinite() && (of_pose.diagonal().array() > 0).all() ? std::optional(of_pose) : std::nullopt;
 }
 
+// What a change of blur weighs beside a movement of points. Motion's smear may be no blur, which then never settles; a
+// sharp one may flicker where few sides are left.
+double unsettled_px(double blur_before_px, double blur_after_px) {
+  constexpr double sharp_px = 1.8, weight = 5;
+  if (std::max(blur_before_px, blur_after_px) < sharp_px) return 0;
+  return weight * std::abs(blur_after_px - blur_before_px);
+}
+
 }  // namespace
 
 double FineFit::located_share() const {
@@ -384,23 +395,40 @@ double FineFit::located_share() const {
 }
 
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur) {
-  constexpr std::array<Effort, 3> efforts{{{5, 3, 3}, {2, 2, 3}, {2, 1, 1}}};
+  constexpr Effort capture{5, 3, 3}, approach{2, 2, 3}, measure_all{2, 1, 1};
   FineFit fit;
   fit.unknowns = start;
   fit.blur = blur;
   const int unknowns = start.size();
   double film_m = film_mean_m;
   Pass pass;
-  for (std::size_t i = 0; i < efforts.size(); ++i) {
-    pass = measure(scene, light, fit.unknowns, film_m, efforts[i], fit.blur);
-    if (static_cast<int>(pass.measurements.size()) < 2 * fit.unknowns.size()) return fit;
+  // Returns how far the measured points and the blur moved, in pixels; nullopt when too little was seen.
+  const auto refine = [&](const Effort& effort) -> std::optional<double> {
+    pass = measure(scene, light, fit.unknowns, film_m, effort, fit.blur);
+    if (static_cast<int>(pass.measurements.size()) < 2 * fit.unknowns.size()) return std::nullopt;
     const UnknownVector step = solve(pass.measurements, unknowns, (film_mean_m - film_m) / film_sigma_m);
-    for (Measurement& m : pass.measurements) m.residual_px -= extended_row(m).dot(step);
-    fit.blur = {pass.boundary_blur.improved(fit.blur.boundaries_px), pass.side_blur.improved(fit.blur.sides_px)};
+    double moved_px = 0;
+    for (Measurement& m : pass.measurements) {
+      const double shift_px = extended_row(m).dot(step);
+      m.residual_px -= shift_px;
+      moved_px = std::max(moved_px, std::abs(shift_px));
+    }
+    const EdgeBlur improved{pass.boundary_blur.improved(fit.blur.boundaries_px),
+                            pass.side_blur.improved(fit.blur.sides_px)};
+    moved_px = std::max({moved_px, unsettled_px(fit.blur.boundaries_px, improved.boundaries_px),
+                         unsettled_px(fit.blur.sides_px, improved.sides_px)});
+    fit.blur = improved;
     fit.unknowns = fit.unknowns.changed_by(step.head(unknowns));
     film_m = std::clamp(film_m + step[unknowns] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
-    if (!fit.unknowns.pose().camera_from_unrolled.translation.allFinite()) return fit;
-  }
+    if (!fit.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
+    return moved_px;
+  };
+  const auto captured_px = refine(capture);
+  if (!captured_px) return fit;
+  if (*captured_px > settled_px && !refine(approach)) return fit;
+  std::optional<double> moved_px = settled_px + 1;
+  for (int i = 0; i < most_passes && moved_px && *moved_px > settled_px; ++i) moved_px = refine(measure_all);
+  if (!moved_px || *moved_px > settled_px) return fit;
   fit.lines = pass.lines;
   fit.in_image = pass.in_image;
   double squares = 0;

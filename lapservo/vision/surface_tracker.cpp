@@ -116,11 +116,14 @@ void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
 }
 
 SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImage& light, const Memory& memory) const {
+  const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
+  const FineFit near = fit_finely(scene, light, expected, memory.blur);
+  if (judge(scene, near) == Status::ok) return {Status::ok, near};
   CoarseFitOptions options;
   options.search_rotation = false;
   options.along_reach = 0.2;
   options.rounds = 1;
-  const CoarseFit coarse = fit_coarsely(scene, memory.last.changed_by(memory.velocity), options);
+  const CoarseFit coarse = fit_coarsely(scene, expected, options);
   if (!coarse.found) return {};
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
   const Status status = judge(scene, fit);

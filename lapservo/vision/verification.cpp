@@ -102,9 +102,11 @@ Status judge(const Scene& scene, const FineFit& fit) {
   const double largest_rms_sigmas = 1.3 + 5.5 * std::clamp(share - 0.7, 0.0, 0.2);
   if (share < 0.2 || fit.inlier_rms_sigmas > largest_rms_sigmas) return Status::poor_fit;
   // Smeared by motion across, the sides hold the shaft's place no more; and few boundaries need the sides beside them.
-  constexpr double smeared_px = 2.5;
+  // A smeared end that most lines miss is not hidden: what they found is another.
+  constexpr double smeared_px = 2;
   constexpr int fewest_sides = 8;
   const bool smeared = std::max(fit.blur.boundaries_px, fit.blur.sides_px) > smeared_px;
+  if (smeared && 5 * *std::min_element(fit.used.begin(), fit.used.end()) < 3 * fit.lines) return Status::uncertain;
   if ((smeared || share < mostly_hidden) && fit.sides_used < fewest_sides) return Status::uncertain;
   const Eigen::Index psi = fit.unknowns.size() - 1;
   if (!(std::sqrt(fit.covariance(psi, psi)) < largest_sigma_psi_rad)) return Status::uncertain;
