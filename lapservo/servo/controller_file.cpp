@@ -1,96 +1,68 @@
 #include "lapservo/servo/controller_file.h"
 
-#include <array>
-#include <cmath>
-#include <string_view>
+#include <optional>
 
 #include <fmt/format.h>
-#include <yaml-cpp/yaml.h>
 
-#include "lapservo/core/csv.h"
-#include "lapservo/core/error.h"
+#include "lapservo/rig/yaml_field.h"
 
 namespace lapservo {
 namespace {
 
-class Reader {
- public:
-  explicit Reader(std::string source) : source_(std::move(source)) {}
-
-  [[noreturn]] void complain(const std::string& field, const YAML::Node& value, const std::string& expected) const {
-    throw InputError(source_, field, value.IsScalar() ? value.Scalar() : "a list or map", expected);
-  }
-  double number(const std::string& field, const YAML::Node& node) const {
-    const auto value = node.IsScalar() ? parse_finite(node.Scalar()) : std::nullopt;
-    if (!value) complain(field, node, "a finite number");
-    return *value;
-  }
-  Eigen::Vector4d four(const std::string& field, const YAML::Node& node) const {
-    if (!node.IsSequence() || node.size() != 4) complain(field, node, "a list of four numbers");
-    Eigen::Vector4d values;
-    for (std::size_t i = 0; i < 4; ++i)
-      values[static_cast<Eigen::Index>(i)] = number(fmt::format("{}[{}]", field, i), node[i]);
-    return values;
-  }
-  template <class Take>
-  void each(const std::string& field, const YAML::Node& map, const Take& take) const {
-    if (!map.IsMap()) complain(field, map, "a map");
-    for (const auto& entry : map) {
-      const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
-      const std::string name = field.empty() ? key : field + "." + key;
-      if (!take(key, name, entry.second)) throw InputError(source_, name, "unknown", "a key that the controller knows");
-    }
-  }
-
- private:
-  std::string source_;
-};
-
-void read_limits(const Reader& reader, const YAML::Node& node, JointLimits& limits) {
-  reader.each("limits", node, [&](const std::string& key, const std::string& name, const YAML::Node& value) {
-    for (const auto& [word, target] : {std::pair<std::string_view, Eigen::Vector4d*>{"lower", &limits.lower},
-                                       {"upper", &limits.upper},
-                                       {"rate", &limits.rate},
-                                       {"acceleration", &limits.acceleration}})
-      if (key == word) return *target = reader.four(name, value), true;
-    return false;
-  });
+[[noreturn]] void refuse_key(const YamlField& field) {
+  field.fail("unknown", "a key that the controller knows");
 }
 
-ImageWindow read_window(const Reader& reader, const YAML::Node& node, ImageWindow window) {
-  reader.each("window", node, [&](const std::string& key, const std::string& name, const YAML::Node& value) {
-    for (const auto& [word, target] : {std::pair<std::string_view, double*>{"u_min_px", &window.u_min_px},
-                                       {"u_max_px", &window.u_max_px},
-                                       {"v_min_px", &window.v_min_px},
-                                       {"v_max_px", &window.v_max_px}})
-      if (key == word) return *target = reader.number(name, value), true;
-    return false;
-  });
+Eigen::Vector4d four(const YamlField& field) {
+  const auto values = field.numbers<4>("a list of four numbers");
+  return Eigen::Vector4d(values.data());
+}
+
+JointLimits read_limits(const YamlField& map, JointLimits limits) {
+  for (const auto& [key, value] : map.entries("a map")) {
+    if (key == "lower")
+      limits.lower = four(value);
+    else if (key == "upper")
+      limits.upper = four(value);
+    else if (key == "rate")
+      limits.rate = four(value);
+    else if (key == "acceleration")
+      limits.acceleration = four(value);
+    else
+      refuse_key(value);
+  }
+  return limits;
+}
+
+ImageWindow read_window(const YamlField& map, ImageWindow window) {
+  constexpr auto expected = "a finite number";
+  for (const auto& [key, value] : map.entries("a map")) {
+    if (key == "u_min_px")
+      window.u_min_px = value.number(expected);
+    else if (key == "u_max_px")
+      window.u_max_px = value.number(expected);
+    else if (key == "v_min_px")
+      window.v_min_px = value.number(expected);
+    else if (key == "v_max_px")
+      window.v_max_px = value.number(expected);
+    else
+      refuse_key(value);
+  }
   return window;
 }
 
-bool read_key(const Reader& reader, const std::string& key, const YAML::Node& value, ControllerConfig& config) {
-  if (key == "mode") {
-    const auto mode = value.IsScalar() ? mode_from_word(value.Scalar()) : std::nullopt;
-    if (!mode) reader.complain(key, value, "default, paper or uncalibrated");
-    config.mode = *mode;
-  } else if (key == "period_s") {
-    config.period_s = reader.number(key, value);
-  } else if (key == "gains_per_s") {
-    config.gains.per_s = reader.four(key, value);
-  } else if (key == "delay_s") {
-    if (value.IsScalar() && value.Scalar() == "estimate")
-      config.observer.delay_s.reset();
-    else
-      config.observer.delay_s = reader.number(key, value);
-  } else if (key == "limits") {
-    read_limits(reader, value, config.limits);
-  } else if (key == "window") {
-    config.window = read_window(reader, value, config.window.value_or(ImageWindow{}));
-  } else {
-    return false;
-  }
-  return true;
+ControlMode read_mode(const YamlField& field) {
+  constexpr auto expected = "default, paper or uncalibrated";
+  const auto mode = mode_from_word(field.text(expected));
+  if (!mode) field.fail(field.value_text(), expected);
+  return *mode;
+}
+
+// Without a value it is to be estimated.
+std::optional<double> read_delay(const YamlField& field) {
+  constexpr auto expected = "a finite number or estimate";
+  if (field.text(expected) == "estimate") return {};
+  return field.number(expected);
 }
 
 std::string list_of(const Eigen::Vector4d& v) {
@@ -100,20 +72,23 @@ std::string list_of(const Eigen::Vector4d& v) {
 }  // namespace
 
 ControllerConfig load_controller(const std::filesystem::path& path, const ControllerConfig& base) {
-  const Reader reader(path.string());
   ControllerConfig config = base;
-  YAML::Node root;
-  try {
-    root = YAML::LoadFile(path.string());
-  } catch (const YAML::BadFile&) {
-    throw InputError(path.string(), "can't be read");
-  } catch (const YAML::Exception& error) {
-    throw InputError(path.string(), fmt::format("is not YAML: line {}: {}", error.mark.line + 1, error.msg));
+  for (const auto& [key, value] : YamlField::read(path, "controller file").entries("a map of the controller's keys")) {
+    if (key == "mode")
+      config.mode = read_mode(value);
+    else if (key == "period_s")
+      config.period_s = value.number("a finite number");
+    else if (key == "gains_per_s")
+      config.gains.per_s = four(value);
+    else if (key == "delay_s")
+      config.observer.delay_s = read_delay(value);
+    else if (key == "limits")
+      config.limits = read_limits(value, config.limits);
+    else if (key == "window")
+      config.window = read_window(value, config.window.value_or(ImageWindow{}));
+    else
+      refuse_key(value);
   }
-  if (!root.IsMap()) throw InputError(path.string(), "holds no keys, expected a controller's YAML");
-  reader.each("", root, [&](const std::string& key, const std::string&, const YAML::Node& value) {
-    return read_key(reader, key, value, config);
-  });
   return config;
 }
 

@@ -1,0 +1,135 @@
+#include "lapservo/rig/yaml_field.h"
+
+#include <fstream>
+#include <optional>
+#include <system_error>
+
+#include <yaml-cpp/yaml.h>
+
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr std::size_t largest_file_bytes = 1 << 20;
+
+std::string read_text(const fs::path& path) {
+  std::error_code ignored;  // a name that no file can have is a file that can't be opened
+  if (fs::is_directory(path, ignored)) throw InputError(path.string(), "is a folder, expected a YAML file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) throw InputError(path.string(), "can't be opened, expected a YAML file");
+  std::string text(largest_file_bytes + 1, '\0');  // a byte more, to tell what is too long; /dev/zero has no end
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.empty()) throw InputError(path.string(), "is empty, expected a YAML file");
+  return text;
+}
+
+// yaml-cpp recurses over nesting without a limit of its own: refuse what no file of ours needs before it parses.
+bool nests_too_deeply(std::string_view yaml) {
+  int depth = 0;
+  for (const char c : yaml) {
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > 16) return true;
+  }
+  std::size_t run = 0;  // "- - - -" and "? ? ?" and ": : :" nest too
+  for (const char c : yaml) {
+    if (c == '-' || c == '?' || c == ':') {
+      if (++run > 64) return true;
+    } else if (c != ' ' && c != '\n' && c != '\t') {
+      run = 0;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+YamlField YamlField::read(const fs::path& path, std::string_view kind) {
+  return parse(read_text(path), path.string(), kind);
+}
+
+YamlField YamlField::parse(std::string_view yaml, const std::string& source, std::string_view kind) {
+  if (yaml.size() > largest_file_bytes)
+    throw InputError(source, "is larger than 1 MiB, expected a " + std::string(kind));
+  if (nests_too_deeply(yaml)) throw InputError(source, "nests more deeply than a " + std::string(kind) + " does");
+  try {
+    return {source, "", YAML::Load(std::string(yaml))};
+  } catch (const YAML::Exception& error) {
+    throw InputError(source, std::string("is not YAML: ") + error.what());
+  }
+}
+
+YamlField::YamlField(std::string source, std::string path, const YAML::Node& node)
+    : source_(std::move(source)), path_(std::move(path)), node_(std::make_shared<const YAML::Node>(node)) {}
+
+YamlField YamlField::at_key(const std::string& key, const YAML::Node& node) const {
+  return {source_, path_.empty() ? key : path_ + "." + key, node};
+}
+
+void YamlField::fail(std::string_view value, std::string_view expected) const {
+  throw InputError(source_, path_.empty() ? "file" : path_, value, expected);
+}
+
+void YamlField::fail_within(const std::string& problem) const {
+  throw InputError(source_, path_ + "." + problem);
+}
+
+std::string YamlField::value_text() const {
+  if (!present()) return "missing";
+  if (node_->IsScalar()) return node_->Scalar().empty() ? "''" : node_->Scalar();
+  return node_->IsSequence() ? "a list of " + std::to_string(node_->size()) : "a map";
+}
+
+bool YamlField::present() const {
+  return node_->IsDefined() && !node_->IsNull();
+}
+
+bool YamlField::is_scalar() const {
+  return present() && node_->IsScalar();
+}
+
+YamlField YamlField::operator[](const std::string& key) const {
+  if (!present() || !node_->IsMap()) fail(value_text(), "a map with '" + key + "'");
+  return at_key(key, (*node_)[key]);
+}
+
+std::vector<std::pair<std::string, YamlField>> YamlField::entries(std::string_view expected) const {
+  if (!present() || !node_->IsMap()) fail(value_text(), expected);
+  std::vector<std::pair<std::string, YamlField>> all;
+  for (const auto& entry : *node_) {
+    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
+    all.emplace_back(key, at_key(key, entry.second));
+  }
+  return all;
+}
+
+std::vector<YamlField> YamlField::list(std::string_view expected) const {
+  if (!present() || !node_->IsSequence()) fail(value_text(), expected);
+  std::vector<YamlField> items;
+  for (std::size_t i = 0; i < node_->size(); ++i)
+    items.push_back({source_, path_ + "[" + std::to_string(i) + "]", (*node_)[i]});
+  return items;
+}
+
+std::string YamlField::text(std::string_view expected) const {
+  if (!is_scalar() || node_->Scalar().empty()) fail(value_text(), expected);
+  return node_->Scalar();
+}
+
+double YamlField::number(std::string_view expected) const {
+  const auto value = is_scalar() ? parse_finite(node_->Scalar()) : std::nullopt;
+  if (!value) fail(value_text(), expected);
+  return *value;
+}
+
+double YamlField::number_between(double low, double high, std::string_view expected) const {
+  const double value = number(expected);
+  if (!(value >= low && value <= high)) fail(value_text(), expected);
+  return value;
+}
+
+}  // namespace lapservo

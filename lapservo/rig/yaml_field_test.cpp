@@ -1,0 +1,58 @@
+#include "lapservo/rig/yaml_field.h"
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/input_error.h"
+
+namespace lapservo {
+namespace {
+using testing::input_error;
+
+YamlField parse(const std::string& yaml) {
+  return YamlField::parse(yaml, "a.yaml", "file of ours");
+}
+
+TEST(YamlField, KnowsWhereItStands) {
+  const YamlField root = parse("a: {b: [1, {c: x}]}");
+  const auto number_of = [](const YamlField& field) { return input_error([&] { field.number("a number"); }); };
+  EXPECT_EQ(number_of(root), "a.yaml: file: is a map, expected a number");
+  EXPECT_EQ(number_of(root["a"]["b"]), "a.yaml: a.b: is a list of 2, expected a number");
+  EXPECT_EQ(number_of(root["a"]["b"].list("")[1]["c"]), "a.yaml: a.b[1].c: is x, expected a number");
+  EXPECT_EQ(number_of(root["a"]["d"]), "a.yaml: a.d: is missing, expected a number");
+  EXPECT_EQ(input_error([&] { root["a"]["d"]["e"]; }), "a.yaml: a.d: is missing, expected a map with 'e'");
+}
+
+TEST(YamlField, EntriesAreThoseOfTheMapInItsOrder) {
+  std::vector<std::string> keys;
+  std::vector<double> values;
+  for (const auto& [key, value] : parse("z: 3\na: 1\nm: 2").entries("a map")) {
+    keys.push_back(key);
+    values.push_back(value.number("a number"));
+    EXPECT_EQ(input_error([&field = value] { field.list("a list"); }),
+              "a.yaml: " + key + ": is " + value.value_text() + ", expected a list");
+  }
+  EXPECT_EQ(keys, (std::vector<std::string>{"z", "a", "m"}));
+  EXPECT_EQ(values, (std::vector<double>{3, 1, 2}));
+  EXPECT_EQ(input_error([] { parse("[1, 2]").entries("a map of keys"); }),
+            "a.yaml: file: is a list of 2, expected a map of keys");
+  EXPECT_EQ(input_error([] { parse("# nothing").entries("a map of keys"); }),
+            "a.yaml: file: is missing, expected a map of keys");
+}
+
+TEST(YamlField, OutlivesItsRoot) {
+  EXPECT_EQ(parse("a: [4, 5]")["a"].numbers<2>("two numbers"), (std::array<double, 2>{4, 5}));
+}
+
+TEST(YamlField, NamesTheKindOfFileThatWasExpected) {
+  EXPECT_EQ(input_error([] { parse(std::string(17, '[')); }), "a.yaml: nests more deeply than a file of ours does");
+  EXPECT_EQ(input_error([] { parse(std::string((1 << 20) + 1, ' ')); }),
+            "a.yaml: is larger than 1 MiB, expected a file of ours");
+  EXPECT_EQ(input_error([] { parse(std::string(16, '[') + std::string(16, ']')); }), "");
+}
+
+}  // namespace
+}  // namespace lapservo
