@@ -10,9 +10,9 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
-#include "lapservo/geometry/cylinder.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo::acceptance {
@@ -167,20 +167,10 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
 std::vector<std::vector<RcmCoordinates>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
                                                                double steepest_rad) {
   Random random(seed);
+  constexpr double border_px = 40;
   const auto acceptable = [&](const Instrument& instrument, const RcmCoordinates& q) {
-    const Marker& marker = instrument.marker;
-    const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(q);
-    const auto view = view_cylinder(pose, marker.radius_m());
-    if (!view) return false;
-    const double beyond_m = pose.inverse().translation.z() - marker.length_m() / 2;
-    if (std::abs(std::atan2(beyond_m, view->camera_to_axis_m)) > steepest_rad) return false;
-    for (const double side : {-1.0, 1.0})
-      for (const double along_m : {0.0, marker.length_m()}) {
-        const Eigen::Vector3d point =
-            pose * surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
-        if (point.z() < 0.04 || !rig.camera.contains(rig.camera.ideal_from_point(point), 40)) return false;
-      }
-    return true;
+    return marker_in_view(rig.camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q),
+                          {steepest_rad, border_px});
   };
   std::vector<std::vector<RcmCoordinates>> configurations;
   for (int frame = 0; frame < count; ++frame) {

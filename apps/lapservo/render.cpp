@@ -18,10 +18,10 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
-#include "lapservo/geometry/cylinder.h"
 #include "lapservo/io/configuration_csv.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/sim/truth.h"
@@ -42,34 +42,16 @@ ShaftPlacement placement_of(const Instrument& instrument, const RcmCoordinates& 
   return {*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
 }
 
-// Whether the whole marker is seen, from not too steep an angle.
-bool in_view(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q) {
-  const Marker& marker = instrument.marker;
-  const Rigid3 pose = placement_of(instrument, q).camera_from_unrolled;
-  const auto view = view_cylinder(pose, marker.radius_m());
-  if (!view) return false;
-  const Eigen::Vector3d camera_in_marker = pose.inverse().translation - Eigen::Vector3d(0, 0, marker.length_m() / 2);
-  if (std::abs(camera_in_marker.z()) > 1.2 * view->camera_to_axis_m) return false;
-  const double margin_px = 0.02 * camera.width_px;
-  for (const double side : {-1.0, 0.0, 1.0})
-    for (const double along_m : {0.0, marker.length_m()}) {
-      const Eigen::Vector3d point =
-          pose * surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
-      if (point.z() < 0.02 || !camera.contains(camera.raw_from_point(point), margin_px)) return false;
-      if (!camera.contains(camera.ideal_from_point(point), -0.5 * camera.width_px)) return false;
-    }
-  return true;
-}
-
 RcmCoordinates random_configuration(const Camera& camera, const Instrument& instrument, const std::string& rig,
                                     Random& random) {
+  const ViewLimits limits{.steepest_rad = std::atan(1.2), .border_px = 0.02 * camera.width_px};
   for (int attempt = 0; attempt < 20000; ++attempt) {
     const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
     const Eigen::Vector3d point = camera.ray_from_ideal(pixel) * random.uniform(0.06, 0.14);
     auto q = configuration_through(*instrument.camera_from_rcm, point);
     if (!q || q->rho_m < 0.02 || std::sin(q->phi_rad) < 0.1) continue;
     q->psi_rad = random.uniform(-pi, pi);
-    if (in_view(camera, instrument, *q)) return *q;
+    if (marker_in_view(camera, instrument.marker, placement_of(instrument, *q).camera_from_unrolled, limits)) return *q;
   }
   throw InputError(
       rig, "instrument " + instrument.name + " is never wholly in view between 60 and 140 mm: check camera_from_rcm");

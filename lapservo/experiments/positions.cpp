@@ -6,12 +6,12 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
-#include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/visibility.h"
 
 namespace lapservo {
 namespace {
 
-constexpr double nearest_m = 0.06, farthest_m = 0.13, steepest_rad = 0.35, border_px = 30;
+constexpr double nearest_m = 0.06, farthest_m = 0.13;
 constexpr int most_attempts = 20000, candidates = 12;
 
 RcmCoordinates random_position(const Rig& rig, Random& random) {
@@ -32,21 +32,8 @@ RcmCoordinates random_position(const Rig& rig, Random& random) {
 }  // namespace
 
 bool marker_well_in_view(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q) {
-  const Marker& marker = instrument.marker;
-  const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(q);
-  const auto view = view_cylinder(pose, marker.radius_m());
-  if (!view) return false;
-  const double beyond_m = pose.inverse().translation.z() - marker.length_m() / 2;
-  if (std::abs(std::atan2(beyond_m, view->camera_to_axis_m)) > steepest_rad) return false;
-  for (const double side : {-1.0, 0.0, 1.0})
-    for (const double along_m : {0.0, marker.length_m()}) {
-      const Eigen::Vector3d point =
-          pose * surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
-      if (point.z() < 0.02 || !camera.contains(camera.raw_from_point(point), border_px)) return false;
-      // Beyond the lens's own field raw_from_point folds back.
-      if (!camera.contains(camera.ideal_from_point(point), -0.5 * camera.width_px)) return false;
-    }
-  return true;
+  return marker_in_view(camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q),
+                        {.steepest_rad = 0.35, .border_px = 30});
 }
 
 Eigen::Vector2d marker_middle_px(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q) {

@@ -21,6 +21,7 @@ const std::array<Port, 3> ports{{{{90, 180, 270}, {-0.078, 0.067, 0.059}, {-0.02
 
 constexpr double steepest_rad = 0.35, border_px = 30;
 
+// Less than marker_in_view() asks: here the silhouettes' ends alone count, as a lens without distortion shows them.
 bool wholly_in_view(const Rig& rig, const Marker& marker, const Rigid3& pose) {
   const auto view = view_cylinder(pose, marker.radius_m());
   if (!view) return false;
