@@ -14,22 +14,13 @@
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/rcm.h"
 #include "lapservo/experiments/rotation.h"
+#include "lapservo/testing/rigs.h"
 
 namespace lapservo {
 namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint64_t seed = 73;
-
-// The rig with a smaller camera of the same field of view.
-Rig scaled_rig(int divisor) {
-  Rig rig = paper_rig();
-  Camera& camera = rig.camera;
-  camera.width_px /= divisor, camera.height_px /= divisor;
-  camera.fx_px /= divisor, camera.fy_px /= divisor;
-  camera.cx_px = (camera.width_px - 1) / 2.0, camera.cy_px = (camera.height_px - 1) / 2.0;
-  return rig;
-}
 
 TEST(Positions, AreInViewSpreadOutAndRepeatable) {
   const Rig rig = paper_rig();
@@ -120,7 +111,7 @@ TEST(Rcm, ErrorsInSigmasAreOneWhenTheCovarianceIsHonest) {
 // A whole experiment, small: better than the paper, data complete, the same again whichever thread did what.
 TEST(Illumination, EndToEnd) {
   ExperimentSetup setup;
-  setup.rig = scaled_rig(2);
+  setup.rig = testing::small_test_rig();
   setup.seed = seed;
   setup.methods = {Method::surface};
   const IlluminationResult result = measure_illumination(setup);

@@ -8,7 +8,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/test_models.h"
-#include "lapservo/rig/rig.h"
+#include "lapservo/testing/rigs.h"
 
 namespace lapservo {
 namespace {
@@ -97,7 +97,7 @@ TEST(FeatureInverse, IsUniqueInThePapersWorkingRegion) {
 }
 
 ImageModel paper_rig() {
-  const Rig rig = load_rig(LAPSERVO_SOURCE_DIR "/configs/paper.yaml");
+  const Rig rig = testing::paper_test_rig();
   return {rig.camera, rig.instruments.front().marker, rig.instruments.front().camera_from_rcm.value()};
 }
 

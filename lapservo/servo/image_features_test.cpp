@@ -5,7 +5,7 @@
 
 #include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
-#include "lapservo/servo/test_rig.h"
+#include "lapservo/testing/rigs.h"
 
 namespace lapservo {
 namespace {

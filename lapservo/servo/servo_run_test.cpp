@@ -8,10 +8,10 @@
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/test_rig.h"
 #include "lapservo/servo/theatre_site.h"
 #include "lapservo/servo/theatre_start.h"
 #include "lapservo/testing/input_error.h"
+#include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/test_rig.h"
+#include "lapservo/testing/rigs.h"
 
 namespace lapservo {
 namespace {

@@ -12,13 +12,10 @@
 namespace lapservo {
 namespace {
 
+using theatre::fit_from;
 using theatre::Shot;
 using theatre::Sight;
 using theatre::usual_shot;
-
-FineFit fit_from(const Shot& shot, const PoseUnknowns& start) {
-  return fit_finely(shot.sight.scene(), shot.sight.light(), start, {});
-}
 
 // As far off as a coarse fit may leave it: up to three pixels.
 UnknownVector random_offset(Random& random, int unknowns) {

@@ -134,4 +134,8 @@ const Shot& usual_shot(std::uint64_t seed) {
   return shots.try_emplace(seed, seed).first->second;
 }
 
+FineFit fit_from(const Shot& shot, const PoseUnknowns& start) {
+  return fit_finely(shot.sight.scene(), shot.sight.light(), start, {});
+}
+
 }  // namespace lapservo::theatre

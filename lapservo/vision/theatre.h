@@ -9,6 +9,7 @@
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
+#include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
@@ -66,5 +67,8 @@ struct Shot {
 
 /// The shot of a seed, rendered once for all who ask.
 const Shot& usual_shot(std::uint64_t seed);
+
+/// The fine fit to a shot, of a frame on its own.
+FineFit fit_from(const Shot& shot, const PoseUnknowns& start);
 
 }  // namespace lapservo::theatre

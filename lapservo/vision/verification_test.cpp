@@ -11,13 +11,11 @@
 namespace lapservo {
 namespace {
 
+using theatre::fit_from;
 using theatre::Shot;
 using theatre::Sight;
 using theatre::usual_shot;
 
-FineFit fit_from(const Shot& shot, const PoseUnknowns& start) {
-  return fit_finely(shot.sight.scene(), shot.sight.light(), start, {});
-}
 FineFit fit_from_truth(const Shot& shot) {
   return fit_from(shot, shot.truth(true));
 }
