@@ -11,6 +11,7 @@ namespace lapservo {
 /// make the limb of a shaded cylinder.
 struct BlurredEdge {
   float density, step, root, three_halves;
+  float root_slope;  ///< d(root)/du
 };
 
 /// Tabulates them; errors below 1e-4.
@@ -20,24 +21,27 @@ class BlurredEdges {
   static const BlurredEdges& instance();
 
   BlurredEdge at(float u) const {
-    if (!(u > first_u)) return {0, 0, 0, 0};
+    if (!(u > first_u)) return {0, 0, 0, 0, 0};
     if (u >= last_u) {  // asymptotic expansions of the moments
-      const float root = std::sqrt(u);
-      return {0, 1, root * (1 - 1 / (8 * u * u)), root * u * (1 + 3 / (8 * u * u))};
+      const float root = std::sqrt(u), correction = 1 / (8 * u * u);
+      return {0, 1, root * (1 - correction), root * u * (1 + 3 * correction), (1 + 3 * correction) / (2 * root)};
     }
     const float place = (u - first_u) * per_sigma;
     const auto i = static_cast<std::size_t>(place);
     const float f = place - static_cast<float>(i);
     const BlurredEdge &a = entries_[i], &b = entries_[i + 1];
     return {a.density + f * (b.density - a.density), a.step + f * (b.step - a.step), a.root + f * (b.root - a.root),
-            a.three_halves + f * (b.three_halves - a.three_halves)};
+            a.three_halves + f * (b.three_halves - a.three_halves), a.root_slope + f * (b.root_slope - a.root_slope)};
   }
+
+  /// The table itself: entry i holds u = first_u + i / per_sigma, up to last_u and one beyond.
+  static constexpr float first_u = -6, last_u = 8;
+  static constexpr int per_sigma = 64;
+  const BlurredEdge* entries() const { return entries_.data(); }
 
  private:
   BlurredEdges();
 
-  static constexpr float first_u = -6, last_u = 8;
-  static constexpr int per_sigma = 64;
   std::array<BlurredEdge, static_cast<std::size_t>((last_u - first_u) * per_sigma) + 2> entries_;
 };
 

@@ -10,8 +10,6 @@
 namespace lapservo {
 namespace {
 
-constexpr float tolerance_px = 0.004F;
-
 // At every sample: the model's linear basis (a constant, then `Shapes`), and the shapes' derivatives by the edge's
 // position and by the blur.
 template <int Shapes>
@@ -43,112 +41,11 @@ Basis<2> limb_basis(const EdgeProfile& profile, float edge_px, float blur_px, fl
     basis.value[0][i] = edge.step;
     basis.by_position[0][i] = -edge.density / blur_px;
     basis.value[1][i] = scale * root_blur * (edge.root - blur_px * edge.three_halves / (4 * radius_px));
-    // d/du of the blurred root, by a central difference of the table's own functions
-    const BlurredEdge ahead = edges.at(u + 0.1F), behind = edges.at(u - 0.1F);
-    const float root_slope = (ahead.root - behind.root) / 0.2F;
-    basis.by_position[1][i] = -scale / root_blur * (root_slope - blur_px * 1.5F * edge.root / (4 * radius_px));
+    basis.by_position[1][i] = -scale / root_blur * (edge.root_slope - blur_px * 1.5F * edge.root / (4 * radius_px));
     basis.by_blur[0][i] = -edge.density * u / blur_px;
-    basis.by_blur[1][i] = scale / root_blur * (0.5F * edge.root - u * root_slope);
+    basis.by_blur[1][i] = scale / root_blur * (0.5F * edge.root - u * edge.root_slope);
   }
   return basis;
-}
-
-float dot(const float* a, const float* b, std::size_t count) {
-  float sum = 0;
-  for (std::size_t i = 0; i < count; ++i) sum += a[i] * b[i];
-  return sum;
-}
-
-using Column = std::array<float, EdgeProfile::max_samples>;
-
-void subtract(Column& from, float factor, const Column& column, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i) from[i] -= factor * column[i];
-}
-
-// The basis made orthonormal, and the parts of the derivatives that it can't imitate: common to the three channels.
-template <int Shapes>
-struct OrthogonalBasis {
-  static constexpr std::size_t linear = Shapes + 1;
-  std::array<Column, linear> unit;
-  std::array<std::array<float, linear>, linear> triangle{};  // of the orthogonalisation
-  std::array<Column, Shapes> by_position, by_blur;
-  std::array<std::array<float, Shapes>, Shapes> position_gram{}, blur_gram{};
-  bool independent = true;
-};
-
-template <int Shapes>
-OrthogonalBasis<Shapes> orthogonalise(const Basis<Shapes>& basis, std::size_t count) {
-  OrthogonalBasis<Shapes> out;
-  for (std::size_t j = 0; j < out.linear; ++j) {
-    Column& column = out.unit[j];
-    if (j == 0) {
-      column.fill(1);
-    } else {
-      column = basis.value[j - 1];
-    }
-    const float before = dot(column.data(), column.data(), count);
-    for (std::size_t k = 0; k < j; ++k) {
-      out.triangle[k][j] = dot(out.unit[k].data(), column.data(), count);
-      subtract(column, out.triangle[k][j], out.unit[k], count);
-    }
-    const float square = dot(column.data(), column.data(), count);
-    out.independent = out.independent && square > 1e-5F * before;
-    out.triangle[j][j] = std::sqrt(square);
-    for (std::size_t i = 0; i < count; ++i) column[i] /= out.triangle[j][j];
-  }
-  for (std::size_t s = 0; s < Shapes; ++s) {
-    out.by_position[s] = basis.by_position[s];
-    out.by_blur[s] = basis.by_blur[s];
-    for (const Column& unit : out.unit) {
-      subtract(out.by_position[s], dot(unit.data(), out.by_position[s].data(), count), unit, count);
-      subtract(out.by_blur[s], dot(unit.data(), out.by_blur[s].data(), count), unit, count);
-    }
-  }
-  for (std::size_t s = 0; s < Shapes; ++s)
-    for (std::size_t t = 0; t < Shapes; ++t) {
-      out.position_gram[s][t] = dot(out.by_position[s].data(), out.by_position[t].data(), count);
-      out.blur_gram[s][t] = dot(out.by_blur[s].data(), out.by_blur[t].data(), count);
-    }
-  return out;
-}
-
-// As project() below, where no sample is missing.
-template <int Shapes>
-EdgeFit project_whole(const EdgeProfile& profile, const Basis<Shapes>& basis) {
-  EdgeFit fit;
-  const std::size_t count = profile.count;
-  const OrthogonalBasis<Shapes> q = orthogonalise(basis, count);
-  if (!q.independent) return fit;
-  float position_gradient = 0, squares = 0;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const float* light = profile.light[c].data();
-    std::array<float, q.linear> coefficient, amplitude;
-    squares += dot(light, light, count);
-    for (std::size_t j = 0; j < q.linear; ++j) {
-      coefficient[j] = dot(q.unit[j].data(), light, count);
-      squares -= coefficient[j] * coefficient[j];
-    }
-    for (std::size_t j = q.linear; j-- > 0;) {
-      amplitude[j] = coefficient[j];
-      for (std::size_t k = j + 1; k < q.linear; ++k) amplitude[j] -= q.triangle[j][k] * amplitude[k];
-      amplitude[j] /= q.triangle[j][j];
-    }
-    for (std::size_t s = 0; s < Shapes; ++s) {
-      position_gradient += amplitude[s + 1] * dot(q.by_position[s].data(), light, count);
-      fit.blur_gradient += amplitude[s + 1] * dot(q.by_blur[s].data(), light, count);
-      for (std::size_t t = 0; t < Shapes; ++t) {
-        fit.information += amplitude[s + 1] * amplitude[t + 1] * q.position_gram[s][t];
-        fit.blur_information += amplitude[s + 1] * amplitude[t + 1] * q.blur_gram[s][t];
-      }
-      fit.step[c] += amplitude[s + 1];
-    }
-  }
-  const int degrees = 3 * (static_cast<int>(count) - static_cast<int>(q.linear)) - 1;
-  if (degrees < 3 || !(fit.information > 0)) return fit;
-  fit.offset_px = position_gradient / fit.information;
-  fit.residual_variance = std::max(0.0F, squares) / static_cast<float>(degrees);
-  fit.converged = std::isfinite(fit.offset_px) && std::isfinite(fit.residual_variance);
-  return fit;
 }
 
 // One variable-projection step: linear amplitudes per channel, then the position in what they leave.
@@ -211,7 +108,7 @@ EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
     degrees += used - linear;
     fit.step[c] = amplitude.tail(Shapes).sum();
   }
-  if (degrees < 3 || !(fit.information > 0)) return fit;
+  if (degrees < 3 || !(fit.information > least_edge_information)) return fit;
   fit.offset_px = position_gradient / fit.information;
   fit.residual_variance = squares / static_cast<float>(degrees);
   fit.converged = std::isfinite(fit.offset_px) && std::isfinite(fit.residual_variance);
@@ -224,7 +121,7 @@ EdgeFit iterate(const EdgeProfile& profile, int iterations, const MakeBasis& bas
   EdgeFit fit;
   const float reach_px = static_cast<float>(profile.count) / 2;
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    fit = profile.all_usable ? project_whole(profile, basis_at(edge_px)) : project(profile, basis_at(edge_px));
+    fit = project(profile, basis_at(edge_px));
     if (!fit.converged) return fit;
     const float step_px = std::clamp(fit.offset_px, -2.0F, 2.0F);
     edge_px += step_px;
@@ -232,9 +129,9 @@ EdgeFit iterate(const EdgeProfile& profile, int iterations, const MakeBasis& bas
       fit.converged = false;
       return fit;
     }
-    if (std::abs(step_px) < tolerance_px) break;
+    if (std::abs(step_px) < edge_tolerance_px) break;
   }
-  fit.converged = std::abs(fit.offset_px) < (iterations > 1 ? 0.25F : 1.5F);
+  fit.converged = std::abs(fit.offset_px) < (iterations > 1 ? largest_last_step_px : largest_only_step_px);
   fit.offset_px = edge_px;
   return fit;
 }

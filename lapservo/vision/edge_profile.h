@@ -12,7 +12,6 @@ struct EdgeProfile {
   std::size_t count = 0;
   std::array<std::array<float, max_samples>, 3> light;
   std::array<std::array<bool, max_samples>, 3> usable;  ///< false where saturated
-  bool all_usable = true;
 };
 
 /// Where the edge is, by least squares over the three channels with amplitudes free in each.
@@ -24,6 +23,12 @@ struct EdgeFit {
   std::array<float, 3> step{};                    ///< change of the light over the edge, per channel
   float blur_gradient = 0, blur_information = 0;  ///< Gauss-Newton terms of the blur, for unit noise
 };
+
+/// An edge with less information has no contrast.
+inline constexpr float least_edge_information = 1e-9F;
+/// Iterations end below the first; the last of several may move the edge by less than the second, an only one by less
+/// than the third.
+inline constexpr float edge_tolerance_px = 0.004F, largest_last_step_px = 0.25F, largest_only_step_px = 1.5F;
 
 /// A step between two flat stretches, blurred by `blur_px`. Takes up to `iterations` Gauss-Newton steps.
 EdgeFit fit_step(const EdgeProfile& profile, float blur_px, int iterations);

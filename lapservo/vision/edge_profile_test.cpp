@@ -106,7 +106,6 @@ TEST(EdgeProfile, TheErrorOfALimbIsAsPredicted) {
 TEST(EdgeProfile, SaturatedSamplesAreDropped) {
   EdgeProfile profile = profile_of(step(1.2), 0.6, 9, 0.003, 5);
   for (std::size_t i = 12; i < profile.count; ++i) profile.usable[0][i] = false;
-  profile.all_usable = false;
   const EdgeFit fit = fit_step(profile, 1.2F, 8);
   ASSERT_TRUE(fit.converged);
   EXPECT_NEAR(fit.offset_px, 0.6, 4 * 0.003 / std::sqrt(fit.information));
@@ -129,33 +128,9 @@ TEST(EdgeProfile, InformationAddsUpOverTheChannels) {
     EdgeProfile part = profile;
     for (std::size_t c = 0; c < 3; ++c)
       if (c != only) part.usable[c].fill(false);
-    part.all_usable = false;
     sum += fit_step(part, 1.2F, 1).information;
   }
   EXPECT_NEAR(sum, fit_step(profile, 1.2F, 1).information, 1e-3F * sum);
-}
-
-// The fast path for whole profiles and the one for profiles with gaps are the same fit.
-TEST(EdgeProfile, BothPathsAgree) {
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    SCOPED_TRACE("seed " + std::to_string(seed));
-    EdgeProfile whole = profile_of(step(1.3), Random(seed).uniform(-1, 1), 9, 0.01, seed);
-    EdgeProfile gaps = whole;
-    gaps.all_usable = false;
-    const auto expect_same = [](const EdgeFit& a, const EdgeFit& b) {
-      ASSERT_TRUE(a.converged && b.converged);
-      EXPECT_NEAR(a.offset_px, b.offset_px, 1e-3);
-      EXPECT_NEAR(a.information, b.information, 2e-3 * a.information);
-      EXPECT_NEAR(a.residual_variance, b.residual_variance, 0.01 * a.residual_variance);
-      EXPECT_NEAR(a.blur_gradient, b.blur_gradient, 0.02 * std::sqrt(a.blur_information * a.residual_variance) + 1e-4);
-      EXPECT_NEAR(a.blur_information, b.blur_information, 5e-3 * a.blur_information);
-    };
-    expect_same(fit_step(whole, 1.2F, 5), fit_step(gaps, 1.2F, 5));
-    const Shape shape = limb(1.2, 45);
-    whole = gaps = profile_of(shape, 0.1, 12, 0.003, seed);
-    gaps.all_usable = false;
-    expect_same(fit_limb(whole, 1.2F, 45, 5), fit_limb(gaps, 1.2F, 45, 5));
-  }
 }
 
 // More light everywhere, or another exposure, moves no edge; seen from the other side it lies at minus its place.

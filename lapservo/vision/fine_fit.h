@@ -2,17 +2,12 @@
 
 #include <array>
 
+#include "lapservo/vision/edge_measurements.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo {
-
-/// Width of the blur (one sigma) along the boundaries' normals and across the shaft's sides: motion makes them differ.
-/// Carried from frame to frame.
-struct EdgeBlur {
-  double boundaries_px = 1.2, sides_px = 1.2;
-};
 
 struct FineFit {
   bool converged = false;

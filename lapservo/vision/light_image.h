@@ -15,6 +15,9 @@ class LightImage {
   LightImage(const ImageView& image, const std::array<float, 256>& light_of_value)
       : image_(image), light_(light_of_value) {}
 
+  const ImageView& image() const { return image_; }
+  const std::array<float, 256>& light_of_value() const { return light_; }
+
   /// Encoded values at and above this are taken for saturated: the light there is unknown.
   static constexpr std::uint8_t saturated_value = 252;
 

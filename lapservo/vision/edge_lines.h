@@ -1,0 +1,34 @@
+#pragma once
+
+#include <span>
+
+#include "lapservo/core/inplace_vector.h"
+#include "lapservo/vision/edge_profile.h"
+#include "lapservo/vision/light_image.h"
+
+namespace lapservo {
+
+/// A line in the raw image across an edge, sampled every pixel. All of it must lie inside the image
+/// (LightImage::contains).
+struct EdgeLine {
+  float u_px = 0, v_px = 0;    ///< where the edge is expected
+  float du = 1, dv = 0;        ///< unit direction; offsets count along it
+  int before = 0, after = 0;   ///< samples on either side, at most EdgeProfile::max_samples - 1 together
+  float blur_px = 1;           ///< of the edge along the line, one sigma
+  float limb_radius_px = 0;    ///< for locate_limbs
+};
+
+inline constexpr std::size_t most_edge_lines = 512;
+using EdgeFits = InplaceVector<EdgeFit, most_edge_lines>;
+
+/// The light along a line; fit_step and fit_limb of it.
+EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line);
+EdgeFit locate_step(const LightImage& light, const EdgeLine& line, int iterations);
+EdgeFit locate_limb(const LightImage& light, const EdgeLine& line, int iterations);
+
+/// The same for many lines, several at once in the lanes of the processor's vectors (Highway, chosen when run): one fit
+/// a line, equal to rounding. More than most_edge_lines: std::length_error.
+EdgeFits locate_steps(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
+EdgeFits locate_limbs(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
+
+}  // namespace lapservo

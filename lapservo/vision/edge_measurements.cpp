@@ -1,0 +1,316 @@
+#include "lapservo/vision/edge_measurements.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/vision/edge_lines.h"
+
+namespace lapservo {
+namespace {
+
+constexpr int most_lines = EdgeMeasurements::most_lines, stations = EdgeMeasurements::most_stations;
+constexpr int fewest_lines = 12;
+constexpr double line_reach = 0.9;  // of the visible half width: beyond, light and resolution are gone
+// What the model leaves out (shading across the blur, lens, print) of every single measurement.
+constexpr double single_floor_px = 0.04;
+// Interpolated samples are smoother than the pixels are noisy.
+constexpr double interpolation_noise = 1.6;
+constexpr double ambient_share = 0.18, most_lit = 2;  // of the film's edge
+
+// A direction around the shaft, in the unrolled frame and in the camera's.
+struct Generatrix {
+  double azimuth_rad;
+  Eigen::Vector3d outwards_unrolled, outwards, around;
+};
+
+// What a pass measures with.
+struct Frame {
+  const Scene& scene;
+  const LightImage& light;
+  const PoseUnknowns& unknowns;
+  double film_m;
+  CylinderView view;
+  Eigen::Matrix3d axes;                // of the unrolled frame, in the camera
+  Eigen::Vector3d camera_in_unrolled;  // [m]
+
+  Frame(const Scene& of_scene, const LightImage& of_light, const PoseUnknowns& of_unknowns, double of_film_m,
+        const CylinderView& of_view)
+      : scene(of_scene),
+        light(of_light),
+        unknowns(of_unknowns),
+        film_m(of_film_m),
+        view(of_view),
+        axes(unknowns.pose().camera_from_unrolled.rotation.toRotationMatrix()),
+        camera_in_unrolled(-axes.transpose() * unknowns.pose().camera_from_unrolled.translation) {}
+
+  const Marker& marker() const { return scene.marker; }
+  Generatrix generatrix(double azimuth_rad) const {
+    const double cosine = std::cos(azimuth_rad), sine = std::sin(azimuth_rad);
+    return {azimuth_rad, {cosine, sine, 0}, cosine * axes.col(0) + sine * axes.col(1),
+            cosine * axes.col(1) - sine * axes.col(0)};
+  }
+  Eigen::Vector3d point(const Generatrix& line, double along_m) const {
+    return unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * line.outwards +
+           along_m * axes.col(2);
+  }
+  // How brightly the film's edge at boundary k shows, relative to the outside beside it; 0 when it is not seen.
+  double film_light(std::size_t k, const Generatrix& line) const {
+    if (k == 1 || k == 2) return 0;
+    Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
+    if (k == 3) to_camera.z() -= marker().length_m();
+    const double beyond = k == 0 ? -to_camera.z() : to_camera.z();
+    if (beyond <= 0) return 0;
+    const double distance_m = to_camera.norm();
+    const auto lit = [](double cosine) { return ambient_share + (1 - ambient_share) * std::max(0.0, cosine); };
+    return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m), most_lit);
+  }
+  double tau(double azimuth_rad) const { return azimuth_rad - unknowns.pose().psi_rad - marker().seam_rad; }
+
+  // The line through a point of the image, when all of it can be sampled.
+  std::optional<EdgeLine> edge_line(const Eigen::Vector2d& centre_px, const Eigen::Vector2d& direction, int before,
+                                    int after, double blur_px) const {
+    if (!light.contains(centre_px - before * direction) || !light.contains(centre_px + after * direction))
+      return std::nullopt;
+    EdgeLine line;
+    line.u_px = static_cast<float>(centre_px.x()), line.v_px = static_cast<float>(centre_px.y());
+    line.du = static_cast<float>(direction.x()), line.dv = static_cast<float>(direction.y());
+    line.before = before, line.after = after;
+    line.blur_px = static_cast<float>(blur_px);
+    return line;
+  }
+};
+
+// A boundary on a generatrix, where it is expected; all of the measurement but residual and sigma.
+struct BoundaryPlace {
+  Measurement measurement;
+  Eigen::Vector2d point_px, along;
+  double normal_cosine;
+  EdgeLine line;
+};
+
+bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_px) {
+  const std::size_t k = place.measurement.group;
+  const Eigen::Vector2d at_px = place.point_px + static_cast<double>(offset_px) * place.along;
+  const Eigen::Vector2d reach = 0.8 * place.line.before * place.along;
+  return frame.scene.class_at(at_px - reach) == (k == 0 ? 0 : frame.scene.bands[k - 1]) &&
+         frame.scene.class_at(at_px + reach) == (k == 3 ? 0 : frame.scene.bands[k]);
+}
+
+std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
+                                            const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
+                                            double blur_px) {
+  constexpr double least_cosine = 0.3;
+  const double film_light = frame.film_light(k, generatrix);
+  const Eigen::Vector3d point =
+      frame.point(generatrix, along_m[k]) - film_light * frame.film_m * generatrix.outwards;
+  if (!(point.z() > 1e-3)) return std::nullopt;
+  const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
+  const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
+  const double px_per_m = axis_px.norm();
+  BoundaryPlace place;
+  place.point_px = image.point_px;
+  place.along = axis_px / px_per_m;
+  const Eigen::Vector2d tangent =
+      (frame.marker().radius_m() * (image.d_px_d_point * generatrix.around) + slope_m * axis_px).normalized();
+  const Eigen::Vector2d normal(-tangent.y(), tangent.x());
+  place.normal_cosine = normal.dot(place.along);
+  if (!(std::abs(place.normal_cosine) > least_cosine)) return std::nullopt;
+
+  double gap_px = 1e9;
+  if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
+  if (k < 3) gap_px = std::min(gap_px, (along_m[k + 1] - along_m[k]) * px_per_m);
+  const double line_blur_px = blur_px / std::abs(place.normal_cosine);
+  const int reach =
+      static_cast<int>(std::min({2.5 * line_blur_px + effort.extra_px, 0.6 * gap_px - line_blur_px, 22.0}));
+  if (reach < 3) return std::nullopt;
+  const auto line = frame.edge_line(image.point_px, place.along, reach, reach, line_blur_px);
+  if (!line) return std::nullopt;
+  place.line = *line;
+  const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
+  place.measurement.row = frame.unknowns.row(point, pull);
+  place.measurement.row[place.measurement.row.size() - 1] = -slope_m * pull.dot(frame.axes.col(2));
+  place.measurement.by_film = -film_light * film_sigma_m * pull.dot(generatrix.outwards);
+  place.measurement.group = k;
+  return place;
+}
+
+// Reorders the values.
+float median(std::span<float> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// A boundary point that was located.
+struct Candidate {
+  const BoundaryPlace* place;
+  const EdgeFit* edge;
+  bool colors_agree;
+};
+
+// Keeps the candidates of one boundary whose change of light is what most see where the colours agree; gives each its
+// sigma from the noise that the lines show.
+void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
+  std::array<float, 3> typical{};
+  InplaceVector<float, most_lines> values;
+  for (std::size_t c = 0; c < 3; ++c) {
+    values.clear();
+    for (const Candidate& candidate : candidates)
+      if (candidate.colors_agree) values.push_back(candidate.edge->step[c]);
+    if (values.size() < 3) return;
+    typical[c] = median(values);
+  }
+  values.clear();
+  for (const Candidate& candidate : candidates)
+    if (candidate.colors_agree) values.push_back(candidate.edge->residual_variance);
+  const double typical_variance = median(values);
+  const auto dot = [](const std::array<float, 3>& a, const std::array<float, 3>& b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  };
+  const float typical_square = dot(typical, typical);
+  for (const auto& [place, edge, agree] : candidates) {
+    const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
+    const bool alike = projection > 0.25F * typical_square && projection * projection > 0.7F * square * typical_square;
+    if (!alike || edge->residual_variance > 0.05F * square + 9 * typical_variance) continue;
+    const double variance = 0.5 * (edge->residual_variance + typical_variance) * interpolation_noise;
+    const double cosine = place->normal_cosine;
+    Measurement measurement = place->measurement;
+    measurement.residual_px = edge->offset_px * cosine;
+    measurement.sigma_px =
+        std::sqrt(variance / edge->information * cosine * cosine + single_floor_px * single_floor_px);
+    out.all.push_back(measurement);
+    out.boundary_blur.add(*edge, variance);
+  }
+}
+
+void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
+  const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
+  out.lines = std::max(fewest_lines, std::min(static_cast<int>(1.8 * radius_px), most_lines) / effort.thinning);
+  const auto slopes_m = boundary_slopes_m(frame.marker());
+  const double sine_of_half = std::sin(frame.view.half_visible_rad);
+  InplaceVector<BoundaryPlace, 4 * most_lines> places;
+  InplaceVector<EdgeLine, 4 * most_lines> lines;
+  for (int i = 0; i < out.lines; ++i) {
+    const double sine = line_reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
+    const Generatrix generatrix = frame.generatrix(frame.view.facing_azimuth_rad + std::asin(sine));
+    const double tau_rad = frame.tau(generatrix.azimuth_rad);
+    const auto along_m = boundaries_m(frame.marker(), tau_rad);
+    const double seam_px = std::abs(wrap_pi(tau_rad)) * radius_px * std::sqrt(1 - sine * sine);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const bool inner = k == 1 || k == 2;
+      if (inner && seam_px < 2.5 * blur_px + 1.5) continue;
+      const auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur_px);
+      if (!place) continue;
+      ++out.in_image[k];
+      places.push_back(*place);
+      lines.push_back(place->line);
+    }
+  }
+  const EdgeFits edges = locate_steps(frame.light, lines, effort.iterations);
+  for (std::size_t k = 0; k < 4; ++k) {
+    InplaceVector<Candidate, most_lines> candidates;
+    for (std::size_t i = 0; i < places.size(); ++i)
+      if (places[i].measurement.group == k && edges[i].converged)
+        candidates.push_back({&places[i], &edges[i], colors_agree(frame, places[i], edges[i].offset_px)});
+    trust(candidates, out);
+  }
+}
+
+// Whether one band fills the section between two azimuths at a place, with some room.
+bool one_band(const Frame& frame, double azimuth_a_rad, double azimuth_b_rad, double along_m, double room_m) {
+  const double tau_a = wrap_two_pi(frame.tau(azimuth_a_rad)), tau_b = wrap_two_pi(frame.tau(azimuth_b_rad));
+  if (std::abs(tau_a - tau_b) > pi) return false;  // the seam lies between
+  const auto a = boundaries_m(frame.marker(), tau_a), b = boundaries_m(frame.marker(), tau_b);
+  const auto band = [](const std::array<double, 4>& e, double x) { return std::upper_bound(e.begin(), e.end(), x) - e.begin(); };
+  const auto first = band(a, along_m - room_m);
+  return first >= 1 && first <= 3 && first == band(a, along_m + room_m) && first == band(b, along_m - room_m) &&
+         first == band(b, along_m + room_m);
+}
+
+// A point of a side where it is expected.
+struct SidePlace {
+  Measurement measurement;
+  EdgeLine line;
+};
+
+std::optional<SidePlace> place_side(const Frame& frame, double side, double along_m, const Effort& effort,
+                                    double blur_px) {
+  constexpr double deep_rad = 0.87;  // where d = R (1 - cos 0.87) = 0.35 R
+  const double azimuth_rad = frame.view.facing_azimuth_rad + side * frame.view.half_visible_rad;
+  const Eigen::Vector3d point = frame.point(frame.generatrix(azimuth_rad), along_m);
+  if (!(point.z() > 1e-3)) return std::nullopt;
+  const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
+  const Eigen::Vector2d along = (image.d_px_d_point * frame.axes.col(2)).normalized();
+  const Eigen::Vector3d inside_point = frame.point(frame.generatrix(azimuth_rad - side * deep_rad), along_m);
+  Eigen::Vector2d inwards(-along.y(), along.x());
+  if (inwards.dot(frame.scene.camera.raw_from_point(inside_point) - image.point_px) < 0) inwards = -inwards;
+  const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
+  const int inside = static_cast<int>(std::min(0.34 * radius_px, 26.0));
+  const int outside = static_cast<int>(std::min(2.5 * blur_px + effort.extra_px, 14.0));
+  if (inside < 5) return std::nullopt;
+  const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
+  if (!one_band(frame, azimuth_rad, azimuth_rad - side * deep_rad, along_m, room_m)) return std::nullopt;
+  const auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
+  if (!line) return std::nullopt;
+  SidePlace place{{}, *line};
+  place.line.limb_radius_px = static_cast<float>(radius_px);
+  place.measurement.row = frame.unknowns.row(point, image.d_px_d_point.transpose() * inwards);
+  place.measurement.group = side < 0 ? 4 : 5;
+  return place;
+}
+
+void measure_sides(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
+  constexpr double largest_sigma_px = 2;
+  const int count = stations / effort.thinning;
+  InplaceVector<SidePlace, 2 * stations> places;
+  InplaceVector<EdgeLine, 2 * stations> lines;
+  for (int station = 0; station < count; ++station)
+    for (const double side : {-1.0, 1.0}) {
+      const double along_m = frame.marker().length_m() * (station + 0.5) / count;
+      const auto place = place_side(frame, side, along_m, effort, blur_px);
+      if (!place) continue;
+      places.push_back(*place);
+      lines.push_back(place->line);
+    }
+  const EdgeFits edges = locate_limbs(frame.light, lines, effort.iterations);
+  InplaceVector<float, 2 * stations> variances;
+  for (const EdgeFit& edge : edges)
+    if (edge.converged) variances.push_back(edge.residual_variance);
+  if (variances.size() < 4) return;
+  const double typical_variance = median(variances);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const EdgeFit& edge = edges[i];
+    if (!edge.converged) continue;
+    const double variance = 0.5 * (edge.residual_variance + typical_variance) * interpolation_noise;
+    Measurement measurement = places[i].measurement;
+    measurement.residual_px = edge.offset_px;
+    measurement.sigma_px = std::sqrt(variance / edge.information + 4 * single_floor_px * single_floor_px);
+    if (measurement.sigma_px > largest_sigma_px) continue;
+    out.all.push_back(measurement);
+    out.side_blur.add(edge, variance);
+  }
+}
+
+}  // namespace
+
+double BlurEvidence::improved(double blur_px) const {
+  if (!(information > 0)) return blur_px;
+  return std::clamp(blur_px + gradient / information, std::max(0.5, 0.6 * blur_px), std::min(8.0, 1.7 * blur_px));
+}
+
+EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,
+                               const Effort& effort, const EdgeBlur& blur) {
+  EdgeMeasurements out;
+  const auto view = view_cylinder(unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
+  if (!view) return out;
+  const Frame frame(scene, light, unknowns, film_m, *view);
+  measure_boundaries(frame, effort, blur.boundaries_px, out);
+  measure_sides(frame, effort, blur.sides_px, out);
+  return out;
+}
+
+}  // namespace lapservo

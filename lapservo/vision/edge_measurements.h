@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "lapservo/core/inplace_vector.h"
+#include "lapservo/vision/edge_profile.h"
+#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/scene.h"
+#include "lapservo/vision/shaft_pose.h"
+
+namespace lapservo {
+
+/// Width of the blur (one sigma) along the boundaries' normals and across the shaft's sides: motion makes them differ.
+/// Carried from frame to frame.
+struct EdgeBlur {
+  double boundaries_px = 1.2, sides_px = 1.2;
+};
+
+/// The film that carries the marker stands out from the shaft. Seen from beyond an end, its edge shows too and moves the
+/// apparent end inwards (towards the axis) by the film's thickness, as far as the edge is lit compared with the outside:
+/// diffusely from the camera, with some ambient light. The rig does not say how thick it is, so each fit estimates it.
+inline constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.04e-3;
+
+/// How far one point of an edge in the image lies from where a pose has it.
+struct Measurement {
+  UnknownVector row;     ///< d(position along the image normal)/d(unknowns)
+  double by_film = 0;    ///< d(...)/d(film thickness), pixels per film_sigma_m
+  double residual_px;    ///< along the normal
+  double sigma_px;
+  std::size_t group;     ///< 0..3: the boundary; 4 and 5: the sides
+};
+inline constexpr std::size_t measurement_groups = 6;
+
+/// How far beyond the blur a pass looks for edges, how often it refines each before the pose, and which share of the
+/// generatrices and stations it uses: one of so many.
+struct Effort {
+  double extra_px;
+  int iterations;
+  int thinning;
+};
+
+/// What the edges say about the blur.
+struct BlurEvidence {
+  double gradient = 0, information = 0;
+  void add(const EdgeFit& edge, double variance) {
+    gradient += edge.blur_gradient / variance;
+    information += edge.blur_information / variance;
+  }
+  /// The blur after a Gauss-Newton step of limited size.
+  double improved(double blur_px) const;
+};
+
+/// Everything that a frame shows of a marker's boundaries and of its shaft's sides near a pose.
+struct EdgeMeasurements {
+  static constexpr int most_lines = 96, most_stations = 28;
+  InplaceVector<Measurement, 4 * most_lines + 2 * most_stations> all;
+  std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
+  int lines = 0;                  ///< generatrices looked at
+  BlurEvidence boundary_blur, side_blur;
+};
+
+/// Looks around `unknowns` in linear light, to a fraction of a pixel. Nothing when the pose shows no shaft.
+EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,
+                               const Effort& effort, const EdgeBlur& blur);
+
+}  // namespace lapservo
