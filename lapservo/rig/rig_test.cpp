@@ -333,7 +333,11 @@ TEST(Rig, RefusesWhatIsNotYaml) {
   EXPECT_TRUE(error_of("camera: [1, 2").starts_with("rig.yaml: is not YAML: "));
   EXPECT_TRUE(error_of("a: b: c").starts_with("rig.yaml: is not YAML: "));
   EXPECT_EQ(error_of(std::string(100000, '[')), "rig.yaml: nests more deeply than a rig file does");
-  EXPECT_EQ(error_of(std::string(3000, '-')), "rig.yaml: nests more deeply than a rig file does");
+  std::string nested, ruler(3000, '-');
+  for (int i = 0; i < 3000; ++i) nested += "- ";
+  EXPECT_EQ(error_of(nested), "rig.yaml: nests more deeply than a rig file does");
+  EXPECT_NE(error_of(ruler), "rig.yaml: nests more deeply than a rig file does");
+  EXPECT_EQ(error_of("# " + ruler + "\n" + good), "");
   EXPECT_EQ(error_of(std::string(2 << 20, ' ')), "rig.yaml: is larger than 1 MiB, expected a rig file");
 }
 

@@ -35,11 +35,14 @@ bool nests_too_deeply(std::string_view yaml) {
     if (c == ']' || c == '}') --depth;
     if (depth > 16) return true;
   }
-  std::size_t run = 0;  // "- - - -" and "? ? ?" and ": : :" nest too
-  for (const char c : yaml) {
-    if (c == '-' || c == '?' || c == ':') {
+  constexpr std::string_view blanks = " \n\t\r";
+  std::size_t run = 0;  // "- - - -" and "? ? ?" and ": : :" nest too; a ruler of dashes does not
+  for (std::size_t i = 0; i < yaml.size(); ++i) {
+    const bool indicator = (yaml[i] == '-' || yaml[i] == '?' || yaml[i] == ':') &&
+                           (i + 1 == yaml.size() || blanks.find(yaml[i + 1]) != std::string_view::npos);
+    if (indicator) {
       if (++run > 64) return true;
-    } else if (c != ' ' && c != '\n' && c != '\t') {
+    } else if (blanks.find(yaml[i]) == std::string_view::npos) {
       run = 0;
     }
   }
