@@ -23,7 +23,8 @@ inline double wrap_pi(double angle_rad) {
 
 /// The same angle in [0, 2 pi).
 inline double wrap_two_pi(double angle_rad) {
-  double wrapped = std::fmod(angle_rad, two_pi);
+  if (angle_rad >= 0 && angle_rad < two_pi) return angle_rad;
+  double wrapped = angle_rad < 0 && angle_rad > -two_pi ? angle_rad : std::fmod(angle_rad, two_pi);
   if (wrapped < 0) wrapped += two_pi;
   return wrapped >= two_pi ? 0.0 : wrapped;
 }

@@ -30,23 +30,12 @@ Distorted distort(const std::array<double, 5>& k, const Eigen::Vector2d& x) {
 
 }  // namespace
 
-bool Camera::distorted() const {
-  const auto& k = distortion;  // asked for every sample: no branches
-  return (k[0] != 0) | (k[1] != 0) | (k[2] != 0) | (k[3] != 0) | (k[4] != 0);
-}
-
 bool Camera::contains(const Eigen::Vector2d& raw_px, double margin_px) const {
   return raw_px.x() >= margin_px && raw_px.y() >= margin_px && raw_px.x() <= width_px - 1 - margin_px &&
          raw_px.y() <= height_px - 1 - margin_px;
 }
 
-Eigen::Vector2d Camera::ideal_from_point(const Eigen::Vector3d& point_in_camera) const {
-  const double inverse_z = 1 / point_in_camera.z();
-  return {cx_px + fx_px * point_in_camera.x() * inverse_z, cy_px + fy_px * point_in_camera.y() * inverse_z};
-}
-
-Eigen::Vector2d Camera::raw_from_ideal(const Eigen::Vector2d& ideal_px) const {
-  if (!distorted()) return ideal_px;
+Eigen::Vector2d Camera::distorted_from_ideal(const Eigen::Vector2d& ideal_px) const {
   const Eigen::Vector2d x = distort(distortion, ray_from_ideal(ideal_px).head<2>()).point;
   return {cx_px + fx_px * x.x(), cy_px + fy_px * x.y()};
 }
@@ -68,10 +57,6 @@ std::optional<Eigen::Vector2d> Camera::ideal_from_raw(const Eigen::Vector2d& raw
       return Eigen::Vector2d(cx_px + fx_px * x.x(), cy_px + fy_px * x.y());
   }
   return std::nullopt;
-}
-
-Eigen::Vector2d Camera::raw_from_point(const Eigen::Vector3d& point_in_camera) const {
-  return raw_from_ideal(ideal_from_point(point_in_camera));
 }
 
 ProjectionWithJacobian Camera::ideal_with_jacobian(const Eigen::Vector3d& p) const {

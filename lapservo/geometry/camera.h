@@ -24,21 +24,34 @@ struct Camera {
   std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3
   Response response;
 
-  bool distorted() const;
+  bool distorted() const {
+    const auto& k = distortion;  // asked for every sample: no branches
+    return (k[0] != 0) | (k[1] != 0) | (k[2] != 0) | (k[3] != 0) | (k[4] != 0);
+  }
   bool contains(const Eigen::Vector2d& raw_px, double margin_px = 0) const;
 
   /// Pinhole image of a point in the camera frame; only for z > 0 (behind the camera it mirrors).
-  Eigen::Vector2d ideal_from_point(const Eigen::Vector3d& point_in_camera) const;
-  Eigen::Vector2d raw_from_ideal(const Eigen::Vector2d& ideal_px) const;
+  Eigen::Vector2d ideal_from_point(const Eigen::Vector3d& point_in_camera) const {
+    const double inverse_z = 1 / point_in_camera.z();
+    return {cx_px + fx_px * point_in_camera.x() * inverse_z, cy_px + fy_px * point_in_camera.y() * inverse_z};
+  }
+  Eigen::Vector2d raw_from_ideal(const Eigen::Vector2d& ideal_px) const {
+    return distorted() ? distorted_from_ideal(ideal_px) : ideal_px;
+  }
   /// Newton's method; nullopt where the distortion can't be inverted (far outside the image of a barrel lens).
   std::optional<Eigen::Vector2d> ideal_from_raw(const Eigen::Vector2d& raw_px) const;
-  Eigen::Vector2d raw_from_point(const Eigen::Vector3d& point_in_camera) const;
+  Eigen::Vector2d raw_from_point(const Eigen::Vector3d& point_in_camera) const {
+    return raw_from_ideal(ideal_from_point(point_in_camera));
+  }
   /// raw_from_point with its derivative.
   ProjectionWithJacobian raw_with_jacobian(const Eigen::Vector3d& point_in_camera) const;
   /// ideal_from_point with its derivative.
   ProjectionWithJacobian ideal_with_jacobian(const Eigen::Vector3d& point_in_camera) const;
   /// Direction (not normalised, z = 1) of the ray through an ideal pixel.
   Eigen::Vector3d ray_from_ideal(const Eigen::Vector2d& ideal_px) const;
+
+ private:
+  Eigen::Vector2d distorted_from_ideal(const Eigen::Vector2d& ideal_px) const;
 };
 
 }  // namespace lapservo

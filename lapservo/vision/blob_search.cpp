@@ -2,60 +2,101 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
+#include <utility>
 
 namespace lapservo {
 
-std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int least_samples) {
-  const int columns = image.width_px / grid_px, rows = image.height_px / grid_px, first = grid_px / 2;
-  std::vector<std::uint8_t> grid(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  std::vector<int> colored;
-  for (int row = 0; row < rows; ++row) {
-    const std::uint8_t* pixel = image.pixel(first, first + row * grid_px);
-    for (int column = 0; column < columns; ++column, pixel += 3 * static_cast<std::ptrdiff_t>(grid_px)) {
-      const std::uint8_t color = classes(pixel);
-      const int cell = row * columns + column;
-      grid[static_cast<std::size_t>(cell)] = color;
-      if (color) colored.push_back(cell);
+namespace {
+
+// Classes of the grid's samples, framed by cells without colour, so that a cell's neighbourhood always exists.
+class Grid {
+ public:
+  static constexpr int reach = 2;  // cells: bridges a highlight along the shaft and blotches of blood
+  static constexpr int around = 2 * reach + 1;
+
+  Grid(const ImageView& image, const ColorClasses& classes, int grid_px)
+      : grid_px_(grid_px), columns_(image.width_px / grid_px), rows_(image.height_px / grid_px) {
+    cells_.resize(static_cast<std::size_t>(stride()) * static_cast<std::size_t>(rows_ + 2 * reach));
+    for (int row = 0; row < rows_; ++row) {
+      const std::uint8_t* pixel = image.pixel(grid_px / 2, grid_px / 2 + row * grid_px);
+      const int first = (row + reach) * stride() + reach;
+      for (int cell = first; cell < first + columns_; ++cell, pixel += 3 * static_cast<std::ptrdiff_t>(grid_px)) {
+        const std::uint8_t color = classes(pixel);
+        at(cell) = color;
+        if (color) colored_.push_back(cell);
+      }
     }
   }
 
-  // Sensor noise in the dark has colours too, but neighbours do not share them.
-  constexpr int least_alike = 3;
-  const auto alike = [&](int cell) {
-    const int column = cell % columns, row = cell / columns;
-    int count = 0;
-    for (int r = std::max(0, row - 1); r <= std::min(rows - 1, row + 1); ++r)
-      for (int c = std::max(0, column - 1); c <= std::min(columns - 1, column + 1); ++c)
-        count += grid[static_cast<std::size_t>(r * columns + c)] == grid[static_cast<std::size_t>(cell)];
-    return count - 1 >= least_alike;
-  };
-  std::vector<int> lonely;
-  for (const int cell : colored)
-    if (!alike(cell)) lonely.push_back(cell);
-  for (const int cell : lonely) grid[static_cast<std::size_t>(cell)] = 0;
+  /// Cells that had a colour at first.
+  const std::vector<int>& colored() const { return colored_; }
+  std::uint8_t& at(int cell) { return cells_[static_cast<std::size_t>(cell)]; }
+  /// `around` cells from the left to the right of a neighbour `rows` further down.
+  std::uint8_t* row_around(int cell, int rows) { return &at(cell + rows * stride() - reach); }
+  int cell_of(const std::uint8_t* place) const { return static_cast<int>(place - cells_.data()); }
+  Blob::Sample sample(int cell) {
+    const int column = cell % stride() - reach, row = cell / stride() - reach;
+    return {grid_px_ / 2 + column * grid_px_, grid_px_ / 2 + row * grid_px_, at(cell)};
+  }
 
-  constexpr int reach = 2;  // cells: bridges a highlight along the shaft and blotches of blood
+ private:
+  int stride() const { return columns_ + 2 * reach; }
+  int grid_px_, columns_, rows_;
+  std::vector<std::uint8_t> cells_;
+  std::vector<int> colored_;
+};
+
+// Sensor noise in the dark has colours too, but neighbours do not share them.
+void drop_lonely(Grid& grid) {
+  constexpr int least_alike = 3;
+  std::vector<int> lonely;
+  for (const int cell : grid.colored()) {
+    int count = -1;  // itself
+    for (int row = -1; row <= 1; ++row) {
+      const std::uint8_t* places = grid.row_around(cell, row);
+      for (int i = Grid::reach - 1; i <= Grid::reach + 1; ++i) count += places[i] == grid.at(cell);
+    }
+    if (count < least_alike) lonely.push_back(cell);
+  }
+  for (const int cell : lonely) grid.at(cell) = 0;
+}
+
+// Moves what hangs together with a cell out of the grid.
+Blob take_blob(Grid& grid, int seed, std::vector<int>& stack) {
+  Blob blob;
+  const auto take = [&](int cell) {
+    blob.samples.push_back(grid.sample(cell));
+    grid.at(cell) = 0;
+    stack.push_back(cell);
+  };
+  take(seed);
+  while (!stack.empty()) {
+    const int cell = stack.back();
+    stack.pop_back();
+    for (int row = -Grid::reach; row <= Grid::reach; ++row) {
+      const std::uint8_t* places = grid.row_around(cell, row);
+      std::uint64_t any = 0;  // most are taken already: look at all at once
+      std::memcpy(&any, places, Grid::around);
+      if (!any) continue;
+      for (int i = 0; i < Grid::around; ++i)
+        if (places[i]) take(grid.cell_of(places + i));
+    }
+  }
+  return blob;
+}
+
+}  // namespace
+
+std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int least_samples) {
+  Grid grid(image, classes, grid_px);
+  drop_lonely(grid);
   std::vector<Blob> blobs;
   std::vector<int> stack;
-  for (const int seed : colored) {
-    if (!grid[static_cast<std::size_t>(seed)]) continue;
-    Blob blob;
+  for (const int seed : grid.colored()) {
+    if (!grid.at(seed)) continue;
+    Blob blob = take_blob(grid, seed, stack);
     blob.grid_px = grid_px;
-    const auto take = [&](int column, int row) {
-      const int cell = row * columns + column;
-      std::uint8_t& color = grid[static_cast<std::size_t>(cell)];
-      if (!color) return;
-      blob.samples.push_back({first + column * grid_px, first + row * grid_px, color});
-      color = 0;
-      stack.push_back(cell);
-    };
-    take(seed % columns, seed / columns);
-    while (!stack.empty()) {
-      const int column = stack.back() % columns, row = stack.back() / columns;
-      stack.pop_back();
-      for (int r = std::max(0, row - reach); r <= std::min(rows - 1, row + reach); ++r)
-        for (int c = std::max(0, column - reach); c <= std::min(columns - 1, column + reach); ++c) take(c, r);
-    }
     if (static_cast<int>(blob.samples.size()) >= least_samples) blobs.push_back(std::move(blob));
   }
   std::sort(blobs.begin(), blobs.end(),

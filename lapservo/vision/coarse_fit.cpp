@@ -198,7 +198,7 @@ class RotationScore {
         sums[0] = 0;
         for (std::size_t k = 0; k < samples_along; ++k) {
           const std::uint8_t color = surface.lines[i].classes[k];
-          const bool ours = color == scene.bands[0] || color == scene.bands[1] || color == scene.bands[2];
+          const bool ours = scene.is_ours(color);
           sums[k + 1] = sums[k] + (color == scene.bands[band] ? 1 : (ours ? -1 : 0));
           seen_ += band == 0 && ours ? 1 : 0;
         }
@@ -209,15 +209,16 @@ class RotationScore {
     int score = 0;
     for (std::size_t i = 0; i < line_count; ++i) {
       const auto ends_m = boundaries_m(scene_.marker, surface_.lines[i].azimuth_rad - psi_rad - scene_.marker.seam_rad);
-      for (std::size_t band = 0; band < 3; ++band)
-        score += sums_[i][band][index(ends_m[band + 1])] - sums_[i][band][index(ends_m[band])];
+      std::array<std::size_t, 4> ends;
+      for (std::size_t k = 0; k < 4; ++k) ends[k] = index(ends_m[k]);
+      for (std::size_t band = 0; band < 3; ++band) score += sums_[i][band][ends[band + 1]] - sums_[i][band][ends[band]];
     }
     return seen_ ? static_cast<double>(score) / seen_ : 0;
   }
 
  private:
   std::size_t index(double along_m) const {
-    const double k = std::round((along_m - surface_.first_m) / surface_.step_m);
+    const double k = (along_m - surface_.first_m) / surface_.step_m + 0.5;
     return static_cast<std::size_t>(std::clamp(k, 0.0, static_cast<double>(samples_along)));
   }
 

@@ -8,7 +8,7 @@ namespace lapservo {
 struct CoarseFitOptions {
   double lateral_reach_px = 24;  ///< how far beyond the predicted silhouettes the shaft's sides are looked for
   double along_reach = 0.25;     ///< how far beyond the marker's ends boundaries are looked for, in marker lengths
-  int rounds = 3;                ///< of measuring and fitting; the rotation is searched in the second
+  int rounds = 2;                ///< of measuring and fitting; the rotation is searched in the second
   bool search_rotation = true;   ///< look for psi over the full turn; else start from the given one
 };
 

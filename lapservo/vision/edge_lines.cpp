@@ -85,10 +85,14 @@ struct Neighbours {
     const VI word = hn::Load(Ints(), words[2 * lower + (byte > 3 ? 1 : 0)].data());
     const VI low = hn::Set(Ints(), 255);
     switch (byte > 3 ? byte - 2 : byte) {
-      case 0: return hn::And(word, low);
-      case 1: return hn::And(hn::ShiftRight<8>(word), low);
-      case 2: return hn::And(hn::ShiftRight<16>(word), low);
-      default: return hn::And(hn::ShiftRight<24>(word), low);
+      case 0:
+        return hn::And(word, low);
+      case 1:
+        return hn::And(hn::ShiftRight<8>(word), low);
+      case 2:
+        return hn::And(hn::ShiftRight<16>(word), low);
+      default:
+        return hn::And(hn::ShiftRight<24>(word), low);
     }
   }
 };
@@ -145,13 +149,12 @@ BlurredLanes blurred_at(V u) {
   BlurredLanes edge{field(0), field(1), V(), V(), V()};
   if constexpr (WithRoots) {
     const Mask far = hn::Gt(u, last);
-    const V safe = hn::Max(u, last), root = hn::Sqrt(safe), correction = hn::Div(hn::Set(d, 0.125F), hn::Mul(safe, safe));
+    const V safe = hn::Max(u, last), root = hn::Sqrt(safe),
+            correction = hn::Div(hn::Set(d, 0.125F), hn::Mul(safe, safe));
     const V one = hn::Set(d, 1), three = hn::Set(d, 3);
     edge.root = hn::IfThenElse(far, hn::Mul(root, hn::Sub(one, correction)), field(2));
-    edge.three_halves =
-        hn::IfThenElse(far, hn::Mul(hn::Mul(root, safe), hn::MulAdd(three, correction, one)), field(3));
-    edge.root_slope = hn::IfThenElse(
-        far, hn::Div(hn::MulAdd(three, correction, one), hn::Add(root, root)), field(4));
+    edge.three_halves = hn::IfThenElse(far, hn::Mul(hn::Mul(root, safe), hn::MulAdd(three, correction, one)), field(3));
+    edge.root_slope = hn::IfThenElse(far, hn::Div(hn::MulAdd(three, correction, one), hn::Add(root, root)), field(4));
   }
   return edge;
 }
@@ -222,8 +225,7 @@ struct Basis {
         const V bent = hn::Mul(hn::Mul(bend, hn::Set(d, 1.5F)), edge.root);
         unit[2][i].store(hn::Mul(up, hn::NegMulAdd(bend, edge.three_halves, edge.root)));
         by_position[1][i].store(hn::Mul(down, hn::Sub(bent, edge.root_slope)));
-        by_blur[1][i].store(
-            hn::Mul(down, hn::NegMulAdd(u, edge.root_slope, hn::Mul(hn::Set(d, 0.5F), edge.root))));
+        by_blur[1][i].store(hn::Mul(down, hn::NegMulAdd(u, edge.root_slope, hn::Mul(hn::Set(d, 0.5F), edge.root))));
       }
     }
   }
@@ -358,8 +360,13 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
     if (of(sampled.brightest) >= LightImage::saturated_value) {
       fits.push_back(Shapes == 1 ? locate_step(image, lines[j], iterations) : locate_limb(image, lines[j], iterations));
     } else {
-      fits.push_back({of(converged) > 0, of(offset), of(information), of(variance), {of(step[0]), of(step[1]), of(step[2])},
-                      of(blur_gradient), of(blur_information)});
+      fits.push_back({of(converged) > 0,
+                      of(offset),
+                      of(information),
+                      of(variance),
+                      {of(step[0]), of(step[1]), of(step[2])},
+                      of(blur_gradient),
+                      of(blur_information)});
     }
   }
 }

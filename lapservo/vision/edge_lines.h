@@ -11,11 +11,11 @@ namespace lapservo {
 /// A line in the raw image across an edge, sampled every pixel. All of it must lie inside the image
 /// (LightImage::contains).
 struct EdgeLine {
-  float u_px = 0, v_px = 0;    ///< where the edge is expected
-  float du = 1, dv = 0;        ///< unit direction; offsets count along it
-  int before = 0, after = 0;   ///< samples on either side, at most EdgeProfile::max_samples - 1 together
-  float blur_px = 1;           ///< of the edge along the line, one sigma
-  float limb_radius_px = 0;    ///< for locate_limbs
+  float u_px = 0, v_px = 0;   ///< where the edge is expected
+  float du = 1, dv = 0;       ///< unit direction; offsets count along it
+  int before = 0, after = 0;  ///< samples on either side, at most EdgeProfile::max_samples - 1 together
+  float blur_px = 1;          ///< of the edge along the line, one sigma
+  float limb_radius_px = 0;   ///< for locate_limbs
 };
 
 inline constexpr std::size_t most_edge_lines = 512;

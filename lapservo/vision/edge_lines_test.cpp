@@ -1,12 +1,12 @@
 #include "lapservo/vision/edge_lines.h"
 
 #include <cmath>
+#include <hwy/highway.h>
+#include <hwy/targets.h>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
-#include <hwy/targets.h>
 #include <opencv2/core.hpp>
 
 #include "lapservo/core/random.h"

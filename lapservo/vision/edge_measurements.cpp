@@ -50,7 +50,9 @@ struct Frame {
   const Marker& marker() const { return scene.marker; }
   Generatrix generatrix(double azimuth_rad) const {
     const double cosine = std::cos(azimuth_rad), sine = std::sin(azimuth_rad);
-    return {azimuth_rad, {cosine, sine, 0}, cosine * axes.col(0) + sine * axes.col(1),
+    return {azimuth_rad,
+            {cosine, sine, 0},
+            cosine * axes.col(0) + sine * axes.col(1),
             cosine * axes.col(1) - sine * axes.col(0)};
   }
   Eigen::Vector3d point(const Generatrix& line, double along_m) const {
@@ -84,6 +86,15 @@ struct Frame {
   }
 };
 
+// Measurement::row of a point, moving along `pull` [px/m], with its parts by psi and by the film.
+UnknownVector row_of(const PoseUnknowns& unknowns, const Eigen::Vector3d& point, const Eigen::Vector3d& pull,
+                     double by_psi, double by_film) {
+  UnknownVector row(unknowns.size() + 1);
+  row << unknowns.row(point, pull), by_film;
+  row[unknowns.size() - 1] = by_psi;
+  return row;
+}
+
 // A boundary on a generatrix, where it is expected; all of the measurement but residual and sigma.
 struct BoundaryPlace {
   Measurement measurement;
@@ -105,8 +116,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
                                             double blur_px) {
   constexpr double least_cosine = 0.3;
   const double film_light = frame.film_light(k, generatrix);
-  const Eigen::Vector3d point =
-      frame.point(generatrix, along_m[k]) - film_light * frame.film_m * generatrix.outwards;
+  const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - film_light * frame.film_m * generatrix.outwards;
   if (!(point.z() > 1e-3)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
@@ -131,9 +141,8 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   if (!line) return std::nullopt;
   place.line = *line;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
-  place.measurement.row = frame.unknowns.row(point, pull);
-  place.measurement.row[place.measurement.row.size() - 1] = -slope_m * pull.dot(frame.axes.col(2));
-  place.measurement.by_film = -film_light * film_sigma_m * pull.dot(generatrix.outwards);
+  place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
+                                 -film_light * film_sigma_m * pull.dot(generatrix.outwards));
   place.measurement.group = k;
   return place;
 }
@@ -189,7 +198,7 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
 
 void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
-  out.lines = std::max(fewest_lines, std::min(static_cast<int>(1.8 * radius_px), most_lines) / effort.thinning);
+  out.lines = std::max(fewest_lines, std::min(static_cast<int>(1.2 * radius_px), most_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
   const double sine_of_half = std::sin(frame.view.half_visible_rad);
   InplaceVector<BoundaryPlace, 4 * most_lines> places;
@@ -225,7 +234,9 @@ bool one_band(const Frame& frame, double azimuth_a_rad, double azimuth_b_rad, do
   const double tau_a = wrap_two_pi(frame.tau(azimuth_a_rad)), tau_b = wrap_two_pi(frame.tau(azimuth_b_rad));
   if (std::abs(tau_a - tau_b) > pi) return false;  // the seam lies between
   const auto a = boundaries_m(frame.marker(), tau_a), b = boundaries_m(frame.marker(), tau_b);
-  const auto band = [](const std::array<double, 4>& e, double x) { return std::upper_bound(e.begin(), e.end(), x) - e.begin(); };
+  const auto band = [](const std::array<double, 4>& e, double x) {
+    return std::upper_bound(e.begin(), e.end(), x) - e.begin();
+  };
   const auto first = band(a, along_m - room_m);
   return first >= 1 && first <= 3 && first == band(a, along_m + room_m) && first == band(b, along_m - room_m) &&
          first == band(b, along_m + room_m);
@@ -258,7 +269,7 @@ std::optional<SidePlace> place_side(const Frame& frame, double side, double alon
   if (!line) return std::nullopt;
   SidePlace place{{}, *line};
   place.line.limb_radius_px = static_cast<float>(radius_px);
-  place.measurement.row = frame.unknowns.row(point, image.d_px_d_point.transpose() * inwards);
+  place.measurement.row = row_of(frame.unknowns, point, image.d_px_d_point.transpose() * inwards, 0, 0);
   place.measurement.group = side < 0 ? 4 : 5;
   return place;
 }

@@ -17,18 +17,18 @@ struct EdgeBlur {
   double boundaries_px = 1.2, sides_px = 1.2;
 };
 
-/// The film that carries the marker stands out from the shaft. Seen from beyond an end, its edge shows too and moves the
-/// apparent end inwards (towards the axis) by the film's thickness, as far as the edge is lit compared with the outside:
-/// diffusely from the camera, with some ambient light. The rig does not say how thick it is, so each fit estimates it.
+/// The film that carries the marker stands out from the shaft. Seen from beyond an end, its edge shows too and moves
+/// the apparent end inwards (towards the axis) by the film's thickness, as far as the edge is lit compared with the
+/// outside: diffusely from the camera, with some ambient light. The rig does not say how thick it is, so each fit
+/// estimates it.
 inline constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.04e-3;
 
 /// How far one point of an edge in the image lies from where a pose has it.
 struct Measurement {
-  UnknownVector row;     ///< d(position along the image normal)/d(unknowns)
-  double by_film = 0;    ///< d(...)/d(film thickness), pixels per film_sigma_m
-  double residual_px;    ///< along the normal
+  UnknownVector row;   ///< d(position along the image normal)/d(unknowns, then film thickness in film_sigma_m) [px]
+  double residual_px;  ///< along the normal
   double sigma_px;
-  std::size_t group;     ///< 0..3: the boundary; 4 and 5: the sides
+  std::size_t group;  ///< 0..3: the boundary; 4 and 5: the sides
 };
 inline constexpr std::size_t measurement_groups = 6;
 
@@ -53,7 +53,7 @@ struct BlurEvidence {
 
 /// Everything that a frame shows of a marker's boundaries and of its shaft's sides near a pose.
 struct EdgeMeasurements {
-  static constexpr int most_lines = 96, most_stations = 28;
+  static constexpr int most_lines = 64, most_stations = 24;
   InplaceVector<Measurement, 4 * most_lines + 2 * most_stations> all;
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
   int lines = 0;                  ///< generatrices looked at

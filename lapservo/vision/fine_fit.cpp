@@ -14,14 +14,14 @@ namespace lapservo {
 namespace {
 
 // What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole.
-constexpr double common_boundary_px = 0.008, common_side_px = 0.02;
+constexpr double common_boundary_px = 0.007, common_side_px = 0.02;
 // And as a share of the blur beyond a lens's: motion and defocus do not blur like a Gaussian, and beside a limb even
 // less.
 constexpr double usual_blur_px = 1.2, boundary_share_of_blur = 0.05, side_share_of_blur = 0.2;
 // Where most of a marker is hidden, some of what was taken for its boundaries are the blood's.
 constexpr double usual_share = 0.7, doubt_of_hidden = 4;
 constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
-// A fit has settled when a pass moves no point and no smear (unsettled_px) farther than this.
+// A fit has settled when a pass moves no point and no smear (Change) farther than this.
 constexpr double settled_px = 1.5;
 constexpr int most_passes = 3;
 
@@ -29,26 +29,20 @@ double robust_weight(const Measurement& m, double residual_px) {
   return cauchy_weight(residual_px / m.sigma_px, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
 }
 
-// The unknowns of the pose, then the film's thickness in film_sigma_m.
-UnknownVector extended_row(const Measurement& m) {
-  UnknownVector row(m.row.size() + 1);
-  row << m.row, m.by_film;
-  return row;
-}
-
-// Minimises the robust cost of linearised measurements: iteratively reweighted. `film_prior` is what the film's
-// thickness lies below its expected one, in sigmas.
+// Minimises the robust cost of linearised measurements: iteratively reweighted. The unknowns are the pose's, then the
+// film's thickness in film_sigma_m; `film_prior` is what that lies below its expected one.
 UnknownVector solve(std::span<const Measurement> measurements, int unknowns, double film_prior) {
-  constexpr int iterations = 4;
+  constexpr int most_iterations = 4;
+  constexpr double settled_sigmas = 0.01;
   UnknownVector step = UnknownVector::Zero(unknowns + 1);
-  for (int i = 0; i < iterations; ++i) {
+  for (int i = 0; i < most_iterations; ++i) {
     NormalEquations equations(unknowns + 1);
     equations.add(UnknownVector::Unit(unknowns + 1, unknowns), film_prior, 1);
-    for (const Measurement& m : measurements) {
-      const UnknownVector row = extended_row(m);
-      equations.add(row, m.residual_px, robust_weight(m, m.residual_px - row.dot(step)));
-    }
-    step = equations.solve(1e-9);
+    for (const Measurement& m : measurements)
+      equations.add(m.row, m.residual_px, robust_weight(m, m.residual_px - m.row.dot(step)));
+    const UnknownVector next = equations.solve(1e-9), change = next - step;
+    step = next;
+    if (change.dot(equations.information() * change) < settled_sigmas * settled_sigmas) break;
   }
   return step;
 }
@@ -61,10 +55,9 @@ std::optional<UnknownMatrix> covariance_of(std::span<const Measurement> measurem
   std::array<UnknownVector, measurement_groups> pull;
   pull.fill(UnknownVector::Zero(unknowns + 1));
   for (const Measurement& m : measurements) {
-    const UnknownVector row = extended_row(m);
     const double weight = robust_weight(m, m.residual_px);
-    equations.add(row, 0, weight);
-    pull[m.group] += weight * row;
+    equations.add(m.row, 0, weight);
+    pull[m.group] += weight * m.row;
   }
   const Eigen::FullPivLU<UnknownMatrix> lu(equations.information());
   if (!lu.isInvertible()) return std::nullopt;
@@ -83,13 +76,25 @@ std::optional<UnknownMatrix> covariance_of(std::span<const Measurement> measurem
   return of_pose.allFinite() && (of_pose.diagonal().array() > 0).all() ? std::optional(of_pose) : std::nullopt;
 }
 
-// What a change of blur weighs beside a movement of points. Motion's smear may be no blur, which then never settles; a
-// sharp one may flicker where few sides are left.
-double unsettled_px(double blur_before_px, double blur_after_px) {
-  constexpr double sharp_px = 1.8, weight = 5;
-  if (std::max(blur_before_px, blur_after_px) < sharp_px) return 0;
-  return weight * std::abs(blur_after_px - blur_before_px);
-}
+// What a pass changed.
+struct Change {
+  double points_px = 0;   // how far the farthest measured point moved
+  double blur_share = 0;  // by how much the blur did, of what it was
+  double smear_px = 0;    // by how much a blur beyond a lens's did
+
+  void add_blur(double before_px, double after_px) {
+    constexpr double sharp_px = 1.8;  // where few sides are left, a sharp blur may flicker
+    blur_share = std::max(blur_share, std::abs(after_px / before_px - 1));
+    if (std::max(before_px, after_px) > sharp_px) smear_px = std::max(smear_px, std::abs(after_px - before_px));
+  }
+  // Motion's smear may be no blur, which then never settles.
+  bool settled() const {
+    constexpr double smear_weight = 5;
+    return std::max(points_px, smear_weight * smear_px) < settled_px;
+  }
+  // Whether edges located with the blur before are good enough for the last pass.
+  bool sharp() const { return blur_share < 0.1; }
+};
 
 }  // namespace
 
@@ -106,33 +111,36 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const int unknowns = start.size();
   double film_m = film_mean_m;
   EdgeMeasurements pass;
-  // Returns how far the measured points and the blur moved, in pixels; nullopt when too little was seen.
-  const auto refine = [&](const Effort& effort) -> std::optional<double> {
+  // Nullopt when too little was seen.
+  const auto refine = [&](const Effort& effort) -> std::optional<Change> {
     pass = measure_edges(scene, light, fit.unknowns, film_m, effort, fit.blur);
     if (static_cast<int>(pass.all.size()) < 2 * fit.unknowns.size()) return std::nullopt;
     const UnknownVector step = solve(pass.all, unknowns, (film_mean_m - film_m) / film_sigma_m);
-    double moved_px = 0;
+    Change change;
     for (Measurement& m : pass.all) {
-      const double shift_px = extended_row(m).dot(step);
+      const double shift_px = m.row.dot(step);
       m.residual_px -= shift_px;
-      moved_px = std::max(moved_px, std::abs(shift_px));
+      change.points_px = std::max(change.points_px, std::abs(shift_px));
     }
     const EdgeBlur improved{pass.boundary_blur.improved(fit.blur.boundaries_px),
                             pass.side_blur.improved(fit.blur.sides_px)};
-    moved_px = std::max({moved_px, unsettled_px(fit.blur.boundaries_px, improved.boundaries_px),
-                         unsettled_px(fit.blur.sides_px, improved.sides_px)});
+    change.add_blur(fit.blur.boundaries_px, improved.boundaries_px);
+    change.add_blur(fit.blur.sides_px, improved.sides_px);
     fit.blur = improved;
     fit.unknowns = fit.unknowns.changed_by(step.head(unknowns));
     film_m = std::clamp(film_m + step[unknowns] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
     if (!fit.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
-    return moved_px;
+    return change;
   };
-  const auto captured_px = refine(capture);
-  if (!captured_px) return fit;
-  if (*captured_px > settled_px && !refine(approach)) return fit;
-  std::optional<double> moved_px = settled_px + 1;
-  for (int i = 0; i < most_passes && moved_px && *moved_px > settled_px; ++i) moved_px = refine(measure_all);
-  if (!moved_px || *moved_px > settled_px) return fit;
+  auto change = refine(capture);
+  if (change && !(change->settled() && change->sharp())) change = refine(approach);
+  if (!change) return fit;
+  for (int i = 0; i < most_passes; ++i) {
+    change = refine(measure_all);
+    if (!change) return fit;
+    if (change->settled()) break;
+  }
+  if (!change->settled()) return fit;
   fit.lines = pass.lines;
   fit.in_image = pass.in_image;
   double squares = 0;

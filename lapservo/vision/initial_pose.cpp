@@ -108,16 +108,15 @@ SideLine fit_side(const std::vector<Eigen::Vector2d>& points, double outwards) {
 struct Section {
   double low, high;
 };
-std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, double x, double reach_px) {
-  const double step_px = std::max(1.0, reach_px / 150);
+std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, double x, double reach_px,
+                                  double step_px) {
   const int reach = static_cast<int>(reach_px / step_px);
   double best = 0, sum = 0;
   int first = -reach, best_first = 0, best_last = -1;
   bool outside = false;
   for (int i = -reach; i <= reach; ++i) {
     const std::uint8_t color = scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px)));
-    const bool ours = color == scene.bands[0] || color == scene.bands[1] || color == scene.bands[2];
-    sum += ours ? 1 : -0.8;
+    sum += scene.is_ours(color) ? 1 : -0.8;
     if (sum <= 0) {
       sum = 0;
       first = i + 1;
@@ -147,10 +146,13 @@ std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, 
       outline.last_x = std::max(outline.last_x, offset.dot(outline.frame.along));
       widest = std::max(widest, std::abs(offset.dot(outline.frame.across())));
     }
+    // The first rounds only turn and shift the frame.
+    const double reach_px = widest * 1.3 + 12, finest_px = std::max(1.0, reach_px / 150);
+    const double step_px = round + 1 < rounds ? std::max(finest_px, reach_px / 40) : finest_px;
     std::vector<Eigen::Vector2d> low, high;
     for (int i = 0; i < sections; ++i) {
       const double x = outline.first_x + (outline.last_x - outline.first_x) * (i + 0.5) / sections;
-      if (const auto section = section_at(scene, outline.frame, x, widest * 1.3 + 12)) {
+      if (const auto section = section_at(scene, outline.frame, x, reach_px, step_px)) {
         low.emplace_back(x, section->low);
         high.emplace_back(x, section->high);
       }

@@ -16,10 +16,17 @@ class NormalEquations {
 
   /// residual = measured - predicted, row = d(predicted)/d(unknowns).
   void add(const UnknownVector& row, double residual, double weight) {
-    for (int i = 0; i < unknowns_; ++i) {
-      const double weighted = weight * row[i];
-      for (int j = 0; j <= i; ++j) lower_[i][j] += weighted * row[j];
-      gradient_[i] += weighted * residual;
+    switch (unknowns_) {  // loops of fixed length are several times faster
+      case 4:
+        return add_fixed<4>(row.data(), residual, weight);
+      case 5:
+        return add_fixed<5>(row.data(), residual, weight);
+      case 6:
+        return add_fixed<6>(row.data(), residual, weight);
+      case 7:
+        return add_fixed<7>(row.data(), residual, weight);
+      default:
+        return add_some(unknowns_, row.data(), residual, weight);
     }
   }
 
@@ -40,6 +47,18 @@ class NormalEquations {
   }
 
  private:
+  template <int Unknowns>
+  void add_fixed(const double* row, double residual, double weight) {
+    add_some(Unknowns, row, residual, weight);
+  }
+  [[gnu::always_inline]] void add_some(int unknowns, const double* row, double residual, double weight) {
+    for (int i = 0; i < unknowns; ++i) {
+      const double weighted = weight * row[i];
+      for (int j = 0; j <= i; ++j) lower_[i][j] += weighted * row[j];
+      gradient_[i] += weighted * residual;
+    }
+  }
+
   int unknowns_;
   std::array<std::array<double, max_unknowns>, max_unknowns> lower_{};
   std::array<double, max_unknowns> gradient_{};

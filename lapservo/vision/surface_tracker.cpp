@@ -17,6 +17,9 @@ namespace {
 
 constexpr int grid_px = 8, least_samples = 8, most_blobs = 6;
 constexpr double least_rotation_score = 0.5, rival_ratio = 0.93;
+// From the last frame, and a second time from a pose that is good to a few pixels.
+constexpr CoarseFitOptions from_memory{.along_reach = 0.2, .rounds = 1, .search_rotation = false};
+constexpr CoarseFitOptions near_by{.lateral_reach_px = 12, .along_reach = 0.125, .rounds = 1, .search_rotation = false};
 // To contradict camera_from_rcm, the marker must be seen well.
 constexpr double share_against_registration = 0.7;
 
@@ -119,11 +122,7 @@ SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImag
   const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
   const FineFit near = fit_finely(scene, light, expected, memory.blur);
   if (judge(scene, near) == Status::ok) return {Status::ok, near};
-  CoarseFitOptions options;
-  options.search_rotation = false;
-  options.along_reach = 0.2;
-  options.rounds = 1;
-  const CoarseFit coarse = fit_coarsely(scene, expected, options);
+  const CoarseFit coarse = fit_coarsely(scene, expected, from_memory);
   if (!coarse.found) return {};
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
   const Status status = judge(scene, fit);
@@ -135,7 +134,11 @@ SurfaceTracker::Found SurfaceTracker::try_start(const Scene& scene, const LightI
   const CoarseFit coarse = fit_coarsely(scene, start, {});
   if (!coarse.found || coarse.rotation_score < least_rotation_score) return {};
   if (coarse.rival_score > rival_ratio * coarse.rotation_score) return {Status::ambiguous, std::nullopt};
-  const FineFit fit = fit_finely(scene, light, coarse.unknowns, {});
+  if (const FineFit fit = fit_finely(scene, light, coarse.unknowns, {}); judge(scene, fit) == Status::ok)
+    return {Status::ok, fit};
+  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, near_by);
+  if (!nearer.found) return {};
+  const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
   const Status status = judge(scene, fit);
   return status == Status::ok ? Found{status, fit} : Found{status, std::nullopt};
 }

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double largest_sigma_psi_rad = 0.02;  // five sigma: a tenth of a radian
 constexpr double least_matching = 0.3, most_wrong = 0.05, most_beyond = 0.5, most_beside = 0.2;
+constexpr double tolerance_of_complete = 1.6;
 constexpr double least_in_image = 0.25;
 constexpr double blurred_px = 1.5;  // colours mix so far on both sides of a boundary
 
@@ -84,12 +85,15 @@ Status judge(const Scene& scene, const FineFit& fit) {
   if (!fit.converged) return Status::poor_fit;
   const ColorAgreement agreement = color_agreement(scene, fit.unknowns.pose());
   if (agreement.in_image < least_in_image) return Status::cut;
-  if (agreement.wrong > most_wrong || agreement.beyond > most_beyond || agreement.beside > most_beside)
+  // Where the marker shows as it should, colours around it are noise: the dark has plenty under a high gain.
+  const double share = fit.located_share();
+  const double tolerance = agreement.matching > 0.9 && share > 0.9 ? tolerance_of_complete : 1;
+  if (agreement.wrong > most_wrong || agreement.beyond > tolerance * most_beyond ||
+      agreement.beside > tolerance * most_beside)
     return Status::poor_fit;
   if (agreement.matching < least_matching) return Status::occluded;
   const int inner_used = fit.used[1] + fit.used[2], outer_used = fit.used[0] + fit.used[3];
   if (inner_used < std::max(6, fit.lines / 10) || outer_used < 4) return Status::occluded;
-  const double share = fit.located_share();
   // Without the RCM, only both ends together fix the depth and with it everything else. With it they confirm what is
   // left of a hidden marker.
   constexpr double mostly_hidden = 0.5, partly_hidden = 0.7, most_spilled = 0.12;
