@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstring>
+#include <span>
 #include <utility>
 
 namespace lapservo {
@@ -19,13 +20,11 @@ class Grid {
       : grid_px_(grid_px), columns_(image.width_px / grid_px), rows_(image.height_px / grid_px) {
     cells_.resize(static_cast<std::size_t>(stride()) * static_cast<std::size_t>(rows_ + 2 * reach));
     for (int row = 0; row < rows_; ++row) {
-      const std::uint8_t* pixel = image.pixel(grid_px / 2, grid_px / 2 + row * grid_px);
       const int first = (row + reach) * stride() + reach;
-      for (int cell = first; cell < first + columns_; ++cell, pixel += 3 * static_cast<std::ptrdiff_t>(grid_px)) {
-        const std::uint8_t color = classes(pixel);
-        at(cell) = color;
-        if (color) colored_.push_back(cell);
-      }
+      const std::span<std::uint8_t> line(&at(first), static_cast<std::size_t>(columns_));
+      classes.classify(image.pixel(grid_px / 2, grid_px / 2 + row * grid_px), 3 * static_cast<std::ptrdiff_t>(grid_px),
+                       line);
+      add_colored(line, first);
     }
   }
 
@@ -41,6 +40,17 @@ class Grid {
   }
 
  private:
+  void add_colored(std::span<const std::uint8_t> line, int first) {
+    constexpr std::size_t at_once = 8;  // few have a colour
+    for (std::size_t i = 0; i < line.size(); i += at_once) {
+      const std::size_t count = std::min(at_once, line.size() - i);
+      std::uint64_t any = 0;
+      std::memcpy(&any, &line[i], count);
+      for (std::size_t j = i; any && j < i + count; ++j)
+        if (line[j]) colored_.push_back(first + static_cast<int>(j));
+    }
+  }
+
   int stride() const { return columns_ + 2 * reach; }
   int grid_px_, columns_, rows_;
   std::vector<std::uint8_t> cells_;

@@ -192,39 +192,40 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
 class RotationScore {
  public:
   RotationScore(const Scene& scene, const SampledSurface& surface) : scene_(scene), surface_(surface) {
-    for (std::size_t i = 0; i < line_count; ++i)
-      for (std::size_t band = 0; band < 3; ++band) {
-        auto& sums = sums_[i][band];
-        sums[0] = 0;
-        for (std::size_t k = 0; k < samples_along; ++k) {
-          const std::uint8_t color = surface.lines[i].classes[k];
-          const bool ours = scene.is_ours(color);
-          sums[k + 1] = sums[k] + (color == scene.bands[band] ? 1 : (ours ? -1 : 0));
-          seen_ += band == 0 && ours ? 1 : 0;
-        }
+    for (std::size_t i = 0; i < line_count; ++i) {
+      std::array<int, 3> sums{};
+      sums_[i][0] = sums;
+      for (std::size_t k = 0; k < samples_along; ++k) {
+        const std::uint8_t color = surface.lines[i].classes[k];
+        const bool ours = scene.is_ours(color);
+        for (std::size_t band = 0; band < 3; ++band) sums[band] += 2 * (color == scene.bands[band]) - ours;
+        sums_[i][k + 1] = sums;
+        seen_ += ours;
       }
+    }
   }
 
   double at(double psi_rad) const {
     int score = 0;
     for (std::size_t i = 0; i < line_count; ++i) {
       const auto ends_m = boundaries_m(scene_.marker, surface_.lines[i].azimuth_rad - psi_rad - scene_.marker.seam_rad);
-      std::array<std::size_t, 4> ends;
-      for (std::size_t k = 0; k < 4; ++k) ends[k] = index(ends_m[k]);
-      for (std::size_t band = 0; band < 3; ++band) score += sums_[i][band][ends[band + 1]] - sums_[i][band][ends[band]];
+      std::array<const std::array<int, 3>*, 4> sums;
+      for (std::size_t k = 0; k < 4; ++k) sums[k] = &sums_[i][index(ends_m[k])];
+      for (std::size_t band = 0; band < 3; ++band) score += (*sums[band + 1])[band] - (*sums[band])[band];
     }
     return seen_ ? static_cast<double>(score) / seen_ : 0;
   }
 
  private:
   std::size_t index(double along_m) const {
-    const double k = (along_m - surface_.first_m) / surface_.step_m + 0.5;
+    const double k = (along_m - surface_.first_m) * per_m_ + 0.5;
     return static_cast<std::size_t>(std::clamp(k, 0.0, static_cast<double>(samples_along)));
   }
 
   const Scene& scene_;
   const SampledSurface& surface_;
-  std::array<std::array<std::array<int, samples_along + 1>, 3>, line_count> sums_{};
+  double per_m_ = 1 / surface_.step_m;
+  std::array<std::array<std::array<int, 3>, samples_along + 1>, line_count> sums_;  // over samples before, per band
   int seen_ = 0;
 };
 
@@ -232,7 +233,7 @@ struct RotationSearch {
   double psi_rad, score, rival_score;
 };
 RotationSearch search_rotation(const Scene& scene, const SampledSurface& surface) {
-  constexpr int steps = 180, rival_gap = 20;  // 0.7 rad
+  constexpr int steps = 90, rival_gap = 10;  // 0.7 rad
   const RotationScore score(scene, surface);
   std::array<double, steps> scores{};
   for (int i = 0; i < steps; ++i) scores[static_cast<std::size_t>(i)] = score.at(two_pi * i / steps);

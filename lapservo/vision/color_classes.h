@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "lapservo/rig/rig.h"
@@ -15,9 +17,11 @@ class ColorClasses {
  public:
   explicit ColorClasses(const std::vector<Instrument>& instruments);
 
-  std::uint8_t operator()(const std::uint8_t* bgr) const {
-    return table_[static_cast<std::size_t>((bgr[0] >> shift) << 2 * bits | (bgr[1] >> shift) << bits |
-                                           (bgr[2] >> shift))];
+  std::uint8_t operator()(const std::uint8_t* bgr) const { return table_[index(bgr)]; }
+  /// Of pixels that lie `step_bytes` apart, as many as `classes` has places.
+  void classify(const std::uint8_t* bgr, std::ptrdiff_t step_bytes, std::span<std::uint8_t> classes) const {
+    const std::uint8_t* table = table_.data();  // a local: bytes written could be anything's
+    for (std::uint8_t& out : classes) out = table[index(bgr)], bgr += step_bytes;
   }
   /// Class of one band of one instrument.
   std::uint8_t of_band(std::size_t instrument, std::size_t band) const { return bands_[instrument][band]; }
@@ -25,6 +29,9 @@ class ColorClasses {
 
  private:
   static constexpr int bits = 5, shift = 8 - bits;
+  static std::size_t index(const std::uint8_t* bgr) {
+    return static_cast<std::size_t>((bgr[0] >> shift) << 2 * bits | (bgr[1] >> shift) << bits | (bgr[2] >> shift));
+  }
 
   std::vector<double> hues_deg_;
   std::vector<std::array<std::uint8_t, 3>> bands_;

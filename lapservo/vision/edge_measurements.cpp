@@ -242,45 +242,56 @@ bool one_band(const Frame& frame, double azimuth_a_rad, double azimuth_b_rad, do
          first == band(b, along_m + room_m);
 }
 
+// One of the shaft's sides, and a generatrix as deep inside as the limb's model holds.
+struct Side {
+  static constexpr double deep_rad = 0.87;  // where d = R (1 - cos 0.87) = 0.35 R
+  Generatrix limb, deep;
+  std::size_t group;
+
+  Side(const Frame& frame, double sign)
+      : limb(frame.generatrix(frame.view.facing_azimuth_rad + sign * frame.view.half_visible_rad)),
+        deep(frame.generatrix(limb.azimuth_rad - sign * deep_rad)),
+        group(sign < 0 ? 4 : 5) {}
+};
+
 // A point of a side where it is expected.
 struct SidePlace {
   Measurement measurement;
   EdgeLine line;
 };
 
-std::optional<SidePlace> place_side(const Frame& frame, double side, double along_m, const Effort& effort,
+std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort,
                                     double blur_px) {
-  constexpr double deep_rad = 0.87;  // where d = R (1 - cos 0.87) = 0.35 R
-  const double azimuth_rad = frame.view.facing_azimuth_rad + side * frame.view.half_visible_rad;
-  const Eigen::Vector3d point = frame.point(frame.generatrix(azimuth_rad), along_m);
+  const Eigen::Vector3d point = frame.point(side.limb, along_m);
   if (!(point.z() > 1e-3)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d along = (image.d_px_d_point * frame.axes.col(2)).normalized();
-  const Eigen::Vector3d inside_point = frame.point(frame.generatrix(azimuth_rad - side * deep_rad), along_m);
   Eigen::Vector2d inwards(-along.y(), along.x());
-  if (inwards.dot(frame.scene.camera.raw_from_point(inside_point) - image.point_px) < 0) inwards = -inwards;
+  if (inwards.dot(frame.scene.camera.raw_from_point(frame.point(side.deep, along_m)) - image.point_px) < 0)
+    inwards = -inwards;
   const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
   const int inside = static_cast<int>(std::min(0.34 * radius_px, 26.0));
   const int outside = static_cast<int>(std::min(2.5 * blur_px + effort.extra_px, 14.0));
   if (inside < 5) return std::nullopt;
   const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
-  if (!one_band(frame, azimuth_rad, azimuth_rad - side * deep_rad, along_m, room_m)) return std::nullopt;
+  if (!one_band(frame, side.limb.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
   const auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
   if (!line) return std::nullopt;
   SidePlace place{{}, *line};
   place.line.limb_radius_px = static_cast<float>(radius_px);
   place.measurement.row = row_of(frame.unknowns, point, image.d_px_d_point.transpose() * inwards, 0, 0);
-  place.measurement.group = side < 0 ? 4 : 5;
+  place.measurement.group = side.group;
   return place;
 }
 
 void measure_sides(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
   constexpr double largest_sigma_px = 2;
   const int count = stations / effort.thinning;
+  const std::array<Side, 2> sides{Side(frame, -1), Side(frame, 1)};
   InplaceVector<SidePlace, 2 * stations> places;
   InplaceVector<EdgeLine, 2 * stations> lines;
   for (int station = 0; station < count; ++station)
-    for (const double side : {-1.0, 1.0}) {
+    for (const Side& side : sides) {
       const double along_m = frame.marker().length_m() * (station + 0.5) / count;
       const auto place = place_side(frame, side, along_m, effort, blur_px);
       if (!place) continue;

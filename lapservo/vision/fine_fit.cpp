@@ -31,16 +31,20 @@ double robust_weight(const Measurement& m, double residual_px) {
 
 // Minimises the robust cost of linearised measurements: iteratively reweighted. The unknowns are the pose's, then the
 // film's thickness in film_sigma_m; `film_prior` is what that lies below its expected one.
-UnknownVector solve(std::span<const Measurement> measurements, int unknowns, double film_prior) {
+template <int Size>
+UnknownVector solve(std::span<const Measurement> measurements, double film_prior) {
   constexpr int most_iterations = 4;
   constexpr double settled_sigmas = 0.01;
-  UnknownVector step = UnknownVector::Zero(unknowns + 1);
+  using Row = Eigen::Matrix<double, Size, 1>;
+  Row step = Row::Zero();
   for (int i = 0; i < most_iterations; ++i) {
-    NormalEquations equations(unknowns + 1);
-    equations.add(UnknownVector::Unit(unknowns + 1, unknowns), film_prior, 1);
-    for (const Measurement& m : measurements)
-      equations.add(m.row, m.residual_px, robust_weight(m, m.residual_px - m.row.dot(step)));
-    const UnknownVector next = equations.solve(1e-9), change = next - step;
+    NormalEquations equations(Size);
+    equations.add(Row::Unit(Size - 1), film_prior, 1);
+    for (const Measurement& m : measurements) {
+      const Row row = m.row.head<Size>();
+      equations.add(row, m.residual_px, robust_weight(m, m.residual_px - row.dot(step)));
+    }
+    const Row next = equations.solve(1e-9), change = next - step;
     step = next;
     if (change.dot(equations.information() * change) < settled_sigmas * settled_sigmas) break;
   }
@@ -115,7 +119,8 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const auto refine = [&](const Effort& effort) -> std::optional<Change> {
     pass = measure_edges(scene, light, fit.unknowns, film_m, effort, fit.blur);
     if (static_cast<int>(pass.all.size()) < 2 * fit.unknowns.size()) return std::nullopt;
-    const UnknownVector step = solve(pass.all, unknowns, (film_mean_m - film_m) / film_sigma_m);
+    const double film_prior = (film_mean_m - film_m) / film_sigma_m;
+    const UnknownVector step = unknowns == 4 ? solve<5>(pass.all, film_prior) : solve<7>(pass.all, film_prior);
     Change change;
     for (Measurement& m : pass.all) {
       const double shift_px = m.row.dot(step);

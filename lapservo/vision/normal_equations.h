@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <type_traits>
 
 #include <Eigen/Cholesky>
 
@@ -14,19 +15,17 @@ class NormalEquations {
  public:
   explicit NormalEquations(int unknowns) : unknowns_(unknowns) {}
 
-  /// residual = measured - predicted, row = d(predicted)/d(unknowns).
-  void add(const UnknownVector& row, double residual, double weight) {
-    switch (unknowns_) {  // loops of fixed length are several times faster
-      case 4:
-        return add_fixed<4>(row.data(), residual, weight);
-      case 5:
-        return add_fixed<5>(row.data(), residual, weight);
-      case 6:
-        return add_fixed<6>(row.data(), residual, weight);
-      case 7:
-        return add_fixed<7>(row.data(), residual, weight);
-      default:
-        return add_some(unknowns_, row.data(), residual, weight);
+  /// residual = measured - predicted, row = d(predicted)/d(unknowns). Rows of fixed size are several times faster.
+  template <typename Row>
+  void add(const Eigen::MatrixBase<Row>& row, double residual, double weight) {
+    constexpr bool fixed = Row::SizeAtCompileTime != Eigen::Dynamic;
+    // A copy, which no sum can alias, off the heap.
+    const std::conditional_t<fixed, Eigen::Matrix<double, Row::SizeAtCompileTime, 1>, UnknownVector> local = row;
+    const int count = fixed ? static_cast<int>(Row::SizeAtCompileTime) : unknowns_;
+    for (int i = 0; i < count; ++i) {
+      const double weighted = weight * local[i];
+      for (int j = 0; j <= i; ++j) lower_[i][j] += weighted * local[j];
+      gradient_[i] += weighted * residual;
     }
   }
 
@@ -47,18 +46,6 @@ class NormalEquations {
   }
 
  private:
-  template <int Unknowns>
-  void add_fixed(const double* row, double residual, double weight) {
-    add_some(Unknowns, row, residual, weight);
-  }
-  [[gnu::always_inline]] void add_some(int unknowns, const double* row, double residual, double weight) {
-    for (int i = 0; i < unknowns; ++i) {
-      const double weighted = weight * row[i];
-      for (int j = 0; j <= i; ++j) lower_[i][j] += weighted * row[j];
-      gradient_[i] += weighted * residual;
-    }
-  }
-
   int unknowns_;
   std::array<std::array<double, max_unknowns>, max_unknowns> lower_{};
   std::array<double, max_unknowns> gradient_{};

@@ -40,21 +40,20 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
       length_m * std::max(0.02, blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
   int total = 0, inside = 0, matching = 0, wrong = 0, outer = 0, beyond = 0, flank = 0, beside = 0;
   std::array<int, 2> ring{}, spilled{};
-  const auto class_of = [&](double radius_m, double azimuth_rad, double along_m) {
-    return scene.class_at_point(pose.camera_from_unrolled * surface_point(radius_m, azimuth_rad, along_m));
-  };
+  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = view->facing_azimuth_rad + 0.8 * view->half_visible_rad * (2.0 * i / (azimuths - 1) - 1);
     const auto ends_m = boundaries_m(scene.marker, azimuth_rad - pose.psi_rad - scene.marker.seam_rad);
+    const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, 0);
     for (int k = -margin; k < places + margin; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
-      const bool near_boundary =
-          std::any_of(ends_m.begin(), ends_m.end(), [&](double end_m) { return std::abs(end_m - along_m) < guard_m; });
+      bool near_boundary = false;
+      int band = 0;
+      for (const double end_m : ends_m) near_boundary |= std::abs(end_m - along_m) < guard_m, band += along_m >= end_m;
       if (near_boundary) continue;
-      const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin();
       const bool on_marker = band >= 1 && band <= 3;
       total += on_marker;
-      const std::uint8_t color = class_of(scene.marker.radius_m(), azimuth_rad, along_m);
+      const std::uint8_t color = scene.class_at_point(base + along_m * axis);
       if (color == Scene::outside) continue;
       const bool ours = scene.is_ours(color);
       if (!on_marker) {
@@ -69,12 +68,14 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
       matching += match, wrong += ours && !match;
     }
   }
-  for (const double side : {-1.0, 1.0})
+  for (const double side : {-1.0, 1.0}) {
+    const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(beside_radii * scene.marker.radius_m(),
+                                                                           view->facing_azimuth_rad + side * pi / 2, 0);
     for (int k = 0; k < places; ++k) {
-      const std::uint8_t color = class_of(beside_radii * scene.marker.radius_m(),
-                                          view->facing_azimuth_rad + side * pi / 2, length_m * (k + 0.5) / places);
+      const std::uint8_t color = scene.class_at_point(base + length_m * (k + 0.5) / places * axis);
       if (color != Scene::outside) ++flank, beside += scene.is_ours(color);
     }
+  }
   const auto share = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
   return {share(matching, inside), share(wrong, inside),
           share(inside, total),    share(beyond, outer),
