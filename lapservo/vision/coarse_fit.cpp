@@ -17,7 +17,7 @@
 namespace lapservo {
 namespace {
 
-constexpr int line_count = 17, station_count = 15, samples_along = 160;
+constexpr int line_count = 13, station_count = 15, samples_along = 128;
 constexpr double line_reach = 0.74;  // of the visible half angle: beyond, bands are too foreshortened and dark
 constexpr double side_sigma_px = 2.0, boundary_sigma_px = 1.5;
 constexpr double limb_inset_px = 1.0;  // the limb is dark, its colour ends inside the true silhouette

@@ -136,7 +136,7 @@ std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, d
 std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, Eigen::Vector2d along) {
   Outline outline;
   outline.frame = {shape.centre, along};
-  constexpr int rounds = 3, sections = 17;
+  constexpr int rounds = 3, sections = 13;
   for (int round = 0; round < rounds; ++round) {
     double widest = 0;
     outline.first_x = outline.last_x = 0;

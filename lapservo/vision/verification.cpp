@@ -108,9 +108,12 @@ Status judge(const Scene& scene, const FineFit& fit) {
   if (share < 0.2 || fit.inlier_rms_sigmas > largest_rms_sigmas) return Status::poor_fit;
   // Smeared by motion across, the sides hold the shaft's place no more; and few boundaries need the sides beside them.
   // A smeared end that most lines miss is not hidden: what they found is another.
-  constexpr double smeared_px = 2;
+  // Beyond some width the smear's form, which nobody knows, decides where the edges are taken to be.
+  constexpr double smeared_px = 2, lost_px = 4.5;
   constexpr int fewest_sides = 8;
-  const bool smeared = std::max(fit.blur.boundaries_px, fit.blur.sides_px) > smeared_px;
+  const double smear_px = std::max(fit.blur.boundaries_px, fit.blur.sides_px);
+  const bool smeared = smear_px > smeared_px;
+  if (smear_px > lost_px) return Status::uncertain;
   if (smeared && 5 * *std::min_element(fit.used.begin(), fit.used.end()) < 3 * fit.lines) return Status::uncertain;
   if ((smeared || share < mostly_hidden) && fit.sides_used < fewest_sides) return Status::uncertain;
   const Eigen::Index psi = fit.unknowns.size() - 1;
