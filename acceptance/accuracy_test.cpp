@@ -229,6 +229,21 @@ TEST(Rendered, HeavyBlood) {
   expect_found_within(score_single(rendered_frames(set)), 0.8, 15 * mrad);
 }
 
+// The first pass sees edges much too sharp; those after it have to make up for that.
+TEST(Rendered, StrongDefocus) {
+  RenderedSet set = usual_set(47, 16);
+  set.options.sensor.blur_px = 3.2;
+  expect_found_within(score_single(rendered_frames(set)), 0.9, 8 * mrad);
+}
+
+// So dark that noise has the marker's colours everywhere: many are lost, none is wrong.
+TEST(Rendered, AlmostNoLight) {
+  RenderedSet set = usual_set(48, 16);
+  set.options.sensor.gains = Light::Constant(0.08F);
+  set.options.sensor.read_noise *= 2;
+  expect_found_within(score_single(rendered_frames(set)), 0.5, 25 * mrad);
+}
+
 // Motion smears the marker over more than a band's width at worst: it may be lost, but is never guessed.
 TEST(Rendered, SmearedMarkersAreNotGuessed) {
   RenderedSet set = moving_set(53, 40, 4);

@@ -103,12 +103,15 @@ struct BoundaryPlace {
   EdgeLine line;
 };
 
+// Whether the pixels on both sides have the colours that should be there. A blurred band tints the shaft beyond its
+// end.
 bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_px) {
   const std::size_t k = place.measurement.group;
   const Eigen::Vector2d at_px = place.point_px + static_cast<double>(offset_px) * place.along;
-  const Eigen::Vector2d reach = 0.8 * place.line.before * place.along;
-  return frame.scene.class_at(at_px - reach) == (k == 0 ? 0 : frame.scene.bands[k - 1]) &&
-         frame.scene.class_at(at_px + reach) == (k == 3 ? 0 : frame.scene.bands[k]);
+  const double on_band_px = 0.8 * place.line.before, on_shaft_px = on_band_px + 1.5 * place.line.blur_px;
+  const std::uint8_t before = frame.scene.class_at(at_px - (k == 0 ? on_shaft_px : on_band_px) * place.along);
+  const std::uint8_t after = frame.scene.class_at(at_px + (k == 3 ? on_shaft_px : on_band_px) * place.along);
+  return before == (k == 0 ? 0 : frame.scene.bands[k - 1]) && after == (k == 3 ? 0 : frame.scene.bands[k]);
 }
 
 std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
@@ -298,6 +301,7 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
       places.push_back(*place);
       lines.push_back(place->line);
     }
+  out.sides_in_image = static_cast<int>(places.size());
   const EdgeFits edges = locate_limbs(frame.light, lines, effort.iterations);
   InplaceVector<float, 2 * stations> variances;
   for (const EdgeFit& edge : edges)

@@ -56,6 +56,7 @@ struct EdgeMeasurements {
   static constexpr int most_lines = 64, most_stations = 24;
   InplaceVector<Measurement, 4 * most_lines + 2 * most_stations> all;
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
+  int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at
   BlurEvidence boundary_blur, side_blur;
 };

@@ -15,9 +15,9 @@ namespace {
 
 // What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole.
 constexpr double common_boundary_px = 0.007, common_side_px = 0.02;
-// And as a share of the blur beyond a lens's: motion and defocus do not blur like a Gaussian, and beside a limb even
-// less.
-constexpr double usual_blur_px = 1.2, boundary_share_of_blur = 0.05, side_share_of_blur = 0.2;
+// And as a share of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. A limb that motion smears
+// is worst: the part of its blur that the boundaries do not have.
+constexpr double usual_blur_px = 1.2, common_share_of_blur = 0.05, side_share_of_smear = 0.15;
 // Where most of a marker is hidden, some of what was taken for its boundaries are the blood's.
 constexpr double usual_share = 0.7, doubt_of_hidden = 4;
 constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
@@ -68,11 +68,14 @@ std::optional<UnknownMatrix> covariance_of(std::span<const Measurement> measurem
   const UnknownMatrix inverse = lu.inverse();
   const double scale = std::max(1.0, residual_rms_sigmas);
   UnknownMatrix covariance = inverse;
+  const double smear_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, usual_blur_px));
+  const double boundary_px =
+      common_boundary_px + common_share_of_blur * std::max(0.0, blur.boundaries_px - usual_blur_px);
+  const double side_px = common_side_px + common_share_of_blur * std::max(0.0, blur.sides_px - usual_blur_px) +
+                         side_share_of_smear * smear_px;
   for (std::size_t group = 0; group < measurement_groups; ++group) {
     const UnknownVector shift = inverse * pull[group];
-    const double common_px =
-        group < 4 ? common_boundary_px + boundary_share_of_blur * std::max(0.0, blur.boundaries_px - usual_blur_px)
-                  : common_side_px + side_share_of_blur * std::max(0.0, blur.sides_px - usual_blur_px);
+    const double common_px = group < 4 ? boundary_px : side_px;
     covariance += common_px * common_px * shift * shift.transpose();
   }
   covariance *= scale * scale;
@@ -108,7 +111,7 @@ double FineFit::located_share() const {
 }
 
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur) {
-  constexpr Effort capture{5, 3, 3}, approach{2, 2, 3}, measure_all{2, 1, 1};
+  constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
   FineFit fit;
   fit.unknowns = start;
   fit.blur = blur;
@@ -148,6 +151,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   if (!change->settled()) return fit;
   fit.lines = pass.lines;
   fit.in_image = pass.in_image;
+  fit.sides_in_image = pass.sides_in_image;
   double squares = 0;
   int inliers = 0;
   for (const Measurement& m : pass.all) {

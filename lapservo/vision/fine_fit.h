@@ -17,8 +17,9 @@ struct FineFit {
   int lines = 0;                  ///< generatrices looked at
   std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
-  int sides_used = 0;
-  double inlier_rms_sigmas = 0;  ///< of the boundaries' residuals
+  int sides_in_image = 0;         ///< places at which the shaft's sides were looked for
+  int sides_used = 0;             ///< of them, those at which the side was located and agrees with the fit
+  double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals
 
   /// Of the boundary points that the image could show, the share that was located.
   double located_share() const;

@@ -86,10 +86,10 @@ Status judge(const Scene& scene, const FineFit& fit) {
   if (!fit.converged) return Status::poor_fit;
   const ColorAgreement agreement = color_agreement(scene, fit.unknowns.pose());
   if (agreement.in_image < least_in_image) return Status::cut;
-  // Where the marker shows as it should, colours around it are noise: the dark has plenty under a high gain.
+  // Where all boundaries show as they should, other colours are noise: the dark has plenty under a high gain.
   const double share = fit.located_share();
-  const double tolerance = agreement.matching > 0.9 && share > 0.9 ? tolerance_of_complete : 1;
-  if (agreement.wrong > most_wrong || agreement.beyond > tolerance * most_beyond ||
+  const double tolerance = agreement.matching > 0.6 && share > 0.9 ? tolerance_of_complete : 1;
+  if (agreement.wrong > tolerance * most_wrong || agreement.beyond > tolerance * most_beyond ||
       agreement.beside > tolerance * most_beside)
     return Status::poor_fit;
   if (agreement.matching < least_matching) return Status::occluded;
@@ -101,10 +101,11 @@ Status judge(const Scene& scene, const FineFit& fit) {
   const bool needs_both_ends = !fit.unknowns.q() || (share < mostly_hidden && agreement.in_image > 0.98);
   if (needs_both_ends && std::min(fit.used[0], fit.used[3]) < std::max(6, fit.lines / 12))
     return agreement.in_image < 0.98 ? Status::cut : Status::occluded;
-  // Wrong fits agree with few boundaries, and badly; blood leaves few, which agree well; compression leaves many,
-  // noisy.
+  // Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
+  // many, noisy.
   if (share < partly_hidden && agreement.spilled > most_spilled) return Status::poor_fit;
-  const double largest_rms_sigmas = 1.3 + 5.5 * std::clamp(share - 0.7, 0.0, 0.2);
+  const bool few_sides = 4 * fit.sides_used < fit.sides_in_image;
+  const double largest_rms_sigmas = 1.3 + (few_sides ? 0 : 5.5 * std::clamp(share - 0.7, 0.0, 0.2));
   if (share < 0.2 || fit.inlier_rms_sigmas > largest_rms_sigmas) return Status::poor_fit;
   // Smeared by motion across, the sides hold the shaft's place no more; and few boundaries need the sides beside them.
   // A smeared end that most lines miss is not hidden: what they found is another.
