@@ -25,8 +25,9 @@ struct Camera {
   Response response;
 
   bool distorted() const {
-    const auto& k = distortion;  // asked for every sample: no branches
-    return (k[0] != 0) | (k[1] != 0) | (k[2] != 0) | (k[3] != 0) | (k[4] != 0);
+    int some = 0;  // asked for every sample: no branches
+    for (const double k : distortion) some |= static_cast<int>(k != 0);
+    return some != 0;
   }
   bool contains(const Eigen::Vector2d& raw_px, double margin_px = 0) const;
 
