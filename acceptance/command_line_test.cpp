@@ -13,6 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "lapservo/core/csv.h"
+#include "lapservo/testing/sample_frames.h"
 
 namespace lapservo {
 namespace {
@@ -66,7 +67,7 @@ class CommandLine : public testing::Test {
   }
 
   fs::path folder_;
-  const std::string rig_ = std::string(LAPSERVO_SOURCE_DIR) + "/configs/example.yaml";
+  const std::string rig_ = lapservo::testing::source_folder().string() + "/configs/example.yaml";
 };
 
 TEST_F(CommandLine, RenderThenTrack) {
@@ -184,7 +185,7 @@ TEST_F(CommandLine, Markers) {
 }
 
 TEST_F(CommandLine, ServoRunsAndReplays) {
-  const std::string paper = std::string(LAPSERVO_SOURCE_DIR) + "/configs/paper.yaml";
+  const std::string paper = lapservo::testing::source_folder().string() + "/configs/paper.yaml";
   ASSERT_EQ(run("servo --rig " + paper + " --robot sim --duration 6 --seed 2 --out " + out("run")), 0) << errors();
   EXPECT_NE(output().find("within 1 px and 5 mrad from"), std::string::npos) << output();
   for (const char* name : {"log.csv", "rig.yaml", "controller.yaml"}) EXPECT_TRUE(fs::exists(out("run") + "/" + name));
@@ -204,7 +205,7 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
 
 TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   const std::string servo =
-      "servo --rig " + std::string(LAPSERVO_SOURCE_DIR) + "/configs/paper.yaml --out " + out("run");
+      "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --out " + out("run");
   expect_refused(servo, {"--robot", "sim"});
   expect_refused(servo + " --robot psm9", {"--robot", "psm9", "sim"});
   expect_refused(servo + " --robot sim --set-point 0.9,795,365,900", {"--set-point", "can't be followed at 0.00 s"});
@@ -221,7 +222,7 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
                  {"gains", "-4"});
   expect_refused("servo --replay " + in("log.csv"), {"rig.yaml"});
   expect_refused(
-      "servo --rig " + std::string(LAPSERVO_SOURCE_DIR) + "/configs/paper.yaml --robot sim --out /proc/nowhere",
+      "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --robot sim --out /proc/nowhere",
       {"/proc/nowhere", "folder"});
 }
 

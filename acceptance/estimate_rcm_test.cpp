@@ -16,12 +16,13 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/testing/sample_frames.h"
 
 namespace lapservo {
 namespace {
 namespace fs = std::filesystem;
 
-const std::string paper_rig = LAPSERVO_SOURCE_DIR "/configs/paper.yaml";
+const std::string paper_rig = (lapservo::testing::source_folder() / "configs/paper.yaml").string();
 
 std::string read(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 #include <numeric>
 #include <stdexcept>
@@ -14,6 +13,7 @@
 #include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/tissue.h"
+#include "lapservo/testing/sample_frames.h"
 
 namespace lapservo::acceptance {
 namespace fs = std::filesystem;
@@ -56,11 +56,7 @@ void Score::add(const TrueFrame& frame, const std::vector<Observation>& observat
   }
 }
 
-std::optional<fs::path> sample_folder() {
-  const char* named = std::getenv("LAPSERVO_FRAMES");
-  const fs::path folder = named ? fs::path(named) : fs::path(LAPSERVO_SOURCE_DIR) / "../shared/frames";
-  return fs::is_directory(folder) ? std::optional(folder) : std::nullopt;
-}
+std::optional<fs::path> sample_folder() { return lapservo::testing::sample_frames(); }
 
 std::vector<TrueFrame> sample_frames(const std::string& set) {
   const fs::path all = sample_folder().value(), folder = all / set;
@@ -102,7 +98,7 @@ Score score_single(const std::vector<TrueFrame>& frames) {
 }
 
 Rig example_rig() {
-  return load_rig(fs::path(LAPSERVO_SOURCE_DIR) / "configs/example.yaml");
+  return load_rig(lapservo::testing::source_folder() / "configs/example.yaml");
 }
 
 namespace {

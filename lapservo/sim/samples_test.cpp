@@ -1,6 +1,5 @@
 // The renderer beside ray-traced pictures of the same scenes (another program's work; see ../shared/frames).
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/edge_probe.h"
 #include "lapservo/sim/renderer.h"
+#include "lapservo/testing/sample_frames.h"
 
 namespace lapservo {
 namespace {
@@ -62,11 +62,9 @@ std::vector<Pair> pairs(const fs::path& folder) {
 class Samples : public testing::Test {
  protected:
   void SetUp() override {
-    const char* named = std::getenv("LAPSERVO_FRAMES");
-    const fs::path folder =
-        (named ? fs::path(named) : fs::path(LAPSERVO_SOURCE_DIR) / "../shared/frames") / "illumination";
-    if (!fs::exists(folder / "truth.csv")) GTEST_SKIP() << "no sample frames";
-    pairs_ = pairs(folder);
+    const auto folder = testing::sample_frames("illumination");
+    if (!folder) GTEST_SKIP() << "no sample frames";
+    pairs_ = pairs(*folder);
     ASSERT_GE(pairs_.size(), 3U);
   }
   std::vector<Pair> pairs_;

@@ -8,13 +8,14 @@
 #include "lapservo/core/error.h"
 #include "lapservo/kinematics/features.h"
 #include "lapservo/sim/edge_probe.h"
+#include "lapservo/testing/sample_frames.h"
 
 namespace lapservo {
 namespace {
 
 // The example's scene, a third as large.
 Rig small_rig() {
-  Rig rig = load_rig(std::string(LAPSERVO_SOURCE_DIR) + "/configs/example.yaml");
+  Rig rig = load_rig(testing::source_folder() / "configs/example.yaml");
   Camera& camera = rig.camera;
   camera.width_px = 426;
   camera.height_px = 240;
