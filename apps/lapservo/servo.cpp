@@ -226,7 +226,9 @@ int simulate(const Options& options) {
                 return !interrupted() && (!view || show(*view, record, run.rig, frame, seen));
               });
   }
-  std::printf("%s\n", summary.text().c_str());
+  std::printf("method %s, seen by %s\n%s\n", std::string(mode_word(run.controller.mode)).c_str(),
+              run.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
+              summary.text().c_str());
   if (folder) {
     folder->log().commit();
     std::printf("log, rig and controller: %s\n", folder->path().c_str());
