@@ -210,9 +210,11 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     }
     observations_[i] = {};
     observations_[i].status = found.status;
-    if (found.refused)
-      observations_[i].refused = {
-          Observation::Refused::What::pose, found.refused->camera_from_unrolled, found.refused->psi_rad, {}};
+    if (found.refused) {
+      observations_[i].refused.what = Observation::Refused::What::pose;
+      observations_[i].refused.camera_from_unrolled = found.refused->camera_from_unrolled;
+      observations_[i].refused.psi_rad = found.refused->psi_rad;
+    }
     if (!found.fit) continue;
     observations_[i] = observation_of(scene, *found.fit, camera_from_rcm);
     remember(i, *found.fit);
