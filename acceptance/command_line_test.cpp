@@ -1,5 +1,7 @@
 // The tool as its user meets it: exit codes, one line per complaint, nothing left half-written.
 
+#include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -26,11 +28,11 @@ std::string read(const fs::path& path) {
   return text.str();
 }
 
-class CommandLine : public testing::Test {
+class CommandLine : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::temp_directory_path() / ("lapservo_cli_" + std::to_string(::getpid()) +
-                                           testing::UnitTest::GetInstance()->current_test_info()->name());
+                                           ::testing::UnitTest::GetInstance()->current_test_info()->name());
     // OpenCV's video backends, loaded for a try and unloaded again, keep what they allocated.
     ::setenv("ASAN_OPTIONS", "detect_leaks=0", 1);
     fs::create_directories(folder_ / "in");
@@ -203,6 +205,36 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
   EXPECT_EQ(run("servo --rig " + paper + " --robot sim --duration 0.5"), 1);
 }
 
+// Section V-D, to the letter: omega is 0.5 rad/s for all features, K holds per control period (60 a second).
+TEST_F(CommandLine, ServoByThePapersMethod) {
+  const std::string paper = lapservo::testing::source_folder().string() + "/configs/paper.yaml";
+  EXPECT_EQ(
+      run("servo --method paper --rig " + paper + " --robot sim --trajectory paper --duration 3 --out " + out("run")),
+      1);
+  EXPECT_NE(output().find("Algorithm 1"), std::string::npos) << output();
+  const CsvTable log = CsvTable::read(out("run") + "/log.csv");
+  ASSERT_EQ(log.rows(), 180U);
+  const double start_s = log.number(0, "time_s");
+  for (std::size_t row = 0; row < log.rows(); ++row) {
+    const double swing = std::sin(0.5 * (log.number(row, "time_s") - start_s));
+    EXPECT_NEAR(log.number(row, "desired_s_rad"), 0.9 + 0.05 * swing, 1e-9);
+    EXPECT_NEAR(log.number(row, "desired_r_px"), 795 + 60 * swing, 1e-9);
+    EXPECT_NEAR(log.number(row, "desired_l_px"), 365 + 30 * swing, 1e-9);
+    EXPECT_NEAR(log.number(row, "desired_d_px"), 212 + 37 * swing, 1e-9);
+  }
+  const std::string controller = read(out("run") + "/controller.yaml");
+  double s = 0, r = 0, l = 0, d = 0;
+  ASSERT_EQ(std::sscanf(controller.c_str() + controller.find("gains_per_s"), "gains_per_s: [%lf, %lf, %lf, %lf]", &s,
+                        &r, &l, &d),
+            4)
+      << controller;
+  const std::array<double, 4> per_period{s / 60, r / 60, l / 60, d / 60}, papers{0.032, 0.008, 0.0008, 0.01};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(per_period.at(i), papers.at(i), 1e-12) << i;
+
+  run("servo --method paper --tracker surface --rig " + paper + " --robot sim --duration 0.5");
+  EXPECT_NE(output().find("all visible lines"), std::string::npos) << output();
+}
+
 TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   const std::string servo =
       "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --out " + out("run");
@@ -212,6 +244,7 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --set-point 0.9,795", {"--set-point"});
   expect_refused(servo + " --robot sim --via 1,2,3", {"--via", "four"});
   expect_refused(servo + " --robot sim --method fast", {"--method", "fast", "uncalibrated"});
+  expect_refused(servo + " --robot sim --tracker magic", {"--tracker", "magic"});
   expect_refused(servo + " --robot sim --delay-ms soon", {"--delay-ms", "soon"});
   expect_refused(servo + " --robot sim --fps 1", {"--fps"});
   expect_refused(servo + " --robot sim --trajectory " + in("none.csv"), {"none.csv"});
@@ -221,9 +254,9 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --controller " + in("gains.yaml", "gains_per_s: [1, 2, 3, -4]\n"),
                  {"gains", "-4"});
   expect_refused("servo --replay " + in("log.csv"), {"rig.yaml"});
-  expect_refused(
-      "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --robot sim --out /proc/nowhere",
-      {"/proc/nowhere", "folder"});
+  expect_refused("servo --rig " + lapservo::testing::source_folder().string() +
+                     "/configs/paper.yaml --robot sim --out /proc/nowhere",
+                 {"/proc/nowhere", "folder"});
 }
 
 TEST_F(CommandLine, ExperimentsWriteAReport) {

@@ -40,7 +40,8 @@ constexpr double window_margin_px = 20, via_dwell_s = 1;
 const Eigen::Vector4d via_rate(0.05, 60, 40, 40);  // s_rad, r, l, d px a second
 
 struct Options {
-  std::string rig, robot, trajectory = "paper", method = "default", controller, delay = "estimate", out, replay;
+  std::string rig, robot, trajectory = "paper", method = "default", tracker, controller, delay = "estimate", out,
+                          replay;
   std::vector<double> set_point, via, start, rcm_px, hide;
   double duration_s = 20, latency_ms = 80, fps = 60;
   std::uint64_t seed = 1;
@@ -71,6 +72,12 @@ ControllerConfig controller_of(const Options& options, const Rig& rig) {
   }
   if (!options.controller.empty()) config = load_controller(options.controller, config);
   return checked(config);
+}
+
+// The paper's law comes with the paper's eyes.
+Method tracker_of(const Options& options, ControlMode mode) {
+  const bool own = options.tracker.empty() && mode == ControlMode::paper;
+  return own || options.tracker == "centerline" ? Method::centerline : Method::surface;
 }
 
 std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
@@ -114,6 +121,7 @@ ServoRunConfig run_config_of(const Options& options) {
   run.rig = single_instrument(load_rig(options.rig), options.rig);
   run.controller = controller_of(options, run.rig);
   run.true_rig = run.rig;
+  run.tracker.method = tracker_of(options, run.controller.mode);
   if (run.controller.mode == ControlMode::uncalibrated) forget_registration(run, options);
   return run;
 }
@@ -218,7 +226,9 @@ int simulate(const Options& options) {
                 return !interrupted() && (!view || show(*view, record, run.rig, frame, seen));
               });
   }
-  std::printf("%s\n", summary.text().c_str());
+  std::printf("method %s, seen by %s\n%s\n", std::string(mode_word(run.controller.mode)).c_str(),
+              run.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
+              summary.text().c_str());
   if (folder) {
     folder->log().commit();
     std::printf("log, rig and controller: %s\n", folder->path().c_str());
@@ -261,7 +271,7 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--robot", options->robot, "sim: the built-in theatre");
   command
       ->add_option("--trajectory", options->trajectory,
-                   "paper: section V-D's sinusoids; or a CSV of time_s,s_rad,r_px,l_px,d_px")
+                   "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
       ->capture_default_str();
   command->add_option("--set-point", options->set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
       ->delimiter(',')
@@ -276,9 +286,14 @@ void add_servo(CLI::App& app, Run& run_later) {
   command
       ->add_option(
           "--method", options->method,
-          "default: readings and images fused; paper: its law and gains as they stand; uncalibrated: learns the "
-          "Jacobian")
+          "default: readings and images fused; paper: its law (eq. 21), gains and Algorithm 1; uncalibrated: learns "
+          "the Jacobian")
       ->capture_default_str();
+  command
+      ->add_option("--tracker", options->tracker,
+                   "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
+                   "--method paper, else surface")
+      ->check(CLI::IsMember({"surface", "centerline"}));
   command->add_option("--controller", options->controller, "YAML: gains_per_s, limits, window, delay_s ...");
   command->add_option("--delay-ms", options->delay, "The images' age, or `estimate`")->capture_default_str();
   command->add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
@@ -299,6 +314,9 @@ void add_servo(CLI::App& app, Run& run_later) {
       ->check(CLI::Range(5.0, 500.0));
   command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")->delimiter(',')->expected(2);
   command->footer(
+      "The paper's gains K = 0.032, 0.008, 0.0008, 0.01 (s, r, l, d) and omega = 0.5 have no unit of time in it. Here "
+      "K\n"
+      "is read per control period (gains_per_s = K times --fps) and omega per second.\n"
       "Examples:\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,5 --view\n"

@@ -70,17 +70,22 @@ void Canvas::line(const std::vector<PointMm>& points, const PrintColor& color, d
   cairo_stroke(cairo_);
 }
 
-void Canvas::text(const std::string& text, PointMm at, double height_mm, Anchor anchor, double turn_deg) {
-  cairo_set_source_rgb(cairo_, 0, 0, 0);
+double Canvas::text_width_mm(const std::string& text, double height_mm) {
   cairo_select_font_face(cairo_, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
   cairo_set_font_size(cairo_, height_mm * 1.35);
   cairo_text_extents_t extents;
   cairo_text_extents(cairo_, text.c_str(), &extents);
+  return extents.x_advance;
+}
+
+void Canvas::text(const std::string& text, PointMm at, double height_mm, Anchor anchor, double turn_deg) {
+  const double width_mm = text_width_mm(text, height_mm);
+  cairo_set_source_rgb(cairo_, 0, 0, 0);
   const double share = anchor == Anchor::left ? 0 : (anchor == Anchor::middle ? 0.5 : 1);
   cairo_save(cairo_);
   cairo_translate(cairo_, at.x, at.y);
   cairo_rotate(cairo_, rad_from_deg(turn_deg));
-  cairo_move_to(cairo_, -share * extents.x_advance, 0);
+  cairo_move_to(cairo_, -share * width_mm, 0);
   cairo_show_text(cairo_, text.c_str());
   cairo_restore(cairo_);
 }

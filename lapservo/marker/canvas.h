@@ -25,6 +25,8 @@ class Canvas {
   void line(const std::vector<PointMm>& points, const PrintColor& color, double width_mm, bool dashed = false);
   enum class Anchor { left, middle, right };
   void text(const std::string& text, PointMm at, double height_mm, Anchor anchor = Anchor::left, double turn_deg = 0);
+  /// How far a text of this height reaches.
+  double text_width_mm(const std::string& text, double height_mm);
   void arrow(PointMm from, PointMm to);
   void finish();
 

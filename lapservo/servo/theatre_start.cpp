@@ -38,6 +38,25 @@ bool seam_lies_between(const FeatureModel& model, const Eigen::Vector4d& from, c
   return false;
 }
 
+// Where eq. (22) leads: each error decays with its own K. The rates stay empty, since limits only slow the way down.
+Trajectory decay_to(const Trajectory& goal, const Eigen::Vector4d& from, const TrackingGains& gains) {
+  const Eigen::Vector4d error = feature_error(from, goal.at(0).features);
+  return {goal.duration_s, [=](double time_s) {
+            const Eigen::Array4d left = (-time_s * gains.per_s.array()).exp();
+            const Eigen::Vector4d features = goal.at(time_s).features + (left * error.array()).matrix();
+            return DesiredFeatures{features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+          }};
+}
+
+// The truth is what the law sees and what it moves.
+std::optional<Infeasible> problem_on_the_papers_way(const Trajectory& goal, double duration_s,
+                                                    const FeatureModel& model, const ControllerConfig& controller,
+                                                    const Eigen::Vector4d& q_true) {
+  constexpr double check_every_s = 0.1;
+  const Trajectory way = decay_to(goal, model(q_true)->features, controller.gains);
+  return find_infeasible(way, duration_s, model, controller, q_true, check_every_s);
+}
+
 Eigen::Vector4d anywhere(const JointLimits& limits, Random& random) {
   Eigen::Vector4d q;
   for (int i = 0; i < 4; ++i) q[i] = random.uniform(limits.lower[i], limits.upper[i]);
@@ -67,7 +86,9 @@ RcmCoordinates random_start(const Trajectory& trajectory, double duration_s, con
     const Eigen::Vector4d readings = anywhere(controller.limits, random);
     if (!in_view(model, controller.window.value(), readings + arm.joint_offset)) continue;
     ++starts;
-    const auto problem = find_infeasible(trajectory, duration_s, model, controller, readings, check_every_s);
+    auto problem = find_infeasible(trajectory, duration_s, model, controller, readings, check_every_s);
+    if (!problem && controller.mode == ControlMode::paper)
+      problem = problem_on_the_papers_way(trajectory, duration_s, model, controller, readings + arm.joint_offset);
     if (!problem) {
       const auto goal = newton_inverse(model, trajectory.at(0).features, readings, controller.scales);
       if (goal && goal->converged && !seam_lies_between(model, readings, goal->q))

@@ -44,6 +44,16 @@ struct Observation {
   /// Where the fitted shaft lies, to start the next frame from and to draw. camera_from_unrolled, psi.
   Rigid3 camera_from_unrolled;
   double psi_rad = 0;  ///< in the azimuth reference of camera_from_unrolled
+
+  /// Of a frame that is not ok: what was taken for the marker and refused. To be drawn, so that a person sees why; for
+  /// nothing else, since it may lie anywhere. Finite.
+  struct Refused {
+    enum class What { nothing, pose, edges } what = What::nothing;
+    Rigid3 camera_from_unrolled;  ///< of Method::surface, with psi_rad about it
+    double psi_rad = 0;
+    std::array<Eigen::Vector2d, 4> edges_raw_px{};  ///< of Method::centerline
+  };
+  Refused refused;
 };
 
 }  // namespace lapservo
