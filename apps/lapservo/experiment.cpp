@@ -104,11 +104,12 @@ Report report_of(std::vector<ReportSection> sections, const std::string& missing
 }
 
 void print(const ReportSection& section) {
+  std::printf("%s\n", section.title.c_str());
   for (const Comparison& c : with_paper(section)) {
-    std::printf("%s\n", c.what.c_str());
+    std::printf("  %s\n", c.what.c_str());
     for (const auto& [who, value] :
          {std::pair{"the paper", c.paper}, {"its method here", c.centerline}, {"the default here", c.surface}})
-      if (!value.empty()) std::printf("  %-17s %s\n", who, value.c_str());
+      if (!value.empty()) std::printf("    %-17s %s\n", who, value.c_str());
   }
 }
 

@@ -1,6 +1,6 @@
 #include "lapservo/experiments/html_report.h"
 
-#include <cctype>
+#include <algorithm>
 #include <cstdint>
 #include <regex>
 #include <span>
@@ -101,20 +101,14 @@ std::string html_from(const Figure& figure) {
       escaped(title), content, escaped(figure.caption));
 }
 
-// A value stays on one line with its unit, and so do the two sides of a plus-minus: their spaces do not break.
-std::string unbroken(const std::string& text) {
-  static const std::string plus_minus = "\u00b1", no_break = "\u00a0";
-  std::string whole;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const bool after_digit = i > 0 && std::isdigit(static_cast<unsigned char>(text[i - 1])) != 0;
-    const bool about_plus_minus =
-        text.compare(i + 1, plus_minus.size(), plus_minus) == 0 ||
-        (i >= plus_minus.size() && text.compare(i - plus_minus.size(), plus_minus.size(), plus_minus) == 0);
-    static const std::regex unit("(px|mrad|rad|mm|ms|s|%|/s)([^a-z].*)?");
-    const bool before_unit = after_digit && std::regex_match(text.substr(i + 1), unit);
-    whole += text[i] == ' ' && (about_plus_minus || before_unit) ? no_break : std::string(1, text[i]);
-  }
-  return whole;
+// A value stays on one line with its name of one letter and its unit, and so do the two sides of a plus-minus: their
+// spaces do not break.
+std::string unbroken(std::string text) {
+  static const std::regex before_unit("([0-9]) (px|mrad|rad|mm|ms|s|%|/s)(?![a-z])"),
+      after_name("\\b([A-Za-z]|[A-Za-z] =|eq\\.) (?=[0-9])"), about("( ?)\u00b1 ");
+  text = std::regex_replace(text, before_unit, "$1\u00a0$2");
+  text = std::regex_replace(text, after_name, "$1\u00a0");
+  return std::regex_replace(text, about, "\u00a0\u00b1\u00a0");
 }
 
 std::string row_of(const std::vector<std::string>& cells, const char* tag) {
@@ -186,6 +180,21 @@ std::string html_from(const ReportSection& section) {
   return html + "</section>\n";
 }
 
+// "Figure 5", "Table I": what the titles and captions say before a colon.
+std::vector<std::string> papers_pictures(const ReportSection& section) {
+  std::vector<std::string> names;
+  const auto add = [&names](const std::string& text, const char* kind) {
+    const std::string name = text.substr(0, text.find(':'));
+    if (text.starts_with(kind) && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (const Figure& figure : section.figures) {
+    if (const auto* plot = std::get_if<Plot>(&figure.content)) add(plot->title, "Figure ");
+    add(figure.caption, "Figure ");
+  }
+  for (const Table& table : section.tables) add(table.caption, "Table ");
+  return names;
+}
+
 // Every figure of the paper's, section by section.
 std::string summary(const Report& report) {
   std::string rows, links;
@@ -193,13 +202,8 @@ std::string summary(const Report& report) {
     rows += fmt::format("<tr class=\"part\"><td colspan=\"4\"><a href=\"#{}\">{}</a></td></tr>\n", escaped(section.id),
                         escaped(section.title));
     rows += rows_of(with_paper(section));
-    for (const Figure& figure : section.figures)
-      if (const auto* plot = std::get_if<Plot>(&figure.content); plot && plot->title.starts_with("Figure"))
-        links += fmt::format("<a href=\"#{}\">{}</a>\n", escaped(section.id), escaped(plot->title));
-    for (const Table& table : section.tables)
-      if (table.caption.starts_with("Table"))
-        links += fmt::format("<a href=\"#{}\">{}</a>\n", escaped(section.id),
-                             escaped(table.caption.substr(0, table.caption.find(':'))));
+    for (const std::string& name : papers_pictures(section))
+      links += fmt::format("<a href=\"#{}\">{}</a>\n", escaped(section.id), escaped(name));
   }
   return comparison_table(rows) + (links.empty() ? "" : "<nav>\n" + links + "</nav>\n");
 }

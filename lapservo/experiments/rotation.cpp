@@ -163,11 +163,11 @@ std::vector<Comparison> comparisons_of(const Result& result) {
     return compared(what, paper, result.methods, text_of);
   };
   const Pooled paper = pooled(Result::paper_mean_rad, Result::paper_deviation_rad);
-  return {row("rotation: standard deviation of the error, from trial to trial", range_of(Result::paper_deviation_rad),
+  return {row("standard deviation of the error, from trial to trial", range_of(Result::paper_deviation_rad),
               [](const auto& m) { return range_of(m, &Spread::deviation); }),
-          row("rotation: mean error, from trial to trial", range_of(Result::paper_mean_rad),
+          row("mean error, from trial to trial", range_of(Result::paper_mean_rad),
               [](const auto& m) { return range_of(m, &Spread::mean); }),
-          row("rotation: rms error of all trials together, bias included", mrad(paper.rms) + " mrad (from its Table I)",
+          row("rms error of all trials together, bias included", mrad(paper.rms) + " mrad (from its Table I)",
               [](const auto& m) { return mrad(m.all.rms) + " mrad"; }),
           row("standard deviation of all trials together", mrad(paper.deviation) + " mrad (from its Table I)",
               [](const auto& m) { return mrad(m.all.deviation) + " mrad"; }),
@@ -175,8 +175,8 @@ std::vector<Comparison> comparisons_of(const Result& result) {
               [](const auto& m) { return mrad(m.all.mean) + " mrad"; }),
           row("median error", "\u201caround zero\u201d", [](const auto& m) { return mrad(m.all.median) + " mrad"; }),
           row("largest error", "", [](const auto& m) { return mrad(m.all.largest) + " mrad"; }),
-          row("rotation: errors under 0.1 rad", "half", [](const auto& m) { return percent(m.under_100mrad); }),
-          row("rotation: errors under 0.2 rad", "most", [](const auto& m) { return percent(m.under_200mrad); }),
+          row("errors under 0.1 rad", "half", [](const auto& m) { return percent(m.under_100mrad); }),
+          row("errors under 0.2 rad", "most", [](const auto& m) { return percent(m.under_200mrad); }),
           row("rms of error / stated sigma (1 is honest)", "",
               [](const auto& m) { return fmt::format("{:.2f}", m.in_sigmas.rms); }),
           row("frames in which it was found", "",
