@@ -152,7 +152,7 @@ TEST(Illumination, TakesTheLargestOfFour) {
     for (int point = 0; point < 4; ++point)
       for (int light = 0; light < (position == 1 && point == 3 ? 3 : 4); ++light)
         points.push_back({position, light, point, {0, 0}, 0.1 * light + position, 0});
-  const auto of_method = summed_up(Method::surface, 8, points);
+  const auto of_method = summed_up(Method::surface, points);
   ASSERT_EQ(of_method.largest.size(), 7U);
   EXPECT_NEAR(of_method.largest[0].px, 0.3, 1e-12);
   EXPECT_NEAR(of_method.of_largest.mean, (4 * 0.3 + 3 * 1.3) / 7, 1e-12);

@@ -163,6 +163,8 @@ std::vector<Comparison> comparisons_of(const Result& result) {
           row("measurements", measurements, [](const auto& m) { return fmt::format("{}", m.points.size()); }),
           row("the largest distance of all", "",
               [](const auto& m) { return fmt::format("{:.3f} px", m.of_largest.largest); }),
+          row("distance to their centroid, all measurements, mean \u00b1 std", "",
+              [](const auto& m) { return mean_and_deviation(m.to_centroid, "px"); }),
           row("distance to the truth, all measurements, mean \u00b1 std", "",
               [](const auto& m) { return mean_and_deviation(m.to_truth, "px"); })};
 }
@@ -198,16 +200,15 @@ IlluminationResult measure_illumination(const ExperimentSetup& setup) {
       const auto truth = centre_line(camera, setup.rig.instruments[0].marker, unrolled, q.psi_rad);
       add_position(points, sightings, m, i, truth.value(), camera);
     }
-    const int found = static_cast<int>(points.size()) / 4;
-    result.methods.push_back(summed_up(setup.methods[m], found, std::move(points)));
+    result.methods.push_back(summed_up(setup.methods[m], std::move(points)));
   }
   Stage stage(setup.rig, tissue);
   result.example_bgr = example(setup, stage, positions[0]);
   return result;
 }
 
-IlluminationResult::OfMethod summed_up(Method method, int found, std::vector<IlluminationResult::Point> points) {
-  Result::OfMethod of_method{method, found, std::move(points), {}, {}, {}, {}};
+IlluminationResult::OfMethod summed_up(Method method, std::vector<IlluminationResult::Point> points) {
+  Result::OfMethod of_method{method, std::move(points), {}, {}, {}, {}};
   of_method.largest = largest_distances(of_method.points);
   std::vector<double> largest, to_centroid, to_truth;
   for (const Result::Largest& of_point : of_method.largest) largest.push_back(of_point.px);

@@ -33,7 +33,6 @@ struct IlluminationResult {
   };
   struct OfMethod {
     Method method;
-    int found = 0;  ///< frames, of positions x lights
     std::vector<Point> points;
     std::vector<Largest> largest;
     Spread of_largest;             ///< the paper's mean and standard deviation, pixels
@@ -47,7 +46,7 @@ struct IlluminationResult {
 IlluminationResult measure_illumination(const ExperimentSetup& setup);
 
 /// Sums up measurements that are there.
-IlluminationResult::OfMethod summed_up(Method method, int found, std::vector<IlluminationResult::Point> points);
+IlluminationResult::OfMethod summed_up(Method method, std::vector<IlluminationResult::Point> points);
 
 /// illumination.csv: every measurement; illumination_largest.csv: the largest distance of each point.
 void write_data(const IlluminationResult& result, const std::filesystem::path& folder);
