@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
@@ -29,6 +30,7 @@ constexpr std::uintmax_t needed_bytes = 16 << 20;
 struct Options {
   std::string name, out, rig, method = "both";
   std::uint64_t seed = 1;
+  bool force = false;
 };
 
 // Measures, leaves the data in the folder, and tells of it.
@@ -95,8 +97,9 @@ Report report_of(std::vector<ReportSection> sections, const Options& options) {
 
 int run(const Options& options) {
   ExperimentSetup setup = setup_of(options);
-  const fs::path folder = options.out;
-  prepare_output_folder(folder, needed_bytes);
+  InputFiles inputs;
+  inputs.add_rig(options.rig, setup.rig);
+  OutputFolder folder(options.out, setup.rig, inputs, options.force, needed_bytes);
   watch_for_interrupts();
 
   std::vector<ReportSection> sections;
@@ -110,7 +113,7 @@ int run(const Options& options) {
       return !interrupted();
     };
     try {
-      sections.push_back(experiment(setup, folder));
+      sections.push_back(experiment(setup, folder / ""));
     } catch (const Interrupted&) {
       stopped_in = name;
       break;
@@ -120,7 +123,6 @@ int run(const Options& options) {
   }
   if (!stopped_in.empty()) std::printf("stopped in %s\n", stopped_in.c_str());
   if (sections.empty()) return 1;
-  const fs::path path = folder / "report.html";
   for (const ReportSection& section : sections) {
     const Comparison& c = section.comparisons.front();
     std::printf("%s\n", c.what.c_str());
@@ -128,8 +130,9 @@ int run(const Options& options) {
          {std::pair{"the paper", c.paper}, {"its method here", c.centerline}, {"the default here", c.surface}})
       if (!value.empty()) std::printf("  %-17s %s\n", who, value.c_str());
   }
-  write_report(path, report_of(std::move(sections), options));
-  std::printf("report: %s\n", path.c_str());
+  write_report(folder / "report.html", report_of(std::move(sections), options));
+  folder.commit();
+  std::printf("report: %s\n", (fs::path(options.out) / "report.html").c_str());
   return stopped_in.empty() ? 0 : 1;
 }
 
@@ -141,7 +144,11 @@ void add_experiment(CLI::App& app, Run& run_later) {
   std::vector<std::string> choices{"all"};
   for (const Named& named : experiments()) choices.push_back(named.name);
   command->add_option("name", options->name, "Which: " + names())->required()->check(CLI::IsMember(choices));
-  command->add_option("--out", options->out, "Folder for report.html and the CSVs behind it")->required();
+  command
+      ->add_option("--out", options->out,
+                   std::string("Folder for report.html, the CSVs behind it and rig.yaml") + OutputFolder::help)
+      ->required();
+  command->add_flag("--force", options->force, OutputFolder::force_help);
   command->add_option("--rig", options->rig,
                       "Camera and instrument (the first), with camera_from_rcm; else the built-in configs/paper.yaml");
   command->add_option("--seed", options->seed, "Of positions, background and noise")->capture_default_str();
