@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view heading = "# Written by lapservo: the rig of the results in this folder.";
-constexpr auto unfinished_name = "unfinished", replaced_name = "replaced";
+constexpr auto unfinished_name = "unfinished", replaced_name = "replaced";  // the latter within the former
 
 [[noreturn]] void fail(const fs::path& path, const std::error_code& error) {
   throw InputError(path.string(), "can't be written: " + error.message());
@@ -78,7 +78,7 @@ void refuse_existing(const fs::path& folder, bool force) {
   const bool stopped = fs::exists(fs::symlink_status(unfinished, error));
   if (stopped) locked(folder, unfinished);
   const bool leftover = holds_run(unfinished) || (stopped && fs::is_empty(unfinished, error));
-  if (!leftover && !holds_run(folder) && !holds_run(folder / replaced_name))
+  if (!leftover && !holds_run(folder))
     throw InputError(folder.string(), "holds " + names.front() + ", expected a new or an empty folder" +
                                           (force ? ", or a run for --force to replace" : ""));
   if (!force)
@@ -125,7 +125,7 @@ OutputFolder::Unfinished::Unfinished(const fs::path& folder) : path(folder / unf
 OutputFolder::Unfinished::~Unfinished() {
   std::error_code error;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
-    if (entry->path().extension() == ".part") return;
+    if (entry->path().extension() == ".part" || entry->path().filename() == replaced_name) return;
   fs::remove_all(path, error);
 }
 
@@ -136,15 +136,16 @@ OutputFolder::OutputFolder(const fs::path& path, const Rig& rig, const InputFile
 }
 
 void OutputFolder::commit() {
-  const fs::path &folder = folder_.path(), replaced = folder / replaced_name;
-  std::error_code error;
-  std::vector<std::string> old;
+  const fs::path &folder = folder_.path(), replaced = unfinished_.path / replaced_name;
+  std::vector<std::string> old, fresh = names_in(unfinished_.path);
   for (const std::string& name : names_in(folder))
     if (is_result(name)) old.push_back(name);
-  fs::remove_all(replaced, error);  // of a run that was killed at this very point
+  // rig.yaml comes last, so that `unfinished` is known for ours should we be killed at this very point.
+  std::partition(fresh.begin(), fresh.end(), [](const std::string& name) { return name != "rig.yaml"; });
+  std::error_code error;
   if (!old.empty() && !fs::create_directory(replaced, error)) fail(folder, error);
   move_up(folder, replaced, old);
-  move_up(unfinished_.path, folder, names_in(unfinished_.path));
+  move_up(unfinished_.path, folder, fresh);
   fs::remove_all(replaced, error);
 }
 

@@ -32,7 +32,8 @@ class OutputFolder {
   void commit();
 
  private:
-  // Gone in the end with what is in it, unless there are rows that could not be completed.
+  // Gone in the end with what is in it, unless there are rows that could not be completed, or results that could not be
+  // put back.
   struct Unfinished {
     explicit Unfinished(const std::filesystem::path& folder);
     ~Unfinished();
