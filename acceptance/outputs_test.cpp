@@ -88,13 +88,14 @@ class Outputs : public ::testing::Test {
 TEST_F(Outputs, OfEveryCommandKeepLinksModesAndDevices) {
   render();
   expect_done("track frames --out obs.csv");
-  const std::vector<std::pair<std::string, std::string>> commands{{"track frames --out ", ".csv"},
-                                                                  {"track frames/0000.png --overlay ", ".png"},
-                                                                  {"estimate-rcm obs.csv --out ", ".csv"},
-                                                                  {"marker design --out ", ".yaml"},
-                                                                  {"marker print --rig " + rig_ + " --out ", ".pdf"},
-                                                                  {"marker show --rig " + rig_ + " --out ", ".svg"},
-                                                                  {"marker show --rig " + rig_ + " --out ", ".png"}};
+  const std::vector<std::pair<std::string, std::string>> commands{
+      {"track frames --out ", ".csv"},
+      {"track frames/0000.png --out one.csv --overlay ", ".png"},
+      {"estimate-rcm obs.csv --out ", ".csv"},
+      {"marker design --out ", ".yaml"},
+      {"marker print --rig " + rig_ + " --out ", ".pdf"},
+      {"marker show --rig " + rig_ + " --out ", ".svg"},
+      {"marker show --rig " + rig_ + " --out ", ".png"}};
   for (const auto& [command, extension] : commands) {
     SCOPED_TRACE(command + extension);
     const std::string name = "out/a" + extension, link = "out/link" + extension, fifo = "out/fifo" + extension;
