@@ -13,6 +13,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
@@ -136,8 +137,7 @@ std::string number_or_empty(std::optional<double> value) {
   return value ? fmt::format("{:.6g}", *value) : "";
 }
 
-void write_report(const fs::path& path, const std::vector<Result>& results) {
-  AtomicFile file(path);
+void write_report(AtomicFile& file, const std::vector<Result>& results) {
   file.stream()
       << "instrument,method,status,lines,outliers,rcm_u_px,rcm_v_px,sigma_u_px,sigma_v_px,correlation,noise_px,"
          "chi2,direction_spread_rad,near_parallel,rig_u_px,rig_v_px,distance_px\n";
@@ -208,12 +208,14 @@ void warn(const Result& r) {
 int run(const Options& options) {
   std::optional<Rig> rig;
   if (!options.rig.empty()) rig = load_rig(options.rig);
-  std::error_code error;
-  for (const std::string& input : {options.observations, options.rig})
-    if (!options.out.empty() && fs::exists(options.out) && fs::equivalent(options.out, input, error))
-      throw InputError(options.out, "is an input itself, expected another place for the results");
+  InputFiles inputs;
+  inputs.add(options.observations);
+  if (rig) inputs.add_rig(options.rig, *rig);
+  inputs.refuse_as_output(options.out);
+  std::optional<AtomicFile> report;
+  if (!options.out.empty()) report.emplace(options.out);
   const std::vector<Result> results = estimate_all(options, rig);
-  if (!options.out.empty()) write_report(options.out, results);
+  if (report) write_report(*report, results);
   for (const Result& result : results) {
     print(result);
     warn(result);
@@ -237,7 +239,8 @@ void add_estimate_rcm(CLI::App& app, Run& run_later) {
       ->required();
   command->add_option("--rig", options->rig,
                       "To undistort the lines, and to compare with its camera_from_rcm where it has one");
-  command->add_option("--out", options->out, "CSV to write: a row per instrument and method, in ideal pixels");
+  command->add_option("--out", options->out,
+                      "CSV to write or replace: a row per instrument and method, in ideal pixels");
   command
       ->add_option("--sigma-px", options->sigma_px,
                    "Standard deviation of e0 and e3 in either coordinate; else estimated from how badly the lines meet")

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
@@ -29,6 +30,7 @@ constexpr std::uintmax_t needed_bytes = 16 << 20;
 struct Options {
   std::string name, out, rig, method = "both";
   std::uint64_t seed = 1;
+  bool force = false;
 };
 
 // Measures, leaves the data in the folder, and tells of it.
@@ -143,17 +145,18 @@ Outcome run_experiments(ExperimentSetup setup, const Options& options, const fs:
 
 int run(const Options& options) {
   ExperimentSetup setup = setup_of(options);
-  const fs::path folder = options.out;
-  prepare_output_folder(folder, needed_bytes);
+  InputFiles inputs;
+  inputs.add_rig(options.rig, setup.rig);
+  OutputFolder folder(options.out, setup.rig, inputs, options.force, needed_bytes);
   watch_for_interrupts();
-  Outcome outcome = run_experiments(std::move(setup), options, folder);
+  Outcome outcome = run_experiments(std::move(setup), options, folder / "");
   const std::string missing = missing_from(outcome.sections, outcome.stopped_in);
   for (const ReportSection& section : outcome.sections) print(section);
   if (!missing.empty()) std::printf("%s\n", missing.c_str());
   if (outcome.sections.empty()) return 1;
-  const fs::path path = folder / "report.html";
-  write_report(path, report_of(std::move(outcome.sections), missing, options));
-  std::printf("report: %s\n", path.c_str());
+  write_report(folder / "report.html", report_of(std::move(outcome.sections), missing, options));
+  folder.commit();
+  std::printf("report: %s\n", (fs::path(options.out) / "report.html").c_str());
   return missing.empty() ? 0 : 1;
 }
 
@@ -165,7 +168,11 @@ void add_experiment(CLI::App& app, Run& run_later) {
   std::vector<std::string> choices{"all"};
   for (const Named& named : experiments()) choices.push_back(named.name);
   command->add_option("name", options->name, "Which: " + names())->required()->check(CLI::IsMember(choices));
-  command->add_option("--out", options->out, "Folder for report.html and the CSVs behind it")->required();
+  command
+      ->add_option("--out", options->out,
+                   std::string("Folder for report.html, the CSVs behind it and rig.yaml") + OutputFolder::help)
+      ->required();
+  command->add_flag("--force", options->force, OutputFolder::force_help);
   command->add_option("--rig", options->rig,
                       "Camera and instrument (the first), with camera_from_rcm; else the built-in configs/paper.yaml");
   command->add_option("--seed", options->seed, "Of positions, background and noise")->capture_default_str();

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
@@ -118,6 +119,8 @@ void print_length_code(const Marker& marker, const Viewing& viewing) {
 int run_design(const DesignOptions& options) {
   if (options.hues_deg.size() != 3) throw InputError("--hues", "needs three hues, like 90,180,270");
   const Viewing viewing = options.viewing.viewing();
+  std::optional<AtomicFile> file;
+  if (!options.out.empty()) file.emplace(options.out);
   const bool given = !options.upper_mm.empty() || !options.lower_mm.empty();
   Marker marker;
   if (given) {
@@ -152,8 +155,9 @@ int run_design(const DesignOptions& options) {
                                                                            "inverse)");
   std::puts("");
   std::fputs(yaml_of(marker).c_str(), stdout);
-  if (!options.out.empty()) {
-    write_file(options.out, yaml_of(marker));
+  if (file) {
+    file->stream() << yaml_of(marker);
+    file->commit();
     std::printf("\nwritten: %s\n", options.out.c_str());
   }
   return 0;
@@ -167,6 +171,9 @@ struct RigOptions {
 
 Instrument chosen(const RigOptions& options) {
   const Rig rig = load_rig(options.rig);
+  InputFiles inputs;
+  inputs.add_rig(options.rig, rig);
+  inputs.refuse_as_output(options.out);
   if (options.instrument.empty()) return rig.instruments.front();
   for (const Instrument& instrument : rig.instruments)
     if (instrument.name == options.instrument) return instrument;
@@ -237,7 +244,7 @@ void add_design(CLI::App* parent, Run& run_later) {
           "of one band (eq. 16), set beside the cross-ratio to show what perspective does to it")
       ->capture_default_str()
       ->check(CLI::IsMember({"cross-ratio", "length"}));
-  command->add_option("--out", options->out, "Write the marker: block of a rig");
+  command->add_option("--out", options->out, "Write the marker: block of a rig; a file of that name is replaced");
   add_viewing(command, options->viewing);
   command->footer(
       "Example:\n  lapservo marker design --diameter-mm 8.4 --distance-mm 110 --out marker.yaml\n"
@@ -264,7 +271,7 @@ void add_marker(CLI::App& app, Run& run_later) {
 
   auto printing = std::make_shared<RigOptions>();
   CLI::App* print = add_for_rig(marker, "print", "Write a sheet to print at true scale.", printing);
-  print->add_option("--out", printing->out, "sheet.pdf or sheet.svg")->required();
+  print->add_option("--out", printing->out, "sheet.pdf or sheet.svg; a file of that name is replaced")->required();
   print->add_option("--paper", printing->paper, "a4 or letter")
       ->capture_default_str()
       ->check(CLI::IsMember({"a4", "letter"}));
@@ -276,7 +283,7 @@ void add_marker(CLI::App& app, Run& run_later) {
 
   auto showing = std::make_shared<RigOptions>();
   CLI::App* show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
-  show->add_option("--out", showing->out, "Write a picture too: .svg, .pdf or .png");
+  show->add_option("--out", showing->out, "Write a picture too: .svg, .pdf or .png; a file of that name is replaced");
   add_viewing(show, showing->viewing);
   show->footer("Example:\n  lapservo marker show --rig configs/example.yaml --out marker.svg");
   show->callback([showing, &run_later] { run_later = [showing] { return run_show(*showing); }; });

@@ -1,7 +1,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,6 +10,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_view.h"
 #include "apps/lapservo/output_folder.h"
@@ -45,13 +45,8 @@ struct Options {
   std::vector<double> set_point, via, start, rcm_px, hide;
   double duration_s = 20, latency_ms = 80, fps = 60;
   std::uint64_t seed = 1;
-  bool view = false;
+  bool view = false, force = false;
 };
-
-std::string text_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 Eigen::Vector4d four(const std::vector<double>& values) {
   return Eigen::Vector4d(values.data());
@@ -140,20 +135,33 @@ RcmCoordinates readings_at_start(const Options& options, const Trajectory& traje
 
 class RunFolder {
  public:
-  RunFolder(const Options& options, const ServoRunConfig& run) : path_(options.out) {
-    constexpr std::uintmax_t bytes_a_period = 2000;
-    prepare_output_folder(path_,
-                          bytes_a_period * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20));
-    write_file(path_ / "rig.yaml", text_of(options.rig));
-    write_file(path_ / "controller.yaml", controller_yaml(run.controller));
-    log_.emplace(path_ / "log.csv");
+  // With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
+  RunFolder(const Options& options, const ServoRunConfig& run)
+      : folder_(options.out, *run.true_rig, inputs_of(options, *run.true_rig), options.force, needed_bytes(options)),
+        log_(folder_ / "log.csv") {
+    write_file(folder_ / "controller.yaml", controller_yaml(run.controller));
   }
-  ServoLog& log() { return *log_; }
-  fs::path path() const { return path_; }
+  ServoLog& log() { return log_; }
+  void commit() {
+    log_.commit();
+    folder_.commit();
+  }
 
  private:
-  fs::path path_;
-  std::optional<ServoLog> log_;
+  static std::uintmax_t needed_bytes(const Options& options) {
+    constexpr std::uintmax_t bytes_a_period = 2000;
+    return bytes_a_period * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20);
+  }
+  static InputFiles inputs_of(const Options& options, const Rig& rig) {
+    InputFiles inputs;
+    inputs.add_rig(options.rig, rig);
+    inputs.add(options.controller);
+    inputs.add(options.trajectory);
+    return inputs;
+  }
+
+  OutputFolder folder_;
+  ServoLog log_;
 };
 
 // What the run came to, for the last lines.
@@ -230,8 +238,8 @@ int simulate(const Options& options) {
               run.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
               summary.text().c_str());
   if (folder) {
-    folder->log().commit();
-    std::printf("log, rig and controller: %s\n", folder->path().c_str());
+    folder->commit();
+    std::printf("log, rig and controller: %s\n", options.out.c_str());
   }
   return summary.converged() ? 0 : 1;
 }
@@ -299,7 +307,9 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
       ->delimiter(',')
       ->expected(2);
-  command->add_option("--out", options->out, "Folder for log.csv, rig.yaml and controller.yaml");
+  command->add_option("--out", options->out,
+                      std::string("Folder for log.csv, rig.yaml and controller.yaml") + OutputFolder::help);
+  command->add_flag("--force", options->force, OutputFolder::force_help);
   command->add_flag("--view", options->view, "Show it live");
   command->add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
   command->add_option("--start", options->start, "sim: readings to start from, theta,phi,rho,psi; else random")

@@ -8,13 +8,11 @@
 #include <fstream>
 #include <iterator>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo {
@@ -82,6 +80,15 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
   }
 }
 
+std::vector<std::uint8_t> encode_image(const fs::path& name, const cv::Mat& image) {
+  std::vector<std::uint8_t> bytes;
+  try {
+    if (has_image_extension(name) && cv::imencode(name.extension().string(), image, bytes)) return bytes;
+  } catch (const cv::Exception&) {
+  }
+  throw InputError(name.string(), "can't be written as a picture");
+}
+
 }  // namespace
 
 bool has_image_extension(const fs::path& path) {
@@ -138,20 +145,14 @@ cv::Mat read_image(const fs::path& path) {
 }
 
 void write_image(const fs::path& path, const cv::Mat& image) {
-  const fs::path temporary = temporary_name(path);
-  bool written = false;
-  try {
-    written = cv::imwrite(temporary.string(), image);
-  } catch (const cv::Exception&) {
-    written = false;
-  }
-  std::error_code error;
-  if (written) fs::rename(temporary, path, error);
-  if (!written || error) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw InputError(path.string(), "can't be written as a picture");
-  }
+  AtomicFile file(path);
+  write_image(file, path, image);
+}
+
+void write_image(AtomicFile& file, const fs::path& name, const cv::Mat& image) {
+  const auto bytes = encode_image(name, image);
+  file.stream().write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.commit();
 }
 
 }  // namespace lapservo

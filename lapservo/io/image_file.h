@@ -1,10 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
 
 #include <opencv2/core.hpp>
+
+#include "lapservo/core/atomic_file.h"
 
 namespace lapservo {
 
@@ -21,7 +24,9 @@ cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& sou
 /// 8-bit BGR of any supported pixel type, as above.
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source);
 
-/// Writes under a temporary name, then renames. Throws InputError when that fails.
+/// Writes whole or not at all: see AtomicFile. Throws InputError when that fails.
 void write_image(const std::filesystem::path& path, const cv::Mat& image);
+/// The same into a file that is open already; `name` says the format by its ending.
+void write_image(AtomicFile& file, const std::filesystem::path& name, const cv::Mat& image);
 
 }  // namespace lapservo

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "lapservo/core/atomic_file.h"
 #include "lapservo/marker/drawing.h"
 
 namespace lapservo {
@@ -13,7 +14,8 @@ struct PointMm {
   double x, y;
 };
 
-/// A page in millimetres, y down, written as SVG, PDF or PNG by the name's ending; appears when finish()ed.
+/// A page in millimetres, y down, written as SVG, PDF or PNG by the name's ending; appears when finish()ed (see
+/// AtomicFile).
 class Canvas {
  public:
   Canvas(const std::filesystem::path& path, double width_mm, double height_mm);
@@ -31,7 +33,8 @@ class Canvas {
   void finish();
 
  private:
-  std::filesystem::path path_, temporary_;
+  std::filesystem::path path_;
+  AtomicFile file_;
   cairo_surface_t* surface_ = nullptr;
   cairo_t* cairo_ = nullptr;
   bool png_ = false;

@@ -325,7 +325,7 @@ TEST(PrintSheet, RefusesWhatDoesNotFitOrCanNotBeWrittenAndLeavesNothingBehind) {
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   std::filesystem::create_directory(folder / "taken.svg");
-  EXPECT_EQ(refusal("taken.svg", example), place + "taken.svg: can't be written");
+  EXPECT_EQ(refusal("taken.svg", example), place + "taken.svg: is a folder, expected a file to write");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the folder";
 }
 

@@ -99,7 +99,9 @@ Rigid3 parse_transform(const YamlField& field) {
   const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
   if (!(std::abs(rotation.norm() - 1) < 1e-2))
     quaternion.fail("of norm " + std::to_string(rotation.norm()), "x y z w of a unit quaternion");
-  return {rotation.normalized(), {t[0], t[1], t[2]}};
+  // What is normalised already keeps its bits, however often a rig is written and read.
+  const bool unit = std::abs(rotation.squaredNorm() - 1) < 1e-14;
+  return {unit ? rotation : rotation.normalized(), {t[0], t[1], t[2]}};
 }
 
 Instrument parse_instrument(const YamlField& field) {
@@ -130,7 +132,9 @@ void check_distinguishable(const std::vector<Instrument>& instruments, const std
 
 Rig parse_root(const YamlField& root, const fs::path& folder) {
   Rig rig;
-  rig.camera = parse_camera(root["camera"], folder);
+  const YamlField camera = root["camera"];
+  rig.camera = parse_camera(camera, folder);
+  if (camera.is_scalar()) rig.camera_file = folder / camera.text("a path");
   const YamlField list = root["instruments"];
   const auto fields = list.list("a list of instruments");
   if (fields.empty() || fields.size() > 8) list.fail(list.value_text(), "one to eight instruments");

@@ -22,6 +22,7 @@ struct Instrument {
 struct Rig {
   Camera camera;
   std::vector<Instrument> instruments;
+  std::filesystem::path camera_file{};  ///< where the camera was read from, when it has a file of its own
 };
 
 /// Reads and checks everything: after it, the camera can be inverted over its whole image and every marker decoded.

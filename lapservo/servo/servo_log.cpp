@@ -160,6 +160,13 @@ std::string joined(const std::vector<std::string>& fields) {
   return fmt::format("{}", fmt::join(fields, ","));
 }
 
+std::string header() {
+  std::vector<std::string> truth;
+  name(truth, "true_", joints);
+  name(truth, "true_", features);
+  return fmt::format("period,{},{},{}", joined(input_columns()), joined(decision_columns()), joined(truth));
+}
+
 }  // namespace
 
 const std::vector<std::string>& decision_columns() {
@@ -185,20 +192,14 @@ std::vector<std::string> decision_fields(const ServoDecision& decision) {
   return fields;
 }
 
-ServoLog::ServoLog(const std::filesystem::path& path) : file_(path) {
-  std::vector<std::string> truth;
-  name(truth, "true_", joints);
-  name(truth, "true_", features);
-  file_.stream() << "period," << joined(input_columns()) << ',' << joined(decision_columns()) << ',' << joined(truth)
-                 << '\n';
-}
+ServoLog::ServoLog(const std::filesystem::path& path) : file_(path, header()) {}
 
 void ServoLog::add(const ServoRecord& record) {
   std::vector<std::string> truth;
   record.true_q ? write(truth, *record.true_q) : leave_empty(truth, 4);
   record.true_features ? write(truth, *record.true_features) : leave_empty(truth, 4);
-  file_.stream() << period_++ << ',' << joined(input_fields(record.input)) << ','
-                 << joined(decision_fields(record.decision)) << ',' << joined(truth) << '\n';
+  file_.add(fmt::format("{},{},{},{}", period_++, joined(input_fields(record.input)),
+                        joined(decision_fields(record.decision)), joined(truth)));
 }
 
 std::vector<LoggedPeriod> read_servo_log(const std::filesystem::path& path) {

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/row_file.h"
 #include "lapservo/servo/servo.h"
 
 namespace lapservo {
@@ -19,7 +19,8 @@ struct ServoRecord {
   std::optional<Eigen::Vector4d> true_q, true_features;
 };
 
-/// A run's complete log, one row a period. Numbers are written so that reading them gives the same bits.
+/// A run's complete log, one row a period, written as they come (see RowFile). Numbers are written so that reading them
+/// gives the same bits.
 class ServoLog {
  public:
   /// Throws InputError when the file can't be written.
@@ -28,7 +29,7 @@ class ServoLog {
   void commit() { file_.commit(); }
 
  private:
-  AtomicFile file_;
+  RowFile file_;
   long period_ = 0;
 };
 
