@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <system_error>
 #include <utility>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/input_file.h"
 
 namespace lapservo {
 namespace {
@@ -54,6 +53,13 @@ std::optional<std::vector<std::string>> split_fields(std::string_view line) {
   }
 }
 
+std::string names(const std::vector<std::string>& header) {
+  std::string text;
+  for (const std::string& name : header) text += (text.empty() ? "" : ",") + name;
+  constexpr std::size_t longest = 80;
+  return text.size() <= longest ? text : text.substr(0, longest) + "...";
+}
+
 std::string at_line(const std::string& source, std::size_t line) {
   return source + ":" + std::to_string(line);
 }
@@ -79,13 +85,8 @@ std::string csv_field(std::string_view text) {
 }
 
 CsvTable CsvTable::read(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) throw InputError(path.string(), "is a folder, expected a CSV file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path.string(), "can't be opened, expected a CSV file");
-  std::ostringstream text;
-  text << file.rdbuf();
-  return parse(text.view(), path.string());
+  constexpr std::size_t largest_bytes = std::size_t{256} << 20;
+  return parse(read_input(path, largest_bytes, "a CSV file"), path.string());
 }
 
 CsvTable CsvTable::parse(std::string_view text, std::string source) {
@@ -123,7 +124,8 @@ bool CsvTable::has(std::string_view column) const {
 
 std::size_t CsvTable::index_of(std::string_view column) const {
   const auto found = std::find(header_.begin(), header_.end(), column);
-  if (found == header_.end()) throw InputError(source_, "has no column '" + std::string(column) + "'");
+  if (found == header_.end())
+    throw InputError(source_, "has no column '" + std::string(column) + "', expected one beside " + names(header_));
   return static_cast<std::size_t>(found - header_.begin());
 }
 

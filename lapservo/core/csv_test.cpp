@@ -97,7 +97,7 @@ TEST(CsvTable, ComplaintsNameFileLineColumnValueAndExpectation) {
   const CsvTable table = CsvTable::parse("a,b\n1,2\n\nfast,nan\n", "t.csv");
   EXPECT_EQ(input_error([&] { table.number(1, "a"); }), "t.csv:4: a: is fast, expected a finite number");
   EXPECT_EQ(input_error([&] { table.number_or_empty(1, "b"); }), "t.csv:4: b: is nan, expected a finite number");
-  EXPECT_EQ(input_error([&] { table.text(0, "c"); }), "t.csv: has no column 'c'");
+  EXPECT_EQ(input_error([&] { table.text(0, "c"); }), "t.csv: has no column 'c', expected one beside a,b");
 }
 
 TEST(CsvTable, AComplaintIsOnePrintableLineWhateverTheFieldHolds) {
