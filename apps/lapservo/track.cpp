@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -108,6 +109,15 @@ void check_output(const Options& options) {
   throw error;
 }
 
+// In a flawed frame nothing is measured, and the next is searched anew.
+std::vector<Observation> observed(Tracker& tracker, const Rig& rig, const Frame& frame) {
+  if (!frame.flaw) return tracker.track(frame.bgr);
+  tracker.reset();
+  Observation nothing;
+  nothing.status = *frame.flaw;
+  return std::vector<Observation>(rig.instruments.size(), nothing);
+}
+
 int run(const Options& options) {
   check_output(options);
   RigByFrame rigs(options);
@@ -127,7 +137,7 @@ int run(const Options& options) {
       if (!frame) break;
       Tracker& tracker = rigs.tracker_for(*frame);
       try {
-        const auto& observations = tracker.track(frame->bgr);
+        const auto observations = observed(tracker, rigs.rig(), *frame);
         tally.add(rigs.rig(), observations);
         for (std::size_t i = 0; i < observations.size(); ++i)
           csv.add(frame->index, frame->time_s, frame->file.filename().string(), rigs.rig().instruments[i].name,
@@ -151,6 +161,11 @@ int run(const Options& options) {
   std::printf("%s%d frames%s\nobservations: %s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str(),
               options.out.c_str());
   if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
+  if (const std::string complaint = source->complaint(); !stopped && !complaint.empty()) {
+    std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options.input.c_str(),
+                 complaint.c_str());
+    return 1;
+  }
   if (tally.anything()) return 0;
   std::fprintf(
       stderr,
