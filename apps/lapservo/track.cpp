@@ -12,6 +12,7 @@
 
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_view.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
@@ -195,7 +196,7 @@ void add_track(CLI::App& app, Run& run_later) {
   command->add_flag("--view", options->view, "Show a live window");
   command->add_option("--fps", options->fps, "Frames per second of a folder's pictures")
       ->capture_default_str()
-      ->check(CLI::Range(0.001, 100000.0));
+      ->check(number_between(0.001, 100000.0));
   command->footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
   command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
 }
