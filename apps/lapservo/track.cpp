@@ -114,9 +114,9 @@ void check_output(const Options& options) {
 std::vector<Observation> observed(Tracker& tracker, const Rig& rig, const Frame& frame) {
   if (!frame.flaw) return tracker.track(frame.bgr);
   tracker.reset();
-  Observation nothing;
-  nothing.status = *frame.flaw;
-  return std::vector<Observation>(rig.instruments.size(), nothing);
+  std::vector<Observation> nothing(rig.instruments.size());
+  for (Observation& observation : nothing) observation.status = *frame.flaw;
+  return nothing;
 }
 
 int run(const Options& options) {
