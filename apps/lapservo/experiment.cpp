@@ -10,6 +10,7 @@
 
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
@@ -175,7 +176,9 @@ void add_experiment(CLI::App& app, Run& run_later) {
   command->add_flag("--force", options->force, OutputFolder::force_help);
   command->add_option("--rig", options->rig,
                       "Camera and instrument (the first), with camera_from_rcm; else the built-in configs/paper.yaml");
-  command->add_option("--seed", options->seed, "Of positions, background and noise")->capture_default_str();
+  command->add_option("--seed", options->seed, "Of positions, background and noise")
+      ->capture_default_str()
+      ->check(seed_number());
   command->add_option("--method", options->method, "centerline: the paper's; surface: the default; or both")
       ->capture_default_str()
       ->check(CLI::IsMember({"both", "centerline", "surface"}));

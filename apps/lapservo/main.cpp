@@ -20,6 +20,14 @@ void silence_libraries() {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   setenv("OPENCV_VIDEOIO_DEBUG", "0", 0);
+  setenv("GST_DEBUG", "none", 0);
+}
+
+// Formats whose size we don't ask for beforehand: a few bytes must not ask for gigabytes.
+void limit_pictures() {
+  setenv("OPENCV_IO_MAX_IMAGE_WIDTH", "16384", 0);
+  setenv("OPENCV_IO_MAX_IMAGE_HEIGHT", "16384", 0);
+  setenv("OPENCV_IO_MAX_IMAGE_PIXELS", "268435456", 0);
 }
 
 // A closed one would give its number to a result's file, and our messages would go there. A limit on files' sizes is an
@@ -66,10 +74,12 @@ int parse_and_run(int argc, char** argv) {
 int main(int argc, char** argv) {
   silence_libraries();
   prepare_standard_streams();
+  limit_pictures();
   try {
     return flushed(parse_and_run(argc, argv));
   } catch (const std::filesystem::filesystem_error& error) {
-    std::fprintf(stderr, "lapservo: %s: %s\n", error.path1().c_str(), error.code().message().c_str());
+    std::fprintf(stderr, "lapservo: %s: can't be used (%s), expected a name that can\n", error.path1().c_str(),
+                 error.code().message().c_str());
     return bad_input;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "lapservo: %s\n", error.what());

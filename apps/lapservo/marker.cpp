@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/input_files.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
@@ -30,13 +31,13 @@ struct ViewingOptions {
 void add_viewing(CLI::App* command, ViewingOptions& options) {
   command->add_option("--focal-px", options.focal_px, "Focal length of the camera")
       ->capture_default_str()
-      ->check(CLI::Range(10.0, 1e5));
+      ->check(number_between(10.0, 1e5));
   command->add_option("--distance-mm", options.distance_mm, "From the camera to the marker")
       ->capture_default_str()
-      ->check(CLI::Range(5.0, 2000.0));
+      ->check(number_between(5.0, 2000.0));
   command->add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line")
       ->capture_default_str()
-      ->check(CLI::Range(1e-4, 100.0));
+      ->check(number_between(1e-4, 100.0));
 }
 
 struct DesignOptions {
@@ -226,17 +227,21 @@ void add_design(CLI::App* parent, Run& run_later) {
   CLI::App* command = parent->add_subcommand("design", "Choose the bands of a marker, or judge given ones.");
   command->add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included")
       ->capture_default_str()
-      ->check(CLI::Range(0.5, 100.0));
+      ->check(number_between(0.5, 100.0));
   command->add_option("--length-mm", options->length_mm, "Length of the marker; default three diameters")
-      ->check(CLI::Range(1.0, 500.0));
+      ->check(number_between(1.0, 500.0));
   command->add_option("--smallest-band-mm", options->smallest_band_mm, "No band is shorter; default 3 mm or 12 px")
-      ->check(CLI::Range(0.1, 200.0));
+      ->check(number_between(0.1, 200.0));
   command->add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
+      ->check(finite_number())
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--bands-upper-mm", options->upper_mm, "Judge this design: lengths at the upper edge")
+      ->check(finite_number())
       ->delimiter(',');
-  command->add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge")->delimiter(',');
+  command->add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge")
+      ->check(finite_number())
+      ->delimiter(',');
   command
       ->add_option(
           "--code", options->code,
@@ -277,7 +282,7 @@ void add_marker(CLI::App& app, Run& run_later) {
       ->check(CLI::IsMember({"a4", "letter"}));
   print->add_option("--copies", printing->copies, "Markers on the sheet, as many as fit")
       ->capture_default_str()
-      ->check(CLI::Range(1, 100));
+      ->check(whole_number_between(1, 100));
   print->footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
   print->callback([printing, &run_later] { run_later = [printing] { return run_print(*printing); }; });
 

@@ -13,6 +13,7 @@
 
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
@@ -21,7 +22,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/io/configuration_csv.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/video_file.h"
+#include "lapservo/io/video_writer.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/renderer.h"
@@ -160,7 +161,7 @@ int run(const Options& options) {
       options.poses.empty() ? random_configurations(rig, options) : read_configurations(options.poses, rig);
   Renderer renderer = make_renderer(rig, options);
   TruthCsv truth(folder / "truth.csv");
-  std::optional<VideoFile> video;
+  std::optional<VideoWriter> video;
   if (options.video) video.emplace(folder / "video.mp4", options.fps);
   watch_for_interrupts();
   {
@@ -206,37 +207,39 @@ void add_render(CLI::App& app, Run& run_later) {
                       "random ones in view");
   command->add_option("--count", options->count, "How many random configurations")
       ->capture_default_str()
-      ->check(CLI::Range(1, 100000));
-  command->add_option("--seed", options->seed, "Of configurations, background and noise")->capture_default_str();
+      ->check(whole_number_between(1, 100000));
+  command->add_option("--seed", options->seed, "Of configurations, background and noise")
+      ->capture_default_str()
+      ->check(seed_number());
   command->add_flag("--moving", options->moving, "A smooth path through random configurations");
   command->add_option("--background", options->background, "A picture, or tissue")->capture_default_str();
   command->add_option("--light", options->light, "Exposure, 1 is normal")
       ->capture_default_str()
-      ->check(CLI::Range(0.01, 10.0));
+      ->check(number_between(0.01, 10.0));
   command->add_option("--smoke", options->smoke, "Share of grey veil, 0 to 1")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_between(0.0, 1.0));
   command->add_option("--blood", options->blood, "Share of the marker covered, 0 to 0.9")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 0.9));
+      ->check(number_between(0.0, 0.9));
   command->add_option("--noise", options->noise, "Times the sensor's usual noise")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 20.0));
+      ->check(number_between(0.0, 20.0));
   command->add_option("--blur-px", options->blur_px, "Sigma of the optical blur")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 20.0));
+      ->check(number_between(0.0, 20.0));
   command->add_option("--motion", options->motion, "Motion blur: share of the step to the next frame, 0 to 1")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_between(0.0, 1.0));
   command->add_option("--film-mm", options->film_mm, "Thickness of the film that carries the marker")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_between(0.0, 1.0));
   command->add_option("--condition", options->condition, "Name for truth.csv")->capture_default_str();
   command->add_option("--format", options->format, "png or jpg")
       ->capture_default_str()
       ->check(CLI::IsMember({"png", "jpg"}));
   command->add_flag("--video", options->video, "Write video.mp4 instead of pictures");
-  command->add_option("--fps", options->fps, "Of the video")->capture_default_str()->check(CLI::Range(0.1, 1000.0));
+  command->add_option("--fps", options->fps, "Of the video")->capture_default_str()->check(number_between(0.1, 1000.0));
   command->add_flag("--force", options->force, OutputFolder::force_help);
   command->footer(
       "Example:\n  lapservo render --rig configs/example.yaml --out frames --count 50 --moving --blood 0.2");

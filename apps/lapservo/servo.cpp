@@ -13,6 +13,7 @@
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_view.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
@@ -282,15 +283,17 @@ void add_servo(CLI::App& app, Run& run_later) {
                    "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
       ->capture_default_str();
   command->add_option("--set-point", options->set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
+      ->check(finite_number())
       ->delimiter(',')
       ->expected(4);
   command
       ->add_option("--via", options->via,
                    "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
+      ->check(finite_number())
       ->delimiter(',');
   command->add_option("--duration", options->duration_s, "Seconds")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 36000.0));
+      ->check(number_between(0.1, 36000.0));
   command
       ->add_option(
           "--method", options->method,
@@ -305,6 +308,7 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--controller", options->controller, "YAML: gains_per_s, limits, window, delay_s ...");
   command->add_option("--delay-ms", options->delay, "The images' age, or `estimate`")->capture_default_str();
   command->add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
+      ->check(finite_number())
       ->delimiter(',')
       ->expected(2);
   command->add_option("--out", options->out,
@@ -313,16 +317,22 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_flag("--view", options->view, "Show it live");
   command->add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
   command->add_option("--start", options->start, "sim: readings to start from, theta,phi,rho,psi; else random")
+      ->check(finite_number())
       ->delimiter(',')
       ->expected(4);
-  command->add_option("--seed", options->seed, "sim: of start, tissue, noise, jitter")->capture_default_str();
+  command->add_option("--seed", options->seed, "sim: of start, tissue, noise, jitter")
+      ->capture_default_str()
+      ->check(seed_number());
   command->add_option("--latency-ms", options->latency_ms, "sim: from exposure to arrival")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(number_between(0.0, 1000.0));
   command->add_option("--fps", options->fps, "Control periods, and frames in sim, a second")
       ->capture_default_str()
-      ->check(CLI::Range(5.0, 500.0));
-  command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")->delimiter(',')->expected(2);
+      ->check(number_between(6.0, 500.0));
+  command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")
+      ->check(finite_number())
+      ->delimiter(',')
+      ->expected(2);
   command->footer(
       "The paper's gains K = 0.032, 0.008, 0.0008, 0.01 (s, r, l, d) and omega = 0.5 have no unit of time in it. Here "
       "K\n"

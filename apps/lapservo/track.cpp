@@ -7,12 +7,14 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_view.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
@@ -129,6 +131,15 @@ struct Tally {
   throw error;
 }
 
+// In a flawed frame nothing is measured, and the next is searched anew.
+std::vector<Observation> observed(Tracker& tracker, const Rig& rig, const Frame& frame) {
+  if (!frame.flaw) return tracker.track(frame.bgr);
+  tracker.reset();
+  std::vector<Observation> nothing(rig.instruments.size());
+  for (Observation& observation : nothing) observation.status = *frame.flaw;
+  return nothing;
+}
+
 int run(const Options& options) {
   refuse_outputs(options, inputs_of(options));
   RigByFrame rigs(options);
@@ -148,7 +159,7 @@ int run(const Options& options) {
       if (!frame) break;
       Tracker& tracker = rigs.tracker_for(*frame);
       try {
-        const auto& observations = tracker.track(frame->bgr);
+        const auto observations = observed(tracker, rigs.rig(), *frame);
         tally.add(rigs.rig(), observations);
         for (std::size_t i = 0; i < observations.size(); ++i)
           csv.add(frame->index, frame->time_s, frame->file.filename().string(), rigs.rig().instruments[i].name,
@@ -172,6 +183,11 @@ int run(const Options& options) {
   std::printf("%s%d frames%s\nobservations: %s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str(),
               options.out.c_str());
   if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
+  if (const std::string complaint = source->complaint(); !stopped && !complaint.empty()) {
+    std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options.input.c_str(),
+                 complaint.c_str());
+    return 1;
+  }
   if (tally.anything()) return 0;
   std::fprintf(
       stderr,
@@ -207,7 +223,7 @@ void add_track(CLI::App& app, Run& run_later) {
   command->add_flag("--view", options->view, "Show a live window");
   command->add_option("--fps", options->fps, "Frames per second of a folder's pictures")
       ->capture_default_str()
-      ->check(CLI::Range(0.001, 100000.0));
+      ->check(number_between(0.001, 100000.0));
   command->footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
   command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
 }

@@ -6,7 +6,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/new_folder.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/video_file.h"
+#include "lapservo/io/video_writer.h"
 
 namespace lapservo {
 namespace {
@@ -42,7 +42,7 @@ class VideoOverlay : public OverlayWriter {
   void commit() override { video_.commit(); }
 
  private:
-  VideoFile video_;
+  VideoWriter video_;
 };
 
 }  // namespace

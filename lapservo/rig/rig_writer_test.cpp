@@ -29,6 +29,8 @@ void expect_same_bits(const Rig& a, const Rig& b) {
   EXPECT_EQ(a.camera.distortion, b.camera.distortion);
   EXPECT_EQ(a.camera.response.kind, b.camera.response.kind);
   EXPECT_EQ(a.camera.response.gamma, b.camera.response.gamma);
+  EXPECT_EQ(a.camera.response.table_light, b.camera.response.table_light);
+  EXPECT_EQ(a.camera.response.table_value, b.camera.response.table_value);
   ASSERT_EQ(a.instruments.size(), b.instruments.size());
   for (std::size_t i = 0; i < a.instruments.size(); ++i) {
     const Instrument &left = a.instruments[i], &right = b.instruments[i];
@@ -38,6 +40,13 @@ void expect_same_bits(const Rig& a, const Rig& b) {
     EXPECT_EQ(left.marker.bands_upper_m, right.marker.bands_upper_m);
     EXPECT_EQ(left.marker.bands_lower_m, right.marker.bands_lower_m);
     EXPECT_EQ(left.marker.seam_rad, right.marker.seam_rad);
+    EXPECT_EQ(left.image_delay_s, right.image_delay_s);
+    ASSERT_EQ(left.joints.has_value(), right.joints.has_value());
+    if (left.joints) {
+      EXPECT_EQ(left.joints->names, right.joints->names);
+      EXPECT_EQ(left.joints->sign, right.joints->sign);
+      EXPECT_EQ(left.joints->offset, right.joints->offset);
+    }
     ASSERT_EQ(left.camera_from_rcm.has_value(), right.camera_from_rcm.has_value());
     if (!left.camera_from_rcm) continue;
     EXPECT_EQ(left.camera_from_rcm->translation, right.camera_from_rcm->translation);
@@ -60,7 +69,16 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
     rig.camera.distortion = {random.uniform(-0.05, 0.05), 1e-17, 0, -0.0, random.uniform(-1e-9, 1e-9)};
     if (i % 3 == 0) rig.camera.response = {Response::Kind::power, random.uniform(0.3, 4)};
     if (i % 3 == 1) rig.camera.response = {Response::Kind::power, 1};
+    if (i % 7 == 2) rig.camera.response = {Response::Kind::rec709};
+    if (i % 7 == 3) {
+      const double bend = random.uniform(0.1, 0.9);
+      rig.camera.response = {Response::Kind::table, 1, {0, bend, 1}, {0, 1 - bend / 3, 1}};
+    }
     Instrument& instrument = rig.instruments[0];
+    if (i % 5 == 0)
+      instrument.joints =
+          Joints{{"yaw", "a \"pitch\"", "insertion \\", "roll"}, {1, -1, 1, -1}, {0, 1.0 / 3, -0.0, random.normal()}};
+    if (i % 5 == 1) instrument.image_delay_s = random.uniform(0, 0.3);
     instrument.marker.seam_rad = random.uniform(-3, 3);
     instrument.marker.hues_deg[0] += random.uniform(-1, 1);
     if (i % 2 == 0)

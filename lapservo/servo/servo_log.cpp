@@ -204,6 +204,7 @@ void ServoLog::add(const ServoRecord& record) {
 
 std::vector<LoggedPeriod> read_servo_log(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
+  if (table.rows() == 0) throw InputError(path.string(), "holds no period, expected the log of a run");
   std::vector<LoggedPeriod> periods;
   for (std::size_t i = 0; i < table.rows(); ++i) {
     LoggedPeriod period{read_input(Row(table, i, path.string())), {}};

@@ -1,4 +1,4 @@
-#include "lapservo/io/video_file.h"
+#include "lapservo/io/video_writer.h"
 
 #include <cmath>
 #include <string>
@@ -28,7 +28,7 @@ bool holds_frames(const fs::path& path, int count) {
 
 }  // namespace
 
-VideoFile::VideoFile(const fs::path& path, double frames_per_second)
+VideoWriter::VideoWriter(const fs::path& path, double frames_per_second)
     : target_(output_target(path)),
       frames_per_second_(frames_per_second),
       writer_(std::make_unique<cv::VideoWriter>()) {
@@ -37,11 +37,11 @@ VideoFile::VideoFile(const fs::path& path, double frames_per_second)
   temporary_.emplace(target_, TemporaryFile::Name::always);
 }
 
-VideoFile::~VideoFile() {
+VideoWriter::~VideoWriter() {
   writer_->release();  // before its file goes
 }
 
-void VideoFile::add(const cv::Mat& frame) {
+void VideoWriter::add(const cv::Mat& frame) {
   if (frames_ == 0)
     writer_->open(temporary_->path().string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'),
                   frames_per_second_, frame.size());
@@ -51,7 +51,7 @@ void VideoFile::add(const cv::Mat& frame) {
   ++frames_;
 }
 
-void VideoFile::commit() {
+void VideoWriter::commit() {
   if (frames_ == 0) return;
   writer_->release();
   if (!holds_frames(temporary_->path(), frames_))

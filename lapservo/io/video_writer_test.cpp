@@ -1,4 +1,4 @@
-#include "lapservo/io/video_file.h"
+#include "lapservo/io/video_writer.h"
 
 #include <csignal>
 #include <filesystem>
@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 using testing::input_error;
 using testing::TemporaryFolder;
 
-void write_noise(VideoFile& video, int frames) {
+void write_noise(VideoWriter& video, int frames) {
   cv::RNG random(1);
   cv::Mat noise(120, 160, CV_8UC3);
   for (int i = 0; i < frames; ++i) {
@@ -27,22 +27,22 @@ void write_noise(VideoFile& video, int frames) {
   video.commit();
 }
 
-TEST(VideoFile, IsWholeInEveryContainerAndReplacesThroughALink) {
+TEST(VideoWriter, IsWholeInEveryContainerAndReplacesThroughALink) {
   const TemporaryFolder folder;
   for (const std::string extension : {".mp4", ".avi", ".mkv", ".mov", ".ts"}) {
     for (const int frames : {1, 2, 25}) {
-      VideoFile video(folder / ("a" + extension), 30);
+      VideoWriter video(folder / ("a" + extension), 30);
       EXPECT_EQ(input_error([&] { write_noise(video, frames); }), "") << extension << " " << frames;
     }
     EXPECT_GT(fs::file_size(folder / ("a" + extension)), 1000U);
   }
   fs::create_symlink("a.mp4", folder / "link.mp4");
-  VideoFile video(folder / "link.mp4", 29.97);
+  VideoWriter video(folder / "link.mp4", 29.97);
   write_noise(video, 3);
   EXPECT_TRUE(fs::is_symlink(folder / "link.mp4"));
 }
 
-TEST(VideoFile, OnAFullDiskIsNoSuccess) {
+TEST(VideoWriter, OnAFullDiskIsNoSuccess) {
   const TemporaryFolder folder;
   const auto previous = std::signal(SIGXFSZ, SIG_IGN);
   struct rlimit old {};
@@ -51,14 +51,14 @@ TEST(VideoFile, OnAFullDiskIsNoSuccess) {
     const fs::path path = folder / ("a" + extension);
     std::uintmax_t whole = 0;
     {
-      VideoFile video(path, 30);
+      VideoWriter video(path, 30);
       write_noise(video, 20);
       whole = fs::file_size(path);
     }
     for (const double part : {0.0, 0.3, 0.9}) {
       const struct rlimit small { static_cast<rlim_t>(part* static_cast<double>(whole)), old.rlim_max };
       const std::string said = input_error([&] {
-        VideoFile video(path, 30);
+        VideoWriter video(path, 30);
         ::setrlimit(RLIMIT_FSIZE, &small);
         write_noise(video, 20);
       });
@@ -72,11 +72,11 @@ TEST(VideoFile, OnAFullDiskIsNoSuccess) {
   std::signal(SIGXFSZ, previous);
 }
 
-TEST(VideoFile, RefusesWhatCanNotHoldOne) {
+TEST(VideoWriter, RefusesWhatCanNotHoldOne) {
   const TemporaryFolder folder;
   const auto said = [&](const fs::path& path) {
     return input_error([&] {
-      VideoFile video(path, 30);
+      VideoWriter video(path, 30);
       write_noise(video, 1);
     });
   };

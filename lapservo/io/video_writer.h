@@ -17,13 +17,13 @@ namespace lapservo {
 
 /// A video that appears whole or not at all; its kind goes by the name's ending (.mp4, .avi, .mkv). It must be a
 /// regular file, as an index is written in the end. See OutputTarget.
-class VideoFile {
+class VideoWriter {
  public:
   /// Throws InputError at once when it can't be written.
-  VideoFile(const std::filesystem::path& path, double frames_per_second);
-  ~VideoFile();
-  VideoFile(const VideoFile&) = delete;
-  VideoFile& operator=(const VideoFile&) = delete;
+  VideoWriter(const std::filesystem::path& path, double frames_per_second);
+  ~VideoWriter();
+  VideoWriter(const VideoWriter&) = delete;
+  VideoWriter& operator=(const VideoWriter&) = delete;
 
   /// 8-bit BGR, all of one size. Throws InputError when there is no encoder for the name's ending.
   void add(const cv::Mat& frame);
