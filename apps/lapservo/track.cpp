@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 struct Options {
   std::string input, rig, out = "obs.csv", overlay;
   std::string method = "surface";
-  bool single = false, view = false;
+  bool single = false, deinterlace = false, view = false;
   double fps = 30;
 };
 
@@ -94,8 +94,8 @@ class RigByFrame {
     inputs.add_rig(path, rig_);
     refuse_outputs(options_, inputs);
     path_ = path;
-    tracker_.emplace(
-        rig_, TrackerOptions{options_.method == "centerline" ? Method::centerline : Method::surface, options_.single});
+    const Method method = options_.method == "centerline" ? Method::centerline : Method::surface;
+    tracker_.emplace(rig_, TrackerOptions{method, options_.single, options_.deinterlace});
   }
 
   const Options& options_;
@@ -217,6 +217,9 @@ void add_track(CLI::App& app, Run& run_later) {
       ->check(CLI::IsMember({"surface", "centerline"}));
   command->add_flag("--single", options->single,
                     "Treat every frame on its own, without tracking from the frame before");
+  command->add_flag("--deinterlace", options->deinterlace,
+                    "For interlaced video (status: interlaced): track the field of the even rows; the same as "
+                    "deinterlace: true in the rig's camera");
   command->add_option("--overlay", options->overlay,
                       "Write pictures (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
                       "same name");

@@ -23,6 +23,7 @@ struct Camera {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3
   Response response;
+  bool deinterlace = false;  ///< its frames are two fields, of two moments
 
   bool distorted() const {
     int some = 0;  // asked for every sample: no branches

@@ -84,6 +84,13 @@ void refuse_chromatic_aberration(const YamlField& field) {
       magnification.number_between(1, 1, "1: no other magnification is corrected");
 }
 
+bool parse_switch(const YamlField& field) {
+  constexpr auto expected = "true or false";
+  const std::string word = field.text(expected);
+  if (word != "true" && word != "false") field.fail(word, expected);
+  return word == "true";
+}
+
 Camera parse_camera_fields(const YamlField& field) {
   expect_keys(field, {{"header", "camera_name", "distortion_model", "rectification_matrix", "projection_matrix",
                        "binning_x", "binning_y", "roi", "deinterlace"},
@@ -109,6 +116,8 @@ Camera parse_camera_fields(const YamlField& field) {
   }
   camera.response = parse_response(field["response"]);
   refuse_chromatic_aberration(field["lateral_chromatic_aberration"]);
+  if (const YamlField deinterlace = field["deinterlace"]; deinterlace.present())
+    camera.deinterlace = parse_switch(deinterlace);
   check_unused(field);
   return camera;
 }

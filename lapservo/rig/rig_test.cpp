@@ -117,6 +117,15 @@ TEST(Rig, ReadsEveryResponse) {
   EXPECT_EQ(table.table_value, (std::vector<double>{0, 0.5, 1}));
 }
 
+TEST(Rig, ReadsWhetherFramesAreInterlaced) {
+  const auto deinterlace = [](const std::string& line) {
+    return parse_rig(with("  response", line + "  response"), "rig.yaml").camera.deinterlace;
+  };
+  EXPECT_FALSE(deinterlace(""));
+  EXPECT_TRUE(deinterlace("  deinterlace: true\n"));
+  EXPECT_FALSE(deinterlace("  deinterlace: false\n"));
+}
+
 TEST(Rig, ReadsJointsAndTheImagesDelay) {
   const Rig rig = parse_rig(with_joints("[yaw, pitch, insertion, roll]", "[1, -1, 1, 1]", "[0, 1.5, -0.0156, 0]") +
                                 "    image_delay_s: 0.08\n    sigma_image_delay_s: 0.001\n",
@@ -211,6 +220,8 @@ std::vector<Complaint> wrong_types() {
       {"WidthHasAUnit", with("1280", "1280px"),
        "camera.image_width: is 1280px, expected a whole number of pixels, 16 to 16384"},
       {"WidthIsEmpty", with("1280", "''"), "camera.image_width: is '', expected a whole number of pixels, 16 to 16384"},
+      {"DeinterlaceIsANumber", with("  response", "  deinterlace: 1\n  response"),
+       "camera.deinterlace: is 1, expected true or false"},
       {"MatrixEntryIsAWord", with("639.5", "centre"),
        "camera.camera_matrix.data[2]: is centre, expected a finite number"},
       {"MatrixTooShort", with("0, 0, 1]}", "0, 0]}"),

@@ -51,8 +51,9 @@ std::string camera_yaml(const Camera& camera) {
   return fmt::format(
       "camera:\n  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n"
       "  camera_matrix: {{rows: 3, cols: 3, data: {}}}\n"
-      "  distortion_coefficients: {{rows: 1, cols: 5, data: {}}}\n  response: {}\n",
-      camera.width_px, camera.height_px, list_of(matrix), list_of(camera.distortion), response_yaml(camera.response));
+      "  distortion_coefficients: {{rows: 1, cols: 5, data: {}}}\n  response: {}\n{}",
+      camera.width_px, camera.height_px, list_of(matrix), list_of(camera.distortion), response_yaml(camera.response),
+      camera.deinterlace ? "  deinterlace: true\n" : "");
 }
 
 std::string instrument_yaml(const Instrument& instrument) {

@@ -27,6 +27,7 @@ void expect_same_bits(const Rig& a, const Rig& b) {
   for (const auto member : {&Camera::fx_px, &Camera::fy_px, &Camera::cx_px, &Camera::cy_px})
     EXPECT_EQ(a.camera.*member, b.camera.*member);
   EXPECT_EQ(a.camera.distortion, b.camera.distortion);
+  EXPECT_EQ(a.camera.deinterlace, b.camera.deinterlace);
   EXPECT_EQ(a.camera.response.kind, b.camera.response.kind);
   EXPECT_EQ(a.camera.response.gamma, b.camera.response.gamma);
   EXPECT_EQ(a.camera.response.table_light, b.camera.response.table_light);
@@ -74,6 +75,7 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
       const double bend = random.uniform(0.1, 0.9);
       rig.camera.response = {Response::Kind::table, 1, {0, bend, 1}, {0, 1 - bend / 3, 1}};
     }
+    rig.camera.deinterlace = i % 2 == 1;
     Instrument& instrument = rig.instruments[0];
     if (i % 5 == 0)
       instrument.joints =

@@ -76,8 +76,8 @@ TEST(ImageFeatures, WithoutTheRcmThereIsNoMeasurementUnlessItsImageIsGiven) {
 TEST(ImageFeatures, WhatIsNotOkIsNotFound) {
   const Rig rig = testing::paper_test_rig();
   Observation observation = seen_at(rig, somewhere);
-  for (const Status status :
-       {Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit, Status::uncertain}) {
+  for (const Status status : {Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit,
+                              Status::uncertain, Status::interlaced}) {
     observation.status = status;
     EXPECT_FALSE(measurement_of(observation, feature_model(rig), 0, {}).found) << status_word(status);
   }

@@ -22,6 +22,7 @@ enum class Status {
   damaged,     ///< the decoder of the picture or video complained: its pixels are not the camera's
   few_colors,  ///< the picture has no more colours than a palette: its pixels are not the camera's
   uncertain,   ///< found, but the rotation's standard deviation is too large to be of use
+  interlaced,  ///< the frame is made of two fields, of two moments: use --deinterlace
 };
 std::string_view status_word(Status status);
 

@@ -1,9 +1,12 @@
 #include "lapservo/vision/tracker.h"
 
+#include <cstddef>
 #include <string>
 
 #include "lapservo/core/error.h"
 #include "lapservo/vision/centerline.h"
+#include "lapservo/vision/image_view.h"
+#include "lapservo/vision/interlacing.h"
 #include "lapservo/vision/surface_tracker.h"
 
 namespace lapservo {
@@ -20,14 +23,50 @@ void check_image(const cv::Mat& image, const Camera& camera) {
                      size_text(camera.width_px, camera.height_px) + " as in the rig");
 }
 
+Observation refused_as_interlaced(const Observation& observation, Method method) {
+  using What = Observation::Refused::What;
+  Observation refused;
+  refused.status = Status::interlaced;
+  refused.refused = observation.refused;
+  if (observation.status != Status::ok) return refused;
+  refused.refused.what = method == Method::surface ? What::pose : What::edges;
+  refused.refused.camera_from_unrolled = observation.camera_from_unrolled;
+  refused.refused.psi_rad = observation.psi_rad;
+  refused.refused.edges_raw_px = observation.edges_raw_px;
+  return refused;
+}
+
 }  // namespace
 
 struct Tracker::State {
-  State(const Rig& rig, TrackerOptions options)
-      : camera(rig.camera), method(options.method), surface(rig, options.single), centerline(rig) {}
+  State(const Rig& of_rig, TrackerOptions options)
+      : rig(of_rig),
+        method(options.method),
+        deinterlace(options.deinterlace || rig.camera.deinterlace),
+        even_field(rig.camera.response),
+        surface(rig, options.single),
+        centerline(rig) {}
 
-  Camera camera;
+  void observe(const cv::Mat& image_bgr) {
+    if (method == Method::surface)
+      observations = surface.track(image_bgr);
+    else
+      observations = centerline.observe(image_bgr);
+  }
+  // What lies between two moments is no observation of either, and nothing to start the next frame from.
+  void refuse_combed(const cv::Mat& image_bgr) {
+    const ImageView image(image_bgr);
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      if (!is_combed(image, rig.camera, rig.instruments[i].marker, observations[i])) continue;
+      observations[i] = refused_as_interlaced(observations[i], method);
+      surface.reset();
+    }
+  }
+
+  Rig rig;
   Method method;
+  bool deinterlace;
+  EvenField even_field;
   SurfaceTracker surface;
   CenterlineMethod centerline;
   std::vector<Observation> observations;
@@ -39,9 +78,13 @@ Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 
 const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr) & {
-  check_image(image_bgr, state_->camera);
-  if (state_->method == Method::surface) return state_->surface.track(image_bgr);
-  state_->observations = state_->centerline.observe(image_bgr);
+  check_image(image_bgr, state_->rig.camera);
+  if (state_->deinterlace) {
+    state_->observe(state_->even_field.of(image_bgr));
+  } else {
+    state_->observe(image_bgr);
+    state_->refuse_combed(image_bgr);
+  }
   return state_->observations;
 }
 

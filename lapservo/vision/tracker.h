@@ -18,6 +18,7 @@ enum class Method {
 struct TrackerOptions {
   Method method = Method::surface;
   bool single = false;  ///< treat every frame on its own instead of starting from the frame before
+  bool deinterlace = false;  ///< track the field of the even rows; also when the rig's camera says so
 };
 
 /// Finds all instruments of a rig in the frames of one camera. Holds what it learnt from the frame before.
