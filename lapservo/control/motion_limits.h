@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/velocity_qp.h"
+#include "lapservo/robot/joint_path.h"
 
 namespace lapservo {
 
@@ -25,12 +26,6 @@ struct ImageWindow {
 struct EndPoints {
   Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();
   Eigen::Matrix4d jacobian = Eigen::Matrix4d::Zero();
-};
-
-/// Where the commanded motion stands.
-struct MotionState {
-  Eigen::Vector4d position = Eigen::Vector4d::Zero();
-  Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
 };
 
 /// Time that stopping never takes longer than: the largest rate / acceleration of a joint.

@@ -21,7 +21,7 @@ TrackingGains paper_gains(double control_period_s);
 /// each period: (1 - exp(-decay T)) / T. Tends to `decay` for small periods.
 double exact_gain_held(double decay_per_s, double period_s);
 /// The same when the velocity ramps linearly from the last one to the new one over each period, as
-/// SetpointInterpolator does: e' = e + T (v + v')/2 with v' = -K e has the solution exp(-decay t) for
+/// JointPath does: e' = e + T (v + v')/2 with v' = -K e has the solution exp(-decay t) for
 /// K = (2/T) exp(-decay T) tanh(decay T / 2).
 double exact_gain_ramped(double decay_per_s, double period_s);
 

@@ -59,7 +59,7 @@ std::vector<Pair> pairs(const fs::path& folder) {
   return found;
 }
 
-class Samples : public testing::Test {
+class Samples : public ::testing::Test {
  protected:
   void SetUp() override {
     const auto folder = testing::sample_frames("illumination");

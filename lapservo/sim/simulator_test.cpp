@@ -1,4 +1,4 @@
-#include "lapservo/sim/theatre.h"
+#include "lapservo/sim/simulator.h"
 
 #include <cmath>
 #include <stdexcept>
@@ -31,45 +31,45 @@ RcmCoordinates in_view(const Rig& rig) {
   return q;
 }
 
-TheatreConfig without_offsets() {
-  TheatreConfig config;
+SimulatorConfig without_offsets() {
+  SimulatorConfig config;
   config.arm.joint_offset.setZero();
   config.arm.backlash.setZero();
   return config;
 }
 
 struct Seen {
-  std::vector<TheatreFrame> frames;
+  std::vector<SimulatedFrame> frames;
   std::vector<double> polled_s;
 };
 
 // A slow sweep at 1 kHz.
-Seen sweep(Theatre& theatre, const RcmCoordinates& from, double duration_s) {
+Seen sweep(Simulator& simulator, const RcmCoordinates& from, double duration_s) {
   Seen seen;
   const auto ticks = static_cast<int>(std::lround(duration_s * 1000));
   for (int k = 0; k < ticks; ++k) {
-    const double phase = 3 * theatre.time_s();
-    theatre.servo_jp(from.vector() + std::sin(phase) * Eigen::Vector4d(0.04, 0.03, 0.004, 0.3));
-    theatre.step(0.001);
-    for (TheatreFrame& frame : theatre.arrived()) {
+    const double phase = 3 * simulator.now_s();
+    simulator.servo_jp(from.vector() + std::sin(phase) * Eigen::Vector4d(0.04, 0.03, 0.004, 0.3));
+    simulator.step(0.001);
+    for (SimulatedFrame& frame : simulator.arrived()) {
       seen.frames.push_back(std::move(frame));
-      seen.polled_s.push_back(theatre.time_s());
+      seen.polled_s.push_back(simulator.now_s());
     }
   }
   return seen;
 }
 
-TEST(Theatre, IsTheSameBitForBitWhateverThreadsRender) {
+TEST(Simulator, IsTheSameBitForBitWhateverThreadsRender) {
   const Rig rig = small_rig();
   std::vector<Seen> runs;
   for (const int threads : {0, 1, 2, 1}) {
-    TheatreConfig config;
+    SimulatorConfig config;
     config.endoscope.render_threads = threads;
     config.endoscope.exposure_s = 0.004;
     config.endoscope.dropped_share = 0.1;
     if (runs.size() == 3) config.seed = 2;
-    Theatre theatre(rig, config, in_view(rig));
-    runs.push_back(sweep(theatre, in_view(rig), 0.7));
+    Simulator simulator(rig, config, in_view(rig));
+    runs.push_back(sweep(simulator, in_view(rig), 0.7));
   }
   ASSERT_GT(runs[0].frames.size(), 20U);
   for (const std::size_t other : {1, 2}) {
@@ -84,11 +84,11 @@ TEST(Theatre, IsTheSameBitForBitWhateverThreadsRender) {
   EXPECT_GT(cv::norm(runs[0].frames[0].picture.bgr, runs[3].frames[0].picture.bgr, cv::NORM_INF), 0);
 }
 
-TEST(Theatre, StepsOfAnyLengthGiveTheSameFrames) {
+TEST(Simulator, StepsOfAnyLengthGiveTheSameFrames) {
   const Rig rig = small_rig();
-  TheatreConfig config;
+  SimulatorConfig config;
   config.endoscope.pictures = false;
-  Theatre coarse(rig, config, in_view(rig)), fine(rig, config, in_view(rig));
+  Simulator coarse(rig, config, in_view(rig)), fine(rig, config, in_view(rig));
   const Eigen::Vector4d goal = in_view(rig).vector() + Eigen::Vector4d(0.05, 0.02, 0.01, 1);
   coarse.servo_jp(goal);
   fine.servo_jp(goal);
@@ -103,19 +103,19 @@ TEST(Theatre, StepsOfAnyLengthGiveTheSameFrames) {
   }
 }
 
-TEST(Theatre, AFrameShowsTheInstrumentAtItsExposure) {
+TEST(Simulator, AFrameShowsTheInstrumentAtItsExposure) {
   const Rig rig = small_rig();
   for (const double latency_s : {0.0, 0.08, 0.25}) {
-    TheatreConfig config = without_offsets();
+    SimulatorConfig config = without_offsets();
     config.endoscope.latency_s = latency_s;
     config.endoscope.jitter_s = 0;
     config.endoscope.dropped_share = 0;
     config.render.sensor.gains = Light::Constant(0.5F);
-    Theatre theatre(rig, config, in_view(rig));
-    const Seen seen = sweep(theatre, in_view(rig), 0.5);
+    Simulator simulator(rig, config, in_view(rig));
+    const Seen seen = sweep(simulator, in_view(rig), 0.5);
     ASSERT_NEAR(static_cast<double>(seen.frames.size()), (0.5 - latency_s) * 60, 1.5);
     for (std::size_t k = 0; k < seen.frames.size(); ++k) {
-      const TheatreFrame& frame = seen.frames[k];
+      const SimulatedFrame& frame = seen.frames[k];
       EXPECT_NEAR(frame.picture.stamp_s - frame.picture.exposed_s, latency_s, 1e-9);
       EXPECT_GE(seen.polled_s[k], frame.picture.stamp_s - 1e-9);
       EXPECT_LE(seen.polled_s[k], frame.picture.stamp_s + 0.001 + 1e-9);
@@ -132,28 +132,28 @@ TEST(Theatre, AFrameShowsTheInstrumentAtItsExposure) {
   }
 }
 
-TEST(Theatre, ReadingsAreOffByTwoDegreesAndThreeMillimetres) {
+TEST(Simulator, ReadingsAreOffByTwoDegreesAndThreeMillimetres) {
   const Rig rig = small_rig();
-  TheatreConfig config;
+  SimulatorConfig config;
   config.endoscope.pictures = false;
-  Theatre theatre(rig, config, in_view(rig));
-  const Eigen::Vector4d off = (theatre.true_q().vector() - theatre.measured_jp()).cwiseAbs();
+  Simulator simulator(rig, config, in_view(rig));
+  const Eigen::Vector4d off = (simulator.true_q().vector() - simulator.measured_jp()).cwiseAbs();
   for (const int joint : {0, 1, 3}) EXPECT_NEAR(off[joint], 0.0349, 2e-4);
   EXPECT_NEAR(off[2], 0.003, 1e-5);
   config.arm.rcm_offset_m = {0.001, 0, -0.002};
-  const Theatre moved(rig, config, in_view(rig));
+  const Simulator moved(rig, config, in_view(rig));
   const Eigen::Vector3d by = rig.instruments[0].camera_from_rcm->rotation * config.arm.rcm_offset_m;
-  const auto at = [](const Theatre& t) { return t.placement().camera_from_unrolled.translation; };
-  EXPECT_LT((at(moved) - at(theatre) - by).norm(), 1e-12);
+  const auto at = [](const Simulator& t) { return t.placement().camera_from_unrolled.translation; };
+  EXPECT_LT((at(moved) - at(simulator) - by).norm(), 1e-12);
 }
 
-TEST(Theatre, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
+TEST(Simulator, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
   const Rig rig = small_rig();
-  TheatreConfig config = without_offsets();
+  SimulatorConfig config = without_offsets();
   config.endoscope.jitter_s = config.endoscope.dropped_share = 0;
-  Theatre theatre(rig, config, in_view(rig));
-  theatre.cover_marker({0.2, 0.3});
-  const auto middle_of_band = [&](const TheatreFrame& frame) {
+  Simulator simulator(rig, config, in_view(rig));
+  simulator.cover_marker({0.2, 0.3});
+  const auto middle_of_band = [&](const SimulatedFrame& frame) {
     const auto line = centre_line(rig.camera, rig.instruments[0].marker,
                                   *rig.instruments[0].camera_from_rcm * rcm_from_unrolled(frame.q), frame.q.psi_rad)
                           .value();
@@ -162,9 +162,9 @@ TEST(Theatre, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
   };
   Light usual = Light::Zero();
   for (int k = 0; k < 480; ++k) {
-    if (k == 305) theatre.set_light(0.5F);
-    theatre.step(0.001);
-    for (const TheatreFrame& frame : theatre.arrived()) {
+    if (k == 305) simulator.set_light(0.5F);
+    simulator.step(0.001);
+    for (const SimulatedFrame& frame : simulator.arrived()) {
       const Light seen = middle_of_band(frame);
       const double at_s = frame.picture.exposed_s;
       if (usual.isZero()) usual = seen;
@@ -178,13 +178,13 @@ TEST(Theatre, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
   }
 }
 
-TEST(Theatre, RefusesNonsense) {
+TEST(Simulator, RefusesNonsense) {
   Rig rig = small_rig();
   rig.instruments[0].camera_from_rcm.reset();
-  EXPECT_THROW(Theatre(rig, {}, {0, 1.5, 0.1, 0}), InputError);
-  EXPECT_THROW(Theatre(small_rig(), {}, in_view(small_rig())).step(-0.1), std::invalid_argument);
+  EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
+  EXPECT_THROW(Simulator(small_rig(), {}, in_view(small_rig())).step(-0.1), std::invalid_argument);
   rig.instruments.clear();
-  EXPECT_THROW(Theatre(rig, {}, {0, 1.5, 0.1, 0}), InputError);
+  EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "lapservo/control/setpoint_interpolator.h"
+#include "lapservo/robot/joint_path.h"
 
 #include <algorithm>
 
@@ -12,21 +12,21 @@ MotionState after(const MotionState& state, const Eigen::Vector4d& acceleration,
 
 }  // namespace
 
-void SetpointInterpolator::reset(double time_s, const Eigen::Vector4d& position) {
+void JointPath::reset(double time_s, const Eigen::Vector4d& position) {
   start_ = {position, Eigen::Vector4d::Zero()};
   end_velocity_.setZero();
   start_s_ = time_s;
   period_s_ = 0;
 }
 
-void SetpointInterpolator::ramp_to(double time_s, const Eigen::Vector4d& velocity, double period_s) {
+void JointPath::ramp_to(double time_s, const Eigen::Vector4d& velocity, double period_s) {
   start_ = at(time_s);
   start_s_ = time_s;
   period_s_ = period_s;
   end_velocity_ = velocity;
 }
 
-MotionState SetpointInterpolator::at(double time_s) const {
+MotionState JointPath::at(double time_s) const {
   const double passed_s = std::max(0.0, time_s - start_s_);
   if (passed_s < period_s_) return after(start_, (end_velocity_ - start_.velocity) / period_s_, passed_s);
   const MotionState end{start_.position + (start_.velocity + end_velocity_) * (period_s_ / 2), end_velocity_};

@@ -1,4 +1,4 @@
-#include "lapservo/control/setpoint_interpolator.h"
+#include "lapservo/robot/joint_path.h"
 
 #include <gtest/gtest.h>
 
@@ -8,16 +8,17 @@ namespace lapservo {
 namespace {
 
 constexpr double period_s = 1.0 / 60;
+const Eigen::Vector4d rate(0.4, 0.4, 0.04, 1.5), acceleration(2, 2, 0.2, 7.5);
 
 Eigen::Vector4d random_vector(Random& random) {
   return {random.normal(), random.normal(), random.normal(), random.normal()};
 }
 
-TEST(SetpointInterpolator, PathIsSmoothAtTheArmsRate) {
+TEST(JointPath, PathIsSmoothAtTheArmsRate) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
-    SetpointInterpolator path{JointLimits{}};
+    JointPath path(acceleration);
     path.reset(0, random_vector(random));
     constexpr double tick_s = 0.0005;
     MotionState before = path.at(0);
@@ -41,8 +42,8 @@ TEST(SetpointInterpolator, PathIsSmoothAtTheArmsRate) {
   }
 }
 
-TEST(SetpointInterpolator, CoversTheMeanVelocityTimesThePeriod) {
-  SetpointInterpolator path{JointLimits{}};
+TEST(JointPath, CoversTheMeanVelocityTimesThePeriod) {
+  JointPath path(acceleration);
   path.reset(1, Eigen::Vector4d::Zero());
   path.ramp_to(1, Eigen::Vector4d::Ones(), 0.1);
   EXPECT_NEAR(path.end().position[0], 0.05, 1e-12);
@@ -50,24 +51,23 @@ TEST(SetpointInterpolator, CoversTheMeanVelocityTimesThePeriod) {
   EXPECT_NEAR(path.end().position[0], 0.1, 1e-12);
 }
 
-TEST(SetpointInterpolator, BrakesWhenTheControllerIsLate) {
-  const JointLimits limits;
-  SetpointInterpolator path(limits);
+TEST(JointPath, BrakesWhenTheControllerIsLate) {
+  JointPath path(acceleration);
   path.reset(0, Eigen::Vector4d::Zero());
-  path.ramp_to(0, limits.rate, 0.3);
+  path.ramp_to(0, rate, 0.3);
   MotionState before = path.at(0.3);
   constexpr double tick_s = 0.001;
   for (double t = 0.3 + tick_s; t < 1; t += tick_s) {
     const MotionState now = path.at(t);
     const Eigen::Vector4d acceleration = (now.velocity - before.velocity).cwiseAbs() / tick_s;
-    EXPECT_LE((acceleration - limits.acceleration).maxCoeff(), 1e-6) << t;
+    EXPECT_LE((acceleration - acceleration).maxCoeff(), 1e-6) << t;
     EXPECT_LT((now.position - before.position - tick_s * (now.velocity + before.velocity) / 2).norm(), 1e-5) << t;
     before = now;
   }
   EXPECT_TRUE(before.velocity.isZero());
   // Taken up again in the middle of braking, the path goes on from where it is.
   const MotionState braking = path.at(0.35);
-  path.ramp_to(0.35, limits.rate, 0.1);
+  path.ramp_to(0.35, rate, 0.1);
   EXPECT_TRUE(path.at(0.35).position.isApprox(braking.position, 1e-12));
   EXPECT_TRUE(path.at(0.35).velocity.isApprox(braking.velocity, 1e-12));
 }

@@ -2,22 +2,27 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/robot/clock.h"
+#include "lapservo/robot/robot.h"
 #include "lapservo/sim/arm.h"
 #include "lapservo/sim/endoscope.h"
+#include "lapservo/stream/image_stream.h"
 
 namespace lapservo {
 
-struct TheatreConfig {
+struct SimulatorConfig {
   ArmConfig arm;
   EndoscopeConfig endoscope;
   RenderOptions render;
-  std::uint64_t seed = 1;  ///< of tissue, noise, jitter and lost frames
+  double arm_rate_hz = 1000;  ///< at which the arm samples a path
+  std::uint64_t seed = 1;     ///< of tissue, noise, jitter and lost frames
 };
 
 /// An interval of simulated time, for example in which the marker is covered: from `begin_s` up to `end_s`.
@@ -27,26 +32,35 @@ struct Interval {
 };
 
 /// A frame with its truth.
-struct TheatreFrame {
+struct SimulatedFrame {
   EndoscopePicture picture;
   RcmCoordinates q;  ///< of the instrument in the middle of the exposure, for evaluation
 };
 
-/// A simulated operating theatre: the first instrument of a rig on an arm, before an endoscope. Simulated time starts
-/// at 0 and passes only in step(). The same configuration, seed and commands give the same frames, bit for bit.
-class Theatre {
+/// A simulated operating room: the first instrument of a rig on an arm, before an endoscope, and the time that they
+/// share. It is a robot, its camera and its clock at once, as the servo loop wants them. Simulated time starts at 0 and
+/// passes only in sleep_until() and step(). The same configuration, seed and commands give the same frames, bit for
+/// bit.
+class Simulator : public Robot, public ImageStream, public Clock {
  public:
   /// `rig` is how things really are; what a program believes may differ. Its first instrument needs camera_from_rcm
   /// (else InputError). The arm starts at rest with these readings.
-  Theatre(const Rig& rig, const TheatreConfig& config, const RcmCoordinates& readings);
+  Simulator(const Rig& rig, const SimulatorConfig& config, const RcmCoordinates& readings);
 
+  JointState state() override;
+  void send(const JointPath& path) override;
+  std::optional<StampedImage> newest() override;
+  double now_s() const override { return time_s_; }
+  /// Lets time pass; the arm samples the path at SimulatorConfig::arm_rate_hz.
+  void sleep_until(double time_s) override;
+
+  /// A single setpoint instead of a path.
   void servo_jp(const Eigen::Vector4d& setpoint) { arm_.servo_jp(setpoint); }
   /// Lets time pass; frames are taken when they are due, also within a step. Not backwards (std::invalid_argument).
   void step(double dt_s);
-  double time_s() const { return time_s_; }
   Eigen::Vector4d measured_jp() const { return arm_.measured_jp(); }
-  /// Frames that have arrived by now and since the last call.
-  std::vector<TheatreFrame> arrived();
+  /// Frames that have arrived by now and since the last call, with their truth. newest() takes from the same.
+  std::vector<SimulatedFrame> arrived();
 
   Arm& arm() { return arm_; }
   const Arm& arm() const { return arm_; }
@@ -63,6 +77,8 @@ class Theatre {
   Rigid3 camera_from_rcm_;
   Arm arm_;
   Endoscope endoscope_;
+  double arm_period_s_;
+  std::optional<JointPath> path_;
   std::vector<Interval> covered_;
   double time_s_ = 0;
   Exposure exposing_;                     // the moments of the current frame so far

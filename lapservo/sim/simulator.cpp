@@ -1,4 +1,4 @@
-#include "lapservo/sim/theatre.h"
+#include "lapservo/sim/simulator.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -14,9 +14,9 @@ namespace {
 constexpr double same_s = 1e-9;  // moments that are equal but for rounding
 
 const Instrument& first_instrument(const Rig& rig) {
-  if (rig.instruments.empty()) throw InputError("theatre", "instruments", "none", "at least one in the rig");
+  if (rig.instruments.empty()) throw InputError("simulator", "instruments", "none", "at least one in the rig");
   if (!rig.instruments.front().camera_from_rcm)
-    throw InputError("theatre", "instruments[0].camera_from_rcm", "missing",
+    throw InputError("simulator", "instruments[0].camera_from_rcm", "missing",
                      "a transform: it says where the instrument is");
   return rig.instruments.front();
 }
@@ -27,7 +27,7 @@ ShaftModel shaft_of(const Instrument& instrument) {
   return shaft;
 }
 
-Endoscope make_endoscope(const Rig& rig, const TheatreConfig& config) {
+Endoscope make_endoscope(const Rig& rig, const SimulatorConfig& config) {
   const Camera& camera = rig.camera;
   const cv::Mat tissue =
       config.endoscope.pictures ? make_tissue(camera.width_px, camera.height_px, config.seed) : cv::Mat();
@@ -36,20 +36,45 @@ Endoscope make_endoscope(const Rig& rig, const TheatreConfig& config) {
 
 }  // namespace
 
-Theatre::Theatre(const Rig& rig, const TheatreConfig& config, const RcmCoordinates& readings)
+Simulator::Simulator(const Rig& rig, const SimulatorConfig& config, const RcmCoordinates& readings)
     : camera_from_rcm_(*first_instrument(rig).camera_from_rcm *
                        Rigid3{Eigen::Quaterniond::Identity(), config.arm.rcm_offset_m}),
       arm_(config.arm, readings.vector()),
-      endoscope_(make_endoscope(rig, config)) {}
+      endoscope_(make_endoscope(rig, config)),
+      arm_period_s_(1 / config.arm_rate_hz) {}
 
-ShaftPlacement Theatre::placement() const {
+JointState Simulator::state() {
+  return {time_s_, JointVector::from_vector(arm_.measured_jp()),
+          arm_.faulted() ? OperatingState::fault : OperatingState::enabled};
+}
+
+void Simulator::send(const JointPath& path) {
+  path_ = path;
+}
+
+std::optional<StampedImage> Simulator::newest() {
+  auto frames = arrived();
+  if (frames.empty()) return std::nullopt;
+  return StampedImage{frames.back().picture.stamp_s, std::move(frames.back().picture.bgr)};
+}
+
+void Simulator::sleep_until(double time_s) {
+  while (time_s - time_s_ > same_s) {
+    if (arm_.faulted()) path_.reset();
+    const double next_s = path_ ? std::min(time_s, time_s_ + arm_period_s_) : time_s;
+    if (path_) arm_.servo_jp(path_->at(next_s).position);
+    step(next_s - time_s_);
+  }
+}
+
+ShaftPlacement Simulator::placement() const {
   const RcmCoordinates q = true_q();
   const bool covered =
       std::any_of(covered_.begin(), covered_.end(), [&](const Interval& when) { return when.contains(time_s_); });
   return {camera_from_rcm_ * rcm_from_unrolled(q), q.psi_rad, covered};
 }
 
-void Theatre::step(double dt_s) {
+void Simulator::step(double dt_s) {
   if (!(dt_s >= 0 && dt_s < 1e6)) throw std::invalid_argument("time passes by 0 or more");
   const double end_s = time_s_ + dt_s;
   while (true) {
@@ -68,8 +93,8 @@ void Theatre::step(double dt_s) {
   time_s_ = end_s;
 }
 
-std::vector<TheatreFrame> Theatre::arrived() {
-  std::vector<TheatreFrame> frames;
+std::vector<SimulatedFrame> Simulator::arrived() {
+  std::vector<SimulatedFrame> frames;
   for (EndoscopePicture& picture : endoscope_.arrived(time_s_)) {
     const RcmCoordinates q = truth_.at(picture.index);
     truth_.erase(truth_.begin(), truth_.upper_bound(picture.index));
