@@ -35,6 +35,28 @@ bool seam_lies_between(const FeatureModel& model, const Eigen::Vector4d& from, c
   return false;
 }
 
+// Where eq. (22) leads: each error decays with its own K. The rates stay empty, since limits only slow the way down.
+Trajectory decay_to(const Trajectory& goal, const Eigen::Vector4d& from, const TrackingGains& gains) {
+  const Eigen::Vector4d error = feature_error(from, goal.at(0).features);
+  return {goal.duration_s, [=](double time_s) {
+            const Eigen::Array4d left = (-time_s * gains.per_s.array()).exp();
+            const Eigen::Vector4d features = goal.at(time_s).features + (left * error.array()).matrix();
+            return DesiredFeatures{features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+          }};
+}
+
+// What keeps the arm from following from here; with the paper's law on its own way too, where the truth is what the law
+// sees and what it moves.
+std::optional<Infeasible> find_problem(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
+                                       const ControllerConfig& config, const Eigen::Vector4d& q,
+                                       const Eigen::Vector4d& q_true) {
+  constexpr double check_every_s = 0.1;
+  if (auto problem = find_infeasible(trajectory, duration_s, model, config, q, check_every_s)) return problem;
+  if (config.mode != ControlMode::paper) return std::nullopt;
+  const Trajectory way = decay_to(trajectory, model(q_true)->features, config.gains);
+  return find_infeasible(way, duration_s, model, config, q_true, check_every_s);
+}
+
 Eigen::Vector4d anywhere(const JointLimits& limits, Random& random) {
   Eigen::Vector4d q;
   for (int i = 0; i < 4; ++i) q[i] = random.uniform(limits.lower[i], limits.upper[i]);
@@ -47,14 +69,13 @@ JointVector random_start(const Trajectory& trajectory, double duration_s, const 
                          const ControllerConfig& config, const Eigen::Vector4d& joint_offset, Random& random,
                          const std::string& source) {
   constexpr int max_places = 100000, max_starts = 60;
-  constexpr double check_every_s = 0.1;
   std::string why = "no place in view lies within the joint limits";
   int starts = 0;
   for (int i = 0; i < max_places && starts < max_starts; ++i) {
     const Eigen::Vector4d q = anywhere(config.limits, random);
     if (!in_view(model, config.window.value(), q + joint_offset)) continue;
     ++starts;
-    if (const auto problem = find_infeasible(trajectory, duration_s, model, config, q, check_every_s)) {
+    if (const auto problem = find_problem(trajectory, duration_s, model, config, q, q + joint_offset)) {
       why = problem->text();
       continue;
     }

@@ -10,7 +10,7 @@
 namespace lapservo {
 
 TrackingGains paper_gains(double control_period_s) {
-  return {Eigen::Vector4d::Constant(paper_gain_per_period / control_period_s)};
+  return {Eigen::Vector4d(0.032, 0.008, 0.0008, 0.01) / control_period_s};
 }
 
 double exact_gain_held(double decay_per_s, double period_s) {

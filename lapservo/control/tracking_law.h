@@ -11,10 +11,9 @@ struct TrackingGains {
   Eigen::Vector4d per_s{5, 5, 5, 5};
 };
 
-/// The paper's gains. Of the four only K_l = 0.0008 is known to us, without its unit: per second it would mean a time
-/// constant of 20 minutes, so it is read per control period. s, r and d are given the same value, which makes the error
-/// vector decay along a straight line.
-inline constexpr double paper_gain_per_period = 0.0008;
+/// Section V-D's gains: K_s = 0.032, K_r = 0.008, K_l = 0.0008, K_d = 0.01. The paper gives no unit of time. Per second
+/// they would mean time constants of 31 s to 21 minutes beside a trajectory of 12.6 s, so they are read per control
+/// period.
 TrackingGains paper_gains(double control_period_s);
 
 /// The gain that makes an error sampled every `period_s` decay exactly as exp(-decay t) when the velocity is held over

@@ -57,8 +57,8 @@ TEST(TrackingLaw, ErrorOfTheAngleTakesTheShorterWay) {
 }
 
 TEST(TrackingLaw, PaperGainsAreReadPerControlPeriod) {
-  EXPECT_NEAR(paper_gains(0.001).per_s[2], 0.8, 1e-12);
-  EXPECT_NEAR(paper_gains(1.0 / 60).per_s[2], 0.048, 1e-12);
+  EXPECT_TRUE(paper_gains(0.001).per_s.isApprox(Eigen::Vector4d(32, 8, 0.8, 10), 1e-12));
+  EXPECT_TRUE(paper_gains(1.0 / 60).per_s.isApprox(Eigen::Vector4d(1.92, 0.48, 0.048, 0.6), 1e-12));
 }
 
 TEST(TrackingLaw, PaperVelocityMovesTheFeaturesAsWanted) {

@@ -129,14 +129,13 @@ Trajectory sinusoids(const Sinusoids& sinusoids) {
   require_finite("offset", sinusoids.offset);
   require_finite("amplitude", sinusoids.amplitude);
   require_finite("phase_rad", sinusoids.phase_rad);
-  require_positive("period_s", sinusoids.period_s);
+  require_positive("omega_rad_s", sinusoids.omega_rad_s);
   return {0, [sinusoids](double time_s) {
-            const Eigen::Array4d frequency = two_pi * sinusoids.period_s.array().inverse();
-            const Eigen::Array4d angle = frequency * time_s + sinusoids.phase_rad.array();
+            const Eigen::Array4d omega = sinusoids.omega_rad_s.array();
+            const Eigen::Array4d angle = omega * time_s + sinusoids.phase_rad.array();
             const Eigen::Array4d amplitude = sinusoids.amplitude.array();
             return DesiredFeatures{sinusoids.offset + (amplitude * angle.sin()).matrix(),
-                                   amplitude * frequency * angle.cos(),
-                                   -amplitude * frequency * frequency * angle.sin()};
+                                   amplitude * omega * angle.cos(), -amplitude * omega * omega * angle.sin()};
           }};
 }
 

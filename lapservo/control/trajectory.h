@@ -26,14 +26,14 @@ struct Trajectory {
 
 Trajectory set_point(const Eigen::Vector4d& features);
 
-/// The paper's trajectory, section V-D: f_d(t) = offset + amplitude * sin(2 pi t / period + phase), feature by feature.
+/// The paper's trajectory, section V-D: f_d(t) = offset + amplitude * sin(omega t + phase), feature by feature.
 struct Sinusoids {
   Eigen::Vector4d offset = Eigen::Vector4d::Zero();
   Eigen::Vector4d amplitude = Eigen::Vector4d::Zero();
-  Eigen::Vector4d period_s = Eigen::Vector4d::Ones();
+  Eigen::Vector4d omega_rad_s = Eigen::Vector4d::Ones();
   Eigen::Vector4d phase_rad = Eigen::Vector4d::Zero();
 };
-/// Throws InputError for numbers that are not finite and periods that are not positive.
+/// Throws InputError for numbers that are not finite and omegas that are not positive.
 Trajectory sinusoids(const Sinusoids& sinusoids);
 
 /// From point to point along straight lines in feature space, at rest in each, by minimum-jerk motions (quintic; Flash

@@ -28,13 +28,23 @@ void expect_consistent(const Trajectory& trajectory, double start_s, double end_
   }
 }
 
-TEST(Trajectory, SinusoidsAreThePapersWithTheirDerivatives) {
-  const Sinusoids f{{0.9, 795, 365, 212}, {0.05, 60, 30, 37}, {12, 10, 14, 9}, {0, 0.5, 1, 1.5}};
+TEST(Trajectory, SinusoidsComeWithTheirDerivatives) {
+  const Sinusoids f{{0.9, 795, 365, 212}, {0.05, 60, 30, 37}, {0.5, 0.6, 0.4, 0.7}, {0, 0.5, 1, 1.5}};
   const Trajectory trajectory = sinusoids(f);
   expect_consistent(trajectory, 0, 40);
   for (int i = 0; i < 4; ++i) {
-    const double expected = f.offset[i] + f.amplitude[i] * std::sin(two_pi * 3.3 / f.period_s[i] + f.phase_rad[i]);
+    const double expected = f.offset[i] + f.amplitude[i] * std::sin(3.3 * f.omega_rad_s[i] + f.phase_rad[i]);
     EXPECT_NEAR(trajectory.at(3.3).features[i], expected, 1e-9);
+  }
+}
+
+// Section V-D: A sin(omega t) + B with omega = 0.5 for all four.
+TEST(Trajectory, ThePapersHasItsConstants) {
+  const Trajectory trajectory = sinusoids(paper_sinusoids());
+  for (const double t : {0.0, 1.0, 4.7, 20.0}) {
+    const double swing = std::sin(0.5 * t);
+    const Eigen::Vector4d expected(0.05 * swing + 0.9, 60 * swing + 795, 30 * swing + 365, 37 * swing + 212);
+    EXPECT_LT((trajectory.at(t).features - expected).norm(), 1e-9) << t;
   }
 }
 
@@ -66,7 +76,7 @@ TEST(Trajectory, ViaPointsAreReachedWithinTheLargestRate) {
 
 TEST(Trajectory, CsvIsASmoothCurveThroughItsRows) {
   std::string text = "time_s,s_rad,r_px,l_px,d_px\n";
-  const Sinusoids f{{3.1, 795, 365, 212}, {0.3, 60, 30, 37}, {12, 10, 14, 9}, {0, 0.5, 1, 1.5}};
+  const Sinusoids f{{3.1, 795, 365, 212}, {0.3, 60, 30, 37}, {0.5, 0.6, 0.4, 0.7}, {0, 0.5, 1, 1.5}};
   const Trajectory source = sinusoids(f);
   for (int i = 0; i <= 100; ++i) {
     const auto row = source.at(0.1 * i).features;
@@ -126,7 +136,7 @@ TEST_F(TrajectoryCheck, NamesTimeAndLimit) {
   EXPECT_GT(outside->time_s, 0);
 
   auto fast = paper_sinusoids();
-  fast.period_s[1] = 0.5;
+  fast.omega_rad_s[1] = 12;
   const auto rate = find_infeasible(sinusoids(fast), 30, model, config, start);
   ASSERT_TRUE(rate);
   EXPECT_NE(rate->what.find("limits.rate"), std::string::npos) << rate->what;

@@ -29,11 +29,14 @@ struct TrackingRun {
   TrackingScenario scenario;
   TimeTable table;                    ///< what tracking_ID.csv holds
   std::optional<double> converged_s;  ///< true errors get within 1 px and 5 mrad and stay there for a second
-  Eigen::Vector4d steady_rms = Eigen::Vector4d::Zero();   ///< of the true errors over the last third: s_rad, r, l, d px
-  Eigen::Vector4d steady_mean = Eigen::Vector4d::Zero();  ///< likewise
+  /// Of the true errors s_rad, r, l, d px over the last third, or from the hidden marker's return on.
+  Eigen::Vector4d steady_rms = Eigen::Vector4d::Zero(), steady_mean = Eigen::Vector4d::Zero(),
+                  steady_largest = Eigen::Vector4d::Zero();
+  Eigen::Vector4d decay_per_s = Eigen::Vector4d::Zero();  ///< of each feature's error at the start; NaN: not measured
   double delay_s = 0;                                     ///< as believed at the end
   double rate_share = 0;                                  ///< largest setpoint rate as a share of its limit
   std::optional<double> held_s, resumed_s;                ///< after the marker was hidden, after it was back
+  std::optional<double> back_s;                           ///< from the marker's return to within 1 px and 5 mrad
 };
 
 /// The paper's section V-D: from a random start in the field of view the instrument tracks the trajectory of its
@@ -43,6 +46,10 @@ struct TrackingResult {
   std::vector<TrackingRun> runs;
   Eigen::Vector2d estimated_rcm_px = Eigen::Vector2d::Zero();  ///< what the uncalibrated run goes by
 };
+
+inline constexpr double tracking_period_s = 1.0 / 60;
+/// What steers a run.
+ControllerConfig tracking_controller(const TrackingScenario& scenario, const Camera& camera);
 
 TrackingResult measure_tracking(const ExperimentSetup& setup);
 

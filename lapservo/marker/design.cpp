@@ -10,6 +10,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/marker/decoder.h"
+#include "lapservo/marker/length_code.h"
 
 namespace lapservo {
 namespace {
@@ -69,6 +70,26 @@ std::optional<Choice> search(const DesignSpec& spec, double length_m, double sma
   return best;
 }
 
+// The first band grows at the cost of the last. nullopt when there is no room to grow.
+std::optional<Marker> length_marker(const DesignSpec& spec, double length_m, double smallest_m) {
+  const double longest_m = length_m - 2 * smallest_m;
+  if (longest_m - smallest_m < rounding_m / 2) return std::nullopt;
+  Marker marker;
+  marker.diameter_m = spec.diameter_m;
+  marker.hues_deg = spec.hues_deg;
+  marker.bands_upper_m = {smallest_m, smallest_m, longest_m};
+  marker.bands_lower_m = {longest_m, smallest_m, smallest_m};
+  return marker;
+}
+
+std::optional<Marker> cross_ratio_marker(const DesignSpec& spec, double length_m, double smallest_m) {
+  const double reach_m = (length_m - 3 * smallest_m) / 2, middle_m = (length_m + smallest_m) / 2;
+  const auto coarse = search(spec, length_m, smallest_m, {0.5, middle_m, middle_m}, 0.5, reach_m);
+  if (!coarse) return std::nullopt;
+  const auto fine = search(spec, length_m, smallest_m, *coarse, 0.08, reach_m / 8);
+  return marker_of(spec, length_m, fine.value_or(*coarse));
+}
+
 }  // namespace
 
 double worst_sigma_centre_line_rad(const Marker& marker, const Viewing& viewing) {
@@ -87,17 +108,16 @@ bool in_linear_family(const Marker& marker) {
 Marker design_marker(const DesignSpec& spec) {
   const double length_m = spec.length_m.value_or(std::round(3e3 * spec.diameter_m) * 1e-3);
   const double smallest_m = spec.smallest_band_m.value_or(std::max(0.003, 12 / spec.viewing.px_per_m()));
-  const double reach_m = (length_m - 3 * smallest_m) / 2, middle_m = (length_m + smallest_m) / 2;
-  const auto coarse = search(spec, length_m, smallest_m, {0.5, middle_m, middle_m}, 0.5, reach_m);
-  if (!coarse)
+  const bool by_cross_ratio = spec.code == MarkerCode::cross_ratio;
+  const auto marker =
+      by_cross_ratio ? cross_ratio_marker(spec, length_m, smallest_m) : length_marker(spec, length_m, smallest_m);
+  if (!marker)
     throw InputError("length", "no marker: three bands of at least " + millimetres(smallest_m) +
                                    " that change over the turn do not fit into " + millimetres(length_m));
-  const auto fine = search(spec, length_m, smallest_m, *coarse, 0.08, reach_m / 8);
-  const Marker marker = marker_of(spec, length_m, fine.value_or(*coarse));
-  if (const std::string problem = marker_problem(marker); !problem.empty()) throw InputError("marker", problem);
-  if (const std::string problem = decoding_problem(marker); !problem.empty())
-    throw InputError("marker", "not decodable: " + problem);
-  return marker;
+  if (const std::string problem = marker_problem(*marker); !problem.empty()) throw InputError("marker", problem);
+  const std::string problem = by_cross_ratio ? decoding_problem(*marker) : length_decoding_problem(*marker, 0);
+  if (!problem.empty()) throw InputError("marker", "not decodable: " + problem);
+  return *marker;
 }
 
 }  // namespace lapservo

@@ -24,11 +24,11 @@ std::array<double, 4> boundaries_m(const Marker& marker, double tau_rad);
 /// Derivative of boundaries_m by tau, metres per radian: constant but for the jump at the seam.
 std::array<double, 4> boundary_slopes_m(const Marker& marker);
 
-/// Cross-ratio r(l1, l2, l3) = (l1 + l2)(l2 + l3) / (l2 (l1 + l2 + l3)) of collinear points (eq. 16). It is the same
+/// Cross-ratio r(l1, l2, l3) = (l1 + l2)(l2 + l3) / (l2 (l1 + l2 + l3)) of collinear points (eq. 17). It is the same
 /// in every perspective image of them.
 double cross_ratio(double l1, double l2, double l3);
 
-/// Cross-ratio of the marker's boundaries at an azimuth (eq. 17).
+/// Cross-ratio of the marker's boundaries at an azimuth, from which eq. (18) tells it.
 double cross_ratio_at(const Marker& marker, double tau_rad);
 
 /// Empty when lengths, hues and sums make a marker; else "field: is value, expected ..." for the first that doesn't.

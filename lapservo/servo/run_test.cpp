@@ -201,7 +201,7 @@ TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
   ControllerConfig controller;
   controller.window = image_window(rig.camera, 20);
   Sinusoids fast = paper_sinusoids();
-  fast.period_s.setConstant(0.5);
+  fast.omega_rad_s.setConstant(12);
   const JointVector start{0.05, 1.57, 0.064, 1.2};
   const std::string complaint = testing::input_error(
       [&] { refuse_infeasible(sinusoids(fast), 10, feature_model(rig), controller, start, "fast.csv"); });
