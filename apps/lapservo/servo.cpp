@@ -29,6 +29,8 @@
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
+#include "lapservo/servo/replay.h"
 #include "lapservo/servo/run.h"
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/sim/simulator.h"
@@ -265,11 +267,10 @@ int simulate(const Options& options) {
 
 int replay_log(const Options& options) {
   const fs::path log = options.replay, folder = log.parent_path();
-  RunConfig run;
-  run.rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
-  run.controller = load_controller(folder / "controller.yaml", {});
+  const Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
+  const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
   const auto ticks = read_servo_log(log);
-  const auto difference = replay(ticks, run);
+  const auto difference = replay(ticks, rig, controller);
   if (!difference) {
     std::printf("%zu ticks reproduced bit for bit\n", ticks.size());
     return 0;

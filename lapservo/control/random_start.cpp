@@ -6,6 +6,7 @@
 #include <string>
 
 #include "lapservo/control/newton_inverse.h"
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 

@@ -2,14 +2,10 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 
 namespace lapservo {
-
-/// K of eq. (21), per second, for s, r, l, d.
-struct TrackingGains {
-  Eigen::Vector4d per_s{5, 5, 5, 5};
-};
 
 /// Section V-D's gains: K_s = 0.032, K_r = 0.008, K_l = 0.0008, K_d = 0.01. The paper gives no unit of time. Per second
 /// they would mean time constants of 31 s to 21 minutes beside a trajectory of 12.6 s, so they are read per control

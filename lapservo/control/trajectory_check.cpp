@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "lapservo/control/newton_inverse.h"
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo {

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
+#include "lapservo/control/feature_model.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/core/joint_vector.h"
 

@@ -28,18 +28,6 @@ bool all_finite(const ImageMeasurement& image) {
 
 }  // namespace
 
-std::string_view to_string(ControlAction action) {
-  switch (action) {
-    case ControlAction::track:
-      return "track";
-    case ControlAction::probe:
-      return "probe";
-    case ControlAction::hold:
-      return "hold";
-  }
-  return "";
-}
-
 VisualController::VisualController(const ControllerConfig& config, FeatureModel model)
     : config_(checked(config)),
       exact_gains_(exact_gains(config)),

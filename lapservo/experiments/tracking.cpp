@@ -16,7 +16,9 @@
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
 #include "lapservo/servo/run.h"
+#include "lapservo/servo/servo_log.h"
 #include "lapservo/sim/simulator.h"
 #include "lapservo/sim/tissue.h"
 
@@ -69,11 +71,7 @@ class Recorder : public RunObserver {
  public:
   Recorder(TrackingRun& run, const FeatureModel& true_model, const Simulator& simulator, const JointLimits& limits,
            std::function<bool()> keep_going)
-      : run_(run),
-        true_model_(true_model),
-        simulator_(simulator),
-        limits_(limits),
-        keep_going_(std::move(keep_going)) {
+      : run_(run), true_model_(true_model), simulator_(simulator), limits_(limits), keep_going_(std::move(keep_going)) {
     for (const char* what : {"desired_", "true_", "error_"})
       for (const std::string_view feature : FeatureVector::names)
         run_.table.columns.push_back({what + std::string(feature), {}});

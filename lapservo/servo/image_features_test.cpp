@@ -1,4 +1,5 @@
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>

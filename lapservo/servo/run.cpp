@@ -1,8 +1,11 @@
 #include "lapservo/servo/run.h"
 
+#include <algorithm>
 #include <cmath>
 
+#include "lapservo/control/motion_limits.h"
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/servo.h"
 
 namespace lapservo {
 
@@ -29,17 +32,6 @@ void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& confi
   }
   // No more velocities: the path brakes by itself.
   clock.sleep_until(clock.now_s() + stopping_time_s(config.controller.limits) + period_s);
-}
-
-std::optional<ReplayDifference> replay(const std::vector<LoggedTick>& log, const RunConfig& config) {
-  Servo servo(config.controller, feature_model(config.rig));
-  for (std::size_t i = 0; i < log.size(); ++i) {
-    const auto fields = decision_fields(servo.step(log[i].input));
-    for (std::size_t k = 0; k < fields.size(); ++k)
-      if (fields[k] != log[i].decision[k])
-        return ReplayDifference{i, decision_columns()[k], log[i].decision[k], fields[k]};
-  }
-  return std::nullopt;
 }
 
 }  // namespace lapservo

@@ -1,17 +1,15 @@
 #pragma once
 
 #include <optional>
-#include <string>
-#include <vector>
 
 #include <Eigen/Core>
 
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/clock.h"
 #include "lapservo/robot/robot.h"
-#include "lapservo/servo/servo.h"
-#include "lapservo/servo/servo_log.h"
+#include "lapservo/servo/servo_decision.h"
 #include "lapservo/servo/tracked_image.h"
 #include "lapservo/stream/image_stream.h"
 
@@ -47,13 +45,5 @@ class RunObserver {
 /// on by itself when all is well again. A late tick shifts none of those after it.
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
-
-/// Puts a log's inputs through a servo of the same configuration again. The first tick whose decision differs in any
-/// bit, or nullopt.
-struct ReplayDifference {
-  std::size_t tick = 0;
-  std::string column, logged, replayed;
-};
-std::optional<ReplayDifference> replay(const std::vector<LoggedTick>& log, const RunConfig& config);
 
 }  // namespace lapservo

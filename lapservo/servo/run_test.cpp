@@ -10,6 +10,9 @@
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
+#include "lapservo/servo/replay.h"
+#include "lapservo/servo/servo_log.h"
 #include "lapservo/sim/simulator.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/rigs.h"
@@ -190,9 +193,9 @@ TEST(Run, RepeatsAndReplaysBitForBit) {
       ASSERT_EQ(decision_fields(first.records[i].decision), decision_fields(second.records[i].decision)) << i;
     auto ticks = read_servo_log(folder / "log.csv");
     const RunConfig config = config_of(testing::small_test_rig(), c);
-    EXPECT_FALSE(replay(ticks, config));
+    EXPECT_FALSE(replay(ticks, config.rig, config.controller));
     ticks[70].input.desired.features[1] += 1e-9;
-    EXPECT_TRUE(replay(ticks, config));
+    EXPECT_TRUE(replay(ticks, config.rig, config.controller));
   }
 }
 

@@ -3,24 +3,9 @@
 #include <optional>
 
 #include "lapservo/control/visual_controller.h"
-#include "lapservo/core/joint_vector.h"
-#include "lapservo/robot/robot.h"
+#include "lapservo/servo/servo_decision.h"
 
 namespace lapservo {
-
-/// All that one step of the loop goes by.
-struct ServoInput {
-  double time_s = 0;
-  JointState joints;
-  std::optional<ImageMeasurement> image;  ///< the newest frame since the step before, if any
-  DesiredFeatures desired;                ///< at time_s
-};
-
-/// What one step decides.
-struct ServoDecision {
-  ControlStep control;
-  bool send = false;  ///< the arm is to follow path(); else it is left alone and holds by itself
-};
 
 /// The loop's one step, the same for a real arm, a simulated one and a replay: it goes by nothing but its inputs.
 class Servo {

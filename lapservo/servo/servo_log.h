@@ -7,8 +7,9 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/feature_model.h"
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/servo/servo.h"
+#include "lapservo/servo/servo_decision.h"
 
 namespace lapservo {
 
