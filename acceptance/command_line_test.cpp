@@ -1,5 +1,9 @@
 // The tool as its user meets it: exit codes, one line per complaint, nothing left half-written.
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -8,9 +12,12 @@
 #include <string>
 #include <sys/wait.h>
 #include <unistd.h>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
 
 #include "lapservo/core/csv.h"
 #include "lapservo/testing/sample_frames.h"
@@ -26,11 +33,11 @@ std::string read(const fs::path& path) {
   return text.str();
 }
 
-class CommandLine : public testing::Test {
+class CommandLine : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::temp_directory_path() / ("lapservo_cli_" + std::to_string(::getpid()) +
-                                           testing::UnitTest::GetInstance()->current_test_info()->name());
+                                           ::testing::UnitTest::GetInstance()->current_test_info()->name());
     // OpenCV's video backends, loaded for a try and unloaded again, keep what they allocated.
     ::setenv("ASAN_OPTIONS", "detect_leaks=0", 1);
     fs::create_directories(folder_ / "in");
@@ -138,7 +145,8 @@ TEST_F(CommandLine, RigsThatAreNone) {
   expect_refused("track " + in("grey.png") + " --rig " + in("none.yaml") + " --out " + out("obs.csv"), {"none.yaml"});
   expect_refused(with("diameter_m: 0.0084", "diameter_m: -1"), {"rig.yaml", "diameter_m", "-1"});
   expect_refused(with("diameter_m: 0.0084", "diameter_m: .nan"), {"rig.yaml", "diameter_m", ".nan"});
-  expect_refused(with("diameter_m: 0.0084", "diameter: 0.0084"), {"rig.yaml", "diameter_m", "missing"});
+  expect_refused(with("diameter_m: 0.0084", "diameter: 0.0084"),
+                 {"rig.yaml", "marker.diameter", "unknown", "diameter_m"});
   expect_refused(with("image_width: 1280", "image_width: wide"), {"rig.yaml", "image_width", "wide"});
   expect_refused(with("[0.0095, 0.0095, 0.005]", "[0.0035, 0.0035, 0.017]"), {"rig.yaml", "marker", "decodable"});
   expect_refused(with("camera:", "[[[[["), {"rig.yaml"});
@@ -203,6 +211,131 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
   EXPECT_EQ(run("servo --rig " + paper + " --robot sim --duration 0.5"), 1);
 }
 
+// Section V-D, to the letter: omega is 0.5 rad/s for all features, K holds per control period (60 a second).
+TEST_F(CommandLine, ServoByThePapersMethod) {
+  const std::string paper = lapservo::testing::source_folder().string() + "/configs/paper.yaml";
+  EXPECT_EQ(
+      run("servo --method paper --rig " + paper + " --robot sim --trajectory paper --duration 3 --out " + out("run")),
+      1);
+  EXPECT_NE(output().find("Algorithm 1"), std::string::npos) << output();
+  const CsvTable log = CsvTable::read(out("run") + "/log.csv");
+  ASSERT_EQ(log.rows(), 180U);
+  const double start_s = log.number(0, "time_s");
+  for (std::size_t row = 0; row < log.rows(); ++row) {
+    const double swing = std::sin(0.5 * (log.number(row, "time_s") - start_s));
+    EXPECT_NEAR(log.number(row, "desired_s_rad"), 0.9 + 0.05 * swing, 1e-9);
+    EXPECT_NEAR(log.number(row, "desired_r_px"), 795 + 60 * swing, 1e-9);
+    EXPECT_NEAR(log.number(row, "desired_l_px"), 365 + 30 * swing, 1e-9);
+    EXPECT_NEAR(log.number(row, "desired_d_px"), 212 + 37 * swing, 1e-9);
+  }
+  const std::string controller = read(out("run") + "/controller.yaml");
+  double s = 0, r = 0, l = 0, d = 0;
+  ASSERT_EQ(std::sscanf(controller.c_str() + controller.find("gains_per_s"), "gains_per_s: [%lf, %lf, %lf, %lf]", &s,
+                        &r, &l, &d),
+            4)
+      << controller;
+  const std::array<double, 4> per_period{s / 60, r / 60, l / 60, d / 60}, papers{0.032, 0.008, 0.0008, 0.01};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(per_period.at(i), papers.at(i), 1e-12) << i;
+
+  run("servo --method paper --tracker surface --rig " + paper + " --robot sim --duration 0.5");
+  EXPECT_NE(output().find("all visible lines"), std::string::npos) << output();
+}
+
+// A number is the whole text, finite and in its range, for every option of every subcommand.
+TEST_F(CommandLine, NumbersThatAreNone) {
+  const std::string frames = "render --rig " + rig_ + " --out " + out("frames"), design = "marker design",
+                    servo = "servo --rig " + rig_ + " --robot sim --out " + out("run"),
+                    estimate = "estimate-rcm " + in("obs.csv", "instrument,status\n") + " --out " + out("rcm.csv");
+  const std::vector<std::pair<std::string, std::vector<const char*>>> options{
+      {frames, {"count", "seed", "light", "smoke", "blood", "noise", "blur-px", "motion", "film-mm", "fps"}},
+      {design, {"diameter-mm", "length-mm", "smallest-band-mm", "focal-px", "distance-mm", "sigma-px"}},
+      {"marker print --rig " + rig_ + " --out " + out("sheet.pdf"), {"copies"}},
+      {"marker show --rig " + rig_, {"focal-px", "distance-mm", "sigma-px"}},
+      {servo, {"duration", "latency-ms", "fps", "seed"}},
+      {estimate, {"sigma-px", "common-px"}},
+      {"experiment rcm --out " + out("report"), {"seed"}},
+      {track(in("none.png")), {"fps"}}};
+  for (const auto& [command, names] : options)
+    for (const char* name : names)
+      for (const char* value : {"nan", "-1", "1x"})
+        expect_refused(command + " --" + name + " " + value, {name, "expected"});
+  for (const char* list : {"start 0,1.5,nan,0", "start 0,1.5,0.1,1e999", "set-point nan,795,365,212", "via 1,2,x,4",
+                           "rcm-px nan,1", "hide 1,inf"})
+    expect_refused(servo + " --" + list,
+                   {std::string(list).substr(0, std::string(list).find(' ')).c_str(), "expected"});
+  for (const char* value : {"1.5", "18446744073709551617", "9007199254740993"})
+    expect_refused(frames + " --seed " + value, {"--seed", value, "whole number"});
+  expect_refused(frames + " --count 1.5", {"--count", "1.5"});
+}
+
+// A flipped bit that the decoder notices, a picture of a palette, one that is to be turned: never a row that is ok.
+TEST_F(CommandLine, FlawedPicturesHaveAWordOfTheirOwn) {
+  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("frames") + " --count 1 --seed 5 --format jpg"), 0)
+      << errors();
+  const std::string whole = read(out("frames") + "/0000.jpg");
+  std::string damaged = whole;
+  damaged.erase(damaged.size() / 2, 300);
+  cv::Mat few = cv::imread(out("frames") + "/0000.jpg");
+  few &= cv::Scalar(0xc0, 0xc0, 0xc0);
+  cv::imwrite(in("few.png"), few);
+  for (const auto& [file, word] : {std::pair{in("damaged.jpg", damaged), "damaged"}, {in("few.png"), "few_colors"}}) {
+    EXPECT_EQ(run("track " + file + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
+    EXPECT_EQ(CsvTable::read(out("obs.csv")).text(0, "status"), word);
+  }
+  EXPECT_EQ(run("track " + in("whole.jpg", whole) + " --rig " + rig_ + " --out " + out("obs.csv")), 0) << errors();
+}
+
+TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {
+  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("film") + " --count 12 --moving"), 0) << errors();
+  cv::VideoWriter video(in("a.mkv"), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25, {1280, 720});
+  for (int i = 0; i < 12; ++i)
+    video.write(cv::imread(out("film") + (i < 10 ? "/000" : "/00") + std::to_string(i) + ".png"));
+  video.release();
+  const std::string whole = read(in("a.mkv"));
+  const std::string half = in("half.mkv", whole.substr(0, whole.size() / 2));
+  EXPECT_EQ(run("track " + half + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
+  EXPECT_NE(errors().find("half.mkv: ends early"), std::string::npos) << errors();
+  const std::string said = errors();
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
+  const std::size_t rows = CsvTable::read(out("obs.csv")).rows();
+  EXPECT_GE(rows, 3U);
+  EXPECT_LT(rows, 12U);
+}
+
+TEST_F(CommandLine, ANameWithALineEndIsQuoted) {
+  fs::create_directories(folder_ / "in/folder");
+  cv::imwrite((folder_ / "in/folder/a.png").string(), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
+  fs::rename(folder_ / "in/folder/a.png", folder_ / "in/folder/a\nb.png");
+  EXPECT_EQ(run("track " + in("folder") + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
+  EXPECT_EQ(CsvTable::read(out("obs.csv")).text(0, "file"), "a\nb.png");
+}
+
+TEST_F(CommandLine, WhatHasNoEndIsRefused) {
+  fs::create_symlink("/dev/zero", in("endless.png"));
+  expect_refused(track(in("endless.png")), {"endless.png", "larger than 256 MiB"});
+  std::ofstream(in("sparse.png")) << "x";
+  fs::resize_file(in("sparse.png"), std::uintmax_t{8} << 30);
+  expect_refused(track(in("sparse.png")), {"sparse.png", "larger than 256 MiB"});
+  expect_refused("track /dev/zero --rig " + rig_ + " --out " + out("obs.csv"), {"/dev/zero", "no file"});
+  expect_refused("estimate-rcm /dev/zero --out " + out("rcm.csv"), {"/dev/zero", "larger than 256 MiB"});
+}
+
+TEST_F(CommandLine, TheLeastFramesASecondThatServoTakesWork) {
+  const std::string servo =
+      "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --robot sim";
+  EXPECT_EQ(run(servo + " --fps 6 --duration 1"), 1) << errors();  // it has not converged, but it ran
+  EXPECT_NE(output().find("not within 1 px"), std::string::npos) << output() << errors();
+  expect_refused(servo + " --fps 5 --out " + out("run"), {"--fps", "expected a number of 6"});
+}
+
+TEST_F(CommandLine, ALogWithoutPeriodsIsNoSuccess) {
+  const std::string paper = lapservo::testing::source_folder().string() + "/configs/paper.yaml";
+  run("servo --rig " + paper + " --robot sim --duration 0.1 --out " + in("run"));
+  const std::string log = read(in("run") + "/log.csv");
+  std::ofstream(in("run") + "/log.csv") << log.substr(0, log.find('\n') + 1);
+  expect_refused("servo --replay " + in("run") + "/log.csv", {"log.csv", "holds no tick"});
+}
+
 TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   const std::string servo =
       "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --out " + out("run");
@@ -212,6 +345,7 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --set-point 0.9,795", {"--set-point"});
   expect_refused(servo + " --robot sim --via 1,2,3", {"--via", "four"});
   expect_refused(servo + " --robot sim --method fast", {"--method", "fast", "uncalibrated"});
+  expect_refused(servo + " --robot sim --tracker magic", {"--tracker", "magic"});
   expect_refused(servo + " --robot sim --delay-ms soon", {"--delay-ms", "soon"});
   expect_refused(servo + " --robot sim --fps 1", {"--fps"});
   expect_refused(servo + " --robot sim --trajectory " + in("none.csv"), {"none.csv"});
@@ -221,9 +355,9 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --controller " + in("gains.yaml", "gains_per_s: [1, 2, 3, -4]\n"),
                  {"gains", "-4"});
   expect_refused("servo --replay " + in("log.csv"), {"rig.yaml"});
-  expect_refused(
-      "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --robot sim --out /proc/nowhere",
-      {"/proc/nowhere", "folder"});
+  expect_refused("servo --rig " + lapservo::testing::source_folder().string() +
+                     "/configs/paper.yaml --robot sim --out /proc/nowhere",
+                 {"/proc/nowhere", "folder"});
 }
 
 TEST_F(CommandLine, ExperimentsWriteAReport) {

@@ -1,6 +1,7 @@
 // `lapservo estimate-rcm` as its user meets it, and the accuracy promised for it.
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -37,11 +38,11 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return at == std::string::npos ? text : text.replace(at, what.size(), by);
 }
 
-class EstimateRcm : public testing::Test {
+class EstimateRcm : public ::testing::Test {
  protected:
   void SetUp() override {
     folder_ = fs::temp_directory_path() / ("lapservo_rcm_" + std::to_string(::getpid()) +
-                                           testing::UnitTest::GetInstance()->current_test_info()->name());
+                                           ::testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }
@@ -161,6 +162,36 @@ TEST_F(EstimateRcm, ExitsWithOneWhenThereIsNone) {
   expect_said("stdout", "parallel");
 }
 
+TEST_F(EstimateRcm, RepeatedRowsAndVeryManyOfThem) {
+  constexpr std::uint64_t seed = 84;
+  Random random(seed);
+  const Camera camera = load_rig(paper_rig).camera;
+  const std::string rows = observed_lines(camera, "PSM1", {-300, 900}, 0.5, random);
+  std::string often = header, many = header;
+  for (int i = 0; i < 100; ++i) often += rows;
+  for (int i = 0; i < 96000 / 20; ++i) many += observed_lines(camera, "PSM1", {-300, 900}, 0.5, random);
+  ASSERT_EQ(run("estimate-rcm " + write("once.csv", header + rows) + " --out " + path("a.csv")), 0);
+  ASSERT_EQ(run("estimate-rcm " + write("often.csv", often) + " --out " + path("b.csv")), 0);
+  expect_said("stderr", "2000 rows of 20 positions");
+  const CsvTable once = CsvTable::read(path("a.csv")), repeated = CsvTable::read(path("b.csv"));
+  for (std::size_t method = 0; method < 2; ++method)
+    EXPECT_NEAR(repeated.number(method, "sigma_u_px") / once.number(method, "sigma_u_px"), 1, 1e-3);
+  const auto start = std::chrono::steady_clock::now();
+  ASSERT_EQ(run("estimate-rcm " + write("many.csv", many) + " --out " + path("c.csv")), 0);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+  EXPECT_NEAR(CsvTable::read(path("c.csv")).number(0, "rcm_u_px"), -300, 2);
+}
+
+TEST_F(EstimateRcm, RefusesTenParallelLines) {
+  std::string rows = header;
+  for (int i = 0; i < 10; ++i)
+    rows += std::to_string(i) + ",PSM1,ok,100," + std::to_string(100 + 20 * i) + ",400," +
+            std::to_string(100 + 20 * i) + (i % 2 ? ".001\n" : "\n");
+  EXPECT_EQ(run("estimate-rcm " + write("parallel.csv", rows)), 1);
+  expect_said("stdout", "weighted: none (parallel");
+  expect_said("stdout", "pairwise: none (parallel");
+}
+
 TEST_F(EstimateRcm, WarnsOfWhatTheNumbersDoNotTell) {
   const std::string one = "0,PSM1,ok,100,100,300,100\n";
   EXPECT_EQ(run("estimate-rcm " + write("narrow.csv", header + one + "1,PSM1,ok,100,200,300,205\n")), 0);
@@ -174,7 +205,8 @@ TEST_F(EstimateRcm, WarnsOfWhatTheNumbersDoNotTell) {
   expect_said("stderr", "camera_from_rcm");
   EXPECT_EQ(run("estimate-rcm --sigma-px 0.001 " +
                 write("noisy.csv", header + observed_lines(camera, "PSM1", {-300, 900}, 1, random))),
-            0);
+            1)
+      << "the few lines left are parallel to within the noise";
   expect_said("stderr", "--sigma-px is too small");
 }
 

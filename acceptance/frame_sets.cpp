@@ -56,7 +56,9 @@ void Score::add(const TrueFrame& frame, const std::vector<Observation>& observat
   }
 }
 
-std::optional<fs::path> sample_folder() { return lapservo::testing::sample_frames(); }
+std::optional<fs::path> sample_folder() {
+  return lapservo::testing::sample_frames();
+}
 
 std::vector<TrueFrame> sample_frames(const std::string& set) {
   const fs::path all = sample_folder().value(), folder = all / set;

@@ -13,12 +13,15 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
+#include "apps/lapservo/input_files.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/kinematics/features.h"
+#include "lapservo/rcm/distinct_lines.h"
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/rig/rig.h"
@@ -104,11 +107,13 @@ Result weighted_result(const std::vector<LineObservation>& lines, const Options&
   return result;
 }
 
-Result pairwise_result(const std::vector<LineObservation>& lines) {
+// Of parallel lines the pairs meet anywhere.
+Result pairwise_result(const std::vector<LineObservation>& lines, const Result& weighted) {
   Result result;
   result.method = "pairwise";
   result.lines = static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), is_usable));
-  const auto mean = mean_of_intersections(lines);
+  const bool parallel = weighted.status == rcm_status_word(RcmStatus::parallel);
+  const auto mean = parallel ? std::nullopt : mean_of_intersections(lines);
   result.status = rcm_status_word(mean               ? RcmStatus::ok
                                   : result.lines < 2 ? RcmStatus::too_few_lines
                                                      : RcmStatus::parallel);
@@ -120,9 +125,14 @@ Result pairwise_result(const std::vector<LineObservation>& lines) {
 
 std::vector<Result> estimate_all(const Options& options, const std::optional<Rig>& rig) {
   std::vector<Result> results;
-  for (const auto& [name, lines] : read_lines(options, rig)) {
+  for (const auto& [name, rows] : read_lines(options, rig)) {
     const Instrument* instrument = find_instrument(rig, name);
-    for (Result result : std::array{weighted_result(lines, options), pairwise_result(lines)}) {
+    const std::vector<LineObservation> lines = distinct_lines(rows);
+    if (lines.size() < rows.size())
+      std::fprintf(stderr, "lapservo: note: %s: %zu rows of %zu positions that differ: a position counts once\n",
+                   name.c_str(), rows.size(), lines.size());
+    const Result weighted = weighted_result(lines, options);
+    for (Result result : std::array{weighted, pairwise_result(lines, weighted)}) {
       result.instrument = name;
       if (instrument && instrument->camera_from_rcm)
         result.rig_px = projected_rcm_px(rig->camera, *instrument->camera_from_rcm);
@@ -136,8 +146,7 @@ std::string number_or_empty(std::optional<double> value) {
   return value ? fmt::format("{:.6g}", *value) : "";
 }
 
-void write_report(const fs::path& path, const std::vector<Result>& results) {
-  AtomicFile file(path);
+void write_report(AtomicFile& file, const std::vector<Result>& results) {
   file.stream()
       << "instrument,method,status,lines,outliers,rcm_u_px,rcm_v_px,sigma_u_px,sigma_v_px,correlation,noise_px,"
          "chi2,direction_spread_rad,near_parallel,rig_u_px,rig_v_px,distance_px\n";
@@ -169,7 +178,8 @@ void write_report(const fs::path& path, const std::vector<Result>& results) {
 void print(const Result& r) {
   const std::string head = fmt::format("{} {:<9}", r.instrument, r.method + ":");
   if (!r.point_px) {
-    std::printf("%s none (%s, %zu lines)\n", head.c_str(), r.status.c_str(), r.lines);
+    const char* why = r.status == "parallel" ? ": turn the instrument farther between frames" : "";
+    std::printf("%s none (%s, %zu lines%s)\n", head.c_str(), r.status.c_str(), r.lines, why);
     return;
   }
   std::string line = fmt::format("({:.2f}, {:.2f}) px", r.point_px->x(), r.point_px->y());
@@ -208,12 +218,14 @@ void warn(const Result& r) {
 int run(const Options& options) {
   std::optional<Rig> rig;
   if (!options.rig.empty()) rig = load_rig(options.rig);
-  std::error_code error;
-  for (const std::string& input : {options.observations, options.rig})
-    if (!options.out.empty() && fs::exists(options.out) && fs::equivalent(options.out, input, error))
-      throw InputError(options.out, "is an input itself, expected another place for the results");
+  InputFiles inputs;
+  inputs.add(options.observations);
+  if (rig) inputs.add_rig(options.rig, *rig);
+  inputs.refuse_as_output(options.out);
+  std::optional<AtomicFile> report;
+  if (!options.out.empty()) report.emplace(options.out);
   const std::vector<Result> results = estimate_all(options, rig);
-  if (!options.out.empty()) write_report(options.out, results);
+  if (report) write_report(*report, results);
   for (const Result& result : results) {
     print(result);
     warn(result);
@@ -237,17 +249,18 @@ void add_estimate_rcm(CLI::App& app, Run& run_later) {
       ->required();
   command->add_option("--rig", options->rig,
                       "To undistort the lines, and to compare with its camera_from_rcm where it has one");
-  command->add_option("--out", options->out, "CSV to write: a row per instrument and method, in ideal pixels");
+  command->add_option("--out", options->out,
+                      "CSV to write or replace: a row per instrument and method, in ideal pixels");
   command
       ->add_option("--sigma-px", options->sigma_px,
                    "Standard deviation of e0 and e3 in either coordinate; else estimated from how badly the lines meet")
-      ->check(CLI::Range(1e-6, 1000.0));
+      ->check(number_between(1e-6, 1000.0));
   command
       ->add_option("--common-px", options->common_px,
                    "Standard deviation of an error across the lines that all of them share and no number of lines "
                    "averages out; the default is that of `lapservo track` behind a well calibrated lens")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(number_between(0.0, 1000.0));
   command->footer(
       "Prints two estimates: weighted, by total least squares without outliers, and pairwise, the paper's mean of all\n"
       "intersections, with one standard deviation each. Lines should come from positions of the instrument that "

@@ -8,7 +8,9 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
@@ -29,6 +31,7 @@ constexpr std::uintmax_t needed_bytes = 16 << 20;
 struct Options {
   std::string name, out, rig, method = "both";
   std::uint64_t seed = 1;
+  bool force = false;
 };
 
 // Measures, leaves the data in the folder, and tells of it.
@@ -73,7 +76,16 @@ ExperimentSetup setup_of(const Options& options) {
   return setup;
 }
 
-Report report_of(std::vector<ReportSection> sections, const Options& options) {
+// What an interrupted run lacks; empty when it went to its end.
+std::string missing_from(const std::vector<ReportSection>& sections, const std::string& stopped_in) {
+  std::string text;
+  for (const ReportSection& section : sections)
+    if (!section.unfinished.empty()) text += " " + section.title + ": " + section.unfinished;
+  if (!stopped_in.empty()) text += " The experiment \u201c" + stopped_in + "\u201d and those after it are missing.";
+  return text.empty() ? "" : "This report is not whole: it was stopped." + text;
+}
+
+Report report_of(std::vector<ReportSection> sections, const std::string& missing, const Options& options) {
   return {
       "lapservo: the experiments of the paper",
       {"\u201cImage-Based Trajectory Tracking Control of 4-DoF Laparoscopic Instruments Using a Rotation "
@@ -83,7 +95,8 @@ Report report_of(std::vector<ReportSection> sections, const Options& options) {
                    "paper\u2019s method reads the marker on the shaft\u2019s centre line (its Algorithm 1); the "
                    "default fits all visible lines of the surface. Everything is repeatable: seed {}.",
                    options.rig.empty() ? "the rig of configs/paper.yaml" : "the rig " + options.rig, options.seed)},
-      std::move(sections)};
+      std::move(sections),
+      missing};
 }
 
 // The library knows the rig, but not its file.
@@ -93,14 +106,23 @@ Report report_of(std::vector<ReportSection> sections, const Options& options) {
   throw error;
 }
 
-int run(const Options& options) {
-  ExperimentSetup setup = setup_of(options);
-  const fs::path folder = options.out;
-  prepare_output_folder(folder, needed_bytes);
-  watch_for_interrupts();
+void print(const ReportSection& section) {
+  std::printf("%s\n", section.title.c_str());
+  for (const Comparison& c : with_paper(section)) {
+    std::printf("  %s\n", c.what.c_str());
+    for (const auto& [who, value] :
+         {std::pair{"the paper", c.paper}, {"its method here", c.centerline}, {"the default here", c.surface}})
+      if (!value.empty()) std::printf("    %-17s %s\n", who, value.c_str());
+  }
+}
 
+struct Outcome {
   std::vector<ReportSection> sections;
-  std::string stopped_in;
+  std::string stopped_in;  // the first experiment that has no section
+};
+
+Outcome run_experiments(ExperimentSetup setup, const Options& options, const fs::path& folder) {
+  Outcome outcome;
   for (const auto& [name, experiment] : experiments()) {
     if (options.name != "all" && options.name != name) continue;
     std::optional<Progress> progress;
@@ -110,27 +132,33 @@ int run(const Options& options) {
       return !interrupted();
     };
     try {
-      sections.push_back(experiment(setup, folder));
+      if (interrupted()) throw Interrupted{};
+      outcome.sections.push_back(experiment(setup, folder));
     } catch (const Interrupted&) {
-      stopped_in = name;
+      outcome.stopped_in = name;
       break;
     } catch (const InputError& error) {
       rethrow_with_rig(error, options);
     }
   }
-  if (!stopped_in.empty()) std::printf("stopped in %s\n", stopped_in.c_str());
-  if (sections.empty()) return 1;
-  const fs::path path = folder / "report.html";
-  for (const ReportSection& section : sections) {
-    const Comparison& c = section.comparisons.front();
-    std::printf("%s\n", c.what.c_str());
-    for (const auto& [who, value] :
-         {std::pair{"the paper", c.paper}, {"its method here", c.centerline}, {"the default here", c.surface}})
-      if (!value.empty()) std::printf("  %-17s %s\n", who, value.c_str());
-  }
-  write_report(path, report_of(std::move(sections), options));
-  std::printf("report: %s\n", path.c_str());
-  return stopped_in.empty() ? 0 : 1;
+  return outcome;
+}
+
+int run(const Options& options) {
+  ExperimentSetup setup = setup_of(options);
+  InputFiles inputs;
+  inputs.add_rig(options.rig, setup.rig);
+  OutputFolder folder(options.out, setup.rig, inputs, options.force, needed_bytes);
+  watch_for_interrupts();
+  Outcome outcome = run_experiments(std::move(setup), options, folder / "");
+  const std::string missing = missing_from(outcome.sections, outcome.stopped_in);
+  for (const ReportSection& section : outcome.sections) print(section);
+  if (!missing.empty()) std::printf("%s\n", missing.c_str());
+  if (outcome.sections.empty()) return 1;
+  write_report(folder / "report.html", report_of(std::move(outcome.sections), missing, options));
+  folder.commit();
+  std::printf("report: %s\n", (fs::path(options.out) / "report.html").c_str());
+  return missing.empty() ? 0 : 1;
 }
 
 }  // namespace
@@ -141,10 +169,16 @@ void add_experiment(CLI::App& app, Run& run_later) {
   std::vector<std::string> choices{"all"};
   for (const Named& named : experiments()) choices.push_back(named.name);
   command->add_option("name", options->name, "Which: " + names())->required()->check(CLI::IsMember(choices));
-  command->add_option("--out", options->out, "Folder for report.html and the CSVs behind it")->required();
+  command
+      ->add_option("--out", options->out,
+                   std::string("Folder for report.html, the CSVs behind it and rig.yaml") + OutputFolder::help)
+      ->required();
+  command->add_flag("--force", options->force, OutputFolder::force_help);
   command->add_option("--rig", options->rig,
                       "Camera and instrument (the first), with camera_from_rcm; else the built-in configs/paper.yaml");
-  command->add_option("--seed", options->seed, "Of positions, background and noise")->capture_default_str();
+  command->add_option("--seed", options->seed, "Of positions, background and noise")
+      ->capture_default_str()
+      ->check(seed_number());
   command->add_option("--method", options->method, "centerline: the paper's; surface: the default; or both")
       ->capture_default_str()
       ->check(CLI::IsMember({"both", "centerline", "surface"}));

@@ -1,6 +1,10 @@
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <fcntl.h>
+#include <filesystem>
+#include <unistd.h>
 
 #include <opencv2/core/utils/logger.hpp>
 
@@ -16,6 +20,29 @@ void silence_libraries() {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
   setenv("OPENCV_VIDEOIO_DEBUG", "0", 0);
+  setenv("GST_DEBUG", "none", 0);
+}
+
+// Formats whose size we don't ask for beforehand: a few bytes must not ask for gigabytes.
+void limit_pictures() {
+  setenv("OPENCV_IO_MAX_IMAGE_WIDTH", "16384", 0);
+  setenv("OPENCV_IO_MAX_IMAGE_HEIGHT", "16384", 0);
+  setenv("OPENCV_IO_MAX_IMAGE_PIXELS", "268435456", 0);
+}
+
+// A closed one would give its number to a result's file, and our messages would go there. A limit on files' sizes is an
+// error like a full disk, which is reported, and not the end.
+void prepare_standard_streams() {
+  for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(number, F_GETFD) == -1 && ::open("/dev/null", O_RDWR) != number) std::abort();
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+// What was printed may be what was wanted.
+int flushed(int exit_code) {
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return exit_code;
+  std::fprintf(stderr, "lapservo: standard output: could not be written to its end\n");
+  return bad_input;
 }
 
 int parse_and_run(int argc, char** argv) {
@@ -46,8 +73,14 @@ int parse_and_run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   silence_libraries();
+  prepare_standard_streams();
+  limit_pictures();
   try {
-    return parse_and_run(argc, argv);
+    return flushed(parse_and_run(argc, argv));
+  } catch (const std::filesystem::filesystem_error& error) {
+    std::fprintf(stderr, "lapservo: %s: can't be used (%s), expected a name that can\n", error.path1().c_str(),
+                 error.code().message().c_str());
+    return bad_input;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "lapservo: %s\n", error.what());
     return bad_input;

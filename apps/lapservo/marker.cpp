@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/input_files.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
@@ -29,13 +31,13 @@ struct ViewingOptions {
 void add_viewing(CLI::App* command, ViewingOptions& options) {
   command->add_option("--focal-px", options.focal_px, "Focal length of the camera")
       ->capture_default_str()
-      ->check(CLI::Range(10.0, 1e5));
+      ->check(number_between(10.0, 1e5));
   command->add_option("--distance-mm", options.distance_mm, "From the camera to the marker")
       ->capture_default_str()
-      ->check(CLI::Range(5.0, 2000.0));
+      ->check(number_between(5.0, 2000.0));
   command->add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line")
       ->capture_default_str()
-      ->check(CLI::Range(1e-4, 100.0));
+      ->check(number_between(1e-4, 100.0));
 }
 
 struct DesignOptions {
@@ -118,6 +120,8 @@ void print_length_code(const Marker& marker, const Viewing& viewing) {
 int run_design(const DesignOptions& options) {
   if (options.hues_deg.size() != 3) throw InputError("--hues", "needs three hues, like 90,180,270");
   const Viewing viewing = options.viewing.viewing();
+  std::optional<AtomicFile> file;
+  if (!options.out.empty()) file.emplace(options.out);
   const bool given = !options.upper_mm.empty() || !options.lower_mm.empty();
   Marker marker;
   if (given) {
@@ -152,8 +156,9 @@ int run_design(const DesignOptions& options) {
                                                                            "inverse)");
   std::puts("");
   std::fputs(yaml_of(marker).c_str(), stdout);
-  if (!options.out.empty()) {
-    write_file(options.out, yaml_of(marker));
+  if (file) {
+    file->stream() << yaml_of(marker);
+    file->commit();
     std::printf("\nwritten: %s\n", options.out.c_str());
   }
   return 0;
@@ -167,6 +172,9 @@ struct RigOptions {
 
 Instrument chosen(const RigOptions& options) {
   const Rig rig = load_rig(options.rig);
+  InputFiles inputs;
+  inputs.add_rig(options.rig, rig);
+  inputs.refuse_as_output(options.out);
   if (options.instrument.empty()) return rig.instruments.front();
   for (const Instrument& instrument : rig.instruments)
     if (instrument.name == options.instrument) return instrument;
@@ -219,17 +227,21 @@ void add_design(CLI::App* parent, Run& run_later) {
   CLI::App* command = parent->add_subcommand("design", "Choose the bands of a marker, or judge given ones.");
   command->add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included")
       ->capture_default_str()
-      ->check(CLI::Range(0.5, 100.0));
+      ->check(number_between(0.5, 100.0));
   command->add_option("--length-mm", options->length_mm, "Length of the marker; default three diameters")
-      ->check(CLI::Range(1.0, 500.0));
+      ->check(number_between(1.0, 500.0));
   command->add_option("--smallest-band-mm", options->smallest_band_mm, "No band is shorter; default 3 mm or 12 px")
-      ->check(CLI::Range(0.1, 200.0));
+      ->check(number_between(0.1, 200.0));
   command->add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
+      ->check(finite_number())
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--bands-upper-mm", options->upper_mm, "Judge this design: lengths at the upper edge")
+      ->check(finite_number())
       ->delimiter(',');
-  command->add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge")->delimiter(',');
+  command->add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge")
+      ->check(finite_number())
+      ->delimiter(',');
   command
       ->add_option(
           "--code", options->code,
@@ -237,7 +249,7 @@ void add_design(CLI::App* parent, Run& run_later) {
           "of one band (eq. 16), set beside the cross-ratio to show what perspective does to it")
       ->capture_default_str()
       ->check(CLI::IsMember({"cross-ratio", "length"}));
-  command->add_option("--out", options->out, "Write the marker: block of a rig");
+  command->add_option("--out", options->out, "Write the marker: block of a rig; a file of that name is replaced");
   add_viewing(command, options->viewing);
   command->footer(
       "Example:\n  lapservo marker design --diameter-mm 8.4 --distance-mm 110 --out marker.yaml\n"
@@ -264,19 +276,19 @@ void add_marker(CLI::App& app, Run& run_later) {
 
   auto printing = std::make_shared<RigOptions>();
   CLI::App* print = add_for_rig(marker, "print", "Write a sheet to print at true scale.", printing);
-  print->add_option("--out", printing->out, "sheet.pdf or sheet.svg")->required();
+  print->add_option("--out", printing->out, "sheet.pdf or sheet.svg; a file of that name is replaced")->required();
   print->add_option("--paper", printing->paper, "a4 or letter")
       ->capture_default_str()
       ->check(CLI::IsMember({"a4", "letter"}));
   print->add_option("--copies", printing->copies, "Markers on the sheet, as many as fit")
       ->capture_default_str()
-      ->check(CLI::Range(1, 100));
+      ->check(whole_number_between(1, 100));
   print->footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
   print->callback([printing, &run_later] { run_later = [printing] { return run_print(*printing); }; });
 
   auto showing = std::make_shared<RigOptions>();
   CLI::App* show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
-  show->add_option("--out", showing->out, "Write a picture too: .svg, .pdf or .png");
+  show->add_option("--out", showing->out, "Write a picture too: .svg, .pdf or .png; a file of that name is replaced");
   add_viewing(show, showing->viewing);
   show->footer("Example:\n  lapservo marker show --rig configs/example.yaml --out marker.svg");
   show->callback([showing, &run_later] { run_later = [showing] { return run_show(*showing); }; });

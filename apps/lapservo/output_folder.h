@@ -1,11 +1,48 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <string>
+
+#include "apps/lapservo/input_files.h"
+#include "lapservo/core/file_descriptor.h"
+#include "lapservo/core/new_folder.h"
+#include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
 
-/// Makes the folder when there is none. Throws InputError now, before the work, when it can't be made or written or has
-/// less room than `needed_bytes`.
-void prepare_output_folder(const std::filesystem::path& folder, std::uintmax_t needed_bytes);
+/// The folder of a run's results. They are gathered in its subfolder `unfinished`, and moved up by commit() when they
+/// are complete: a run that ends early leaves what was there before, and one that is killed also what it had, in
+/// `unfinished`. Each holds rig.yaml, the rig as it was understood, whose first line says that the folder is ours.
+class OutputFolder {
+ public:
+  /// Makes the folder when there is none. Throws InputError now, before the work, when it can't be made or written, has
+  /// less room than `needed_bytes`, holds an input, or holds anything (hidden files apart) without `force`. `force`
+  /// lets commit() replace the results of a run, finished or not, and nothing else; it asks for a run to be there.
+  OutputFolder(const std::filesystem::path& path, const Rig& rig, const InputFiles& inputs, bool force,
+               std::uintmax_t needed_bytes);
+
+  /// Where to write a result of this name for now.
+  std::filesystem::path operator/(const std::string& name) const { return unfinished_.path / name; }
+  /// What every run's help says about existing folders.
+  static constexpr auto help =
+      "; it must be new or empty, or hold a run that --force replaces; until all is done, and if the run is killed, "
+      "what there is stands in its subfolder unfinished";
+  static constexpr auto force_help = "Replace a run that is in the folder of --out already; other files there stay";
+  void commit();
+
+ private:
+  // Gone in the end with what is in it, unless there are rows that could not be completed, or results that could not be
+  // put back.
+  struct Unfinished {
+    explicit Unfinished(const std::filesystem::path& folder);
+    ~Unfinished();
+    std::filesystem::path path;
+    FileDescriptor lock;
+  };
+
+  NewFolder folder_;
+  Unfinished unfinished_;
+};
 
 }  // namespace lapservo::app

@@ -10,9 +10,11 @@
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/numbers.h"
+#include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
@@ -20,6 +22,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/io/configuration_csv.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/video_writer.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/renderer.h"
@@ -28,7 +31,7 @@
 
 namespace lapservo::app {
 namespace {
-namespace fs = std::filesystem;
+constexpr std::uintmax_t needed_bytes = 4 << 20;
 
 struct Options {
   std::string rig, out, poses, background = "tissue", condition = "rendered", format = "png";
@@ -143,48 +146,23 @@ Exposure exposure_of(const Rig& rig, const std::vector<Configurations>& frames, 
   return exposure;
 }
 
-// The folder under its temporary name until all is in it.
-class OutputFolder {
- public:
-  OutputFolder(const fs::path& path, bool force) : path_(path), temporary_(path.string() + ".part") {
-    if (fs::exists(path_) && !force)
-      throw InputError(path.string(), "exists already, expected a new folder (or --force to replace it)");
-    std::error_code error;
-    fs::remove_all(temporary_, error);
-    if (!fs::create_directories(temporary_, error))
-      throw InputError(path.string(), "can't be created: " + error.message());
-  }
-  ~OutputFolder() {
-    std::error_code ignored;
-    fs::remove_all(temporary_, ignored);
-  }
-  fs::path operator/(const std::string& name) const { return temporary_ / name; }
-  void commit() {
-    fs::remove_all(path_);
-    fs::rename(temporary_, path_);
-  }
-
- private:
-  fs::path path_, temporary_;
-};
-
 int run(const Options& options) {
   const Rig rig = load_rig(options.rig);
   for (const Instrument& instrument : rig.instruments)
     if (!instrument.camera_from_rcm)
       throw InputError(options.rig, "instruments." + instrument.name + ".camera_from_rcm", "missing",
                        "a transform: it says where the instrument is");
+  InputFiles inputs;
+  inputs.add_rig(options.rig, rig);
+  inputs.add(options.poses);
+  inputs.add(options.background);
+  OutputFolder folder(options.out, rig, inputs, options.force, needed_bytes);
   const auto frames =
       options.poses.empty() ? random_configurations(rig, options) : read_configurations(options.poses, rig);
   Renderer renderer = make_renderer(rig, options);
-  OutputFolder folder(options.out, options.force);
   TruthCsv truth(folder / "truth.csv");
-  cv::VideoWriter video;
-  if (options.video) {
-    video.open((folder / "video.mp4").string(), cv::VideoWriter::fourcc('m', 'p', '4', 'v'), options.fps,
-               {rig.camera.width_px, rig.camera.height_px});
-    if (!video.isOpened()) throw InputError(options.out, "no video can be written here");
-  }
+  std::optional<VideoWriter> video;
+  if (options.video) video.emplace(folder / "video.mp4", options.fps);
   watch_for_interrupts();
   {
     Progress progress(static_cast<int>(frames.size()));
@@ -199,17 +177,16 @@ int run(const Options& options) {
         }
       }
       const cv::Mat image = renderer.render_exposure(exposure_of(rig, frames, i, options.motion), options.seed + i);
-      if (options.video) {
-        video.write(image);
+      if (video) {
+        video->add(image);
       } else {
         write_image(folder / name, image);
       }
       progress.show(static_cast<int>(i) + 1, "");
     }
   }
-  video.release();
+  if (video) video->commit();
   truth.commit();
-  fs::copy_file(options.rig, folder / "rig.yaml");
   folder.commit();
   std::printf("%zu frames with truth.csv and rig.yaml: %s\n", frames.size(), options.out.c_str());
   return 0;
@@ -221,44 +198,49 @@ void add_render(CLI::App& app, Run& run_later) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("render", "Render frames of a rig with exact truth.");
   command->add_option("--rig", options->rig, "Camera and instruments, with camera_from_rcm")->required();
-  command->add_option("--out", options->out, "Folder to create: NNNN.png, truth.csv, rig.yaml")->required();
+  command
+      ->add_option("--out", options->out,
+                   std::string("Folder for NNNN.png, truth.csv and rig.yaml") + OutputFolder::help)
+      ->required();
   command->add_option("--poses", options->poses,
                       "CSV of theta_rad, phi_rad, rho_m, psi_rad (and instrument), a row a frame and instrument; else "
                       "random ones in view");
   command->add_option("--count", options->count, "How many random configurations")
       ->capture_default_str()
-      ->check(CLI::Range(1, 100000));
-  command->add_option("--seed", options->seed, "Of configurations, background and noise")->capture_default_str();
+      ->check(whole_number_between(1, 100000));
+  command->add_option("--seed", options->seed, "Of configurations, background and noise")
+      ->capture_default_str()
+      ->check(seed_number());
   command->add_flag("--moving", options->moving, "A smooth path through random configurations");
   command->add_option("--background", options->background, "A picture, or tissue")->capture_default_str();
   command->add_option("--light", options->light, "Exposure, 1 is normal")
       ->capture_default_str()
-      ->check(CLI::Range(0.01, 10.0));
+      ->check(number_between(0.01, 10.0));
   command->add_option("--smoke", options->smoke, "Share of grey veil, 0 to 1")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_between(0.0, 1.0));
   command->add_option("--blood", options->blood, "Share of the marker covered, 0 to 0.9")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 0.9));
+      ->check(number_between(0.0, 0.9));
   command->add_option("--noise", options->noise, "Times the sensor's usual noise")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 20.0));
+      ->check(number_between(0.0, 20.0));
   command->add_option("--blur-px", options->blur_px, "Sigma of the optical blur")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 20.0));
+      ->check(number_between(0.0, 20.0));
   command->add_option("--motion", options->motion, "Motion blur: share of the step to the next frame, 0 to 1")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_between(0.0, 1.0));
   command->add_option("--film-mm", options->film_mm, "Thickness of the film that carries the marker")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
+      ->check(number_between(0.0, 1.0));
   command->add_option("--condition", options->condition, "Name for truth.csv")->capture_default_str();
   command->add_option("--format", options->format, "png or jpg")
       ->capture_default_str()
       ->check(CLI::IsMember({"png", "jpg"}));
   command->add_flag("--video", options->video, "Write video.mp4 instead of pictures");
-  command->add_option("--fps", options->fps, "Of the video")->capture_default_str()->check(CLI::Range(0.1, 1000.0));
-  command->add_flag("--force", options->force, "Replace the folder if it exists");
+  command->add_option("--fps", options->fps, "Of the video")->capture_default_str()->check(number_between(0.1, 1000.0));
+  command->add_flag("--force", options->force, OutputFolder::force_help);
   command->footer(
       "Example:\n  lapservo render --rig configs/example.yaml --out frames --count 50 --moving --blood 0.2");
   command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });

@@ -1,7 +1,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -11,8 +10,10 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_view.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
@@ -48,13 +49,8 @@ struct Options {
   std::vector<double> set_point, via, start, rcm_px, hide;
   double duration_s = 20, latency_ms = 80, fps = 60;
   std::uint64_t seed = 1;
-  bool view = false;
+  bool view = false, force = false;
 };
-
-std::string text_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 Eigen::Vector4d four(const std::vector<double>& values) {
   return Eigen::Vector4d(values.data());
@@ -142,20 +138,33 @@ JointVector joints_at_start(const Options& options, const Trajectory& trajectory
 
 class RunFolder {
  public:
-  RunFolder(const Options& options, const RunConfig& run) : path_(options.out) {
-    constexpr std::uintmax_t bytes_a_tick = 2000;
-    prepare_output_folder(path_,
-                          bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20));
-    write_file(path_ / "rig.yaml", text_of(options.rig));
-    write_file(path_ / "controller.yaml", controller_yaml(run.controller));
-    log_.emplace(path_ / "log.csv");
+  // With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
+  RunFolder(const Options& options, const Rig& rig, const ControllerConfig& controller)
+      : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(options)),
+        log_(folder_ / "log.csv") {
+    write_file(folder_ / "controller.yaml", controller_yaml(controller));
   }
-  ServoLog& log() { return *log_; }
-  fs::path path() const { return path_; }
+  ServoLog& log() { return log_; }
+  void commit() {
+    log_.commit();
+    folder_.commit();
+  }
 
  private:
-  fs::path path_;
-  std::optional<ServoLog> log_;
+  static std::uintmax_t needed_bytes(const Options& options) {
+    constexpr std::uintmax_t bytes_a_tick = 2000;
+    return bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20);
+  }
+  static InputFiles inputs_of(const Options& options, const Rig& rig) {
+    InputFiles inputs;
+    inputs.add_rig(options.rig, rig);
+    inputs.add(options.controller);
+    inputs.add(options.trajectory);
+    return inputs;
+  }
+
+  OutputFolder folder_;
+  ServoLog log_;
 };
 
 // What the run came to, for the last lines.
@@ -250,17 +259,19 @@ int simulate(const Options& options) {
   Simulator simulator(true_rig, simulated, start);
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<RunFolder> folder;
-  if (!options.out.empty()) folder.emplace(options, config);
+  if (!options.out.empty()) folder.emplace(options, true_rig, config.controller);
   watch_for_interrupts();
 
   Watcher watcher(config.rig, true_model, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
                   static_cast<int>(std::lround(options.duration_s / config.controller.period_s)));
   lapservo::run(simulator, simulator, simulator, config, trajectory, options.duration_s, watcher);
   const Summary& summary = watcher.finish();
-  std::printf("%s\n", summary.text().c_str());
+  std::printf("method %s, seen by %s\n%s\n", std::string(mode_word(config.controller.mode)).c_str(),
+              config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
+              summary.text().c_str());
   if (folder) {
-    folder->log().commit();
-    std::printf("log, rig and controller: %s\n", folder->path().c_str());
+    folder->commit();
+    std::printf("log, rig and controller: %s\n", options.out.c_str());
   }
   return summary.converged() ? 0 : 1;
 }
@@ -302,15 +313,17 @@ void add_servo(CLI::App& app, Run& run_later) {
                    "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
       ->capture_default_str();
   command->add_option("--set-point", options->set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
+      ->check(finite_number())
       ->delimiter(',')
       ->expected(4);
   command
       ->add_option("--via", options->via,
                    "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
+      ->check(finite_number())
       ->delimiter(',');
   command->add_option("--duration", options->duration_s, "Seconds")
       ->capture_default_str()
-      ->check(CLI::Range(0.1, 36000.0));
+      ->check(number_between(0.1, 36000.0));
   command
       ->add_option(
           "--method", options->method,
@@ -325,22 +338,31 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--controller", options->controller, "YAML: gains_per_s, limits, window, delay_s ...");
   command->add_option("--delay-ms", options->delay, "The images' age, or `estimate`")->capture_default_str();
   command->add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
+      ->check(finite_number())
       ->delimiter(',')
       ->expected(2);
-  command->add_option("--out", options->out, "Folder for log.csv, rig.yaml and controller.yaml");
+  command->add_option("--out", options->out,
+                      std::string("Folder for log.csv, rig.yaml and controller.yaml") + OutputFolder::help);
+  command->add_flag("--force", options->force, OutputFolder::force_help);
   command->add_flag("--view", options->view, "Show it live");
   command->add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
   command->add_option("--start", options->start, "sim: readings to start from, theta,phi,rho,psi; else random")
+      ->check(finite_number())
       ->delimiter(',')
       ->expected(4);
-  command->add_option("--seed", options->seed, "sim: of start, tissue, noise, jitter")->capture_default_str();
+  command->add_option("--seed", options->seed, "sim: of start, tissue, noise, jitter")
+      ->capture_default_str()
+      ->check(seed_number());
   command->add_option("--latency-ms", options->latency_ms, "sim: from exposure to arrival")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 1000.0));
+      ->check(number_between(0.0, 1000.0));
   command->add_option("--fps", options->fps, "Control periods, and frames in sim, a second")
       ->capture_default_str()
-      ->check(CLI::Range(5.0, 500.0));
-  command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")->delimiter(',')->expected(2);
+      ->check(number_between(6.0, 500.0));
+  command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")
+      ->check(finite_number())
+      ->delimiter(',')
+      ->expected(2);
   command->footer(
       "The paper's gains K = 0.032, 0.008, 0.0008, 0.01 (s, r, l, d) and omega = 0.5 have no unit of time in it. Here "
       "K\n"

@@ -6,11 +6,15 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_view.h"
+#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
@@ -31,6 +35,25 @@ struct Options {
   double fps = 30;
 };
 
+// What is known to be read before the first frame; rigs beside the frames come with them.
+InputFiles inputs_of(const Options& options) {
+  InputFiles inputs;
+  std::error_code error;
+  inputs.add(options.input);
+  if (fs::is_directory(options.input, error)) inputs.add_pictures_in(options.input);
+  return inputs;
+}
+
+void refuse_outputs(const Options& options, const InputFiles& inputs) {
+  inputs.refuse_as_output(options.out);
+  inputs.refuse_as_output(options.overlay);
+  inputs.refuse_in_folder(options.overlay);
+  std::error_code error;
+  if (!options.overlay.empty() &&
+      fs::weakly_canonical(options.out, error) == fs::weakly_canonical(options.overlay, error))
+    throw InputError(options.out, "is the place for --out and --overlay, expected two places");
+}
+
 // Which rig a frame is to be tracked with: the one named by --rig, else NAME.rig.yaml beside the picture, else rig.yaml
 // in its folder. The tracker begins anew when the rig changes.
 class RigByFrame {
@@ -43,13 +66,13 @@ class RigByFrame {
     if (options_.rig.empty()) {
       const fs::path at = frame.file.empty() ? fs::path(options_.input) : frame.file;
       const fs::path own = sidecar(at), shared = at.parent_path() / "rig.yaml";
-      const fs::path chosen = fs::exists(own) ? own : shared;
-      if (!fs::exists(chosen))
+      std::error_code error;
+      const fs::path chosen = fs::exists(own, error) ? own : shared;
+      if (!fs::exists(chosen, error))
         throw InputError(at.string(),
                          "has no rig beside it (" + own.filename().string() + " or rig.yaml): name one with --rig");
       if (chosen != path_) use(chosen);
-    } else if (!frame.file.empty() && !warned_ && fs::exists(sidecar(frame.file)) &&
-               !fs::equivalent(sidecar(frame.file), options_.rig)) {
+    } else if (!frame.file.empty() && !warned_ && has_other_rig(frame.file)) {
       std::fprintf(stderr, "lapservo: note: --rig is used for all frames, though %s has a rig of its own\n",
                    frame.file.filename().c_str());
       warned_ = true;
@@ -60,9 +83,16 @@ class RigByFrame {
   const fs::path& path() const { return path_; }
 
  private:
+  bool has_other_rig(const fs::path& picture) const {
+    std::error_code error;
+    return fs::exists(sidecar(picture), error) && !fs::equivalent(sidecar(picture), options_.rig, error);
+  }
   static fs::path sidecar(const fs::path& file) { return fs::path(file).replace_extension(".rig.yaml"); }
   void use(const fs::path& path) {
     rig_ = load_rig(path);
+    InputFiles inputs;
+    inputs.add_rig(path, rig_);
+    refuse_outputs(options_, inputs);
     path_ = path;
     tracker_.emplace(
         rig_, TrackerOptions{options_.method == "centerline" ? Method::centerline : Method::surface, options_.single});
@@ -94,13 +124,6 @@ struct Tally {
   }
 };
 
-void check_output(const Options& options) {
-  std::error_code error;
-  for (const std::string& out : {options.out, options.overlay})
-    if (!out.empty() && fs::exists(out) && fs::equivalent(out, options.input, error))
-      throw InputError(out, "is the input itself, expected another place for the results");
-}
-
 [[noreturn]] void rethrow_with_frame(const InputError& error, const Options& options, const Frame& frame) {
   const std::string name = frame.file.empty() ? options.input : frame.file.string();
   const std::string text = error.what();
@@ -108,8 +131,17 @@ void check_output(const Options& options) {
   throw error;
 }
 
+// In a flawed frame nothing is measured, and the next is searched anew.
+std::vector<Observation> observed(Tracker& tracker, const Rig& rig, const Frame& frame) {
+  if (!frame.flaw) return tracker.track(frame.bgr);
+  tracker.reset();
+  std::vector<Observation> nothing(rig.instruments.size());
+  for (Observation& observation : nothing) observation.status = *frame.flaw;
+  return nothing;
+}
+
 int run(const Options& options) {
-  check_output(options);
+  refuse_outputs(options, inputs_of(options));
   RigByFrame rigs(options);
   const auto source = open_frame_source(options.input, options.fps);
   std::optional<LiveView> view;
@@ -127,7 +159,7 @@ int run(const Options& options) {
       if (!frame) break;
       Tracker& tracker = rigs.tracker_for(*frame);
       try {
-        const auto& observations = tracker.track(frame->bgr);
+        const auto observations = observed(tracker, rigs.rig(), *frame);
         tally.add(rigs.rig(), observations);
         for (std::size_t i = 0; i < observations.size(); ++i)
           csv.add(frame->index, frame->time_s, frame->file.filename().string(), rigs.rig().instruments[i].name,
@@ -151,6 +183,11 @@ int run(const Options& options) {
   std::printf("%s%d frames%s\nobservations: %s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str(),
               options.out.c_str());
   if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
+  if (const std::string complaint = source->complaint(); !stopped && !complaint.empty()) {
+    std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options.input.c_str(),
+                 complaint.c_str());
+    return 1;
+  }
   if (tally.anything()) return 0;
   std::fprintf(
       stderr,
@@ -169,18 +206,24 @@ void add_track(CLI::App& app, Run& run_later) {
       ->required();
   command->add_option("--rig", options->rig,
                       "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
-  command->add_option("--out", options->out, "CSV of observations to write")->capture_default_str();
+  command
+      ->add_option(
+          "--out", options->out,
+          "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
+          "killed, the rows are in NAME.part, which the next run of that name writes over")
+      ->capture_default_str();
   command->add_option("--method", options->method, "surface: all visible lines; centerline: the paper's Algorithm 1")
       ->capture_default_str()
       ->check(CLI::IsMember({"surface", "centerline"}));
   command->add_flag("--single", options->single,
                     "Treat every frame on its own, without tracking from the frame before");
   command->add_option("--overlay", options->overlay,
-                      "Write pictures (a folder) or a video (.mp4) with the detection drawn in");
+                      "Write pictures (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
+                      "same name");
   command->add_flag("--view", options->view, "Show a live window");
   command->add_option("--fps", options->fps, "Frames per second of a folder's pictures")
       ->capture_default_str()
-      ->check(CLI::Range(0.001, 100000.0));
+      ->check(number_between(0.001, 100000.0));
   command->footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
   command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
 }

@@ -1,34 +1,37 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
-#include <string>
+#include <optional>
+#include <ostream>
+#include <string_view>
+
+#include "lapservo/core/output_target.h"
+#include "lapservo/core/temporary_file.h"
 
 namespace lapservo {
 
-/// A file that appears whole or not at all: written under a temporary name beside it, renamed by commit(). Without
-/// commit() the temporary file is removed and whatever stood at `path` before stays.
-/// Throws InputError when the folder can't be written, at construction, and when writing failed, in commit().
+/// A file that appears whole or not at all: written under no or a temporary name, put in its place by commit(). Without
+/// commit() whatever stood at `path` before stays, and nothing else is left. What is no regular file is written into as
+/// it comes. See OutputTarget.
+/// Throws InputError when it can't be written, at construction, and when writing failed, in commit().
 class AtomicFile {
  public:
-  explicit AtomicFile(std::filesystem::path path);
-  ~AtomicFile();
+  explicit AtomicFile(const std::filesystem::path& path);
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  std::ofstream& stream() { return stream_; }
+  std::ostream& stream() { return stream_; }
   void commit();
 
  private:
-  std::filesystem::path path_, temporary_;
-  std::ofstream stream_;
+  OutputTarget target_;
+  std::optional<TemporaryFile> temporary_;
+  FileDescriptor opened_;  // of a stream
+  DescriptorBuffer buffer_;
+  std::ostream stream_;
 };
 
 /// Writes the whole text in that way.
-void write_file(const std::filesystem::path& path, const std::string& text);
-
-/// The temporary name beside `path` under which a result is written before it is renamed. Keeps the extension, which
-/// writers of pictures and videos go by.
-std::filesystem::path temporary_name(const std::filesystem::path& path);
+void write_file(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace lapservo

@@ -1,7 +1,10 @@
 #include "lapservo/core/atomic_file.h"
 
+#include <fcntl.h>
 #include <filesystem>
 #include <string>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <gtest/gtest.h>
 
@@ -75,11 +78,39 @@ TEST(AtomicFile, ATornWriteIsAnErrorAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(folder / "out.csv"));
 }
 
-TEST(TemporaryName, StandsBesideTheFileAndKeepsItsExtension) {
-  const fs::path name = temporary_name("results/run.avi");
-  EXPECT_EQ(name.parent_path(), "results");
-  EXPECT_EQ(name.extension(), ".avi");
-  EXPECT_NE(name, fs::path("results/run.avi"));
+TEST(AtomicFile, KeepsLinksAndModes) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "real.csv", "old");
+  fs::permissions(folder / "real.csv", fs::perms(0640));
+  fs::create_symlink("real.csv", folder / "link.csv");
+  write_file(folder / "link.csv", "new");
+  EXPECT_TRUE(fs::is_symlink(folder / "link.csv"));
+  EXPECT_EQ(read_file(folder / "real.csv"), "new");
+  EXPECT_EQ(fs::status(folder / "real.csv").permissions(), fs::perms(0640));
+  EXPECT_EQ(files_in(folder), 2);
+}
+
+TEST(AtomicFile, ANewFileHasTheUsersMask) {
+  const testing::TemporaryFolder folder;
+  const mode_t before = ::umask(027);
+  write_file(folder / "new.csv", "new");
+  ::umask(before);
+  EXPECT_EQ(fs::status(folder / "new.csv").permissions(), fs::perms(0640));
+}
+
+TEST(AtomicFile, WritesIntoWhatIsNoRegularFile) {
+  const testing::TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
+  const FileDescriptor reader(::open((folder / "fifo").c_str(), O_RDONLY | O_NONBLOCK));
+  write_file(folder / "fifo", "text");
+  char text[8] = {};
+  EXPECT_EQ(::read(reader.number(), text, sizeof text), 4);
+  EXPECT_STREQ(text, "text");
+  EXPECT_TRUE(fs::is_fifo(folder / "fifo"));
+  write_file("/dev/null", "text");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  EXPECT_EQ(input_error([] { write_file("/dev/full", "text"); }),
+            "/dev/full: could not be written to its end: No space left on device");
 }
 
 }  // namespace

@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <system_error>
 #include <utility>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/input_file.h"
 
 namespace lapservo {
 namespace {
@@ -54,6 +53,31 @@ std::optional<std::vector<std::string>> split_fields(std::string_view line) {
   }
 }
 
+// Where the row ends that begins the text: at the first line end outside of quotes, or of all where a quote isn't
+// closed.
+std::size_t row_end(std::string_view text) {
+  std::size_t at = 0;
+  while (true) {
+    at = std::min(text.find_first_not_of(" \t\r", at), text.size());
+    if (at < text.size() && text[at] == '"') {
+      const std::size_t open = at++;
+      while (at < text.size() && (text[at] != '"' || text.substr(at).starts_with(R"("")")))
+        at += text[at] == '"' ? 2 : 1;
+      if (at >= text.size()) return text.find('\n', open);
+    }
+    at = text.find_first_of(",\n", at);
+    if (at == std::string_view::npos || text[at] == '\n') return at;
+    ++at;
+  }
+}
+
+std::string names(const std::vector<std::string>& header) {
+  std::string text;
+  for (const std::string& name : header) text += (text.empty() ? "" : ",") + name;
+  constexpr std::size_t longest = 80;
+  return text.size() <= longest ? text : text.substr(0, longest) + "...";
+}
+
 std::string at_line(const std::string& source, std::size_t line) {
   return source + ":" + std::to_string(line);
 }
@@ -69,9 +93,8 @@ std::optional<double> parse_finite(std::string_view text) {
 }
 
 std::string csv_field(std::string_view text) {
-  if (text.find_first_of(std::string_view("\n\r\0", 3)) != std::string_view::npos)
-    throw InputError("CSV", "field", text, "text without line ends and NUL bytes");
-  if (trimmed(text).size() == text.size() && text.find_first_of(",\"") == std::string_view::npos)
+  if (text.find('\0') != std::string_view::npos) throw InputError("CSV", "field", text, "text without NUL bytes");
+  if (trimmed(text).size() == text.size() && text.find_first_of(",\"\n\r") == std::string_view::npos)
     return std::string(text);
   std::string field = "\"";
   for (const char c : text) field.append(c == '"' ? 2 : 1, c);
@@ -79,13 +102,8 @@ std::string csv_field(std::string_view text) {
 }
 
 CsvTable CsvTable::read(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(path, ignored)) throw InputError(path.string(), "is a folder, expected a CSV file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path.string(), "can't be opened, expected a CSV file");
-  std::ostringstream text;
-  text << file.rdbuf();
-  return parse(text.view(), path.string());
+  constexpr std::size_t largest_bytes = std::size_t{256} << 20;
+  return parse(read_input(path, largest_bytes, "a CSV file"), path.string());
 }
 
 CsvTable CsvTable::parse(std::string_view text, std::string source) {
@@ -94,9 +112,12 @@ CsvTable CsvTable::parse(std::string_view text, std::string source) {
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   CsvTable table;
   table.source_ = std::move(source);
-  for (std::size_t line_number = 1; !text.empty(); ++line_number) {
-    const auto end = text.find('\n');
+  std::size_t next_number = 1;
+  while (!text.empty()) {
+    const auto end = row_end(text);
     const std::string_view line = text.substr(0, end);
+    const std::size_t line_number = next_number;
+    next_number += 1 + static_cast<std::size_t>(std::count(line.begin(), line.end(), '\n'));
     text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
     if (trimmed(line).empty()) continue;
     auto split = split_fields(line);
@@ -123,7 +144,8 @@ bool CsvTable::has(std::string_view column) const {
 
 std::size_t CsvTable::index_of(std::string_view column) const {
   const auto found = std::find(header_.begin(), header_.end(), column);
-  if (found == header_.end()) throw InputError(source_, "has no column '" + std::string(column) + "'");
+  if (found == header_.end())
+    throw InputError(source_, "has no column '" + std::string(column) + "', expected one beside " + names(header_));
   return static_cast<std::size_t>(found - header_.begin());
 }
 

@@ -10,8 +10,8 @@
 namespace lapservo {
 
 /// A comma-separated table with one header line, as all our files have; a row is a line, fields may stand in double
-/// quotes. CRLF and a byte order mark are tolerated. Every row has as many fields as the header. Errors name the file,
-/// the line and the column.
+/// quotes and then hold line ends. CRLF and a byte order mark are tolerated. Every row has as many fields as the
+/// header. Errors name the file, the line and the column.
 class CsvTable {
  public:
   /// Throws InputError when the file can't be read, is empty, holds NUL bytes or a row of another length.
@@ -36,8 +36,8 @@ class CsvTable {
   std::vector<std::size_t> line_numbers_;
 };
 
-/// A text as a field of such a table: quoted where a comma, a quote or blanks at its ends need it. Throws InputError
-/// when it holds line ends or NUL bytes.
+/// A text as a field of such a table: quoted where a comma, a quote, a line end or blanks at its ends need it. Throws
+/// InputError when it holds NUL bytes.
 std::string csv_field(std::string_view text);
 
 /// The whole text as one finite number, or nullopt.

@@ -68,10 +68,23 @@ TEST(CsvTable, TextsComeBackAsTheyWereWritten) {
     EXPECT_EQ(table.text(0, "z"), "end") << "seed " << seed;
   }
   EXPECT_EQ(csv_field("0001.png"), "0001.png");
-  EXPECT_EQ(input_error([] { csv_field("a\nb"); }),
-            "CSV: field: is a b, expected text without line ends and NUL bytes");
+  EXPECT_EQ(csv_field("a\nb"), "\"a\nb\"");
+  EXPECT_EQ(input_error([] { csv_field(std::string_view("a\0b", 3)); }),
+            "CSV: field: is a b, expected text without NUL bytes");
   EXPECT_EQ(csv_field("left, \"new\".png"), "\"left, \"\"new\"\".png\"");
   EXPECT_EQ(CsvTable::parse("x,y\n \"a,b\" , 2\r\n", "t.csv").text(0, "x"), "a,b");
+}
+
+// Names of files may hold line ends.
+TEST(CsvTable, AQuotedFieldMayHoldLineEnds) {
+  for (const std::string name : {"a\nb", "\n", "a\r\nb\n", "\"\n\",\n", "a\n\n\"b"}) {
+    const CsvTable table = CsvTable::parse("x,y\n" + csv_field(name) + ",1\n2,z\n", "t.csv");
+    ASSERT_EQ(table.rows(), 2U);
+    EXPECT_EQ(table.text(0, "x"), name);
+    EXPECT_EQ(table.text(1, "y"), "z");
+  }
+  EXPECT_EQ(input_error([] { CsvTable::parse("x,y\n\"a\nb\",1\n2\n", "t.csv"); }),
+            "t.csv:4: has 1 fields, expected 2 as the header has");
 }
 
 TEST(CsvTable, AQuoteEndsWithItsField) {
@@ -97,7 +110,7 @@ TEST(CsvTable, ComplaintsNameFileLineColumnValueAndExpectation) {
   const CsvTable table = CsvTable::parse("a,b\n1,2\n\nfast,nan\n", "t.csv");
   EXPECT_EQ(input_error([&] { table.number(1, "a"); }), "t.csv:4: a: is fast, expected a finite number");
   EXPECT_EQ(input_error([&] { table.number_or_empty(1, "b"); }), "t.csv:4: b: is nan, expected a finite number");
-  EXPECT_EQ(input_error([&] { table.text(0, "c"); }), "t.csv: has no column 'c'");
+  EXPECT_EQ(input_error([&] { table.text(0, "c"); }), "t.csv: has no column 'c', expected one beside a,b");
 }
 
 TEST(CsvTable, AComplaintIsOnePrintableLineWhateverTheFieldHolds) {

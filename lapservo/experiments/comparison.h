@@ -3,7 +3,10 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "lapservo/experiments/html_report.h"
+#include "lapservo/experiments/statistics.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo {
@@ -15,6 +18,11 @@ Comparison compared(std::string what, std::string paper, const Results& results,
   for (const auto& result : results)
     (result.method == Method::centerline ? row.centerline : row.surface) = text_of(result);
   return row;
+}
+
+/// "1.49 ± 1.2 px": three digits of the mean, two of the deviation.
+inline std::string mean_and_deviation(const Spread& spread, const char* unit) {
+  return fmt::format("{} \u00b1 {} {}", with_digits(spread.mean, 3), with_digits(spread.deviation, 2), unit);
 }
 
 }  // namespace lapservo

@@ -14,6 +14,7 @@
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/rcm.h"
 #include "lapservo/experiments/rotation.h"
+#include "lapservo/experiments/stage.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo {
@@ -80,16 +81,97 @@ TEST(Rotation, IsSummedUpByTrial) {
   for (int trial = 0; trial < RotationResult::trials; ++trial)
     for (int step = 0; step < 2000; ++step) {
       const double sigma = 0.01 * (trial + 1), truth = random.uniform(-4, 4);
-      samples.push_back({trial, step, truth, truth + 0.1 * trial + sigma * random.normal(), sigma});
+      samples.push_back({0, trial, step, truth, truth + 0.1 * trial + sigma * random.normal(), sigma});
     }
   const auto of_method = summed_up(Method::surface, samples);
-  ASSERT_EQ(of_method.by_trial.size(), static_cast<std::size_t>(RotationResult::trials));
+  ASSERT_EQ(of_method.by_trial.size(), static_cast<std::size_t>(RotationResult::sets * RotationResult::trials));
   for (int trial = 0; trial < RotationResult::trials; ++trial) {
     const Spread& spread = of_method.by_trial[static_cast<std::size_t>(trial)];
     EXPECT_NEAR(spread.deviation, 0.01 * (trial + 1), 0.001 * (trial + 1)) << "seed " << seed;
     EXPECT_NEAR(spread.mean, 0.1 * trial, 0.002 * (trial + 1));
   }
   EXPECT_NEAR(of_method.all.mean, 0.45, 0.01);
+  EXPECT_NEAR(of_method.under_100mrad, 0.15, 0.01) << "trial 0 and half of trial 1";
+}
+
+// Parts put together again have the mean, deviation and rms of the whole.
+TEST(Rotation, PartsArePooledWithTheirBias) {
+  Random random(seed);
+  std::vector<double> all, means, deviations;
+  for (int part = 0; part < 4; ++part) {
+    std::vector<double> errors;
+    for (int i = 0; i < 50000; ++i) errors.push_back(0.3 * part + (1 + part) * random.normal());
+    const Spread spread = spread_of(errors);
+    means.push_back(spread.mean), deviations.push_back(spread.deviation);
+    all.insert(all.end(), errors.begin(), errors.end());
+  }
+  const Spread whole = spread_of(all);
+  const Pooled of_parts = pooled(means, deviations);
+  EXPECT_NEAR(of_parts.mean, whole.mean, 1e-9);
+  EXPECT_NEAR(of_parts.deviation, whole.deviation, 1e-4);
+  EXPECT_NEAR(of_parts.rms, whole.rms, 1e-4);
+}
+
+TEST(Rcm, IntersectionsAreAllPairsOfASet) {
+  const Eigen::Vector2d through(100, 50);
+  std::vector<RcmResult::Line> lines;
+  for (int set = 0; set < 2; ++set)
+    for (int position = 0; position < RcmResult::positions; ++position) {
+      const double angle = 0.1 * position;
+      const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
+      lines.push_back({set, position, through + 200 * along, through + 300 * along});
+    }
+  const auto found = intersections_of(lines, through + Eigen::Vector2d(3, 4));
+  ASSERT_EQ(found.size(), 2U * RcmResult::pairs);
+  EXPECT_EQ(RcmResult::pairs, 190);
+  for (const RcmResult::Intersection& at : found) {
+    EXPECT_LT((at.px - through).norm(), 1e-9);
+    EXPECT_NEAR(at.distance_px, 5, 1e-9);
+    const double apart = 0.1 * (at.second - at.first);
+    EXPECT_NEAR(at.angle_rad, std::min(apart, pi - apart), 1e-7);
+  }
+}
+
+TEST(Rcm, IsBroughtIntoViewUnlessItIs) {
+  const Rig given = paper_rig(), moved = with_rcm_in_view(given);
+  const auto raw_px = [](const Rig& rig) {
+    return rig.camera.raw_from_point(rig.instruments[0].camera_from_rcm->translation);
+  };
+  EXPECT_LT(raw_px(given).x(), 0) << "the paper's trajectory needs it outside";
+  EXPECT_GT(raw_px(moved).minCoeff(), 0);
+  EXPECT_LT(raw_px(moved).x(), moved.camera.width_px);
+  EXPECT_LT(raw_px(moved).y(), moved.camera.height_px);
+  EXPECT_EQ(with_rcm_in_view(moved).instruments[0].camera_from_rcm->translation,
+            moved.instruments[0].camera_from_rcm->translation);
+}
+
+// Of each point the largest distance, and only where all four measurements are there.
+TEST(Illumination, TakesTheLargestOfFour) {
+  std::vector<IlluminationResult::Point> points;
+  for (int position = 0; position < 2; ++position)
+    for (int point = 0; point < 4; ++point)
+      for (int light = 0; light < (position == 1 && point == 3 ? 3 : 4); ++light)
+        points.push_back({position, light, point, {0, 0}, 0.1 * light + position, 0});
+  const auto of_method = summed_up(Method::surface, points);
+  ASSERT_EQ(of_method.largest.size(), 7U);
+  EXPECT_NEAR(of_method.largest[0].px, 0.3, 1e-12);
+  EXPECT_NEAR(of_method.of_largest.mean, (4 * 0.3 + 3 * 1.3) / 7, 1e-12);
+}
+
+// A part of the light does not come from the lamps.
+TEST(Stage, TurnedDownLampsLeaveTheAmbientPart) {
+  const Rig rig = testing::small_test_rig();
+  Random random(seed);
+  const RcmCoordinates q = spread_positions(rig, 1, random)[0];
+  const cv::Mat tissue(rig.camera.height_px, rig.camera.width_px, CV_32FC3, cv::Scalar::all(0.9));
+  Stage stage(rig, tissue);
+  const cv::Mat full = stage.render(q, 1, 1), dim = stage.render(q, 0.4, 1);
+  const auto light = [&](const cv::Mat& frame) {
+    const double value = frame.at<cv::Vec3b>(5, frame.cols - 5)[1] / 255.0;
+    return rig.camera.response.light_from_value(value);
+  };
+  const double share = Stage::ambient_share + 0.4 * (1 - Stage::ambient_share);
+  EXPECT_NEAR(light(dim) / light(full), share, 0.03);
 }
 
 // Errors drawn from the covariance that is stated have unit spread in its units, however oblong it is.
@@ -130,6 +212,7 @@ TEST(Illumination, EndToEnd) {
   };
   const std::string first = text(result);
   EXPECT_EQ(CsvTable::parse(first, "illumination.csv").rows(), 320U);
+  EXPECT_EQ(result.methods[0].largest.size(), 80U);
   EXPECT_EQ(text(measure_illumination(setup)), first);
   fs::remove_all(folder);
 

@@ -1,6 +1,8 @@
 #include "lapservo/experiments/html_report.h"
 
+#include <algorithm>
 #include <cstdint>
+#include <regex>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -23,6 +25,9 @@ p,li{max-width:72ch}a{color:var(--c0)}nav a{display:inline-block;margin-right:1r
 table{border-collapse:collapse;font-variant-numeric:tabular-nums}
 caption{text-align:left;color:var(--soft);padding:.3rem 0}
 th,td{border-bottom:1px solid var(--edge);padding:.35rem .7rem;text-align:right;vertical-align:top}
+td{white-space:nowrap}.words td{white-space:normal}.words td:first-child{min-width:14em}
+.words tr.part td{font-weight:600;padding-top:1rem}
+.warning{border:2px solid var(--c1);border-radius:6px;padding:.6rem;font-weight:600}
 th:first-child,td:first-child{text-align:left}.words td,.words th{text-align:left}
 thead th{border-bottom:2px solid var(--grey)}
 .figures{display:grid;gap:16px;grid-template-columns:repeat(auto-fit,minmax(min(100%,420px),1fr));align-items:start}
@@ -40,10 +45,11 @@ dialog .plot{max-height:98vh}dialog.near .plot,dialog.near img{max-height:none}d
 dialog button{position:fixed;top:8px;right:8px;width:44px;height:44px;border-radius:22px;border:1px solid var(--edge);
 background:var(--card);color:var(--ink);font-size:20px}
 @media(max-width:600px){body{font-size:15px}main{padding:10px}th,td{padding:.3rem .45rem;font-size:.9rem}
-.words,.words tbody{display:block}.words thead{display:none}
-.words tr{display:grid;grid-template-columns:repeat(3,1fr);border-bottom:1px solid var(--edge);padding:.4rem 0}
-.words td{border:0;padding:.1rem .4rem .1rem 0}.words td:first-child{grid-column:1/-1;font-weight:600}
-.words td:not(:first-child)::before{content:attr(data-of);display:block;font-size:.75rem;color:var(--soft)}}
+.words,.words tbody,.words tr,.words td{display:block}.words thead{display:none}
+.words tr{border-bottom:1px solid var(--edge);padding:.4rem 0}.words tr.part{border-color:var(--grey)}
+.words td{border:0;padding:.1rem 0}.words td:first-child{font-weight:600}
+.words td:not(:first-child){display:flex;gap:.6rem}
+.words td:not(:first-child)::before{content:attr(data-of);flex:0 0 8.5em;color:var(--soft)}}
 @media print{nav,dialog{display:none}figure{break-inside:avoid}}
 )";
 
@@ -95,6 +101,16 @@ std::string html_from(const Figure& figure) {
       escaped(title), content, escaped(figure.caption));
 }
 
+// A value stays on one line with its name of one letter and its unit, and so do the two sides of a plus-minus: their
+// spaces do not break.
+std::string unbroken(std::string text) {
+  static const std::regex before_unit("([0-9]) (px|mrad|rad|mm|ms|s|%|/s)(?![a-z])"),
+      after_name("\\b([A-Za-z]|[A-Za-z] =|eq\\.) (?=[0-9])"), about("( ?)\u00b1 ");
+  text = std::regex_replace(text, before_unit, "$1\u00a0$2");
+  text = std::regex_replace(text, after_name, "$1\u00a0");
+  return std::regex_replace(text, about, "\u00a0\u00b1\u00a0");
+}
+
 std::string row_of(const std::vector<std::string>& cells, const char* tag) {
   std::string text = "<tr>";
   for (const std::string& cell : cells) text += fmt::format("<{0}>{1}</{0}>", tag, escaped(cell));
@@ -113,17 +129,28 @@ std::string or_dash(const std::string& text) {
   return text.empty() ? "\u2013" : text;
 }
 
-std::string html_from(const std::vector<Comparison>& comparisons) {
-  std::string text = "<div class=\"scroll\"><table class=\"words\">\n<thead>";
-  text += row_of({"", "the paper", "the paper\u2019s method here", "the default here"}, "th") + "</thead>\n<tbody>\n";
+std::string rows_of(const std::vector<Comparison>& comparisons) {
+  std::string text;
   for (const Comparison& c : comparisons) {
-    text += "<tr><td>" + escaped(c.what) + "</td>";
+    text += "<tr><td>" + escaped(unbroken(c.what)) + "</td>";
     for (const auto& [name, value] :
          {std::pair{"the paper", c.paper}, {"its method here", c.centerline}, {"the default here", c.surface}})
-      text += fmt::format("<td data-of=\"{}\">{}</td>", name, escaped(or_dash(value)));
+      text += fmt::format("<td data-of=\"{}\"><span>{}</span></td>", name, escaped(unbroken(or_dash(value))));
     text += "</tr>\n";
   }
-  return text + "</tbody></table></div>\n";
+  return text;
+}
+
+std::string comparison_table(const std::string& rows) {
+  return "<div class=\"scroll\"><table class=\"words\">\n<thead>" +
+         row_of(
+             {"", "the paper (a real robot)", "the paper\u2019s method here (rendered)", "the default here (rendered)"},
+             "th") +
+         "</thead>\n<tbody>\n" + rows + "</tbody></table></div>\n";
+}
+
+std::string warning(const std::string& text) {
+  return text.empty() ? "" : "<p class=\"warning\">" + escaped(text) + "</p>\n";
 }
 
 std::string paragraphs(const std::vector<std::string>& text) {
@@ -134,7 +161,7 @@ std::string paragraphs(const std::vector<std::string>& text) {
 
 std::string html_from(const ReportSection& section) {
   std::string html = fmt::format("<section id=\"{}\">\n<h2>{}</h2>\n", escaped(section.id), escaped(section.title));
-  html += paragraphs(section.text) + html_from(section.comparisons);
+  html += warning(section.unfinished) + paragraphs(section.text) + comparison_table(rows_of(section.comparisons));
   if (!section.figures.empty()) {
     html += "<h3>Figures</h3>\n<div class=\"figures\">\n";
     for (const Figure& figure : section.figures) html += html_from(figure);
@@ -153,17 +180,42 @@ std::string html_from(const ReportSection& section) {
   return html + "</section>\n";
 }
 
-std::string summary(const Report& report) {
-  std::vector<Comparison> firsts;
-  std::string links;
-  for (const ReportSection& section : report.sections) {
-    if (!section.comparisons.empty()) firsts.push_back(section.comparisons.front());
-    links += fmt::format("<a href=\"#{}\">{}</a>\n", escaped(section.id), escaped(section.title));
+// "Figure 5", "Table I": what the titles and captions say before a colon.
+std::vector<std::string> papers_pictures(const ReportSection& section) {
+  std::vector<std::string> names;
+  const auto add = [&names](const std::string& text, const char* kind) {
+    const std::string name = text.substr(0, text.find(':'));
+    if (text.starts_with(kind) && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (const Figure& figure : section.figures) {
+    if (const auto* plot = std::get_if<Plot>(&figure.content)) add(plot->title, "Figure ");
+    add(figure.caption, "Figure ");
   }
-  return html_from(firsts) + "<nav>\n" + links + "</nav>\n";
+  for (const Table& table : section.tables) add(table.caption, "Table ");
+  return names;
+}
+
+// Every figure of the paper's, section by section.
+std::string summary(const Report& report) {
+  std::string rows, links;
+  for (const ReportSection& section : report.sections) {
+    rows += fmt::format("<tr class=\"part\"><td colspan=\"4\"><a href=\"#{}\">{}</a></td></tr>\n", escaped(section.id),
+                        escaped(section.title));
+    rows += rows_of(with_paper(section));
+    for (const std::string& name : papers_pictures(section))
+      links += fmt::format("<a href=\"#{}\">{}</a>\n", escaped(section.id), escaped(name));
+  }
+  return comparison_table(rows) + (links.empty() ? "" : "<nav>\n" + links + "</nav>\n");
 }
 
 }  // namespace
+
+std::vector<Comparison> with_paper(const ReportSection& section) {
+  std::vector<Comparison> rows;
+  for (const Comparison& comparison : section.comparisons)
+    if (!comparison.paper.empty()) rows.push_back(comparison);
+  return rows;
+}
 
 std::string html_from(const Report& report) {
   std::string html =
@@ -173,7 +225,8 @@ std::string html_from(const Report& report) {
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src &#39;none&#39;; img-src data:; "
       "style-src &#39;unsafe-inline&#39;; script-src &#39;unsafe-inline&#39;\"/>\n";
   html += "<title>" + escaped(report.title) + "</title>\n<style>\n" + plot_css() + page_css + "</style>\n</head>\n";
-  html += "<body>\n<main>\n<h1>" + escaped(report.title) + "</h1>\n" + paragraphs(report.text) + summary(report);
+  html += "<body>\n<main>\n<h1>" + escaped(report.title) + "</h1>\n" + warning(report.unfinished);
+  html += paragraphs(report.text) + summary(report);
   for (const ReportSection& section : report.sections) html += html_from(section);
   html += "</main>\n<dialog aria-label=\"Figure\"><div></div>";
   html += "<button type=\"button\" aria-label=\"Close\">\u00d7</button></dialog>\n";

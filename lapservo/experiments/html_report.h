@@ -38,19 +38,24 @@ struct ReportSection {
   std::string id;  ///< a word: the link to it
   std::string title;
   std::vector<std::string> text;
-  std::vector<Comparison> comparisons;  ///< the first stands in the report's summary too
+  std::vector<Comparison> comparisons;  ///< those that have a figure of the paper's stand in the summary too
   std::vector<Figure> figures;
   std::vector<Table> tables;
   std::vector<std::string> notes;  ///< how to read it, what departs from the paper
   std::string command;             ///< that makes it again
   std::vector<std::string> files;  ///< CSVs beside the report
+  std::string unfinished = {};     ///< what is missing, when it was stopped before its end
 };
 
 struct Report {
   std::string title;
   std::vector<std::string> text;
   std::vector<ReportSection> sections;
+  std::string unfinished = {};  ///< what is missing, when it was stopped before its end: stands at the top
 };
+
+/// The comparisons that have a figure of the paper's.
+std::vector<Comparison> with_paper(const ReportSection& section);
 
 /// One HTML file that needs nothing else: no network, figures as SVG, pictures within. Well-formed as XML too. The same
 /// report gives the same bytes.

@@ -59,7 +59,7 @@ TEST(HtmlReport, NeedsNothingButItself) {
     EXPECT_EQ(html.compare(at, 7, "href=\"#"), 0) << html.substr(at, 40);
 }
 
-TEST(HtmlReport, SaysEverythingOnceAndTheFirstComparisonInTheSummaryToo) {
+TEST(HtmlReport, SaysEverythingOnceAndThePapersFiguresInTheSummaryToo) {
   Report report = sample_report();
   report.sections[0].comparisons[0].paper = "the-papers-figure";
   report.sections[0].comparisons[1].surface = "our-figure";
@@ -110,6 +110,32 @@ TEST(HtmlReport, AppearsWholeOrNotAtAll) {
   EXPECT_THROW(write_report(folder / "missing" / "report.html", sample_report()), InputError);
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
   fs::remove_all(folder);
+}
+
+TEST(HtmlReport, SaysAtTheTopThatItIsNotWhole) {
+  Report report = sample_report();
+  EXPECT_EQ(html_from(report).find("class=\"warning\""), std::string::npos);
+  report.unfinished = "stopped in the middle";
+  const std::string html = html_from(report);
+  EXPECT_LT(html.find("stopped in the middle"), html.find("class=\"words\"")) << "before the first figure";
+}
+
+TEST(HtmlReport, LinksToThePapersFiguresAndTables) {
+  Report report = sample_report();
+  std::get<Plot>(report.sections[0].figures[0].content).title = "Figure 5: one trial";
+  report.sections[0].tables[0].caption = "Table I: errors";
+  const std::string html = html_from(report);
+  EXPECT_NE(html.find("<a href=\"#one\">Figure 5</a>"), std::string::npos);
+  EXPECT_NE(html.find("<a href=\"#one\">Table I</a>"), std::string::npos);
+}
+
+TEST(HtmlReport, DoesNotBreakValues) {
+  Report report = sample_report();
+  report.sections[0].comparisons = {{"a b", "3.62 \u00b1 2.13 px", "58 mrad, l 2.48, K = 3 /s", "2 positions"}};
+  const std::string html = html_from(report);
+  EXPECT_NE(html.find("3.62\u00a0\u00b1\u00a02.13\u00a0px"), std::string::npos);
+  EXPECT_NE(html.find("58\u00a0mrad, l\u00a02.48, K =\u00a03\u00a0/s"), std::string::npos);
+  EXPECT_NE(html.find("2 positions"), std::string::npos);
 }
 
 }  // namespace

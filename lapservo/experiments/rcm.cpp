@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <fmt/format.h>
 
-#include "lapservo/core/error.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/experiments/comparison.h"
 #include "lapservo/experiments/data_file.h"
 #include "lapservo/experiments/positions.h"
@@ -23,11 +23,8 @@ constexpr double nominal_sigma_px = 0.1;  // only its being the same for all lin
 // What all lines share, as `lapservo estimate-rcm` has it: the sides of the shaft are lit unequally.
 constexpr double common_px = 0.01;
 
-Eigen::Vector2d true_rcm_px(const Rig& rig) {
-  const auto rcm_px = projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm);
-  if (!rcm_px) throw InputError("rig", "the RCM lies in the camera's focal plane, expected one that has an image");
-  return *rcm_px;
-}
+// Pairs of lines that cross at less make up the long tail of the intersections.
+constexpr double well_crossed_rad = 10 * pi / 180;
 
 std::vector<LineObservation> lines_of_set(const Result::OfMethod& of_method, int set) {
   std::vector<LineObservation> lines;
@@ -49,23 +46,46 @@ void estimate(Result::OfMethod& of_method, const Eigen::Vector2d& true_px) {
   of_method.least_squares = summed_up(std::move(least_squares));
 }
 
-std::string mean_and_deviation(const Result::Estimates& of) {
-  return fmt::format("{:.3g} \u00b1 {:.2g} px", of.distance.mean, of.distance.deviation);
-}
-
 std::string estimator_name(bool pairwise) {
   return pairwise ? "mean of intersections" : "total least squares";
 }
 
-// Estimates about the truth.
-Plot cloud(const Result::OfMethod& of_method) {
-  Plot plot{"Estimates about the truth: " + method_title(of_method.method),
-            {"error in u", "px", {}, {}},
-            {"error in v", "px", {}, {}},
-            {},
-            {},
-            true};
+std::vector<double> distances_of(const Result::OfMethod& of_method, double least_angle_rad) {
+  std::vector<double> distances;
+  for (const Result::Intersection& at : of_method.intersections)
+    if (at.angle_rad >= least_angle_rad) distances.push_back(at.distance_px);
+  return distances;
+}
+
+Plot error_plane(const std::string& title) {
+  Plot plot{title, {"error in u", "px", {}, {}}, {"error in v", "px", {}, {}}, {}, {}, true};
   plot.series.push_back({"truth", {0}, {0}, {}, Draw::points, -1});
+  return plot;
+}
+
+// With its scale for most of the points, and how many are beyond it.
+Figure robust_figure(Plot plot, const std::string& caption) {
+  limit_to_most(plot);
+  const std::size_t outside = points_outside(plot);
+  const std::string where =
+      outside == 0 ? "All lie within the plot." : fmt::format("{} of them lie outside the plot.", outside);
+  return {std::move(plot), caption + " " + where};
+}
+
+Figure cloud_of_intersections(const Result::OfMethod& of_method, const Eigen::Vector2d& true_px) {
+  Plot plot = error_plane("Intersections about the truth: " + method_title(of_method.method));
+  Series series{"of two lines", {}, {}, {}, Draw::points, method_color(of_method.method)};
+  for (const Result::Intersection& at : of_method.intersections)
+    if (at.set == 0) {
+      series.x.push_back(at.px.x() - true_px.x());
+      series.y.push_back(at.px.y() - true_px.y());
+    }
+  plot.series.push_back(std::move(series));
+  return robust_figure(std::move(plot), fmt::format("The {} pairs of the first set.", Result::pairs));
+}
+
+Figure cloud_of_estimates(const Result::OfMethod& of_method) {
+  Plot plot = error_plane("Estimates about the truth: " + method_title(of_method.method));
   for (const bool pairwise : {true, false}) {
     const auto& of = pairwise ? of_method.pairwise : of_method.least_squares;
     Series series{estimator_name(pairwise), {}, {}, {}, Draw::points, pairwise ? 1 : 0};
@@ -75,21 +95,34 @@ Plot cloud(const Result::OfMethod& of_method) {
     }
     plot.series.push_back(std::move(series));
   }
-  return plot;
+  return robust_figure(
+      std::move(plot),
+      fmt::format("One estimate from each of {} sets; both estimators, the same lines.", Result::sets));
 }
 
-Plot distance_by_set(const Result& result) {
-  Plot plot{"Distance from the true RCM, by set", {"set of 20 positions", "", 0, Result::sets + 1},
-            {"distance", "px", {}, {}, true},     {},
-            {{"the paper: 3.62 px", 3.62}},       false};
+// What share of the intersections lies within a distance.
+Plot shares_within(const Result& result) {
+  Plot plot{"Distances of the intersections from the true RCM",
+            {"distance", "px", {}, {}, true},
+            {"share within", "%", 0, 100},
+            {},
+            {{"half of them", 50}},
+            false};
   for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), {}, {}, {}, Draw::line_and_points, method_color(of_method.method)};
-    for (const Result::Estimate& estimate : of_method.own().estimates) {
-      series.x.push_back(estimate.set + 1);
-      series.y.push_back(estimate.error_px.norm());
+    Series series{method_title(of_method.method), {}, {}, {}, Draw::line, method_color(of_method.method)};
+    const auto distances = distances_of(of_method, 0);
+    for (int percent = 1; percent <= 100; ++percent) {
+      series.x.push_back(quantile_of(distances, 0.01 * percent));
+      series.y.push_back(percent);
     }
     plot.series.push_back(std::move(series));
   }
+  plot.series.push_back({fmt::format("the paper\u2019s mean, {} px", Result::paper_mean_px),
+                         {Result::paper_mean_px, Result::paper_mean_px},
+                         {0, 100},
+                         {},
+                         Draw::dashed,
+                         -1});
   return plot;
 }
 
@@ -118,18 +151,44 @@ Plot fan(const Result& result, const Camera& camera) {
 }
 
 Table by_estimator(const Result& result) {
-  Table table{"Distance from the true RCM by estimator [px]",
-              {"lines of", "estimator", "mean", "std", "largest", "error / sigma", "sets"},
-              {}};
+  Table table{
+      "Distance of the estimate from the true RCM",
+      {"lines of", "estimator", "mean [px]", "std [px]", "median [px]", "largest [px]", "error / sigma", "sets"},
+      {}};
   for (const auto& of_method : result.methods)
     for (const bool pairwise : {true, false}) {
       const auto& of = pairwise ? of_method.pairwise : of_method.least_squares;
       table.rows.push_back({method_title(of_method.method), estimator_name(pairwise),
                             fmt::format("{:.3f}", of.distance.mean), fmt::format("{:.3f}", of.distance.deviation),
-                            fmt::format("{:.3f}", of.distance.largest), fmt::format("{:.2f}", of.in_sigmas),
-                            fmt::format("{}/{}", of.estimates.size(), Result::sets)});
+                            fmt::format("{:.3f}", of.distance.median), fmt::format("{:.3f}", of.distance.largest),
+                            fmt::format("{:.2f}", of.in_sigmas),
+                            fmt::format("{} of {}", of.estimates.size(), Result::sets)});
     }
   return table;
+}
+
+std::vector<Comparison> comparisons_of(const Result& result) {
+  const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
+    return compared(what, paper, result.methods, text_of);
+  };
+  const auto quantile = [](double share) {
+    return [share](const auto& m) { return with_digits(quantile_of(distances_of(m, 0), share), 3) + " px"; };
+  };
+  return {row("intersections of two lines: distance from the true RCM, mean \u00b1 std",
+              fmt::format("{:.2f} \u00b1 {:.2f} px", Result::paper_mean_px, Result::paper_deviation_px),
+              [](const auto& m) { return mean_and_deviation(m.distance, "px"); }),
+          row("of pairs of lines that cross at 10\u00b0 or more", "",
+              [](const auto& m) { return mean_and_deviation(spread_of(distances_of(m, well_crossed_rad)), "px"); }),
+          row("median of all", "", quantile(0.5)),
+          row("nine in ten are within", "", quantile(0.9)),
+          row("intersections", fmt::format("{}", Result::pairs),
+              [](const auto& m) { return fmt::format("{}", m.intersections.size()); }),
+          row("lines", fmt::format("{}", Result::positions),
+              [](const auto& m) { return fmt::format("{} of {}", m.lines.size(), frames); }),
+          row("the estimate itself, mean of a set\u2019s intersections (eq. 9): distance from the true RCM", "",
+              [](const auto& m) { return mean_and_deviation(m.pairwise.distance, "px"); }),
+          row("the estimate itself, weighted total least squares", "",
+              [](const auto& m) { return mean_and_deviation(m.least_squares.distance, "px"); })};
 }
 
 }  // namespace
@@ -150,21 +209,48 @@ RcmResult::Estimates summed_up(std::vector<RcmResult::Estimate> estimates) {
   return summary;
 }
 
+Rig with_rcm_in_view(Rig rig) {
+  const Camera& camera = rig.camera;
+  Eigen::Vector3d& at_m = rig.instruments[0].camera_from_rcm->translation;
+  const auto inside = [](double px, int size_px) { return px >= 0 && px <= size_px - 1; };
+  if (at_m.z() > 0) {
+    const Eigen::Vector2d raw_px = camera.raw_from_point(at_m);
+    if (inside(raw_px.x(), camera.width_px) && inside(raw_px.y(), camera.height_px)) return rig;
+  }
+  constexpr double across = 0.15, down = 0.2, depth_m = 0.1;
+  at_m = depth_m * camera.ray_from_ideal({across * camera.width_px, down * camera.height_px});
+  return rig;
+}
+
+std::vector<RcmResult::Intersection> intersections_of(const std::vector<RcmResult::Line>& lines,
+                                                      const Eigen::Vector2d& true_px) {
+  std::vector<Result::Intersection> found;
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    for (std::size_t k = i + 1; k < lines.size() && lines[k].set == lines[i].set; ++k) {
+      const LineObservation a = line_between(lines[i].from_px, lines[i].to_px, nominal_sigma_px),
+                            b = line_between(lines[k].from_px, lines[k].to_px, nominal_sigma_px);
+      const auto at = intersection_px(a, b);
+      if (!at) continue;
+      const double cosine = (a.to_px - a.from_px).normalized().dot((b.to_px - b.from_px).normalized());
+      found.push_back({lines[i].set, lines[i].position, lines[k].position, *at, (*at - true_px).norm(),
+                       std::acos(std::min(1.0, std::abs(cosine)))});
+    }
+  return found;
+}
+
 RcmResult measure_rcm(const ExperimentSetup& setup) {
-  const Camera& camera = setup.rig.camera;
-  Result result;
-  result.true_px = true_rcm_px(setup.rig);
+  const Rig rig = with_rcm_in_view(setup.rig);
+  Result result{rig, projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm).value(), {}};
   Random random(setup.seed + 2);
   std::vector<RcmCoordinates> positions;
   for (int set = 0; set < Result::sets; ++set)
-    for (const RcmCoordinates& q : spread_positions(setup.rig, Result::positions, random)) positions.push_back(q);
-  const cv::Mat tissue = make_tissue(camera.width_px, camera.height_px, setup.seed + 2);
-  Rig unregistered = setup.rig;  // to know the RCM would be to bring it in
-  unregistered.instruments[0].camera_from_rcm.reset();
+    for (const RcmCoordinates& q : spread_positions(rig, Result::positions, random)) positions.push_back(q);
+  const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, setup.seed + 2);
+  const Rig unregistered = without_registration(rig);  // to know the RCM would be to bring it in
 
   std::vector<std::vector<Observation>> sightings(frames);
   const auto make_worker = [&] {
-    return [&, stage = std::make_shared<Stage>(setup.rig, tissue),
+    return [&, stage = std::make_shared<Stage>(rig, tissue),
             eyes = std::make_shared<Eyes>(unregistered, setup.methods)](int frame) {
       sightings[static_cast<std::size_t>(frame)] = eyes->observe(
           stage->render(positions[static_cast<std::size_t>(frame)], 1, frame_seed(setup.seed + 2, frame)));
@@ -173,13 +259,15 @@ RcmResult measure_rcm(const ExperimentSetup& setup) {
   in_parallel(frames, make_worker, setup.keep_going);
 
   for (std::size_t m = 0; m < setup.methods.size(); ++m) {
-    Result::OfMethod of_method{setup.methods[m], {}, {}, {}};
+    Result::OfMethod of_method{setup.methods[m], {}, {}, {}, {}, {}};
     for (int frame = 0; frame < frames; ++frame) {
       const Observation& o = sightings[static_cast<std::size_t>(frame)][m];
       if (o.status == Status::ok)
         of_method.lines.push_back(
             {frame / Result::positions, frame % Result::positions, o.edges_ideal_px[0], o.edges_ideal_px[3]});
     }
+    of_method.intersections = intersections_of(of_method.lines, result.true_px);
+    of_method.distance = spread_of(distances_of(of_method, 0));
     estimate(of_method, result.true_px);
     result.methods.push_back(std::move(of_method));
   }
@@ -191,8 +279,14 @@ void write_data(const RcmResult& result, const std::filesystem::path& folder) {
                  {"method", "set", "position", "from_u_px", "from_v_px", "to_u_px", "to_v_px"});
   DataFile estimates(folder / "rcm.csv", {"method", "estimator", "set", "true_u_px", "true_v_px", "error_u_px",
                                           "error_v_px", "sigma_u_px", "sigma_v_px", "covariance_uv_px2"});
+  DataFile intersections(folder / "rcm_intersections.csv",
+                         {"method", "set", "first_position", "second_position", "u_px", "v_px", "true_u_px",
+                          "true_v_px", "distance_px", "angle_rad"});
   for (const auto& of_method : result.methods) {
     const std::string word = method_word(of_method.method);
+    for (const Result::Intersection& at : of_method.intersections)
+      intersections.row({word, at.set, at.first, at.second, at.px.x(), at.px.y(), result.true_px.x(),
+                         result.true_px.y(), at.distance_px, at.angle_rad});
     for (const Result::Line& line : of_method.lines)
       lines.row({word, line.set, line.position, line.from_px.x(), line.from_px.y(), line.to_px.x(), line.to_px.y()});
     for (const bool pairwise : {true, false})
@@ -206,39 +300,44 @@ void write_data(const RcmResult& result, const std::filesystem::path& folder) {
       }
   }
   lines.commit();
+  intersections.commit();
   estimates.commit();
 }
 
 ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) {
-  ReportSection section{"rcm", "Image of the RCM (section V)", {}, {}, {}, {}, {}, {}, {}};
-  section.text = {fmt::format(
-      "Every centre line, extended, passes through the image of the remote centre of motion, here at ({:.1f}, {:.1f}) "
-      "px. From 20 positions its place is estimated without knowing where the instrument\u2019s port is: the paper "
-      "takes the mean of the intersections of all pairs of lines, the default a weighted total least squares that "
-      "leaves outliers out and states its covariance. Ten sets of 20 positions each.",
-      result.true_px.x(), result.true_px.y())};
-  section.comparisons = {compared("projected RCM: distance from the truth, 20 positions", "3.62 \u00b1 2.13 px",
-                                  result.methods, [](const auto& m) { return mean_and_deviation(m.own()); }),
-                         compared("median of ten sets", "", result.methods,
-                                  [](const auto& m) { return fmt::format("{:.3g} px", m.own().distance.median); }),
-                         compared("largest of ten sets", "", result.methods,
-                                  [](const auto& m) { return fmt::format("{:.3g} px", m.own().distance.largest); }),
-                         compared("rms of error / stated sigma (1 is honest)", "", result.methods,
-                                  [](const auto& m) { return fmt::format("{:.2f}", m.own().in_sigmas); }),
-                         compared("lines", "20", result.methods,
-                                  [](const auto& m) { return fmt::format("{} of {}", m.lines.size(), frames); })};
-  section.figures.push_back({distance_by_set(result), "Each set is another 20 positions of the instrument."});
-  section.figures.push_back(
-      {fan(result, setup.rig.camera), "As " + method_title(result.methods.back().method) + " saw them."});
+  ReportSection section{"rcm", "Image of the RCM (section V-B)", {}, {}, {}, {}, {}, {}, {}};
+  section.text = {
+      fmt::format(
+          "Every centre line, extended, passes through the image of the remote centre of motion (RCM), here in view at "
+          "({:.1f}, {:.1f}) px. {} positions give {} lines and {} intersections of two; the paper\u2019s figure is the "
+          "distance of each intersection from the RCM as seen in the picture. Here: {} sets of {} positions, pooled, "
+          "against the exact RCM.",
+          result.true_px.x(), result.true_px.y(), Result::positions, Result::positions, Result::pairs, Result::sets,
+          Result::positions),
+      "What the loop goes by is one estimate from all lines, whose error the paper does not give: its mean of the "
+      "intersections (eq. 9), or the default\u2019s weighted total least squares, which leaves outliers out and states "
+      "its covariance."};
+  section.comparisons = comparisons_of(result);
   for (const auto& of_method : result.methods)
-    section.figures.push_back({cloud(of_method), "Ten sets; both estimators from the same lines."});
+    section.figures.push_back(cloud_of_intersections(of_method, result.true_px));
+  section.figures.push_back({shares_within(result), fmt::format("All {} sets.", Result::sets)});
+  section.figures.push_back(
+      {fan(result, result.rig.camera), "As " + method_title(result.methods.back().method) + " saw them."});
+  for (const auto& of_method : result.methods) section.figures.push_back(cloud_of_estimates(of_method));
   section.tables.push_back(by_estimator(result));
+  const Eigen::Vector3d& at_m = result.rig.instruments[0].camera_from_rcm->translation;
   section.notes = {
+      fmt::format("The rig is the one of the other experiments{}: the RCM lies at ({:.1f}, {:.1f}, {:.1f}) mm before "
+                  "the camera.",
+                  at_m == setup.rig.instruments[0].camera_from_rcm->translation ? "" : " with the RCM moved into view",
+                  1e3 * at_m.x(), 1e3 * at_m.y(), 1e3 * at_m.z()),
+      "Two lines that are nearly parallel meet anywhere. How many there are is a matter of the positions, which the "
+      "paper does not give; hence the row for pairs that cross at 10\u00b0 or more.",
       "The trackers do not know camera_from_rcm in this experiment: the default fits the shaft freely.",
       "The sigma of the mean of intersections is a jackknife over the lines, that of the least squares comes from the "
       "fit: the noise of the lines, estimated from how well they meet, and 0.01 px that all lines share."};
   section.command = "lapservo experiment rcm --out DIR" + setup.options;
-  section.files = {"rcm.csv", "rcm_lines.csv"};
+  section.files = {"rcm_intersections.csv", "rcm.csv", "rcm_lines.csv"};
   return section;
 }
 

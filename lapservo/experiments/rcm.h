@@ -12,14 +12,22 @@
 
 namespace lapservo {
 
-/// The image of the RCM from where the shaft's centre lines meet, against the truth; ideal pixels. The paper has one
-/// such estimate from 20 positions; here there are ten, each from 20 positions of its own.
+/// The paper's section V-B, second half: the image of the RCM from where the shaft's centre lines meet, against the
+/// truth, with the RCM in view; ideal pixels. The paper has one set of 20 positions; here there are ten.
 struct RcmResult {
-  static constexpr int sets = 10, positions = 20;
+  static constexpr int sets = 10, positions = 20, pairs = positions * (positions - 1) / 2;
+  static constexpr double paper_mean_px = 3.62, paper_deviation_px = 2.13;
 
   struct Line {
     int set, position;
     Eigen::Vector2d from_px, to_px;  ///< e0 and e3
+  };
+  /// Where two lines of a set meet: what the paper measures.
+  struct Intersection {
+    int set, first, second;  ///< positions
+    Eigen::Vector2d px;
+    double distance_px;  ///< from the true RCM
+    double angle_rad;    ///< between the lines, 0 to pi/2
   };
   struct Estimate {
     int set;
@@ -35,22 +43,31 @@ struct RcmResult {
   struct OfMethod {
     Method method;
     std::vector<Line> lines;
-    Estimates pairwise;       ///< the paper's mean of intersections
+    std::vector<Intersection> intersections;
+    Spread distance;          ///< of the intersections, pixels
+    Estimates pairwise;       ///< the paper's mean of intersections (eq. 9)
     Estimates least_squares;  ///< weighted total least squares
-    /// The estimator that belongs to the method.
-    const Estimates& own() const { return method == Method::centerline ? pairwise : least_squares; }
   };
+  Rig rig;  ///< that was used
   Eigen::Vector2d true_px = Eigen::Vector2d::Zero();
   std::vector<OfMethod> methods;
 };
 
-/// The trackers do not know camera_from_rcm here. Throws InputError when the RCM has no image.
+/// The rig itself when its RCM lies in the picture; else the same with the RCM moved to 100 mm before the camera, near
+/// the upper left corner, not turned.
+Rig with_rcm_in_view(Rig rig);
+
+/// On with_rcm_in_view(setup.rig). The trackers do not know camera_from_rcm here.
 RcmResult measure_rcm(const ExperimentSetup& setup);
 
-/// rcm.csv: every estimate; rcm_lines.csv: the lines behind them.
+/// rcm_intersections.csv: every intersection; rcm.csv: every estimate; rcm_lines.csv: the lines behind them.
 void write_data(const RcmResult& result, const std::filesystem::path& folder);
 
 ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup);
+
+/// All intersections of the lines of each set.
+std::vector<RcmResult::Intersection> intersections_of(const std::vector<RcmResult::Line>& lines,
+                                                      const Eigen::Vector2d& true_px);
 
 /// Sums up estimates that are there.
 RcmResult::Estimates summed_up(std::vector<RcmResult::Estimate> estimates);

@@ -1,5 +1,8 @@
 #include "lapservo/experiments/rotation.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "lapservo/core/angles.h"
@@ -13,10 +16,15 @@ namespace lapservo {
 namespace {
 
 using Result = RotationResult;
-constexpr int frames = Result::trials * Result::steps;
+constexpr int all_trials = Result::sets * Result::trials, frames = all_trials * Result::steps;
 
 double true_rotation_rad(int frame) {
-  return initial_rotation_rad(frame / Result::steps) + two_pi * (frame % Result::steps) / Result::steps;
+  return initial_rotation_rad(frame / Result::steps % Result::trials) +
+         two_pi * (frame % Result::steps) / Result::steps;
+}
+
+std::uint64_t seed_of(const ExperimentSetup& setup, int set) {
+  return setup.seed + 1 + 1000 * static_cast<std::uint64_t>(set);
 }
 
 std::string mrad(double rad) {
@@ -24,96 +32,169 @@ std::string mrad(double rad) {
   return fmt::format("{:.{}f}", value, std::abs(value) < 10 ? 2 : 1);
 }
 
-const Result::OfMethod* find(const Result& result, Method method) {
-  for (const auto& of_method : result.methods)
-    if (of_method.method == method) return &of_method;
-  return nullptr;
-}
-
 // Fig. 5 of the paper.
-Plot measured_against_true(const Result& result) {
-  Plot plot{"Measured against true rotation (the paper\u2019s figure 5)",
-            {"true rotation", "rad", {}, {}},
-            {"measured", "rad", {}, {}},
+Plot one_trial(const Result& result) {
+  Plot plot{fmt::format("Figure 5: one trial, from {:.2f} rad", initial_rotation_rad(0)),
+            {"time", "s", {}, {}},
+            {"rotation", "rad", {}, {}},
             {},
             {},
             false};
-  plot.series.push_back({"truth",
-                         {Result::first_rad, Result::last_rad + two_pi},
-                         {Result::first_rad, Result::last_rad + two_pi},
-                         {},
-                         Draw::dashed,
-                         -1});
+  Series reference{"reference", {}, {}, {}, Draw::dashed, -1};
+  for (int step = 0; step < Result::steps; ++step) {
+    reference.x.push_back(Result::turn_s * step / Result::steps);
+    reference.y.push_back(true_rotation_rad(step));
+  }
   for (const auto& of_method : result.methods) {
     Series series{method_title(of_method.method), {}, {}, {}, Draw::points, method_color(of_method.method)};
-    for (const Result::Sample& sample : of_method.samples) {
-      series.x.push_back(sample.true_rad);
-      series.y.push_back(sample.measured_rad);
-    }
+    for (const Result::Sample& sample : of_method.samples)
+      if (sample.set == 0 && sample.trial == 0) {
+        series.x.push_back(sample.time_s());
+        series.y.push_back(sample.measured_rad);
+      }
     plot.series.push_back(std::move(series));
   }
+  plot.series.push_back(std::move(reference));
   return plot;
 }
 
 // Fig. 6 of the paper.
+Plot distribution_by_trial(const Result::OfMethod& of_method) {
+  Plot plot{"Figure 6: errors by trial, " + method_title(of_method.method),
+            {"initial rotation", "rad", {}, {}},
+            {"error", "mrad", {}, {}},
+            {},
+            {{"no error", 0}},
+            false};
+  Series series{"", {}, {}, {}, Draw::boxes, method_color(of_method.method)};
+  for (const Result::Sample& sample : of_method.samples)
+    if (sample.set == 0) {
+      series.x.push_back(initial_rotation_rad(sample.trial));
+      series.y.push_back(1e3 * sample.error_rad());
+    }
+  plot.series.push_back(std::move(series));
+  return plot;
+}
+
+// Where in a turn the errors are.
 Plot error_against_true(const Result::OfMethod& of_method) {
-  Plot plot{"Error of the rotation: " + method_title(of_method.method) + " (figure 6)",
+  Plot plot{"Error against rotation, " + method_title(of_method.method),
             {"true rotation", "rad", {}, {}},
             {"error", "mrad", {}, {}},
             {},
             {{"no error", 0}},
             false};
   Series series{"", {}, {}, {}, Draw::points, method_color(of_method.method)};
-  for (const Result::Sample& sample : of_method.samples) {
-    series.x.push_back(sample.true_rad);
-    series.y.push_back(1e3 * sample.error_rad());
-  }
+  for (const Result::Sample& sample : of_method.samples)
+    if (sample.set == 0) {
+      series.x.push_back(sample.true_rad);
+      series.y.push_back(1e3 * sample.error_rad());
+    }
   plot.series.push_back(std::move(series));
   return plot;
 }
 
 Plot deviation_by_trial(const Result& result) {
-  Plot plot{"Standard deviation of the error, by trial",
+  Plot plot{"Table I: standard deviation of the error",
             {"initial rotation", "rad", {}, {}},
             {"standard deviation", "mrad", {}, {}, true},
             {},
-            {{"the paper, best: 58 mrad", 58}, {"worst: 92 mrad", 92}},
+            {},
             false};
+  Series paper{"the paper", {}, {}, {}, Draw::line_and_points, -1};
+  for (int trial = 0; trial < Result::trials; ++trial) {
+    paper.x.push_back(initial_rotation_rad(trial));
+    paper.y.push_back(1e3 * Result::paper_deviation_rad[static_cast<std::size_t>(trial)]);
+  }
   for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), {}, {}, {}, Draw::line_and_points, method_color(of_method.method)};
-    for (int trial = 0; trial < Result::trials; ++trial) {
-      series.x.push_back(initial_rotation_rad(trial));
-      series.y.push_back(1e3 * of_method.by_trial[static_cast<std::size_t>(trial)].deviation);
-    }
+    Series series{method_title(of_method.method), paper.x, {}, {}, Draw::line_and_points,
+                  method_color(of_method.method)};
+    for (std::size_t trial = 0; trial < Result::trials; ++trial)
+      series.y.push_back(1e3 * of_method.by_trial[trial].deviation);
     plot.series.push_back(std::move(series));
   }
+  plot.series.push_back(std::move(paper));
   return plot;
 }
 
 Table table_one(const Result& result) {
-  Table table{"Table I: error of the rotation in each trial [mrad]", {"initial rotation [rad]"}, {}};
-  for (const auto& of_method : result.methods)
-    for (const char* what : {"mean", "std", "largest", "found"})
-      table.header.push_back(method_title(of_method.method) + ": " + what);
-  for (int trial = 0; trial < Result::trials; ++trial) {
-    std::vector<std::string> row{fmt::format("{:.2f}", initial_rotation_rad(trial))};
+  Table table{"Table I: mean and standard deviation of the error in each trial of the first set [mrad]",
+              {"initial rotation [rad]", "the paper: mean", "std"},
+              {}};
+  for (const auto& of_method : result.methods) {
+    table.header.push_back((of_method.method == Method::centerline ? "its method here" : "the default here") +
+                           std::string(": mean"));
+    table.header.emplace_back("std");
+  }
+  for (std::size_t trial = 0; trial < Result::trials; ++trial) {
+    std::vector<std::string> row{fmt::format("{:.2f}", initial_rotation_rad(static_cast<int>(trial))),
+                                 mrad(Result::paper_mean_rad[trial]), mrad(Result::paper_deviation_rad[trial])};
     for (const auto& of_method : result.methods) {
-      const Spread& spread = of_method.by_trial[static_cast<std::size_t>(trial)];
-      row.insert(row.end(), {mrad(spread.mean), mrad(spread.deviation), mrad(spread.largest),
-                             fmt::format("{}/{}", spread.count, Result::steps)});
+      row.push_back(mrad(of_method.by_trial[trial].mean));
+      row.push_back(mrad(of_method.by_trial[trial].deviation));
     }
     table.rows.push_back(std::move(row));
   }
   return table;
 }
 
-std::string deviations(const Result::OfMethod& of_method) {
-  double least = HUGE_VAL, most = 0;
-  for (const Spread& spread : of_method.by_trial) {
-    least = std::min(least, spread.deviation);
-    most = std::max(most, spread.deviation);
-  }
+std::string from_to(double least, double most) {
   return fmt::format("{} to {} mrad", mrad(least), mrad(most));
+}
+
+std::string range_of(const Result::OfMethod& of_method, double Spread::*figure) {
+  const auto [least, most] =
+      std::minmax_element(of_method.by_trial.begin(), of_method.by_trial.end(),
+                          [&](const Spread& a, const Spread& b) { return a.*figure < b.*figure; });
+  return from_to((*least).*figure, (*most).*figure);
+}
+
+std::string range_of(const std::array<double, Result::trials>& figures) {
+  const auto [least, most] = std::minmax_element(figures.begin(), figures.end());
+  return from_to(*least, *most);
+}
+
+std::string percent(double share) {
+  return fmt::format("{:.3g} %", 100 * share);
+}
+
+std::vector<Comparison> comparisons_of(const Result& result) {
+  const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
+    return compared(what, paper, result.methods, text_of);
+  };
+  const Pooled paper = pooled(Result::paper_mean_rad, Result::paper_deviation_rad);
+  return {row("standard deviation of the error, from trial to trial", range_of(Result::paper_deviation_rad),
+              [](const auto& m) { return range_of(m, &Spread::deviation); }),
+          row("mean error, from trial to trial", range_of(Result::paper_mean_rad),
+              [](const auto& m) { return range_of(m, &Spread::mean); }),
+          row("rms error of all trials together, bias included", mrad(paper.rms) + " mrad (from its Table I)",
+              [](const auto& m) { return mrad(m.all.rms) + " mrad"; }),
+          row("standard deviation of all trials together", mrad(paper.deviation) + " mrad (from its Table I)",
+              [](const auto& m) { return mrad(m.all.deviation) + " mrad"; }),
+          row("mean error of all trials together", mrad(paper.mean) + " mrad (from its Table I)",
+              [](const auto& m) { return mrad(m.all.mean) + " mrad"; }),
+          row("median error", "\u201caround zero\u201d", [](const auto& m) { return mrad(m.all.median) + " mrad"; }),
+          row("largest error", "", [](const auto& m) { return mrad(m.all.largest) + " mrad"; }),
+          row("errors under 0.1 rad", "half", [](const auto& m) { return percent(m.under_100mrad); }),
+          row("errors under 0.2 rad", "most", [](const auto& m) { return percent(m.under_200mrad); }),
+          row("rms of error / stated sigma (1 is honest)", "",
+              [](const auto& m) { return fmt::format("{:.2f}", m.in_sigmas.rms); }),
+          row("frames in which it was found", "",
+              [](const auto& m) { return fmt::format("{} of {}", m.samples.size(), frames); })};
+}
+
+std::vector<Figure> figures_of(const Result& result) {
+  std::vector<Figure> figures{
+      {one_trial(result), fmt::format("Every frame of the first trial: a turn in {:.0f} s.", Result::turn_s)}};
+  const std::string boxes =
+      "The first set. Boxes from quartile to quartile, with the median; whiskers to the farthest within 1.5 times "
+      "that. ";
+  for (const auto& of_method : result.methods)
+    figures.push_back({distribution_by_trial(of_method), boxes + "Mind the scale."});
+  figures.push_back({deviation_by_trial(result), "The first set, on a logarithmic scale."});
+  for (const auto& of_method : result.methods)
+    figures.push_back({error_against_true(of_method), "Every frame of the first set. Mind the scale."});
+  return figures;
 }
 
 }  // namespace
@@ -122,35 +203,51 @@ double initial_rotation_rad(int trial) {
   return Result::first_rad + (Result::last_rad - Result::first_rad) * trial / (Result::trials - 1);
 }
 
+Pooled pooled(std::span<const double> means, std::span<const double> deviations) {
+  const Spread of_means = spread_of({means.begin(), means.end()});
+  const double within = spread_of({deviations.begin(), deviations.end()}).rms;
+  const double rms = std::hypot(within, of_means.rms);
+  return {of_means.mean, std::sqrt(rms * rms - of_means.mean * of_means.mean), rms};
+}
+
 RotationResult::OfMethod summed_up(Method method, std::vector<RotationResult::Sample> samples) {
-  Result::OfMethod of_method{method, std::move(samples), {}, {}, {}};
-  std::vector<std::vector<double>> errors(Result::trials);
+  Result::OfMethod of_method{method, std::move(samples), {}, {}, {}, 0, 0};
+  std::vector<std::vector<double>> errors(all_trials);
   std::vector<double> all, in_sigmas;
   for (const Result::Sample& sample : of_method.samples) {
-    errors[static_cast<std::size_t>(sample.trial)].push_back(sample.error_rad());
+    errors[static_cast<std::size_t>(sample.set * Result::trials + sample.trial)].push_back(sample.error_rad());
     all.push_back(sample.error_rad());
     in_sigmas.push_back(sample.error_rad() / sample.sigma_rad);
   }
   for (const auto& of_trial : errors) of_method.by_trial.push_back(spread_of(of_trial));
   of_method.all = spread_of(all);
   of_method.in_sigmas = spread_of(in_sigmas);
+  of_method.under_100mrad = share_within(all, 0.1);
+  of_method.under_200mrad = share_within(all, 0.2);
   return of_method;
 }
 
 RotationResult measure_rotation(const ExperimentSetup& setup) {
   const Camera& camera = setup.rig.camera;
-  Random random(setup.seed + 1);
-  const auto positions = spread_positions(setup.rig, Result::trials, random);
-  const cv::Mat tissue = make_tissue(camera.width_px, camera.height_px, setup.seed + 1);
+  std::vector<RcmCoordinates> positions;
+  std::vector<cv::Mat> tissues;
+  for (int set = 0; set < Result::sets; ++set) {
+    Random random(seed_of(setup, set));
+    for (const RcmCoordinates& q : spread_positions(setup.rig, Result::trials, random)) positions.push_back(q);
+    tissues.push_back(make_tissue(camera.width_px, camera.height_px, seed_of(setup, set)));
+  }
 
   std::vector<std::vector<Observation>> sightings(frames);
   const auto make_worker = [&] {
-    return [&, stage = std::make_shared<Stage>(setup.rig, tissue),
-            eyes = std::make_shared<Eyes>(setup.rig, setup.methods)](int frame) {
+    return [&, stage = std::shared_ptr<Stage>(), stage_set = -1,
+            eyes = std::make_shared<Eyes>(setup.rig, setup.methods)](int frame) mutable {
+      const int set = frame / (Result::trials * Result::steps);
+      if (set != stage_set) stage = std::make_shared<Stage>(setup.rig, tissues[static_cast<std::size_t>(set)]);
+      stage_set = set;
       RcmCoordinates q = positions[static_cast<std::size_t>(frame / Result::steps)];
       q.psi_rad = true_rotation_rad(frame);
       sightings[static_cast<std::size_t>(frame)] =
-          eyes->observe(stage->render(q, 1, frame_seed(setup.seed + 1, frame)));
+          eyes->observe(stage->render(q, 1, frame_seed(seed_of(setup, set), frame)));
     };
   };
   in_parallel(frames, make_worker, setup.keep_going);
@@ -162,7 +259,8 @@ RotationResult measure_rotation(const ExperimentSetup& setup) {
       const Observation& o = sightings[static_cast<std::size_t>(frame)][m];
       if (o.status != Status::ok || !o.rcm) continue;
       const double true_rad = true_rotation_rad(frame);
-      samples.push_back({frame / Result::steps, frame % Result::steps, true_rad,
+      const int trial = frame / Result::steps;
+      samples.push_back({trial / Result::trials, trial % Result::trials, frame % Result::steps, true_rad,
                          true_rad + wrap_pi(o.rcm->q.psi_rad - true_rad), std::sqrt(o.rcm->covariance(3, 3))});
     }
     result.methods.push_back(summed_up(setup.methods[m], std::move(samples)));
@@ -172,17 +270,18 @@ RotationResult measure_rotation(const ExperimentSetup& setup) {
 
 void write_data(const RotationResult& result, const std::filesystem::path& folder) {
   DataFile samples(folder / "rotation.csv",
-                   {"method", "trial", "step", "true_rad", "measured_rad", "error_rad", "sigma_rad"});
-  DataFile trials(folder / "rotation_trials.csv",
-                  {"method", "trial", "initial_rad", "found", "mean_error_rad", "std_error_rad", "largest_error_rad"});
+                   {"method", "set", "trial", "step", "time_s", "true_rad", "measured_rad", "error_rad", "sigma_rad"});
+  DataFile trials(folder / "rotation_trials.csv", {"method", "set", "trial", "initial_rad", "found", "mean_error_rad",
+                                                   "std_error_rad", "rms_error_rad", "largest_error_rad"});
   for (const auto& of_method : result.methods) {
     const std::string word = method_word(of_method.method);
     for (const Result::Sample& s : of_method.samples)
-      samples.row({word, s.trial, s.step, s.true_rad, s.measured_rad, s.error_rad(), s.sigma_rad});
-    for (int trial = 0; trial < Result::trials; ++trial) {
-      const Spread& spread = of_method.by_trial[static_cast<std::size_t>(trial)];
-      trials.row({word, trial, initial_rotation_rad(trial), static_cast<int>(spread.count), spread.mean,
-                  spread.deviation, spread.largest});
+      samples.row({word, s.set, s.trial, s.step, s.time_s(), s.true_rad, s.measured_rad, s.error_rad(), s.sigma_rad});
+    for (int i = 0; i < all_trials; ++i) {
+      const Spread& spread = of_method.by_trial[static_cast<std::size_t>(i)];
+      const int trial = i % Result::trials;
+      trials.row({word, i / Result::trials, trial, initial_rotation_rad(trial), static_cast<int>(spread.count),
+                  spread.mean, spread.deviation, spread.rms, spread.largest});
     }
   }
   samples.commit();
@@ -192,29 +291,19 @@ void write_data(const RotationResult& result, const std::filesystem::path& folde
 ReportSection section_of(const RotationResult& result, const ExperimentSetup& setup) {
   ReportSection section{"rotation", "Rotation (section V-C)", {}, {}, {}, {}, {}, {}, {}};
   section.text = {fmt::format(
-      "Ten trials start at rotations from \u22123.5 to \u22121.25 rad, each at its own place in the field of view. In "
-      "each the instrument turns about its shaft once round, in {} steps, and the rotation measured in every frame is "
-      "compared with the true one.",
-      Result::steps)};
-  section.comparisons = {
-      compared("rotation: standard deviation of the error, over the trials", "58 to 92 mrad", result.methods,
-               deviations),
-      compared("mean error, all trials", "", result.methods, [](const auto& m) { return mrad(m.all.mean) + " mrad"; }),
-      compared("rms error, all trials", "", result.methods, [](const auto& m) { return mrad(m.all.rms) + " mrad"; }),
-      compared("median error", "", result.methods, [](const auto& m) { return mrad(m.all.median) + " mrad"; }),
-      compared("largest error", "", result.methods, [](const auto& m) { return mrad(m.all.largest) + " mrad"; }),
-      compared("rms of error / stated sigma (1 is honest)", "", result.methods,
-               [](const auto& m) { return fmt::format("{:.2f}", m.in_sigmas.rms); }),
-      compared("frames in which it was found", "", result.methods,
-               [](const auto& m) { return fmt::format("{} of {}", m.samples.size(), frames); })};
-  section.figures.push_back({measured_against_true(result), "Every frame of the ten trials."});
-  for (const Method method : {Method::surface, Method::centerline})
-    if (const auto* of_method = find(result, method))
-      section.figures.push_back({error_against_true(*of_method), "Mind the scale: it is each method\u2019s own."});
-  section.figures.push_back({deviation_by_trial(result), "Table I as a picture, on a logarithmic scale."});
+      "{} trials start at rotations from {:.2f} to {:.2f} rad, each at its own place in the field of view. In each the "
+      "instrument turns about its shaft once round, in {} steps, and the rotation measured in every frame is compared "
+      "with the true one. {} such sets, each with other places, background and noise, are pooled where it says "
+      "\u201call\u201d or \u201cfrom trial to trial\u201d.",
+      Result::trials, Result::first_rad, Result::last_rad, Result::steps, Result::sets)};
+  section.comparisons = comparisons_of(result);
+  section.figures = figures_of(result);
   section.tables.push_back(table_one(result));
   section.notes = {
       "Rotation is psi, absolute: the direction from which the camera sees the shaft is taken into account.",
+      "The paper\u2019s errors are against its robot\u2019s encoder, ours against the exact rotation of rendered "
+      "frames. "
+      "Its trials\u2019 length is not given; ours are one turn each, so that each passes the seam once.",
       "Once in each turn the marker\u2019s seam passes the centre line, where the cross-ratio jumps. The centre-line "
       "method is at its worst there; lines beside the centre carry the default across.",
       "Each frame is looked at on its own, without help from the one before."};

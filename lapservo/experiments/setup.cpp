@@ -13,6 +13,11 @@ Rig single_instrument(Rig rig, const std::string& source) {
   return rig;
 }
 
+Rig without_registration(Rig rig) {
+  for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
+  return rig;
+}
+
 std::string method_title(Method method) {
   return method == Method::centerline ? "the paper\u2019s method" : "the default";
 }

@@ -27,6 +27,9 @@ Rig paper_rig();
 /// no camera_from_rcm.
 Rig single_instrument(Rig rig, const std::string& source);
 
+/// For trackers that must not know where the RCM is.
+Rig without_registration(Rig rig);
+
 /// "the paper's method" or "the default", and the word of the command line.
 std::string method_title(Method method);
 std::string method_word(Method method);

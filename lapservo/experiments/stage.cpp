@@ -1,20 +1,24 @@
 #include "lapservo/experiments/stage.h"
 
 #include "lapservo/core/random.h"
+#include "lapservo/sim/shaft_lighting.h"
 
 namespace lapservo {
 
 Stage::Stage(const Rig& rig, cv::Mat tissue) : rig_(rig), tissue_(std::move(tissue)) {}
 
-cv::Mat Stage::render(const RcmCoordinates& q, double light, std::uint64_t seed) {
+cv::Mat Stage::render(const RcmCoordinates& q, double lamp_power, std::uint64_t seed) {
   const Instrument& instrument = rig_.instruments[0];
-  if (!renderer_ || light != light_) {
+  if (!renderer_ || lamp_power != lamp_power_) {
     ShaftModel shaft;
     shaft.marker = instrument.marker;
+    const double lamps_share = (1 - ambient_share) * lamp_power;
     RenderOptions options;
-    options.sensor.gains = Light::Constant(static_cast<float>(light));
-    renderer_ = std::make_unique<Renderer>(rig_.camera, std::vector{shaft}, tissue_, options);
-    light_ = light;
+    options.lighting.ambient = static_cast<float>(ambient_share) * options.lighting.diffuse;
+    options.lighting = at_power(options.lighting, static_cast<float>(lamps_share));
+    renderer_ =
+        std::make_unique<Renderer>(rig_.camera, std::vector{shaft}, tissue_ * (lamps_share + ambient_share), options);
+    lamp_power_ = lamp_power;
   }
   return renderer_->render({{*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad}}, seed);
 }

@@ -14,19 +14,23 @@
 namespace lapservo {
 
 /// The built-in theatre for one thread: the first instrument of a rig before seeded tissue, with the usual sensor.
+/// The camera's exposure stays as it is; the lamps beside it can be turned down.
 class Stage {
  public:
+  /// Of the light at full power, what comes from elsewhere (the room, through the port) and does not change.
+  static constexpr double ambient_share = 0.04;
+
   /// `tissue`: make_tissue() of the camera's size, shared by the stages of an experiment.
   Stage(const Rig& rig, cv::Mat tissue);
 
-  /// `light`: exposure, 1 is normal. The same arguments give the same picture.
-  cv::Mat render(const RcmCoordinates& q, double light, std::uint64_t seed);
+  /// `lamp_power`: 1 is full. The same arguments give the same picture.
+  cv::Mat render(const RcmCoordinates& q, double lamp_power, std::uint64_t seed);
 
  private:
   Rig rig_;
   cv::Mat tissue_;
-  double light_ = 0;
-  std::unique_ptr<Renderer> renderer_;  // of that light
+  double lamp_power_ = 0;
+  std::unique_ptr<Renderer> renderer_;  // of that power
 };
 
 /// The eyes: one tracker per method, each frame on its own.

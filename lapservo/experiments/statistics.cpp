@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
 
 namespace lapservo {
 
@@ -20,9 +23,27 @@ Spread spread_of(std::vector<double> values) {
   double about_mean = 0;
   for (const double value : values) about_mean += (value - spread.mean) * (value - spread.mean);
   if (values.size() > 1) spread.deviation = std::sqrt(about_mean / (n - 1));
-  std::sort(values.begin(), values.end());
-  spread.median = 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+  spread.median = quantile_of(std::move(values), 0.5);
   return spread;
+}
+
+double quantile_of(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  std::sort(values.begin(), values.end());
+  const double place = share * static_cast<double>(values.size() - 1);
+  const auto below = static_cast<std::size_t>(place), above = std::min(below + 1, values.size() - 1);
+  return values[below] + (place - static_cast<double>(below)) * (values[above] - values[below]);
+}
+
+double share_within(const std::vector<double>& values, double bound) {
+  if (values.empty()) return 0;
+  const auto within = std::count_if(values.begin(), values.end(), [bound](double v) { return std::abs(v) < bound; });
+  return static_cast<double>(within) / static_cast<double>(values.size());
+}
+
+std::string with_digits(double value, int digits) {
+  const double power = value == 0 ? 0 : std::floor(std::log10(std::abs(value)));
+  return fmt::format("{:.{}f}", value, static_cast<int>(std::clamp(digits - 1 - power, 0.0, 9.0)));
 }
 
 std::vector<double> distances_to_centroid(const std::vector<Eigen::Vector2d>& points) {

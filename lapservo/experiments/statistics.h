@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,6 +17,15 @@ struct Spread {
   double median = 0;
 };
 Spread spread_of(std::vector<double> values);
+
+/// The value below which a share of the numbers lies, between two of them on the straight line; 0 when there are none.
+double quantile_of(std::vector<double> values, double share);
+
+/// Of the magnitudes, the share that is smaller than a bound; 0 when there are none.
+double share_within(const std::vector<double>& values, double bound);
+
+/// A number with as many digits as asked for, or more where it takes more to say whole numbers; no exponent.
+std::string with_digits(double value, int digits);
 
 /// Distance of each point to the centroid of all.
 std::vector<double> distances_to_centroid(const std::vector<Eigen::Vector2d>& points);

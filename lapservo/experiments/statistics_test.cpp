@@ -55,5 +55,27 @@ TEST(DistancesToCentroid, MeasureTheNoiseWhereverThePointsAre) {
   EXPECT_TRUE(distances_to_centroid({}).empty());
 }
 
+TEST(Quantile, LiesBetweenTheNumbers) {
+  EXPECT_DOUBLE_EQ(quantile_of({4, 1, 3, 2}, 0.5), 2.5);
+  EXPECT_DOUBLE_EQ(quantile_of({4, 1, 3, 2}, 0), 1);
+  EXPECT_DOUBLE_EQ(quantile_of({4, 1, 3, 2}, 1), 4);
+  EXPECT_DOUBLE_EQ(quantile_of({0, 10}, 0.9), 9);
+  EXPECT_EQ(quantile_of({}, 0.5), 0);
+}
+
+TEST(ShareWithin, CountsMagnitudes) {
+  EXPECT_DOUBLE_EQ(share_within({-0.05, 0.05, 0.15, -0.3}, 0.1), 0.5);
+  EXPECT_DOUBLE_EQ(share_within({-0.05, 0.05, 0.15, -0.3}, 0.2), 0.75);
+  EXPECT_EQ(share_within({}, 1), 0);
+}
+
+TEST(WithDigits, NeverHasAnExponent) {
+  EXPECT_EQ(with_digits(318.7, 2), "319");
+  EXPECT_EQ(with_digits(18.23, 3), "18.2");
+  EXPECT_EQ(with_digits(0.01512, 3), "0.0151");
+  EXPECT_EQ(with_digits(-2.5e-7, 2), "-0.00000025");
+  EXPECT_EQ(with_digits(0, 3), "0.00");
+}
+
 }  // namespace
 }  // namespace lapservo

@@ -4,8 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <map>
 
 #include <fmt/format.h>
+
+#include "lapservo/experiments/statistics.h"
 
 namespace lapservo {
 namespace {
@@ -121,7 +124,7 @@ std::string shape_path(int color, double x, double y, double size) {
 }
 
 bool has_line(Draw draw) {
-  return draw != Draw::points;
+  return draw != Draw::points && draw != Draw::boxes;
 }
 bool has_points(Draw draw) {
   return draw == Draw::points || draw == Draw::line_and_points;
@@ -185,6 +188,47 @@ std::string points_of(const Plot& plot, const Layout& layout, const Series& seri
   return text;
 }
 
+// What a box shows of its values.
+struct Box {
+  double low_whisker, low, median, high, high_whisker;
+};
+
+Box box_of(const std::vector<double>& values) {
+  const double low = quantile_of(values, 0.25), high = quantile_of(values, 0.75), reach = 1.5 * (high - low);
+  Box box{low, low, quantile_of(values, 0.5), high, high};
+  for (const double value : values) {
+    if (value >= low - reach) box.low_whisker = std::min(box.low_whisker, value);
+    if (value <= high + reach) box.high_whisker = std::max(box.high_whisker, value);
+  }
+  return box;
+}
+
+std::string box_at(const Layout& layout, double x_px, double half_px, const Box& box, const std::string& color) {
+  const double low = layout.y(box.low), high = layout.y(box.high), middle = layout.y(box.median);
+  return fmt::format("<path class=\"bar s-{0}\" d=\"M{1:.1f} {2:.1f}V{3:.1f}M{1:.1f} {4:.1f}V{5:.1f}\"/>", color, x_px,
+                     layout.y(box.low_whisker), low, high, layout.y(box.high_whisker)) +
+         fmt::format("<path class=\"box s-{0} f-{0}\" d=\"M{1:.1f} {2:.1f}h{3:.1f}V{4:.1f}h{5:.1f}z\"/>", color,
+                     x_px - half_px, low, 2 * half_px, high, -2 * half_px) +
+         fmt::format("<path class=\"line s-{0}\" d=\"M{1:.1f} {2:.1f}h{3:.1f}\"/>\n", color, x_px - half_px, middle,
+                     2 * half_px);
+}
+
+std::string boxes_of(const Plot& plot, const Layout& layout, const Series& series) {
+  std::map<double, std::vector<double>> by_x;
+  for (std::size_t i = 0; i < series.x.size(); ++i)
+    if (drawable(layout, series, i)) by_x[series.x[i]].push_back(series.y[i]);
+  const double room_px = std::abs(layout.x.at_high_px - layout.x.at_low_px) / (static_cast<double>(by_x.size()) + 1);
+  Series beyond{series.name, {}, {}, {}, Draw::points, series.color};
+  std::string text;
+  for (const auto& [x, values] : by_x) {
+    const Box box = box_of(values);
+    text += box_at(layout, layout.x(x), std::min(12.0, 0.3 * room_px), box, color_class(series.color));
+    for (const double value : values)
+      if (value < box.low_whisker || value > box.high_whisker) beyond.x.push_back(x), beyond.y.push_back(value);
+  }
+  return text + points_of(plot, layout, beyond);
+}
+
 // A line's points have no marks, but tell their numbers all the same.
 std::string hover_points_of(const Plot& plot, const Layout& layout, const Series& series) {
   std::string text;
@@ -197,6 +241,7 @@ std::string hover_points_of(const Plot& plot, const Layout& layout, const Series
 }
 
 std::string drawn(const Plot& plot, const Layout& layout, const Series& given) {
+  if (given.draw == Draw::boxes) return boxes_of(plot, layout, given);
   const bool many = has_line(given.draw) && given.x.size() > 2000;
   const Series series = many ? thinned(given, static_cast<int>(width_px)) : given;
   std::string text;
@@ -235,7 +280,7 @@ std::string drawn(const LegendEntry& entry) {
   std::string text;
   const double middle = entry.y_px - 4.5;
   const int color = entry.series ? entry.series->color : -1;
-  if (!entry.series || has_line(entry.series->draw))
+  if (!entry.series || entry.series->draw != Draw::points)
     text += fmt::format("<path class=\"line s-{}{}\" d=\"M{:.1f} {:.1f}h22\"/>", color_class(color),
                         !entry.series || entry.series->draw == Draw::dashed ? " dashed" : "", entry.x_px, middle);
   if (entry.series && has_points(entry.series->draw))
@@ -277,6 +322,21 @@ Layout layout_of(const Plot& plot, double top_px, double bottom_edge_px) {
     make_isotropic(layout);
   }
   return layout;
+}
+
+// Where everything goes.
+struct Sheet {
+  std::vector<LegendEntry> legend;
+  double height_px, bottom_edge_px;
+  Layout layout;
+};
+
+Sheet sheet_of(const Plot& plot) {
+  std::vector<LegendEntry> legend = legend_of(plot);
+  const double top = legend.empty() ? 32 : legend.back().y_px + 14;
+  const double total = height_px + (plot.image_plane ? 40 : 0) + std::max(0.0, top - 54);
+  const double bottom_edge = total - bottom_px;
+  return {std::move(legend), total, bottom_edge, layout_of(plot, top, bottom_edge)};
 }
 
 std::string axes(const Plot& plot, const Layout& layout, double bottom_edge_px) {
@@ -419,12 +479,8 @@ std::string escaped(const std::string& text) {
 }
 
 std::string svg_from(const Plot& plot) {
-  const auto legend = legend_of(plot);
-  const double top = legend.empty() ? 32 : legend.back().y_px + 14;
-  const double total = height_px + (plot.image_plane ? 40 : 0) + std::max(0.0, top - 54);
-  const double bottom_edge = total - bottom_px;
-  const Layout layout = layout_of(plot, top, bottom_edge);
-
+  const Sheet sheet = sheet_of(plot);
+  const Layout& layout = sheet.layout;
   std::string content;
   for (const ReferenceLine& line : plot.references)
     content +=
@@ -432,15 +488,37 @@ std::string svg_from(const Plot& plot) {
                     layout.left_px, layout.y(line.y), width_px - right_px, escaped(line.name), number(line.y));
   for (const Series& series : plot.series) content += drawn(plot, layout, series);
   std::string text = fmt::format("<svg class=\"plot\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">\n",
-                                 width_px, total, escaped(plot.title));
+                                 width_px, sheet.height_px, escaped(plot.title));
   text += fmt::format("<text class=\"title\" x=\"8\" y=\"{:.0f}\">{}</text>\n", font_px + 4, escaped(plot.title));
-  for (const LegendEntry& entry : legend) text += drawn(entry);
-  text += axes(plot, layout, bottom_edge);
+  for (const LegendEntry& entry : sheet.legend) text += drawn(entry);
+  text += axes(plot, layout, sheet.bottom_edge_px);
   const std::string clip = clip_name(text + content);
   text += fmt::format(
       "<clipPath id=\"{}\"><rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\"/></clipPath>\n", clip,
-      layout.left_px, top, width_px - right_px - layout.left_px, bottom_edge - top);
+      layout.left_px, layout.top_px, width_px - right_px - layout.left_px, sheet.bottom_edge_px - layout.top_px);
   return text + fmt::format("<g clip-path=\"url(#{})\">\n", clip) + content + "</g>\n</svg>\n";
+}
+
+std::size_t points_outside(const Plot& plot) {
+  const Layout layout = sheet_of(plot).layout;
+  const auto inside = [](const Range& range, double value) { return value >= range.low && value <= range.high; };
+  std::size_t count = 0;
+  for (const Series& series : plot.series)
+    for (std::size_t i = 0; i < series.x.size(); ++i)
+      if (drawable(layout, series, i) && !(inside(layout.x.range, series.x[i]) && inside(layout.y.range, series.y[i])))
+        ++count;
+  return count;
+}
+
+void limit_to_most(Plot& plot, double room) {
+  std::vector<double> distances;
+  for (const Series& series : plot.series)
+    for (std::size_t i = 0; i < series.x.size(); ++i)
+      if (const double distance = std::hypot(series.x[i], series.y[i]); std::isfinite(distance))
+        distances.push_back(distance);
+  const double limit = room * quantile_of(distances, 0.9);
+  if (!(limit > 0) || share_within(distances, limit) == 1) return;
+  for (Axis* axis : {&plot.x, &plot.y}) axis->low = -limit, axis->high = limit;
 }
 
 std::string plot_css() {
@@ -453,7 +531,8 @@ std::string plot_css() {
       ".plot .title{font-weight:600}.plot .middle{text-anchor:middle}.plot .end{text-anchor:end}\n"
       ".plot .grid{stroke:var(--grid);fill:none}.plot .frame{stroke:var(--grey);fill:none}\n"
       ".plot .line{fill:none;stroke-width:1.8;stroke-linejoin:round}.plot .dashed{stroke-dasharray:6 4}\n"
-      ".plot .band{opacity:.2}.plot .bar{stroke-width:1.4;opacity:.6}.plot .hover{fill:transparent}\n"
+      ".plot .box{fill-opacity:.25;stroke-width:1.4}.plot .band{opacity:.2}.plot "
+      ".bar{stroke-width:1.4;opacity:.6}.plot .hover{fill:transparent}\n"
       ".plot .point{fill-opacity:.8}.plot .point:hover,.plot .hover:hover{stroke:var(--ink);stroke-width:1.5}\n";
   for (const char* name : {"c0", "c1", "c2", "c3", "c4", "grey"})
     css += fmt::format(".s-{0}{{stroke:var(--{0})}}.f-{0}{{fill:var(--{0})}}\n", name);

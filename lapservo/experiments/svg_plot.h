@@ -6,8 +6,10 @@
 
 namespace lapservo {
 
-/// How a series is drawn. Its colour and the shape of its points follow from `Series::color`.
-enum class Draw { line, dashed, points, line_and_points };
+/// How a series is drawn. Its colour and the shape of its points follow from `Series::color`. `boxes`: the points of
+/// equal x as one box from quartile to quartile with its median; whiskers to the farthest point within 1.5 times the
+/// box's height, the points beyond as points.
+enum class Draw { line, dashed, points, line_and_points, boxes };
 
 /// A run of points, in the units of the axes. Points that are not finite leave a gap.
 struct Series {
@@ -41,6 +43,13 @@ struct Plot {
 /// The plot as an <svg> element for an HTML page that has plot_css(). Made to be read at 340 px of width; every point
 /// tells its numbers when pointed at. Lines of many points are thinned to what can be seen.
 std::string svg_from(const Plot& plot);
+
+/// How many points the axes of svg_from() leave out, because a limit is nearer than the data.
+std::size_t points_outside(const Plot& plot);
+
+/// Limits an image-plane plot to where most points are, when single ones would ruin its scale: to `room` times the
+/// distance from (0, 0) that nine tenths of all points keep, if any lies beyond that.
+void limit_to_most(Plot& plot, double room = 1.5);
 
 /// The style rules that the elements of svg_from() need, and the palette for light and dark (Okabe and Ito's, told
 /// apart by the colour-blind).

@@ -172,5 +172,42 @@ TEST(Svg, TheImagePlaneHasOneScale) {
   EXPECT_NEAR(u1 - u0, v1 - v0, 0.25);
 }
 
+// Quartiles 2.5 and 4.5, whiskers at 1 and 5; 100 lies beyond.
+TEST(Svg, ABoxHasItsQuartilesWhiskersAndOutliers) {
+  Plot plot{"boxes", {"trial", "", 0, 2}, {"error", "mrad", 0, 100}, {}, {}, false};
+  plot.series.push_back({"", {1, 1, 1, 1, 1, 1, 1}, {1, 2, 3, 3, 4, 5, 100}, {}, Draw::boxes, 0});
+  const std::string svg = svg_from(plot);
+  EXPECT_EQ(testing::markup_problem(svg), "");
+  EXPECT_EQ(count_of(svg, "class=\"box "), 1U);
+  EXPECT_EQ(count_of(svg, "<title>trial 1, error 100 mrad</title>"), 1U);
+  double x = 0, low = 0, width = 0, high = 0, whisker_x = 0, from_low = 0, to_low_whisker = 0;
+  ASSERT_EQ(std::sscanf(svg.c_str() + svg.find("class=\"box "), "class=\"box s-c0 f-c0\" d=\"M%lf %lfh%lfV%lf", &x,
+                        &low, &width, &high),
+            4);
+  ASSERT_EQ(std::sscanf(svg.c_str() + svg.find("class=\"bar "), "class=\"bar s-c0\" d=\"M%lf %lfV%lf", &whisker_x,
+                        &to_low_whisker, &from_low),
+            3);
+  EXPECT_NEAR(whisker_x, x + width / 2, 0.2);
+  EXPECT_NEAR(low, from_low, 0.2);
+  EXPECT_NEAR((low - high) / (to_low_whisker - low), (4.5 - 2.5) / (2.5 - 1), 0.1);
+}
+
+TEST(Svg, LimitsLeaveOutliersOutAndCountThem) {
+  Random random(seed);
+  Plot plot{"cloud", {"u", "px", {}, {}}, {"v", "px", {}, {}}, {}, {}, true};
+  plot.series.push_back({"", {}, {}, {}, Draw::points, 0});
+  for (int i = 0; i < 50; ++i) {
+    plot.series[0].x.push_back(random.normal());
+    plot.series[0].y.push_back(random.normal());
+  }
+  EXPECT_EQ(points_outside(plot), 0U);
+  plot.series[0].x.push_back(1000), plot.series[0].y.push_back(0);
+  plot.series[0].x.push_back(0), plot.series[0].y.push_back(-1000);
+  EXPECT_EQ(points_outside(plot), 0U) << "nothing is left out unasked";
+  limit_to_most(plot);
+  EXPECT_EQ(points_outside(plot), 2U);
+  EXPECT_LT(*plot.x.high, 10);
+}
+
 }  // namespace
 }  // namespace lapservo

@@ -107,9 +107,10 @@ Table run_table(const TrackingResult& result) {
 }
 
 Table decay_table(const TrackingResult& result, const Eigen::Vector4d& gains_per_s) {
-  Table table{"The paper\u2019s law: decay of each feature\u2019s error (eq. 22)",
-              {"feature", "K [a period]", "K [1/s]", "Algorithm 1 [1/s]", "our tracker [1/s]"},
-              {}};
+  Table table{
+      "The paper\u2019s law: decay of each feature\u2019s error (eq. 22); \u2013 where it was small from the start",
+      {"feature", "K [a period]", "K [1/s]", "Algorithm 1 [1/s]", "our tracker [1/s]"},
+      {}};
   const TrackingRun &paper = run_of(result, "paper"), &ours = run_of(result, "paper_surface");
   for (std::size_t k = 0; k < 4; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
@@ -166,7 +167,7 @@ std::vector<std::string> notes(const TrackingResult& result, const Eigen::Vector
               two_pi / paper_sinusoids().omega_rad_s[0], 1 / tracking_period_s),
           fmt::format(
               "The paper\u2019s law takes the late image for the present. At its own gains (at most {:.2f} /s) that "
-              "makes s decay a little faster than K; at ours ({:.0f} /s) it would swing. What stays of r, l and d is "
+              "makes s decay faster than K; at ours ({:.0f} /s) it would swing. What stays of r, l and d is "
               "what the desired features do in the meantime.",
               papers_per_s.maxCoeff(), ours_per_s.maxCoeff()),
           "Starts lie where the paper\u2019s law can lead home: on its way each feature has a pace of its own, and all "

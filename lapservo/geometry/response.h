@@ -1,14 +1,17 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 namespace lapservo {
 
 /// How pixel values encode light. Values and light are in [0, 1].
 struct Response {
-  enum class Kind { srgb, power };
+  enum class Kind { srgb, rec709, power, table };
   Kind kind = Kind::srgb;
   double gamma = 1;  ///< for Kind::power: light = value^gamma; 1 is linear
+  /// For Kind::table: light at value, straight lines between; both rise strictly from 0 to 1 and are equally long.
+  std::vector<double> table_light{}, table_value{};
 
   double light_from_value(double value) const;
   double value_from_light(double light) const;

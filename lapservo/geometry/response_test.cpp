@@ -1,5 +1,6 @@
 #include "lapservo/geometry/response.h"
 
+#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -8,7 +9,13 @@ namespace lapservo {
 namespace {
 
 std::vector<Response> responses() {
-  return {{}, {Response::Kind::power, 1}, {Response::Kind::power, 2.2}, {Response::Kind::power, 0.45}};
+  return {{},
+          {Response::Kind::rec709},
+          {Response::Kind::power, 1},
+          {Response::Kind::power, 2.2},
+          {Response::Kind::power, 0.45},
+          {Response::Kind::table, 1, {0, 1}, {0, 1}},
+          {Response::Kind::table, 1, {0, 0.1, 0.4, 1}, {0, 0.3, 0.7, 1}}};
 }
 
 TEST(Response, ValueAndLightRoundTrip) {
@@ -33,6 +40,22 @@ TEST(Response, LinearIsTheIdentityAndSrgbHasItsKnownMiddle) {
   const Response linear{Response::Kind::power, 1};
   EXPECT_EQ(linear.light_from_value(0.3), 0.3);
   EXPECT_NEAR(Response{}.light_from_value(0.5), 0.21404114, 1e-8);
+}
+
+// BT.709 with its three digits.
+TEST(Response, Rec709HasItsKnownValues) {
+  const Response rec709{Response::Kind::rec709};
+  EXPECT_NEAR(rec709.light_from_value(0.5), std::pow(0.599 / 1.099, 1 / 0.45), 2e-4);
+  EXPECT_NEAR(rec709.value_from_light(0.01), 0.045, 1e-12);
+  EXPECT_NEAR(rec709.value_from_light(0.18), 1.099 * std::pow(0.18, 0.45) - 0.099, 2e-4);
+}
+
+TEST(Response, ATableIsStraightBetweenItsPoints) {
+  const Response table{Response::Kind::table, 1, {0, 0.1, 0.4, 1}, {0, 0.3, 0.7, 1}};
+  for (std::size_t i = 0; i < 4; ++i)
+    EXPECT_NEAR(table.light_from_value(table.table_value[i]), table.table_light[i], 1e-15);
+  EXPECT_NEAR(table.light_from_value(0.5), 0.25, 1e-12);
+  EXPECT_NEAR(table.value_from_light(0.7), 0.85, 1e-12);
 }
 
 TEST(Response, TheTableHoldsTheLightOfEachValue) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <chrono>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -10,6 +11,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/video_reader.h"
 
 namespace lapservo {
 namespace {
@@ -23,7 +25,8 @@ class PictureSource : public FrameSource {
   std::optional<Frame> next() override {
     if (next_ == files_.size()) return std::nullopt;
     const fs::path& file = files_[next_];
-    Frame frame{read_image(file), static_cast<int>(next_), static_cast<double>(next_) / fps_, file};
+    Picture picture = read_picture(file);
+    Frame frame{std::move(picture.bgr), static_cast<int>(next_), static_cast<double>(next_) / fps_, file, picture.flaw};
     ++next_;
     return frame;
   }
@@ -38,14 +41,42 @@ class PictureSource : public FrameSource {
   std::size_t next_ = 0;
 };
 
-class CaptureSource : public FrameSource {
+class VideoSource : public FrameSource {
  public:
-  CaptureSource(Kind kind, const std::string& name, cv::VideoCapture capture)
-      : kind_(kind), name_(name), capture_(std::move(capture)) {
+  explicit VideoSource(const std::string& path) : video_(path), first_(video_.next()) {
+    if (!first_) throw InputError(path, "has no frames, expected a video");
+  }
+
+  std::optional<Frame> next() override {
+    auto image = first_ ? std::exchange(first_, std::nullopt) : video_.next();
+    if (!image) return std::nullopt;
+    Frame frame{std::move(image->bgr), index_, index_ / frames_per_second(), {}, {}};
+    ++index_;
+    if (image->damaged) {
+      frame.flaw = Status::damaged;
+    } else if (has_few_colors(frame.bgr)) {
+      frame.flaw = Status::few_colors;
+    }
+    return frame;
+  }
+  Kind kind() const override { return Kind::video; }
+  std::optional<int> frame_count() const override { return video_.frame_count(); }
+  double frames_per_second() const override { return video_.frames_per_second(); }
+  std::string complaint() const override { return video_.complaint(); }
+
+ private:
+  VideoReader video_;
+  std::optional<VideoReader::Image> first_;
+  int index_ = 0;
+};
+
+class LiveSource : public FrameSource {
+ public:
+  LiveSource(const std::string& name, cv::VideoCapture capture) : name_(name), capture_(std::move(capture)) {
     const double fps = capture_.get(cv::CAP_PROP_FPS);
     if (fps > 0 && fps < 10000) fps_ = fps;
     first_ = read();
-    if (!first_) throw InputError(name_, kind_ == Kind::video ? "has no frames, expected a video" : "gives no frames");
+    if (!first_) throw InputError(name_, "gives no frames, expected a camera or stream");
   }
 
   std::optional<Frame> next() override {
@@ -53,16 +84,12 @@ class CaptureSource : public FrameSource {
     if (!image) return std::nullopt;
     const auto now = std::chrono::steady_clock::now();
     if (index_ == 0) start_ = now;
-    Frame frame{std::move(*image), index_, 0, {}};
-    frame.time_s = kind_ == Kind::live ? std::chrono::duration<double>(now - start_).count() : index_ / fps_;
+    Frame frame{std::move(*image), index_, std::chrono::duration<double>(now - start_).count(), {}, {}};
     ++index_;
     return frame;
   }
-  Kind kind() const override { return kind_; }
-  std::optional<int> frame_count() const override {
-    const double count = kind_ == Kind::video ? capture_.get(cv::CAP_PROP_FRAME_COUNT) : 0;
-    return count > 0 && count < 1e9 ? std::optional(static_cast<int>(count)) : std::nullopt;
-  }
+  Kind kind() const override { return Kind::live; }
+  std::optional<int> frame_count() const override { return std::nullopt; }
   double frames_per_second() const override { return fps_; }
 
  private:
@@ -76,7 +103,6 @@ class CaptureSource : public FrameSource {
     return bgr8_from(image, name_).clone();
   }
 
-  Kind kind_;
   std::string name_;
   cv::VideoCapture capture_;
   std::optional<cv::Mat> first_;
@@ -87,16 +113,21 @@ class CaptureSource : public FrameSource {
 
 std::vector<fs::path> pictures_in(const fs::path& folder) {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
+  std::error_code error;
+  const fs::directory_iterator entries(folder, error);
+  if (error)
+    throw InputError(folder.string(), "can't be read (" + error.message() + "), expected a folder of pictures");
+  for (const auto& entry : entries) {
     const bool hidden = entry.path().filename().string().starts_with(".");
-    if (!hidden && entry.is_regular_file() && has_image_extension(entry.path())) files.push_back(entry.path());
+    if (!hidden && entry.is_regular_file(error) && has_image_extension(entry.path())) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
-  if (files.empty()) throw InputError(folder.string(), "has no pictures (png, jpg, bmp, tif, webp, ppm)");
+  if (files.empty())
+    throw InputError(folder.string(), "has no pictures, expected some (png, jpg, bmp, tif, webp, ppm)");
   return files;
 }
 
-cv::VideoCapture open_capture(const std::string& input, FrameSource::Kind kind) {
+cv::VideoCapture open_capture(const std::string& input) {
   cv::VideoCapture capture;
   try {
     const bool index =
@@ -109,9 +140,7 @@ cv::VideoCapture open_capture(const std::string& input, FrameSource::Kind kind) 
   } catch (const cv::Exception&) {
     capture.release();
   }
-  if (!capture.isOpened())
-    throw InputError(input, kind == FrameSource::Kind::video ? "can't be read, expected a picture or a video"
-                                                             : "can't be opened as a camera or stream");
+  if (!capture.isOpened()) throw InputError(input, "can't be opened, expected a camera or stream");
   return capture;
 }
 
@@ -125,15 +154,17 @@ bool is_live(const std::string& input) {
 
 std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps) {
   using Kind = FrameSource::Kind;
-  if (is_live(input)) return std::make_unique<CaptureSource>(Kind::live, input, open_capture(input, Kind::live));
-  if (!fs::exists(input))
+  if (is_live(input)) return std::make_unique<LiveSource>(input, open_capture(input));
+  std::error_code error;  // of a name that no file can have, or a folder that may not be looked into
+  if (!fs::exists(input, error))
     throw InputError(input, "does not exist, expected a picture, a folder of pictures or a video");
   if (fs::is_directory(input)) return std::make_unique<PictureSource>(Kind::folder, pictures_in(input), folder_fps);
   if (fs::is_regular_file(input) && fs::file_size(input) == 0)
     throw InputError(input, "is empty, expected a picture or a video");
   if (has_image_extension(input))
     return std::make_unique<PictureSource>(Kind::image, std::vector<fs::path>{input}, folder_fps);
-  return std::make_unique<CaptureSource>(Kind::video, input, open_capture(input, Kind::video));
+  if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected a picture, a folder or a video");
+  return std::make_unique<VideoSource>(input);
 }
 
 }  // namespace lapservo

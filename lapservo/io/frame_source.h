@@ -7,6 +7,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/vision/observation.h"
+
 namespace lapservo {
 
 struct Frame {
@@ -14,6 +16,7 @@ struct Frame {
   int index = 0;               ///< from 0
   double time_s = 0;           ///< since the first frame
   std::filesystem::path file;  ///< the picture's path; empty for videos and cameras
+  std::optional<Status> flaw;  ///< why nothing is to be measured in it
 };
 
 /// Frames of a picture, a folder of pictures (sorted by name), a video file, a camera ("0", "/dev/video0") or a stream
@@ -29,6 +32,8 @@ class FrameSource {
   /// Where it is known beforehand.
   virtual std::optional<int> frame_count() const = 0;
   virtual double frames_per_second() const = 0;
+  /// After the end: what is wrong with the file as a whole, for example that it ends early; empty when nothing is.
+  virtual std::string complaint() const { return {}; }
 };
 
 /// `folder_fps` gives the pictures of a folder their times. Throws InputError when there is nothing to read: a missing

@@ -5,23 +5,24 @@
 #include <cctype>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/input_file.h"
+#include "lapservo/io/exif_orientation.h"
+#include "lapservo/io/jpeg_picture.h"
+#include "lapservo/io/png_picture.h"
 
 namespace lapservo {
 namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t largest_side_px = 16384;
+constexpr std::size_t largest_bytes = std::size_t{256} << 20;
 
 bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
@@ -66,19 +67,47 @@ void check_size(const PictureSize& size, const std::string& source) {
                      "at most 16384 pixels a side");
 }
 
+bool is_png(std::span<const std::uint8_t> bytes) {
+  return starts_with(bytes, std::string_view("\x89PNG\r\n\x1a\n", 8));
+}
+
+bool is_jpeg(std::span<const std::uint8_t> bytes) {
+  return starts_with(bytes, "\xff\xd8");
+}
+
 // Decoders return half a picture for half a file, and fill gigabytes for a few bytes: ask for end and size beforehand.
 void check_whole(std::span<const std::uint8_t> bytes, const std::string& source) {
   using namespace std::string_view_literals;
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  if (starts_with(bytes, "\x89PNG\r\n\x1a\n"sv)) {
+  if (is_png(bytes)) {
     if (bytes.size() < 33 || text.rfind("IEND"sv) == std::string_view::npos)
       throw InputError(source, "is a truncated PNG, expected a whole picture");
     check_size(png_size(bytes), source);
   }
-  if (starts_with(bytes, "\xff\xd8"sv)) {
+  if (is_jpeg(bytes)) {
     if (text.rfind("\xff\xd9"sv) == std::string_view::npos)
       throw InputError(source, "is a truncated JPEG, expected a whole picture");
     check_size(jpeg_size(bytes), source);
+  }
+}
+
+std::vector<std::uint8_t> encode_image(const fs::path& name, const cv::Mat& image) {
+  std::vector<std::uint8_t> bytes;
+  try {
+    if (has_image_extension(name) && cv::imencode(name.extension().string(), image, bytes)) return bytes;
+  } catch (const cv::Exception&) {
+  }
+  throw InputError(name.string(), "can't be written as a picture");
+}
+
+DecodedPicture decode(std::span<const std::uint8_t> bytes) {
+  if (is_png(bytes)) return decode_png(bytes);
+  if (is_jpeg(bytes)) return decode_jpeg(bytes);
+  try {
+    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
+    return {cv::imdecode(buffer, cv::IMREAD_UNCHANGED), ""};
+  } catch (const cv::Exception&) {
+    return {};
   }
 }
 
@@ -115,43 +144,65 @@ cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
   }
 }
 
-cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source) {
+bool has_few_colors(const cv::Mat& bgr) {
+  constexpr int palette = 256;
+  std::vector<bool> seen(std::size_t{1} << 24);
+  int colors = 0;
+  bool any_color = false;
+  for (int v = 0; v < bgr.rows; ++v)
+    for (int u = 0; u < bgr.cols; ++u) {
+      const auto& p = bgr.at<cv::Vec3b>(v, u);
+      const std::size_t color = std::size_t{p[0]} | std::size_t{p[1]} << 8 | std::size_t{p[2]} << 16;
+      if (seen[color]) continue;
+      seen[color] = true;
+      any_color = any_color || p[0] != p[1] || p[1] != p[2];
+      if (++colors > palette) return false;
+    }
+  return any_color;
+}
+
+Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (bytes.empty()) throw InputError(source, "is empty, expected a picture");
   check_whole(bytes, source);
-  cv::Mat image;
-  try {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
-    image = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
-    image.release();
+  if (const auto orientation = exif_orientation(bytes); orientation && *orientation != 1)
+    throw InputError(source, "EXIF orientation", std::to_string(*orientation),
+                     "1: the pixels as the calibrated camera has them, not to be turned");
+  DecodedPicture decoded = decode(bytes);
+  if (decoded.bgr.empty()) throw InputError(source, "can't be decoded, expected a picture");
+  Picture picture{bgr8_from(decoded.bgr, source), std::nullopt};
+  if (!decoded.complaint.empty()) {
+    picture.flaw = Status::damaged;
+  } else if (has_few_colors(picture.bgr)) {
+    picture.flaw = Status::few_colors;
   }
-  if (image.empty()) throw InputError(source, "can't be decoded, expected a picture");
-  return bgr8_from(image, source);
+  return picture;
+}
+
+cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source) {
+  const Picture picture = decode_picture(bytes, source);
+  if (picture.flaw == Status::damaged) throw InputError(source, "is damaged, expected a whole picture");
+  return picture.bgr;
+}
+
+Picture read_picture(const fs::path& path) {
+  const std::string bytes = read_input(path, largest_bytes, "a picture");
+  return decode_picture({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, path.string());
 }
 
 cv::Mat read_image(const fs::path& path) {
-  if (fs::is_directory(path)) throw InputError(path.string(), "is a folder, expected a picture");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path.string(), "can't be opened, expected a picture");
-  const std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  return decode_image(bytes, path.string());
+  const std::string bytes = read_input(path, largest_bytes, "a picture");
+  return decode_image({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, path.string());
 }
 
 void write_image(const fs::path& path, const cv::Mat& image) {
-  const fs::path temporary = temporary_name(path);
-  bool written = false;
-  try {
-    written = cv::imwrite(temporary.string(), image);
-  } catch (const cv::Exception&) {
-    written = false;
-  }
-  std::error_code error;
-  if (written) fs::rename(temporary, path, error);
-  if (!written || error) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw InputError(path.string(), "can't be written as a picture");
-  }
+  AtomicFile file(path);
+  write_image(file, path, image);
+}
+
+void write_image(AtomicFile& file, const fs::path& name, const cv::Mat& image) {
+  const auto bytes = encode_image(name, image);
+  file.stream().write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.commit();
 }
 
 }  // namespace lapservo

@@ -1,27 +1,49 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 
 #include <opencv2/core.hpp>
+
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/vision/observation.h"
 
 namespace lapservo {
 
 /// Whether the name ends like a picture's (png, jpg, jpeg, bmp, tif, tiff, webp, ppm, pgm).
 bool has_image_extension(const std::filesystem::path& path);
 
-/// Decodes a picture to 8-bit BGR. Grey is repeated over the channels, alpha dropped, 16-bit rounded to 8; EXIF
-/// rotation is ignored, as the camera's calibration refers to the pixels as stored. Throws InputError for anything that
-/// isn't a whole picture: empty, truncated (PNG without its end chunk, JPEG without its end marker), not decodable,
-/// other pixel types.
+/// A picture in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained, `few_colors`
+/// when it has no more colours than a palette.
+struct Picture {
+  cv::Mat bgr;
+  std::optional<Status> flaw;
+};
+
+/// Decodes a picture. Grey is repeated over the channels, alpha dropped, 16-bit rounded to 8. Throws InputError for
+/// anything that isn't a whole picture of the camera's pixels: empty, larger than 256 MiB, truncated (PNG without its
+/// end chunk, JPEG without its end marker), not decodable, other pixel types, or to be turned by EXIF, as a calibration
+/// belongs to the pixels in one orientation and nobody can tell to which.
+Picture read_picture(const std::filesystem::path& path);
+Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source);
+
+/// The same for pictures that must be without flaw: else InputError.
 cv::Mat read_image(const std::filesystem::path& path);
 cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source);
+
+/// Whether an 8-bit BGR picture has colours, but no more than a palette (256): each then stands for many, and the edges
+/// between them are not where the light's were.
+bool has_few_colors(const cv::Mat& bgr);
 
 /// 8-bit BGR of any supported pixel type, as above.
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source);
 
-/// Writes under a temporary name, then renames. Throws InputError when that fails.
+/// Writes whole or not at all: see AtomicFile. Throws InputError when that fails.
 void write_image(const std::filesystem::path& path, const cv::Mat& image);
+/// The same into a file that is open already; `name` says the format by its ending.
+void write_image(AtomicFile& file, const std::filesystem::path& name, const cv::Mat& image);
 
 }  // namespace lapservo

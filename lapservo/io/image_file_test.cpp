@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
@@ -89,16 +90,82 @@ TEST(Image, SixteenBitsAreRoundedToEight) {
         EXPECT_NEAR(bgr.at<cv::Vec3b>(v, u)[c], deep.at<cv::Vec3w>(v, u)[c] / 257.0, 0.5001) << "seed " << seed;
 }
 
-// The camera's calibration refers to the pixels as stored.
-TEST(Image, ExifDoesNotTurnIt) {
+// Which of the two orientations the camera was calibrated in, nobody can tell.
+TEST(Image, ThatExifWouldTurnIsRefused) {
   const cv::Mat wide(16, 48, CV_8UC3, cv::Scalar(20, 120, 220));
-  Bytes jpeg = encoded(wide, ".jpg");
-  // APP1 after the start marker: TIFF, one entry, orientation (0x0112) 6: to be turned by 90 degrees.
-  const Bytes exif{0xff, 0xe1, 0,    34,   'E', 'x', 'i', 'f', 0, 0, 'M', 'M', 0, 42, 0, 0, 0, 8,
-                   0,    1,    0x01, 0x12, 0,   3,   0,   0,   0, 1, 0,   6,   0, 0,  0, 0, 0, 0};
-  jpeg.insert(jpeg.begin() + 2, exif.begin(), exif.end());
-  ASSERT_EQ(cv::imdecode(jpeg, cv::IMREAD_COLOR).cols, 16) << "the test's own EXIF block is not understood";
-  EXPECT_EQ(decode_image(jpeg, "p").size(), wide.size());
+  const Bytes plain = encoded(wide, ".jpg");
+  for (const std::uint8_t orientation : {1, 3, 6, 8}) {
+    Bytes jpeg = plain;
+    // APP1 after the start marker: TIFF, one entry, orientation (0x0112).
+    const Bytes exif{0xff, 0xe1, 0,    34,   'E', 'x', 'i', 'f', 0, 0, 'M', 'M',         0, 42, 0, 0, 0, 8,
+                     0,    1,    0x01, 0x12, 0,   3,   0,   0,   0, 1, 0,   orientation, 0, 0,  0, 0, 0, 0};
+    jpeg.insert(jpeg.begin() + 2, exif.begin(), exif.end());
+    EXPECT_EQ(cv::imdecode(jpeg, cv::IMREAD_COLOR).cols, orientation > 4 ? 16 : 48) << "the test's own EXIF block";
+    if (orientation == 1)
+      EXPECT_EQ(decode_image(jpeg, "p").size(), wide.size());
+    else
+      EXPECT_EQ(refusal(jpeg), "p: EXIF orientation: is " + std::to_string(orientation) +
+                                   ", expected 1: the pixels as the calibrated camera has them, not to be turned");
+  }
+}
+
+TEST(Image, JpegsAreDecodedAsOpenCvDoes) {
+  Random random(seed);
+  for (const int type : {CV_8UC1, CV_8UC3}) {
+    const Bytes jpeg = encoded(random_image<std::uint8_t>(37, 51, type, random), ".jpg");
+    EXPECT_TRUE(same(decode_image(jpeg, "p"), cv::imdecode(jpeg, cv::IMREAD_COLOR)));
+  }
+}
+
+// A picture with smooth shades, as cameras see, so that a flipped bit matters.
+cv::Mat shades() {
+  cv::Mat image(120, 160, CV_8UC3);
+  for (int v = 0; v < image.rows; ++v)
+    for (int u = 0; u < image.cols; ++u)
+      image.at<cv::Vec3b>(v, u) = cv::Vec3b(static_cast<std::uint8_t>(u + 20), static_cast<std::uint8_t>(2 * v),
+                                            static_cast<std::uint8_t>((u * v) >> 7));
+  return image;
+}
+
+TEST(Image, ThatItsDecoderComplainsOfIsDamaged) {
+  Random random(seed);
+  const Bytes jpeg = encoded(shades(), ".jpg");
+  EXPECT_FALSE(decode_picture(jpeg, "p").flaw);
+  Bytes shortened = jpeg;  // the last quarter of the scan is gone, but the end marker is there
+  shortened.erase(shortened.end() - static_cast<std::ptrdiff_t>(jpeg.size() / 4), shortened.end() - 2);
+  EXPECT_EQ(decode_picture(shortened, "p").flaw, Status::damaged);
+  EXPECT_EQ(refusal(shortened), "p: is damaged, expected a whole picture");
+}
+
+// Every byte of a PNG is under a checksum.
+TEST(Image, AnyChangedBitOfAPngIsNoticed) {
+  Random random(seed);
+  const Bytes png = encoded(shades(), ".png");
+  EXPECT_FALSE(decode_picture(png, "p").flaw);
+  for (int i = 0; i < 300; ++i) {
+    Bytes changed = png;
+    const std::size_t at = 8 + random.bits() % (png.size() - 8 - 12);
+    changed[at] ^= static_cast<std::uint8_t>(1U << random.bits() % 8);
+    bool noticed = false;
+    try {
+      noticed = decode_picture(changed, "p").flaw == Status::damaged;
+    } catch (const InputError&) {
+      noticed = true;
+    }
+    EXPECT_TRUE(noticed) << "byte " << at << " of " << png.size() << ", seed " << seed;
+  }
+}
+
+TEST(Image, OfNoMoreColoursThanAPaletteIsFlagged) {
+  cv::Mat few = shades();
+  for (int v = 0; v < few.rows; ++v)
+    for (int u = 0; u < few.cols; ++u)
+      for (int c = 0; c < 3; ++c) few.at<cv::Vec3b>(v, u)[c] &= 0xc0;
+  EXPECT_TRUE(has_few_colors(few));
+  EXPECT_EQ(decode_picture(encoded(few, ".png"), "p").flaw, Status::few_colors);
+  EXPECT_FALSE(has_few_colors(shades()));
+  const cv::Mat grey(20, 20, CV_8UC3, cv::Scalar::all(90));
+  EXPECT_FALSE(has_few_colors(grey)) << "without colours there is no marker to be wrong about";
 }
 
 TEST(Image, IsRefusedWhereverTheFileIsCut) {
@@ -141,7 +208,7 @@ TEST(Image, IsRefusedWhenItClaimsToBeEnormous) {
   Bytes jpeg = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(7)), ".jpg");
   const Bytes application{0xff, 0xe5, 0, 11, 0xff, 0xc0, 0, 8, 8, 255, 255, 255, 255, 0x12, 0x34};
   jpeg.insert(jpeg.begin() + 2, application.begin(), application.end());
-  EXPECT_EQ(refusal(jpeg), "");
+  EXPECT_EQ(refusal(jpeg), "p: is damaged, expected a whole picture");
   for (const std::uint8_t frame : {0xc0, 0xc1, 0xc2}) {
     Bytes huge = jpeg;
     const Bytes baseline{0xff, 0xc0, 0, 17};
@@ -165,10 +232,12 @@ TEST(Image, ThatCanNotBeWrittenIsNamedAndLeavesNothing) {
   const TemporaryFolder folder;
   const cv::Mat image(4, 4, CV_8UC3, cv::Scalar::all(7));
   std::filesystem::create_directory(folder / "taken.png");
-  for (const char* name : {"none/a.png", "a.xyz", "a", "taken.png"}) {
-    const std::string path = (folder / name).string();
-    EXPECT_EQ(input_error([&] { write_image(path, image); }), path + ": can't be written as a picture");
-  }
+  const auto said = [&](const char* name) { return input_error([&] { write_image(folder / name, image); }); };
+  const std::string place = folder.path().string() + "/";
+  for (const std::string name : {"a.xyz", "a"})
+    EXPECT_EQ(said(name.c_str()), place + name + ": can't be written as a picture");
+  EXPECT_EQ(said("none/a.png"), place + "none/a.png: can't be written: No such file or directory");
+  EXPECT_EQ(said("taken.png"), place + "taken.png: is a folder, expected a file to write");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the folder";
 }
 

@@ -55,13 +55,11 @@ std::string observation_csv_row(int frame, double time_s, const std::string& fil
   return row;
 }
 
-ObservationCsv::ObservationCsv(const std::filesystem::path& path) : file_(path) {
-  file_.stream() << observation_csv_header << '\n';
-}
+ObservationCsv::ObservationCsv(const std::filesystem::path& path) : file_(path, observation_csv_header) {}
 
 void ObservationCsv::add(int frame, double time_s, const std::string& file, const std::string& instrument,
                          const Observation& observation) {
-  file_.stream() << observation_csv_row(frame, time_s, file, instrument, observation) << '\n';
+  file_.add(observation_csv_row(frame, time_s, file, instrument, observation));
 }
 
 }  // namespace lapservo

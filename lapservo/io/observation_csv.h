@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/row_file.h"
 #include "lapservo/vision/observation.h"
 
 namespace lapservo {
@@ -15,17 +15,18 @@ extern const char* const observation_csv_header;
 std::string observation_csv_row(int frame, double time_s, const std::string& file, const std::string& instrument,
                                 const Observation& observation);
 
-/// A CSV of observations that appears under its name when committed.
+/// A CSV of observations that appears under its name when committed; until then see RowFile.
 class ObservationCsv {
  public:
   /// Throws InputError at once when `path` can't be written.
   explicit ObservationCsv(const std::filesystem::path& path);
   void add(int frame, double time_s, const std::string& file, const std::string& instrument,
            const Observation& observation);
+  /// Throws InputError when it could not be written to its end.
   void commit() { file_.commit(); }
 
  private:
-  AtomicFile file_;
+  RowFile file_;
 };
 
 }  // namespace lapservo

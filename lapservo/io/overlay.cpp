@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -9,12 +10,14 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/features.h"
 
 namespace lapservo {
 namespace {
 
 const cv::Scalar white(255, 255, 255), dark(20, 20, 20), outline_color(255, 255, 255), boundary_color(40, 220, 255),
-    axis_color(80, 80, 255);
+    axis_color(80, 80, 255), rcm_color(255, 200, 80), refused_color(60, 140, 255);
+constexpr double line_height = 30;  // of labels
 
 // Draws at a sixteenth of a pixel, thinner on small frames.
 class Pen {
@@ -26,6 +29,24 @@ class Pen {
     for (const Eigen::Vector2d& p : points) fixed.push_back(at(p));
     cv::polylines(canvas_, fixed, false, dark, thickness(width) + 2, cv::LINE_AA, bits);
     cv::polylines(canvas_, fixed, false, color, thickness(width), cv::LINE_AA, bits);
+  }
+  void dashes(const std::vector<Eigen::Vector2d>& points, const cv::Scalar& color) {
+    const double dash_px = 7 * scale_;
+    double along_px = 0;
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      const Eigen::Vector2d step = points[i] - points[i - 1];
+      const int parts = std::clamp(static_cast<int>(step.norm() / dash_px * 4), 1, most_parts);
+      for (int part = 0; part < parts; ++part) {
+        if (std::fmod(along_px, 2 * dash_px) < dash_px)
+          polyline({points[i - 1] + step * part / parts, points[i - 1] + step * (part + 1) / parts}, color);
+        along_px += step.norm() / parts;
+      }
+    }
+  }
+  void cross(const Eigen::Vector2d& p, const cv::Scalar& color) {
+    const double arm = 6 * scale_;
+    polyline({p - Eigen::Vector2d(arm, arm), p + Eigen::Vector2d(arm, arm)}, color);
+    polyline({p - Eigen::Vector2d(arm, -arm), p + Eigen::Vector2d(arm, -arm)}, color);
   }
   void dot(const Eigen::Vector2d& p, const cv::Scalar& color) {
     const int radius = static_cast<int>(3.5 * scale_ * (1 << bits));
@@ -58,7 +79,7 @@ class Pen {
   double scale() const { return scale_; }
 
  private:
-  static constexpr int bits = 4;
+  static constexpr int bits = 4, most_parts = 2000;
   cv::Point at(const Eigen::Vector2d& p) const {
     const auto fixed = [](double x) { return static_cast<int>(std::lround(std::clamp(x, -2e4, 2e4) * (1 << bits))); };
     return {fixed(p.x()), fixed(p.y())};
@@ -69,50 +90,117 @@ class Pen {
   double scale_;
 };
 
-void draw_instrument(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation& o) {
-  const Marker& marker = instrument.marker;
-  const auto view = view_cylinder(o.camera_from_unrolled, marker.radius_m());
-  if (!view) return;
-  const auto image = [&](double azimuth_rad, double along_m) {
-    return camera.raw_from_point(o.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m));
-  };
-  constexpr int steps = 48;
-  const double length_m = marker.length_m();
-  for (const double side : {-1.0, 1.0}) {
-    std::vector<Eigen::Vector2d> line;
-    for (int i = 0; i <= steps; ++i)
-      line.push_back(
-          image(view->facing_azimuth_rad + side * view->half_visible_rad, length_m * (-0.15 + 1.3 * i / steps)));
-    pen.polyline(line, outline_color);
+enum class Style { found, refused };
+
+// The marker where a pose has it: the shaft's sides and the boundaries over the visible surface.
+class DrawnMarker {
+ public:
+  DrawnMarker(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled, double psi_rad)
+      : camera_(camera),
+        marker_(marker),
+        camera_from_unrolled_(camera_from_unrolled),
+        psi_rad_(psi_rad),
+        view_(view_cylinder(camera_from_unrolled, marker.radius_m())) {}
+
+  bool visible() const { return view_.has_value(); }
+  /// `across` runs over the visible surface from -1, one side, to 1, the other.
+  Eigen::Vector2d at(double across, double along_m) const {
+    return camera_.raw_from_point(camera_from_unrolled_ *
+                                  surface_point(marker_.radius_m(), azimuth_rad(across), along_m));
   }
-  for (std::size_t k = 0; k < 4; ++k) {
+  void draw_sides(Pen& pen, Style style) const {
+    for (const double side : {-1.0, 1.0}) {
+      std::vector<Eigen::Vector2d> line;
+      for (int i = 0; i <= steps; ++i) line.push_back(at(side, marker_.length_m() * (-0.15 + 1.3 * i / steps)));
+      stroke(pen, line, style, outline_color);
+    }
+  }
+  void draw_boundary(Pen& pen, std::size_t k, Style style) const {
     std::vector<Eigen::Vector2d> curve;
     double last_tau = -1;
     for (int i = 0; i <= steps; ++i) {
-      const double azimuth_rad = view->facing_azimuth_rad + view->half_visible_rad * (2.0 * i / steps - 1);
-      const double tau = wrap_two_pi(azimuth_rad - o.psi_rad - marker.seam_rad);
+      const double across = 2.0 * i / steps - 1;
+      const double tau = wrap_two_pi(azimuth_rad(across) - psi_rad_ - marker_.seam_rad);
       if (last_tau >= 0 && std::abs(tau - last_tau) > pi) {  // the seam: boundaries jump there
-        pen.polyline(curve, boundary_color);
+        stroke(pen, curve, style, boundary_color);
         curve.clear();
       }
       last_tau = tau;
-      curve.push_back(image(azimuth_rad, boundaries_m(marker, tau)[k]));
+      curve.push_back(at(across, boundaries_m(marker_, tau)[k]));
     }
-    pen.polyline(curve, boundary_color);
+    stroke(pen, curve, style, boundary_color);
   }
+
+ private:
+  static constexpr int steps = 48;
+  double azimuth_rad(double across) const { return view_->facing_azimuth_rad + across * view_->half_visible_rad; }
+  static void stroke(Pen& pen, const std::vector<Eigen::Vector2d>& line, Style style, const cv::Scalar& color) {
+    style == Style::found ? pen.polyline(line, color) : pen.dashes(line, refused_color);
+  }
+
+  const Camera& camera_;
+  const Marker& marker_;
+  Rigid3 camera_from_unrolled_;
+  double psi_rad_;
+  std::optional<CylinderView> view_;
+};
+
+// The RCM's image and r, when it lies in the picture.
+void draw_rcm(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation& o) {
+  if (!instrument.camera_from_rcm || !(instrument.camera_from_rcm->translation.z() > 0)) return;
+  const auto ideal_px = projected_rcm_px(camera, *instrument.camera_from_rcm);
+  if (!ideal_px) return;
+  const Eigen::Vector2d px = camera.raw_from_ideal(*ideal_px);
+  if (!(px.x() >= 0 && px.x() < camera.width_px && px.y() >= 0 && px.y() < camera.height_px)) return;
+  pen.dashes({px, o.edges_raw_px[0]}, rcm_color);
+  pen.cross(px, rcm_color);
+  pen.label("RCM", px + Eigen::Vector2d(12, -8) * pen.scale());
+}
+
+std::string rotation_text(const Observation& o) {
+  return o.rcm ? fmt::format("psi {:+.1f} deg  +-{:.2f}", deg_from_rad(o.rcm->q.psi_rad),
+                             deg_from_rad(std::sqrt(o.rcm->covariance(3, 3))))
+               : fmt::format("tau {:.1f} deg  +-{:.2f}", deg_from_rad(o.tau_rad), deg_from_rad(o.sigma_tau_rad));
+}
+
+std::string features_text(const Features& f) {
+  const std::string r = f.r_px ? fmt::format("{:.1f}", *f.r_px) : "-";
+  return fmt::format("s {:.1f} deg  r {}  l {:.1f}  d {:.1f} px", deg_from_rad(f.s_rad), r, f.l_px, f.d_px);
+}
+
+void draw_found(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation& o) {
+  const DrawnMarker marker(camera, instrument.marker, o.camera_from_unrolled, o.psi_rad);
+  if (!marker.visible()) return;
+  marker.draw_sides(pen, Style::found);
+  for (std::size_t k = 0; k < 4; ++k) marker.draw_boundary(pen, k, Style::found);
+  draw_rcm(pen, camera, instrument, o);
   const Eigen::Vector2d proximal = o.edges_raw_px[0], distal = o.edges_raw_px[3];
   pen.arrow(proximal, distal + 0.25 * (distal - proximal), axis_color);
   for (const Eigen::Vector2d& edge : o.edges_raw_px) pen.dot(edge, boundary_color);
 
-  const std::string rotation =
-      o.rcm ? fmt::format("psi {:+.1f} deg  +-{:.2f}", deg_from_rad(o.rcm->q.psi_rad),
-                          deg_from_rad(std::sqrt(o.rcm->covariance(3, 3))))
-            : fmt::format("tau {:.1f} deg  +-{:.2f}", deg_from_rad(o.tau_rad), deg_from_rad(o.sigma_tau_rad));
   const Eigen::Vector2d along = (distal - proximal).normalized();
-  const double width_px = (image(view->facing_azimuth_rad + view->half_visible_rad, 0) - proximal).norm();
+  const double width_px = (marker.at(1, 0) - proximal).norm();
   const Eigen::Vector2d beside(std::abs(along.y()) * (width_px + 14 * pen.scale()),
                                std::abs(along.x()) * (width_px + 22 * pen.scale()));
-  pen.label(instrument.name + "  " + rotation, (proximal + distal) / 2 + beside);
+  const Eigen::Vector2d place = (proximal + distal) / 2 + beside;
+  pen.label(instrument.name + "  " + rotation_text(o), place);
+  pen.label(features_text(o.features), place + Eigen::Vector2d(0, line_height * pen.scale()));
+}
+
+// What was taken for the marker, in another style.
+void draw_refused(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation::Refused& refused) {
+  using What = Observation::Refused::What;
+  if (refused.what == What::pose) {
+    const DrawnMarker marker(camera, instrument.marker, refused.camera_from_unrolled, refused.psi_rad);
+    if (marker.visible()) {
+      marker.draw_sides(pen, Style::refused);
+      for (std::size_t k = 0; k < 4; ++k) marker.draw_boundary(pen, k, Style::refused);
+    }
+  }
+  if (refused.what == What::edges) {
+    pen.dashes({refused.edges_raw_px.front(), refused.edges_raw_px.back()}, refused_color);
+    for (const Eigen::Vector2d& edge : refused.edges_raw_px) pen.cross(edge, refused_color);
+  }
 }
 
 }  // namespace
@@ -122,13 +210,16 @@ cv::Mat draw_overlay(const cv::Mat& bgr, const Rig& rig, const std::vector<Obser
   Pen pen(canvas);
   double status_y = 26 * pen.scale();
   for (std::size_t i = 0; i < observations.size(); ++i) {
-    if (observations[i].status == Status::ok) {
-      draw_instrument(pen, rig.camera, rig.instruments[i], observations[i]);
+    const Observation& o = observations[i];
+    if (o.status == Status::ok) {
+      draw_found(pen, rig.camera, rig.instruments[i], o);
       continue;
     }
-    pen.label(fmt::format("{}: {}", rig.instruments[i].name, status_word(observations[i].status)),
+    const bool seen = o.refused.what != Observation::Refused::What::nothing;
+    if (seen) draw_refused(pen, rig.camera, rig.instruments[i], o.refused);
+    pen.label(fmt::format("{}: {}{}", rig.instruments[i].name, status_word(o.status), seen ? " (dashed)" : ""),
               {12 * pen.scale(), status_y});
-    status_y += 30 * pen.scale();
+    status_y += line_height * pen.scale();
   }
   return canvas;
 }

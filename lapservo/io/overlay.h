@@ -10,8 +10,9 @@
 namespace lapservo {
 
 /// The frame with what was observed drawn in: the marker's outline, its colour boundaries over the visible surface, the
-/// centre line with e0..e3, an arrow towards the tip, and a label with the rotation and its sigma, or why there is
-/// none.
+/// centre line with e0..e3, an arrow towards the tip, the RCM's image and the way to it (r) when it lies in the
+/// picture, and labels with the rotation, its sigma and the features s, r, l, d. Of a refused frame: why, and in dashes
+/// what was taken for the marker.
 cv::Mat draw_overlay(const cv::Mat& bgr, const Rig& rig, const std::vector<Observation>& observations);
 
 }  // namespace lapservo

@@ -3,10 +3,9 @@
 #include <cairo-pdf.h>
 #include <cairo-svg.h>
 #include <cmath>
-#include <system_error>
+#include <ostream>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo {
@@ -14,18 +13,22 @@ namespace {
 
 constexpr double points_per_mm = 72 / 25.4, png_px_per_mm = 8;
 
+cairo_status_t write_to_stream(void* stream, const unsigned char* bytes, unsigned int count) {
+  static_cast<std::ostream*>(stream)->write(reinterpret_cast<const char*>(bytes), count);
+  return CAIRO_STATUS_SUCCESS;  // the stream knows better, and is asked in the end
+}
+
 }  // namespace
 
-Canvas::Canvas(const std::filesystem::path& path, double width_mm, double height_mm)
-    : path_(path), temporary_(temporary_name(path)) {
+Canvas::Canvas(const std::filesystem::path& path, double width_mm, double height_mm) : path_(path), file_(path) {
   const std::string extension = path.extension().string();
   double unit = 1;
   if (extension == ".svg") {
-    surface_ = cairo_svg_surface_create(temporary_.c_str(), width_mm, height_mm);
+    surface_ = cairo_svg_surface_create_for_stream(write_to_stream, &file_.stream(), width_mm, height_mm);
     cairo_svg_surface_set_document_unit(surface_, CAIRO_SVG_UNIT_MM);
   } else if (extension == ".pdf") {
     unit = points_per_mm;
-    surface_ = cairo_pdf_surface_create(temporary_.c_str(), width_mm * unit, height_mm * unit);
+    surface_ = cairo_pdf_surface_create_for_stream(write_to_stream, &file_.stream(), width_mm * unit, height_mm * unit);
   } else if (extension == ".png") {
     unit = png_px_per_mm;
     png_ = true;
@@ -39,7 +42,7 @@ Canvas::Canvas(const std::filesystem::path& path, double width_mm, double height
   if (cairo_surface_status(surface_) != CAIRO_STATUS_SUCCESS) {
     cairo_destroy(cairo_);
     cairo_surface_destroy(surface_);
-    throw InputError(path.string(), "can't be written: does its folder exist?");
+    throw InputError(path.string(), "can't be drawn");
   }
   cairo_scale(cairo_, unit, unit);
   polygon({{0, 0}, {width_mm, 0}, {width_mm, height_mm}, {0, height_mm}}, {1, 1, 1});
@@ -48,8 +51,6 @@ Canvas::Canvas(const std::filesystem::path& path, double width_mm, double height
 Canvas::~Canvas() {
   if (cairo_) cairo_destroy(cairo_);
   if (surface_) cairo_surface_destroy(surface_);
-  std::error_code ignored;
-  std::filesystem::remove(temporary_, ignored);
 }
 
 void Canvas::polygon(const std::vector<PointMm>& points, const PrintColor& fill) {
@@ -70,17 +71,22 @@ void Canvas::line(const std::vector<PointMm>& points, const PrintColor& color, d
   cairo_stroke(cairo_);
 }
 
-void Canvas::text(const std::string& text, PointMm at, double height_mm, Anchor anchor, double turn_deg) {
-  cairo_set_source_rgb(cairo_, 0, 0, 0);
+double Canvas::text_width_mm(const std::string& text, double height_mm) {
   cairo_select_font_face(cairo_, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
   cairo_set_font_size(cairo_, height_mm * 1.35);
   cairo_text_extents_t extents;
   cairo_text_extents(cairo_, text.c_str(), &extents);
+  return extents.x_advance;
+}
+
+void Canvas::text(const std::string& text, PointMm at, double height_mm, Anchor anchor, double turn_deg) {
+  const double width_mm = text_width_mm(text, height_mm);
+  cairo_set_source_rgb(cairo_, 0, 0, 0);
   const double share = anchor == Anchor::left ? 0 : (anchor == Anchor::middle ? 0.5 : 1);
   cairo_save(cairo_);
   cairo_translate(cairo_, at.x, at.y);
   cairo_rotate(cairo_, rad_from_deg(turn_deg));
-  cairo_move_to(cairo_, -share * extents.x_advance, 0);
+  cairo_move_to(cairo_, -share * width_mm, 0);
   cairo_show_text(cairo_, text.c_str());
   cairo_restore(cairo_);
 }
@@ -96,13 +102,10 @@ void Canvas::arrow(PointMm from, PointMm to) {
 }
 
 void Canvas::finish() {
-  if (png_ && cairo_surface_write_to_png(surface_, temporary_.c_str()) != CAIRO_STATUS_SUCCESS)
-    throw InputError(path_.string(), "can't be written: does its folder exist?");
+  if (png_) cairo_surface_write_to_png_stream(surface_, write_to_stream, &file_.stream());
   cairo_surface_finish(surface_);
-  std::error_code error;
-  if (cairo_surface_status(surface_) == CAIRO_STATUS_SUCCESS) std::filesystem::rename(temporary_, path_, error);
-  if (cairo_surface_status(surface_) != CAIRO_STATUS_SUCCESS || error)
-    throw InputError(path_.string(), "can't be written");
+  if (cairo_surface_status(surface_) != CAIRO_STATUS_SUCCESS) throw InputError(path_.string(), "can't be drawn");
+  file_.commit();
 }
 
 }  // namespace lapservo

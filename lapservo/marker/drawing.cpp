@@ -54,7 +54,23 @@ void draw_ruler(Canvas& canvas, PointMm from, int length, bool vertical) {
   }
 }
 
-void draw_copy(Canvas& canvas, const Marker& marker, PointMm corner) {
+// Smaller where it would not fit otherwise.
+void fitting_text(Canvas& canvas, const std::string& text, PointMm at, double height_mm, double room_mm) {
+  canvas.text(text, at, height_mm * std::min(1.0, room_mm / canvas.text_width_mm(text, height_mm)));
+}
+
+// On the tab, which the glued edge covers: whose marker it is and which way it goes on, out of the tracker's sight.
+void label_tab(Canvas& canvas, const std::string& instrument, PointMm corner, double length) {
+  constexpr double margin = 0.7, height = 1.3, arrow = 3;
+  const double right = corner.x + length - margin, line = corner.y + 3.3;
+  fitting_text(canvas, instrument, {corner.x + margin, corner.y + 1.7}, height, length - 2 * margin);
+  canvas.arrow({right - arrow, line - 0.5}, {right, line - 0.5});
+  canvas.text("tip", {right - arrow - 0.4, line}, height, Anchor::right);
+  const double room = length - 2 * margin - arrow - 0.8 - canvas.text_width_mm("tip", height);
+  if (room > canvas.text_width_mm("glue", height)) canvas.text("glue", {corner.x + margin, line}, height);
+}
+
+void draw_copy(Canvas& canvas, const std::string& instrument, const Marker& marker, PointMm corner) {
   const double length = length_mm(marker), width = width_mm(marker);
   canvas.polygon({{corner.x, corner.y + width},
                   {corner.x + length, corner.y + width},
@@ -68,7 +84,7 @@ void draw_copy(Canvas& canvas, const Marker& marker, PointMm corner) {
                {corner.x, corner.y + width + tab_mm},
                corner},
               grey, 0.1, true);
-  canvas.text("glue", {corner.x + length / 2, corner.y + width + 2.6}, 1.3, Anchor::middle);
+  label_tab(canvas, instrument, {corner.x, corner.y + width}, length);
 }
 
 struct Page {
@@ -79,7 +95,7 @@ Page page_of(Paper paper) {
 }
 
 void draw_curve(Canvas& canvas, PointMm corner, double width, double height, const std::vector<double>& values,
-                const std::string& title, const std::string& format) {
+                const std::string& title, const std::string& label, const std::string& format) {
   const double low = *std::min_element(values.begin(), values.end()),
                high = *std::max_element(values.begin(), values.end());
   const double room = std::max(0.08 * (high - low), 1e-9 + 1e-3 * std::abs(high)), bottom = low - room,
@@ -90,13 +106,15 @@ void draw_curve(Canvas& canvas, PointMm corner, double width, double height, con
     curve.push_back({corner.x + width * static_cast<double>(i) / static_cast<double>(values.size() - 1),
                      corner.y + height * (top - values[i]) / (top - bottom)});
   canvas.line(curve, {0.1, 0.3, 0.7}, 0.4);
-  canvas.text(title, {corner.x, corner.y - 1.5}, 2.4);
+  fitting_text(canvas, title, {corner.x, corner.y - 1.5}, 2.4, width);
+  canvas.text(label, {corner.x - 16, corner.y + height / 2}, 2.2, Anchor::middle, -90);
   for (const double value : {low, high})
     canvas.text(fmt::format(fmt::runtime(format), value),
                 {corner.x - 1, corner.y + height * (top - value) / (top - bottom) + 0.8}, 2, Anchor::right);
   for (int quarter = 0; quarter <= 4; ++quarter)
     canvas.text(fmt::format("{} deg", 90 * quarter), {corner.x + width * quarter / 4, corner.y + height + 4}, 2,
                 Anchor::middle);
+  canvas.text("tau", {corner.x + width / 2, corner.y + height + 7.5}, 2.2, Anchor::middle);
 }
 
 }  // namespace
@@ -140,7 +158,7 @@ void write_print_sheet(const std::filesystem::path& path, const std::string& ins
   canvas.text("tau grows this way (right-handed about the axis to the tip)", {left + 78, 67}, 2.4);
   const int count = std::min(copies, columns * rows);
   for (int i = 0; i < count; ++i)
-    draw_copy(canvas, marker,
+    draw_copy(canvas, instrument, marker,
               {left + (i % columns) * (length + gap_mm), top + (i / columns) * (width + tab_mm + gap_mm)});
   canvas.finish();
 }
@@ -151,13 +169,14 @@ void write_marker_picture(const std::filesystem::path& path, const std::string& 
   Canvas canvas(path, page_width, page_height);
   const double scale = 1e3 * std::min(plot_width / length_mm(marker), 70 / width_mm(marker));
   const double length = scale * marker.length_m(), height = scale * pi * marker.diameter_m;
-  canvas.text(fmt::format("{}: the marker unrolled, print towards you, tip on the right", instrument), {left, 10}, 2.6);
+  fitting_text(canvas, fmt::format("{}: the marker unrolled, print towards you, tip on the right", instrument),
+               {left, 10}, 2.6, plot_width);
   draw_bands(canvas, marker, {left, 16}, height, scale);
   canvas.line({{left, 16}, {left + length, 16}, {left + length, 16 + height}, {left, 16 + height}, {left, 16}}, black,
               0.2);
   for (int quarter = 0; quarter <= 4; ++quarter)
     canvas.text(fmt::format("{} deg", 90 * quarter), {left - 1.5, 16 + height * quarter / 4 + 0.8}, 2, Anchor::right);
-  canvas.text("tau", {left - 14, 16 + height / 2}, 2.4, Anchor::middle, -90);
+  canvas.text("tau", {left - 16, 16 + height / 2}, 2.4, Anchor::middle, -90);
   for (int mm = 0; mm <= static_cast<int>(length_mm(marker) + 0.01); mm += 5)
     canvas.text(fmt::format("{}", mm), {left + 1e-3 * scale * mm, 16 + height + 3.5}, 2, Anchor::middle);
   canvas.text("mm from the proximal end", {left + length / 2, 16 + height + 7}, 2.2, Anchor::middle);
@@ -167,11 +186,12 @@ void write_marker_picture(const std::filesystem::path& path, const std::string& 
     ratio.push_back(cross_ratio_at(marker, tau_rad));
     sigma.push_back(1e3 * predicted_sigma_centre_line_rad(marker, tau_rad, viewing));
   }
-  draw_curve(canvas, {left, 108}, plot_width, plot_height - 8, ratio, "cross-ratio over tau", "{:.3f}");
+  draw_curve(canvas, {left, 108}, plot_width, plot_height - 8, ratio, "cross-ratio over tau (eq. 17)", "cross-ratio",
+             "{:.3f}");
   draw_curve(canvas, {left, 156}, plot_width, plot_height - 8, sigma,
-             fmt::format("predicted sigma, centre line alone [mrad]: {:.2f} px a boundary, f {:.0f} px, {:.0f} mm away",
+             fmt::format("predicted sigma of tau, centre line alone: {:.2f} px a boundary, f {:.0f} px, {:.0f} mm away",
                          viewing.sigma_edge_px, viewing.focal_px, 1e3 * viewing.distance_m),
-             "{:.1f}");
+             "sigma [mrad]", "{:.1f}");
   canvas.finish();
 }
 

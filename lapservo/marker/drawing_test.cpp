@@ -270,6 +270,42 @@ TEST(PrintSheet, HoldsTheCopiesThatFitBesideOneAnother) {
     });
 }
 
+// Where letters begin on an SVG page.
+std::vector<Vector2d> letters(const std::string& svg) {
+  std::vector<Vector2d> found;
+  for (const auto& match : matches(svg, std::regex(R"re(<use xlink:href="#[^"]*" x="([-\d.]+)" y="([-\d.]+)"/>)re")))
+    found.emplace_back(number(match[1]), number(match[2]));
+  return found;
+}
+
+// Each copy tells, once it is cut out, whose it is and which way it goes on; the bands stay clean.
+TEST(PrintSheet, EveryCopysTabHasTheNameAndAnArrowToTheTip) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"PSM1", "needle driver with a long name"}) {
+    write_print_sheet(folder / "sheet.svg", name, example, Paper::a4, 3);
+    const Page page = read_svg(folder / "sheet.svg");
+    const auto tabs = polygons_of(page, {0.93, 0.93, 0.93}), heads = polygons_of(page, {0, 0, 0}),
+               bands = bands_of(page, 180);
+    const auto written = letters(testing::read_file(folder / "sheet.svg"));
+    ASSERT_EQ(tabs.size(), 3U);
+    for (std::size_t i = 0; i < tabs.size(); ++i) {
+      const Eigen::AlignedBox2d tab = tabs[i].box();
+      const auto on_tab =
+          std::count_if(written.begin(), written.end(), [&](const Vector2d& p) { return tab.contains(p); });
+      const auto spaces = std::count(name.begin(), name.end(), ' ');
+      EXPECT_GE(on_tab, static_cast<std::ptrdiff_t>(name.size()) - spaces + 3) << name << ", tip";
+      const auto points_to_tip = [&](const Polygon& head) {
+        return tab.contains(head.box()) && head.points_mm.size() == 3 &&
+               head.points_mm[0].x() > head.points_mm[1].x() && head.points_mm[0].x() > head.points_mm[2].x();
+      };
+      EXPECT_EQ(std::count_if(heads.begin(), heads.end(), points_to_tip), 1) << name;
+      const Eigen::AlignedBox2d band(Vector2d(tab.min().x(), bands.at(i).box().min().y()),
+                                     Vector2d(tab.max().x(), tab.min().y() - rounding_mm));
+      EXPECT_FALSE(std::any_of(written.begin(), written.end(), [&](const Vector2d& p) { return band.contains(p); }));
+    }
+  }
+}
+
 TEST(PrintSheet, RefusesWhatDoesNotFitOrCanNotBeWrittenAndLeavesNothingBehind) {
   const TemporaryFolder folder;
   Marker huge = example;
@@ -289,7 +325,7 @@ TEST(PrintSheet, RefusesWhatDoesNotFitOrCanNotBeWrittenAndLeavesNothingBehind) {
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   std::filesystem::create_directory(folder / "taken.svg");
-  EXPECT_EQ(refusal("taken.svg", example), place + "taken.svg: can't be written");
+  EXPECT_EQ(refusal("taken.svg", example), place + "taken.svg: is a folder, expected a file to write");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the folder";
 }
 
@@ -301,6 +337,16 @@ TEST(MarkerPicture, ShowsTheMarkerAsItIsWrapped) {
     const double height = bands_of(page, 90).at(0).box().sizes().y();
     expect_wraps_into(page, marker, height / (1e3 * pi * marker.diameter_m));
   }
+}
+
+TEST(MarkerPicture, KeepsItsLettersOnThePage) {
+  const TemporaryFolder folder;
+  write_marker_picture(folder / "marker.svg", std::string(80, 'M'), example, {110000, 1.1, 12.34});
+  constexpr double letter_mm = 3;
+  const auto written = letters(testing::read_file(folder / "marker.svg"));
+  ASSERT_GT(written.size(), 100U);
+  for (const Vector2d& p : written)
+    EXPECT_TRUE(Eigen::AlignedBox2d(Vector2d(0, 0), Vector2d(150 - letter_mm, 200)).contains(p)) << p.transpose();
 }
 
 TEST(MarkerPicture, IsAlsoAPng) {

@@ -246,7 +246,8 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
   const double share =
       estimate.covariance_px2 ? larger_sigma(*estimate.covariance_px2) / lever_px(inside, best.point_px) : 0;
   estimate.near_parallel = estimate.direction_spread_rad < near_parallel_rad || share > near_parallel_share;
-  estimate.status = share < 1 ? RcmStatus::ok : RcmStatus::parallel;
+  const bool parallel = !(share < 1) || estimate.direction_spread_rad < parallel_rad;
+  estimate.status = parallel ? RcmStatus::parallel : RcmStatus::ok;
   return estimate;
 }
 

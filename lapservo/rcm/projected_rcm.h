@@ -54,6 +54,8 @@ struct RcmEstimate {
   bool near_parallel = false;
 };
 
+/// Lines whose directions spread by less are parallel: e0 and e3 are known to no better than this over their distance.
+inline constexpr double parallel_rad = 1e-3;
 inline constexpr double near_parallel_rad = 0.0524;
 inline constexpr double near_parallel_share = 0.05;
 

@@ -237,6 +237,16 @@ TEST(ProjectedRcm, WarnsOfNearlyParallelLines) {
   }
 }
 
+// Whose rounding meets, exactly, somewhere.
+TEST(ProjectedRcm, ParallelLinesMeetNowhere) {
+  for (const double slope : {0.0, 1e-6, 1e-5}) {
+    Lines lines;
+    for (int i = 0; i < 10; ++i)
+      lines.push_back(line_between({100, 250 + 20.0 * i}, {400, 250 + 20.0 * i * (1 + 300 * slope)}, 1));
+    EXPECT_EQ(estimate_projected_rcm(lines).status, RcmStatus::parallel) << slope;
+  }
+}
+
 TEST(ProjectedRcm, SaysWhyThereIsNone) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(estimate_projected_rcm({}, {NoiseScale::known}).status, RcmStatus::too_few_lines);

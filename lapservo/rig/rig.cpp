@@ -1,11 +1,16 @@
 #include "lapservo/rig/rig.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <sstream>
+#include <string>
+#include <utility>
 
-#include "lapservo/core/csv.h"
 #include "lapservo/marker/decoder.h"
+#include "lapservo/rig/known_keys.h"
+#include "lapservo/rig/response_field.h"
 #include "lapservo/rig/yaml_field.h"
 
 namespace lapservo {
@@ -13,19 +18,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr auto file_kind = "rig file";
-
-Response parse_response(const YamlField& field) {
-  constexpr auto expected = "srgb, linear or gamma:VALUE with a value of 0.2 to 5";
-  if (!field.present()) return {};
-  const std::string text = field.text(expected);
-  if (text == "srgb") return {};
-  if (text == "linear") return {Response::Kind::power, 1};
-  constexpr std::string_view prefix = "gamma:";
-  const auto gamma =
-      text.starts_with(prefix) ? parse_finite(std::string_view(text).substr(prefix.size())) : std::nullopt;
-  if (!gamma || *gamma < 0.2 || *gamma > 5) field.fail(text, expected);
-  return {Response::Kind::power, *gamma};
-}
 
 int parse_image_size(const YamlField& field) {
   constexpr auto expected = "a whole number of pixels, 16 to 16384";
@@ -47,28 +39,77 @@ void check_invertible(const Camera& camera, const YamlField& coefficients) {
                           "k1 k2 p1 p2 k3 of a calibration that covers the image");
 }
 
+constexpr double rotation_tolerance = 2e-4;  // what four typed digits leave
+
+// A ROS matrix: rows and cols say how the N numbers of data lie.
+template <std::size_t N>
+std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns, std::string_view expected) {
+  expect_keys(field, {{"rows", "cols"}, {"data"}});
+  const YamlField data = field["data"];
+  const auto numbers = data.numbers<N>(expected);
+  for (const auto& [key, size] : {std::pair{"rows", rows}, {"cols", columns}})
+    if (const YamlField given = field[key]; given.present() && given.number("a whole number") != size)
+      given.fail(given.value_text(), std::to_string(size));
+  return numbers;
+}
+
+// What belongs to rectified images is not used, but must be what it says; parts and bins of the sensor would be other
+// pixels than those of camera_matrix.
+void check_unused(const YamlField& field) {
+  if (const YamlField rectification = field["rectification_matrix"]; rectification.present()) {
+    const auto r = parse_matrix<9>(rectification, 3, 3, "nine numbers of a rotation");
+    const Eigen::Matrix3d rotation = Eigen::Map<const Eigen::Matrix3d>(r.data());
+    if (!(rotation * rotation.transpose()).isIdentity(rotation_tolerance) || rotation.determinant() < 0)
+      rectification.fail("no rotation", "nine numbers of a rotation");
+  }
+  if (const YamlField projection = field["projection_matrix"]; projection.present())
+    parse_matrix<12>(projection, 3, 4, "twelve numbers");
+  for (const char* key : {"binning_x", "binning_y"})
+    if (const YamlField binning = field[key]; binning.present())
+      binning.number_between(0, 1, "0 or 1: a camera_matrix of the pixels as they are");
+  const YamlField roi = field["roi"];
+  if (!roi.present()) return;
+  expect_keys(roi, {{"x_offset", "y_offset", "height", "width", "do_rectify"}, {}});
+  for (const char* key : {"x_offset", "y_offset"})
+    if (const YamlField offset = roi[key]; offset.present())
+      offset.number_between(0, 0, "0: a camera_matrix of the pixels as they are");
+}
+
+// Not corrected, so it may not stand in a rig as if it were.
+void refuse_chromatic_aberration(const YamlField& field) {
+  if (!field.present()) return;
+  expect_keys(field, {{}, {"blue", "red"}});
+  for (const char* channel : {"blue", "red"})
+    if (const YamlField magnification = field[channel]; magnification.present())
+      magnification.number_between(1, 1, "1: no other magnification is corrected");
+}
+
 Camera parse_camera_fields(const YamlField& field) {
+  expect_keys(field, {{"header", "camera_name", "distortion_model", "rectification_matrix", "projection_matrix",
+                       "binning_x", "binning_y", "roi", "deinterlace"},
+                      {"image_width", "image_height", "camera_matrix", "distortion_coefficients", "response",
+                       "lateral_chromatic_aberration"}});
   Camera camera;
   camera.width_px = parse_image_size(field["image_width"]);
   camera.height_px = parse_image_size(field["image_height"]);
   if (const YamlField model = field["distortion_model"]; model.present() && model.text("plumb_bob") != "plumb_bob")
     model.fail(model.value_text(), "plumb_bob");
 
-  const YamlField matrix = field["camera_matrix"]["data"];
-  const auto k = matrix.numbers<9>("nine numbers, fx 0 cx 0 fy cy 0 0 1");
+  const auto k = parse_matrix<9>(field["camera_matrix"], 3, 3, "nine numbers, fx 0 cx 0 fy cy 0 0 1");
   const bool pinhole = k[0] > 0 && k[4] > 0 && k[1] == 0 && k[3] == 0 && k[6] == 0 && k[7] == 0 && k[8] == 1;
   if (!pinhole || k[0] > 1e6 || k[4] > 1e6 || std::abs(k[2]) > 1e6 || std::abs(k[5]) > 1e6) {
     std::ostringstream got;
     for (const double value : k) got << value << ' ';
-    matrix.fail(got.str(), "fx 0 cx 0 fy cy 0 0 1 with fx and fy above 0 (pixels)");
+    field["camera_matrix"]["data"].fail(got.str(), "fx 0 cx 0 fy cy 0 0 1 with fx and fy above 0 (pixels)");
   }
   camera.fx_px = k[0], camera.cx_px = k[2], camera.fy_px = k[4], camera.cy_px = k[5];
   if (const YamlField coefficients = field["distortion_coefficients"]; coefficients.present()) {
-    const YamlField data = coefficients["data"];
-    camera.distortion = data.numbers<5>("five numbers, k1 k2 p1 p2 k3");
-    check_invertible(camera, data);
+    camera.distortion = parse_matrix<5>(coefficients, 1, 5, "five numbers, k1 k2 p1 p2 k3");
+    check_invertible(camera, coefficients["data"]);
   }
   camera.response = parse_response(field["response"]);
+  refuse_chromatic_aberration(field["lateral_chromatic_aberration"]);
+  check_unused(field);
   return camera;
 }
 
@@ -79,6 +120,7 @@ Camera parse_camera(const YamlField& field, const fs::path& folder) {
 }
 
 Marker parse_marker(const YamlField& field) {
+  expect_keys(field, {{}, {"diameter_m", "hues_deg", "bands_upper_m", "bands_lower_m", "seam_rad", "tolerance_m"}});
   Marker marker;
   marker.diameter_m = field["diameter_m"].number("0.0005 to 0.1 (metres)");
   if (const YamlField hues = field["hues_deg"]; hues.present())
@@ -93,24 +135,55 @@ Marker parse_marker(const YamlField& field) {
 }
 
 Rigid3 parse_transform(const YamlField& field) {
+  expect_keys(field, {{}, {"translation_m", "quaternion_xyzw"}});
   const auto t = field["translation_m"].numbers<3>("x y z in metres", 10, "a length within 10 m");
   const YamlField quaternion = field["quaternion_xyzw"];
   const auto q = quaternion.numbers<4>("x y z w of a unit quaternion");
   const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
-  if (!(std::abs(rotation.norm() - 1) < 1e-2))
-    quaternion.fail("of norm " + std::to_string(rotation.norm()), "x y z w of a unit quaternion");
-  return {rotation.normalized(), {t[0], t[1], t[2]}};
+  if (!(std::abs(rotation.norm() - 1) < rotation_tolerance))
+    quaternion.fail("of norm " + std::to_string(rotation.norm()), "x y z w of a unit quaternion, to four digits");
+  // What is normalised already keeps its bits, however often a rig is written and read.
+  const bool unit = std::abs(rotation.squaredNorm() - 1) < 1e-14;
+  return {unit ? rotation : rotation.normalized(), {t[0], t[1], t[2]}};
+}
+
+// One that can head a column of our tables.
+bool is_plain_name(const std::string& name) {
+  return std::none_of(name.begin(), name.end(), [](char c) { return c == ',' || static_cast<unsigned char>(c) < ' '; });
+}
+
+Joints parse_joints(const YamlField& field) {
+  expect_keys(field, {{"names", "sign"}, {"offset"}});
+  constexpr auto four_names = "four different names, of theta, phi, rho and psi, without commas";
+  Joints joints;
+  const auto names = field["names"].list(four_names);
+  if (names.size() != joints.names.size()) field["names"].fail(field["names"].value_text(), four_names);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    joints.names[i] = names[i].text(four_names);
+    const bool repeated =
+        std::find(joints.names.begin(), joints.names.begin() + i, joints.names[i]) != joints.names.begin() + i;
+    if (repeated || !is_plain_name(joints.names[i])) names[i].fail(joints.names[i], four_names);
+  }
+  const auto signs = field["sign"];
+  joints.sign = signs.numbers<4>("four signs, 1 or -1");
+  for (const double sign : joints.sign)
+    if (std::abs(sign) != 1) signs.fail(std::to_string(sign), "1 or -1");
+  joints.offset = field["offset"].numbers<4>("four numbers, rad rad m rad", 100, "an offset within 100 rad or m");
+  return joints;
 }
 
 Instrument parse_instrument(const YamlField& field) {
+  expect_keys(field, {{"name", "marker", "camera_from_rcm", "joints"}, {"image_delay_s"}});
   Instrument instrument;
   instrument.name = field["name"].text("a name");
-  for (const char c : instrument.name)
-    if (c == ',' || static_cast<unsigned char>(c) < ' ')
-      field["name"].fail(instrument.name, "a name without commas and control characters");
+  if (!is_plain_name(instrument.name))
+    field["name"].fail(instrument.name, "a name without commas and control characters");
   instrument.marker = parse_marker(field["marker"]);
   if (const YamlField transform = field["camera_from_rcm"]; transform.present())
     instrument.camera_from_rcm = parse_transform(transform);
+  if (const YamlField joints = field["joints"]; joints.present()) instrument.joints = parse_joints(joints);
+  if (const YamlField delay = field["image_delay_s"]; delay.present())
+    instrument.image_delay_s = delay.number_between(-10, 10, "-10 to 10 (seconds)");
   return instrument;
 }
 
@@ -129,8 +202,11 @@ void check_distinguishable(const std::vector<Instrument>& instruments, const std
 }
 
 Rig parse_root(const YamlField& root, const fs::path& folder) {
+  expect_keys(root, {{"camera", "instruments"}, {}});
   Rig rig;
-  rig.camera = parse_camera(root["camera"], folder);
+  const YamlField camera = root["camera"];
+  rig.camera = parse_camera(camera, folder);
+  if (camera.is_scalar()) rig.camera_file = folder / camera.text("a path");
   const YamlField list = root["instruments"];
   const auto fields = list.list("a list of instruments");
   if (fields.empty() || fields.size() > 8) list.fail(list.value_text(), "one to eight instruments");

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -12,16 +13,26 @@
 
 namespace lapservo {
 
+/// The arm's joints behind theta, phi, rho and psi, in this order: q_i = sign_i * joint_i + offset_i, rad and m.
+struct Joints {
+  std::array<std::string, 4> names;
+  std::array<double, 4> sign{1, 1, 1, 1};  ///< 1 or -1
+  std::array<double, 4> offset{};
+};
+
 struct Instrument {
   std::string name;
   Marker marker;
   std::optional<Rigid3> camera_from_rcm;
+  std::optional<Joints> joints;
+  std::optional<double> image_delay_s;  ///< a frame's stamp minus the joints' clock at its exposure
 };
 
 /// What stands before the camera and which camera it is (CONVENTIONS "rig.yaml").
 struct Rig {
   Camera camera;
   std::vector<Instrument> instruments;
+  std::filesystem::path camera_file{};  ///< where the camera was read from, when it has a file of its own
 };
 
 /// Reads and checks everything: after it, the camera can be inverted over its whole image and every marker decoded.

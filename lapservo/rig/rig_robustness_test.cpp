@@ -19,7 +19,7 @@ TEST(RigRobustness, ACameraFileWithANameThatNoFileCanHaveIsAnInputError) {
 }
 
 TEST(RigRobustness, AnEndlessCameraFileIsRefused) {
-  EXPECT_EQ(refusal("camera: /dev/zero"), "/dev/zero: is larger than 1 MiB, expected a rig file");
+  EXPECT_EQ(refusal("camera: /dev/zero"), "/dev/zero: is larger than 1 MiB, expected a YAML file");
 }
 
 }  // namespace

@@ -51,6 +51,10 @@ std::string error_of(const std::string& yaml) {
   return input_error([&] { parse_rig(yaml, "rig.yaml"); });
 }
 
+std::string with_joints(const std::string& names, const std::string& sign, const std::string& offset) {
+  return good + "    joints: {names: " + names + ", sign: " + sign + ", offset: " + offset + "}\n";
+}
+
 // Another instrument of these colours and this name.
 std::string second_instrument(const std::string& name, const std::string& hues_deg) {
   return "  - name: " + name + "\n    marker:\n      diameter_m: 0.0084\n      hues_deg: " + hues_deg +
@@ -106,10 +110,45 @@ TEST(Rig, ReadsEveryResponse) {
   EXPECT_EQ(response("linear").kind, Response::Kind::power);
   EXPECT_EQ(response("linear").gamma, 1);
   EXPECT_EQ(response("gamma:1.8").gamma, 1.8);
+  EXPECT_EQ(response("rec709").kind, Response::Kind::rec709);
+  const Response table = response("{light: [0, 0.2, 1], value: [0, 0.5, 1], sigma_light: [0, 0.01, 0]}");
+  EXPECT_EQ(table.kind, Response::Kind::table);
+  EXPECT_EQ(table.table_light, (std::vector<double>{0, 0.2, 1}));
+  EXPECT_EQ(table.table_value, (std::vector<double>{0, 0.5, 1}));
+}
+
+TEST(Rig, ReadsJointsAndTheImagesDelay) {
+  const Rig rig = parse_rig(with_joints("[yaw, pitch, insertion, roll]", "[1, -1, 1, 1]", "[0, 1.5, -0.0156, 0]") +
+                                "    image_delay_s: 0.08\n    sigma_image_delay_s: 0.001\n",
+                            "rig.yaml");
+  const Instrument& instrument = rig.instruments.front();
+  ASSERT_TRUE(instrument.joints);
+  EXPECT_EQ(instrument.joints->names, (std::array<std::string, 4>{"yaw", "pitch", "insertion", "roll"}));
+  EXPECT_EQ(instrument.joints->sign, (std::array<double, 4>{1, -1, 1, 1}));
+  EXPECT_EQ(instrument.joints->offset, (std::array<double, 4>{0, 1.5, -0.0156, 0}));
+  EXPECT_EQ(instrument.image_delay_s, 0.08);
+  EXPECT_FALSE(parse_rig(good, "rig.yaml").instruments.front().joints);
+}
+
+// What ROS's camera_calibration and calibrate write beside what we need.
+TEST(Rig, TakesTheOtherKeysOfACameraInfoAndSigmas) {
+  EXPECT_EQ(error_of(with("  response", R"(  camera_name: endoscope
+  header: {frame_id: endoscope}
+  rectification_matrix: {rows: 3, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}
+  projection_matrix: {rows: 3, cols: 4, data: [1090, 0, 640, 0, 0, 1080, 360, 0, 0, 0, 1, 0]}
+  binning_x: 0
+  binning_y: 1
+  roi: {x_offset: 0, y_offset: 0, height: 0, width: 0, do_rectify: false}
+  lateral_chromatic_aberration: {blue: 1, red: 1}
+  sigma_camera_matrix: {rows: 3, cols: 3, data: [1, 0, 1, 0, 1, 1, 0, 0, 0]}
+  sigma_distortion_coefficients: {data: [0.01, 0.01, 0.01, 0.01, 0]}
+  response)")),
+            "");
+  EXPECT_EQ(error_of(with("      seam_rad: 0.25", "      seam_rad: 0.25\n      sigma_seam_rad: 0.01")), "");
 }
 
 TEST(Rig, NormalisesARoundedQuaternion) {
-  const Rig rig = parse_rig(with("[0, 0, 0.6, 0.8]", "[0, 0, 0.601, 0.799]"), "rig.yaml");
+  const Rig rig = parse_rig(with("[0, 0, 0.6, 0.8]", "[0, 0, 0.6001, 0.8]"), "rig.yaml");
   EXPECT_NEAR(rig.instruments[0].camera_from_rcm->rotation.norm(), 1, 1e-12);
 }
 
@@ -141,18 +180,18 @@ std::vector<Complaint> missing_keys() {
        with("  camera_matrix: {rows: 3, cols: 3, data: [1100, 0, 639.5, 0, 1090, 359.5, 0, 0, 1]}\n", ""),
        "camera.camera_matrix: is missing, expected a map with 'data'"},
       {"CameraMatrixData", with("data: [1100", "values: [1100"),
-       "camera.camera_matrix.data: is missing, expected nine numbers, fx 0 cx 0 fy cy 0 0 1"},
+       "camera.camera_matrix.values: is unknown, expected a known key, of which cols is the nearest"},
       {"DistortionData", with("data: [-0.1", "values: [-0.1"),
-       "camera.distortion_coefficients.data: is missing, expected five numbers, k1 k2 p1 p2 k3"},
+       "camera.distortion_coefficients.values: is unknown, expected a known key, of which cols is the nearest"},
       {"Name", with("- name: PSM1\n    marker", "- marker"), "instruments[0].name: is missing, expected a name"},
       {"Marker", with("    marker:", "    band:"),
-       "instruments[0].marker: is missing, expected a map with 'diameter_m'"},
+       "instruments[0].band: is unknown, expected a known key, of which name is the nearest"},
       {"Diameter", with("      diameter_m: 0.0084\n", ""),
        "instruments[0].marker.diameter_m: is missing, expected 0.0005 to 0.1 (metres)"},
       {"BandsUpper", with("      bands_upper_m: [0.0035, 0.0036, 0.0169]\n", ""),
        "instruments[0].marker.bands_upper_m: is missing, expected three lengths in metres"},
       {"BandsLower", with("bands_lower_m", "bands_lover_m"),
-       "instruments[0].marker.bands_lower_m: is missing, expected three lengths in metres"},
+       "instruments[0].marker.bands_lover_m: is unknown, expected a known key, of which bands_lower_m is the nearest"},
       {"Translation", with("      translation_m: [-0.0778, 0.0672, 0.0592]\n", ""),
        "instruments[0].camera_from_rcm.translation_m: is missing, expected x y z in metres"},
       {"Quaternion", with("      quaternion_xyzw: [0, 0, 0.6, 0.8]\n", ""),
@@ -164,8 +203,7 @@ std::vector<Complaint> wrong_types() {
   return {
       {"RootIsAList", "[1, 2]", "file: is a list of 2, expected a map with 'camera'"},
       {"RootIsAWord", "rig", "file: is rig, expected a map with 'camera'"},
-      {"CameraIsAList", with("camera:\n  image_width: 1280", "camera: [1]\nrest:\n  image_width: 1280"),
-       "camera: is a list of 1, expected a map with 'image_width'"},
+      {"CameraIsAList", "camera: [1]\n", "camera: is a list of 1, expected a map with 'image_width'"},
       {"WidthIsAWord", with("1280", "wide"),
        "camera.image_width: is wide, expected a whole number of pixels, 16 to 16384"},
       {"WidthIsAMap", with("1280", "{px: 1280}"),
@@ -180,9 +218,11 @@ std::vector<Complaint> wrong_types() {
       {"DistortionTooShort", with("[-0.1, ", "["),
        "camera.distortion_coefficients.data: is a list of 4, expected five numbers, k1 k2 p1 p2 k3"},
       {"ResponseIsAWord", with("gamma:2.2", "log"),
-       "camera.response: is log, expected srgb, linear or gamma:VALUE with a value of 0.2 to 5"},
+       "camera.response: is log, expected srgb, rec709, linear, gamma:VALUE with a value of 0.2 to 5, or a table of "
+       "light and value"},
       {"ResponseIsAList", with("gamma:2.2", "[srgb]"),
-       "camera.response: is a list of 1, expected srgb, linear or gamma:VALUE with a value of 0.2 to 5"},
+       "camera.response: is a list of 1, expected srgb, rec709, linear, gamma:VALUE with a value of 0.2 to 5, or a "
+       "table of light and value"},
       {"InstrumentsIsAMap", with("  - name: PSM1\n    marker:", "  PSM1:\n    marker:"),
        "instruments: is a map, expected a list of instruments"},
       {"NameIsAList", with("PSM1", "[PSM1]"), "instruments[0].name: is a list of 1, expected a name"},
@@ -193,7 +233,7 @@ std::vector<Complaint> wrong_types() {
       {"FourBands", with("[0.0095, 0.0094, 0.0051]", "[0.0095, 0.0094, 0.0051, 0]"),
        "instruments[0].marker.bands_lower_m: is a list of 4, expected three lengths in metres"},
       {"SeamIsAWord", with("0.25", "left"), "instruments[0].marker.seam_rad: is left, expected an angle in radians"},
-      {"TransformIsANumber", with("camera_from_rcm:\n", "camera_from_rcm: 3\n    rest:\n"),
+      {"TransformIsANumber", good.substr(0, good.find("    camera_from_rcm")) + "    camera_from_rcm: 3\n",
        "instruments[0].camera_from_rcm: is 3, expected a map with 'translation_m'"},
   };
 }
@@ -206,7 +246,8 @@ std::vector<Complaint> non_finite_numbers() {
       {"DistortionNan", with("[-0.1", "[nan"),
        "camera.distortion_coefficients.data[0]: is nan, expected a finite number"},
       {"GammaNan", with("gamma:2.2", "gamma:nan"),
-       "camera.response: is gamma:nan, expected srgb, linear or gamma:VALUE with a value of 0.2 to 5"},
+       "camera.response: is gamma:nan, expected srgb, rec709, linear, gamma:VALUE with a value of 0.2 to 5, or a table "
+       "of light and value"},
       {"DiameterInf", with("0.0084", "inf"),
        "instruments[0].marker.diameter_m: is inf, expected 0.0005 to 0.1 (metres)"},
       {"HueNan", with("180", "NaN"), "instruments[0].marker.hues_deg[1]: is NaN, expected a finite number"},
@@ -241,7 +282,8 @@ std::vector<Complaint> impossible_cameras() {
        "camera.distortion_coefficients.data: is not invertible at the image's border, expected k1 k2 p1 p2 k3 of a "
        "calibration that covers the image"},
       {"GammaZero", with("gamma:2.2", "gamma:0"),
-       "camera.response: is gamma:0, expected srgb, linear or gamma:VALUE with a value of 0.2 to 5"},
+       "camera.response: is gamma:0, expected srgb, rec709, linear, gamma:VALUE with a value of 0.2 to 5, or a table "
+       "of light and value"},
   };
 }
 
@@ -271,13 +313,79 @@ std::vector<Complaint> impossible_instruments() {
       {"TranslationInMillimetres", with("0.0672", "67.2"),
        "instruments[0].camera_from_rcm.translation_m[1]: is 67.2, expected a length within 10 m"},
       {"QuaternionNotUnit", with("[0, 0, 0.6, 0.8]", "[0, 0, 0.6, 0.9]"),
-       "instruments[0].camera_from_rcm.quaternion_xyzw: is of norm 1.081665, expected x y z w of a unit quaternion"},
+       "instruments[0].camera_from_rcm.quaternion_xyzw: is of norm 1.081665, expected x y z w of a unit quaternion, to "
+       "four digits"},
       {"QuaternionZero", with("[0, 0, 0.6, 0.8]", "[0, 0, 0, 0]"),
-       "instruments[0].camera_from_rcm.quaternion_xyzw: is of norm 0.000000, expected x y z w of a unit quaternion"},
+       "instruments[0].camera_from_rcm.quaternion_xyzw: is of norm 0.000000, expected x y z w of a unit quaternion, to "
+       "four digits"},
       {"NameWithComma", with("PSM1", "'PSM,1'"),
        "instruments[0].name: is PSM,1, expected a name without commas and control characters"},
       {"NameWithNewline", with("PSM1", R"("PSM\n1")"),
        "instruments[0].name: is PSM 1, expected a name without commas and control characters"},
+  };
+}
+
+// What would be ignored or taken for something else.
+std::vector<Complaint> misunderstandings() {
+  const auto unknown = [](const std::string& field, const std::string& nearest) {
+    return field + ": is unknown, expected a known key, of which " + nearest + " is the nearest";
+  };
+  const std::string unit = "x y z w of a unit quaternion, to four digits";
+  return {
+      {"SeemRad", with("seam_rad", "seem_rad"), unknown("instruments[0].marker.seem_rad", "seam_rad")},
+      {"HuesDg", with("hues_deg", "hues_dg"), unknown("instruments[0].marker.hues_dg", "hues_deg")},
+      {"Respons", with("response", "respons"), unknown("camera.respons", "response")},
+      {"FromRcm", with("camera_from_rcm", "camera_from_rmc"),
+       unknown("instruments[0].camera_from_rmc", "camera_from_rcm")},
+      {"Quaternion", with("quaternion_xyzw", "quaternion_wxyz"),
+       unknown("instruments[0].camera_from_rcm.quaternion_wxyz", "quaternion_xyzw")},
+      {"MoreInstruments", good + "instrument: []\n", unknown("instrument", "instruments")},
+      {"MergedKeys", with("    camera_from_rcm:", "    <<: {joints: 3}\n    camera_from_rcm:"),
+       unknown("instruments[0].<<", "name")},
+      {"SeamTwice", with("seam_rad: 0.25", "seam_rad: 0.25\n      seam_rad: 0.5"),
+       "instruments[0].marker.seam_rad: is there twice, expected every key once"},
+      {"SeamForgotten", with("seam_rad: 0.25", "seam_rad:"),
+       "instruments[0].marker.seam_rad: is empty, expected a value, or no such key"},
+      {"SecondDocument", good + "---\n" + good,
+       "holds 2 documents, expected one: no line of three dashes in the midst of a rig file"},
+      {"QuaternionWithADigitMissing", with("[0, 0, 0.6, 0.8]", "[0, 0, 0.6, 0.79]"),
+       "instruments[0].camera_from_rcm.quaternion_xyzw: is of norm 0.992018, expected " + unit},
+      {"MatrixOfTwoRows", with("rows: 3", "rows: 2"), "camera.camera_matrix.rows: is 2, expected 3"},
+      {"DistortionOfFourColumns", with("cols: 5", "cols: 4"), "camera.distortion_coefficients.cols: is 4, expected 5"},
+      {"Binning", with("  response", "  binning_x: 2\n  response"),
+       "camera.binning_x: is 2, expected 0 or 1: a camera_matrix of the pixels as they are"},
+      {"Roi", with("  response", "  roi: {x_offset: 8}\n  response"),
+       "camera.roi.x_offset: is 8, expected 0: a camera_matrix of the pixels as they are"},
+      {"Rectification", with("  response", "  rectification_matrix: {data: [1, 0, 0, 0, 1, 0, 0, 0, 1.1]}\n  response"),
+       "camera.rectification_matrix: is no rotation, expected nine numbers of a rotation"},
+      {"ChromaticAberration", with("  response", "  lateral_chromatic_aberration: {blue: 0.9993, red: 1}\n  response"),
+       "camera.lateral_chromatic_aberration.blue: is 0.9993, expected 1: no other magnification is corrected"},
+      {"TableThatFalls", with("gamma:2.2", "{light: [0, 0.5, 0.4, 1], value: [0, 0.3, 0.6, 1]}"),
+       "camera.response.light[2]: is 0.4, expected 2 to 4096 numbers that rise from 0 to 1"},
+      {"TableOfUnequalLengths", with("gamma:2.2", "{light: [0, 0.5, 1], value: [0, 1]}"),
+       "camera.response.value: is a list of 2, expected as many numbers as light has"},
+      {"TableThatEndsEarly", with("gamma:2.2", "{light: [0, 0.5], value: [0, 1]}"),
+       "camera.response.light: is a list of 2, expected 2 to 4096 numbers that rise from 0 to 1"},
+  };
+}
+
+std::vector<Complaint> impossible_joints() {
+  const std::string names = "[yaw, pitch, insertion, roll]", sign = "[1, -1, 1, 1]", offset = "[0, 1.5, -0.0156, 0]";
+  const std::string four = "expected four different names, of theta, phi, rho and psi, without commas";
+  const std::string joints = "instruments[0].joints.";
+  return {
+      {"ThreeNames", with_joints("[a, b, c]", sign, offset), joints + "names: is a list of 3, " + four},
+      {"NameTwice", with_joints("[a, b, a, d]", sign, offset), joints + "names[2]: is a, " + four},
+      {"NameWithComma", with_joints("[a, b, 'c,', d]", sign, offset), joints + "names[2]: is c,, " + four},
+      {"SignOfTwo", with_joints(names, "[1, 2, 1, 1]", offset), joints + "sign: is 2.000000, expected 1 or -1"},
+      {"OffsetMissing", good + "    joints: {names: " + names + ", sign: " + sign + "}\n",
+       joints + "offset: is missing, expected four numbers, rad rad m rad"},
+      {"OffsetInMillimetres", with_joints(names, sign, "[0, 1.5, -156, 0]"),
+       joints + "offset[2]: is -156, expected an offset within 100 rad or m"},
+      {"Scale", good + "    joints: {names: " + names + ", sign: " + sign + ", offset: " + offset + ", scale: 1}\n",
+       joints + "scale: is unknown, expected a known key, of which names is the nearest"},
+      {"DelayInMilliseconds", good + "    image_delay_s: 80\n",
+       "instruments[0].image_delay_s: is 80, expected -10 to 10 (seconds)"},
   };
 }
 
@@ -306,6 +414,8 @@ INSTANTIATE_TEST_SUITE_P(WrongType, BadRig, ::testing::ValuesIn(wrong_types()), 
 INSTANTIATE_TEST_SUITE_P(NonFinite, BadRig, ::testing::ValuesIn(non_finite_numbers()), name_of);
 INSTANTIATE_TEST_SUITE_P(Impossible, BadRig, ::testing::ValuesIn(impossible_cameras()), name_of);
 INSTANTIATE_TEST_SUITE_P(ImpossibleInstrument, BadRig, ::testing::ValuesIn(impossible_instruments()), name_of);
+INSTANTIATE_TEST_SUITE_P(Misunderstood, BadRig, ::testing::ValuesIn(misunderstandings()), name_of);
+INSTANTIATE_TEST_SUITE_P(ImpossibleJoints, BadRig, ::testing::ValuesIn(impossible_joints()), name_of);
 INSTANTIATE_TEST_SUITE_P(Confusable, BadRig, ::testing::ValuesIn(confusable_instruments()), name_of);
 
 TEST(Rig, TakesThreeInstrumentsOfCyclicColourOrders) {

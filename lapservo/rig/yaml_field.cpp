@@ -1,31 +1,20 @@
 #include "lapservo/rig/yaml_field.h"
 
-#include <fstream>
 #include <optional>
-#include <system_error>
+#include <string>
+#include <vector>
 
 #include <yaml-cpp/yaml.h>
 
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/input_file.h"
 
 namespace lapservo {
 namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t largest_file_bytes = 1 << 20;
-
-std::string read_text(const fs::path& path) {
-  std::error_code ignored;  // a name that no file can have is a file that can't be opened
-  if (fs::is_directory(path, ignored)) throw InputError(path.string(), "is a folder, expected a YAML file");
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw InputError(path.string(), "can't be opened, expected a YAML file");
-  std::string text(largest_file_bytes + 1, '\0');  // a byte more, to tell what is too long; /dev/zero has no end
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.empty()) throw InputError(path.string(), "is empty, expected a YAML file");
-  return text;
-}
 
 // yaml-cpp recurses over nesting without a limit of its own: refuse what no file of ours needs before it parses.
 bool nests_too_deeply(std::string_view yaml) {
@@ -49,10 +38,20 @@ bool nests_too_deeply(std::string_view yaml) {
   return false;
 }
 
+// yaml-cpp's words begin with its name.
+std::string syntax_problem(const YAML::Exception& error) {
+  std::string text = error.what();
+  constexpr std::string_view prefix = "yaml-cpp: ";
+  if (text.starts_with(prefix)) text.erase(0, prefix.size());
+  return text;
+}
+
 }  // namespace
 
 YamlField YamlField::read(const fs::path& path, std::string_view kind) {
-  return parse(read_text(path), path.string(), kind);
+  const std::string text = read_input(path, largest_file_bytes, "a YAML file");
+  if (text.empty()) throw InputError(path.string(), "is empty, expected a YAML file");
+  return parse(text, path.string(), kind);
 }
 
 YamlField YamlField::parse(std::string_view yaml, const std::string& source, std::string_view kind) {
@@ -60,9 +59,14 @@ YamlField YamlField::parse(std::string_view yaml, const std::string& source, std
     throw InputError(source, "is larger than 1 MiB, expected a " + std::string(kind));
   if (nests_too_deeply(yaml)) throw InputError(source, "nests more deeply than a " + std::string(kind) + " does");
   try {
-    return {source, "", YAML::Load(std::string(yaml))};
+    const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(yaml));
+    if (documents.size() > 1)
+      throw InputError(source, "holds " + std::to_string(documents.size()) +
+                                   " documents, expected one: no line of three dashes in the midst of a " +
+                                   std::string(kind));
+    return {source, "", documents.empty() ? YAML::Node() : documents.front()};
   } catch (const YAML::Exception& error) {
-    throw InputError(source, std::string("is not YAML: ") + error.what());
+    throw InputError(source, "is not YAML: " + syntax_problem(error) + ", expected a " + std::string(kind));
   }
 }
 
@@ -93,6 +97,10 @@ bool YamlField::present() const {
 
 bool YamlField::is_scalar() const {
   return present() && node_->IsScalar();
+}
+
+bool YamlField::is_map() const {
+  return present() && node_->IsMap();
 }
 
 YamlField YamlField::operator[](const std::string& key) const {

@@ -21,7 +21,7 @@ namespace lapservo {
 class YamlField {
  public:
   /// `kind` says what the file should be, for example "rig file". Throws InputError when it can't be opened, is empty,
-  /// larger than 1 MiB, nests more deeply than any file of ours or is not YAML.
+  /// larger than 1 MiB, nests more deeply than any file of ours, is not YAML or holds a second document.
   static YamlField read(const std::filesystem::path& path, std::string_view kind);
   /// The same from text; `source` stands for the file's name in complaints.
   static YamlField parse(std::string_view yaml, const std::string& source, std::string_view kind);
@@ -34,6 +34,7 @@ class YamlField {
 
   bool present() const;
   bool is_scalar() const;
+  bool is_map() const;
 
   /// The value of a map's key, present or not.
   YamlField operator[](const std::string& key) const;

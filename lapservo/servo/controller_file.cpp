@@ -1,17 +1,16 @@
 #include "lapservo/servo/controller_file.h"
 
+#include <initializer_list>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "lapservo/rig/known_keys.h"
 #include "lapservo/rig/yaml_field.h"
 
 namespace lapservo {
 namespace {
-
-[[noreturn]] void refuse_key(const YamlField& field) {
-  field.fail("unknown", "a key that the controller knows");
-}
 
 Eigen::Vector4d four(const YamlField& field) {
   const auto values = field.numbers<4>("a list of four numbers");
@@ -19,35 +18,24 @@ Eigen::Vector4d four(const YamlField& field) {
 }
 
 JointLimits read_limits(const YamlField& map, JointLimits limits) {
-  for (const auto& [key, value] : map.entries("a map")) {
-    if (key == "lower")
-      limits.lower = four(value);
-    else if (key == "upper")
-      limits.upper = four(value);
-    else if (key == "rate")
-      limits.rate = four(value);
-    else if (key == "acceleration")
-      limits.acceleration = four(value);
-    else
-      refuse_key(value);
-  }
+  for (const auto& [key, value] :
+       std::initializer_list<std::pair<const char*, Eigen::Vector4d*>>{{"lower", &limits.lower},
+                                                                       {"upper", &limits.upper},
+                                                                       {"rate", &limits.rate},
+                                                                       {"acceleration", &limits.acceleration}})
+    if (const YamlField field = map[key]; field.present()) *value = four(field);
+  expect_keys(map, {{"lower", "upper", "rate", "acceleration"}, {}});
   return limits;
 }
 
 ImageWindow read_window(const YamlField& map, ImageWindow window) {
-  constexpr auto expected = "a finite number";
-  for (const auto& [key, value] : map.entries("a map")) {
-    if (key == "u_min_px")
-      window.u_min_px = value.number(expected);
-    else if (key == "u_max_px")
-      window.u_max_px = value.number(expected);
-    else if (key == "v_min_px")
-      window.v_min_px = value.number(expected);
-    else if (key == "v_max_px")
-      window.v_max_px = value.number(expected);
-    else
-      refuse_key(value);
-  }
+  for (const auto& [key, value] :
+       std::initializer_list<std::pair<const char*, double*>>{{"u_min_px", &window.u_min_px},
+                                                              {"u_max_px", &window.u_max_px},
+                                                              {"v_min_px", &window.v_min_px},
+                                                              {"v_max_px", &window.v_max_px}})
+    if (const YamlField field = map[key]; field.present()) *value = field.number("a finite number");
+  expect_keys(map, {{"u_min_px", "u_max_px", "v_min_px", "v_max_px"}, {}});
   return window;
 }
 
@@ -73,22 +61,16 @@ std::string list_of(const Eigen::Vector4d& v) {
 
 ControllerConfig load_controller(const std::filesystem::path& path, const ControllerConfig& base) {
   ControllerConfig config = base;
-  for (const auto& [key, value] : YamlField::read(path, "controller file").entries("a map of the controller's keys")) {
-    if (key == "mode")
-      config.mode = read_mode(value);
-    else if (key == "period_s")
-      config.period_s = value.number("a finite number");
-    else if (key == "gains_per_s")
-      config.gains.per_s = four(value);
-    else if (key == "delay_s")
-      config.observer.delay_s = read_delay(value);
-    else if (key == "limits")
-      config.limits = read_limits(value, config.limits);
-    else if (key == "window")
-      config.window = read_window(value, config.window.value_or(ImageWindow{}));
-    else
-      refuse_key(value);
-  }
+  const YamlField file = YamlField::read(path, "controller file");
+  if (!file.is_map()) file.fail(file.value_text(), "a map of the controller's keys");
+  expect_keys(file, {{"mode", "period_s", "gains_per_s", "delay_s", "limits", "window"}, {}});
+  if (const YamlField mode = file["mode"]; mode.present()) config.mode = read_mode(mode);
+  if (const YamlField period = file["period_s"]; period.present()) config.period_s = period.number("a finite number");
+  if (const YamlField gains = file["gains_per_s"]; gains.present()) config.gains.per_s = four(gains);
+  if (const YamlField delay = file["delay_s"]; delay.present()) config.observer.delay_s = read_delay(delay);
+  if (const YamlField limits = file["limits"]; limits.present()) config.limits = read_limits(limits, config.limits);
+  if (const YamlField window = file["window"]; window.present())
+    config.window = read_window(window, config.window.value_or(ImageWindow{}));
   return config;
 }
 

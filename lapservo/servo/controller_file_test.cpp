@@ -81,12 +81,12 @@ TEST(ControllerFile, RefusesWhatIsTooLargeOrNestsTooDeeply) {
   for (const auto& [text, problem] :
        {std::pair<std::string, const char*>{std::string(100000, '['), "nests more deeply than a controller file does"},
         {"period_s: " + std::string(100000, '{'), "nests more deeply than a controller file does"},
-        {std::string(2 << 20, ' '), "is larger than 1 MiB, expected a controller file"}}) {
+        {std::string(2 << 20, ' '), "is larger than 1 MiB, expected a YAML file"}}) {
     const File file(text);
     EXPECT_EQ(file.complaint(), file.path().string() + ": " + problem);
   }
   EXPECT_EQ(testing::input_error([] { load_controller("/dev/zero", {}); }),
-            "/dev/zero: is larger than 1 MiB, expected a controller file");
+            "/dev/zero: is larger than 1 MiB, expected a YAML file");
 }
 
 }  // namespace

@@ -1,11 +1,11 @@
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/image_window.h"
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
 #include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/servo/image_window.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo {

@@ -160,6 +160,13 @@ std::string joined(const std::vector<std::string>& fields) {
   return fmt::format("{}", fmt::join(fields, ","));
 }
 
+std::string header() {
+  std::vector<std::string> truth;
+  name(truth, "true_", joints);
+  name(truth, "true_", features);
+  return fmt::format("period,{},{},{}", joined(input_columns()), joined(decision_columns()), joined(truth));
+}
+
 }  // namespace
 
 const std::vector<std::string>& decision_columns() {
@@ -191,25 +198,20 @@ InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q) {
   return truth;
 }
 
-ServoLog::ServoLog(const std::filesystem::path& path) : file_(path) {
-  std::vector<std::string> truth;
-  name(truth, "true_", joints);
-  name(truth, "true_", features);
-  file_.stream() << "tick," << joined(input_columns()) << ',' << joined(decision_columns()) << ',' << joined(truth)
-                 << '\n';
-}
+ServoLog::ServoLog(const std::filesystem::path& path) : file_(path, header()) {}
 
 void ServoLog::add(const ServoInput& input, const ServoDecision& decision,
                    const std::optional<InstrumentTruth>& truth) {
   std::vector<std::string> fields;
   truth ? write(fields, truth->q) : leave_empty(fields, 4);
   truth && truth->features ? write(fields, *truth->features) : leave_empty(fields, 4);
-  file_.stream() << tick_++ << ',' << joined(input_fields(input)) << ',' << joined(decision_fields(decision)) << ','
-                 << joined(fields) << '\n';
+  file_.add(fmt::format("{},{},{},{}", tick_++, joined(input_fields(input)), joined(decision_fields(decision)),
+                        joined(fields)));
 }
 
 std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
+  if (table.rows() == 0) throw InputError(path.string(), "holds no tick, expected the log of a run");
   std::vector<LoggedTick> ticks;
   for (std::size_t i = 0; i < table.rows(); ++i) {
     LoggedTick tick{read_input(Row(table, i, path.string())), {}};

@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/feature_model.h"
-#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/row_file.h"
 #include "lapservo/servo/servo_decision.h"
 
 namespace lapservo {
@@ -20,7 +20,8 @@ struct InstrumentTruth {
 };
 InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q);
 
-/// A run's complete log, one row a control tick. Numbers are written so that reading them gives the same bits.
+/// A run's complete log, one row a control tick, written as they come (see RowFile). Numbers are written so that
+/// reading them gives the same bits.
 class ServoLog {
  public:
   /// Throws InputError when the file can't be written.
@@ -29,7 +30,7 @@ class ServoLog {
   void commit() { file_.commit(); }
 
  private:
-  AtomicFile file_;
+  RowFile file_;
   long tick_ = 0;
 };
 

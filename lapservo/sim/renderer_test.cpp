@@ -11,6 +11,8 @@
 #include "lapservo/core/random.h"
 #include "lapservo/kinematics/features.h"
 #include "lapservo/sim/edge_probe.h"
+#include "lapservo/sim/shaft_lighting.h"
+#include "lapservo/sim/shaft_tracer.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo {
@@ -182,6 +184,21 @@ TEST(Renderer, TheNearerShaftHidesTheFarther) {
   EXPECT_LE(largest_difference(a(middle), only_near(middle)), 1);
   EXPECT_LE(largest_difference(b(middle), only_near(middle)), 1);
   EXPECT_GT(largest_difference(a, only_near), 50);
+}
+
+// What the lamps add goes with their power, matt and gloss; what is ambient stays.
+TEST(Lighting, TurnedDownLampsLeaveTheAmbientPart) {
+  Lighting full;
+  full.ambient = 0.05F;
+  const ShaftTracer tracer(short_shaft(), across_the_view(0.2, 0));
+  const ShaftLighting bright(full, tracer), dim(at_power(full, 0.4F), tracer);
+  for (const float azimuth_rad : {-1.2F, 0.0F, 0.7F}) {
+    const Eigen::Vector3f normal(std::cos(azimuth_rad), std::sin(azimuth_rad), 0);
+    const Eigen::Vector3f point = tracer.radius_m() * normal + Eigen::Vector3f(0, 0, 0.01F);
+    const Lit a = bright.at(point, normal), b = dim.at(point, normal);
+    EXPECT_NEAR(b.matt - 0.05F, 0.4F * (a.matt - 0.05F), 1e-6) << azimuth_rad;
+    EXPECT_NEAR(b.gloss, 0.4F * a.gloss, 1e-6) << azimuth_rad;
+  }
 }
 
 }  // namespace

@@ -19,6 +19,12 @@ Light printed_color(double hue_deg) {
           static_cast<float>(srgb.light_from_value(channel(5)))};
 }
 
+Lighting at_power(Lighting lighting, float power) {
+  lighting.diffuse *= power;
+  lighting.specular *= power;
+  return lighting;
+}
+
 std::array<Light, 8> reflectances(const Marker& marker) {
   std::array<Light, 8> of_part;
   const auto set = [&](Part part, const Light& light) { of_part.at(static_cast<std::size_t>(part)) = light; };

@@ -39,6 +39,9 @@ class ShaftLighting {
   std::vector<Lit> grid_;
 };
 
+/// The lamps turned down to `power`, 1 being full: their shading and their gloss fade, the ambient part stays.
+Lighting at_power(Lighting lighting, float power);
+
 /// Reflectance in linear light of each Part of a shaft.
 std::array<Light, 8> reflectances(const Marker& marker);
 

@@ -263,6 +263,13 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
   return o;
 }
 
+Observation::Refused refusal(const Camera& camera, const Edges& edges) {
+  Observation::Refused refused;
+  refused.what = Observation::Refused::What::edges;
+  for (std::size_t k = 0; k < 4; ++k) refused.edges_raw_px[k] = camera.raw_from_ideal(edges[k]);
+  return refused;
+}
+
 }  // namespace
 
 CenterlineMethod::CenterlineMethod(const Rig& rig) : rig_(rig) {
@@ -285,6 +292,7 @@ std::vector<Observation> CenterlineMethod::observe(const cv::Mat& image_bgr) con
           edges ? observe_edges(rig_.camera, rig_.instruments[i], decoders_[i], *edges) : std::nullopt;
       if (!observation) {
         observations[i].status = Status::poor_fit;
+        if (edges) observations[i].refused = refusal(rig_.camera, *edges);
         continue;
       }
       observations[i] = *observation;

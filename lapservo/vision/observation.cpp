@@ -16,6 +16,10 @@ std::string_view status_word(Status status) {
       return "ambiguous";
     case Status::poor_fit:
       return "poor_fit";
+    case Status::damaged:
+      return "damaged";
+    case Status::few_colors:
+      return "few_colors";
     case Status::uncertain:
       return "uncertain";
   }

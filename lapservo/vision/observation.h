@@ -14,12 +14,14 @@ namespace lapservo {
 /// Why there is, or is not, an observation. Words for files: status_word().
 enum class Status {
   ok,
-  no_marker,  ///< nothing in the image has the marker's colours in its order
-  cut,        ///< too little of the marker lies inside the image
-  occluded,   ///< too few of its boundaries are visible
-  ambiguous,  ///< two explanations fit about as well
-  poor_fit,   ///< something was found that does not look like the marker on closer sight
-  uncertain,  ///< found, but the rotation's standard deviation is too large to be of use
+  no_marker,   ///< nothing in the image has the marker's colours in its order
+  cut,         ///< too little of the marker lies inside the image
+  occluded,    ///< too few of its boundaries are visible
+  ambiguous,   ///< two explanations fit about as well
+  poor_fit,    ///< something was found that does not look like the marker on closer sight
+  damaged,     ///< the decoder of the picture or video complained: its pixels are not the camera's
+  few_colors,  ///< the picture has no more colours than a palette: its pixels are not the camera's
+  uncertain,   ///< found, but the rotation's standard deviation is too large to be of use
 };
 std::string_view status_word(Status status);
 
@@ -44,6 +46,16 @@ struct Observation {
   /// Where the fitted shaft lies, to start the next frame from and to draw. camera_from_unrolled, psi.
   Rigid3 camera_from_unrolled;
   double psi_rad = 0;  ///< in the azimuth reference of camera_from_unrolled
+
+  /// Of a frame that is not ok: what was taken for the marker and refused. To be drawn, so that a person sees why; for
+  /// nothing else, since it may lie anywhere. Finite.
+  struct Refused {
+    enum class What { nothing, pose, edges } what = What::nothing;
+    Rigid3 camera_from_unrolled;  ///< of Method::surface, with psi_rad about it
+    double psi_rad = 0;
+    std::array<Eigen::Vector2d, 4> edges_raw_px{};  ///< of Method::centerline
+  };
+  Refused refused;
 };
 
 }  // namespace lapservo

@@ -118,29 +118,36 @@ void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
   memory_[i] = Memory{fit.unknowns, velocity, fit.blur};
 }
 
+SurfaceTracker::Found SurfaceTracker::refusal(Status status, const PoseUnknowns& unknowns) {
+  const ShaftPose& pose = unknowns.pose();
+  const bool finite = pose.camera_from_unrolled.translation.allFinite() &&
+                      pose.camera_from_unrolled.rotation.coeffs().allFinite() && std::isfinite(pose.psi_rad);
+  return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
+}
+
 SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImage& light, const Memory& memory) const {
   const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
   const FineFit near = fit_finely(scene, light, expected, memory.blur);
-  if (judge(scene, near) == Status::ok) return {Status::ok, near};
+  if (judge(scene, near) == Status::ok) return {Status::ok, near, {}};
   const CoarseFit coarse = fit_coarsely(scene, expected, from_memory);
   if (!coarse.found) return {};
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
   const Status status = judge(scene, fit);
-  return status == Status::ok ? Found{status, fit} : Found{status, std::nullopt};
+  return status == Status::ok ? Found{status, fit, {}} : refusal(status, fit.unknowns);
 }
 
 SurfaceTracker::Found SurfaceTracker::try_start(const Scene& scene, const LightImage& light,
                                                 const PoseUnknowns& start) const {
   const CoarseFit coarse = fit_coarsely(scene, start, {});
   if (!coarse.found || coarse.rotation_score < least_rotation_score) return {};
-  if (coarse.rival_score > rival_ratio * coarse.rotation_score) return {Status::ambiguous, std::nullopt};
+  if (coarse.rival_score > rival_ratio * coarse.rotation_score) return refusal(Status::ambiguous, coarse.unknowns);
   if (const FineFit fit = fit_finely(scene, light, coarse.unknowns, {}); judge(scene, fit) == Status::ok)
-    return {Status::ok, fit};
+    return {Status::ok, fit, {}};
   const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, near_by);
   if (!nearer.found) return {};
   const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
   const Status status = judge(scene, fit);
-  return status == Status::ok ? Found{status, fit} : Found{status, std::nullopt};
+  return status == Status::ok ? Found{status, fit, {}} : refusal(status, fit.unknowns);
 }
 
 SurfaceTracker::Found SurfaceTracker::detect(const Scene& scene, const LightImage& light,
@@ -171,7 +178,7 @@ SurfaceTracker::Found SurfaceTracker::detect_occluded(const Scene& scene, const 
       for (const PoseUnknowns& candidate : search_agreement(scene, start, camera_from_rcm)) {
         const FineFit fit = fit_finely(scene, light, candidate, {});
         if (judge(scene, fit) != Status::ok) continue;
-        if (!best.fit || fit.inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = {Status::ok, fit};
+        if (!best.fit || fit.inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = {Status::ok, fit, {}};
       }
   return best;
 }
@@ -203,6 +210,11 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     }
     observations_[i] = {};
     observations_[i].status = found.status;
+    if (found.refused) {
+      observations_[i].refused.what = Observation::Refused::What::pose;
+      observations_[i].refused.camera_from_unrolled = found.refused->camera_from_unrolled;
+      observations_[i].refused.psi_rad = found.refused->psi_rad;
+    }
     if (!found.fit) continue;
     observations_[i] = observation_of(scene, *found.fit, camera_from_rcm);
     remember(i, *found.fit);

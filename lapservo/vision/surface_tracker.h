@@ -35,8 +35,10 @@ class SurfaceTracker {
   };
   struct Found {
     Status status = Status::no_marker;
-    std::optional<FineFit> fit;  // when ok
+    std::optional<FineFit> fit;        // when ok
+    std::optional<ShaftPose> refused;  // to draw, when there was something
   };
+  static Found refusal(Status status, const PoseUnknowns& unknowns);
   Found follow(const Scene& scene, const LightImage& light, const Memory& memory) const;
   Found detect(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
                const std::optional<Rigid3>& camera_from_rcm) const;

@@ -1,0 +1,66 @@
+// docs/paper.md names files, functions and tests: all of them exist.
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/sample_frames.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+
+std::string read(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// Without blanks and backticks at its ends.
+std::string bare(const std::string& cell) {
+  const auto first = cell.find_first_not_of(" `"), last = cell.find_last_not_of(" `");
+  return first == std::string::npos ? "" : cell.substr(first, last - first + 1);
+}
+
+std::vector<std::string> cells(const std::string& line) {
+  std::vector<std::string> found;
+  std::istringstream rest(line.substr(1));
+  for (std::string cell; std::getline(rest, cell, '|');) found.push_back(bare(cell));
+  return found;
+}
+
+std::string all_tests(const fs::path& root) {
+  std::string text;
+  for (const char* folder : {"lapservo", "acceptance"})
+    for (const auto& entry : fs::recursive_directory_iterator(root / folder))
+      if (entry.path().string().ends_with("_test.cpp")) text += read(entry.path());
+  return text;
+}
+
+TEST(PaperTable, NamesOnlyWhatThereIs) {
+  const fs::path root = testing::source_folder();
+  const std::string tests = all_tests(root);
+  std::ifstream table(root / "docs/paper.md");
+  int rows = 0;
+  for (std::string line; std::getline(table, line);) {
+    if (!line.starts_with("| ") || line.starts_with("| paper |") || line.starts_with("| ---")) continue;
+    SCOPED_TRACE(line);
+    const auto row = cells(line);
+    ASSERT_EQ(row.size(), 5U);
+    EXPECT_NE(read(root / row[2]).find(row[3]), std::string::npos) << row[2] << " has no " << row[3];
+    std::string test = row[4];
+    if (const auto dot = test.find('.'); dot != std::string::npos) test.replace(dot, 1, ", ");
+    EXPECT_NE(tests.find(test + (test.empty() ? "" : ")")), std::string::npos) << "no test " << row[4];
+    ++rows;
+  }
+  EXPECT_GT(rows, 25);
+}
+
+}  // namespace
+}  // namespace lapservo

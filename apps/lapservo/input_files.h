@@ -1,0 +1,30 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <utility>
+
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::app {
+
+/// The regular files that a command reads, so that none of them is written over, by whatever name or link.
+class InputFiles {
+ public:
+  /// Anything but a regular file is passed over.
+  void add(const std::filesystem::path& path);
+  /// The file and the camera's, where the rig has one.
+  void add_rig(const std::filesystem::path& path, const Rig& rig);
+  /// The pictures in a folder, and the rigs beside them.
+  void add_pictures_in(const std::filesystem::path& folder);
+
+  /// Throws InputError when the file is one of them.
+  void refuse_as_output(const std::filesystem::path& path) const;
+  /// Throws InputError when the folder holds one of them, or a link to one.
+  void refuse_in_folder(const std::filesystem::path& folder) const;
+
+ private:
+  std::map<std::pair<unsigned long long, unsigned long long>, std::filesystem::path> files_;  // by device and inode
+};
+
+}  // namespace lapservo::app

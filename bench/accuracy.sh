@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# accuracy.sh [FRAMES]: measures the table of docs/accuracy.md on frames that lapservo renders itself, or, given the
+# folder of ray-traced samples, on those. Prints the rows. Needs build/lapservo.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+lapservo=$PWD/build/lapservo
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+methods=(surface centerline)
+
+header() {
+  echo "| set, method | instruments | found | psi mean [mrad] | std | rms | largest | theta, phi rms [mrad] | rho rms [mm] | e0..e3 rms [px] | z | wrong |"
+  echo "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |"
+}
+
+# track INPUT RIG OUT OPTION...: status 1 says that nothing was found, which is a result.
+track() {
+  local input=$1 rig=$2 out=$3
+  shift 3
+  "$lapservo" track "$input" --rig "$rig" --out "$out" "$@" >"$scratch/log" 2>&1 || [ $? -eq 1 ] || { cat "$scratch/log" >&2; exit 2; }
+}
+
+# rendered NAME OPTION...: of `lapservo render`; --video frames are tracked, others looked at one by one.
+rendered() {
+  local name=$1 rig=${rig:-configs/example.yaml} folder=$scratch/frames input method options=(--single)
+  shift
+  rm -rf "$folder"
+  "$lapservo" render --rig "$rig" --out "$folder" "$@" >/dev/null 2>&1
+  input=$folder
+  [[ " $* " == *" --video "* ]] && input=$folder/video.mp4
+  [[ " $* " == *" --moving "* ]] && options=()
+  for method in "${methods[@]}"; do
+    track "$input" "$folder/rig.yaml" "$scratch/obs.csv" --method "$method" "${options[@]}"
+    awk -f bench/evaluate.awk -v name="$name, $method" "$folder/truth.csv" "$scratch/obs.csv"
+  done
+}
+
+render_all() {
+  sed 's/distortion_coefficients: .*/distortion_coefficients: {rows: 1, cols: 5, data: [-0.28, 0.09, 0.0006, -0.0004, 0]}/' configs/example.yaml >"$scratch/distorted.yaml"
+  rendered "usual" --count 60 --seed 101
+  rig=$scratch/distorted.yaml rendered "distorted lens" --count 40 --seed 102
+  rendered "dark (--light 0.15)" --light 0.15 --count 40 --seed 103
+  rendered "overexposed (--light 1.7)" --light 1.7 --count 40 --seed 104
+  rendered "blood (--blood 0.2)" --blood 0.2 --count 40 --seed 105
+  rendered "smoke (--smoke 0.55)" --smoke 0.55 --count 40 --seed 106
+  rendered "defocus (--blur-px 2.2)" --blur-px 2.2 --count 40 --seed 107
+  rendered "noise (--noise 4)" --noise 4 --count 40 --seed 108
+  rendered "JPEG (--format jpg)" --format jpg --count 40 --seed 109
+  rendered "video (--moving --video)" --moving --video --count 150 --seed 110
+}
+
+# The rig of a frame is NNNN.rig.yaml, else the folder's rig.yaml.
+sample_set() {
+  local set=$1 name=$2 method frame stem pairs
+  for method in "${methods[@]}"; do
+    pairs=()
+    if [ -e "$set/video.mp4" ]; then
+      track "$set/video.mp4" "$set/rig.yaml" "$scratch/obs.csv" --single --method "$method"
+      pairs=("$set/truth.csv" "$scratch/obs.csv")
+    else
+      for frame in "$set"/[0-9]*.{png,jpg}; do
+        [ -e "$frame" ] || continue
+        stem=$(basename "${frame%.*}")
+        local rig=$set/$stem.rig.yaml
+        [ -e "$rig" ] || rig=$set/rig.yaml
+        track "$frame" "$rig" "$scratch/$stem.csv" --single --method "$method"
+        awk -F, -v file="$(basename "$frame")" 'NR == 1 || $1 == file' "$set/truth.csv" >"$scratch/$stem.truth.csv"
+        pairs+=("$scratch/$stem.truth.csv" "$scratch/$stem.csv")
+      done
+    fi
+    awk -f bench/evaluate.awk -v name="$name, $method" "${pairs[@]}"
+  done
+}
+
+header
+if [ $# -eq 0 ]; then
+  render_all
+else
+  for set in rotation illumination tilt two distorted video stress; do sample_set "$1/$set" "$set"; done
+fi

@@ -1,0 +1,256 @@
+// Rigs, pictures, videos and command lines as hostile, unlucky and impatient users bring them, made by mutations of
+// good ones. Prints how many of each came to what; exits with 1 when a law is broken. campaign RIGS PICTURES COMMANDS
+// [SEED]
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <map>
+#include <string>
+#include <sys/wait.h>
+#include <vector>
+
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "fuzz/campaign/mutations.h"
+#include "fuzz/require_observation.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/error.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/testing/rigs.h"
+#include "lapservo/testing/temporary_folder.h"
+#include "lapservo/vision/tracker.h"
+
+namespace {
+using namespace lapservo;
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr double longest_s = 5, largest_error_rad = 0.1;
+
+// What the cases of one kind came to.
+class Counts {
+ public:
+  explicit Counts(std::string kind) : kind_(std::move(kind)) {}
+  ~Counts() {
+    std::printf("%s:", kind_.c_str());
+    for (const auto& [word, count] : counts_) std::printf(" %d %s", count, word.c_str());
+    std::printf("; longest %.2f s\n", slowest_s_);
+  }
+  // Runs one case; `seed` is what repeats it.
+  void add(std::uint64_t seed, const std::function<std::string()>& one) {
+    const auto start = Clock::now();
+    ++counts_[one()];
+    const double took_s = std::chrono::duration<double>(Clock::now() - start).count();
+    slowest_s_ = std::max(slowest_s_, took_s);
+    if (took_s > longest_s) broken(seed, "takes longer than 5 s");
+  }
+  void broken(std::uint64_t seed, const std::string& law) {
+    ++counts_["BROKEN"];
+    std::printf("%s, seed %llu: %s\n", kind_.c_str(), static_cast<unsigned long long>(seed), law.c_str());
+    any_broken = true;
+  }
+  inline static bool any_broken = false;
+
+ private:
+  std::string kind_;
+  std::map<std::string, int> counts_;
+  double slowest_s_ = 0;
+};
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void try_rigs(int count, std::uint64_t seed) {
+  Counts counts("rigs");
+  const fs::path folder = testing::source_folder() / "configs";
+  const std::string good[] = {text_of(folder / "paper.yaml"), text_of(folder / "example.yaml")};
+  for (int i = 0; i < count; ++i)
+    counts.add(seed + static_cast<std::uint64_t>(i), [&] {
+      Random random(seed + static_cast<std::uint64_t>(i));
+      std::string yaml = good[random.bits() % 2];
+      for (std::uint64_t n = 1 + random.bits() % 3; n > 0; --n) yaml = fuzz::mutated_yaml(yaml, random);
+      try {
+        parse_rig(yaml, "rig.yaml", folder);
+        return "taken";
+      } catch (const InputError& error) {
+        fuzz::require_one_line(error);
+        return "refused";
+      }
+    });
+}
+
+// Files of good frames, and psi in each of their frames.
+struct Sample {
+  std::string extension, bytes;
+  std::vector<double> psi_rad;
+};
+
+std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
+  const Instrument& instrument = rig.instruments.front();
+  ShaftModel shaft;
+  shaft.marker = instrument.marker;
+  Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 1));
+  std::vector<cv::Mat> frames;
+  std::vector<double> psi_rad;
+  const cv::Size size(rig.camera.width_px, rig.camera.height_px);
+  for (int i = 0; i < 6; ++i) {
+    RcmCoordinates q = configuration_through(*instrument.camera_from_rcm, {-0.012, 0.004, 0.1}).value();
+    q.psi_rad = 1;
+    q.psi_rad += 0.1 * i;
+    frames.push_back(renderer.render({{*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad}}, 7));
+    psi_rad.push_back(q.psi_rad);
+  }
+  std::vector<Sample> all;
+  for (const char* extension : {".png", ".jpg", ".bmp", ".tif", ".webp"}) {
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(extension, frames[0], bytes);
+    all.push_back({extension, {bytes.begin(), bytes.end()}, {psi_rad[0]}});
+  }
+  for (const char* extension : {".mkv", ".mp4", ".avi", ".ts"}) {
+    const fs::path path = folder / (std::string("sample") + extension);
+    const bool motion_jpeg = std::string(extension) == ".avi";
+    cv::VideoWriter video(
+        path.string(), cv::CAP_FFMPEG,
+        motion_jpeg ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G') : cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
+        size);
+    for (const cv::Mat& frame : frames) video.write(frame);
+    video.release();
+    all.push_back({extension, text_of(path), psi_rad});
+    fs::remove(path);
+  }
+  return all;
+}
+
+// Frames of a damaged file are not where the truth has them once one is lost: the nearest of the truth's counts.
+double least_error_rad(double psi_rad, const std::vector<double>& truth) {
+  double least = pi;
+  for (const double true_rad : truth) least = std::min(least, std::abs(std::remainder(psi_rad - true_rad, two_pi)));
+  return least;
+}
+
+std::string track_file(const fs::path& path, const Rig& rig, const Sample& sample, Counts& counts, std::uint64_t seed) {
+  std::string worst = "nothing found";
+  try {
+    Tracker tracker(rig, {.single = true});
+    const auto source = open_frame_source(path.string(), 30);
+    while (const auto frame = source->next()) {
+      if (frame->flaw) {
+        worst = "flagged";
+        continue;
+      }
+      for (const Observation& seen : tracker.track(frame->bgr)) {
+        fuzz::require_sound(seen);
+        if (seen.status != Status::ok) continue;
+        if (worst == "nothing found") worst = "measured";
+        const double error_rad = least_error_rad(seen.rcm->q.psi_rad, sample.psi_rad);
+        if (error_rad > largest_error_rad)
+          counts.broken(seed, sample.extension + ": ok with psi off by " + std::to_string(error_rad) + " rad");
+      }
+    }
+    return worst;
+  } catch (const InputError& error) {
+    fuzz::require_one_line(error);
+    return "refused";
+  }
+}
+
+void try_pictures(int count, std::uint64_t seed) {
+  Counts counts("pictures and videos");
+  const testing::TemporaryFolder folder;
+  const Rig rig = testing::small_test_rig();
+  const std::vector<Sample> good = samples(rig, folder.path());
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t own = seed + static_cast<std::uint64_t>(i);
+    counts.add(own, [&] {
+      Random random(own);
+      const Sample& sample = good[fuzz::below(good.size(), random)];
+      const fs::path path = folder / ("a" + sample.extension);
+      testing::write_file(path, fuzz::mutated_bytes(sample.bytes, random));
+      return track_file(path, rig, sample, counts, own);
+    });
+  }
+}
+
+// One subcommand with some of its options, each with a value that may be anything.
+std::string random_command(const std::string& rig, const std::string& out, Random& random) {
+  static const std::vector<std::string> values{"nan", "-1",  "0",   "1",    "1e999", "''", "'a b'", "1,2,3,4", "1,2",
+                                               "x",   "0.5", "png", "/dev", "--",    "1x", "9e9",   "6",       "3"};
+  const std::vector<std::pair<std::string, std::vector<std::string>>> commands{
+      {"render --count 1 --rig " + rig + " --out " + out,
+       {"seed", "light", "smoke", "blood", "noise", "blur-px", "motion", "film-mm", "fps", "format", "poses",
+        "background"}},
+      {"marker design --out " + out,
+       {"diameter-mm", "length-mm", "hues", "bands-upper-mm", "bands-lower-mm", "focal-px", "distance-mm", "sigma-px"}},
+      {"marker print --rig " + rig + " --out " + out + ".svg", {"paper", "copies", "instrument"}},
+      {"marker show --rig " + rig, {"instrument", "focal-px", "distance-mm"}},
+      {"servo --robot sim --duration 0.1 --rig " + rig + " --out " + out,
+       {"set-point", "via", "method", "controller", "delay-ms", "rcm-px", "start", "seed", "latency-ms", "fps", "hide",
+        "trajectory", "replay"}},
+      {"estimate-rcm " + rig + " --out " + out, {"sigma-px", "common-px", "rig"}},
+      {"track " + rig + " --out " + out, {"rig", "method", "fps", "overlay"}},
+      {"experiment none --out " + out, {"seed", "method", "rig"}}};
+  const auto& [command, options] = commands[fuzz::below(commands.size(), random)];
+  std::string text = command;
+  for (std::uint64_t n = random.bits() % 4; n > 0; --n) {
+    text += " --" + options[fuzz::below(options.size(), random)];
+    if (random.bits() % 8 != 0) text += " " + values[fuzz::below(values.size(), random)];
+  }
+  return text;
+}
+
+void try_commands(int count, std::uint64_t seed) {
+  Counts counts("command lines");
+  const std::string rig = (testing::source_folder() / "configs" / "paper.yaml").string();
+  for (int i = 0; i < count; ++i) {
+    const std::uint64_t own = seed + static_cast<std::uint64_t>(i);
+    counts.add(own, [&]() -> std::string {
+      Random random(own);
+      const testing::TemporaryFolder folder;
+      fs::create_directory(folder / "in");
+      const std::string arguments = random_command(rig, (folder / "out").string(), random);
+      const std::string log = (folder / "in/stderr").string();
+      const std::string command = "cd " + (folder / "in").string() +
+                                  " && ASAN_OPTIONS=detect_leaks=0 timeout 20 " LAPSERVO_TOOL " " + arguments +
+                                  " >/dev/null 2>" + log + " </dev/null";
+      const int status = std::system(command.c_str());
+      const int code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+      if (code < 0 || code > 2) counts.broken(own, "exit " + std::to_string(code) + ": " + arguments);
+      const std::string said = text_of(log);
+      if (code == 2 && std::count(said.begin(), said.end(), '\n') != 1)
+        counts.broken(own, "not one line: " + arguments + ": " + said);
+      for (const auto& entry : fs::directory_iterator(folder.path()))
+        if (entry.path().filename() != "in" && (code == 2 || !entry.path().filename().string().starts_with("out")))
+          counts.broken(own, "leaves " + entry.path().filename().string() + ": " + arguments);
+      return "exit " + std::to_string(code);
+    });
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 4) {
+    std::fprintf(stderr, "campaign RIGS PICTURES COMMANDS [SEED]\n");
+    return 2;
+  }
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
+  const std::uint64_t seed = argc > 4 ? std::strtoull(argv[4], nullptr, 10) : 1;
+  try_rigs(std::atoi(argv[1]), seed);
+  try_pictures(std::atoi(argv[2]), seed);
+  try_commands(std::atoi(argv[3]), seed);
+  return Counts::any_broken ? 1 : 0;
+}

@@ -1,0 +1,81 @@
+#include "lapservo/core/input_file.h"
+
+#include <array>
+#include <cerrno>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <system_error>
+#include <unistd.h>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+
+constexpr int patience_ms = 5000;
+
+class Descriptor {
+ public:
+  // Not blocking: to open a pipe that nobody writes would take for ever.
+  explicit Descriptor(const std::filesystem::path& path)
+      : number_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  int number() const { return number_; }
+
+ private:
+  int number_;
+};
+
+class InputFile {
+ public:
+  InputFile(const std::filesystem::path& path, std::size_t largest_bytes, std::string_view expected)
+      : source_(path.string()), expected_(expected), largest_bytes_(largest_bytes), descriptor_(path) {
+    struct stat about {};
+    if (descriptor_.number() < 0 || ::fstat(descriptor_.number(), &about) != 0) fail("can't be opened");
+    if (S_ISDIR(about.st_mode)) fail("is a folder");
+    if (S_ISREG(about.st_mode) && static_cast<std::size_t>(about.st_size) > largest_bytes) fail_too_large();
+  }
+
+  std::string read() {
+    std::string text;
+    std::array<char, 1 << 16> buffer{};
+    while (wait()) {
+      const ssize_t count = ::read(descriptor_.number(), buffer.data(), buffer.size());
+      if (count == 0) break;
+      if (count < 0 && (errno == EINTR || errno == EAGAIN)) continue;
+      if (count < 0) fail("can't be read (" + std::system_category().message(errno) + ")");
+      text.append(buffer.data(), static_cast<std::size_t>(count));
+      if (text.size() > largest_bytes_) fail_too_large();
+    }
+    return text;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& problem) const {
+    throw InputError(source_, problem + ", expected " + expected_);
+  }
+  [[noreturn]] void fail_too_large() const { fail("is larger than " + std::to_string(largest_bytes_ >> 20) + " MiB"); }
+  bool wait() const {
+    pollfd waited{descriptor_.number(), POLLIN, 0};
+    const int ready = ::poll(&waited, 1, patience_ms);
+    if (ready == 0) fail("gives nothing for " + std::to_string(patience_ms / 1000) + " seconds");
+    return ready < 0 ? errno == EINTR : true;
+  }
+
+  std::string source_, expected_;
+  std::size_t largest_bytes_;
+  Descriptor descriptor_;
+};
+
+}  // namespace
+
+std::string read_input(const std::filesystem::path& path, std::size_t largest_bytes, std::string_view expected) {
+  return InputFile(path, largest_bytes, expected).read();
+}
+
+}  // namespace lapservo

@@ -1,0 +1,87 @@
+#include "lapservo/io/exif_orientation.h"
+
+#include <cstddef>
+#include <cstring>
+#include <string_view>
+
+namespace lapservo {
+namespace {
+using Bytes = std::span<const std::uint8_t>;
+
+bool begins_with(Bytes bytes, std::string_view magic) {
+  return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
+}
+
+// Unsigned numbers at a place of bytes of either order; 0 beyond their end.
+struct Numbers {
+  Bytes bytes;
+  bool big_endian;
+
+  std::size_t of(std::size_t at, std::size_t count) const {
+    if (at > bytes.size() || bytes.size() - at < count) return 0;
+    std::size_t value = 0;
+    for (std::size_t i = 0; i < count; ++i) value = value << 8 | bytes[at + (big_endian ? i : count - 1 - i)];
+    return value;
+  }
+};
+
+Bytes from(Bytes bytes, std::size_t at) {
+  return at < bytes.size() ? bytes.subspan(at) : Bytes{};
+}
+
+// EXIF is a TIFF header too. Its first directory: a count, then entries of tag, type, count and value, 12 bytes each.
+std::optional<int> of_tiff(Bytes bytes) {
+  const bool big = begins_with(bytes, std::string_view("MM\0*", 4));
+  if (!big && !begins_with(bytes, std::string_view("II*\0", 4))) return std::nullopt;
+  const Numbers numbers{bytes, big};
+  const std::size_t directory = numbers.of(4, 4), entries = numbers.of(directory, 2);
+  for (std::size_t i = 0; i < entries; ++i) {
+    const std::size_t at = directory + 2 + 12 * i;
+    if (numbers.of(at, 2) == 0x0112) return static_cast<int>(numbers.of(at + 8, 2));
+  }
+  return std::nullopt;
+}
+
+std::optional<int> of_exif(Bytes bytes) {
+  constexpr std::string_view prefix("Exif\0\0", 6);
+  return of_tiff(begins_with(bytes, prefix) ? from(bytes, prefix.size()) : bytes);
+}
+
+// Segments up to the start of the scan: FF, a marker, a length that counts itself.
+std::optional<int> of_jpeg(Bytes bytes) {
+  const Numbers numbers{bytes, true};
+  for (std::size_t at = 2; at + 4 <= bytes.size();) {
+    const std::size_t marker = numbers.of(at + 1, 1), length = numbers.of(at + 2, 2);
+    if (bytes[at] != 0xff || marker == 0xff || marker == 0) {
+      ++at;  // fill bytes, or garbage that decoders step over
+      continue;
+    }
+    if (marker == 0xda) return std::nullopt;
+    const Bytes segment = from(bytes, at + 4);
+    if (marker == 0xe1 && begins_with(segment, "Exif")) return of_exif(segment);
+    at += marker >= 0xd0 && marker <= 0xd8 ? 2 : 2 + (length < 2 ? 2 : length);
+  }
+  return std::nullopt;
+}
+
+// Chunks of a name and a length: PNG's have 8 bytes before their content and 4 behind, RIFF's an even length.
+std::optional<int> of_chunks(Bytes bytes, std::size_t first, bool png) {
+  const Numbers numbers{bytes, png};
+  for (std::size_t at = first; at + 8 <= bytes.size();) {
+    const std::size_t length = numbers.of(png ? at : at + 4, 4);
+    if (begins_with(from(bytes, png ? at + 4 : at), png ? "eXIf" : "EXIF")) return of_exif(from(bytes, at + 8));
+    at += 8 + length + (png ? 4 : length % 2);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<int> exif_orientation(Bytes picture) {
+  if (begins_with(picture, "\xff\xd8")) return of_jpeg(picture);
+  if (begins_with(picture, "\x89PNG")) return of_chunks(picture, 8, true);
+  if (begins_with(picture, "RIFF")) return of_chunks(picture, 12, false);
+  return of_tiff(picture);
+}
+
+}  // namespace lapservo

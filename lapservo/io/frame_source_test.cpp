@@ -1,0 +1,112 @@
+#include "lapservo/io/frame_source.h"
+
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "lapservo/core/random.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr int frames = 20;
+
+void write_video(const fs::path& path, const char* codec) {
+  cv::VideoWriter video(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]),
+                        25, {320, 240});
+  ASSERT_TRUE(video.isOpened()) << path;
+  cv::RNG random(7);
+  for (int i = 0; i < frames; ++i) {
+    cv::Mat image(240, 320, CV_8UC3);
+    random.fill(image, cv::RNG::UNIFORM, 60, 200);
+    image(cv::Rect(10 * i, 50, 40, 40)).setTo(cv::Scalar(20, 40, 250));
+    video.write(image);
+  }
+}
+
+std::string bytes_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct Read {
+  int frames = 0, damaged = 0;
+  std::string complaint;
+};
+
+Read read(const fs::path& path) {
+  const auto source = open_frame_source(path.string(), 30);
+  Read result;
+  while (const auto frame = source->next()) {
+    EXPECT_EQ(frame->index, result.frames);
+    EXPECT_EQ(frame->bgr.size(), cv::Size(320, 240));
+    ++result.frames;
+    result.damaged += frame->flaw == Status::damaged;
+  }
+  result.complaint = source->complaint();
+  return result;
+}
+
+TEST(VideoSource, GivesEveryFrameOfAWholeVideo) {
+  const testing::TemporaryFolder folder;
+  for (const auto& [name, codec] :
+       {std::pair{"a.mp4", "mp4v"}, {"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
+    write_video(folder / name, codec);
+    const Read whole = read(folder / name);
+    EXPECT_EQ(whole.frames, frames) << name;
+    EXPECT_EQ(whole.damaged, 0) << name;
+    EXPECT_EQ(whole.complaint, "") << name;
+  }
+}
+
+TEST(VideoSource, SaysThatAVideoEndsEarly) {
+  const testing::TemporaryFolder folder;
+  for (const auto& [name, codec] : {std::pair{"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
+    write_video(folder / name, codec);
+    const std::string whole = bytes_of(folder / name);
+    testing::write_file(folder / name, whole.substr(0, whole.size() / 2));
+    const Read half = read(folder / name);
+    EXPECT_LT(half.frames, frames) << name;
+    EXPECT_NE(half.complaint, "") << name;
+  }
+}
+
+// Of damage within its data the decoder learns most of the time; then the frame says so and the video as a whole.
+TEST(VideoSource, MarksDamagedFrames) {
+  const testing::TemporaryFolder folder;
+  for (const auto& [name, codec] : {std::pair{"a.mp4", "mp4v"}, {"a.avi", "MJPG"}}) {
+    write_video(folder / name, codec);
+    std::string bytes = bytes_of(folder / name);
+    Random random(3);
+    for (std::size_t i = bytes.size() / 3; i < bytes.size() / 3 + 200; ++i)
+      bytes[i] = static_cast<char>(random.bits() & 0x7f);
+    testing::write_file(folder / name, bytes);
+    const Read damaged = read(folder / name);
+    EXPECT_GE(damaged.damaged, 1) << name;
+    EXPECT_NE(damaged.complaint, "") << name;
+  }
+}
+
+TEST(OpenFrameSource, NamesWhatCanNotBeRead) {
+  const testing::TemporaryFolder folder;
+  const auto said = [&](const std::string& input) {
+    return testing::input_error([&] { open_frame_source(input, 30); });
+  };
+  testing::write_file(folder / "text.mp4", "this is no film");
+  EXPECT_EQ(said((folder / "text.mp4").string()),
+            (folder / "text.mp4").string() + ": can't be read, expected a picture or a video");
+  EXPECT_EQ(said("/dev/zero"), "/dev/zero: is no file, expected a picture, a folder or a video");
+  EXPECT_NE(said(std::string(300, 'a')).find("does not exist"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lapservo

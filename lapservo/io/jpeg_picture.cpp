@@ -1,0 +1,83 @@
+#include "lapservo/io/jpeg_picture.h"
+
+#include <array>
+#include <csetjmp>
+#include <cstdio>
+#include <jpeglib.h>
+
+namespace lapservo {
+namespace {
+
+constexpr int most_scans = 64;  // of a progressive picture; some files have thousands, to take minutes
+
+// The library leaves by longjmp, so nothing here or in read_rows() may have a destructor.
+struct Decoder {
+  jpeg_decompress_struct info;
+  jpeg_error_mgr errors;
+  jpeg_progress_mgr progress;
+  std::jmp_buf leave;
+  std::array<char, JMSG_LENGTH_MAX> complaint;
+};
+
+Decoder& decoder_of(j_common_ptr info) {
+  return *static_cast<Decoder*>(info->client_data);
+}
+
+void keep_complaint(j_common_ptr info) {
+  auto& complaint = decoder_of(info).complaint;
+  if (complaint[0] == '\0') info->err->format_message(info, complaint.data());
+}
+
+void on_message(j_common_ptr info, int level) {
+  if (level < 0) keep_complaint(info);
+}
+
+void on_error(j_common_ptr info) {
+  keep_complaint(info);
+  std::longjmp(decoder_of(info).leave, 1);
+}
+
+void on_progress(j_common_ptr info) {
+  Decoder& decoder = decoder_of(info);
+  if (decoder.info.input_scan_number <= most_scans) return;
+  std::snprintf(decoder.complaint.data(), decoder.complaint.size(), "more than %d scans", most_scans);
+  std::longjmp(decoder.leave, 1);
+}
+
+void print_nothing(j_common_ptr) {}
+
+void read_rows(Decoder& decoder, std::span<const std::uint8_t> bytes, cv::Mat& image) {
+  if (setjmp(decoder.leave) != 0) return;
+  jpeg_create_decompress(&decoder.info);
+  decoder.info.progress = &decoder.progress;
+  jpeg_mem_src(&decoder.info, bytes.data(), bytes.size());
+  jpeg_read_header(&decoder.info, TRUE);
+  decoder.info.out_color_space = JCS_EXT_BGR;
+  jpeg_start_decompress(&decoder.info);
+  image.create(static_cast<int>(decoder.info.output_height), static_cast<int>(decoder.info.output_width), CV_8UC3);
+  image.setTo(0);
+  while (decoder.info.output_scanline < decoder.info.output_height) {
+    JSAMPROW row = image.ptr(static_cast<int>(decoder.info.output_scanline));
+    jpeg_read_scanlines(&decoder.info, &row, 1);
+  }
+  jpeg_finish_decompress(&decoder.info);
+}
+
+}  // namespace
+
+DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes) {
+  Decoder decoder{};
+  decoder.info.client_data = &decoder;
+  decoder.info.err = jpeg_std_error(&decoder.errors);
+  decoder.errors.error_exit = on_error;
+  decoder.errors.emit_message = on_message;
+  decoder.errors.output_message = print_nothing;
+  decoder.progress.progress_monitor = on_progress;
+  DecodedPicture picture;
+  read_rows(decoder, bytes, picture.bgr);
+  jpeg_destroy_decompress(&decoder.info);
+  picture.complaint = decoder.complaint.data();
+  return picture;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+namespace lapservo {
+
+/// What a decoder made of a file: a picture in 8-bit BGR (empty when not even its header could be read), and the first
+/// thing it complained of (empty: nothing).
+struct DecodedPicture {
+  cv::Mat bgr;
+  std::string complaint;
+};
+
+/// By libjpeg, whose warnings OpenCV swallows.
+DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes);
+
+}  // namespace lapservo

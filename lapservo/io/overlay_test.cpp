@@ -1,0 +1,82 @@
+#include "lapservo/io/overlay.h"
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/rigs.h"
+#include "lapservo/vision/shaft_pose.h"
+
+namespace lapservo {
+namespace {
+
+using What = Observation::Refused::What;
+const RcmCoordinates q{0.07, 1.57, 0.064, 1.2};
+
+Rig rig_with_rcm_in_view() {
+  Rig rig = testing::paper_test_rig();
+  rig.instruments[0].camera_from_rcm->translation += Eigen::Vector3d(0.05, 0.04, 0.02);
+  return rig;
+}
+
+cv::Mat grey_frame(const Rig& rig) {
+  return {rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar(90, 90, 90)};
+}
+
+Observation seen_at(const Rig& rig) {
+  const Instrument& instrument = rig.instruments[0];
+  Observation o;
+  o.status = Status::ok;
+  o.camera_from_unrolled = *instrument.camera_from_rcm * rcm_from_unrolled(q);
+  o.psi_rad = q.psi_rad;
+  o.edges_ideal_px = centre_line(rig.camera, instrument.marker, o.camera_from_unrolled, q.psi_rad)->ideal_px;
+  o.edges_raw_px = o.edges_ideal_px;
+  o.features = features_of(o.edges_ideal_px, projected_rcm_px(rig.camera, *instrument.camera_from_rcm));
+  o.rcm = Observation::Rcm{q, 1e-6 * Eigen::Matrix4d::Identity()};
+  return o;
+}
+
+// Pixels within `reach_px` of a place that the overlay changed.
+int drawn_near(const cv::Mat& frame, const cv::Mat& overlay, const Eigen::Vector2d& px, int reach_px) {
+  const cv::Rect around(static_cast<int>(px.x()) - reach_px, static_cast<int>(px.y()) - reach_px, 2 * reach_px + 1,
+                        2 * reach_px + 1);
+  const cv::Rect inside = around & cv::Rect(0, 0, frame.cols, frame.rows);
+  cv::Mat changed;
+  cv::absdiff(frame(inside), overlay(inside), changed);
+  return cv::countNonZero(changed.reshape(1));
+}
+
+TEST(Overlay, MarksTheRcmWhenItLiesInThePicture) {
+  const Rig near = rig_with_rcm_in_view();
+  const Eigen::Vector2d rcm_px = projected_rcm_px(near.camera, *near.instruments[0].camera_from_rcm).value();
+  ASSERT_GT(rcm_px.minCoeff(), 20);
+  const cv::Mat frame = grey_frame(near), overlay = draw_overlay(frame, near, {seen_at(near)});
+  EXPECT_GT(drawn_near(frame, overlay, rcm_px, 4), 10);
+  const Eigen::Vector2d halfway = (rcm_px + seen_at(near).edges_raw_px[0]) / 2;
+  EXPECT_GT(drawn_near(frame, overlay, halfway, 15), 10) << "r leads there";
+}
+
+// With the reason, and in another style than what is believed.
+TEST(Overlay, DrawsWhatWasRefused) {
+  const Rig rig = testing::paper_test_rig();
+  const cv::Mat frame = grey_frame(rig);
+  Observation nothing;
+  nothing.status = Status::poor_fit;
+  const Observation found = seen_at(rig);
+  Observation by_pose = nothing, by_edges = nothing;
+  by_pose.refused.what = What::pose;
+  by_pose.refused.camera_from_unrolled = found.camera_from_unrolled;
+  by_pose.refused.psi_rad = found.psi_rad;
+  by_edges.refused.what = What::edges;
+  by_edges.refused.edges_raw_px = found.edges_raw_px;
+  const Eigen::Vector2d proximal = found.edges_raw_px[0];
+  const cv::Mat without = draw_overlay(frame, rig, {nothing}), believed = draw_overlay(frame, rig, {found});
+  EXPECT_EQ(drawn_near(frame, without, proximal, 12), 0);
+  for (const Observation& refused : {by_pose, by_edges}) {
+    const cv::Mat overlay = draw_overlay(frame, rig, {refused});
+    EXPECT_GT(drawn_near(frame, overlay, proximal, 12), 10);
+    EXPECT_GT(drawn_near(believed, overlay, proximal, 12), 10) << "another style";
+    EXPECT_GT(drawn_near(frame, overlay, {60, 26}, 20), 10) << "the reason";
+  }
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,197 @@
+#include "lapservo/io/video_reader.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libavutil/display.h>
+#include <libswscale/swscale.h>
+}
+
+#include "lapservo/core/error.h"
+
+namespace lapservo {
+namespace {
+using Clock = std::chrono::steady_clock;
+
+template <auto free>
+struct Freed {
+  template <typename Object>
+  void operator()(Object* object) const {
+    free(&object);
+  }
+};
+struct FreedScaler {
+  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
+};
+
+constexpr std::int64_t transport_packet_bytes = 188;
+
+int past(void* deadline) {
+  return Clock::now() > *static_cast<Clock::time_point*>(deadline) ? 1 : 0;
+}
+
+bool turned(const AVStream& stream) {
+  const std::uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+  return matrix && std::abs(av_display_rotation_get(reinterpret_cast<const std::int32_t*>(matrix))) > 1;
+}
+
+}  // namespace
+
+class VideoReader::State {
+ public:
+  explicit State(const std::filesystem::path& path) : source_(path.string()) {
+    av_log_set_level(AV_LOG_QUIET);
+    open();
+    stream_ = format_->streams[choose_stream()];
+    if (turned(*stream_))
+      throw InputError(source_, "is to be turned for display, expected the camera's pixels upright");
+    open_decoder();
+  }
+
+  std::optional<Image> next() {
+    while (true) {
+      const int got = avcodec_receive_frame(decoder_.get(), frame_.get());
+      if (got == 0) return delivered();
+      if (got == AVERROR_EOF) return std::nullopt;
+      if (got != AVERROR(EAGAIN)) return lost();
+      if (!feed()) return lost();
+    }
+  }
+
+  // Where the container doesn't hold the count: from its duration, unless that is a guess from the last packet.
+  std::optional<int> frame_count() const {
+    if (stream_->nb_frames > 0) return static_cast<int>(std::min<std::int64_t>(stream_->nb_frames, 1'000'000'000));
+    if (format_->duration_estimation_method != AVFMT_DURATION_FROM_STREAM || format_->duration <= 0)
+      return std::nullopt;
+    const double count = static_cast<double>(format_->duration) / AV_TIME_BASE * frames_per_second();
+    return count > 0 && count < 1e9 ? std::optional(static_cast<int>(std::lround(count))) : std::nullopt;
+  }
+
+  double frames_per_second() const {
+    const double fps = av_q2d(av_guess_frame_rate(format_.get(), stream_, nullptr));
+    return fps > 0 && fps < 10000 ? fps : 30;
+  }
+
+  std::string complaint() const {
+    constexpr double slack = 0.01;  // durations are rounded, and sound may last longer
+    if (const auto announced = frame_count(); announced && frames_ < *announced - 2 - slack * *announced)
+      return "ends early, after " + std::to_string(frames_) + " of " + std::to_string(*announced) + " frames";
+    const bool transport = std::string_view(format_->iformat->name) == "mpegts";
+    if (transport && format_->pb && avio_size(format_->pb) % transport_packet_bytes != 0) return "ends within a frame";
+    return damaged_ > 0 ? "is damaged in " + std::to_string(damaged_) + " of " + std::to_string(frames_) + " frames"
+                        : "";
+  }
+
+ private:
+  void open() {
+    constexpr auto patience = std::chrono::seconds(5);
+    deadline_ = Clock::now() + patience;
+    AVFormatContext* format = avformat_alloc_context();
+    format->interrupt_callback = {past, &deadline_};
+    const bool opened = avformat_open_input(&format, source_.c_str(), nullptr, nullptr) == 0;
+    format_.reset(opened ? format : nullptr);
+    if (!opened || avformat_find_stream_info(format, nullptr) < 0)
+      throw InputError(source_, "can't be read, expected a picture or a video");
+    format->interrupt_callback = {nullptr, nullptr};
+  }
+
+  std::size_t choose_stream() const {
+    const int chosen = av_find_best_stream(format_.get(), AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+    if (chosen < 0) throw InputError(source_, "has no frames, expected a video");
+    return static_cast<std::size_t>(chosen);
+  }
+
+  void open_decoder() {
+    const AVCodec* codec = avcodec_find_decoder(stream_->codecpar->codec_id);
+    decoder_.reset(codec ? avcodec_alloc_context3(codec) : nullptr);
+    if (!decoder_ || avcodec_parameters_to_context(decoder_.get(), stream_->codecpar) < 0)
+      throw InputError(source_, "can't be decoded, expected a video");
+    decoder_->thread_count = 0;
+    decoder_->thread_type = FF_THREAD_SLICE;  // with frames in parallel, nobody knows whose error it is
+    decoder_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
+    if (avcodec_open2(decoder_.get(), codec, nullptr) < 0)
+      throw InputError(source_, "can't be decoded, expected a video");
+  }
+
+  // Gives the decoder its next packet; false when it complains of it.
+  bool feed() {
+    while (av_read_frame(format_.get(), packet_.get()) >= 0) {
+      const bool ours = packet_->stream_index == stream_->index;
+      if (ours && (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) tainted_ = true;
+      const int sent = ours ? avcodec_send_packet(decoder_.get(), packet_.get()) : 0;
+      av_packet_unref(packet_.get());
+      if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
+    }
+    return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
+  }
+
+  // What is predicted from a damaged frame is damaged too, up to the next that stands alone.
+  Image delivered() {
+    const bool flawed = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
+    const bool packet_flawed = std::exchange(tainted_, false);
+    spoiled_ = flawed || packet_flawed || (spoiled_ && frame_->key_frame == 0);
+    convert();
+    av_frame_unref(frame_.get());
+    return counted(spoiled_);
+  }
+  Image lost() {
+    spoiled_ = true;
+    if (last_.empty())
+      last_ = cv::Mat::zeros(std::max(1, stream_->codecpar->height), std::max(1, stream_->codecpar->width), CV_8UC3);
+    return counted(true);
+  }
+  Image counted(bool damaged) {
+    ++frames_;
+    damaged_ += damaged ? 1 : 0;
+    return {last_.clone(), damaged};
+  }
+
+  void convert() {
+    const int width = frame_->width, height = frame_->height;
+    scaler_.reset(sws_getCachedContext(scaler_.release(), width, height, static_cast<AVPixelFormat>(frame_->format),
+                                       width, height, AV_PIX_FMT_BGR24, SWS_BICUBIC, nullptr, nullptr, nullptr));
+    if (!scaler_) throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
+    last_.create(height, width, CV_8UC3);
+    std::uint8_t* rows[4] = {last_.data};
+    const int steps[4] = {static_cast<int>(last_.step)};
+    sws_scale(scaler_.get(), frame_->data, frame_->linesize, 0, height, rows, steps);
+  }
+
+  std::string source_;
+  Clock::time_point deadline_;
+  std::unique_ptr<AVFormatContext, Freed<avformat_close_input>> format_;
+  std::unique_ptr<AVCodecContext, Freed<avcodec_free_context>> decoder_;
+  std::unique_ptr<AVPacket, Freed<av_packet_free>> packet_{av_packet_alloc()};
+  std::unique_ptr<AVFrame, Freed<av_frame_free>> frame_{av_frame_alloc()};
+  std::unique_ptr<SwsContext, FreedScaler> scaler_;
+  AVStream* stream_ = nullptr;
+  cv::Mat last_;
+  int frames_ = 0, damaged_ = 0;
+  bool tainted_ = false;  // a packet since the last frame was damaged on its way
+  bool spoiled_ = false;  // the last frame is damaged
+};
+
+VideoReader::VideoReader(const std::filesystem::path& path) : state_(std::make_unique<State>(path)) {}
+VideoReader::~VideoReader() = default;
+
+std::optional<VideoReader::Image> VideoReader::next() {
+  return state_->next();
+}
+std::optional<int> VideoReader::frame_count() const {
+  return state_->frame_count();
+}
+double VideoReader::frames_per_second() const {
+  return state_->frames_per_second();
+}
+std::string VideoReader::complaint() const {
+  return state_->complaint();
+}
+
+}  // namespace lapservo

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+namespace lapservo {
+
+/// The frames of a video file, by FFmpeg's libraries: OpenCV hides what their decoders complain of.
+class VideoReader {
+ public:
+  struct Image {
+    cv::Mat bgr;           ///< 8-bit; of a frame that can't be decoded at all, the one before (or black)
+    bool damaged = false;  ///< the decoder complained of it, or of one that it was predicted from
+  };
+
+  /// Throws InputError when it holds no video that can be decoded, or one that is to be turned for display: a
+  /// calibration belongs to the pixels in one orientation and nobody can tell to which.
+  explicit VideoReader(const std::filesystem::path& path);
+  ~VideoReader();
+
+  /// nullopt at the end.
+  std::optional<Image> next();
+  /// As the file announces it; nullopt when it doesn't.
+  std::optional<int> frame_count() const;
+  double frames_per_second() const;
+  /// After the end: that fewer frames came than the file announces or that it ends within one, else empty.
+  std::string complaint() const;
+
+ private:
+  class State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lapservo

@@ -1,0 +1,60 @@
+#include "lapservo/rcm/distinct_lines.h"
+
+#include <chrono>
+#include <cstdint>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/rcm/projected_rcm.h"
+#include "lapservo/rcm/test_lines.h"
+
+namespace lapservo {
+namespace {
+
+constexpr std::uint64_t seed = 91;
+
+TEST(DistinctLines, KeepsThoseOfDifferentPositionsAsTheyAre) {
+  Random random(seed);
+  const auto lines = testing::fan_of_lines({-200, 900}, 20, 1, random);
+  const auto distinct = distinct_lines(lines);
+  ASSERT_EQ(distinct.size(), lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    EXPECT_EQ(distinct[i].from_px, lines[i].from_px);
+    EXPECT_EQ(distinct[i].to_px, lines[i].to_px);
+  }
+}
+
+TEST(DistinctLines, RepeatedOnesDoNotMakeTheEstimateMoreCertain) {
+  Random random(seed);
+  std::vector<LineObservation> once, often;
+  for (const LineObservation& line : testing::fan_of_lines({-200, 900}, 20, 1, random))
+    once.push_back(testing::with_error(line, 1, random));
+  for (int i = 0; i < 100; ++i) often.insert(often.end(), once.begin(), once.end());
+  const auto a = estimate_projected_rcm(once), b = estimate_projected_rcm(distinct_lines(often));
+  EXPECT_NEAR((a.point_px - b.point_px).norm(), 0, 1e-6);
+  ASSERT_TRUE(a.covariance_px2 && b.covariance_px2);
+  EXPECT_NEAR(b.covariance_px2->trace() / a.covariance_px2->trace(), 1, 1e-6);
+}
+
+TEST(DistinctLines, FramesOfOnePositionAreOneLineWhereverItLies) {
+  Random random(seed);
+  for (int place = 0; place < 50; ++place) {
+    const Eigen::Vector2d from(random.uniform(0, 4), random.uniform(0, 4)), along(300, 100);
+    std::vector<LineObservation> lines;
+    for (int i = 0; i < 30; ++i) lines.push_back(testing::with_error(line_between(from, from + along, 0.2), 1, random));
+    EXPECT_EQ(distinct_lines(lines).size(), 1U) << "seed " << seed;
+  }
+}
+
+TEST(DistinctLines, OfManyNoMoreThanAskedForInLinearTime) {
+  Random random(seed);
+  const auto lines = testing::fan_of_lines({-200, 900}, 96000, 1, random);
+  const auto start = std::chrono::steady_clock::now();
+  const auto distinct = distinct_lines(lines);
+  EXPECT_LE(distinct.size(), 1000U);
+  EXPECT_GT(distinct.size(), 100U);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+}
+
+}  // namespace
+}  // namespace lapservo

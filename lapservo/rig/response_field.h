@@ -1,0 +1,12 @@
+#pragma once
+
+#include "lapservo/geometry/response.h"
+#include "lapservo/rig/yaml_field.h"
+
+namespace lapservo {
+
+/// A camera's `response` (CONVENTIONS "rig.yaml"): srgb, rec709, linear, gamma:VALUE or a table; srgb when it is
+/// missing.
+Response parse_response(const YamlField& field);
+
+}  // namespace lapservo

@@ -1,0 +1,84 @@
+#include "lapservo/rig/rig_writer.h"
+
+#include <array>
+#include <cstddef>
+#include <string>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace lapservo {
+namespace {
+
+// {} writes the shortest text that reads back as the same number.
+template <typename Numbers>
+std::string list_of(const Numbers& numbers) {
+  return fmt::format("[{}]", fmt::join(numbers, ", "));
+}
+
+std::string quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + '"';
+}
+
+std::string response_yaml(const Response& response) {
+  switch (response.kind) {
+    case Response::Kind::srgb:
+      return "srgb";
+    case Response::Kind::rec709:
+      return "rec709";
+    case Response::Kind::power:
+      return fmt::format("gamma:{}", response.gamma);
+    case Response::Kind::table:
+      return fmt::format("{{light: {}, value: {}}}", list_of(response.table_light), list_of(response.table_value));
+  }
+  return "srgb";
+}
+
+std::string joints_yaml(const Joints& joints) {
+  std::array<std::string, 4> names;
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = quoted(joints.names[i]);
+  return fmt::format("    joints:\n      names: {}\n      sign: {}\n      offset: {}\n", list_of(names),
+                     list_of(joints.sign), list_of(joints.offset));
+}
+
+std::string camera_yaml(const Camera& camera) {
+  const std::array matrix{camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0};
+  return fmt::format(
+      "camera:\n  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n"
+      "  camera_matrix: {{rows: 3, cols: 3, data: {}}}\n"
+      "  distortion_coefficients: {{rows: 1, cols: 5, data: {}}}\n  response: {}\n",
+      camera.width_px, camera.height_px, list_of(matrix), list_of(camera.distortion), response_yaml(camera.response));
+}
+
+std::string instrument_yaml(const Instrument& instrument) {
+  const Marker& marker = instrument.marker;
+  std::string text = fmt::format(
+      "  - name: {}\n    marker:\n      diameter_m: {}\n      hues_deg: {}\n      bands_upper_m: {}\n"
+      "      bands_lower_m: {}\n      seam_rad: {}\n",
+      quoted(instrument.name), marker.diameter_m, list_of(marker.hues_deg), list_of(marker.bands_upper_m),
+      list_of(marker.bands_lower_m), marker.seam_rad);
+  if (instrument.camera_from_rcm) {
+    const auto& [rotation, translation] = *instrument.camera_from_rcm;
+    text += fmt::format("    camera_from_rcm:\n      translation_m: {}\n      quaternion_xyzw: {}\n",
+                        list_of(std::array{translation.x(), translation.y(), translation.z()}),
+                        list_of(std::array{rotation.x(), rotation.y(), rotation.z(), rotation.w()}));
+  }
+  if (instrument.joints) text += joints_yaml(*instrument.joints);
+  if (instrument.image_delay_s) text += fmt::format("    image_delay_s: {}\n", *instrument.image_delay_s);
+  return text;
+}
+
+}  // namespace
+
+std::string rig_yaml(const Rig& rig) {
+  std::string text = camera_yaml(rig.camera) + "instruments:\n";
+  for (const Instrument& instrument : rig.instruments) text += instrument_yaml(instrument);
+  return text;
+}
+
+}  // namespace lapservo

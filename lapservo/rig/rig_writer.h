@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+#include "lapservo/rig/rig.h"
+
+namespace lapservo {
+
+/// The rig as YAML that parse_rig() reads back to the last bit, its camera included, whatever files it came from.
+std::string rig_yaml(const Rig& rig);
+
+}  // namespace lapservo
