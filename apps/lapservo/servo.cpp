@@ -19,6 +19,7 @@
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/random_start.h"
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/csv.h"

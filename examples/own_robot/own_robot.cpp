@@ -1,5 +1,6 @@
 // own_robot RIG.yaml: ten seconds of the loop around an arm and a camera that lapservo knows nothing of.
-#include <cmath>
+#include <algorithm>
+#include <cstdint>
 #include <cstdio>
 
 #include <lapservo/control/paper_trajectory.h>
@@ -84,7 +85,8 @@ int main(int argc, char** argv) {
   LastSecond watch;
   run(arm, camera, clock, config, sinusoids(paper_sinusoids()), 10, watch);
   const Eigen::Vector4d& e = watch.largest_;
-  std::printf("largest errors in the last second: s %.2f mrad; r %.2f, l %.2f, d %.2f px\n", 1000 * e[0], e[1], e[2],
-              e[3]);
-  return e[0] < 0.005 && e.tail<3>().maxCoeff() < 1 ? 0 : 1;
+  const bool converged = e[0] < 0.005 && e.tail<3>().maxCoeff() < 1;
+  std::printf("%s; largest errors in the last second: s %.2f mrad; r %.2f, l %.2f, d %.2f px\n",
+              converged ? "converged" : "did not converge", 1000 * e[0], e[1], e[2], e[3]);
+  return converged ? 0 : 1;
 }

@@ -6,6 +6,7 @@
 
 #include "lapservo/control/gap_crossing.h"
 #include "lapservo/control/motion_limits.h"
+#include "lapservo/control/tracking_law.h"
 
 namespace lapservo {
 namespace {

@@ -10,6 +10,7 @@
 
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/random_start.h"
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"

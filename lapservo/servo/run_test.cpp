@@ -7,6 +7,7 @@
 
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/random_start.h"
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"

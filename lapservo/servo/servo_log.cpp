@@ -164,7 +164,7 @@ std::string header() {
   std::vector<std::string> truth;
   name(truth, "true_", joints);
   name(truth, "true_", features);
-  return fmt::format("period,{},{},{}", joined(input_columns()), joined(decision_columns()), joined(truth));
+  return fmt::format("tick,{},{},{}", joined(input_columns()), joined(decision_columns()), joined(truth));
 }
 
 }  // namespace
