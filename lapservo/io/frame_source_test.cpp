@@ -1,9 +1,11 @@
 #include "lapservo/io/frame_source.h"
 
+#include <chrono>
 #include <cstdint>
 #include <fstream>
 #include <iterator>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -11,6 +13,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "lapservo/core/random.h"
+#include "lapservo/io/video_reader.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
@@ -66,6 +69,19 @@ TEST(VideoSource, GivesEveryFrameOfAWholeVideo) {
     EXPECT_EQ(whole.damaged, 0) << name;
     EXPECT_EQ(whole.complaint, "") << name;
   }
+}
+
+// Whoever takes his time with the frames gets them all.
+TEST(VideoReader, IsPatientOnceItIsOpen) {
+  const testing::TemporaryFolder folder;
+  write_video(folder / "a.mkv", "mp4v");
+  constexpr std::chrono::seconds patience(2);
+  VideoReader reader(folder / "a.mkv", patience);
+  std::this_thread::sleep_for(patience + std::chrono::milliseconds(50));
+  int count = 0;
+  while (reader.next()) ++count;
+  EXPECT_EQ(count, frames);
+  EXPECT_EQ(reader.complaint(), "");
 }
 
 TEST(VideoSource, SaysThatAVideoEndsEarly) {

@@ -46,9 +46,9 @@ bool turned(const AVStream& stream) {
 
 class VideoReader::State {
  public:
-  explicit State(const std::filesystem::path& path) : source_(path.string()) {
+  State(const std::filesystem::path& path, std::chrono::milliseconds patience) : source_(path.string()) {
     av_log_set_level(AV_LOG_QUIET);
-    open();
+    open(patience);
     stream_ = format_->streams[choose_stream()];
     if (turned(*stream_))
       throw InputError(source_, "is to be turned for display, expected the camera's pixels upright");
@@ -90,8 +90,7 @@ class VideoReader::State {
   }
 
  private:
-  void open() {
-    constexpr auto patience = std::chrono::seconds(5);
+  void open(std::chrono::milliseconds patience) {
     deadline_ = Clock::now() + patience;
     AVFormatContext* format = avformat_alloc_context();
     format->interrupt_callback = {past, &deadline_};
@@ -99,7 +98,7 @@ class VideoReader::State {
     format_.reset(opened ? format : nullptr);
     if (!opened || avformat_find_stream_info(format, nullptr) < 0)
       throw InputError(source_, "can't be read, expected a picture or a video");
-    format->interrupt_callback = {nullptr, nullptr};
+    deadline_ = Clock::time_point::max();  // the file keeps asking; whoever measures slowly is not late
   }
 
   std::size_t choose_stream() const {
@@ -178,7 +177,8 @@ class VideoReader::State {
   bool spoiled_ = false;  // the last frame is damaged
 };
 
-VideoReader::VideoReader(const std::filesystem::path& path) : state_(std::make_unique<State>(path)) {}
+VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience)
+    : state_(std::make_unique<State>(path, patience)) {}
 VideoReader::~VideoReader() = default;
 
 std::optional<VideoReader::Image> VideoReader::next() {

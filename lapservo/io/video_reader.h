@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -19,7 +20,8 @@ class VideoReader {
 
   /// Throws InputError when it holds no video that can be decoded, or one that is to be turned for display: a
   /// calibration belongs to the pixels in one orientation and nobody can tell to which.
-  explicit VideoReader(const std::filesystem::path& path);
+  /// Opening may take no longer than `patience`; reading may.
+  explicit VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience = std::chrono::seconds(5));
   ~VideoReader();
 
   /// nullopt at the end.
