@@ -50,7 +50,7 @@ CsvTable table_of(const Observation& observation) {
   return table_of({observation_csv_row(3, 0.1, "0003.png", "PSM1", observation)});
 }
 
-// CONVENTIONS "lapservo track", word by word.
+// docs/conventions.md, "Observations", word by word.
 TEST(ObservationCsv, HasTheColumnsOfTheConventions) {
   EXPECT_EQ(std::string(observation_csv_header),
             "frame,time_s,file,instrument,status,"

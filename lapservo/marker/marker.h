@@ -5,8 +5,8 @@
 
 namespace lapservo {
 
-/// A printed three-colour marker, wrapped around a shaft (CONVENTIONS "Marker"). The bands run from proximal to
-/// distal; tau in [0, 2 pi) is the azimuth on the marker from its seam, right-handed about the axis towards the tip.
+/// A printed three-colour marker, wrapped around a shaft (docs/conventions.md, "Marker"). The bands run from proximal
+/// to distal; tau in [0, 2 pi) is the azimuth on the marker from its seam, right-handed about the axis towards the tip.
 struct Marker {
   double diameter_m = 0;  ///< outer, film included
   std::array<double, 3> hues_deg{90, 180, 270};
