@@ -14,12 +14,15 @@ struct FineFit {
   PoseUnknowns unknowns;
   UnknownMatrix covariance;  ///< of the unknowns, one sigma squared
   EdgeBlur blur;
-  int lines = 0;                  ///< generatrices looked at
-  std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit
-  std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
-  int sides_in_image = 0;         ///< places at which the shaft's sides were looked for
-  int sides_used = 0;             ///< of them, those at which the side was located and agrees with the fit
-  double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals
+  int lines = 0;                         ///< generatrices looked at
+  std::array<int, 4> used{};             ///< of them, lines on which the boundary was located and agrees with the fit
+  std::array<int, 4> in_image{};         ///< lines on which the boundary lies inside the image and off the seam
+  int sides_in_image = 0;                ///< places at which the shaft's sides were looked for
+  int sides_used = 0;                    ///< of them, those at which the side was located and agrees with the fit
+  double inlier_rms_sigmas = 0;          ///< of the boundaries' residuals, print errors taken out
+  double print_sigma_m = 0;              ///< how far the print is from the rig's: of each boundary's ends (PrintFit)
+  double psi_variance_by_noise = 0;      ///< of the covariance, what is there with an exact print
+  double psi_variance_by_tolerance = 0;  ///< and what the rig's tolerance adds
 
   /// Of the boundary points that the image could show, the share that was located.
   double located_share() const;

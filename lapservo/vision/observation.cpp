@@ -18,6 +18,8 @@ std::string_view status_word(Status status) {
       return "poor_fit";
     case Status::uncertain:
       return "uncertain";
+    case Status::marker_mismatch:
+      return "marker_mismatch";
   }
   return "no_marker";
 }

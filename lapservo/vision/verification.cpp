@@ -27,6 +27,15 @@ double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azim
   return std::isfinite(length_px) ? std::max(1.0, length_px) : 1.0;
 }
 
+// The rotation's sigma, without what the rig's tolerance of the print adds: who sets that wants to live with it.
+Status judge_sigma(const FineFit& fit) {
+  constexpr double limit = largest_sigma_psi_rad * largest_sigma_psi_rad;
+  const Eigen::Index psi = fit.unknowns.size() - 1;
+  const double variance = fit.covariance(psi, psi) - fit.psi_variance_by_tolerance;
+  if (variance < limit) return Status::ok;
+  return fit.psi_variance_by_noise < variance / 2 ? Status::marker_mismatch : Status::uncertain;
+}
+
 }  // namespace
 
 ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
@@ -117,9 +126,7 @@ Status judge(const Scene& scene, const FineFit& fit) {
   if (smear_px > lost_px) return Status::uncertain;
   if (smeared && 5 * *std::min_element(fit.used.begin(), fit.used.end()) < 3 * fit.lines) return Status::uncertain;
   if ((smeared || share < mostly_hidden) && fit.sides_used < fewest_sides) return Status::uncertain;
-  const Eigen::Index psi = fit.unknowns.size() - 1;
-  if (!(std::sqrt(fit.covariance(psi, psi)) < largest_sigma_psi_rad)) return Status::uncertain;
-  return Status::ok;
+  return judge_sigma(fit);
 }
 
 }  // namespace lapservo
