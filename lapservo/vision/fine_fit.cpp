@@ -7,7 +7,6 @@
 #include <span>
 
 #include "lapservo/vision/normal_equations.h"
-#include "lapservo/vision/print_fit.h"
 
 namespace lapservo {
 namespace {
@@ -86,7 +85,8 @@ double FineFit::located_share() const {
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
 }
 
-FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur) {
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
+                   const PrintEvidence& evidence) {
   constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
   FineFit fit;
   fit.unknowns = start;
@@ -130,7 +130,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.sides_in_image = pass.sides_in_image;
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
   const auto print =
-      fit_print(pass.all, unknowns, film_prior, scene.marker.tolerance_m, common_errors(pass.all, fit.blur));
+      fit_print(pass.all, unknowns, film_prior, scene.marker.tolerance_m, common_errors(pass.all, fit.blur), evidence);
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;
@@ -144,8 +144,8 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
   const double doubt = 1 + doubt_of_hidden * std::max(0.0, usual_share - fit.located_share());
   fit.covariance = doubt * doubt * print->covariance;
-  fit.print_sigma_m = print->sigma_m;
-  fit.psi_variance_by_noise = doubt * doubt * print->psi_variance_by_noise;
+  fit.print = print->evidence;
+  fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;
   fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;
   fit.converged = true;
   return fit;

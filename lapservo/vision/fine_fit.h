@@ -4,6 +4,7 @@
 
 #include "lapservo/vision/edge_measurements.h"
 #include "lapservo/vision/light_image.h"
+#include "lapservo/vision/print_fit.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
@@ -20,16 +21,17 @@ struct FineFit {
   int sides_in_image = 0;                ///< places at which the shaft's sides were looked for
   int sides_used = 0;                    ///< of them, those at which the side was located and agrees with the fit
   double inlier_rms_sigmas = 0;          ///< of the boundaries' residuals, print errors taken out
-  double print_sigma_m = 0;              ///< how far the print is from the rig's: of each boundary's ends (PrintFit)
-  double psi_variance_by_noise = 0;      ///< of the covariance, what is there with an exact print
-  double psi_variance_by_tolerance = 0;  ///< and what the rig's tolerance adds
+  PrintEvidence print;                   ///< what this and the frames before say
+  double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
+  double psi_variance_by_print = 0;      ///< and what the print adds beyond that
 
   /// Of the boundary points that the image could show, the share that was located.
   double located_share() const;
 };
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
-/// pixel in linear light, with a robust loss. `start` must be good to some pixels.
-FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur);
+/// pixel in linear light, with a robust loss. `start` must be good to some pixels. `print`: of the frames before.
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
+                   const PrintEvidence& print = {});
 
 }  // namespace lapservo
