@@ -149,7 +149,6 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.group = k;
   place.measurement.turn_share = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / two_pi;
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
-  place.measurement.out_px_per_m = pull.dot(generatrix.outwards);
   return place;
 }
 
@@ -285,9 +284,7 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
   if (!line) return std::nullopt;
   SidePlace place{{}, *line};
   place.line.limb_radius_px = static_cast<float>(radius_px);
-  const Eigen::Vector3d pull = image.d_px_d_point.transpose() * inwards;
-  place.measurement.row = row_of(frame.unknowns, point, pull, 0, 0);
-  place.measurement.out_px_per_m = pull.dot(side.limb.outwards);
+  place.measurement.row = row_of(frame.unknowns, point, image.d_px_d_point.transpose() * inwards, 0, 0);
   place.measurement.group = side.group;
   return place;
 }

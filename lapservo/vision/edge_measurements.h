@@ -31,7 +31,6 @@ struct Measurement {
   std::size_t group;          ///< 0..3: the boundary; 4 and 5: the sides
   double turn_share = 0;      ///< tau / 2 pi
   double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides
-  double out_px_per_m = 0;    ///< and with the radius
 };
 inline constexpr std::size_t measurement_groups = 6;
 

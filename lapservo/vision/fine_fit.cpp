@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 
+#include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/normal_equations.h"
 
 namespace lapservo {
@@ -49,13 +50,26 @@ UnknownVector solve(std::span<const Measurement> measurements, double film_prior
   return step;
 }
 
+double median_sigma_px(std::span<const Measurement> measurements) {
+  InplaceVector<double, 4 * EdgeMeasurements::most_lines> sigmas_px;
+  for (const Measurement& m : measurements)
+    if (m.group < 4) sigmas_px.push_back(m.sigma_px);
+  if (sigmas_px.empty()) return 0;
+  const auto middle = sigmas_px.begin() + static_cast<std::ptrdiff_t>(sigmas_px.size() / 2);
+  std::nth_element(sigmas_px.begin(), middle, sigmas_px.end());
+  return *middle;
+}
+
 // What each boundary and side as a whole may be off, and the noise as it is.
 CommonErrors common_errors(std::span<const Measurement> measurements, const EdgeBlur& blur) {
+  constexpr double usual_sigma_px = 0.05;  // of an edge; compressed ones have three times that
   const double smear_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, usual_blur_px));
+  const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - usual_blur_px);
   return {common_boundary_px + common_share_of_blur * std::max(0.0, blur.boundaries_px - usual_blur_px),
           common_side_px + common_share_of_blur * std::max(0.0, blur.sides_px - usual_blur_px) +
               side_share_of_smear * smear_px,
-          std::max(1.0, scatter_sigmas(measurements))};
+          std::max(1.0, scatter_sigmas(measurements)),
+          std::max(1.0, median_sigma_px(measurements) / usual_sigma_px) + beyond_px};
 }
 
 // What a pass changed.
@@ -85,8 +99,7 @@ double FineFit::located_share() const {
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
 }
 
-FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
-                   const PrintEvidence& evidence) {
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur) {
   constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
   FineFit fit;
   fit.unknowns = start;
@@ -130,7 +143,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.sides_in_image = pass.sides_in_image;
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
   const auto print =
-      fit_print(pass.all, unknowns, film_prior, scene.marker.tolerance_m, common_errors(pass.all, fit.blur), evidence);
+      fit_print(pass.all, unknowns, film_prior, scene.marker.tolerance_m, common_errors(pass.all, fit.blur));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;
@@ -144,7 +157,6 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
   const double doubt = 1 + doubt_of_hidden * std::max(0.0, usual_share - fit.located_share());
   fit.covariance = doubt * doubt * print->covariance;
-  fit.print = print->evidence;
   fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;
   fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;
   fit.converged = true;

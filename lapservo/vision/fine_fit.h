@@ -21,7 +21,6 @@ struct FineFit {
   int sides_in_image = 0;                ///< places at which the shaft's sides were looked for
   int sides_used = 0;                    ///< of them, those at which the side was located and agrees with the fit
   double inlier_rms_sigmas = 0;          ///< of the boundaries' residuals, print errors taken out
-  PrintEvidence print;                   ///< what this and the frames before say
   double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
   double psi_variance_by_print = 0;      ///< and what the print adds beyond that
 
@@ -30,8 +29,7 @@ struct FineFit {
 };
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
-/// pixel in linear light, with a robust loss. `start` must be good to some pixels. `print`: of the frames before.
-FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
-                   const PrintEvidence& print = {});
+/// pixel in linear light, with a robust loss. `start` must be good to some pixels.
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur);
 
 }  // namespace lapservo

@@ -15,14 +15,15 @@
 namespace lapservo {
 namespace {
 
+// How often a print is not the rig's, and by how much then (each as often): an exact print's sigma grows by a tenth.
+constexpr double off_share = 0.1;
+constexpr std::array print_sigmas_mm{0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64};
+constexpr double least_weight = 1e-6;  // less is too unlikely to count
 constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
-constexpr double most_degrees = 15;  // of the evidence that is carried on: some frames
-constexpr double mm = 1e-3;          // the print's errors are in millimetres here
+constexpr double mm = 1e-3;  // the print's errors are in millimetres here
 
-// The bands' errors first: e0, e1 at both edges, e2 at both edges, e3; then those of film and shaft: the slopes of both
-// ends, which are circles unless wrapped askew, and the radius.
-constexpr int print_errors = 9, band_errors = 6, other_errors = 3;
-constexpr int slope_of_e0 = 6, slope_of_e3 = 7, radius_error = 8;
+// e0, e1 at both edges, e2 at both edges, e3: the ends are circles.
+constexpr int print_errors = 6;
 using PrintVector = Eigen::Matrix<double, print_errors, 1>;
 using PrintMatrix = Eigen::Matrix<double, print_errors, print_errors>;
 using CrossMatrix = Eigen::Matrix<double, print_errors, Eigen::Dynamic, 0, print_errors, max_unknowns>;
@@ -86,15 +87,14 @@ double scatter_sigmas(std::span<const Measurement> measurements, const Lines& li
   return inliers ? std::sqrt(squares / inliers) : 0;
 }
 
-// d(residual)/d(print's errors) [px/mm]: of a boundary two, and the radius'.
+// d(residual)/d(print's errors) [px/mm]: of an inner boundary two.
 PrintVector print_row(const Measurement& m) {
   PrintVector row = PrintVector::Zero();
   const double along = mm * m.along_px_per_m, share = m.turn_share;
-  if (m.group == 0) row[0] = along, row[slope_of_e0] = along * (share - 0.5);
+  if (m.group == 0) row[0] = along;
   if (m.group == 1) row[1] = along * (1 - share), row[2] = along * share;
   if (m.group == 2) row[3] = along * (1 - share), row[4] = along * share;
-  if (m.group == 3) row[5] = along, row[slope_of_e3] = along * (share - 0.5);
-  row[radius_error] = mm * m.out_px_per_m;
+  if (m.group == 3) row[5] = along;
   return row;
 }
 
@@ -159,77 +159,32 @@ Sums sums_of(std::span<const Measurement> measurements, const Lines& lines, int 
   return sums;
 }
 
-// What the first `Count` of the print's errors say, when the other ones are normal with this standard deviation.
-template <int Count, int Others>
-PrintEvidence likeliest(const PrintMatrix& all, const PrintVector& pull, double others_mm) {
-  using Vector = Eigen::Matrix<double, Count, 1>;
-  using Matrix = Eigen::Matrix<double, Count, Count>;
-  const Eigen::Matrix<double, Others, Others> rest =
-      all.template bottomRightCorner<Others, Others>() +
-      Eigen::Matrix<double, Others, Others>::Identity() / (others_mm * others_mm);
-  const Eigen::Matrix<double, Count, Others> through =
-      rest.llt().solve(all.template bottomLeftCorner<Others, Count>()).transpose();
-  const Matrix information =
-      all.template topLeftCorner<Count, Count>() - through * all.template bottomLeftCorner<Others, Count>();
-  const Vector gradient = pull.template head<Count>() - through * pull.template tail<Others>();
-  constexpr double least_gain = 1;  // of the logarithm of the likelihood
-  constexpr double smallest_mm = 1e-3, ratio = 1.15;
-  constexpr int steps = 58;  // up to 3 mm
-  const Eigen::SelfAdjointEigenSolver<Matrix> directions(information);
-  const Vector lambda = directions.eigenvalues().cwiseMax(0);
-  const Vector squares = (directions.eigenvectors().transpose() * gradient).cwiseAbs2();
-  double best = least_gain, best_mm = 0, sigma_mm = smallest_mm;
-  for (int i = 0; i < steps; ++i, sigma_mm *= ratio) {
-    const double variance = sigma_mm * sigma_mm;
-    const Vector spread = 1 + variance * lambda.array();
-    const double gain = 0.5 * (variance * squares.cwiseQuotient(spread).sum() - std::log(spread.prod()));
-    if (gain > best) best = gain, best_mm = sigma_mm;
+// What the residuals say about the print's errors, whatever the pose, the film and the common errors are.
+class Evidence {
+ public:
+  Evidence(const Sums& sums, double doubt_scale) {
+    const double certainty = 1 / (doubt_scale * doubt_scale);
+    Equations e = sums.equations;
+    for (const Pull& pull : sums.pulls)
+      if (pull.weight > 0)
+        e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
+    const auto solver = e.xx.ldlt();
+    const CrossMatrix through = solver.solve(e.nx.transpose()).transpose();
+    const PrintVector gradient = e.n - through * e.x;
+    const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(e.nn - through * e.nx.transpose());
+    information_ = certainty * directions.eigenvalues().cwiseMax(0);
+    squares_ = certainty * certainty * (directions.eigenvectors().transpose() * gradient).cwiseAbs2();
   }
-  // How many of the errors a frame tells, were they of a usual size.
-  constexpr double usual_variance_mm2 = 0.03 * 0.03;
-  const Vector told = usual_variance_mm2 * lambda;
-  const double degrees = told.cwiseQuotient(Vector(1 + told.array())).sum();
-  return {mm * best_mm * std::sqrt(1 - least_gain / best), degrees};
-}
+  // Logarithm of the likelihood of this standard deviation, compared with none.
+  double gain(double sigma_mm) const {
+    const double variance = sigma_mm * sigma_mm;
+    const PrintVector spread = 1 + variance * information_.array();
+    return 0.5 * (variance * squares_.cwiseQuotient(spread).sum() - std::log(spread.prod()));
+  }
 
-struct Evidence {
-  PrintEvidence bands;
-  double others_m;
+ private:
+  PrintVector information_, squares_;  // along the directions that are independent
 };
-
-// The standard deviations of the print's errors that make the residuals likeliest, whatever the pose, the film and the
-// common errors are; 0 when the rig's print explains them about as well.
-Evidence evidence_of(const Sums& sums) {
-  Equations e = sums.equations;
-  for (const Pull& pull : sums.pulls)
-    if (pull.weight > 0) e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
-  const auto solver = e.xx.ldlt();
-  const CrossMatrix through = solver.solve(e.nx.transpose()).transpose();
-  const PrintMatrix information = e.nn - through * e.nx.transpose();
-  const PrintVector gradient = e.n - through * e.x;
-  // Ends that are circles and a shaft of the right size say nothing about the bands: each kind is judged by itself.
-  constexpr double loose_mm = 0.3, tight_mm = 1e-4;
-  const PrintEvidence others =
-      likeliest<other_errors, band_errors>(information.reverse(), gradient.reverse(), loose_mm);
-  const PrintEvidence bands =
-      likeliest<band_errors, other_errors>(information, gradient, std::max(others.sigma_m / mm, tight_mm));
-  return {bands, others.sigma_m};
-}
-
-// Both of one print, seen twice.
-PrintEvidence pooled(const PrintEvidence& a, const PrintEvidence& b) {
-  const double degrees = a.degrees + b.degrees;
-  if (!(degrees > 0)) return {};
-  return {std::sqrt((a.degrees * a.sigma_m * a.sigma_m + b.degrees * b.sigma_m * b.sigma_m) / degrees),
-          std::min(degrees, most_degrees)};
-}
-
-// As wide as a t distribution is.
-double widened_sigma_m(const PrintEvidence& evidence) {
-  constexpr double fewest_degrees = 2.5;
-  const double degrees = std::max(evidence.degrees, fewest_degrees);
-  return evidence.sigma_m * std::sqrt(degrees / (degrees - 2));
-}
 
 struct Solution {
   UnknownVector step;
@@ -237,14 +192,10 @@ struct Solution {
   UnknownMatrix covariance;
 };
 
-// The likeliest pose when the bands' and the other errors have these standard deviations, and how sure it is.
-std::optional<Solution> solved(const Sums& sums, double bands_m, double others_m) {
+// The likeliest pose when each of the print's errors has this standard deviation, and how sure it is.
+std::optional<Solution> solved(const Sums& sums, double sigma_mm) {
   const Equations& e = sums.equations;
-  const auto certainty = [](double sigma_m) { return 1 / std::max(sigma_m * sigma_m / (mm * mm), 1e-18); };
-  PrintVector prior = PrintVector::Constant(certainty(bands_m));
-  prior.tail<other_errors>().setConstant(certainty(others_m));
-  PrintMatrix of_print = e.nn;
-  of_print.diagonal() += prior;
+  const PrintMatrix of_print = e.nn + PrintMatrix::Identity() / std::max(sigma_mm * sigma_mm, 1e-18);
   const Eigen::LLT<PrintMatrix> print(of_print);
   const CrossMatrix by_x = print.solve(e.nx);
   const Eigen::FullPivLU<UnknownMatrix> lu(e.xx - e.nx.transpose() * by_x);
@@ -262,6 +213,41 @@ std::optional<Solution> solved(const Sums& sums, double bands_m, double others_m
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
 }
 
+// Weighted solutions as one.
+class Mixture {
+ public:
+  explicit Mixture(int unknowns)
+      : step_(UnknownVector::Zero(unknowns)), squares_(UnknownMatrix::Zero(unknowns, unknowns)) {}
+  void add(const Solution& solution, double weight) {
+    step_ += weight * solution.step;
+    print_mm_ += weight * solution.print_mm;
+    squares_ += weight * (solution.covariance + solution.step * solution.step.transpose());
+    weight_ += weight;
+  }
+  Solution mean() const {
+    const UnknownVector step = step_ / weight_;
+    return {step, print_mm_ / weight_, squares_ / weight_ - step * step.transpose()};
+  }
+
+ private:
+  UnknownVector step_;
+  PrintVector print_mm_ = PrintVector::Zero();
+  UnknownMatrix squares_;
+  double weight_ = 0;
+};
+
+// How likely the tolerated print and those that are off by print_sigmas_mm are, the likeliest of them 1 at most.
+std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& evidence, double tolerance_mm) {
+  std::array<double, print_sigmas_mm.size() + 1> gains{evidence.gain(tolerance_mm)};
+  for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i)
+    gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
+  const double best = *std::max_element(gains.begin(), gains.end());
+  std::array<double, print_sigmas_mm.size() + 1> weights{};
+  for (std::size_t i = 0; i < gains.size(); ++i)
+    weights[i] = (i == 0 ? 1 - off_share : off_share / print_sigmas_mm.size()) * std::exp(gains[i] - best);
+  return weights;
+}
+
 }  // namespace
 
 double scatter_sigmas(std::span<const Measurement> measurements) {
@@ -269,21 +255,29 @@ double scatter_sigmas(std::span<const Measurement> measurements) {
 }
 
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_unknowns, double film_prior,
-                                  double tolerance_m, const CommonErrors& errors, const PrintEvidence& before) {
+                                  double tolerance_m, const CommonErrors& errors) {
   const Sums sums = sums_of(measurements, lines_of(measurements), pose_unknowns, film_prior, errors);
-  const Evidence evidence = evidence_of(sums);
-  PrintFit fit;
-  fit.evidence = pooled(before, evidence.bands);
-  fit.sigma_m = std::max(widened_sigma_m(fit.evidence), tolerance_m);
-  const double others_m = std::max(evidence.others_m, tolerance_m);
-  const auto exact = solved(sums, 0, evidence.others_m), tolerated = solved(sums, tolerance_m, others_m),
-             best = fit.sigma_m > tolerance_m ? solved(sums, fit.sigma_m, others_m) : tolerated;
-  if (!exact || !tolerated || !best) return std::nullopt;
+  const double tolerance_mm = tolerance_m / mm;
+  const auto exact = solved(sums, 0);
+  auto tolerated = tolerance_m > 0 ? solved(sums, tolerance_mm) : exact;
+  if (!exact || !tolerated) return std::nullopt;
   // The exact print's pose is where the measurements were taken.
-  fit.step = fit.sigma_m > 0 || others_m > 0 ? best->step : UnknownVector::Zero(pose_unknowns + 1);
-  for (Measurement& m : measurements) m.residual_px -= m.row.dot(fit.step) + print_row(m).dot(best->print_mm);
+  if (tolerance_m == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
+  const auto weights = weights_of(Evidence(sums, errors.doubt_scale), tolerance_mm);
+  Mixture mixture(pose_unknowns + 1);
+  mixture.add(*tolerated, weights[0]);
+  for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i) {
+    if (weights[i + 1] < least_weight) continue;
+    const auto off = solved(sums, std::hypot(print_sigmas_mm[i], tolerance_mm));
+    if (!off) return std::nullopt;
+    mixture.add(*off, weights[i + 1]);
+  }
+  const Solution mean = mixture.mean();
+  for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_row(m).dot(mean.print_mm);
   const int psi = pose_unknowns - 1;
-  fit.covariance = best->covariance.topLeftCorner(pose_unknowns, pose_unknowns);
+  PrintFit fit;
+  fit.step = mean.step;
+  fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   fit.psi_variance_by_print = fit.covariance(psi, psi) - tolerated->covariance(psi, psi);
   fit.psi_variance_by_tolerance = tolerated->covariance(psi, psi) - exact->covariance(psi, psi);
   return fit;

@@ -123,16 +123,16 @@ void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
   UnknownVector velocity = UnknownVector::Zero(fit.unknowns.size());
   if (memory_[i] && memory_[i]->last.q() && fit.unknowns.q())
     velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
-  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, fit.print};
+  memory_[i] = Memory{fit.unknowns, velocity, fit.blur};
 }
 
 SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImage& light, const Memory& memory) const {
   const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
-  const FineFit near = fit_finely(scene, light, expected, memory.blur, memory.print);
+  const FineFit near = fit_finely(scene, light, expected, memory.blur);
   if (judge(scene, near) == Status::ok) return {Status::ok, near};
   const CoarseFit coarse = fit_coarsely(scene, expected, from_memory);
   if (!coarse.found) return {};
-  const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur, memory.print);
+  const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
   const Status status = judge(scene, fit);
   return status == Status::ok ? Found{status, fit} : Found{status, std::nullopt};
 }

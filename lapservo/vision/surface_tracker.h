@@ -32,7 +32,6 @@ class SurfaceTracker {
     PoseUnknowns last;
     UnknownVector velocity;  // per frame
     EdgeBlur blur;
-    PrintEvidence print;
   };
   struct Found {
     Status status = Status::no_marker;

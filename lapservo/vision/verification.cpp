@@ -28,7 +28,8 @@ double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azim
   return std::isfinite(length_px) ? std::max(1.0, length_px) : 1.0;
 }
 
-// A boundary that lies too far from its place is not located at all; when nothing hides the marker, that is the print.
+// A boundary that lies too far from its place is not located at all, and nothing contradicts what the others say; where
+// nothing hides the marker, that is the print.
 bool misses_a_boundary(const FineFit& fit, const ColorAgreement& agreement) {
   constexpr double unhidden = 0.85, missed = 0.3, sharp_px = 1.8;
   constexpr int enough = 10;
@@ -37,12 +38,14 @@ bool misses_a_boundary(const FineFit& fit, const ColorAgreement& agreement) {
   return missing && agreement.matching > unhidden && fit.blur.boundaries_px < sharp_px;
 }
 
-// The rotation's sigma, without what the rig's tolerance of the print adds: who sets that wants to live with it.
-Status judge_sigma(const FineFit& fit) {
-  constexpr double limit = largest_sigma_psi_rad * largest_sigma_psi_rad;
+// The rotation's sigma, where the rig's tolerance of the print adds to it no more than it should: who sets that wants
+// to live with it.
+Status judge_sigma(const FineFit& fit, const ColorAgreement& agreement) {
+  constexpr double limit = largest_sigma_psi_rad * largest_sigma_psi_rad, slack = 1.5;
   const Eigen::Index psi = fit.unknowns.size() - 1;
-  const double variance = fit.covariance(psi, psi) - fit.psi_variance_by_tolerance;
-  if (variance < limit) return Status::ok;
+  const double variance = fit.covariance(psi, psi);
+  if (fit.psi_variance_by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
+  if (variance < limit + slack * fit.psi_variance_by_tolerance) return Status::ok;
   const bool well_seen = fit.located_share() > well_seen_share;
   return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
 }
@@ -137,8 +140,7 @@ Status judge(const Scene& scene, const FineFit& fit) {
   if (smear_px > lost_px) return Status::uncertain;
   if (smeared && 5 * *std::min_element(fit.used.begin(), fit.used.end()) < 3 * fit.lines) return Status::uncertain;
   if ((smeared || share < mostly_hidden) && fit.sides_used < fewest_sides) return Status::uncertain;
-  if (misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
-  return judge_sigma(fit);
+  return judge_sigma(fit, agreement);
 }
 
 }  // namespace lapservo
