@@ -157,6 +157,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
   const double doubt = 1 + doubt_of_hidden * std::max(0.0, usual_share - fit.located_share());
   fit.covariance = doubt * doubt * print->covariance;
+  fit.print_off_probability = print->off_probability;
   fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;
   fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;
   fit.converged = true;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -280,6 +281,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_
   PrintFit fit;
   fit.step = mean.step;
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
+  fit.off_probability = 1 - weights[0] / std::accumulate(weights.begin(), weights.end(), 0.0);
   fit.psi_variance_by_print = fit.covariance(psi, psi) - tolerated->covariance(psi, psi);
   fit.psi_variance_by_tolerance = tolerated->covariance(psi, psi) - exact->covariance(psi, psi);
   return fit;

@@ -39,9 +39,12 @@ bool misses_a_boundary(const FineFit& fit, const ColorAgreement& agreement) {
 }
 
 // The rotation's sigma, where the rig's tolerance of the print adds to it no more than it should: who sets that wants
-// to live with it.
+// to live with it. By how much a print that is certainly off may be off is known from four numbers at best: ten sigma.
 Status judge_sigma(const FineFit& fit, const ColorAgreement& agreement) {
-  constexpr double limit = largest_sigma_psi_rad * largest_sigma_psi_rad, slack = 1.5;
+  constexpr double certain = 0.999, slack = 1.5;
+  const auto squared = [](double x) { return x * x; };
+  const bool off = fit.print_off_probability > certain;
+  const double limit = squared(off ? largest_sigma_psi_rad / 2 : largest_sigma_psi_rad);
   const Eigen::Index psi = fit.unknowns.size() - 1;
   const double variance = fit.covariance(psi, psi);
   if (fit.psi_variance_by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
