@@ -120,10 +120,10 @@ TEST(ObservationCsv, WithoutARegistrationTheRcmsColumnsAreEmpty) {
 
 TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
   Random random(seed);
-  for (const auto& [status, word] :
-       {std::pair(Status::no_marker, "no_marker"), std::pair(Status::cut, "cut"),
-        std::pair(Status::occluded, "occluded"), std::pair(Status::ambiguous, "ambiguous"),
-        std::pair(Status::poor_fit, "poor_fit"), std::pair(Status::uncertain, "uncertain")}) {
+  for (const auto& [status, word] : {std::pair(Status::no_marker, "no_marker"), std::pair(Status::cut, "cut"),
+                                     std::pair(Status::occluded, "occluded"), std::pair(Status::ambiguous, "ambiguous"),
+                                     std::pair(Status::poor_fit, "poor_fit"), std::pair(Status::uncertain, "uncertain"),
+                                     std::pair(Status::marker_mismatch, "marker_mismatch")}) {
     Observation o = random_observation(random);
     o.status = status;
     const CsvTable table = table_of(o);

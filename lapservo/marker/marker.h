@@ -13,6 +13,7 @@ struct Marker {
   std::array<double, 3> bands_upper_m{};  ///< lengths at tau = 0
   std::array<double, 3> bands_lower_m{};  ///< lengths at tau -> 2 pi
   double seam_rad = 0;                    ///< instrument azimuth of the seam
+  double tolerance_m = 0;  ///< standard deviation of where each boundary lies at either edge of the print
 
   double radius_m() const { return diameter_m / 2; }
   double length_m() const { return bands_upper_m[0] + bands_upper_m[1] + bands_upper_m[2]; }
