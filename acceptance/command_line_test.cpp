@@ -199,14 +199,14 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
   for (const char* name : {"log.csv", "rig.yaml", "controller.yaml"}) EXPECT_TRUE(fs::exists(out("run") + "/" + name));
   EXPECT_EQ(CsvTable::read(out("run") + "/log.csv").rows(), 360U);
   EXPECT_EQ(run("servo --replay " + out("run") + "/log.csv"), 0) << errors();
-  EXPECT_NE(output().find("360 periods reproduced bit for bit"), std::string::npos) << output();
+  EXPECT_NE(output().find("360 ticks reproduced bit for bit"), std::string::npos) << output();
 
   const std::string controller = read(out("run") + "/controller.yaml");
   std::ofstream(out("run") + "/controller.yaml")
       << "gains_per_s: [4, 5, 5, 5]\n"
       << controller.substr(0, controller.find("gains")) << controller.substr(controller.find("delay_s"));
   EXPECT_EQ(run("servo --replay " + out("run") + "/log.csv"), 1);
-  EXPECT_NE(errors().find("period"), std::string::npos);
+  EXPECT_NE(errors().find("tick"), std::string::npos);
   // It has not converged after half a second.
   EXPECT_EQ(run("servo --rig " + paper + " --robot sim --duration 0.5"), 1);
 }
@@ -333,7 +333,7 @@ TEST_F(CommandLine, ALogWithoutPeriodsIsNoSuccess) {
   run("servo --rig " + paper + " --robot sim --duration 0.1 --out " + in("run"));
   const std::string log = read(in("run") + "/log.csv");
   std::ofstream(in("run") + "/log.csv") << log.substr(0, log.find('\n') + 1);
-  expect_refused("servo --replay " + in("run") + "/log.csv", {"log.csv", "holds no period"});
+  expect_refused("servo --replay " + in("run") + "/log.csv", {"log.csv", "holds no tick"});
 }
 
 TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {

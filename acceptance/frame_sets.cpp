@@ -10,7 +10,6 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/sample_frames.h"
@@ -61,7 +60,7 @@ std::optional<fs::path> sample_folder() {
 }
 
 std::vector<TrueFrame> sample_frames(const std::string& set) {
-  const fs::path all = sample_folder().value(), folder = all / set;
+  const fs::path folder = sample_folder().value() / set;
   const CsvTable table = CsvTable::read(folder / "truth.csv");
   std::vector<TrueFrame> frames;
   std::string last_file;
@@ -71,9 +70,6 @@ std::vector<TrueFrame> sample_frames(const std::string& set) {
       const fs::path own = folder / fs::path(file).replace_extension(".rig.yaml");
       TrueFrame frame;
       frame.rig = load_rig(fs::exists(own) ? own : folder / "rig.yaml");
-      const auto rcm_px = projected_rcm_px(frame.rig.camera, frame.rig.instruments[0].camera_from_rcm.value());
-      const Eigen::Vector2d true_rcm_px(table.number(row, "rcm_u_px"), table.number(row, "rcm_v_px"));
-      if (!rcm_px || (*rcm_px - true_rcm_px).norm() > 1) frame.rig = load_rig(all / "rotation" / "rig.yaml");
       if (fs::exists(folder / file)) frame.bgr = read_image(folder / file);
       frames.push_back(std::move(frame));
       last_file = file;

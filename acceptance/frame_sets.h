@@ -48,14 +48,13 @@ double largest(const std::vector<double>& values);
 /// The folder of ray-traced samples, when it is there: LAPSERVO_FRAMES or ../shared/frames.
 std::optional<std::filesystem::path> sample_folder();
 
-/// The frames of one of its sets, in order. A frame's rig is NNNN.rig.yaml or rig.yaml; where that contradicts the
-/// truth's projected RCM (as stress/rig.yaml does for most of its frames) it is the rig of the set `rotation`.
+/// The frames of one of its sets, in order. A frame's rig is NNNN.rig.yaml or rig.yaml.
 std::vector<TrueFrame> sample_frames(const std::string& set);
 
 /// Every frame on its own.
 Score score_single(const std::vector<TrueFrame>& frames);
 
-/// Frames rendered in front of seeded tissue: what a set looks like in our own theatre.
+/// Frames rendered in front of seeded tissue: what a set looks like in our own renderer.
 struct RenderedSet {
   Rig rig;
   std::vector<std::vector<RcmCoordinates>> configurations;  ///< per frame and instrument

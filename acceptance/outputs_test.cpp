@@ -281,7 +281,7 @@ TEST_F(Outputs, WhatAKilledServoLoggedReplays) {
     const fs::path part = folder + "/unfinished/log.csv.part";
     ASSERT_TRUE(killed_when(servo_ + "--duration 600 --force --out " + folder, [&] { return lines_in(part) >= 20; }));
     expect_done("servo --replay " + part.string());
-    EXPECT_NE(read_file("stdout").find("periods reproduced bit for bit"), std::string::npos);
+    EXPECT_NE(read_file("stdout").find("ticks reproduced bit for bit"), std::string::npos);
     expect_refused(servo_ + "--duration 8 --out " + folder, {folder, "not finished", "--force"});
   }
   EXPECT_EQ(read_file("run/log.csv"), log);

@@ -90,8 +90,8 @@ Report report_of(std::vector<ReportSection> sections, const std::string& missing
       "lapservo: the experiments of the paper",
       {"\u201cImage-Based Trajectory Tracking Control of 4-DoF Laparoscopic Instruments Using a Rotation "
        "Distinguishing Marker\u201d (Wang et al., IEEE Robotics and Automation Letters 2(3), 2017), section V, once "
-       "more: in a simulated theatre with exact truth, by the paper\u2019s own method and by lapservo\u2019s default.",
-       fmt::format("The theatre: {}, a light beside the camera, tissue behind, a sensor with blur and noise. The "
+       "more: in a simulator with exact truth, by the paper\u2019s own method and by lapservo\u2019s default.",
+       fmt::format("The simulator: {}, a light beside the camera, tissue behind, a sensor with blur and noise. The "
                    "paper\u2019s method reads the marker on the shaft\u2019s centre line (its Algorithm 1); the "
                    "default fits all visible lines of the surface. Everything is repeatable: seed {}.",
                    options.rig.empty() ? "the rig of configs/paper.yaml" : "the rig " + options.rig, options.seed)},
@@ -165,7 +165,7 @@ int run(const Options& options) {
 
 void add_experiment(CLI::App& app, Run& run_later) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("experiment", "The paper's experiments, in a simulated theatre, as a report.");
+  CLI::App* command = app.add_subcommand("experiment", "The paper's experiments, in a simulator, as a report.");
   std::vector<std::string> choices{"all"};
   for (const Named& named : experiments()) choices.push_back(named.name);
   command->add_option("name", options->name, "Which: " + names())->required()->check(CLI::IsMember(choices));

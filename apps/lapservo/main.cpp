@@ -4,6 +4,7 @@
 #include <exception>
 #include <fcntl.h>
 #include <filesystem>
+#include <iostream>
 #include <unistd.h>
 
 #include <opencv2/core/utils/logger.hpp>
@@ -66,6 +67,7 @@ int parse_and_run(int argc, char** argv) {
     std::fprintf(stderr, "lapservo: %s (try --help)\n", error.what());
     return bad_input;
   }
+  std::cerr.setstate(std::ios::failbit);  // OpenCV's decoders write to it what an exception says better
   return run();
 }
 

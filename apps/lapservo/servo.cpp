@@ -18,6 +18,9 @@
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/control/paper_trajectory.h"
+#include "lapservo/control/random_start.h"
+#include "lapservo/control/tracking_law.h"
+#include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
@@ -28,10 +31,11 @@
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
+#include "lapservo/servo/replay.h"
+#include "lapservo/servo/run.h"
 #include "lapservo/servo/servo_log.h"
-#include "lapservo/servo/servo_run.h"
-#include "lapservo/servo/theatre_site.h"
-#include "lapservo/servo/theatre_start.h"
+#include "lapservo/sim/simulator.h"
 
 namespace lapservo::app {
 namespace {
@@ -99,7 +103,7 @@ Trajectory trajectory_of(const Options& options) {
 }
 
 // The uncalibrated mode gets to know no more of the RCM than its image.
-void forget_registration(ServoRunConfig& run, const Options& options) {
+void forget_registration(RunConfig& run, const Options& options) {
   Instrument& instrument = run.rig.instruments.front();
   if (!options.rcm_px.empty()) {
     run.rcm_px = Eigen::Vector2d(options.rcm_px[0], options.rcm_px[1]);
@@ -112,35 +116,34 @@ void forget_registration(ServoRunConfig& run, const Options& options) {
   instrument.camera_from_rcm.reset();
 }
 
-ServoRunConfig run_config_of(const Options& options) {
-  ServoRunConfig run;
+// Before it is made to forget anything.
+RunConfig run_config_of(const Options& options) {
+  RunConfig run;
   run.rig = single_instrument(load_rig(options.rig), options.rig);
   run.controller = controller_of(options, run.rig);
-  run.true_rig = run.rig;
   run.tracker.method = tracker_of(options, run.controller.mode);
-  if (run.controller.mode == ControlMode::uncalibrated) forget_registration(run, options);
   return run;
 }
 
-RcmCoordinates readings_at_start(const Options& options, const Trajectory& trajectory, const ServoRunConfig& run,
-                                 const TheatreConfig& theatre) {
+JointVector joints_at_start(const Options& options, const Trajectory& trajectory, const RunConfig& run,
+                            const FeatureModel& true_model, const Eigen::Vector4d& joint_offset) {
   const std::string source = trajectory_name(options);
   if (options.start.empty()) {
     Random random(options.seed);
-    return random_start(trajectory, options.duration_s, *run.true_rig, run.controller, theatre.arm, random, source);
+    return random_start(trajectory, options.duration_s, true_model, run.controller, joint_offset, random, source);
   }
-  const RcmCoordinates readings = RcmCoordinates::from_vector(four(options.start));
-  refuse_infeasible(trajectory, options.duration_s, *run.true_rig, run.controller, readings, source);
-  return readings;
+  const JointVector start = JointVector::from_vector(four(options.start));
+  refuse_infeasible(trajectory, options.duration_s, true_model, run.controller, start, source);
+  return start;
 }
 
 class RunFolder {
  public:
   // With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
-  RunFolder(const Options& options, const ServoRunConfig& run)
-      : folder_(options.out, *run.true_rig, inputs_of(options, *run.true_rig), options.force, needed_bytes(options)),
+  RunFolder(const Options& options, const Rig& rig, const ControllerConfig& controller)
+      : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(options)),
         log_(folder_ / "log.csv") {
-    write_file(folder_ / "controller.yaml", controller_yaml(run.controller));
+    write_file(folder_ / "controller.yaml", controller_yaml(controller));
   }
   ServoLog& log() { return log_; }
   void commit() {
@@ -150,8 +153,8 @@ class RunFolder {
 
  private:
   static std::uintmax_t needed_bytes(const Options& options) {
-    constexpr std::uintmax_t bytes_a_period = 2000;
-    return bytes_a_period * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20);
+    constexpr std::uintmax_t bytes_a_tick = 2000;
+    return bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20);
   }
   static InputFiles inputs_of(const Options& options, const Rig& rig) {
     InputFiles inputs;
@@ -168,13 +171,13 @@ class RunFolder {
 // What the run came to, for the last lines.
 class Summary {
  public:
-  void add(const ServoRecord& record) {
-    ++periods_;
-    if (record.decision.control.action == ControlAction::hold) ++held_[std::string(record.decision.reason)];
-    const Eigen::Vector4d error = record.true_features
-                                      ? feature_error(*record.true_features, record.input.desired.features)
-                                      : record.decision.control.error;
-    convergence_.add(record.input.time_s, error);
+  void add(const ControlTick& tick, const InstrumentTruth& truth) {
+    const ControlStep& control = tick.decision.control;
+    ++ticks_;
+    if (control.action == ControlAction::hold) ++held_[std::string(to_string(control.reason))];
+    const Eigen::Vector4d error =
+        truth.features ? feature_error(*truth.features, tick.input.desired.features) : control.error;
+    convergence_.add(tick.input.time_s, error);
   }
   bool converged() const { return convergence_.reached_s().has_value(); }
   std::string text() const {
@@ -186,57 +189,86 @@ class Summary {
           *reached_s, 1000 * rms[0], rms[1], rms[2], rms[3]);
     }
     for (const auto& [reason, count] : held_)
-      text += fmt::format("\nheld for {} of {} periods: {}", count, periods_, reason);
+      text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
     return text;
   }
 
  private:
-  long periods_ = 0;
+  long ticks_ = 0;
   std::map<std::string, long> held_;
   Convergence convergence_;
 };
 
-bool show(LiveView& view, const ServoRecord& record, const Rig& rig, const cv::Mat& frame,
-          const std::vector<Observation>& seen) {
-  if (frame.empty()) return true;
-  cv::Mat picture = draw_overlay(frame, rig, seen);
-  const std::string label =
-      fmt::format("{:.2f} s  {} {}", record.input.time_s, action_word(record.decision.control.action),
-                  record.decision.reason == "none" ? "" : record.decision.reason);
+bool show(LiveView& view, const ControlTick& tick, const Rig& rig) {
+  if (!tick.seen) return true;
+  const ControlStep& control = tick.decision.control;
+  cv::Mat picture = draw_overlay(tick.seen->image.bgr, rig, tick.seen->observations);
+  const std::string label = fmt::format("{:.2f} s  {} {}", tick.input.time_s, to_string(control.action),
+                                        control.reason == HoldReason::none ? "" : to_string(control.reason));
   cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
   return view.show(picture);
 }
 
+// What the user gets of a run: the log, the picture, the progress, the last lines.
+class Watcher : public RunObserver {
+ public:
+  Watcher(const Rig& rig, const FeatureModel& true_model, const Simulator& simulator, RunFolder* folder, LiveView* view,
+          int ticks)
+      : rig_(rig),
+        true_model_(true_model),
+        simulator_(simulator),
+        folder_(folder),
+        view_(view),
+        progress_(std::make_unique<Progress>(ticks)) {}
+
+  bool on_tick(const ControlTick& tick) override {
+    const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
+    summary_.add(tick, truth);
+    if (folder_) folder_->log().add(tick.input, tick.decision, truth);
+    progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
+    return !interrupted() && (!view_ || show(*view_, tick, rig_));
+  }
+  const Summary& finish() {
+    progress_.reset();
+    return summary_;
+  }
+
+ private:
+  Rig rig_;
+  FeatureModel true_model_;
+  const Simulator& simulator_;
+  RunFolder* folder_;
+  LiveView* view_;
+  std::unique_ptr<Progress> progress_;
+  Summary summary_;
+  int done_ = 0;
+};
+
 int simulate(const Options& options) {
   std::optional<LiveView> view;
   if (options.view) view.emplace("servo", "use --out to write a log instead");
-  const ServoRunConfig run = run_config_of(options);
+  RunConfig config = run_config_of(options);
+  const Rig true_rig = config.rig;
+  const FeatureModel true_model = feature_model(true_rig);
+  if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
-  TheatreConfig theatre;
-  theatre.seed = options.seed;
-  theatre.endoscope.latency_s = options.latency_ms / 1000;
-  theatre.endoscope.frame_rate_hz = options.fps;
-  const RcmCoordinates start = readings_at_start(options, trajectory, run, theatre);
-  TheatreSite site(*run.true_rig, theatre, start);
-  if (!options.hide.empty()) site.theatre().cover_marker({options.hide[0], options.hide[1]});
+  SimulatorConfig simulated;
+  simulated.seed = options.seed;
+  simulated.endoscope.latency_s = options.latency_ms / 1000;
+  simulated.endoscope.frame_rate_hz = options.fps;
+  const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
+  Simulator simulator(true_rig, simulated, start);
+  if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<RunFolder> folder;
-  if (!options.out.empty()) folder.emplace(options, run);
+  if (!options.out.empty()) folder.emplace(options, true_rig, config.controller);
   watch_for_interrupts();
 
-  Summary summary;
-  {
-    Progress progress(static_cast<int>(std::lround(options.duration_s / run.controller.period_s)));
-    int done = 0;
-    run_servo(site, run, trajectory, options.duration_s,
-              [&](const ServoRecord& record, const cv::Mat& frame, const std::vector<Observation>& seen) {
-                summary.add(record);
-                if (folder) folder->log().add(record);
-                progress.show(++done, fmt::format(" ({})", action_word(record.decision.control.action)));
-                return !interrupted() && (!view || show(*view, record, run.rig, frame, seen));
-              });
-  }
-  std::printf("method %s, seen by %s\n%s\n", std::string(mode_word(run.controller.mode)).c_str(),
-              run.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
+  Watcher watcher(config.rig, true_model, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
+                  static_cast<int>(std::lround(options.duration_s / config.controller.period_s)));
+  lapservo::run(simulator, simulator, simulator, config, trajectory, options.duration_s, watcher);
+  const Summary& summary = watcher.finish();
+  std::printf("method %s, seen by %s\n%s\n", std::string(mode_word(config.controller.mode)).c_str(),
+              config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
               summary.text().c_str());
   if (folder) {
     folder->commit();
@@ -247,16 +279,15 @@ int simulate(const Options& options) {
 
 int replay_log(const Options& options) {
   const fs::path log = options.replay, folder = log.parent_path();
-  ServoRunConfig run;
-  run.rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
-  run.controller = load_controller(folder / "controller.yaml", {});
-  const auto periods = read_servo_log(log);
-  const auto difference = replay(periods, run);
+  const Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
+  const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
+  const auto ticks = read_servo_log(log);
+  const auto difference = replay(ticks, rig, controller);
   if (!difference) {
-    std::printf("%zu periods reproduced bit for bit\n", periods.size());
+    std::printf("%zu ticks reproduced bit for bit\n", ticks.size());
     return 0;
   }
-  std::fprintf(stderr, "lapservo: %s: period %zu: %s was %s and is %s now\n", log.c_str(), difference->period,
+  std::fprintf(stderr, "lapservo: %s: tick %zu: %s was %s and is %s now\n", log.c_str(), difference->tick,
                difference->column.c_str(), difference->logged.c_str(), difference->replayed.c_str());
   return 1;
 }
@@ -277,7 +308,7 @@ void add_servo(CLI::App& app, Run& run_later) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
   command->add_option("--rig", options->rig, "Camera, marker and camera_from_rcm");
-  command->add_option("--robot", options->robot, "sim: the built-in theatre");
+  command->add_option("--robot", options->robot, "sim: the built-in simulator");
   command
       ->add_option("--trajectory", options->trajectory,
                    "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/play.h"
 
@@ -14,16 +15,6 @@ namespace lapservo {
 struct BacklashEstimate {
   double width = 0;  ///< full play, rad or m
   double sigma = 0;
-};
-
-struct BacklashEstimatorConfig {
-  /// The widest gap looked for: theta_rad, phi_rad, rho_m, psi_rad; 0 where there is none.
-  Eigen::Vector4d largest{0, 0, 5e-4, 0.1};
-  double forgetting_s = 60;  ///< time constant by which old frames lose weight
-  double offset_time_s = 2;  ///< time constant of the mean that is removed: slower differences don't count
-  double model_error = 0.3;  ///< what a wrong model makes of motion, a share of it: one sigma
-  double delay_error_s = 0.01;
-  double largest_sigma = 0.03;  ///< share of the largest width: estimates less certain don't count
 };
 
 /// How wide the gaps between motors and instrument are, from the data. What the image shows beyond the readings is

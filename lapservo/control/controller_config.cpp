@@ -3,6 +3,9 @@
 #include <cmath>
 #include <string>
 
+#include "lapservo/control/delay_estimator.h"
+#include "lapservo/control/motion_limits.h"
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo {

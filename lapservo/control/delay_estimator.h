@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/joint_history.h"
 
 namespace lapservo {
@@ -13,16 +14,6 @@ namespace lapservo {
 struct DelayEstimate {
   double delay_s = 0;
   double sigma_s = 0;
-};
-
-struct DelayEstimatorConfig {
-  double forgetting_s = 20;        ///< time constant by which old frames lose weight
-  double offset_time_s = 2;        ///< time constant of the mean that is removed: slower differences don't count
-  double least_time_s = 1;         ///< no estimate before this much has been seen
-  double largest_sigma_s = 0.005;  ///< nor one less certain than this: then there was too little motion
-  /// Disagreement between readings and the true joints that is not noise: theta_rad, phi_rad, rho_m, psi_rad. Backlash
-  /// looks like additional delay, so insertion and roll count little.
-  Eigen::Vector4d reading_sigma{2e-4, 2e-4, 1e-3, 2e-2};
 };
 
 /// How old the image is, from the data: the image's joint positions are compared with the readings at each of a grid of

@@ -19,10 +19,4 @@ struct FeatureState {
 /// one, a wrong one, or one learnt online.
 using FeatureModel = std::function<std::optional<FeatureState>(const Eigen::Vector4d& q)>;
 
-/// Typical sizes, by which radians, metres and pixels are compared.
-struct Scales {
-  Eigen::Vector4d features{0.005, 1, 1, 1};     ///< s_rad, r_px, l_px, d_px: what "close" means in the image
-  Eigen::Vector4d joints{0.1, 0.1, 0.01, 0.3};  ///< theta_rad, phi_rad, rho_m, psi_rad: a hand's breadth of motion
-};
-
 }  // namespace lapservo

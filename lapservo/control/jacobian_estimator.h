@@ -3,19 +3,11 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/affine_fit.h"
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/probing.h"
 
 namespace lapservo {
-
-struct JacobianEstimatorConfig {
-  double noise = 0.3;       ///< of an image, in feature scales
-  double walk = 0.3;        ///< of the features at rest, in feature scales per square root of a second
-  double bend = 12;         ///< how much J changes along a joint scale of motion, in scales: forgetting by distance
-  double slack = 3;         ///< features' change that motion doesn't explain (backlash), per joint scale moved
-  double gate_chi2 = 60;    ///< of four features; curvature adds to noise, so wider than noise alone would need
-  int reacquire_after = 5;  ///< so many outliers in a row are the truth
-};
 
 /// Learns image and Jacobian online from joint readings and features alone: no camera, marker or registration. The
 /// model is y(q) = y0 + G (q - q0) about the latest image's joints q0; y0 and the rows of G follow random walks whose

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/control/test_theatre.h"
+#include "lapservo/control/tracking_law.h"
 
 namespace lapservo {
 namespace {

@@ -22,6 +22,8 @@ class JointHistory {
   double oldest_s() const { return entry(0).time_s; }          ///< only when size() > 0
   double newest_s() const { return entry(size_ - 1).time_s; }  ///< only when size() > 0
 
+  /// nullopt when there is none.
+  std::optional<Eigen::Vector4d> newest() const { return size_ ? std::optional(entry(size_ - 1).q) : std::nullopt; }
   /// Linear interpolation; the newest reading for times after it, nullopt for times before the oldest.
   std::optional<Eigen::Vector4d> at(double time_s) const;
 

@@ -4,33 +4,16 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/velocity_qp.h"
+#include "lapservo/robot/joint_path.h"
 
 namespace lapservo {
-
-/// Bounds of the joints as the arm reads them: theta, phi, rho, psi.
-struct JointLimits {
-  Eigen::Vector4d lower{-1, 0.6, 0.03, -4};
-  Eigen::Vector4d upper{1, 2.5, 0.2, 4};
-  Eigen::Vector4d rate{0.4, 0.4, 0.04, 1.5};     ///< rad/s, m/s
-  Eigen::Vector4d acceleration{2, 2, 0.2, 7.5};  ///< rad/s^2, m/s^2
-};
-
-/// Where the marker's end points have to stay, in the pixels of FeatureState::ends_px.
-struct ImageWindow {
-  double u_min_px = 0, u_max_px = 0, v_min_px = 0, v_max_px = 0;
-};
 
 /// The end points now and how they move.
 struct EndPoints {
   Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();
   Eigen::Matrix4d jacobian = Eigen::Matrix4d::Zero();
-};
-
-/// Where the commanded motion stands.
-struct MotionState {
-  Eigen::Vector4d position = Eigen::Vector4d::Zero();
-  Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
 };
 
 /// Time that stopping never takes longer than: the largest rate / acceleration of a joint.

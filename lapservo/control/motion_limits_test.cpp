@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/control/setpoint_interpolator.h"
 #include "lapservo/core/random.h"
+#include "lapservo/robot/joint_path.h"
 
 namespace lapservo {
 namespace {
@@ -49,7 +49,7 @@ TEST(MotionLimits, AreNeverCrossedWhateverIsWanted) {
     LinearCamera camera;
     camera.centre = (limits.lower + limits.upper) / 2;
     camera.jacobian = random_matrix(random) * Eigen::Vector4d(900, 900, 8000, 20).asDiagonal();
-    SetpointInterpolator path(limits);
+    JointPath path(limits.acceleration);
     path.reset(0, camera.centre);
     Eigen::Vector4d wanted = Eigen::Vector4d::Zero();
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 
 namespace lapservo {

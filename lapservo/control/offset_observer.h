@@ -6,46 +6,15 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/backlash_estimator.h"
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/delay_estimator.h"
+#include "lapservo/control/estimate.h"
 #include "lapservo/control/feature_model.h"
+#include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/play.h"
 
 namespace lapservo {
-
-/// What one frame tells the controller. The image stamped `time_s` shows the scene at time_s - delay: stamp it when it
-/// arrives and the delay is the whole chain's, or when it was exposed and the delay is zero.
-struct ImageMeasurement {
-  bool found = false;  ///< false: the marker was not seen; nothing else counts then
-  double time_s = 0;
-  Eigen::Vector4d features = Eigen::Vector4d::Zero();        ///< s_rad, r_px, l_px, d_px on ideal pixels
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< of the features
-  Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();         ///< e0 u, v, e3 u, v
-  std::optional<Eigen::Vector4d> q;                          ///< a start for the first frame, when known
-};
-
-/// Covariance of features from that of q.
-inline Eigen::Matrix4d feature_covariance(const FeatureState& state, const Eigen::Matrix4d& q_covariance) {
-  return state.jacobian * q_covariance * state.jacobian.transpose();
-}
-
-struct ObserverConfig {
-  std::optional<double> delay_s;  ///< known delay; absent: estimated from the data
-  double initial_delay_s = 0.1;   ///< until there is an estimate
-  double bandwidth_rad_s = 12;    ///< how fast the offset follows the image
-  /// Random walk of the offset between readings and truth, per square root of a second: theta, phi, rho, psi.
-  Eigen::Vector4d offset_walk{0.002, 0.002, 0.0003, 0.008};
-  /// The offset changes with motion too (a wrong camera model, backlash not learnt): by about this share of the
-  /// distance moved.
-  double offset_per_motion = 0.3;
-  /// How far the offset may move the model's configuration from the readings; what a wrong model needs beyond that is
-  /// put into the features instead.
-  Eigen::Vector4d largest_offset{0.35, 0.35, 0.03, 0.8};
-  double gate_chi2 = 28.5;  ///< innovations beyond it are outliers: 1 in 100000 of 4 degrees of freedom
-  int reacquire_after = 5;  ///< so many outliers in a row that agree with each other are the truth
-  DelayEstimatorConfig delay_estimator;
-  BacklashEstimatorConfig backlash;
-};
 
 enum class Update {
   accepted,
@@ -54,24 +23,6 @@ enum class Update {
   no_history,    ///< there are no readings from the time when the image was taken
   not_modelled,  ///< the model sees nothing where the instrument should be
   non_finite,
-};
-
-/// Where the joints are in their gaps, as believed.
-struct GapState {
-  Eigen::Vector4d width = Eigen::Vector4d::Zero();  ///< full play of each joint
-  Eigen::Vector4d shift = Eigen::Vector4d::Zero();  ///< what it adds to the readings: -width/2 to width/2
-};
-
-/// The instrument now.
-struct Estimate {
-  Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< readings through their play, plus offset
-  GapState gap;
-  Eigen::Matrix4d q_covariance = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d features = Eigen::Vector4d::Zero();  ///< unbiased in the image even if the model is wrong
-  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-  Eigen::Matrix4d jacobian = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();
-  Eigen::Matrix4d ends_jacobian = Eigen::Matrix4d::Zero();
 };
 
 /// Fuses joint readings, which are fast and smooth but off (kinematic offsets, backlash), with the image, which is

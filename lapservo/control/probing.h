@@ -7,17 +7,12 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/affine_fit.h"
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/motion_limits.h"
 
 namespace lapservo {
-
-struct ProbingConfig {
-  /// How far each joint goes, one after the other, and comes back: theta_rad, phi_rad, rho_m, psi_rad.
-  Eigen::Vector4d distance{0.03, 0.03, 0.004, 0.16};
-  double joint_time_s = 0.7;  ///< there and back
-};
 
 /// The small motion by which an uncalibrated controller learns what its joints do in the image: x(t) = distance / 2
 /// (1 - cos(2 pi t / T)), joint after joint, away from the nearer joint limit; then rest until the last of it has

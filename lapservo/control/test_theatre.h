@@ -9,6 +9,7 @@
 
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/paper_trajectory.h"
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/control/visual_controller.h"
 #include "lapservo/core/random.h"
 #include "lapservo/kinematics/feature_map.h"

@@ -2,14 +2,10 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 
 namespace lapservo {
-
-/// K of eq. (21), per second, for s, r, l, d.
-struct TrackingGains {
-  Eigen::Vector4d per_s{5, 5, 5, 5};
-};
 
 /// Section V-D's gains: K_s = 0.032, K_r = 0.008, K_l = 0.0008, K_d = 0.01. The paper gives no unit of time. Per second
 /// they would mean time constants of 31 s to 21 minutes beside a trajectory of 12.6 s, so they are read per control
@@ -20,7 +16,7 @@ TrackingGains paper_gains(double control_period_s);
 /// each period: (1 - exp(-decay T)) / T. Tends to `decay` for small periods.
 double exact_gain_held(double decay_per_s, double period_s);
 /// The same when the velocity ramps linearly from the last one to the new one over each period, as
-/// SetpointInterpolator does: e' = e + T (v + v')/2 with v' = -K e has the solution exp(-decay t) for
+/// JointPath does: e' = e + T (v + v')/2 with v' = -K e has the solution exp(-decay t) for
 /// K = (2/T) exp(-decay T) tanh(decay T / 2).
 double exact_gain_ramped(double decay_per_s, double period_s);
 

@@ -5,11 +5,12 @@
 #include <cstdio>
 
 #include "lapservo/control/newton_inverse.h"
+#include "lapservo/control/tracking_law.h"
+#include "lapservo/core/error.h"
 
 namespace lapservo {
 namespace {
 
-constexpr std::array<const char*, 4> joint_names{"theta_rad", "phi_rad", "rho_m", "psi_rad"};
 constexpr std::array<const char*, 4> end_names{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
 
 std::string bound_text(const char* limit, const char* name, double bound, double needed) {
@@ -21,7 +22,7 @@ std::string bound_text(const char* limit, const char* name, double bound, double
 std::optional<std::string> broken_joint_limit(const JointLimits& limits, const Eigen::Vector4d& q,
                                               const Eigen::Vector4d& velocity) {
   for (int i = 0; i < 4; ++i) {
-    const char* name = joint_names[static_cast<std::size_t>(i)];
+    const char* name = JointVector::names[static_cast<std::size_t>(i)].data();
     if (q[i] < limits.lower[i]) return bound_text("limits.lower", name, limits.lower[i], q[i]);
     if (q[i] > limits.upper[i]) return bound_text("limits.upper", name, limits.upper[i], q[i]);
     if (std::abs(velocity[i]) > limits.rate[i]) return bound_text("limits.rate", name, limits.rate[i], velocity[i]);
@@ -51,6 +52,12 @@ std::optional<std::string> broken_limit(const ControllerConfig& config, const Fe
 
 }  // namespace
 
+std::string Infeasible::text() const {
+  std::array<char, 64> begin{};
+  std::snprintf(begin.data(), begin.size(), "can't be followed at %.2f s: ", time_s);
+  return begin.data() + what;
+}
+
 std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
                                           const ControllerConfig& config, const Eigen::Vector4d& q_start,
                                           double step_s) {
@@ -65,6 +72,13 @@ std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double d
     if (auto broken = broken_limit(config, *model(q), q, desired.rate)) return Infeasible{time_s, *broken};
   }
   return std::nullopt;
+}
+
+void refuse_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
+                       const ControllerConfig& config, const JointVector& q_start, const std::string& source) {
+  if (!model) return;
+  if (const auto problem = find_infeasible(trajectory, duration_s, model, config, q_start.vector()))
+    throw InputError(source, problem->text());
 }
 
 }  // namespace lapservo

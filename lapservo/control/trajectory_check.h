@@ -6,7 +6,9 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
+#include "lapservo/control/feature_model.h"
 #include "lapservo/control/trajectory.h"
+#include "lapservo/core/joint_vector.h"
 
 namespace lapservo {
 
@@ -14,6 +16,7 @@ namespace lapservo {
 struct Infeasible {
   double time_s = 0;
   std::string what;  ///< the limit's name with value and bound, for example "limits.upper rho_m 0.2: needs 0.213"
+  std::string text() const;  ///< "can't be followed at 1.20 s: ..."
 };
 
 /// Walks along the trajectory from 0 to `duration_s` in steps of `step_s`, finding the configuration at each by the
@@ -23,5 +26,10 @@ struct Infeasible {
 std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
                                           const ControllerConfig& config, const Eigen::Vector4d& q_start,
                                           double step_s = 0.02);
+
+/// Throws InputError, naming `source`, the time and the limit, when the trajectory can't be followed from these joints
+/// as far as the model knows. An empty model knows nothing: then nothing is checked.
+void refuse_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
+                       const ControllerConfig& config, const JointVector& q_start, const std::string& source);
 
 }  // namespace lapservo

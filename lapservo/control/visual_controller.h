@@ -1,57 +1,23 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string_view>
 
 #include <Eigen/Core>
 
 #include "lapservo/control/arm_lag.h"
+#include "lapservo/control/control_step.h"
 #include "lapservo/control/controller_config.h"
+#include "lapservo/control/estimator.h"
 #include "lapservo/control/feature_model.h"
-#include "lapservo/control/jacobian_estimator.h"
+#include "lapservo/control/hold_reason.h"
+#include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
-#include "lapservo/control/offset_observer.h"
-#include "lapservo/control/probing.h"
-#include "lapservo/control/setpoint_interpolator.h"
 #include "lapservo/control/trajectory.h"
+#include "lapservo/robot/joint_path.h"
 
 namespace lapservo {
-
-enum class ControlAction {
-  track,  ///< follows the desired features
-  probe,  ///< uncalibrated: moves a little to learn the Jacobian
-  hold,   ///< brakes to rest and stays there; HoldReason says why
-};
-
-enum class HoldReason {
-  none,
-  no_image_yet,
-  marker_lost,    ///< the latest image does not show the marker
-  stale_image,    ///< no usable image for too long, or one that was too old when it came
-  outlier,        ///< the latest image contradicts the readings and the images before
-  no_history,     ///< the image is older than the readings
-  not_modelled,   ///< the model has no features where the instrument is, or none that match
-  singular,       ///< the Jacobian can't be inverted here
-  not_following,  ///< the arm is far from its setpoint: reset() when it is in order again
-  not_learnt,     ///< uncalibrated: the probing motion said too little; it is repeated
-  bad_time,       ///< time did not advance
-  non_finite,     ///< readings, image, desired features or the result hold a NaN or an infinity
-};
-std::string_view action_word(ControlAction action);
-std::string_view reason_word(HoldReason reason);
-
-/// What to do in the coming period.
-struct ControlStep {
-  ControlAction action = ControlAction::hold;
-  HoldReason reason = HoldReason::none;                ///< none unless holding
-  Eigen::Vector4d velocity = Eigen::Vector4d::Zero();  ///< to be reached, by a linear ramp, when the period ends
-  bool has_setpoint = false;                           ///< false before the first finite readings: send nothing
-  MotionState setpoint;                                ///< of the arm when the period ends
-  bool limited = false;                                ///< a limit keeps the motion from what the law wants
-  std::optional<Estimate> estimate;                 ///< the instrument now; given while holding too, when there is one
-  Eigen::Vector4d error = Eigen::Vector4d::Zero();  ///< estimated features minus desired ones; zero without estimate
-  double delay_s = 0;                               ///< of the image, as believed now
-};
 
 /// The visual servo controller: joint readings, images and desired features in, joint velocities and setpoints out.
 /// One call a period; no allocation in it; every number that leaves is finite; setpoints never leave the joint limits
@@ -70,52 +36,42 @@ class VisualController {
   ControlStep step(double time_s, const Eigen::Vector4d& q_joint, const std::optional<ImageMeasurement>& image,
                    const DesiredFeatures& desired);
 
-  /// The setpoints between calls, for an arm with a faster rate.
-  const SetpointInterpolator& path() const { return path_; }
+  /// The setpoints from the latest step on.
+  const JointPath& path() const { return path_; }
   const ControllerConfig& config() const { return config_; }
   /// The delay as believed now, known or estimated.
-  double delay_s() const;
+  double delay_s() const { return estimator_->delay_s(); }
   double arm_lag_s() const { return arm_lag_.seconds(); }
 
  private:
   struct Law {
     HoldReason reason = HoldReason::none;
+    ControlAction action = ControlAction::track;
     Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
     Eigen::Vector4d feed_forward = Eigen::Vector4d::Zero();  ///< what of it the desired motion alone asks for
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();    ///< of deviations from it
   };
 
   HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired);
-  HoldReason look(double time_s, const ImageMeasurement& image);
-  HoldReason look_paper(const ImageMeasurement& image);
-  HoldReason look_uncalibrated(const ImageMeasurement& image);
-  HoldReason finish_probing();
-  std::optional<Estimate> estimate(double time_s, const Eigen::Vector4d& q_joint) const;
-  Law law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
-  Law probing_law() const;
+  HoldReason update(const ImageMeasurement& image);
+  void watch_image_age();
+  Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
+  Law probing_law(const Eigen::Vector4d& velocity) const;
+  Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
+  void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
   Eigen::Matrix4d deviation_weight(const Eigen::Matrix4d& jacobian) const;
   Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity) const;
-  bool probing() const { return config_.mode == ControlMode::uncalibrated && !learnt_; }
 
   ControllerConfig config_;
-  FeatureModel model_;
   TrackingGains exact_gains_;
+  std::unique_ptr<Estimator> estimator_;
   JointHistory history_;
-  OffsetObserver observer_;
-  JacobianEstimator jacobian_;
   ArmLag arm_lag_;
-  SetpointInterpolator path_;
+  JointPath path_;
   bool started_ = false;
   double now_s_ = 0;
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
   double usable_s_ = 0;                                 ///< when the last usable one arrived
-  double stamp_s_ = 0;                                  ///< of the last usable one
-  std::optional<Estimate> paper_estimate_;
-  std::optional<ProbingMotion> probing_motion_;
-  ProbingFit probing_fit_;
-  double probed_s_ = 0;
-  bool learnt_ = false;
-  double learnt_delay_s_ = 0;
 };
 
 }  // namespace lapservo

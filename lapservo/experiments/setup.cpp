@@ -9,7 +9,7 @@ Rig single_instrument(Rig rig, const std::string& source) {
   rig.instruments.resize(1);
   if (!rig.instruments[0].camera_from_rcm)
     throw InputError(source, "instruments[0].camera_from_rcm", "missing",
-                     "a transform: the theatre needs to know where the instrument is");
+                     "a transform: the simulator needs to know where the instrument is");
   return rig;
 }
 

@@ -13,7 +13,7 @@
 
 namespace lapservo {
 
-/// The built-in theatre for one thread: the first instrument of a rig before seeded tissue, with the usual sensor.
+/// The built-in simulator for one thread: the first instrument of a rig before seeded tissue, with the usual sensor.
 /// The camera's exposure stays as it is; the lamps beside it can be turned down.
 class Stage {
  public:

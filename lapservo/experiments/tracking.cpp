@@ -1,29 +1,32 @@
 #include "lapservo/experiments/tracking.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <functional>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "lapservo/control/paper_trajectory.h"
+#include "lapservo/control/random_start.h"
+#include "lapservo/control/tracking_law.h"
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/servo_run.h"
-#include "lapservo/servo/theatre_site.h"
-#include "lapservo/servo/theatre_start.h"
+#include "lapservo/servo/image_window.h"
+#include "lapservo/servo/run.h"
+#include "lapservo/servo/servo_log.h"
+#include "lapservo/sim/simulator.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo {
 namespace {
 
 constexpr double period_s = tracking_period_s, window_margin_px = 20;
-constexpr std::array features{"s_rad", "r_px", "l_px", "d_px"};
-constexpr std::array joints{"theta_rad", "phi_rad", "rho_m", "psi_rad"};
 
 std::vector<TrackingScenario> scenarios() {
   std::vector<TrackingScenario> all{
@@ -65,33 +68,38 @@ Eigen::Vector2d estimate_rcm_px(const ExperimentSetup& setup) {
   return fit.point_px;
 }
 
-class Recorder {
+class Recorder : public RunObserver {
  public:
-  explicit Recorder(TrackingRun& run) : run_(run) {
+  Recorder(TrackingRun& run, const FeatureModel& true_model, const Simulator& simulator, const JointLimits& limits,
+           std::function<bool()> keep_going)
+      : run_(run), true_model_(true_model), simulator_(simulator), limits_(limits), keep_going_(std::move(keep_going)) {
     for (const char* what : {"desired_", "true_", "error_"})
-      for (const char* feature : features) run_.table.columns.push_back({std::string(what) + feature, {}});
-    for (const char* joint : joints) run_.table.columns.push_back({std::string("true_") + joint, {}});
-    run_.table.columns.push_back({"holds", {}});
-    run_.table.columns.push_back({"limited", {}});
-    run_.table.columns.push_back({"delay_s", {}});
+      for (const std::string_view feature : FeatureVector::names)
+        run_.table.columns.push_back({what + std::string(feature), {}});
+    for (const std::string_view joint : JointVector::names)
+      run_.table.columns.push_back({"true_" + std::string(joint), {}});
+    for (const char* what : {"holds", "limited", "delay_s"}) run_.table.columns.push_back({what, {}});
   }
 
-  void add(const ServoRecord& record, const JointLimits& limits) {
-    const Eigen::Vector4d truth = record.true_features.value_or(Eigen::Vector4d::Constant(std::nan("")));
-    const Eigen::Vector4d error = feature_error(truth, record.input.desired.features);
-    const bool holds = record.decision.control.action == ControlAction::hold;
-    run_.table.time_s.push_back(record.input.time_s);
+  bool on_tick(const ControlTick& tick) override {
+    const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
+    const Eigen::Vector4d features = truth.features.value_or(Eigen::Vector4d::Constant(std::nan("")));
+    const Eigen::Vector4d& desired = tick.input.desired.features;
+    const ControlStep& control = tick.decision.control;
+    const bool holds = control.action == ControlAction::hold;
+    run_.table.time_s.push_back(tick.input.time_s);
     std::size_t column = 0;
     const auto put = [&](double value) { run_.table.columns[column++].values.push_back(value); };
-    for (const auto& four : {record.input.desired.features, truth, error, record.true_q.value()})
+    for (const Eigen::Vector4d& four : {desired, features, feature_error(features, desired), truth.q})
       for (const double value : four) put(value);
     put(holds);
-    put(record.decision.control.limited);
-    put(record.decision.control.delay_s);
-    run_.delay_s = record.decision.control.delay_s;
-    run_.rate_share = std::max(
-        run_.rate_share, record.decision.control.setpoint.velocity.cwiseAbs().cwiseQuotient(limits.rate).maxCoeff());
-    note_hold(record.input.time_s, holds);
+    put(control.limited);
+    put(control.delay_s);
+    run_.delay_s = control.delay_s;
+    run_.rate_share =
+        std::max(run_.rate_share, control.setpoint.velocity.cwiseAbs().cwiseQuotient(limits_.rate).maxCoeff());
+    note_hold(tick.input.time_s, holds);
+    return keep_going_();
   }
 
  private:
@@ -103,7 +111,12 @@ class Recorder {
     if (holds && !run_.held_s && time_s >= lost_s - period_s) run_.held_s = time_s - lost_s;
     if (!holds && run_.held_s && !run_.resumed_s && time_s >= back_s - period_s) run_.resumed_s = time_s - back_s;
   }
+
   TrackingRun& run_;
+  FeatureModel true_model_;
+  const Simulator& simulator_;
+  JointLimits limits_;
+  std::function<bool()> keep_going_;
 };
 
 Eigen::Vector4d error_at(const TimeTable& table, std::size_t i) {
@@ -163,36 +176,33 @@ RcmCoordinates common_start(const ExperimentSetup& setup) {
   for (const TrackingScenario& scenario : scenarios())
     if (scenario.duration_s > longest.duration_s && scenario.mode == ControlMode::paper) longest = scenario;
   Random random(setup.seed + 3);
-  return random_start(sinusoids(paper_sinusoids()), longest.duration_s, setup.rig,
-                      tracking_controller(longest, setup.rig.camera), ArmConfig{}, random, "rig");
+  return random_start(sinusoids(paper_sinusoids()), longest.duration_s, feature_model(setup.rig),
+                      tracking_controller(longest, setup.rig.camera), ArmConfig{}.joint_offset, random, "rig");
 }
 
 TrackingRun run_scenario(const TrackingScenario& scenario, const ExperimentSetup& setup, const RcmCoordinates& start,
                          const Eigen::Vector2d& rcm_px, int done_before, int total) {
   TrackingRun run;
   run.scenario = scenario;
-  Recorder recorder(run);
-  TheatreConfig theatre;
-  theatre.seed = setup.seed;
-  theatre.endoscope.latency_s = scenario.latency_s;
+  SimulatorConfig simulated;
+  simulated.seed = setup.seed;
+  simulated.endoscope.latency_s = scenario.latency_s;
   const Trajectory trajectory = sinusoids(paper_sinusoids());
-  TheatreSite site(setup.rig, theatre, start);
-  if (scenario.hidden_from_s) site.theatre().cover_marker({*scenario.hidden_from_s, *scenario.hidden_to_s});
+  Simulator simulator(setup.rig, simulated, start);
+  if (scenario.hidden_from_s) simulator.cover_marker({*scenario.hidden_from_s, *scenario.hidden_to_s});
 
-  ServoRunConfig config{
-      setup.rig, tracking_controller(scenario, setup.rig.camera), {}, setup.rig, {scenario.method, false}};
+  RunConfig config{setup.rig, tracking_controller(scenario, setup.rig.camera), {}, {scenario.method, false}};
   if (scenario.mode == ControlMode::uncalibrated) {
     config.rig.instruments[0].camera_from_rcm.reset();
     config.rcm_px = rcm_px;
   }
   int done = done_before;
   bool stopped = false;
-  run_servo(site, config, trajectory, scenario.duration_s,
-            [&](const ServoRecord& record, const cv::Mat&, const std::vector<Observation>&) {
-              recorder.add(record, config.controller.limits);
-              stopped = !setup.keep_going(++done, total);
-              return !stopped;
-            });
+  Recorder recorder(run, feature_model(setup.rig), simulator, config.controller.limits, [&] {
+    stopped = !setup.keep_going(++done, total);
+    return !stopped;
+  });
+  lapservo::run(simulator, simulator, simulator, config, trajectory, scenario.duration_s, recorder);
   if (stopped) throw Interrupted{};
   sum_up(run);
   return run;

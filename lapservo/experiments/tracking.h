@@ -14,7 +14,7 @@
 
 namespace lapservo {
 
-/// One run of the closed loop in the theatre.
+/// One run of the closed loop in the simulator.
 struct TrackingScenario {
   std::string id;     ///< a word, for the file's name
   std::string title;  ///< of the figures

@@ -9,7 +9,7 @@
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/experiments/tracking.h"
-#include "lapservo/sim/theatre.h"
+#include "lapservo/sim/simulator.h"
 
 namespace lapservo {
 namespace {
@@ -186,7 +186,7 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
                             tracking_controller(run_of(result, "paper").scenario, setup.rig.camera).gains.per_s,
                         ours_per_s =
                             tracking_controller(run_of(result, "default").scenario, setup.rig.camera).gains.per_s;
-  const TheatreConfig theatre;
+  const SimulatorConfig simulated;
   ReportSection section{"tracking", "Trajectory tracking (section V-D)", {}, {}, {}, {}, {}, {}, {}};
   section.text = {fmt::format(
       "From a random start in the field of view the instrument follows {}, driven by what the simulated endoscope "
@@ -194,8 +194,8 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
       "{:.0f} frames/s, {:.0f} ms late, with noise, jitter and lost frames; an arm with lag, encoder steps, backlash, "
       "and "
       "readings that are {:.0f} mm and {:.0f} degrees off. All errors are those of the true features.",
-      trajectory_text(), theatre.endoscope.frame_rate_hz, 1000 * run_of(result, "default").scenario.latency_s,
-      1000 * theatre.arm.joint_offset[2], deg_from_rad(theatre.arm.joint_offset[0]))};
+      trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * run_of(result, "default").scenario.latency_s,
+      1000 * simulated.arm.joint_offset[2], deg_from_rad(simulated.arm.joint_offset[0]))};
   section.comparisons = comparisons(result, papers_per_s);
   section.figures = figures(result);
   section.tables = {run_table(result), decay_table(result, papers_per_s)};

@@ -50,7 +50,7 @@ CsvTable table_of(const Observation& observation) {
   return table_of({observation_csv_row(3, 0.1, "0003.png", "PSM1", observation)});
 }
 
-// CONVENTIONS "lapservo track", word by word.
+// docs/conventions.md, "Observations", word by word.
 TEST(ObservationCsv, HasTheColumnsOfTheConventions) {
   EXPECT_EQ(std::string(observation_csv_header),
             "frame,time_s,file,instrument,status,"
@@ -120,10 +120,11 @@ TEST(ObservationCsv, WithoutARegistrationTheRcmsColumnsAreEmpty) {
 
 TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
   Random random(seed);
-  for (const auto& [status, word] : {std::pair(Status::no_marker, "no_marker"), std::pair(Status::cut, "cut"),
-                                     std::pair(Status::occluded, "occluded"), std::pair(Status::ambiguous, "ambiguous"),
-                                     std::pair(Status::poor_fit, "poor_fit"), std::pair(Status::uncertain, "uncertain"),
-                                     std::pair(Status::interlaced, "interlaced")}) {
+  for (const auto& [status, word] :
+       {std::pair(Status::no_marker, "no_marker"), std::pair(Status::cut, "cut"),
+        std::pair(Status::occluded, "occluded"), std::pair(Status::ambiguous, "ambiguous"),
+        std::pair(Status::poor_fit, "poor_fit"), std::pair(Status::uncertain, "uncertain"),
+        std::pair(Status::marker_mismatch, "marker_mismatch"), std::pair(Status::interlaced, "interlaced")}) {
     Observation o = random_observation(random);
     o.status = status;
     const CsvTable table = table_of(o);

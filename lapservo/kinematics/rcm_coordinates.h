@@ -4,19 +4,12 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/core/joint_vector.h"
 #include "lapservo/geometry/rigid3.h"
 
 namespace lapservo {
 
-/// The four degrees of freedom of an instrument that pivots at its remote centre of motion (CONVENTIONS "Frames and
-/// coordinates"): instrument rotation Rz(theta) Ry(phi) Rz(psi) in the RCM frame, and the distance rho along the shaft
-/// from the RCM to the marker's proximal end. phi = 0 is singular.
-struct RcmCoordinates {
-  double theta_rad = 0, phi_rad = 0, rho_m = 0, psi_rad = 0;
-
-  Eigen::Vector4d vector() const { return {theta_rad, phi_rad, rho_m, psi_rad}; }
-  static RcmCoordinates from_vector(const Eigen::Vector4d& q) { return {q[0], q[1], q[2], q[3]}; }
-};
+using RcmCoordinates = JointVector;
 
 /// Shaft axis in the RCM frame, from the RCM towards the tip.
 Eigen::Vector3d shaft_axis_in_rcm(const RcmCoordinates& q);

@@ -5,14 +5,15 @@
 
 namespace lapservo {
 
-/// A printed three-colour marker, wrapped around a shaft (CONVENTIONS "Marker"). The bands run from proximal to
-/// distal; tau in [0, 2 pi) is the azimuth on the marker from its seam, right-handed about the axis towards the tip.
+/// A printed three-colour marker, wrapped around a shaft (docs/conventions.md, "Marker"). The bands run from proximal
+/// to distal; tau in [0, 2 pi) is the azimuth on the marker from its seam, right-handed about the axis towards the tip.
 struct Marker {
   double diameter_m = 0;  ///< outer, film included
   std::array<double, 3> hues_deg{90, 180, 270};
   std::array<double, 3> bands_upper_m{};  ///< lengths at tau = 0
   std::array<double, 3> bands_lower_m{};  ///< lengths at tau -> 2 pi
   double seam_rad = 0;                    ///< instrument azimuth of the seam
+  double tolerance_m = 0;  ///< standard deviation of where each boundary lies at either edge of the print
 
   double radius_m() const { return diameter_m / 2; }
   double length_m() const { return bands_upper_m[0] + bands_upper_m[1] + bands_upper_m[2]; }

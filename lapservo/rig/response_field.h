@@ -5,8 +5,8 @@
 
 namespace lapservo {
 
-/// A camera's `response` (CONVENTIONS "rig.yaml"): srgb, rec709, linear, gamma:VALUE or a table; srgb when it is
-/// missing.
+/// A camera's `response` (docs/conventions.md, "rig.yaml"): srgb, rec709, linear, gamma:VALUE or a table; srgb when it
+/// is missing.
 Response parse_response(const YamlField& field);
 
 }  // namespace lapservo

@@ -35,6 +35,7 @@ instruments:
       bands_upper_m: [0.0035, 0.0036, 0.0169]
       bands_lower_m: [0.0095, 0.0094, 0.0051]
       seam_rad: 0.25
+      tolerance_m: 0.0001
     camera_from_rcm:
       translation_m: [-0.0778, 0.0672, 0.0592]
       quaternion_xyzw: [0, 0, 0.6, 0.8]
@@ -80,6 +81,7 @@ TEST(Rig, HoldsWhatTheFileSays) {
   EXPECT_EQ(instrument.marker.bands_upper_m, (std::array<double, 3>{0.0035, 0.0036, 0.0169}));
   EXPECT_EQ(instrument.marker.bands_lower_m, (std::array<double, 3>{0.0095, 0.0094, 0.0051}));
   EXPECT_EQ(instrument.marker.seam_rad, 0.25);
+  EXPECT_EQ(instrument.marker.tolerance_m, 1e-4);
   ASSERT_TRUE(instrument.camera_from_rcm);
   EXPECT_EQ(instrument.camera_from_rcm->translation, Eigen::Vector3d(-0.0778, 0.0672, 0.0592));
   // About z by 2 asin(0.6).
@@ -99,6 +101,7 @@ instruments:
   EXPECT_EQ(rig.camera.response.kind, Response::Kind::srgb);
   EXPECT_EQ(rig.instruments[0].marker.hues_deg, (std::array<double, 3>{90, 180, 270}));
   EXPECT_EQ(rig.instruments[0].marker.seam_rad, 0);
+  EXPECT_EQ(rig.instruments[0].marker.tolerance_m, 0);
   EXPECT_FALSE(rig.instruments[0].camera_from_rcm);
 }
 
@@ -303,6 +306,8 @@ std::vector<Complaint> impossible_instruments() {
       {"DiameterZero", with("0.0084", "0"), "instruments[0].marker.diameter_m: is 0, expected 0.0005 to 0.1 (metres)"},
       {"DiameterInMillimetres", with("0.0084", "8.4"),
        "instruments[0].marker.diameter_m: is 8.4, expected 0.0005 to 0.1 (metres)"},
+      {"ToleranceNegative", with("0.0001", "-0.0001"),
+       "instruments[0].marker.tolerance_m: is -0.0001, expected 0 to 0.005 (metres)"},
       {"HueTooLarge", with("270", "400"), "instruments[0].marker.hues_deg[2]: is 400, expected 0 to 360"},
       {"HuesTooClose", with("[90, 180, 270]", "[90, 100, 270]"),
        "instruments[0].marker.hues_deg[1]: is 100, expected hues at least 40 degrees apart"},

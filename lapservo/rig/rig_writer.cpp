@@ -63,6 +63,7 @@ std::string instrument_yaml(const Instrument& instrument) {
       "      bands_lower_m: {}\n      seam_rad: {}\n",
       quoted(instrument.name), marker.diameter_m, list_of(marker.hues_deg), list_of(marker.bands_upper_m),
       list_of(marker.bands_lower_m), marker.seam_rad);
+  if (marker.tolerance_m > 0) text += fmt::format("      tolerance_m: {}\n", marker.tolerance_m);
   if (instrument.camera_from_rcm) {
     const auto& [rotation, translation] = *instrument.camera_from_rcm;
     text += fmt::format("    camera_from_rcm:\n      translation_m: {}\n      quaternion_xyzw: {}\n",

@@ -41,6 +41,7 @@ void expect_same_bits(const Rig& a, const Rig& b) {
     EXPECT_EQ(left.marker.bands_upper_m, right.marker.bands_upper_m);
     EXPECT_EQ(left.marker.bands_lower_m, right.marker.bands_lower_m);
     EXPECT_EQ(left.marker.seam_rad, right.marker.seam_rad);
+    EXPECT_EQ(left.marker.tolerance_m, right.marker.tolerance_m);
     EXPECT_EQ(left.image_delay_s, right.image_delay_s);
     ASSERT_EQ(left.joints.has_value(), right.joints.has_value());
     if (left.joints) {
@@ -83,6 +84,7 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
     if (i % 5 == 1) instrument.image_delay_s = random.uniform(0, 0.3);
     instrument.marker.seam_rad = random.uniform(-3, 3);
     instrument.marker.hues_deg[0] += random.uniform(-1, 1);
+    if (i % 4 == 1) instrument.marker.tolerance_m = random.uniform(0, 1e-3);
     if (i % 2 == 0)
       instrument.camera_from_rcm =
           Rigid3{Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized(),

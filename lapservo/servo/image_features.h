@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/feature_model.h"
-#include "lapservo/control/motion_limits.h"
 #include "lapservo/control/offset_observer.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/observation.h"
@@ -15,10 +14,6 @@ namespace lapservo {
 /// The rig's first instrument as the controller knows it: q to image features with their derivatives (eq. 12-15, 20).
 /// Empty when the rig has no camera_from_rcm.
 FeatureModel feature_model(const Rig& rig);
-
-/// The camera's image less a margin, in ideal pixels: the largest upright rectangle of which every point lies in the
-/// (distorted) image. Throws InputError when the margin leaves nothing.
-ImageWindow image_window(const Camera& camera, double margin_px);
 
 /// What an observation tells the controller. Found only when all four features are known: r from the observation, or
 /// from `rcm_px` (the RCM's image in ideal pixels, see estimate-rcm) where the rig has no camera_from_rcm. The

@@ -5,6 +5,7 @@
 
 #include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/servo/image_window.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo {

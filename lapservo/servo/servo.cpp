@@ -19,19 +19,18 @@ bool orderly(const ControlStep& control) {
 Servo::Servo(const ControllerConfig& config, FeatureModel model) : controller_(config, std::move(model)) {}
 
 ServoDecision Servo::step(const ServoInput& input) {
+  const Eigen::Vector4d q = input.joints.q.vector();
   ServoDecision decision;
-  decision.control = controller_.step(input.time_s, input.arm.q_joint, input.image, input.desired);
-  decision.reason = reason_word(decision.control.reason);
+  decision.control = controller_.step(input.time_s, q, input.image, input.desired);
   decision.send = orderly(decision.control);
-  if (input.arm.state != ArmState::enabled) {
+  start_anew_when_at_rest(input, decision.control.reason);
+  if (input.joints.operating_state != OperatingState::enabled) {
     decision.control.action = ControlAction::hold;
-    decision.reason = "arm_not_enabled";
+    decision.control.reason = HoldReason::arm_not_enabled;
     decision.send = false;
     // Setpoints stay where the arm is, so that nothing jumps when it is enabled again.
-    if (std::isfinite(input.time_s) && input.arm.q_joint.allFinite())
-      controller_.reset(input.time_s, input.arm.q_joint);
+    if (std::isfinite(input.time_s) && q.allFinite()) controller_.reset(input.time_s, q);
   }
-  start_anew_when_at_rest(input, decision.control.reason);
   return decision;
 }
 
@@ -40,12 +39,13 @@ void Servo::start_anew_when_at_rest(const ServoInput& input, HoldReason reason) 
     not_following_since_s_.reset();
     return;
   }
-  const bool moved = ((input.arm.q_joint - q_then_).cwiseAbs().array() > at_rest.array()).any();
+  const Eigen::Vector4d q = input.joints.q.vector();
+  const bool moved = ((q - q_then_).cwiseAbs().array() > at_rest.array()).any();
   if (!not_following_since_s_ || moved) {
     not_following_since_s_ = input.time_s;
-    q_then_ = input.arm.q_joint;
+    q_then_ = q;
   } else if (input.time_s - *not_following_since_s_ > at_rest_s) {
-    controller_.reset(input.time_s, input.arm.q_joint);
+    controller_.reset(input.time_s, q);
     not_following_since_s_.reset();
   }
 }

@@ -1,27 +1,11 @@
 #pragma once
 
 #include <optional>
-#include <string_view>
 
 #include "lapservo/control/visual_controller.h"
-#include "lapservo/robot/arm_port.h"
+#include "lapservo/servo/servo_decision.h"
 
 namespace lapservo {
-
-/// All that one step of the loop goes by.
-struct ServoInput {
-  double time_s = 0;
-  ArmReading arm;
-  std::optional<ImageMeasurement> image;  ///< the newest frame since the step before, if any
-  DesiredFeatures desired;                ///< at time_s
-};
-
-/// What one step decides.
-struct ServoDecision {
-  ControlStep control;
-  bool send = false;             ///< the arm is to follow path(); else it is left alone and holds by itself
-  std::string_view reason = "";  ///< why it holds; "none" when it doesn't
-};
 
 /// The loop's one step, the same for a real arm, a simulated one and a replay: it goes by nothing but its inputs.
 class Servo {
@@ -31,8 +15,8 @@ class Servo {
 
   ServoDecision step(const ServoInput& input);
 
-  /// The setpoints until the next step.
-  const SetpointInterpolator& path() const { return controller_.path(); }
+  /// The setpoints from the latest step on.
+  const JointPath& path() const { return controller_.path(); }
   const VisualController& controller() const { return controller_; }
 
  private:

@@ -13,17 +13,16 @@
 namespace lapservo {
 namespace {
 
-constexpr std::array features{"s_rad", "r_px", "l_px", "d_px"};
-constexpr std::array rates{"s_rad_s", "r_px_s", "l_px_s", "d_px_s"};
-constexpr std::array accelerations{"s_rad_s2", "r_px_s2", "l_px_s2", "d_px_s2"};
-constexpr std::array joints{"theta_rad", "phi_rad", "rho_m", "psi_rad"};
-constexpr std::array joint_rates{"theta_rad_s", "phi_rad_s", "rho_m_s", "psi_rad_s"};
-constexpr std::array ends{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
-
-using Names = std::array<const char*, 4>;
+using Names = std::array<std::string_view, 4>;
+constexpr auto features = FeatureVector::names;
+constexpr Names rates{"s_rad_s", "r_px_s", "l_px_s", "d_px_s"};
+constexpr Names accelerations{"s_rad_s2", "r_px_s2", "l_px_s2", "d_px_s2"};
+constexpr auto joints = JointVector::names;
+constexpr Names joint_rates{"theta_rad_s", "phi_rad_s", "rho_m_s", "psi_rad_s"};
+constexpr Names ends{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
 
 void name(std::vector<std::string>& columns, const char* prefix, const Names& names) {
-  for (const char* each : names) columns.push_back(std::string(prefix) + each);
+  for (const std::string_view each : names) columns.push_back(prefix + std::string(each));
 }
 
 // The shortest text that reads back as the same number.
@@ -88,8 +87,8 @@ void write_image(std::vector<std::string>& fields, const std::optional<ImageMeas
 std::vector<std::string> input_fields(const ServoInput& input) {
   std::vector<std::string> fields;
   write(fields, input.time_s);
-  fields.emplace_back(state_word(input.arm.state));
-  write(fields, input.arm.q_joint);
+  fields.emplace_back(to_string(input.joints.operating_state));
+  write(fields, input.joints.q.vector());
   write_image(fields, input.image);
   write(fields, input.desired.features);
   write(fields, input.desired.rate);
@@ -113,11 +112,11 @@ class Row {
   }
   Eigen::Vector4d numbers(const char* prefix, const Names& names) const {
     Eigen::Vector4d values;
-    for (int i = 0; i < 4; ++i) values[i] = number(std::string(prefix) + names[static_cast<std::size_t>(i)]);
+    for (int i = 0; i < 4; ++i) values[i] = number(prefix + std::string(names[static_cast<std::size_t>(i)]));
     return values;
   }
   [[noreturn]] void complain(const std::string& column, const char* expected) const {
-    throw InputError(source_, fmt::format("period {}, {}", row_, column), text(column), expected);
+    throw InputError(source_, fmt::format("tick {}, {}", row_, column), text(column), expected);
   }
 
  private:
@@ -145,10 +144,11 @@ std::optional<ImageMeasurement> read_image(const Row& row) {
 ServoInput read_input(const Row& row) {
   ServoInput input;
   input.time_s = row.number("time_s");
-  input.arm.q_joint = row.numbers("joint_", joints);
-  const auto state = state_from_word(row.text("arm_state"));
+  input.joints.time_s = input.time_s;
+  input.joints.q = JointVector::from_vector(row.numbers("joint_", joints));
+  const auto state = operating_state_from_string(row.text("arm_state"));
   if (!state) row.complain("arm_state", "DISABLED, ENABLED, PAUSED or FAULT");
-  input.arm.state = *state;
+  input.joints.operating_state = *state;
   input.image = read_image(row);
   input.desired.features = row.numbers("desired_", features);
   input.desired.rate = row.numbers("desired_", rates);
@@ -164,7 +164,7 @@ std::string header() {
   std::vector<std::string> truth;
   name(truth, "true_", joints);
   name(truth, "true_", features);
-  return fmt::format("period,{},{},{}", joined(input_columns()), joined(decision_columns()), joined(truth));
+  return fmt::format("tick,{},{},{}", joined(input_columns()), joined(decision_columns()), joined(truth));
 }
 
 }  // namespace
@@ -176,7 +176,7 @@ const std::vector<std::string>& decision_columns() {
 
 std::vector<std::string> decision_fields(const ServoDecision& decision) {
   const ControlStep& control = decision.control;
-  std::vector<std::string> fields{std::string(action_word(control.action)), std::string(decision.reason),
+  std::vector<std::string> fields{std::string(to_string(control.action)), std::string(to_string(control.reason)),
                                   decision.send ? "1" : "0", control.limited ? "1" : "0"};
   write(fields, control.delay_s);
   write(fields, control.velocity);
@@ -192,26 +192,33 @@ std::vector<std::string> decision_fields(const ServoDecision& decision) {
   return fields;
 }
 
-ServoLog::ServoLog(const std::filesystem::path& path) : file_(path, header()) {}
-
-void ServoLog::add(const ServoRecord& record) {
-  std::vector<std::string> truth;
-  record.true_q ? write(truth, *record.true_q) : leave_empty(truth, 4);
-  record.true_features ? write(truth, *record.true_features) : leave_empty(truth, 4);
-  file_.add(fmt::format("{},{},{},{}", period_++, joined(input_fields(record.input)),
-                        joined(decision_fields(record.decision)), joined(truth)));
+InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q) {
+  InstrumentTruth truth{q.vector(), {}};
+  if (const auto state = true_model ? true_model(truth.q) : std::nullopt) truth.features = state->features;
+  return truth;
 }
 
-std::vector<LoggedPeriod> read_servo_log(const std::filesystem::path& path) {
+ServoLog::ServoLog(const std::filesystem::path& path) : file_(path, header()) {}
+
+void ServoLog::add(const ServoInput& input, const ServoDecision& decision,
+                   const std::optional<InstrumentTruth>& truth) {
+  std::vector<std::string> fields;
+  truth ? write(fields, truth->q) : leave_empty(fields, 4);
+  truth && truth->features ? write(fields, *truth->features) : leave_empty(fields, 4);
+  file_.add(fmt::format("{},{},{},{}", tick_++, joined(input_fields(input)), joined(decision_fields(decision)),
+                        joined(fields)));
+}
+
+std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path) {
   const CsvTable table = CsvTable::read(path);
-  if (table.rows() == 0) throw InputError(path.string(), "holds no period, expected the log of a run");
-  std::vector<LoggedPeriod> periods;
+  if (table.rows() == 0) throw InputError(path.string(), "holds no tick, expected the log of a run");
+  std::vector<LoggedTick> ticks;
   for (std::size_t i = 0; i < table.rows(); ++i) {
-    LoggedPeriod period{read_input(Row(table, i, path.string())), {}};
-    for (const std::string& column : decision_columns()) period.decision.push_back(table.text(i, column));
-    periods.push_back(std::move(period));
+    LoggedTick tick{read_input(Row(table, i, path.string())), {}};
+    for (const std::string& column : decision_columns()) tick.decision.push_back(table.text(i, column));
+    ticks.push_back(std::move(tick));
   }
-  return periods;
+  return ticks;
 }
 
 }  // namespace lapservo

@@ -7,34 +7,35 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/feature_model.h"
 #include "lapservo/core/row_file.h"
-#include "lapservo/servo/servo.h"
+#include "lapservo/servo/servo_decision.h"
 
 namespace lapservo {
 
-/// One period of a run: what the loop went by, what it decided and, in a simulation, the truth.
-struct ServoRecord {
-  ServoInput input;
-  ServoDecision decision;
-  std::optional<Eigen::Vector4d> true_q, true_features;
+/// Where the instrument truly is, which only a simulation knows.
+struct InstrumentTruth {
+  Eigen::Vector4d q = Eigen::Vector4d::Zero();
+  std::optional<Eigen::Vector4d> features;  ///< absent where the camera sees none
 };
+InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q);
 
-/// A run's complete log, one row a period, written as they come (see RowFile). Numbers are written so that reading them
-/// gives the same bits.
+/// A run's complete log, one row a control tick, written as they come (see RowFile). Numbers are written so that
+/// reading them gives the same bits.
 class ServoLog {
  public:
   /// Throws InputError when the file can't be written.
   explicit ServoLog(const std::filesystem::path& path);
-  void add(const ServoRecord& record);
+  void add(const ServoInput& input, const ServoDecision& decision, const std::optional<InstrumentTruth>& truth);
   void commit() { file_.commit(); }
 
  private:
   RowFile file_;
-  long period_ = 0;
+  long tick_ = 0;
 };
 
 /// A row of a log: the inputs, and the decision as it was written.
-struct LoggedPeriod {
+struct LoggedTick {
   ServoInput input;
   std::vector<std::string> decision;  ///< fields, in the order of decision_columns()
 };
@@ -43,6 +44,6 @@ const std::vector<std::string>& decision_columns();
 std::vector<std::string> decision_fields(const ServoDecision& decision);
 
 /// Throws InputError naming file, line and column.
-std::vector<LoggedPeriod> read_servo_log(const std::filesystem::path& path);
+std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path);
 
 }  // namespace lapservo

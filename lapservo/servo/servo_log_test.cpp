@@ -21,10 +21,17 @@ Eigen::Vector4d any(Random& random) {
   return {random.normal(), 1e-7 * random.normal(), 1e5 * random.normal(), random.uniform()};
 }
 
-ServoRecord any_record(Random& random, int kind) {
-  ServoRecord record;
+struct Record {
+  ServoInput input;
+  ServoDecision decision;
+  std::optional<InstrumentTruth> truth;
+};
+
+Record any_record(Random& random, int kind) {
+  Record record;
   record.input.time_s = random.uniform(0, 100);
-  record.input.arm = {any(random), kind % 2 ? ArmState::enabled : ArmState::fault};
+  record.input.joints = {record.input.time_s, JointVector::from_vector(any(random)),
+                         kind % 2 ? OperatingState::enabled : OperatingState::fault};
   record.input.desired = {any(random), any(random), any(random)};
   if (kind % 3) {
     ImageMeasurement image;
@@ -40,16 +47,15 @@ ServoRecord any_record(Random& random, int kind) {
     }
     record.input.image = image;
   }
-  record.decision.reason = "none";
   record.decision.control.velocity = any(random);
-  if (kind % 2) record.true_q = any(random);
+  if (kind % 2) record.truth = InstrumentTruth{any(random), {}};
   return record;
 }
 
 void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   EXPECT_EQ(a.time_s, b.time_s);
-  EXPECT_EQ(a.arm.q_joint, b.arm.q_joint);
-  EXPECT_EQ(a.arm.state, b.arm.state);
+  EXPECT_EQ(a.joints.q.vector(), b.joints.q.vector());
+  EXPECT_EQ(a.joints.operating_state, b.joints.operating_state);
   EXPECT_EQ(a.desired.features, b.desired.features);
   EXPECT_EQ(a.desired.rate, b.desired.rate);
   EXPECT_EQ(a.desired.acceleration, b.desired.acceleration);
@@ -74,33 +80,32 @@ std::string text_of(const std::filesystem::path& path) {
 TEST(ServoLog, ReadsBackToTheLastBit) {
   const testing::TemporaryFolder folder;
   Random random(seed);
-  std::vector<ServoRecord> records;
+  std::vector<Record> records;
   ServoLog log(folder / "log.csv");
   for (int i = 0; i < 60; ++i) {
     records.push_back(any_record(random, i));
-    log.add(records.back());
+    log.add(records.back().input, records.back().decision, records.back().truth);
   }
   EXPECT_FALSE(std::filesystem::exists(folder / "log.csv"));
   log.commit();
-  const auto periods = read_servo_log(folder / "log.csv");
-  ASSERT_EQ(periods.size(), records.size());
-  for (std::size_t i = 0; i < periods.size(); ++i) {
+  const auto ticks = read_servo_log(folder / "log.csv");
+  ASSERT_EQ(ticks.size(), records.size());
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
     SCOPED_TRACE(i);
-    expect_same_bits(records[i].input, periods[i].input);
-    EXPECT_EQ(periods[i].decision, decision_fields(records[i].decision));
+    expect_same_bits(records[i].input, ticks[i].input);
+    EXPECT_EQ(ticks[i].decision, decision_fields(records[i].decision));
   }
 }
 
 TEST(ServoLog, KeepsWhatIsNotANumber) {
   const testing::TemporaryFolder folder;
-  ServoRecord record;
-  record.decision.reason = "non_finite";
-  record.input.arm.q_joint << std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 0,
-      -0.0;
+  Record record;
+  record.decision.control.reason = HoldReason::non_finite;
+  record.input.joints.q = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 0, -0.0};
   ServoLog log(folder / "log.csv");
-  log.add(record);
+  log.add(record.input, record.decision, record.truth);
   log.commit();
-  const Eigen::Vector4d q = read_servo_log(folder / "log.csv")[0].input.arm.q_joint;
+  const Eigen::Vector4d q = read_servo_log(folder / "log.csv")[0].input.joints.q.vector();
   EXPECT_TRUE(std::isnan(q[0]));
   EXPECT_EQ(q[1], std::numeric_limits<double>::infinity());
   EXPECT_TRUE(std::signbit(q[3]));
@@ -110,7 +115,8 @@ TEST(ServoLog, NamesWhatIsWrong) {
   const testing::TemporaryFolder folder;
   Random random(seed);
   ServoLog log(folder / "log.csv");
-  log.add(any_record(random, 1));
+  const Record record = any_record(random, 1);
+  log.add(record.input, record.decision, record.truth);
   log.commit();
   const std::string good = text_of(folder / "log.csv");
   const auto complaint = [&](const std::string& from, const std::string& to) {

@@ -26,13 +26,13 @@ class PerfectWorld {
   }
 
   ServoDecision step() {
-    ServoInput input{time_s_, {q_, state}, std::nullopt, desired_};
+    ServoInput input{time_s_, {time_s_, JointVector::from_vector(q_), state}, std::nullopt, desired_};
     if (sees) {
       const FeatureState state_now = model_(q_).value();
       input.image = ImageMeasurement{visible,           time_s_, state_now.features, 1e-4 * Eigen::Matrix4d::Identity(),
                                      state_now.ends_px, q_};
     }
-    if (broken_reading) input.arm.q_joint[1] = std::numeric_limits<double>::quiet_NaN();
+    if (broken_reading) input.joints.q.phi_rad = std::numeric_limits<double>::quiet_NaN();
     time_s_ += period_s;
     const ServoDecision decision = servo_.step(input);
     if (decision.send && !stuck) q_ = decision.control.setpoint.position;
@@ -44,7 +44,7 @@ class PerfectWorld {
     return last;
   }
 
-  ArmState state = ArmState::enabled;
+  OperatingState state = OperatingState::enabled;
   bool sees = true, visible = true, broken_reading = false, stuck = false;
   const Eigen::Vector4d& q() const { return q_; }
   void push(const Eigen::Vector4d& by) { q_ += by; }
@@ -61,7 +61,7 @@ TEST(Servo, Tracks) {
   PerfectWorld world;
   const ServoDecision last = world.steps(240);
   EXPECT_EQ(last.control.action, ControlAction::track);
-  EXPECT_EQ(last.reason, "none");
+  EXPECT_EQ(last.control.reason, HoldReason::none);
   EXPECT_LT(last.control.error.norm(), 0.01);
 }
 
@@ -71,7 +71,7 @@ TEST(Servo, HoldsWithinAPeriodWhenTheMarkerIsLostAndGoesOnWithoutAJump) {
   world.visible = false;
   ServoDecision decision = world.step();
   EXPECT_EQ(decision.control.action, ControlAction::hold);
-  EXPECT_EQ(decision.reason, "marker_lost");
+  EXPECT_EQ(decision.control.reason, HoldReason::marker_lost);
   decision = world.steps(60);
   EXPECT_EQ(decision.control.velocity, Eigen::Vector4d::Zero());
   world.visible = true;
@@ -87,17 +87,17 @@ TEST(Servo, HoldsWithinAPeriodWhenTheMarkerIsLostAndGoesOnWithoutAJump) {
 TEST(Servo, SendsNothingToAnArmThatIsNotEnabledAndStartsAnewWhereItIs) {
   PerfectWorld world;
   world.steps(20);
-  for (const ArmState state : {ArmState::disabled, ArmState::paused, ArmState::fault}) {
+  for (const OperatingState state : {OperatingState::disabled, OperatingState::paused, OperatingState::fault}) {
     world.state = state;
     const ServoDecision decision = world.step();
     EXPECT_FALSE(decision.send);
     EXPECT_EQ(decision.control.action, ControlAction::hold);
-    EXPECT_EQ(decision.reason, "arm_not_enabled");
+    EXPECT_EQ(decision.control.reason, HoldReason::arm_not_enabled);
   }
   world.push({0.05, -0.05, 0.002, 0.3});  // somebody moves it meanwhile
   world.step();
   const Eigen::Vector4d there = world.q();
-  world.state = ArmState::enabled;
+  world.state = OperatingState::enabled;
   world.step();
   EXPECT_LT((world.q() - there).norm(), 0.01);
   EXPECT_LT(world.steps(300).control.error.norm(), 0.05);
@@ -110,7 +110,7 @@ TEST(Servo, AReadingThatIsNotANumberLeavesEverythingFinite) {
   for (int i = 0; i < 30; ++i) {
     const ServoDecision decision = world.step();
     EXPECT_EQ(decision.control.action, ControlAction::hold);
-    EXPECT_EQ(decision.reason, "non_finite");
+    EXPECT_EQ(decision.control.reason, HoldReason::non_finite);
     EXPECT_TRUE(decision.control.setpoint.position.allFinite());
     EXPECT_TRUE(decision.control.velocity.allFinite());
   }
@@ -124,7 +124,7 @@ TEST(Servo, AnArmThatDoesNotFollowIsLeftAloneUntilItRests) {
   world.steps(3);
   world.push({0.3, 0, 0, 0});
   world.stuck = true;
-  EXPECT_EQ(world.step().reason, "not_following");
+  EXPECT_EQ(world.step().control.reason, HoldReason::not_following);
   world.stuck = false;
   EXPECT_LT(world.steps(400).control.error.norm(), 0.05);
 }
@@ -132,11 +132,11 @@ TEST(Servo, AnArmThatDoesNotFollowIsLeftAloneUntilItRests) {
 TEST(Servo, WithoutImagesItHolds) {
   PerfectWorld world;
   world.sees = false;
-  EXPECT_EQ(world.steps(5).reason, "no_image_yet");
+  EXPECT_EQ(world.steps(5).control.reason, HoldReason::no_image_yet);
   world.sees = true;
   EXPECT_EQ(world.steps(30).control.action, ControlAction::track);
   world.sees = false;
-  EXPECT_EQ(world.steps(30).reason, "stale_image");
+  EXPECT_EQ(world.steps(30).control.reason, HoldReason::stale_image);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
+#include "lapservo/sim/render_queue.h"
 
 namespace lapservo {
 namespace {
@@ -38,6 +39,10 @@ Endoscope::Endoscope(const Camera& camera, const std::vector<ShaftModel>& shafts
   if (config.pictures)
     queue_ = std::make_unique<RenderQueue>(Renderer(camera, shafts, background, options), config.render_threads);
 }
+
+Endoscope::~Endoscope() = default;
+Endoscope::Endoscope(Endoscope&&) noexcept = default;
+Endoscope& Endoscope::operator=(Endoscope&&) noexcept = default;
 
 std::vector<double> Endoscope::next_moments_s() const {
   const double opens_s = static_cast<double>(next_) / config_.frame_rate_hz;

@@ -9,10 +9,11 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/sim/render_queue.h"
 #include "lapservo/sim/renderer.h"
 
 namespace lapservo {
+
+class RenderQueue;
 
 struct EndoscopeConfig {
   double frame_rate_hz = 60;
@@ -42,6 +43,10 @@ class Endoscope {
  public:
   Endoscope(const Camera& camera, const std::vector<ShaftModel>& shafts, const cv::Mat& background,
             const RenderOptions& options, const EndoscopeConfig& config, std::uint64_t seed);
+
+  ~Endoscope();
+  Endoscope(Endoscope&&) noexcept;
+  Endoscope& operator=(Endoscope&&) noexcept;
 
   /// The moments at which expose() wants to know where the shafts are, ascending.
   std::vector<double> next_moments_s() const;

@@ -4,6 +4,11 @@
 #include <cstddef>
 #include <utility>
 
+#include "lapservo/sim/optics.h"
+#include "lapservo/sim/outline.h"
+#include "lapservo/sim/sensor.h"
+#include "lapservo/sim/shaft_painter.h"
+
 namespace lapservo {
 namespace {
 
@@ -26,8 +31,36 @@ std::vector<cv::Rect> without_overlap(std::vector<cv::Rect> parts) {
 
 }  // namespace
 
-Renderer::Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background,
-                   RenderOptions options)
+class Renderer::State {
+ public:
+  State(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background, RenderOptions options);
+  cv::Mat render_exposure(const Exposure& exposure, std::uint64_t seed);
+  void set_gains(const Light& gains);
+  std::unique_ptr<State> clone() const {
+    return std::make_unique<State>(camera_, shafts_, background_light_, options_);
+  }
+
+ private:
+  void develop_background();
+  std::vector<cv::Rect> draw(const std::vector<ShaftPlacement>& placements);
+  void clear(const std::vector<cv::Rect>& drawn);
+  void develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded);
+
+  Camera camera_;
+  double half_field_rad_;
+  std::vector<ShaftModel> shafts_;
+  RenderOptions options_;
+  Optics optics_;
+  SensorEncoder encoder_;
+  PixelRays rays_;
+  SceneLight scene_;                           // the frame being drawn
+  cv::Mat background_light_;                   // sharp
+  SensorEncoder::Encoded background_, frame_;  // blurred and encoded
+  std::vector<float> veiled_;
+};
+
+Renderer::State::State(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background,
+                       RenderOptions options)
     : camera_(camera),
       half_field_rad_(half_field_rad(camera)),
       shafts_(std::move(shafts)),
@@ -37,21 +70,21 @@ Renderer::Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const c
       rays_(camera) {
   CV_Assert(background.type() == CV_32FC3 && background.cols == camera.width_px && background.rows == camera.height_px);
   background_light_ = background.clone();
-  canvas_.light = background.clone();
+  scene_.light = background.clone();
   if (shafts_.size() > 1) {
-    canvas_.depth_m = cv::Mat(background.size(), CV_32F, cv::Scalar(far_m));
-    canvas_.cover = cv::Mat(background.size(), CV_32F, cv::Scalar(0));
+    scene_.depth_m = cv::Mat(background.size(), CV_32F, cv::Scalar(far_m));
+    scene_.cover = cv::Mat(background.size(), CV_32F, cv::Scalar(0));
   }
   develop_background();
 }
 
-void Renderer::develop_background() {
+void Renderer::State::develop_background() {
   background_ = encoder_.allocate(background_light_.size());
   develop(background_light_, cv::Rect({0, 0}, background_light_.size()), background_);
   frame_ = {background_.value.clone(), background_.sigma.clone()};
 }
 
-void Renderer::set_gains(const Light& gains) {
+void Renderer::State::set_gains(const Light& gains) {
   if (gains == options_.sensor.gains) return;
   options_.sensor.gains = gains;
   encoder_.set_gains(gains);
@@ -59,7 +92,7 @@ void Renderer::set_gains(const Light& gains) {
 }
 
 // Blurs, veils and encodes a part. A veil is even: it may come after the blur.
-void Renderer::develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded) {
+void Renderer::State::develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded) {
   const float clear = 1 - options_.smoke, veil = smoke_light * options_.smoke;
   veiled_.resize(static_cast<std::size_t>(3 * part.width));
   for (int v = part.y; v < part.y + part.height; ++v) {
@@ -72,7 +105,7 @@ void Renderer::develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder
   }
 }
 
-std::vector<cv::Rect> Renderer::draw(const std::vector<ShaftPlacement>& placements) {
+std::vector<cv::Rect> Renderer::State::draw(const std::vector<ShaftPlacement>& placements) {
   std::vector<cv::Rect> drawn;
   for (std::size_t i = 0; i < placements.size(); ++i) {
     const ShaftModel& shaft = shafts_.at(i);
@@ -86,38 +119,34 @@ std::vector<cv::Rect> Renderer::draw(const std::vector<ShaftPlacement>& placemen
       const int top = static_cast<int>(b) * band_rows;
       const cv::Rect part(bands[b].begin, top, bands[b].end - bands[b].begin,
                           std::min(band_rows, camera_.height_px - top));
-      painter.paint(rays_, part, background_light_, canvas_);
+      painter.paint(rays_, part, background_light_, scene_);
       drawn.push_back(part);
     }
   }
   return without_overlap(std::move(drawn));
 }
 
-void Renderer::clear(const std::vector<cv::Rect>& drawn) {
+void Renderer::State::clear(const std::vector<cv::Rect>& drawn) {
   for (const cv::Rect& part : drawn) {
-    background_light_(part).copyTo(canvas_.light(part));
-    if (canvas_.cover.empty()) continue;
-    canvas_.depth_m(part).setTo(far_m);
-    canvas_.cover(part).setTo(0);
+    background_light_(part).copyTo(scene_.light(part));
+    if (scene_.cover.empty()) continue;
+    scene_.depth_m(part).setTo(far_m);
+    scene_.cover(part).setTo(0);
   }
 }
 
-cv::Mat Renderer::render(const std::vector<ShaftPlacement>& placements, std::uint64_t seed) {
-  return render_exposure({placements}, seed);
-}
-
-cv::Mat Renderer::render_exposure(const Exposure& exposure, std::uint64_t seed) {
+cv::Mat Renderer::State::render_exposure(const Exposure& exposure, std::uint64_t seed) {
   std::vector<cv::Rect> drawn;
   if (exposure.size() == 1) {
     drawn = draw(exposure.front());
-    for (const cv::Rect& part : drawn) develop(canvas_.light, part, frame_);
+    for (const cv::Rect& part : drawn) develop(scene_.light, part, frame_);
     clear(drawn);
   } else {
     cv::Mat exposed = background_light_.clone();
     const double share = 1.0 / static_cast<double>(exposure.size());
     for (const auto& moment : exposure) {
       const std::vector<cv::Rect> now = draw(moment);
-      for (const cv::Rect& part : now) exposed(part) += (canvas_.light(part) - background_light_(part)) * share;
+      for (const cv::Rect& part : now) exposed(part) += (scene_.light(part) - background_light_(part)) * share;
       clear(now);
       drawn.insert(drawn.end(), now.begin(), now.end());
     }
@@ -130,6 +159,30 @@ cv::Mat Renderer::render_exposure(const Exposure& exposure, std::uint64_t seed) 
     background_.sigma(part).copyTo(frame_.sigma(part));
   }
   return image;
+}
+
+Renderer::Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background,
+                   RenderOptions options)
+    : state_(std::make_unique<State>(camera, std::move(shafts), background, options)) {}
+Renderer::Renderer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Renderer::~Renderer() = default;
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+
+cv::Mat Renderer::render(const std::vector<ShaftPlacement>& placements, std::uint64_t seed) {
+  return state_->render_exposure({placements}, seed);
+}
+
+cv::Mat Renderer::render_exposure(const Exposure& exposure, std::uint64_t seed) {
+  return state_->render_exposure(exposure, seed);
+}
+
+void Renderer::set_gains(const Light& gains) {
+  state_->set_gains(gains);
+}
+
+Renderer Renderer::clone() const {
+  return Renderer(state_->clone());
 }
 
 }  // namespace lapservo

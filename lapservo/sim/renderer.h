@@ -1,16 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
 #include "lapservo/geometry/camera.h"
-#include "lapservo/sim/optics.h"
-#include "lapservo/sim/outline.h"
 #include "lapservo/sim/scene.h"
-#include "lapservo/sim/sensor.h"
-#include "lapservo/sim/shaft_painter.h"
 
 namespace lapservo {
 
@@ -31,8 +28,9 @@ class Renderer {
  public:
   /// `background`: linear light, CV_32FC3, of the camera's size.
   Renderer(const Camera& camera, std::vector<ShaftModel> shafts, const cv::Mat& background, RenderOptions options = {});
-  Renderer(Renderer&&) = default;
-  Renderer& operator=(Renderer&&) = default;
+  ~Renderer();
+  Renderer(Renderer&&) noexcept;
+  Renderer& operator=(Renderer&&) noexcept;
 
   /// One placement per shaft. The same seed gives the same noise.
   cv::Mat render(const std::vector<ShaftPlacement>& placements, std::uint64_t seed);
@@ -41,25 +39,12 @@ class Renderer {
   /// Exposure and white balance of the frames to come; a change costs about a frame.
   void set_gains(const Light& gains);
   /// One that shares nothing with this, for another thread.
-  Renderer clone() const { return Renderer(camera_, shafts_, background_light_, options_); }
+  Renderer clone() const;
 
  private:
-  void develop_background();
-  std::vector<cv::Rect> draw(const std::vector<ShaftPlacement>& placements);
-  void clear(const std::vector<cv::Rect>& drawn);
-  void develop(const cv::Mat& light, const cv::Rect& part, SensorEncoder::Encoded& encoded);
-
-  Camera camera_;
-  double half_field_rad_;
-  std::vector<ShaftModel> shafts_;
-  RenderOptions options_;
-  Optics optics_;
-  SensorEncoder encoder_;
-  PixelRays rays_;
-  Canvas canvas_;                              // the frame being drawn
-  cv::Mat background_light_;                   // sharp
-  SensorEncoder::Encoded background_, frame_;  // blurred and encoded
-  std::vector<float> veiled_;
+  class State;
+  explicit Renderer(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
 };
 
 }  // namespace lapservo

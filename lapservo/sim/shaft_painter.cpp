@@ -92,7 +92,7 @@ ShaftPainter::Corners ShaftPainter::corners(const RayRow& above, const RayRow& b
           around(above.depth_m, below.depth_m)};
 }
 
-void ShaftPainter::paint(const PixelRays& rays, const cv::Rect& part, const cv::Mat& behind, Canvas& canvas) {
+void ShaftPainter::paint(const PixelRays& rays, const cv::Rect& part, const cv::Mat& behind, SceneLight& scene) {
   if (!tracer_.visible()) return;
   const auto width = static_cast<std::size_t>(part.width);
   above_.resize(width + 1);
@@ -105,7 +105,7 @@ void ShaftPainter::paint(const PixelRays& rays, const cv::Rect& part, const cv::
   for (int v = part.y; v < part.y + part.height; ++v) {
     std::swap(above_, below_);
     trace(below_, v + 1);
-    auto* const light = canvas.light.ptr<cv::Vec3f>(v, part.x);
+    auto* const light = scene.light.ptr<cv::Vec3f>(v, part.x);
     const auto* const background = behind.ptr<cv::Vec3f>(v, part.x);
     for (std::size_t i = 0; i < width; ++i) {
       if (above_.part[i] == Part::nothing && above_.part[i + 1] == Part::nothing && below_.part[i] == Part::nothing &&
@@ -114,15 +114,15 @@ void ShaftPainter::paint(const PixelRays& rays, const cv::Rect& part, const cv::
       const Corners at = corners(above_, below_, i);
       const Paint paint = paint_pixel(at);
       cv::Vec3f& pixel = light[i];
-      if (canvas.cover.empty()) {
+      if (scene.cover.empty()) {
         for (int c = 0; c < 3; ++c) pixel[c] += paint.light[c] - paint.cover * pixel[c];
         continue;
       }
       float depth_m = 1e9F;
       for (std::size_t k = 0; k < 4; ++k)
         if (at.part[k] != Part::nothing) depth_m = std::min(depth_m, at.depth_m[k]);
-      float& nearest_m = canvas.depth_m.ptr<float>(v, part.x)[i];
-      float& cover = canvas.cover.ptr<float>(v, part.x)[i];
+      float& nearest_m = scene.depth_m.ptr<float>(v, part.x)[i];
+      float& cover = scene.cover.ptr<float>(v, part.x)[i];
       const bool in_front = depth_m < nearest_m;
       const float seen = in_front ? 1 : 1 - cover;
       for (int c = 0; c < 3; ++c) {

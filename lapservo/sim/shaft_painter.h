@@ -27,7 +27,7 @@ class PixelRays {
 
 /// Light that gathers in front of a background. `depth_m` and `cover` say for each pixel how near the nearest shaft
 /// drawn so far is and what share of the pixel shafts cover; empty when there is only one.
-struct Canvas {
+struct SceneLight {
   cv::Mat light, depth_m, cover;
 };
 
@@ -37,8 +37,8 @@ class ShaftPainter {
   /// `tip`: a circle around the image of its tip.
   ShaftPainter(const ShaftModel& model, const ShaftPlacement& placement, const Lighting& lighting, const Disc& tip);
 
-  /// Paints pixels of `part` over what the canvas holds; `behind` is the background alone.
-  void paint(const PixelRays& rays, const cv::Rect& part, const cv::Mat& behind, Canvas& canvas);
+  /// Paints pixels of `part` over what the scene holds; `behind` is the background alone.
+  void paint(const PixelRays& rays, const cv::Rect& part, const cv::Mat& behind, SceneLight& scene);
 
  private:
   /// What a pixel receives from this shaft: light, already weighted with the share of the pixel that it covers.

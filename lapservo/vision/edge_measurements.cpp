@@ -147,6 +147,8 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
                                  -film_light * film_sigma_m * pull.dot(generatrix.outwards));
   place.measurement.group = k;
+  place.measurement.turn_share = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / two_pi;
+  place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   return place;
 }
 

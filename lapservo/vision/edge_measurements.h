@@ -28,7 +28,9 @@ struct Measurement {
   UnknownVector row;   ///< d(position along the image normal)/d(unknowns, then film thickness in film_sigma_m) [px]
   double residual_px;  ///< along the normal
   double sigma_px;
-  std::size_t group;  ///< 0..3: the boundary; 4 and 5: the sides
+  std::size_t group;          ///< 0..3: the boundary; 4 and 5: the sides
+  double turn_share = 0;      ///< tau / 2 pi
+  double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides
 };
 inline constexpr std::size_t measurement_groups = 6;
 

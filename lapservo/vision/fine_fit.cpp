@@ -6,8 +6,7 @@
 #include <optional>
 #include <span>
 
-#include <Eigen/LU>
-
+#include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/normal_equations.h"
 
 namespace lapservo {
@@ -51,36 +50,26 @@ UnknownVector solve(std::span<const Measurement> measurements, double film_prior
   return step;
 }
 
-// Inverse information, widened by what each boundary and side as a whole may be off.
-std::optional<UnknownMatrix> covariance_of(std::span<const Measurement> measurements, int unknowns,
-                                           double residual_rms_sigmas, const EdgeBlur& blur) {
-  NormalEquations equations(unknowns + 1);
-  equations.add(UnknownVector::Unit(unknowns + 1, unknowns), 0, 1);
-  std::array<UnknownVector, measurement_groups> pull;
-  pull.fill(UnknownVector::Zero(unknowns + 1));
-  for (const Measurement& m : measurements) {
-    const double weight = robust_weight(m, m.residual_px);
-    equations.add(m.row, 0, weight);
-    pull[m.group] += weight * m.row;
-  }
-  const Eigen::FullPivLU<UnknownMatrix> lu(equations.information());
-  if (!lu.isInvertible()) return std::nullopt;
-  const UnknownMatrix inverse = lu.inverse();
-  const double scale = std::max(1.0, residual_rms_sigmas);
-  UnknownMatrix covariance = inverse;
+double median_sigma_px(std::span<const Measurement> measurements) {
+  InplaceVector<double, 4 * EdgeMeasurements::most_lines> sigmas_px;
+  for (const Measurement& m : measurements)
+    if (m.group < 4) sigmas_px.push_back(m.sigma_px);
+  if (sigmas_px.empty()) return 0;
+  const auto middle = sigmas_px.begin() + static_cast<std::ptrdiff_t>(sigmas_px.size() / 2);
+  std::nth_element(sigmas_px.begin(), middle, sigmas_px.end());
+  return *middle;
+}
+
+// What each boundary and side as a whole may be off, and the noise as it is.
+CommonErrors common_errors(std::span<const Measurement> measurements, const EdgeBlur& blur) {
+  constexpr double usual_sigma_px = 0.05;  // of an edge; compressed ones have three times that
   const double smear_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, usual_blur_px));
-  const double boundary_px =
-      common_boundary_px + common_share_of_blur * std::max(0.0, blur.boundaries_px - usual_blur_px);
-  const double side_px = common_side_px + common_share_of_blur * std::max(0.0, blur.sides_px - usual_blur_px) +
-                         side_share_of_smear * smear_px;
-  for (std::size_t group = 0; group < measurement_groups; ++group) {
-    const UnknownVector shift = inverse * pull[group];
-    const double common_px = group < 4 ? boundary_px : side_px;
-    covariance += common_px * common_px * shift * shift.transpose();
-  }
-  covariance *= scale * scale;
-  const UnknownMatrix of_pose = covariance.topLeftCorner(unknowns, unknowns);
-  return of_pose.allFinite() && (of_pose.diagonal().array() > 0).all() ? std::optional(of_pose) : std::nullopt;
+  const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - usual_blur_px);
+  return {common_boundary_px + common_share_of_blur * std::max(0.0, blur.boundaries_px - usual_blur_px),
+          common_side_px + common_share_of_blur * std::max(0.0, blur.sides_px - usual_blur_px) +
+              side_share_of_smear * smear_px,
+          std::max(1.0, scatter_sigmas(measurements)),
+          std::max(1.0, median_sigma_px(measurements) / usual_sigma_px) + beyond_px};
 }
 
 // What a pass changed.
@@ -152,6 +141,11 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.lines = pass.lines;
   fit.in_image = pass.in_image;
   fit.sides_in_image = pass.sides_in_image;
+  const double film_prior = (film_mean_m - film_m) / film_sigma_m;
+  const auto print =
+      fit_print(pass.all, unknowns, film_prior, scene.marker.tolerance_m, common_errors(pass.all, fit.blur));
+  if (!print) return fit;
+  fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;
   int inliers = 0;
   for (const Measurement& m : pass.all) {
@@ -161,10 +155,11 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
     if (m.group < 4) squares += sigmas * sigmas, ++inliers;
   }
   fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
-  const auto covariance = covariance_of(pass.all, fit.unknowns.size(), fit.inlier_rms_sigmas, fit.blur);
-  if (!covariance) return fit;
   const double doubt = 1 + doubt_of_hidden * std::max(0.0, usual_share - fit.located_share());
-  fit.covariance = doubt * doubt * *covariance;
+  fit.covariance = doubt * doubt * print->covariance;
+  fit.print_off_probability = print->off_probability;
+  fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;
+  fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;
   fit.converged = true;
   return fit;
 }

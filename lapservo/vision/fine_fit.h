@@ -4,6 +4,7 @@
 
 #include "lapservo/vision/edge_measurements.h"
 #include "lapservo/vision/light_image.h"
+#include "lapservo/vision/print_fit.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
@@ -14,12 +15,15 @@ struct FineFit {
   PoseUnknowns unknowns;
   UnknownMatrix covariance;  ///< of the unknowns, one sigma squared
   EdgeBlur blur;
-  int lines = 0;                  ///< generatrices looked at
-  std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit
-  std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
-  int sides_in_image = 0;         ///< places at which the shaft's sides were looked for
-  int sides_used = 0;             ///< of them, those at which the side was located and agrees with the fit
-  double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals
+  int lines = 0;                         ///< generatrices looked at
+  std::array<int, 4> used{};             ///< of them, lines on which the boundary was located and agrees with the fit
+  std::array<int, 4> in_image{};         ///< lines on which the boundary lies inside the image and off the seam
+  int sides_in_image = 0;                ///< places at which the shaft's sides were looked for
+  int sides_used = 0;                    ///< of them, those at which the side was located and agrees with the fit
+  double inlier_rms_sigmas = 0;          ///< of the boundaries' residuals, print errors taken out
+  double print_off_probability = 0;      ///< that the print is off by more than the rig's tolerance
+  double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
+  double psi_variance_by_print = 0;      ///< and what the print adds beyond that
 
   /// Of the boundary points that the image could show, the share that was located.
   double located_share() const;

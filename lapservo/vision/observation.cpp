@@ -22,6 +22,8 @@ std::string_view status_word(Status status) {
       return "few_colors";
     case Status::uncertain:
       return "uncertain";
+    case Status::marker_mismatch:
+      return "marker_mismatch";
     case Status::interlaced:
       return "interlaced";
   }

@@ -22,6 +22,14 @@ constexpr CoarseFitOptions from_memory{.along_reach = 0.2, .rounds = 1, .search_
 constexpr CoarseFitOptions near_by{.lateral_reach_px = 12, .along_reach = 0.125, .rounds = 1, .search_rotation = false};
 // To contradict camera_from_rcm, the marker must be seen well.
 constexpr double share_against_registration = 0.7;
+// And its print be as the rig says: one that is not contradicts any registration.
+constexpr double print_share_against_registration = 0.25;
+
+bool contradicts_registration(const FineFit& free) {
+  const Eigen::Index psi = free.unknowns.size() - 1;
+  return free.located_share() > share_against_registration &&
+         free.psi_variance_by_print <= print_share_against_registration * free.covariance(psi, psi);
+}
 
 // Standard deviation of tau: gamma moves with the pose, psi is its last unknown.
 double sigma_tau(const Scene& scene, const FineFit& fit, double tau_rad) {
@@ -141,8 +149,10 @@ SurfaceTracker::Found SurfaceTracker::try_start(const Scene& scene, const LightI
   const CoarseFit coarse = fit_coarsely(scene, start, {});
   if (!coarse.found || coarse.rotation_score < least_rotation_score) return {};
   if (coarse.rival_score > rival_ratio * coarse.rotation_score) return refusal(Status::ambiguous, coarse.unknowns);
-  if (const FineFit fit = fit_finely(scene, light, coarse.unknowns, {}); judge(scene, fit) == Status::ok)
-    return {Status::ok, fit, {}};
+  const FineFit first = fit_finely(scene, light, coarse.unknowns, {});
+  const Status judged = judge(scene, first);
+  if (judged == Status::ok) return {judged, first, {}};
+  if (judged == Status::marker_mismatch) return refusal(judged, first.unknowns);
   const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, near_by);
   if (!nearer.found) return {};
   const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
@@ -158,6 +168,8 @@ SurfaceTracker::Found SurfaceTracker::detect(const Scene& scene, const LightImag
     for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm)) {
       Found found = try_start(scene, light, start);
       if (!found.fit) {
+        // A print that is off is no reason to look for it elsewhere, with a boundary less.
+        if (found.status == Status::marker_mismatch) return found;
         if (!best.fit && found.status != Status::no_marker) best = found;
         continue;
       }
@@ -167,6 +179,28 @@ SurfaceTracker::Found SurfaceTracker::detect(const Scene& scene, const LightImag
     if (best.fit) break;
   }
   return best;
+}
+
+// Whether the marker shows in another place as well: a second print, a reflection, a picture of tiles. The RCM would
+// tell which is ours.
+bool SurfaceTracker::has_rival(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
+                               const FineFit& fit) const {
+  constexpr double apart_radii = 1;
+  const auto middle = [&](const PoseUnknowns& unknowns) {
+    const Eigen::Vector3d along(0, 0, scene.marker.length_m() / 2);
+    return scene.camera.raw_from_point(unknowns.pose().camera_from_unrolled * along);
+  };
+  const double radius_px =
+      scene.marker.radius_m() / fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
+  for (const Blob& blob : blobs)
+    for (const PoseUnknowns& start : initial_poses(scene, blob, std::nullopt)) {
+      if ((middle(start) - middle(fit.unknowns)).norm() < apart_radii * radius_px) continue;
+      const Found other = try_start(scene, light, start);
+      if (other.status == Status::marker_mismatch) return true;
+      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_radii * radius_px)
+        return true;
+    }
+  return false;
 }
 
 SurfaceTracker::Found SurfaceTracker::detect_occluded(const Scene& scene, const LightImage& light,
@@ -200,11 +234,12 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
         if (blobs->size() > most_blobs) blobs->resize(most_blobs);
       }
       found = detect(scene, light, *blobs, camera_from_rcm);
+      if (found.fit && !camera_from_rcm && has_rival(scene, light, *blobs, *found.fit))
+        found = {Status::ambiguous, std::nullopt, std::nullopt};
       if (!found.fit && camera_from_rcm)
-        if (Found free = detect(scene, light, *blobs, std::nullopt);
-            free.fit && free.fit->located_share() > share_against_registration)
+        if (Found free = detect(scene, light, *blobs, std::nullopt); free.fit && contradicts_registration(*free.fit))
           found = std::move(free);
-      if (!found.fit && camera_from_rcm)
+      if (!found.fit && camera_from_rcm && found.status != Status::marker_mismatch)
         if (Found occluded = detect_occluded(scene, light, *blobs, *camera_from_rcm); occluded.fit)
           found = std::move(occluded);
     }

@@ -45,6 +45,7 @@ class SurfaceTracker {
   Found detect_occluded(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
                         const Rigid3& camera_from_rcm) const;
   Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start) const;
+  bool has_rival(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs, const FineFit& fit) const;
   void remember(std::size_t instrument, const FineFit& fit);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;
 

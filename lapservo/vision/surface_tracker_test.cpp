@@ -207,5 +207,57 @@ TEST(Tracker, RefusesOtherImagesThanTheRigs) {
   EXPECT_THROW(tracker.track(cv::Mat()), InputError);
 }
 
+// A print whose inner boundaries lie 0.2 mm off, away from one another: no turn explains that.
+Rig with_print_off(const Rig& rig) {
+  constexpr double off_m = 0.2e-3;
+  Rig printed = rig;
+  Marker& marker = printed.instruments[0].marker;
+  for (auto* bands : {&marker.bands_upper_m, &marker.bands_lower_m})
+    (*bands)[0] -= off_m, (*bands)[1] += 2 * off_m, (*bands)[2] -= off_m;
+  return printed;
+}
+
+TEST(SurfaceTracker, SaysThatThePrintIsNotAsTheRigSays) {
+  const Rig rig = theatre::usual_rig(), printed = with_print_off(rig);
+  int said = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const Shot shot(seed, {}, printed);
+    const Status status = Tracker(rig).track(shot.bgr)[0].status;
+    EXPECT_NE(status, Status::ok) << "seed " << seed;
+    said += status == Status::marker_mismatch;
+    expect_right(Tracker(printed).track(shot.bgr)[0], shot.q);
+  }
+  EXPECT_GE(said, 7);
+}
+
+// Who says how far the print may be off gets a pose with a sigma that holds.
+TEST(SurfaceTracker, AToleranceOfThePrintEntersSigma) {
+  Rig tolerant = theatre::usual_rig();
+  tolerant.instruments[0].marker.tolerance_m = 0.4e-3;
+  const Rig printed = with_print_off(theatre::usual_rig());
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const Shot shot(seed, {}, printed);
+    const Observation o = Tracker(tolerant).track(shot.bgr)[0];
+    ASSERT_EQ(status_word(o.status), "ok") << "seed " << seed;
+    const double sigma_rad = std::sqrt(o.rcm->covariance(3, 3));
+    EXPECT_GT(sigma_rad, 0.08);
+    EXPECT_LT(std::abs(wrap_pi(o.rcm->q.psi_rad - shot.q.psi_rad)), 2 * sigma_rad);
+  }
+}
+
+// Without the RCM nothing says which of two prints is the instrument's.
+TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
+  Rig both = theatre::usual_rig(2);
+  both.instruments[1].marker = both.instruments[0].marker;
+  Rig one = theatre::usual_rig();
+  one.instruments[0].camera_from_rcm.reset();
+  Random random(5);
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const auto configurations = apart(both, random);
+    EXPECT_EQ(status_word(Tracker(one).track(theatre::render(both, configurations, seed))[0].status), "ambiguous");
+    EXPECT_EQ(status_word(Tracker(one).track(usual_shot(seed).bgr)[0].status), "ok");
+  }
+}
+
 }  // namespace
 }  // namespace lapservo

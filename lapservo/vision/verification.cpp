@@ -15,7 +15,8 @@ constexpr double largest_sigma_psi_rad = 0.02;  // five sigma: a tenth of a radi
 constexpr double least_matching = 0.3, most_wrong = 0.05, most_beyond = 0.5, most_beside = 0.2;
 constexpr double tolerance_of_complete = 1.6;
 constexpr double least_in_image = 0.25;
-constexpr double blurred_px = 1.5;  // colours mix so far on both sides of a boundary
+constexpr double well_seen_share = 0.7;  // to blame the print
+constexpr double blurred_px = 1.5;       // colours mix so far on both sides of a boundary
 
 // Of the marker; at least a pixel.
 double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
@@ -25,6 +26,31 @@ double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azim
   };
   const double length_px = (px(scene.marker.length_m()) - px(0)).norm();
   return std::isfinite(length_px) ? std::max(1.0, length_px) : 1.0;
+}
+
+// A boundary that lies too far from its place is not located at all, and nothing contradicts what the others say; where
+// nothing hides the marker, that is the print.
+bool misses_a_boundary(const FineFit& fit, const ColorAgreement& agreement) {
+  constexpr double unhidden = 0.85, missed = 0.3, sharp_px = 1.8;
+  constexpr int enough = 10;
+  bool missing = false;
+  for (std::size_t k = 0; k < 4; ++k) missing |= fit.in_image[k] >= enough && fit.used[k] < missed * fit.in_image[k];
+  return missing && agreement.matching > unhidden && fit.blur.boundaries_px < sharp_px;
+}
+
+// The rotation's sigma, where the rig's tolerance of the print adds to it no more than it should: who sets that wants
+// to live with it. By how much a print that is certainly off may be off is known from four numbers at best: ten sigma.
+Status judge_sigma(const FineFit& fit, const ColorAgreement& agreement) {
+  constexpr double certain = 0.999, slack = 1.5;
+  const auto squared = [](double x) { return x * x; };
+  const bool off = fit.print_off_probability > certain;
+  const double limit = squared(off ? largest_sigma_psi_rad / 2 : largest_sigma_psi_rad);
+  const Eigen::Index psi = fit.unknowns.size() - 1;
+  const double variance = fit.covariance(psi, psi);
+  if (fit.psi_variance_by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
+  if (variance < limit + slack * fit.psi_variance_by_tolerance) return Status::ok;
+  const bool well_seen = fit.located_share() > well_seen_share;
+  return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
 }
 
 }  // namespace
@@ -117,9 +143,7 @@ Status judge(const Scene& scene, const FineFit& fit) {
   if (smear_px > lost_px) return Status::uncertain;
   if (smeared && 5 * *std::min_element(fit.used.begin(), fit.used.end()) < 3 * fit.lines) return Status::uncertain;
   if ((smeared || share < mostly_hidden) && fit.sides_used < fewest_sides) return Status::uncertain;
-  const Eigen::Index psi = fit.unknowns.size() - 1;
-  if (!(std::sqrt(fit.covariance(psi, psi)) < largest_sigma_psi_rad)) return Status::uncertain;
-  return Status::ok;
+  return judge_sigma(fit, agreement);
 }
 
 }  // namespace lapservo

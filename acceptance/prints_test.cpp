@@ -1,0 +1,153 @@
+// Markers that are not as the rig says: printed, cut and wrapped by hand. Rendered as they are, tracked with the rig's.
+// LAPSERVO_PRINTS, LAPSERVO_PRINT_POSES and LAPSERVO_PRINT_SEED set how many (20 and 3; the figures of docs/accuracy.md
+// are of 200 and 10) and which.
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "acceptance/frame_sets.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo::acceptance {
+namespace {
+
+constexpr double mm = 1e-3;
+constexpr double steepest_rad = 0.35;
+
+int from_environment(const char* name, int otherwise) {
+  const char* text = std::getenv(name);
+  return text ? std::atoi(text) : otherwise;
+}
+
+struct Print {
+  Marker marker;
+  double error_m;  // standard deviation of the bands' lengths
+};
+
+// Every band is off by itself, at either edge; the last takes up what keeps the ends circles, unless wrapped askew.
+Print random_print(const Marker& nominal, double error_m, bool askew, Random& random) {
+  Print print{nominal, error_m};
+  auto &upper = print.marker.bands_upper_m, &lower = print.marker.bands_lower_m;
+  for (auto* bands : {&upper, &lower})
+    for (double& band : *bands) band += error_m * random.normal();
+  if (!askew) lower[2] = print.marker.length_m() - lower[0] - lower[1];
+  print.marker.seam_rad += 0.05 * random.normal();
+  return print;
+}
+
+struct Tally {
+  int frames = 0, wrong = 0;
+  std::map<std::string, int> statuses;
+  std::vector<double> errors_rad, errors_sigmas;
+
+  // The seam's error is none that a picture could show.
+  void add(const Observation& o, double true_psi_rad, double seam_error_rad) {
+    ++frames;
+    ++statuses[std::string(status_word(o.status))];
+    if (o.status != Status::ok || !o.rcm) return;
+    const double error_rad = wrap_pi(o.rcm->q.psi_rad - true_psi_rad - seam_error_rad);
+    wrong += std::abs(error_rad) > 0.1;
+    errors_rad.push_back(error_rad);
+    errors_sigmas.push_back(error_rad / std::sqrt(o.rcm->covariance(3, 3)));
+  }
+  void add(const Tally& other) {
+    frames += other.frames, wrong += other.wrong;
+    for (const auto& [status, count] : other.statuses) statuses[status] += count;
+    errors_rad.insert(errors_rad.end(), other.errors_rad.begin(), other.errors_rad.end());
+    errors_sigmas.insert(errors_sigmas.end(), other.errors_sigmas.begin(), other.errors_sigmas.end());
+  }
+  double share(const std::string& status) const {
+    const auto found = statuses.find(status);
+    return found == statuses.end() ? 0 : static_cast<double>(found->second) / frames;
+  }
+  void show(const std::string& name) const {
+    std::printf("%s: %d frames", name.c_str(), frames);
+    for (const auto& [status, count] : statuses) std::printf(", %d %s", count, status.c_str());
+    std::printf("; psi rms %.1f mrad, largest %.1f mrad, error / sigma %.2f, %d wrong\n", 1e3 * rms(errors_rad),
+                1e3 * largest(errors_rad), rms(errors_sigmas), wrong);
+  }
+};
+
+class Prints : public ::testing::Test {
+ protected:
+  const int prints = from_environment("LAPSERVO_PRINTS", 20), poses = from_environment("LAPSERVO_PRINT_POSES", 3);
+  const int seed = from_environment("LAPSERVO_PRINT_SEED", 7);
+  const Rig rig = example_rig();
+  const Marker& nominal = rig.instruments[0].marker;
+  Random random{static_cast<std::uint64_t>(seed)};
+
+  // In random places, or on the way between two.
+  std::vector<std::vector<RcmCoordinates>> places(int number, bool moving) const {
+    constexpr double step = 0.02;
+    auto all =
+        random_configurations(rig, moving ? 2 : poses, static_cast<std::uint64_t>(1000 * seed + number), steepest_rad);
+    if (!moving) return all;
+    const Eigen::Vector4d from = all[0][0].vector(), to = all[1][0].vector();
+    all.clear();
+    for (int i = 0; i < poses; ++i) all.push_back({RcmCoordinates::from_vector(from + step * i * (to - from))});
+    return all;
+  }
+
+  // What is seen of a print by a tracker that takes it for that of `believed`.
+  Tally seen(const Print& print, const Rig& believed, int number, bool moving) const {
+    RenderedSet set;
+    set.rig = rig;
+    set.configurations = places(number, moving);
+    set.seed = static_cast<std::uint64_t>(number);
+    set.rig.instruments[0].marker = print.marker;
+    Tracker tracker(believed, {.method = Method::surface, .single = !moving});
+    Tally tally;
+    for (const TrueFrame& frame : rendered_frames(set))
+      tally.add(tracker.track(frame.bgr)[0], frame.truths[0].q.psi_rad, print.marker.seam_rad - nominal.seam_rad);
+    return tally;
+  }
+
+  double random_error_m() { return random.uniform(0.02 * mm, 0.3 * mm); }
+};
+
+TEST_F(Prints, ThatAreOffAreNotTrusted) {
+  Tally all;
+  std::map<int, Tally> by_error;
+  for (int i = 0; i < prints; ++i) {
+    const Print print = random_print(nominal, random_error_m(), false, random);
+    const Tally tally = seen(print, rig, i, false);
+    all.add(tally), by_error[static_cast<int>(print.error_m / (0.05 * mm))].add(tally);
+  }
+  for (const auto& [error, tally] : by_error)
+    tally.show("bands off by " + std::to_string(error * 5) + " to " + std::to_string(error * 5 + 5) + " / 100 mm");
+  all.show("all");
+  EXPECT_EQ(all.wrong, 0);
+  EXPECT_LE(rms(all.errors_sigmas), 2);
+  EXPECT_GE(all.share("marker_mismatch"), 0.8);
+}
+
+TEST_F(Prints, ThatAreTrackedOrAskewAreNotTrustedEither) {
+  for (const bool askew : {false, true}) {
+    Tally all;
+    for (int i = 0; i < prints; ++i)
+      all.add(seen(random_print(nominal, random_error_m(), askew, random), rig, i, true));
+    all.show(askew ? "tracked, distal end askew" : "tracked");
+    EXPECT_EQ(all.wrong, 0);
+    EXPECT_LE(rms(all.errors_sigmas), 2);
+  }
+}
+
+// Whoever says how far the print may be off gets a pose whose sigma holds.
+TEST_F(Prints, WithinTheToleranceAreFound) {
+  Rig tolerant = rig;
+  tolerant.instruments[0].marker.tolerance_m = 0.1 * mm;
+  Tally all;
+  for (int i = 0; i < prints; ++i) all.add(seen(random_print(nominal, 0.06 * mm, false, random), tolerant, i, false));
+  all.show("tolerated");
+  EXPECT_GE(all.share("ok"), 0.9);
+  EXPECT_LE(rms(all.errors_sigmas), 2);
+}
+
+}  // namespace
+}  // namespace lapservo::acceptance

@@ -1,0 +1,92 @@
+// own_robot RIG.yaml: ten seconds of the loop around an arm and a camera that lapservo knows nothing of.
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+
+#include <lapservo/control/paper_trajectory.h>
+#include <lapservo/kinematics/rcm_coordinates.h>
+#include <lapservo/servo/image_window.h>
+#include <lapservo/servo/run.h>
+#include <lapservo/sim/renderer.h>
+
+#include "second_order_arm.h"
+
+using namespace lapservo;
+
+// A camera of one's own: 30 pictures a second of where the arm is, 50 ms late.
+class Camera30 : public ImageStream {
+ public:
+  Camera30(const Rig& rig, SecondOrderArm& arm)
+      : camera_from_rcm_(rig.instruments[0].camera_from_rcm.value()),
+        arm_(arm),
+        renderer_(rig.camera, {ShaftModel{.marker = rig.instruments[0].marker}},
+                  cv::Mat(rig.camera.height_px, rig.camera.width_px, CV_32FC3, cv::Scalar(0.05, 0.06, 0.2))) {}
+
+  std::optional<StampedImage> newest() override {
+    if (exposed_ && arm_.time_s() >= exposed_s_ + 0.05) {
+      const ShaftPlacement shaft{camera_from_rcm_ * rcm_from_unrolled(*exposed_), exposed_->psi_rad};
+      exposed_.reset();
+      return StampedImage{arm_.time_s(), renderer_.render({shaft}, ++pictures_)};
+    }
+    return std::nullopt;
+  }
+  void expose() {
+    if (exposed_ || arm_.time_s() < exposed_s_ + 1.0 / 30) return;
+    exposed_ = arm_.state().q;
+    exposed_s_ = arm_.time_s();
+  }
+
+ private:
+  Rigid3 camera_from_rcm_;
+  SecondOrderArm& arm_;
+  Renderer renderer_;
+  std::optional<JointVector> exposed_;
+  double exposed_s_ = 0;
+  std::uint64_t pictures_ = 0;
+};
+
+// The arm's physics pass while the loop sleeps. With a real arm this is lapservo's SteadyClock.
+class ArmsClock : public Clock {
+ public:
+  ArmsClock(SecondOrderArm& arm, Camera30& camera) : arm_(arm), camera_(camera) {}
+  double now_s() const override { return arm_.time_s(); }
+  void sleep_until(double time_s) override {
+    while (arm_.time_s() < time_s - 1e-9) {
+      arm_.advance(std::min(0.001, time_s - arm_.time_s()));
+      camera_.expose();
+    }
+  }
+
+ private:
+  SecondOrderArm& arm_;
+  Camera30& camera_;
+};
+
+// What is worth knowing of the run: the error in its last second.
+class LastSecond : public RunObserver {
+ public:
+  bool on_tick(const ControlTick& tick) override {
+    const Eigen::Vector4d error = tick.decision.control.error.cwiseAbs();
+    if (tick.input.time_s > 9) largest_ = largest_.cwiseMax(error);
+    return true;
+  }
+  Eigen::Vector4d largest_ = Eigen::Vector4d::Zero();
+};
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  const Rig rig = load_rig(argv[1]);
+  SecondOrderArm arm({0.05, 1.57, 0.064, 1.2});
+  Camera30 camera(rig, arm);
+  ArmsClock clock(arm, camera);
+  RunConfig config;
+  config.rig = rig;
+  config.controller.window = image_window(rig.camera, 20);
+  LastSecond watch;
+  run(arm, camera, clock, config, sinusoids(paper_sinusoids()), 10, watch);
+  const Eigen::Vector4d& e = watch.largest_;
+  const bool converged = e[0] < 0.005 && e.tail<3>().maxCoeff() < 1;
+  std::printf("%s; largest errors in the last second: s %.2f mrad; r %.2f, l %.2f, d %.2f px\n",
+              converged ? "converged" : "did not converge", 1000 * e[0], e[1], e[2], e[3]);
+  return converged ? 0 : 1;
+}

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/estimate.h"
+#include "lapservo/control/hold_reason.h"
+#include "lapservo/robot/joint_path.h"
+
+namespace lapservo {
+
+enum class ControlAction {
+  track,  ///< follows the desired features
+  probe,  ///< uncalibrated: moves a little to learn the Jacobian
+  hold,   ///< brakes to rest and stays there; HoldReason says why
+};
+
+/// "track", "probe", "hold".
+std::string_view to_string(ControlAction action);
+
+/// What to do in the coming period.
+struct ControlStep {
+  ControlAction action = ControlAction::hold;
+  HoldReason reason = HoldReason::none;                ///< none unless holding
+  Eigen::Vector4d velocity = Eigen::Vector4d::Zero();  ///< to be reached, by a linear ramp, when the period ends
+  bool has_setpoint = false;                           ///< false before the first finite readings: send nothing
+  MotionState setpoint;                                ///< of the arm when the period ends
+  bool limited = false;                                ///< a limit keeps the motion from what the law wants
+  std::optional<Estimate> estimate;                 ///< the instrument now; given while holding too, when there is one
+  Eigen::Vector4d error = Eigen::Vector4d::Zero();  ///< estimated features minus desired ones; zero without estimate
+  double delay_s = 0;                               ///< of the image, as believed now
+};
+
+}  // namespace lapservo

@@ -1,0 +1,20 @@
+#pragma once
+
+#include "lapservo/control/estimator.h"
+
+namespace lapservo {
+
+/// Measured joints and late images fused by OffsetObserver.
+class FusedEstimator : public Estimator {
+ public:
+  FusedEstimator(const ControllerConfig& config, FeatureModel model);
+  HoldReason update(const ImageMeasurement& image, const JointHistory& history) override;
+  std::optional<Estimate> at(double time_s, const Eigen::Vector4d& q_joint) const override;
+  double delay_s() const override { return observer_.delay_s(); }
+
+ private:
+  FeatureModel model_;
+  OffsetObserver observer_;
+};
+
+}  // namespace lapservo

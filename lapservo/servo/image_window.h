@@ -1,0 +1,12 @@
+#pragma once
+
+#include "lapservo/control/controller_config.h"
+#include "lapservo/geometry/camera.h"
+
+namespace lapservo {
+
+/// The camera's image less a margin, in ideal pixels: the largest upright rectangle of which every point lies in the
+/// (distorted) image. Throws InputError when the margin leaves nothing.
+ImageWindow image_window(const Camera& camera, double margin_px);
+
+}  // namespace lapservo

@@ -1,0 +1,37 @@
+#include "lapservo/servo/run.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lapservo/control/motion_limits.h"
+#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/servo.h"
+
+namespace lapservo {
+
+void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
+         double duration_s, RunObserver& observer) {
+  Servo servo(config.controller, feature_model(config.rig));
+  const auto vision = track_images(images, config.rig, config.tracker, config.rcm_px, config.tracking_thread);
+  const double period_s = config.controller.period_s, start_s = clock.now_s();
+  const auto ticks = std::lround(duration_s / period_s);
+  bool go_on = true;
+  for (long k = 0; k < ticks && go_on;) {
+    ControlTick tick;
+    tick.seen = vision->newest();
+    tick.input.time_s = clock.now_s();
+    tick.input.joints = robot.state();
+    tick.input.desired = trajectory.at(tick.input.time_s - start_s);
+    if (tick.seen) tick.input.image = tick.seen->measurement;
+    tick.decision = servo.step(tick.input);
+    if (tick.decision.send) robot.send(servo.path());
+    go_on = observer.on_tick(tick);
+    // The next tick that has not passed yet.
+    k = std::max(k + 1, std::lround((clock.now_s() - start_s) / period_s));
+    clock.sleep_until(start_s + static_cast<double>(k) * period_s);
+  }
+  // No more velocities: the path brakes by itself.
+  clock.sleep_until(clock.now_s() + stopping_time_s(config.controller.limits) + period_s);
+}
+
+}  // namespace lapservo

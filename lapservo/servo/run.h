@@ -1,0 +1,49 @@
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/controller_config.h"
+#include "lapservo/control/trajectory.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/robot/clock.h"
+#include "lapservo/robot/robot.h"
+#include "lapservo/servo/servo_decision.h"
+#include "lapservo/servo/tracked_image.h"
+#include "lapservo/stream/image_stream.h"
+
+namespace lapservo {
+
+struct RunConfig {
+  Rig rig;  ///< as the loop believes it to be; its first instrument is steered
+  ControllerConfig controller;
+  std::optional<Eigen::Vector2d> rcm_px;  ///< for r, where the rig has no camera_from_rcm; ideal pixels
+  TrackerOptions tracker;
+  TrackingThread tracking_thread = TrackingThread::callers;
+};
+
+/// One control tick: what the loop went by, what it decided, and the image that came, if one did.
+struct ControlTick {
+  ServoInput input;
+  ServoDecision decision;
+  std::optional<TrackedImage> seen;
+};
+
+/// Told of every tick after its set-points were sent, in the loop's thread: what takes long here makes the next tick
+/// late, nothing worse.
+class RunObserver {
+ public:
+  virtual ~RunObserver() = default;
+  /// False ends the run.
+  virtual bool on_tick(const ControlTick& tick) = 0;
+};
+
+/// The servo loop: reads the joints, sees, decides, sends, then tells the observer, once every
+/// ControllerConfig::period_s for `duration_s`; then lets the arm brake to rest. A missing or stale image, a lost
+/// marker, an outlier, a number that is not finite or an arm that is not enabled make it hold within the tick; it goes
+/// on by itself when all is well again. A late tick shifts none of those after it.
+void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
+         double duration_s, RunObserver& observer);
+
+}  // namespace lapservo

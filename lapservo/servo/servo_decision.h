@@ -1,0 +1,26 @@
+#pragma once
+
+#include <optional>
+
+#include "lapservo/control/control_step.h"
+#include "lapservo/control/image_measurement.h"
+#include "lapservo/control/trajectory.h"
+#include "lapservo/robot/robot.h"
+
+namespace lapservo {
+
+/// All that one step of the loop goes by.
+struct ServoInput {
+  double time_s = 0;
+  JointState joints;
+  std::optional<ImageMeasurement> image;  ///< the newest frame since the step before, if any
+  DesiredFeatures desired;                ///< at time_s
+};
+
+/// What one step decides.
+struct ServoDecision {
+  ControlStep control;
+  bool send = false;  ///< the arm is to follow path(); else it is left alone and holds by itself
+};
+
+}  // namespace lapservo

@@ -1,0 +1,90 @@
+#include "lapservo/servo/tracked_image.h"
+
+#include <atomic>
+#include <chrono>
+#include <exception>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "lapservo/servo/image_features.h"
+
+namespace lapservo {
+namespace {
+
+class CallersTracking : public TrackedImageStream {
+ public:
+  CallersTracking(ImageStream& images, const Rig& rig, const TrackerOptions& options,
+                  const std::optional<Eigen::Vector2d>& rcm_px)
+      : images_(images), model_(feature_model(rig)), tracker_(rig, options), rcm_px_(rcm_px) {}
+
+  std::optional<TrackedImage> newest() override {
+    auto image = images_.newest();
+    if (!image) return std::nullopt;
+    TrackedImage tracked{std::move(*image), {}, {}};
+    tracked.observations = tracker_.track(tracked.image.bgr);
+    tracked.measurement = measurement_of(tracked.observations[0], model_, tracked.image.time_s, rcm_px_);
+    return tracked;
+  }
+
+ private:
+  ImageStream& images_;
+  FeatureModel model_;
+  Tracker tracker_;
+  std::optional<Eigen::Vector2d> rcm_px_;
+};
+
+class OwnThreadTracking : public TrackedImageStream {
+ public:
+  explicit OwnThreadTracking(std::unique_ptr<TrackedImageStream> tracking)
+      : tracking_(std::move(tracking)), thread_([this] { work(); }) {}
+  ~OwnThreadTracking() override {
+    stop_ = true;
+    thread_.join();
+  }
+  OwnThreadTracking(const OwnThreadTracking&) = delete;
+  OwnThreadTracking& operator=(const OwnThreadTracking&) = delete;
+
+  std::optional<TrackedImage> newest() override {
+    const std::lock_guard lock(mutex_);
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+    return std::exchange(latest_, std::nullopt);
+  }
+
+ private:
+  void work() {
+    constexpr std::chrono::microseconds between_looks(500);
+    try {
+      while (!stop_) {
+        auto tracked = tracking_->newest();
+        if (!tracked) {
+          std::this_thread::sleep_for(between_looks);
+          continue;
+        }
+        const std::lock_guard lock(mutex_);
+        latest_ = std::move(tracked);
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      failure_ = std::current_exception();
+    }
+  }
+
+  std::unique_ptr<TrackedImageStream> tracking_;
+  std::mutex mutex_;
+  std::optional<TrackedImage> latest_;
+  std::exception_ptr failure_;
+  std::atomic<bool> stop_ = false;
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace
+
+std::unique_ptr<TrackedImageStream> track_images(ImageStream& images, const Rig& rig, const TrackerOptions& options,
+                                                 const std::optional<Eigen::Vector2d>& rcm_px, TrackingThread thread) {
+  auto tracking = std::make_unique<CallersTracking>(images, rig, options, rcm_px);
+  if (thread == TrackingThread::callers) return tracking;
+  return std::make_unique<OwnThreadTracking>(std::move(tracking));
+}
+
+}  // namespace lapservo

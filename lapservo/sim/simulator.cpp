@@ -1,0 +1,106 @@
+#include "lapservo/sim/simulator.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <stdexcept>
+#include <utility>
+
+#include "lapservo/core/error.h"
+#include "lapservo/sim/tissue.h"
+
+namespace lapservo {
+namespace {
+
+constexpr double same_s = 1e-9;  // moments that are equal but for rounding
+
+const Instrument& first_instrument(const Rig& rig) {
+  if (rig.instruments.empty()) throw InputError("simulator", "instruments", "none", "at least one in the rig");
+  if (!rig.instruments.front().camera_from_rcm)
+    throw InputError("simulator", "instruments[0].camera_from_rcm", "missing",
+                     "a transform: it says where the instrument is");
+  return rig.instruments.front();
+}
+
+ShaftModel shaft_of(const Instrument& instrument) {
+  ShaftModel shaft;
+  shaft.marker = instrument.marker;
+  return shaft;
+}
+
+Endoscope make_endoscope(const Rig& rig, const SimulatorConfig& config) {
+  const Camera& camera = rig.camera;
+  const cv::Mat tissue =
+      config.endoscope.pictures ? make_tissue(camera.width_px, camera.height_px, config.seed) : cv::Mat();
+  return Endoscope(camera, {shaft_of(first_instrument(rig))}, tissue, config.render, config.endoscope, config.seed);
+}
+
+}  // namespace
+
+Simulator::Simulator(const Rig& rig, const SimulatorConfig& config, const RcmCoordinates& readings)
+    : camera_from_rcm_(*first_instrument(rig).camera_from_rcm *
+                       Rigid3{Eigen::Quaterniond::Identity(), config.arm.rcm_offset_m}),
+      arm_(config.arm, readings.vector()),
+      endoscope_(make_endoscope(rig, config)),
+      arm_period_s_(1 / config.arm_rate_hz) {}
+
+JointState Simulator::state() {
+  return {time_s_, JointVector::from_vector(arm_.measured_jp()),
+          arm_.faulted() ? OperatingState::fault : OperatingState::enabled};
+}
+
+void Simulator::send(const JointPath& path) {
+  path_ = path;
+}
+
+std::optional<StampedImage> Simulator::newest() {
+  auto frames = arrived();
+  if (frames.empty()) return std::nullopt;
+  return StampedImage{frames.back().picture.stamp_s, std::move(frames.back().picture.bgr)};
+}
+
+void Simulator::sleep_until(double time_s) {
+  while (time_s - time_s_ > same_s) {
+    if (arm_.faulted()) path_.reset();
+    const double next_s = path_ ? std::min(time_s, time_s_ + arm_period_s_) : time_s;
+    if (path_) arm_.servo_jp(path_->at(next_s).position);
+    step(next_s - time_s_);
+  }
+}
+
+ShaftPlacement Simulator::placement() const {
+  const RcmCoordinates q = true_q();
+  const bool covered =
+      std::any_of(covered_.begin(), covered_.end(), [&](const Interval& when) { return when.contains(time_s_); });
+  return {camera_from_rcm_ * rcm_from_unrolled(q), q.psi_rad, covered};
+}
+
+void Simulator::step(double dt_s) {
+  if (!(dt_s >= 0 && dt_s < 1e6)) throw std::invalid_argument("time passes by 0 or more");
+  const double end_s = time_s_ + dt_s;
+  while (true) {
+    const std::vector<double> moments_s = endoscope_.next_moments_s();
+    const double next_s = moments_s[exposing_.size()];
+    if (next_s > end_s + same_s) break;
+    arm_.step(std::max(0.0, next_s - time_s_));
+    time_s_ = std::max(time_s_, next_s);
+    if (exposing_.size() == moments_s.size() / 2) truth_[taken_] = true_q();
+    exposing_.push_back({placement()});
+    if (exposing_.size() < moments_s.size()) continue;
+    endoscope_.expose(std::exchange(exposing_, {}));
+    ++taken_;
+  }
+  arm_.step(std::max(0.0, end_s - time_s_));
+  time_s_ = end_s;
+}
+
+std::vector<SimulatedFrame> Simulator::arrived() {
+  std::vector<SimulatedFrame> frames;
+  for (EndoscopePicture& picture : endoscope_.arrived(time_s_)) {
+    const RcmCoordinates q = truth_.at(picture.index);
+    truth_.erase(truth_.begin(), truth_.upper_bound(picture.index));
+    frames.push_back({std::move(picture), q});
+  }
+  return frames;
+}
+
+}  // namespace lapservo

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/robot/clock.h"
+#include "lapservo/robot/robot.h"
+#include "lapservo/sim/arm.h"
+#include "lapservo/sim/endoscope.h"
+#include "lapservo/stream/image_stream.h"
+
+namespace lapservo {
+
+struct SimulatorConfig {
+  ArmConfig arm;
+  EndoscopeConfig endoscope;
+  RenderOptions render;
+  double arm_rate_hz = 1000;  ///< at which the arm samples a path
+  std::uint64_t seed = 1;     ///< of tissue, noise, jitter and lost frames
+};
+
+/// An interval of simulated time, for example in which the marker is covered: from `begin_s` up to `end_s`.
+struct Interval {
+  double begin_s = 0, end_s = 0;
+  bool contains(double time_s) const { return begin_s <= time_s && time_s < end_s; }
+};
+
+/// A frame with its truth.
+struct SimulatedFrame {
+  EndoscopePicture picture;
+  RcmCoordinates q;  ///< of the instrument in the middle of the exposure, for evaluation
+};
+
+/// A simulated operating room: the first instrument of a rig on an arm, before an endoscope, and the time that they
+/// share. It is a robot, its camera and its clock at once, as the servo loop wants them. Simulated time starts at 0 and
+/// passes only in sleep_until() and step(). The same configuration, seed and commands give the same frames, bit for
+/// bit.
+class Simulator : public Robot, public ImageStream, public Clock {
+ public:
+  /// `rig` is how things really are; what a program believes may differ. Its first instrument needs camera_from_rcm
+  /// (else InputError). The arm starts at rest with these readings.
+  Simulator(const Rig& rig, const SimulatorConfig& config, const RcmCoordinates& readings);
+
+  JointState state() override;
+  void send(const JointPath& path) override;
+  std::optional<StampedImage> newest() override;
+  double now_s() const override { return time_s_; }
+  /// Lets time pass; the arm samples the path at SimulatorConfig::arm_rate_hz.
+  void sleep_until(double time_s) override;
+
+  /// A single setpoint instead of a path.
+  void servo_jp(const Eigen::Vector4d& setpoint) { arm_.servo_jp(setpoint); }
+  /// Lets time pass; frames are taken when they are due, also within a step. Not backwards (std::invalid_argument).
+  void step(double dt_s);
+  Eigen::Vector4d measured_jp() const { return arm_.measured_jp(); }
+  /// Frames that have arrived by now and since the last call, with their truth. newest() takes from the same.
+  std::vector<SimulatedFrame> arrived();
+
+  Arm& arm() { return arm_; }
+  const Arm& arm() const { return arm_; }
+  /// Light on the scene from now on: 1 is usual.
+  void set_light(float light) { endoscope_.set_light(light); }
+  /// Something lies over the whole marker then.
+  void cover_marker(const Interval& when) { covered_.push_back(when); }
+
+  /// The instrument in the camera's truth, now.
+  RcmCoordinates true_q() const { return RcmCoordinates::from_vector(arm_.true_jp()); }
+  ShaftPlacement placement() const;
+
+ private:
+  Rigid3 camera_from_rcm_;
+  Arm arm_;
+  Endoscope endoscope_;
+  double arm_period_s_;
+  std::optional<JointPath> path_;
+  std::vector<Interval> covered_;
+  double time_s_ = 0;
+  Exposure exposing_;                     // the moments of the current frame so far
+  std::map<long, RcmCoordinates> truth_;  // of frames on their way
+  long taken_ = 0;
+};
+
+}  // namespace lapservo

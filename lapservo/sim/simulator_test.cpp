@@ -1,0 +1,191 @@
+#include "lapservo/sim/simulator.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/sim/edge_probe.h"
+#include "lapservo/testing/sample_frames.h"
+
+namespace lapservo {
+namespace {
+
+// The example's scene, a third as large.
+Rig small_rig() {
+  Rig rig = load_rig(testing::source_folder() / "configs/example.yaml");
+  Camera& camera = rig.camera;
+  camera.width_px = 426;
+  camera.height_px = 240;
+  camera.fx_px = camera.fy_px = 366;
+  camera.cx_px = 212.5;
+  camera.cy_px = 119.5;
+  return rig;
+}
+
+RcmCoordinates in_view(const Rig& rig) {
+  RcmCoordinates q = configuration_through(*rig.instruments[0].camera_from_rcm, {-0.012, 0.004, 0.1}).value();
+  q.psi_rad = 0.6;
+  return q;
+}
+
+SimulatorConfig without_offsets() {
+  SimulatorConfig config;
+  config.arm.joint_offset.setZero();
+  config.arm.backlash.setZero();
+  return config;
+}
+
+struct Seen {
+  std::vector<SimulatedFrame> frames;
+  std::vector<double> polled_s;
+};
+
+// A slow sweep at 1 kHz.
+Seen sweep(Simulator& simulator, const RcmCoordinates& from, double duration_s) {
+  Seen seen;
+  const auto ticks = static_cast<int>(std::lround(duration_s * 1000));
+  for (int k = 0; k < ticks; ++k) {
+    const double phase = 3 * simulator.now_s();
+    simulator.servo_jp(from.vector() + std::sin(phase) * Eigen::Vector4d(0.04, 0.03, 0.004, 0.3));
+    simulator.step(0.001);
+    for (SimulatedFrame& frame : simulator.arrived()) {
+      seen.frames.push_back(std::move(frame));
+      seen.polled_s.push_back(simulator.now_s());
+    }
+  }
+  return seen;
+}
+
+TEST(Simulator, IsTheSameBitForBitWhateverThreadsRender) {
+  const Rig rig = small_rig();
+  std::vector<Seen> runs;
+  for (const int threads : {0, 1, 2, 1}) {
+    SimulatorConfig config;
+    config.endoscope.render_threads = threads;
+    config.endoscope.exposure_s = 0.004;
+    config.endoscope.dropped_share = 0.1;
+    if (runs.size() == 3) config.seed = 2;
+    Simulator simulator(rig, config, in_view(rig));
+    runs.push_back(sweep(simulator, in_view(rig), 0.7));
+  }
+  ASSERT_GT(runs[0].frames.size(), 20U);
+  for (const std::size_t other : {1, 2}) {
+    ASSERT_EQ(runs[other].frames.size(), runs[0].frames.size());
+    for (std::size_t k = 0; k < runs[0].frames.size(); ++k) {
+      const EndoscopePicture &a = runs[0].frames[k].picture, &b = runs[other].frames[k].picture;
+      EXPECT_EQ(a.stamp_s, b.stamp_s);
+      EXPECT_EQ(cv::norm(a.bgr, b.bgr, cv::NORM_INF), 0) << k;
+      EXPECT_EQ(runs[0].frames[k].q.vector(), runs[other].frames[k].q.vector());
+    }
+  }
+  EXPECT_GT(cv::norm(runs[0].frames[0].picture.bgr, runs[3].frames[0].picture.bgr, cv::NORM_INF), 0);
+}
+
+TEST(Simulator, StepsOfAnyLengthGiveTheSameFrames) {
+  const Rig rig = small_rig();
+  SimulatorConfig config;
+  config.endoscope.pictures = false;
+  Simulator coarse(rig, config, in_view(rig)), fine(rig, config, in_view(rig));
+  const Eigen::Vector4d goal = in_view(rig).vector() + Eigen::Vector4d(0.05, 0.02, 0.01, 1);
+  coarse.servo_jp(goal);
+  fine.servo_jp(goal);
+  coarse.step(0.5);
+  for (int k = 0; k < 500; ++k) fine.step(0.001);
+  const auto a = coarse.arrived(), b = fine.arrived();
+  ASSERT_EQ(a.size(), b.size());
+  ASSERT_GT(a.size(), 20U);
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    EXPECT_EQ(a[k].picture.index, b[k].picture.index);
+    EXPECT_LT((a[k].q.vector() - b[k].q.vector()).norm(), 1e-12);
+  }
+}
+
+TEST(Simulator, AFrameShowsTheInstrumentAtItsExposure) {
+  const Rig rig = small_rig();
+  for (const double latency_s : {0.0, 0.08, 0.25}) {
+    SimulatorConfig config = without_offsets();
+    config.endoscope.latency_s = latency_s;
+    config.endoscope.jitter_s = 0;
+    config.endoscope.dropped_share = 0;
+    config.render.sensor.gains = Light::Constant(0.5F);
+    Simulator simulator(rig, config, in_view(rig));
+    const Seen seen = sweep(simulator, in_view(rig), 0.5);
+    ASSERT_NEAR(static_cast<double>(seen.frames.size()), (0.5 - latency_s) * 60, 1.5);
+    for (std::size_t k = 0; k < seen.frames.size(); ++k) {
+      const SimulatedFrame& frame = seen.frames[k];
+      EXPECT_NEAR(frame.picture.stamp_s - frame.picture.exposed_s, latency_s, 1e-9);
+      EXPECT_GE(seen.polled_s[k], frame.picture.stamp_s - 1e-9);
+      EXPECT_LE(seen.polled_s[k], frame.picture.stamp_s + 0.001 + 1e-9);
+      if (k % 6 != 0) continue;
+      const auto line = centre_line(rig.camera, rig.instruments[0].marker,
+                                    *rig.instruments[0].camera_from_rcm * rcm_from_unrolled(frame.q), frame.q.psi_rad)
+                            .value();
+      const cv::Mat light = light_of(frame.picture.bgr, rig.camera.response);
+      const Eigen::Vector2d direction = (line.ideal_px[3] - line.ideal_px[0]).normalized();
+      const auto off_px = crossing_px(light, line.ideal_px[1], direction);
+      ASSERT_TRUE(off_px);
+      EXPECT_NEAR(*off_px, 0, 0.15) << k;
+    }
+  }
+}
+
+TEST(Simulator, ReadingsAreOffByTwoDegreesAndThreeMillimetres) {
+  const Rig rig = small_rig();
+  SimulatorConfig config;
+  config.endoscope.pictures = false;
+  Simulator simulator(rig, config, in_view(rig));
+  const Eigen::Vector4d off = (simulator.true_q().vector() - simulator.measured_jp()).cwiseAbs();
+  for (const int joint : {0, 1, 3}) EXPECT_NEAR(off[joint], 0.0349, 2e-4);
+  EXPECT_NEAR(off[2], 0.003, 1e-5);
+  config.arm.rcm_offset_m = {0.001, 0, -0.002};
+  const Simulator moved(rig, config, in_view(rig));
+  const Eigen::Vector3d by = rig.instruments[0].camera_from_rcm->rotation * config.arm.rcm_offset_m;
+  const auto at = [](const Simulator& t) { return t.placement().camera_from_unrolled.translation; };
+  EXPECT_LT((at(moved) - at(simulator) - by).norm(), 1e-12);
+}
+
+TEST(Simulator, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
+  const Rig rig = small_rig();
+  SimulatorConfig config = without_offsets();
+  config.endoscope.jitter_s = config.endoscope.dropped_share = 0;
+  Simulator simulator(rig, config, in_view(rig));
+  simulator.cover_marker({0.2, 0.3});
+  const auto middle_of_band = [&](const SimulatedFrame& frame) {
+    const auto line = centre_line(rig.camera, rig.instruments[0].marker,
+                                  *rig.instruments[0].camera_from_rcm * rcm_from_unrolled(frame.q), frame.q.psi_rad)
+                          .value();
+    const cv::Mat light = light_of(frame.picture.bgr, rig.camera.response);
+    return light_at(light, 0.5 * (line.ideal_px[0] + line.ideal_px[1]));
+  };
+  Light usual = Light::Zero();
+  for (int k = 0; k < 480; ++k) {
+    if (k == 305) simulator.set_light(0.5F);
+    simulator.step(0.001);
+    for (const SimulatedFrame& frame : simulator.arrived()) {
+      const Light seen = middle_of_band(frame);
+      const double at_s = frame.picture.exposed_s;
+      if (usual.isZero()) usual = seen;
+      if (at_s >= 0.2 - 1e-9 && at_s < 0.3 - 1e-9) {
+        EXPECT_LT(seen.maxCoeff(), 0.35 * usual.maxCoeff()) << at_s;
+      } else {
+        const float expected = at_s > 0.305 ? 0.5F : 1.0F;
+        EXPECT_NEAR(seen[2] / usual[2], expected, 0.1) << at_s;
+      }
+    }
+  }
+}
+
+TEST(Simulator, RefusesNonsense) {
+  Rig rig = small_rig();
+  rig.instruments[0].camera_from_rcm.reset();
+  EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
+  EXPECT_THROW(Simulator(small_rig(), {}, in_view(small_rig())).step(-0.1), std::invalid_argument);
+  rig.instruments.clear();
+  EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <optional>
+
+#include <opencv2/core.hpp>
+
+namespace lapservo {
+
+struct StampedImage {
+  /// On the loop's clock: when it was exposed if that is known (the estimator's delay is 0 then), else when it arrived.
+  double time_s = 0;
+  cv::Mat bgr;  ///< 8-bit BGR of the rig's size; not changed by anybody afterwards
+};
+
+/// The port to a camera. newest() is called by one thread only, the one that tracks, and must not block: what waits for
+/// the camera does so in a thread of its own, and drops what nobody fetched.
+class ImageStream {
+ public:
+  virtual ~ImageStream() = default;
+  /// The newest image that came since the last call, if any.
+  virtual std::optional<StampedImage> newest() = 0;
+};
+
+}  // namespace lapservo

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "lapservo/vision/edge_measurements.h"
+#include "lapservo/vision/shaft_pose.h"
+
+namespace lapservo {
+
+/// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
+/// says, and by how much it is to be taken larger still before the print is blamed: smear and compression move
+/// boundaries as a print's errors would.
+struct CommonErrors {
+  double boundary_px = 0, side_px = 0, noise_scale = 1, doubt_scale = 1;
+};
+
+/// A pose, given that the print may lie elsewhere than the rig says: each boundary at either edge of the print (tau = 0
+/// and tau -> 2 pi, linear between; the ends are circles). These six errors are normal, independent and alike.
+struct PrintFit {
+  UnknownVector step;                    ///< to the mean of pose and film, from where the measurements were taken
+  UnknownMatrix covariance;              ///< of the pose's unknowns
+  double off_probability = 0;            ///< that the print is off by more than the tolerance
+  double psi_variance_by_tolerance = 0;  ///< of it, what the rig's tolerance adds to an exact print's
+  double psi_variance_by_print = 0;      ///< and what the print adds beyond the tolerance
+};
+
+/// Tells the print's errors from the settled measurements' residuals. How large they usually are is not known, so the
+/// pose is a mean over the rig's print and prints that are off by 5 um to 0.6 mm, each weighted by how likely it
+/// makes the residuals. On return the residuals are those that the step and the print's likeliest errors leave.
+/// `film_prior` as the fit has it. Nullopt when a direction is not seen at all.
+std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_unknowns, double film_prior,
+                                  double tolerance_m, const CommonErrors& errors);
+
+/// Root mean square of the boundaries' residuals in sigmas, each about its own straight line over the print; outliers
+/// do not count.
+double scatter_sigmas(std::span<const Measurement> measurements);
+
+}  // namespace lapservo
