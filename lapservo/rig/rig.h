@@ -24,8 +24,8 @@ struct Instrument {
   std::string name;
   Marker marker;
   std::optional<Rigid3> camera_from_rcm;
-  std::optional<Joints> joints;
-  std::optional<double> image_delay_s;  ///< a frame's stamp minus the joints' clock at its exposure
+  std::optional<Joints> joints{};
+  std::optional<double> image_delay_s{};  ///< a frame's stamp minus the joints' clock at its exposure
 };
 
 /// What stands before the camera and which camera it is (docs/conventions.md, "rig.yaml").

@@ -59,8 +59,8 @@ TEST(JointPath, BrakesWhenTheControllerIsLate) {
   constexpr double tick_s = 0.001;
   for (double t = 0.3 + tick_s; t < 1; t += tick_s) {
     const MotionState now = path.at(t);
-    const Eigen::Vector4d acceleration = (now.velocity - before.velocity).cwiseAbs() / tick_s;
-    EXPECT_LE((acceleration - acceleration).maxCoeff(), 1e-6) << t;
+    const Eigen::Vector4d change = (now.velocity - before.velocity).cwiseAbs() / tick_s;
+    EXPECT_LE((change - acceleration).maxCoeff(), 1e-6) << t;
     EXPECT_LT((now.position - before.position - tick_s * (now.velocity + before.velocity) / 2).norm(), 1e-5) << t;
     before = now;
   }
