@@ -27,6 +27,12 @@ enum class Status {
 };
 std::string_view status_word(Status status);
 
+/// Four points at zero: Eigen's own default is whatever memory holds.
+inline std::array<Eigen::Vector2d, 4> zero_points() {
+  const Eigen::Vector2d zero = Eigen::Vector2d::Zero();
+  return {zero, zero, zero, zero};
+}
+
 /// What one frame tells of one instrument. All but `status` is meaningful only when it is Status::ok; then every
 /// number is finite. Sigmas are one standard deviation.
 struct Observation {
@@ -41,8 +47,8 @@ struct Observation {
 
   double tau_rad = 0;  ///< azimuth of the marker on the centre line, [0, 2 pi)
   double sigma_tau_rad = 0;
-  std::array<Eigen::Vector2d, 4> edges_ideal_px{};  ///< e0..e3 on the centre line
-  std::array<Eigen::Vector2d, 4> edges_raw_px{};
+  std::array<Eigen::Vector2d, 4> edges_ideal_px = zero_points();  ///< e0..e3 on the centre line
+  std::array<Eigen::Vector2d, 4> edges_raw_px = zero_points();
   Features features;
 
   /// Where the fitted shaft lies, to start the next frame from and to draw. camera_from_unrolled, psi.
@@ -55,7 +61,7 @@ struct Observation {
     enum class What { nothing, pose, edges } what = What::nothing;
     Rigid3 camera_from_unrolled;  ///< of Method::surface, with psi_rad about it
     double psi_rad = 0;
-    std::array<Eigen::Vector2d, 4> edges_raw_px{};  ///< of Method::centerline
+    std::array<Eigen::Vector2d, 4> edges_raw_px = zero_points();  ///< of Method::centerline
   };
   Refused refused;
 };
