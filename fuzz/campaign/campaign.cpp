@@ -86,7 +86,7 @@ std::string text_of(const fs::path& path) {
 
 void try_rigs(int count, std::uint64_t seed) {
   Counts counts("rigs");
-  const fs::path folder = testing::source_folder() / "configs";
+  const fs::path folder = lapservo::testing::source_folder() / "configs";
   const std::string good[] = {text_of(folder / "paper.yaml"), text_of(folder / "example.yaml")};
   for (int i = 0; i < count; ++i)
     counts.add(seed + static_cast<std::uint64_t>(i), [&] {
@@ -180,8 +180,8 @@ std::string track_file(const fs::path& path, const Rig& rig, const Sample& sampl
 
 void try_pictures(int count, std::uint64_t seed) {
   Counts counts("pictures and videos");
-  const testing::TemporaryFolder folder;
-  const Rig rig = testing::small_test_rig();
+  const lapservo::testing::TemporaryFolder folder;
+  const Rig rig = lapservo::testing::small_test_rig();
   const std::vector<Sample> good = samples(rig, folder.path());
   for (int i = 0; i < count; ++i) {
     const std::uint64_t own = seed + static_cast<std::uint64_t>(i);
@@ -189,7 +189,7 @@ void try_pictures(int count, std::uint64_t seed) {
       Random random(own);
       const Sample& sample = good[fuzz::below(good.size(), random)];
       const fs::path path = folder / ("a" + sample.extension);
-      testing::write_file(path, fuzz::mutated_bytes(sample.bytes, random));
+      lapservo::testing::write_file(path, fuzz::mutated_bytes(sample.bytes, random));
       return track_file(path, rig, sample, counts, own);
     });
   }
@@ -224,12 +224,12 @@ std::string random_command(const std::string& rig, const std::string& out, Rando
 
 void try_commands(int count, std::uint64_t seed) {
   Counts counts("command lines");
-  const std::string rig = (testing::source_folder() / "configs" / "paper.yaml").string();
+  const std::string rig = (lapservo::testing::source_folder() / "configs" / "paper.yaml").string();
   for (int i = 0; i < count; ++i) {
     const std::uint64_t own = seed + static_cast<std::uint64_t>(i);
     counts.add(own, [&]() -> std::string {
       Random random(own);
-      const testing::TemporaryFolder folder;
+      const lapservo::testing::TemporaryFolder folder;
       fs::create_directory(folder / "in");
       const std::string arguments = random_command(rig, (folder / "out").string(), random);
       const std::string log = (folder / "in/stderr").string();
