@@ -8,6 +8,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo::bench {
@@ -66,7 +67,7 @@ Rig rig_with(cv::Size size_px, double focal_px, int instruments) {
     instrument.marker = {0.0084, port.hues_deg, {0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005}, 0};
     // The RCM frame's x axis points to the work space: phi is near pi/2 there.
     instrument.camera_from_rcm =
-        Rigid3{Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), port.marker_m - port.rcm_m), port.rcm_m};
+        Rigid3{rotation_between(Eigen::Vector3d::UnitX(), port.marker_m - port.rcm_m), port.rcm_m};
     rig.instruments.push_back(instrument);
   }
   return rig;

@@ -8,6 +8,7 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/kinematics/test_models.h"
 
@@ -22,7 +23,7 @@ Rigid3 leaning_shaft(const Marker& marker, const Eigen::Vector3d& middle_m, doub
   const Eigen::Vector3d sight = middle_m.normalized(), across = sight.unitOrthogonal();
   const Eigen::Vector3d axis =
       Eigen::AngleAxisd(turn_rad, sight) * (std::cos(lean_rad) * across + std::sin(lean_rad) * sight).eval();
-  const Eigen::Quaterniond rotation = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis);
+  const Eigen::Quaterniond rotation = rotation_between(Eigen::Vector3d::UnitZ(), axis);
   return {rotation, middle_m - marker.length_m() / 2 * axis};
 }
 

@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo {
@@ -241,7 +242,7 @@ std::optional<Observation> observe_edges(const Camera& camera, const Instrument&
     const double depth_m = camera.fx_px * instrument.marker.length_m() / o.features.l_px;
     const Eigen::Vector3d from = camera.ray_from_ideal(edges[0]) * depth_m,
                           to = camera.ray_from_ideal(edges[3]) * depth_m;
-    o.camera_from_unrolled = {Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), to - from), from};
+    o.camera_from_unrolled = {rotation_between(Eigen::Vector3d::UnitZ(), to - from), from};
     return o;
   }
   const auto q = configuration_from(camera, instrument, edges, o.tau_rad);

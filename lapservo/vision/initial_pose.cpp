@@ -7,6 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/features.h"
 #include "lapservo/vision/line_segmentation.h"
 
@@ -209,7 +210,7 @@ std::optional<Eigen::Vector3d> axis_point(const Scene& scene, const Outline& out
 
 // A frame at `origin` whose z axis is `axis`.
 Rigid3 frame_along(const Eigen::Vector3d& origin, const Eigen::Vector3d& axis) {
-  return {Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), axis), origin};
+  return {rotation_between(Eigen::Vector3d::UnitZ(), axis), origin};
 }
 
 // Depth of the proximal end at which a shaft through the RCM shows its distal end where it is seen.

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <array>
-#include <cmath>
+#include <optional>
 #include <type_traits>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 
 #include "lapservo/vision/shaft_pose.h"
 
@@ -29,27 +29,19 @@ class NormalEquations {
     }
   }
 
-  UnknownMatrix information() const {
-    UnknownMatrix information(unknowns_, unknowns_);
-    for (int i = 0; i < unknowns_; ++i)
-      for (int j = 0; j <= i; ++j) information(i, j) = information(j, i) = lower_[i][j];
-    return information;
-  }
+  UnknownMatrix information() const;
 
   /// The step; `damping` scales the diagonal (Marquardt). Directions without information get no step.
-  UnknownVector solve(double damping) const {
-    UnknownMatrix damped = information();
-    const UnknownVector diagonal = damped.diagonal();
-    damped.diagonal() += damping * diagonal.cwiseMax(1e-12 * diagonal.maxCoeff());
-    const UnknownVector step = damped.ldlt().solve(Eigen::Map<const UnknownVector>(gradient_.data(), unknowns_));
-    return step.allFinite() ? step : UnknownVector::Zero(unknowns_);
-  }
+  UnknownVector solve(double damping) const;
 
  private:
   int unknowns_;
   std::array<std::array<double, max_unknowns>, max_unknowns> lower_{};
   std::array<double, max_unknowns> gradient_{};
 };
+
+/// Of a symmetric positive definite matrix; nullopt when it is none to within rounding.
+std::optional<UnknownMatrix> inverse_of(const UnknownMatrix& information);
 
 /// Weight of a residual in units of its sigma under the Cauchy loss: 1 near zero, falling for outliers.
 inline double cauchy_weight(double residual_sigmas, double scale_sigmas) {

@@ -67,7 +67,7 @@ Line line_of(std::span<const Measurement> measurements, std::size_t group) {
       information += weight * row * row.transpose();
       gradient += weight * m.residual_px / unit * row;
     }
-    const Eigen::Vector2d solved = information.ldlt().solve(gradient);
+    const Eigen::Vector2d solved = information.inverse() * gradient;
     line = {solved[0], solved[1]};
   }
   return line;
@@ -170,8 +170,9 @@ class Evidence {
     for (const Pull& pull : sums.pulls)
       if (pull.weight > 0)
         e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
-    const auto solver = e.xx.ldlt();
-    const CrossMatrix through = solver.solve(e.nx.transpose()).transpose();
+    const auto inverse = inverse_of(e.xx);
+    if (!inverse) return;  // the frame tells nothing of the print
+    const CrossMatrix through = e.nx * *inverse;
     const PrintVector gradient = e.n - through * e.x;
     const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(e.nn - through * e.nx.transpose());
     information_ = certainty * directions.eigenvalues().cwiseMax(0);
@@ -185,7 +186,7 @@ class Evidence {
   }
 
  private:
-  PrintVector information_, squares_;  // along the directions that are independent
+  PrintVector information_ = PrintVector::Zero(), squares_ = PrintVector::Zero();  // along the directions that are independent
 };
 
 struct Solution {
@@ -200,10 +201,10 @@ std::optional<Solution> solved(const Sums& sums, double sigma_mm) {
   const PrintMatrix of_print = e.nn + PrintMatrix::Identity() / std::max(sigma_mm * sigma_mm, 1e-18);
   const Eigen::LLT<PrintMatrix> print(of_print);
   const CrossMatrix by_x = print.solve(e.nx);
-  const Eigen::FullPivLU<UnknownMatrix> lu(e.xx - e.nx.transpose() * by_x);
-  if (!lu.isInvertible()) return std::nullopt;
+  const auto inverted = inverse_of(e.xx - e.nx.transpose() * by_x);
+  if (!inverted) return std::nullopt;
+  const UnknownMatrix& inverse = *inverted;
   Solution solution;
-  const UnknownMatrix inverse = lu.inverse();
   solution.step = inverse * (e.x - by_x.transpose() * e.n);
   solution.print_mm = print.solve(e.n - e.nx * solution.step);
   solution.covariance = inverse;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo::theatre {
@@ -47,8 +48,7 @@ Rig usual_rig(std::size_t instruments) {
     const Port& port = ports.at(i);
     const Marker marker{0.0084, port.hues_deg, {0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005}, 0.4};
     // The RCM frame's x axis points to the work space: phi is near pi/2 there.
-    const Rigid3 camera_from_rcm{
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), port.marker_m - port.rcm_m), port.rcm_m};
+    const Rigid3 camera_from_rcm{rotation_between(Eigen::Vector3d::UnitX(), port.marker_m - port.rcm_m), port.rcm_m};
     rig.instruments.push_back({"PSM" + std::to_string(i + 1), marker, camera_from_rcm});
   }
   return rig;
