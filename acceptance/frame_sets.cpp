@@ -10,6 +10,7 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/sample_frames.h"

@@ -27,7 +27,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/experiments/setup.h"
 #include "lapservo/io/overlay.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"

@@ -12,6 +12,7 @@
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/io/overlay.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo {

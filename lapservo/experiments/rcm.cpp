@@ -10,6 +10,7 @@
 #include "lapservo/experiments/data_file.h"
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/sim/tissue.h"

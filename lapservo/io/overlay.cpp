@@ -10,6 +10,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/features.h"
 
 namespace lapservo {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/vision/shaft_pose.h"
 

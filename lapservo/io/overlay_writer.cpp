@@ -5,6 +5,7 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/new_folder.h"
+#include "lapservo/io/image_encoding.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/video_writer.h"
 
@@ -15,7 +16,7 @@ namespace fs = std::filesystem;
 class PictureOverlay : public OverlayWriter {
  public:
   explicit PictureOverlay(const fs::path& path) : path_(path), file_(path) {}
-  void add(const Frame&, const cv::Mat& overlay) override { write_image(file_, path_, overlay); }
+  void add(const Frame&, const cv::Mat& overlay) override { write_open_image(file_, path_, overlay); }
   void commit() override {}
 
  private:

@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/centre_line.h"
 
 namespace lapservo {
 namespace {

@@ -8,7 +8,6 @@
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/rigid3.h"
-#include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/marker/marker.h"
 

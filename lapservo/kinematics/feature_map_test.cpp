@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/test_models.h"
 
 namespace lapservo {

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/servo/image_window.h"
 #include "lapservo/testing/rigs.h"

@@ -6,6 +6,7 @@
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/servo.h"
+#include "lapservo/servo/track_images.h"
 
 namespace lapservo {
 

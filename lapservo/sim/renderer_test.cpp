@@ -9,7 +9,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/sim/edge_probe.h"
 #include "lapservo/sim/shaft_lighting.h"
 #include "lapservo/sim/shaft_tracer.h"

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/sim/edge_probe.h"
 #include "lapservo/testing/sample_frames.h"
 

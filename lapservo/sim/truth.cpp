@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/features.h"
 
 namespace lapservo {

@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/theatre.h"
 

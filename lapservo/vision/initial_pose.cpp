@@ -7,7 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/line_segmentation.h"
 
 namespace lapservo {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/theatre.h"
 #include "lapservo/vision/tracker.h"
 

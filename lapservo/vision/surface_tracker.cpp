@@ -6,6 +6,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/agreement_search.h"
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/initial_pose.h"

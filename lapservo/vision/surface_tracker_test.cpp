@@ -8,6 +8,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/theatre.h"
 #include "lapservo/vision/tracker.h"
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo::theatre {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"

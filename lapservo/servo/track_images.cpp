@@ -1,4 +1,4 @@
-#include "lapservo/servo/tracked_image.h"
+#include "lapservo/servo/track_images.h"
 
 #include <atomic>
 #include <chrono>

@@ -1,4 +1,4 @@
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 
 #include <array>
 #include <cmath>
