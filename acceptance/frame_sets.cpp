@@ -16,6 +16,7 @@
 #include "lapservo/testing/sample_frames.h"
 
 namespace lapservo::acceptance {
+using namespace internal;
 namespace fs = std::filesystem;
 
 double mean(const std::vector<double>& values) {

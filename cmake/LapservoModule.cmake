@@ -1,8 +1,9 @@
 # One folder of lapservo/ is one target. lapservo_module(NAME SOURCES ... USES ... TESTS ...) declares what the folder
-# compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE), and its
-# tests, which stand beside the sources. The build thereby enforces the direction of dependencies.
+# compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE), its tests,
+# which stand beside the sources, and the headers that users call (PUBLIC_HEADERS); all other headers are internal. The
+# linker and the test `boundaries` (LapservoBoundaries.cmake) enforce the direction of dependencies.
 function(lapservo_module name)
-  cmake_parse_arguments(M "" "" "SOURCES;USES;PRIVATE;TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;TEST_USES" ${ARGN})
   set(target lapservo_${name})
   if(M_SOURCES)
     add_library(${target} STATIC ${M_SOURCES})
@@ -24,6 +25,7 @@ function(lapservo_module name)
     target_precompile_headers(${target} REUSE_FROM lapservo_precompiled)
   endif()
   install(TARGETS ${target} EXPORT lapservoTargets)
+  lapservo_remember_module(${name} ${ARGN})
   if(LAPSERVO_BUILD_TESTS AND M_TESTS)
     add_executable(${name}_test ${M_TESTS})
     target_link_libraries(${name}_test PRIVATE lapservo::${name} ${M_TEST_USES} lapservo_testing lapservo_flags GTest::gtest_main)

@@ -27,6 +27,7 @@
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

@@ -38,6 +38,7 @@
 #include "lapservo/sim/simulator.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

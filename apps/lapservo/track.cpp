@@ -25,6 +25,7 @@
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

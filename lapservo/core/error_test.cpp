@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 TEST(InputError, KeepsItsFieldsAsTheyWereGiven) {
@@ -35,4 +35,4 @@ TEST(InputError, SaysTheSameOfAnotherSource) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -17,7 +17,7 @@
 #include "lapservo/experiments/stage.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -225,4 +225,4 @@ TEST(Illumination, EndToEnd) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -15,7 +15,7 @@
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Result = RcmResult;
@@ -342,4 +342,4 @@ ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) 
   return section;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -29,4 +29,4 @@ void write_open_image(AtomicFile& file, const fs::path& name, const cv::Mat& ima
   file.commit();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -20,6 +20,7 @@
 #include "lapservo/io/png_picture.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

@@ -6,7 +6,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using What = Observation::Refused::What;
@@ -80,4 +80,4 @@ TEST(Overlay, DrawsWhatWasRefused) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/video_writer.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -62,4 +62,4 @@ std::unique_ptr<OverlayWriter> open_overlay_writer(const fs::path& path, const F
   return std::make_unique<VideoOverlay>(path, source.frames_per_second());
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

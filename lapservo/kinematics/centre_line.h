@@ -10,7 +10,7 @@
 #include "lapservo/kinematics/features.h"
 #include "lapservo/marker/marker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The marker on the centre line: the images of e0..e3 on the facing generatrix, where the plane through the shaft's
 /// axis and the camera centre meets the surface (docs/conventions.md, "What the centre line shows").
@@ -32,4 +32,4 @@ Features features_of(const std::array<Eigen::Vector2d, 4>& edges_ideal_px,
 /// Image of the RCM; algebraic (mirrored) when it lies behind the camera, nullopt when in its focal plane.
 std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigid3& camera_from_rcm);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/kinematics/centre_line.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double smallest_px = 1e-6;  // lengths below it give no direction
@@ -116,4 +116,4 @@ FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q) {
   return {Undefined::none, point};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/test_models.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double step_by_joint[4] = {1e-6, 1e-6, 1e-7, 1e-6};
@@ -160,4 +160,4 @@ TEST(FeatureMap, SaysWhyItIsUndefined) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/kinematics/test_models.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double any_steepness_rad = 1.57;
@@ -98,4 +98,4 @@ TEST(Visibility, IsNotMistakenWhereTheLensFoldsBack) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/servo/image_window.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 const Eigen::Vector4d somewhere(0.05, 1.57, 0.064, 1.2);
@@ -101,4 +101,4 @@ TEST(ImageFeatures, TheWindowLiesInThePicture) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,6 +9,7 @@
 #include "lapservo/servo/track_images.h"
 
 namespace lapservo {
+using namespace internal;
 
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer) {

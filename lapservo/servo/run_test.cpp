@@ -19,7 +19,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // The trajectory as the half-size camera sees it.
@@ -218,4 +218,4 @@ TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

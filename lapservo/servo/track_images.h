@@ -10,7 +10,7 @@
 #include "lapservo/stream/image_stream.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Tracked images as they come, by whichever thread tracks.
 class TrackedImageStream {
@@ -25,4 +25,4 @@ class TrackedImageStream {
 std::unique_ptr<TrackedImageStream> track_images(ImageStream& images, const Rig& rig, const TrackerOptions& options,
                                                  const std::optional<Eigen::Vector2d>& rcm_px, TrackingThread thread);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,6 +11,7 @@
 #include "lapservo/sim/render_queue.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 // Moments that are equal but for rounding.

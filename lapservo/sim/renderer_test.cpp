@@ -15,7 +15,7 @@
 #include "lapservo/sim/shaft_tracer.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 Camera small_camera() {
@@ -202,4 +202,4 @@ TEST(Lighting, TurnedDownLampsLeaveTheAmbientPart) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/sim/edge_probe.h"
 #include "lapservo/testing/sample_frames.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // The example's scene, a third as large.
@@ -188,4 +188,4 @@ TEST(Simulator, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

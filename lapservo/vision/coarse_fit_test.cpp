@@ -10,7 +10,7 @@
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/theatre.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::Shot;
@@ -129,4 +129,4 @@ TEST(InitialPoses, AreNoneForABlobWithoutTheMarkersColoursInTheirOrder) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

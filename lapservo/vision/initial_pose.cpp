@@ -10,7 +10,7 @@
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/line_segmentation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // The shaft in the ideal image: x along its axis from `origin` (towards the tip), y across.
@@ -286,4 +286,4 @@ std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
   return poses;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/vision/theatre.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::Shot;
@@ -160,4 +160,4 @@ TEST(Observation, IsFiniteForEveryStatus) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

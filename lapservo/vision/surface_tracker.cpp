@@ -13,7 +13,7 @@
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/verification.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int grid_px = 8, least_samples = 8, most_blobs = 6;
@@ -258,4 +258,4 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
   return observations_;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

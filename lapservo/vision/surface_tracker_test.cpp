@@ -12,7 +12,7 @@
 #include "lapservo/vision/theatre.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::Shot;
@@ -261,4 +261,4 @@ TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal
