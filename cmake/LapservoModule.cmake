@@ -1,16 +1,17 @@
 # One folder of lapservo/ is one target. lapservo_module(NAME SOURCES ... USES ... TESTS ...) declares what the folder
 # compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE), its tests,
-# which stand beside the sources, and the headers that users call (PUBLIC_HEADERS); all other headers are internal. The
+# which stand beside the sources, and the headers that are installed (PUBLIC_HEADERS); all other headers are internal. The
 # linker and the test `boundaries` (LapservoBoundaries.cmake) enforce the direction of dependencies.
+# What has no public header is nobody's library: it goes into the tool.
 function(lapservo_module name)
   cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;TEST_USES" ${ARGN})
   set(target lapservo_${name})
-  if(M_SOURCES)
-    add_library(${target} STATIC ${M_SOURCES})
-    set(scope PUBLIC)
-  else()
+  set(scope PUBLIC)
+  if(NOT M_SOURCES)
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
+  else()
+    add_library(${target} STATIC ${M_SOURCES})
   endif()
   add_library(lapservo::${name} ALIAS ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
@@ -24,7 +25,9 @@ function(lapservo_module name)
   if(M_SOURCES AND LAPSERVO_PRECOMPILE)
     target_precompile_headers(${target} REUSE_FROM lapservo_precompiled)
   endif()
-  install(TARGETS ${target} EXPORT lapservoTargets)
+  if(M_PUBLIC_HEADERS)
+    lapservo_install(${target} ${M_PUBLIC_HEADERS})
+  endif()
   lapservo_remember_module(${name} ${ARGN})
   if(LAPSERVO_BUILD_TESTS AND M_TESTS)
     add_executable(${name}_test ${M_TESTS})
@@ -32,6 +35,17 @@ function(lapservo_module name)
     lapservo_compile_quickly(${name}_test)
     gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
   endif()
+endfunction()
+
+# A target that others may link, with the headers that they may include.
+function(lapservo_install target)
+  get_target_property(type ${target} TYPE)
+  set(scope PUBLIC)
+  if(type STREQUAL INTERFACE_LIBRARY)
+    set(scope INTERFACE)
+  endif()
+  target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${ARGN})
+  install(TARGETS ${target} EXPORT lapservoTargets FILE_SET HEADERS)
 endfunction()
 
 # For tests: they are compiled more often than they run.
