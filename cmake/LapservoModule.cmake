@@ -10,11 +10,14 @@ function(lapservo_module name)
   if(NOT M_SOURCES)
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
+  elseif(M_PUBLIC_HEADERS)
+    add_library(${target} ${M_SOURCES})  # static or shared: BUILD_SHARED_LIBS
   else()
     add_library(${target} STATIC ${M_SOURCES})
   endif()
   add_library(lapservo::${name} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON DEFINE_SYMBOL ""
+    VERSION ${PROJECT_VERSION} SOVERSION ${LAPSERVO_SOVERSION})
   target_compile_features(${target} ${scope} cxx_std_20)
   target_include_directories(${target} ${scope}
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
