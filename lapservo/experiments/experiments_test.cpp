@@ -15,6 +15,7 @@
 #include "lapservo/experiments/rcm.h"
 #include "lapservo/experiments/rotation.h"
 #include "lapservo/experiments/stage.h"
+#include "lapservo/experiments/tracking.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo::internal {
@@ -222,6 +223,24 @@ TEST(Illumination, EndToEnd) {
 
   setup.keep_going = [](int done, int) { return done < 3; };
   EXPECT_THROW(measure_illumination(setup), Interrupted);
+}
+
+TEST(Tracking, StoppedInItsSecondRunKeepsTheFirst) {
+  ExperimentSetup setup;
+  setup.rig = paper_rig();
+  setup.seed = seed;
+  constexpr int first_run = static_cast<int>(TrackingScenario{}.duration_s / tracking_period_s);
+  setup.keep_going = [](int done, int) { return done < first_run + 5; };
+  const TrackingResult result = measure_tracking(setup);
+  ASSERT_EQ(result.runs.size(), 1U) << "seed " << seed;
+  EXPECT_GT(result.missing.size(), 3U);
+  EXPECT_TRUE(result.runs[0].converged_s);
+
+  const ReportSection section = section_of(result, setup);
+  for (const std::string& title : result.missing) EXPECT_NE(section.unfinished.find(title), std::string::npos);
+  EXPECT_EQ(section.files, std::vector<std::string>{"tracking_default.csv"});
+  for (const Comparison& row : section.comparisons)
+    EXPECT_FALSE(row.centerline.empty() && row.surface.empty()) << row.what;
 }
 
 }  // namespace

@@ -180,8 +180,10 @@ RcmCoordinates common_start(const ExperimentSetup& setup) {
                       tracking_controller(longest, setup.rig.camera), ArmConfig{}.joint_offset, random, "rig");
 }
 
-TrackingRun run_scenario(const TrackingScenario& scenario, const ExperimentSetup& setup, const RcmCoordinates& start,
-                         const Eigen::Vector2d& rcm_px, int done_before, int total) {
+// Nothing when it was stopped.
+std::optional<TrackingRun> run_scenario(const TrackingScenario& scenario, const ExperimentSetup& setup,
+                                        const RcmCoordinates& start, const Eigen::Vector2d& rcm_px, int done_before,
+                                        int total) {
   TrackingRun run;
   run.scenario = scenario;
   SimulatorConfig simulated;
@@ -203,7 +205,7 @@ TrackingRun run_scenario(const TrackingScenario& scenario, const ExperimentSetup
     return !stopped;
   });
   lapservo::run(simulator, simulator, simulator, config, trajectory, scenario.duration_s, recorder);
-  if (stopped) throw Interrupted{};
+  if (stopped) return std::nullopt;
   sum_up(run);
   return run;
 }
@@ -230,9 +232,15 @@ TrackingResult measure_tracking(const ExperimentSetup& setup) {
   int total = 0, done = 0;
   for (const TrackingScenario& scenario : scenarios()) total += periods_of(scenario);
   for (const TrackingScenario& scenario : scenarios()) {
-    result.runs.push_back(run_scenario(scenario, setup, start, result.estimated_rcm_px, done, total));
+    std::optional<TrackingRun> run;
+    if (result.missing.empty()) run = run_scenario(scenario, setup, start, result.estimated_rcm_px, done, total);
+    if (run)
+      result.runs.push_back(std::move(*run));
+    else
+      result.missing.push_back(scenario.title);
     done += periods_of(scenario);
   }
+  if (result.runs.empty()) throw Interrupted{};
   return result;
 }
 

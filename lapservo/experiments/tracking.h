@@ -45,12 +45,14 @@ struct TrackingRun {
 struct TrackingResult {
   std::vector<TrackingRun> runs;
   Eigen::Vector2d estimated_rcm_px = Eigen::Vector2d::Zero();  ///< what the uncalibrated run goes by
+  std::vector<std::string> missing = {};                       ///< titles of runs not finished: it was stopped
 };
 
 inline constexpr double tracking_period_s = 1.0 / 60;
 /// What steers a run.
 ControllerConfig tracking_controller(const TrackingScenario& scenario, const Camera& camera);
 
+/// Stopped, it has the runs that were finished. Throws Interrupted when there is none.
 TrackingResult measure_tracking(const ExperimentSetup& setup);
 
 /// tracking_ID.csv: every period of a run.

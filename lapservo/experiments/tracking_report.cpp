@@ -21,9 +21,18 @@ struct FeatureName {
 constexpr std::array features{FeatureName{"s", "s_rad", "mrad", 1000}, FeatureName{"r", "r_px", "px", 1},
                               FeatureName{"l", "l_px", "px", 1}, FeatureName{"d", "d_px", "px", 1}};
 
-const TrackingRun& run_of(const TrackingResult& result, const std::string& id) {
-  return *std::find_if(result.runs.begin(), result.runs.end(),
-                       [&](const TrackingRun& run) { return run.scenario.id == id; });
+// Null when it was stopped before its end.
+const TrackingRun* run_of(const TrackingResult& result, const std::string& id) {
+  const auto run = std::find_if(result.runs.begin(), result.runs.end(),
+                                [&](const TrackingRun& candidate) { return candidate.scenario.id == id; });
+  return run == result.runs.end() ? nullptr : &*run;
+}
+
+// What a finished run has to say.
+template <class Say>
+std::string text_of(const TrackingResult& result, const std::string& id, Say say) {
+  const TrackingRun* run = run_of(result, id);
+  return run ? say(*run) : "";
 }
 
 std::string features_text(const Eigen::Vector4d& values) {
@@ -62,7 +71,8 @@ Plot figure_7(const TrackingResult& result, const FeatureName& feature) {
   for (const auto& [id, name] :
        {std::pair{"default", "the default"}, std::pair{"paper", "the paper\u2019s law, Algorithm 1"},
         std::pair{"paper_surface", "the paper\u2019s law, our tracker"}})
-    plot.series.push_back(over_time(run_of(result, id).table, column, name, color++, Draw::line, feature.scale));
+    if (const TrackingRun* run = run_of(result, id))
+      plot.series.push_back(over_time(run->table, column, name, color++, Draw::line, feature.scale));
   return plot;
 }
 
@@ -111,49 +121,62 @@ Table decay_table(const TrackingResult& result, const Eigen::Vector4d& gains_per
       "The paper\u2019s law: decay of each feature\u2019s error (eq. 22); \u2013 where it was small from the start",
       {"feature", "K [a period]", "K [1/s]", "Algorithm 1 [1/s]", "our tracker [1/s]"},
       {}};
-  const TrackingRun &paper = run_of(result, "paper"), &ours = run_of(result, "paper_surface");
   for (std::size_t k = 0; k < 4; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
+    const auto decay = [i](const TrackingRun& run) { return decay_text(run.decay_per_s[i]); };
     table.rows.push_back({features[k].name, fmt::format("{:.4g}", gains_per_s[i] * tracking_period_s),
-                          fmt::format("{:.3f}", gains_per_s[i]), decay_text(paper.decay_per_s[i]),
-                          decay_text(ours.decay_per_s[i])});
+                          fmt::format("{:.3f}", gains_per_s[i]), text_of(result, "paper", decay),
+                          text_of(result, "paper_surface", decay)});
   }
   return table;
 }
 
+std::string hold_text(const TrackingRun& run) {
+  return fmt::format("{:.0f} ms, {:.0f} ms, {:.2f} s", 1000 * run.held_s.value_or(NAN),
+                     1000 * run.resumed_s.value_or(NAN), run.back_s.value_or(NAN));
+}
+
 std::vector<Comparison> comparisons(const TrackingResult& result, const Eigen::Vector4d& gains_per_s) {
-  const TrackingRun &ours = run_of(result, "default"), &paper = run_of(result, "paper"),
-                    &paper_surface = run_of(result, "paper_surface"), &hidden = run_of(result, "hidden"),
-                    &uncalibrated = run_of(result, "uncalibrated");
-  return {
+  const auto rms = [](const TrackingRun& run) { return features_text(run.steady_rms); };
+  const auto decay = [](const TrackingRun& run) { return decays_text(run.decay_per_s); };
+  const auto with_our_tracker = [&](const TrackingRun& run) {
+    return decay(run) + " (the paper\u2019s law, our tracker)";
+  };
+  std::vector<Comparison> rows{
       {"tracking: rms of the errors over the last third", "figure 7: \u201cconverge to zero\u201d",
-       features_text(paper.steady_rms), features_text(ours.steady_rms)},
-      {"the paper\u2019s law with our tracker", "", "", features_text(paper_surface.steady_rms)},
-      {"within 1 px and 5 mrad", "", converged_text(paper), converged_text(ours)},
+       text_of(result, "paper", rms), text_of(result, "default", rms)},
+      {"the paper\u2019s law with our tracker", "", "", text_of(result, "paper_surface", rms)},
+      {"within 1 px and 5 mrad", "", text_of(result, "paper", converged_text),
+       text_of(result, "default", converged_text)},
       {"decay of the errors of s, r, l, d by the paper\u2019s law", "K = " + decays_text(gains_per_s) + " (eq. 22)",
-       decays_text(paper.decay_per_s), decays_text(paper_surface.decay_per_s) + " (the paper\u2019s law, our tracker)"},
-      {"the same without knowing camera_from_rcm", "", "", converged_text(uncalibrated)},
+       text_of(result, "paper", decay), text_of(result, "paper_surface", with_our_tracker)},
+      {"the same without knowing camera_from_rcm", "", "", text_of(result, "uncalibrated", converged_text)},
       {"marker hidden for 2 s: holds after, goes on after, close again after", "", "",
-       fmt::format("{:.0f} ms, {:.0f} ms, {:.2f} s", 1000 * hidden.held_s.value_or(NAN),
-                   1000 * hidden.resumed_s.value_or(NAN), hidden.back_s.value_or(NAN))},
-      {"rms of the errors from the marker\u2019s return on", "", "", features_text(hidden.steady_rms)}};
+       text_of(result, "hidden", hold_text)},
+      {"rms of the errors from the marker\u2019s return on", "", "", text_of(result, "hidden", rms)}};
+  std::erase_if(rows, [](const Comparison& row) { return row.centerline.empty() && row.surface.empty(); });
+  return rows;
 }
 
 std::vector<Figure> figures(const TrackingResult& result) {
-  const TrackingRun &ours = run_of(result, "default"), &hidden = run_of(result, "hidden");
   constexpr double settled_s = 5;
   std::vector<Figure> figures;
+  const auto add = [&](const std::string& id, auto plot_of, const std::string& caption) {
+    if (const TrackingRun* run = run_of(result, id)) figures.push_back({plot_of(*run), caption});
+  };
+  const auto errors = [](const TrackingRun& run) { return error_plot(run, settled_s); };
   for (const FeatureName& feature : features)
     figures.push_back(
         {figure_7(result, feature), &feature == features.data() ? "Figure 7: the errors, from a random start." : ""});
-  for (const FeatureName& feature : features) figures.push_back({feature_plot(ours, feature), ""});
-  figures.push_back({error_plot(ours, settled_s), "The first seconds leave the scale."});
-  figures.push_back({error_plot(run_of(result, "uncalibrated"), settled_s),
-                     "First it moves each joint a little to learn what that does in the image."});
-  figures.push_back(
-      {error_plot(hidden, settled_s),
-       fmt::format("Between {:.0f} and {:.0f} s nothing is seen: the arm holds, the desired features move on.",
-                   hidden.scenario.hidden_from_s.value_or(0), hidden.scenario.hidden_to_s.value_or(0))});
+  for (const FeatureName& feature : features)
+    add("default", [&](const TrackingRun& run) { return feature_plot(run, feature); }, "");
+  add("default", errors, "The first seconds leave the scale.");
+  add("uncalibrated", errors, "First it moves each joint a little to learn what that does in the image.");
+  if (const TrackingRun* hidden = run_of(result, "hidden"))
+    figures.push_back(
+        {errors(*hidden),
+         fmt::format("Between {:.0f} and {:.0f} s nothing is seen: the arm holds, the desired features move on.",
+                     hidden->scenario.hidden_from_s.value_or(0), hidden->scenario.hidden_to_s.value_or(0))});
   return figures;
 }
 
@@ -182,10 +205,10 @@ std::vector<std::string> notes(const TrackingResult& result, const Eigen::Vector
 }  // namespace
 
 ReportSection section_of(const TrackingResult& result, const ExperimentSetup& setup) {
-  const Eigen::Vector4d papers_per_s =
-                            tracking_controller(run_of(result, "paper").scenario, setup.rig.camera).gains.per_s,
-                        ours_per_s =
-                            tracking_controller(run_of(result, "default").scenario, setup.rig.camera).gains.per_s;
+  TrackingScenario papers, ours;
+  papers.mode = ControlMode::paper;
+  const Eigen::Vector4d papers_per_s = tracking_controller(papers, setup.rig.camera).gains.per_s,
+                        ours_per_s = tracking_controller(ours, setup.rig.camera).gains.per_s;
   const SimulatorConfig simulated;
   ReportSection section{"tracking", "Trajectory tracking (section V-D)", {}, {}, {}, {}, {}, {}, {}};
   section.text = {fmt::format(
@@ -194,8 +217,11 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
       "{:.0f} frames/s, {:.0f} ms late, with noise, jitter and lost frames; an arm with lag, encoder steps, backlash, "
       "and "
       "readings that are {:.0f} mm and {:.0f} degrees off. All errors are those of the true features.",
-      trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * run_of(result, "default").scenario.latency_s,
+      trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * ours.latency_s,
       1000 * simulated.arm.joint_offset[2], deg_from_rad(simulated.arm.joint_offset[0]))};
+  for (const std::string& title : result.missing)
+    section.unfinished += (section.unfinished.empty() ? "Stopped. Missing: " : ", ") + title;
+  if (!result.missing.empty()) section.unfinished += ".";
   section.comparisons = comparisons(result, papers_per_s);
   section.figures = figures(result);
   section.tables = {run_table(result), decay_table(result, papers_per_s)};
