@@ -15,6 +15,7 @@
 
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/numbers.h"
+#include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
@@ -76,7 +77,9 @@ LinesByInstrument read_lines(const Options& options, const std::optional<Rig>& r
   const CsvTable table = CsvTable::read(options.observations);
   const double sigma_px = options.sigma_px > 0 ? options.sigma_px : 1;
   LinesByInstrument lines;
+  Progress progress(static_cast<int>(table.rows()));
   for (std::size_t row = 0; row < table.rows(); ++row) {
+    progress.show(static_cast<int>(row) + 1, "");
     const std::string& name = table.text(row, "instrument");
     if (rig && !find_instrument(rig, name))
       throw InputError(options.observations, "instrument", name, "an instrument of " + options.rig);

@@ -229,8 +229,8 @@ TEST(Tracking, StoppedInItsSecondRunKeepsTheFirst) {
   ExperimentSetup setup;
   setup.rig = paper_rig();
   setup.seed = seed;
-  constexpr int first_run = static_cast<int>(TrackingScenario{}.duration_s / tracking_period_s);
-  setup.keep_going = [](int done, int) { return done < first_run + 5; };
+  const auto first_run = static_cast<int>(TrackingScenario{}.duration_s / tracking_period_s);
+  setup.keep_going = [first_run](int done, int) { return done < first_run + 5; };
   const TrackingResult result = measure_tracking(setup);
   ASSERT_EQ(result.runs.size(), 1U) << "seed " << seed;
   EXPECT_GT(result.missing.size(), 3U);

@@ -39,7 +39,7 @@ int count_alternating(const std::uint8_t* a, const std::uint8_t* b, const std::u
 
 // Of a share of the box's bytes, chunks spread over all its rows and columns.
 Alternation sampled_alternation(const ImageView& image, const PixelBox& box) {
-  constexpr int most_pixels = 4000, stagger = 5, bytes = channels * chunk_px;
+  constexpr int most_pixels = 2500, stagger = 5, bytes = channels * chunk_px;
   const int width_px = box.u_end - box.u_begin, height_px = box.v_end - box.v_begin;
   int every = 1;  // a power of two: a multiple of the odd stagger then meets all chunks
   while (static_cast<std::int64_t>(width_px) * height_px / every > most_pixels) every *= 2;
