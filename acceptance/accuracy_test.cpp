@@ -15,6 +15,7 @@
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo::acceptance {
+using namespace internal;
 namespace {
 
 constexpr double mrad = 1e-3, mm = 1e-3;

@@ -23,6 +23,7 @@
 #include "lapservo/testing/sample_frames.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

@@ -10,11 +10,13 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/sample_frames.h"
 
 namespace lapservo::acceptance {
+using namespace internal;
 namespace fs = std::filesystem;
 
 double mean(const std::vector<double>& values) {

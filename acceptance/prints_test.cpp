@@ -15,6 +15,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::acceptance {
+using namespace internal;
 namespace {
 
 constexpr double mm = 1e-3;

@@ -4,6 +4,7 @@
 #include "lapservo/control/test_theatre.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 /// One step of the controller with an image in it, the model (feature_map) included.

@@ -12,6 +12,7 @@
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo::bench {
+using namespace internal;
 namespace {
 
 struct Port {

@@ -5,6 +5,7 @@
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::bench {
+using namespace internal;
 namespace {
 
 int found_in(const std::vector<Observation>& observations) {

@@ -1,18 +1,23 @@
 # One folder of lapservo/ is one target. lapservo_module(NAME SOURCES ... USES ... TESTS ...) declares what the folder
-# compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE), and its
-# tests, which stand beside the sources. The build thereby enforces the direction of dependencies.
+# compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE), its tests,
+# which stand beside the sources, and the headers that are installed (PUBLIC_HEADERS); all other headers are internal. The
+# linker and the test `boundaries` (LapservoBoundaries.cmake) enforce the direction of dependencies.
+# What has no public header is nobody's library: it goes into the tool.
 function(lapservo_module name)
-  cmake_parse_arguments(M "" "" "SOURCES;USES;PRIVATE;TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;TEST_USES" ${ARGN})
   set(target lapservo_${name})
-  if(M_SOURCES)
-    add_library(${target} STATIC ${M_SOURCES})
-    set(scope PUBLIC)
-  else()
+  set(scope PUBLIC)
+  if(NOT M_SOURCES)
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
+  elseif(M_PUBLIC_HEADERS)
+    add_library(${target} ${M_SOURCES})  # static or shared: BUILD_SHARED_LIBS
+  else()
+    add_library(${target} STATIC ${M_SOURCES})
   endif()
   add_library(lapservo::${name} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON DEFINE_SYMBOL ""
+    VERSION ${PROJECT_VERSION} SOVERSION ${LAPSERVO_SOVERSION})
   target_compile_features(${target} ${scope} cxx_std_20)
   target_include_directories(${target} ${scope}
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
@@ -23,13 +28,27 @@ function(lapservo_module name)
   if(M_SOURCES AND LAPSERVO_PRECOMPILE)
     target_precompile_headers(${target} REUSE_FROM lapservo_precompiled)
   endif()
-  install(TARGETS ${target} EXPORT lapservoTargets)
+  if(M_PUBLIC_HEADERS)
+    lapservo_install(${target} ${M_PUBLIC_HEADERS})
+  endif()
+  lapservo_remember_module(${name} ${ARGN})
   if(LAPSERVO_BUILD_TESTS AND M_TESTS)
     add_executable(${name}_test ${M_TESTS})
     target_link_libraries(${name}_test PRIVATE lapservo::${name} ${M_TEST_USES} lapservo_testing lapservo_flags GTest::gtest_main)
     lapservo_compile_quickly(${name}_test)
     gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 300)
   endif()
+endfunction()
+
+# A target that others may link, with the headers that they may include.
+function(lapservo_install target)
+  get_target_property(type ${target} TYPE)
+  set(scope PUBLIC)
+  if(type STREQUAL INTERFACE_LIBRARY)
+    set(scope INTERFACE)
+  endif()
+  target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${ARGN})
+  install(TARGETS ${target} EXPORT lapservoTargets FILE_SET HEADERS)
 endfunction()
 
 # For tests: they are compiled more often than they run.

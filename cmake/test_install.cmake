@@ -1,5 +1,6 @@
-# Installs BUILD into a fresh prefix, builds the projects in EXAMPLES against it, and runs them: on a picture that the
-# installed tool renders, and around a robot of their own.
+# Installs BUILD into a fresh prefix, compiles every installed header on its own, builds the projects in EXAMPLES against
+# the prefix, and runs them: on a picture that the installed tool renders, and around a robot of their own.
+cmake_minimum_required(VERSION 3.25)
 set(folder ${BUILD}/install-test)
 set(prefix ${folder}/prefix)
 
@@ -7,16 +8,47 @@ function(run)
   execute_process(COMMAND ${ARGV} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
 
-function(build_example name)
-  run(${CMAKE_COMMAND} -S ${EXAMPLES}/${name} -B ${folder}/${name} -G Ninja -DCMAKE_PREFIX_PATH=${prefix}
+function(build_project source name)
+  run(${CMAKE_COMMAND} -S ${source} -B ${folder}/${name} -G Ninja -DCMAKE_PREFIX_PATH=${prefix}
       -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER})
   run(${CMAKE_COMMAND} --build ${folder}/${name})
 endfunction()
 
+# A project in which each header is a source of its own. Fails, too, when others than the public ones are installed.
+function(check_headers)
+  file(GLOB_RECURSE headers RELATIVE ${prefix}/include ${prefix}/include/*)
+  include(${BUILD}/modules.cmake)
+  set(expected lapservo/lapservo.h)
+  foreach(module IN LISTS modules)
+    foreach(header IN LISTS ${module}_PUBLIC_HEADERS)
+      list(APPEND expected lapservo/${module}/${header})
+    endforeach()
+  endforeach()
+  list(SORT headers)
+  list(SORT expected)
+  if(NOT headers STREQUAL expected)
+    message(FATAL_ERROR "installed are the headers ${headers}, expected ${expected}")
+  endif()
+  foreach(header IN LISTS headers)
+    string(MAKE_C_IDENTIFIER ${header} name)
+    file(WRITE ${folder}/each_header/${name}.cpp "#include <${header}>\n")
+  endforeach()
+  file(WRITE ${folder}/each_header/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)
+project(each_header LANGUAGES CXX)
+find_package(lapservo REQUIRED)
+file(GLOB sources *.cpp)
+add_library(each_header OBJECT \${sources})
+target_compile_options(each_header PRIVATE -O0 -Wall -Wextra -Werror)
+target_link_libraries(each_header PRIVATE lapservo::lapservo)
+")
+  build_project(${folder}/each_header each_header.build)
+endfunction()
+
 file(REMOVE_RECURSE ${folder})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
-build_example(find_package)
-build_example(own_robot)
+check_headers()
+build_project(${EXAMPLES}/find_package find_package)
+build_project(${EXAMPLES}/own_robot own_robot)
 run(${prefix}/bin/lapservo render --rig ${prefix}/share/lapservo/configs/example.yaml --out ${folder}/frames --count 1)
 run(${folder}/find_package/rotation ${folder}/frames/rig.yaml ${folder}/frames/0000.png)
 run(${folder}/own_robot/own_robot ${prefix}/share/lapservo/configs/paper.yaml)

@@ -12,6 +12,7 @@
 // Any text is a table whose numbers are finite, or an InputError. The columns are those of observations and truth.
 namespace {
 using namespace lapservo;
+using namespace lapservo::internal;
 using fuzz::require;
 
 void read_number(const CsvTable& table, std::size_t row, const std::string& column) {

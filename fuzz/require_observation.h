@@ -7,6 +7,7 @@
 #include "lapservo/vision/observation.h"
 
 namespace lapservo::fuzz {
+using namespace internal;
 
 /// What an observation promises when its status is ok.
 inline void require_sound(const Observation& o) {

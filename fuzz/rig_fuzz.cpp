@@ -11,6 +11,7 @@
 // Any text is a rig that can be used over its whole image and every rotation, or an InputError.
 namespace {
 using namespace lapservo;
+using namespace lapservo::internal;
 using fuzz::require;
 
 void require_usable(const Camera& camera) {

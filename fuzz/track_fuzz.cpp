@@ -19,6 +19,7 @@
 // go on.
 namespace {
 using namespace lapservo;
+using namespace lapservo::internal;
 using fuzz::require;
 
 std::vector<cv::Mat> pictures() {

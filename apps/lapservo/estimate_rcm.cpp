@@ -21,13 +21,14 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rcm/distinct_lines.h"
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

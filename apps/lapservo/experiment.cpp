@@ -23,6 +23,7 @@
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
@@ -101,8 +102,7 @@ Report report_of(std::vector<ReportSection> sections, const std::string& missing
 
 // The library knows the rig, but not its file.
 [[noreturn]] void rethrow_with_rig(const InputError& error, const Options& options) {
-  const std::string text = error.what();
-  if (text.starts_with("rig: ") && !options.rig.empty()) throw InputError(options.rig, text.substr(5));
+  if (error.source() == "rig" && !options.rig.empty()) throw error.with_source(options.rig);
   throw error;
 }
 

@@ -21,6 +21,7 @@
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 
 struct ViewingOptions {

@@ -9,6 +9,7 @@
 #include "lapservo/core/csv.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 
 constexpr double largest_seed = 9007199254740991;  // 2^53 - 1: whole in a double too

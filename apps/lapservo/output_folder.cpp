@@ -20,6 +20,7 @@
 #include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

@@ -10,6 +10,7 @@
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
+using namespace internal;
 
 /// The folder of a run's results. They are gathered in its subfolder `unfinished`, and moved up by commit() when they
 /// are complete: a run that ends early leaves what was there before, and one that is killed also what it had, in

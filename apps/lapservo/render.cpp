@@ -30,6 +30,7 @@
 #include "lapservo/sim/truth.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 constexpr std::uintmax_t needed_bytes = 4 << 20;
 

@@ -27,7 +27,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/experiments/setup.h"
 #include "lapservo/io/overlay.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
@@ -38,6 +38,7 @@
 #include "lapservo/sim/simulator.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

@@ -25,6 +25,7 @@
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::app {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
@@ -125,9 +126,7 @@ struct Tally {
 };
 
 [[noreturn]] void rethrow_with_frame(const InputError& error, const Options& options, const Frame& frame) {
-  const std::string name = frame.file.empty() ? options.input : frame.file.string();
-  const std::string text = error.what();
-  if (text.starts_with("image: ")) throw InputError(name, text.substr(7));
+  if (error.source() == "image") throw error.with_source(frame.file.empty() ? options.input : frame.file.string());
   throw error;
 }
 

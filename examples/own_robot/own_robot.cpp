@@ -3,11 +3,7 @@
 #include <cstdint>
 #include <cstdio>
 
-#include <lapservo/control/paper_trajectory.h>
-#include <lapservo/kinematics/rcm_coordinates.h>
-#include <lapservo/servo/image_window.h>
-#include <lapservo/servo/run.h>
-#include <lapservo/sim/renderer.h>
+#include <lapservo/lapservo.h>
 
 #include "second_order_arm.h"
 

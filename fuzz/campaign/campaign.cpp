@@ -33,6 +33,7 @@
 
 namespace {
 using namespace lapservo;
+using namespace lapservo::internal;
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 

@@ -10,6 +10,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::fuzz {
+using namespace internal;
 
 inline std::size_t below(std::size_t count, Random& random) {
   return random.bits() % std::max<std::size_t>(count, 1);

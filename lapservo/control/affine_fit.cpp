@@ -2,7 +2,7 @@
 
 #include <Eigen/Cholesky>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 void AffineFit::add(const Eigen::Vector4d& x, const ImageVector& y) {
   Eigen::Matrix<double, 5, 1> regressor;
@@ -27,4 +27,4 @@ std::optional<AffineFit::Solution> AffineFit::solve() const {
   return solution;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

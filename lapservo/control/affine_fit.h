@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The eight numbers of an image: s_rad, r_px, l_px, d_px, then the end points e0 u, v, e3 u, v.
 using ImageVector = Eigen::Matrix<double, 8, 1>;
@@ -31,4 +31,4 @@ class AffineFit {
   int samples_ = 0;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

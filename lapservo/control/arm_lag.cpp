@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 void ArmLag::add(const MotionState& setpoint, const Eigen::Vector4d& q_joint, double interval_s) {
   constexpr double forgetting_s = 10;
@@ -20,4 +20,4 @@ double ArmLag::seconds() const {
   return std::clamp(cross_ / (square_ + little), 0.0, largest_s);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/motion_limits.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// How far the arm lags behind its setpoints, in seconds: least squares of setpoint - reading = lag * velocity over the
 /// last seconds of motion. The desired motion is fed forward that much earlier.
@@ -22,4 +22,4 @@ class ArmLag {
   double cross_ = 0, square_ = 0;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

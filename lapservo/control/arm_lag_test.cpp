@@ -6,7 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = 1.0 / 60;
@@ -43,4 +43,4 @@ TEST(ArmLag, IsZeroWithoutMotionAndBounded) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

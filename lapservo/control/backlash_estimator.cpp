@@ -5,7 +5,7 @@
 
 #include <Eigen/Cholesky>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 BacklashEstimator::BacklashEstimator(const BacklashEstimatorConfig& config, const Scales& scales)
     : config_(config), scales_(scales) {}
@@ -101,4 +101,4 @@ std::optional<BacklashEstimate> BacklashEstimator::estimate(int index) const {
                           std::sqrt(2 / curvature * misfit * frames_alike)};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

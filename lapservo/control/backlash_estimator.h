@@ -10,7 +10,7 @@
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/play.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 struct BacklashEstimate {
   double width = 0;  ///< full play, rad or m
@@ -72,4 +72,4 @@ class BacklashEstimator {
   bool followed_ = false;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

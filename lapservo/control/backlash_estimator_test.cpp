@@ -8,7 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = 1.0 / 60;
@@ -124,4 +124,4 @@ TEST(BacklashEstimator, KeepsWhatItKnowsThroughAnInterruption) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

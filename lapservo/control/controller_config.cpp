@@ -9,6 +9,7 @@
 #include "lapservo/core/error.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 void require(bool good, const std::string& field, double value, const char* expected) {

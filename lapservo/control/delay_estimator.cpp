@@ -6,7 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const Eigen::Matrix4d& covariance,
                          const JointHistory& history) {
@@ -50,4 +50,4 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   return DelayEstimate{delay_s, sigma_s};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/joint_history.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 struct DelayEstimate {
   double delay_s = 0;
@@ -48,4 +48,4 @@ class DelayEstimator {
   bool started_ = false;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 /// Slow motion of all joints, as a trajectory or an approach makes it.
@@ -78,4 +78,4 @@ TEST(DelayEstimator, SaysNothingWithoutMotion) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include "lapservo/control/uncalibrated_estimator.h"
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 std::optional<Eigen::Vector4d> Estimator::probing_velocity(double) const {
   return std::nullopt;
@@ -29,4 +29,4 @@ std::unique_ptr<Estimator> make_estimator(const ControllerConfig& config, const 
   return nullptr;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/offset_observer.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Where the instrument is now and what the image's features do when its joints move, made of the measured joints and
 /// the images so far. One implementation a ControlMode.
@@ -40,4 +40,4 @@ class Estimator {
 /// `model` maps q to features; ControlMode::uncalibrated does without, the others throw InputError when it is empty.
 std::unique_ptr<Estimator> make_estimator(const ControllerConfig& config, const FeatureModel& model);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

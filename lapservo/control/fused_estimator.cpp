@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 HoldReason reason_of(Update update) {
@@ -35,4 +35,4 @@ std::optional<Estimate> FusedEstimator::at(double time_s, const Eigen::Vector4d&
   return observer_.estimate(model_, q_joint, time_s);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

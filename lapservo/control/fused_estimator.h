@@ -2,7 +2,7 @@
 
 #include "lapservo/control/estimator.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Measured joints and late images fused by OffsetObserver.
 class FusedEstimator : public Estimator {
@@ -17,4 +17,4 @@ class FusedEstimator : public Estimator {
   OffsetObserver observer_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 /// Speed at a distance from the gap's end: slows down at half the acceleration, and the last part exponentially.
@@ -34,4 +34,4 @@ Eigen::Vector4d cross_gaps(const JointLimits& limits, const MotionState& motion,
   return velocity;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

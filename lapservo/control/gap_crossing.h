@@ -5,7 +5,7 @@
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/control/offset_observer.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// `wanted` plus what takes the motors quickly through the rest of their gaps when the desired motion has turned:
 /// while the instrument stands still whatever the motor does, it falls behind. Only joints whose wanted motion is that
@@ -16,4 +16,4 @@ Eigen::Vector4d cross_gaps(const JointLimits& limits, const MotionState& motion,
                            const Eigen::Vector4d& q_joint, const Eigen::Vector4d& feed_forward,
                            const Eigen::Vector4d& wanted, double period_s);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 #include "lapservo/control/play.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = 1.0 / 60;
@@ -86,4 +86,4 @@ TEST(CrossGaps, StaysWithinRateAndAcceleration) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

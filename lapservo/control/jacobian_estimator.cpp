@@ -2,7 +2,7 @@
 
 #include "lapservo/control/tracking_law.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 using Regressor = Eigen::Matrix<double, 5, 1>;
 
@@ -69,4 +69,4 @@ double JacobianEstimator::variance_at(const Eigen::Vector4d& q) const {
   return regressor.dot(covariance_ * regressor);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

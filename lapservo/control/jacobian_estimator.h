@@ -7,7 +7,7 @@
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/probing.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Learns image and Jacobian online from joint readings and features alone: no camera, marker or registration. The
 /// model is y(q) = y0 + G (q - q0) about the latest image's joints q0; y0 and the rows of G follow random walks whose
@@ -43,4 +43,4 @@ class JacobianEstimator {
   int outliers_ = 0;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

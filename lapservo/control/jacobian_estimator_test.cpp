@@ -5,7 +5,7 @@
 #include "lapservo/control/test_theatre.h"
 #include "lapservo/control/tracking_law.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using testing::TestRig;
@@ -166,4 +166,4 @@ TEST_F(JacobianEstimatorOnTheWay, IgnoresAnOutlierButBelievesAStep) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -1,6 +1,6 @@
 #include "lapservo/control/joint_history.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 void JointHistory::push(double time_s, const Eigen::Vector4d& q) {
   if (size_ > 0 && !(time_s > newest_s())) return;
@@ -24,4 +24,4 @@ std::optional<Eigen::Vector4d> JointHistory::at(double time_s) const {
   return a.q + (b.q - a.q) * ((time_s - a.time_s) / (b.time_s - a.time_s));
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The latest joint readings in order of time, so that an image can be compared with where the joints were when it was
 /// taken. A ring of fixed size: 1 s at 1 kHz; no allocation.
@@ -46,4 +46,4 @@ class JointHistory {
   std::size_t first_ = 0, size_ = 0;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/tracking_law.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 LatestImageEstimator::LatestImageEstimator(const ControllerConfig& config, FeatureModel model)
     : model_(std::move(model)),
@@ -41,4 +41,4 @@ HoldReason LatestImageEstimator::update(const ImageMeasurement& image, const Joi
   return HoldReason::none;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

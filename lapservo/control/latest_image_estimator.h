@@ -2,7 +2,7 @@
 
 #include "lapservo/control/estimator.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// As the paper has it: what the latest image shows is where the instrument is, and J is taken at the configuration
 /// that shows these features. The joints only start the search for it.
@@ -22,4 +22,4 @@ class LatestImageEstimator : public Estimator {
   std::optional<Estimate> latest_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

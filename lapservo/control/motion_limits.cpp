@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 double stopping_time_s(const JointLimits& limits) {
   return limits.rate.cwiseQuotient(limits.acceleration).maxCoeff();
@@ -46,4 +46,4 @@ LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<Im
   return {solution.x, solution.constrained};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

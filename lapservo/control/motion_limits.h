@@ -8,7 +8,7 @@
 #include "lapservo/control/velocity_qp.h"
 #include "lapservo/robot/joint_path.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The end points now and how they move.
 struct EndPoints {
@@ -50,4 +50,4 @@ LimitedVelocity limit_velocity(const JointLimits& limits, const std::optional<Im
                                const MotionState& motion, const std::optional<EndPoints>& ends,
                                const Eigen::Vector4d& wanted, const Eigen::Matrix4d& weight, double period_s);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/robot/joint_path.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = 1.0 / 60;
@@ -123,4 +123,4 @@ TEST(MotionLimits, BrakingKeepsTheDirectionAndStops) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

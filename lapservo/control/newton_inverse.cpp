@@ -2,7 +2,7 @@
 
 #include "lapservo/control/tracking_law.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 std::optional<NewtonInverse> newton_inverse(const FeatureModel& model, const Eigen::Vector4d& target,
                                             const Eigen::Vector4d& guess, const Scales& scales, int max_iterations) {
@@ -37,4 +37,4 @@ std::optional<NewtonInverse> newton_inverse(const FeatureModel& model, const Eig
   return best;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Result of a search for the q at which a model shows given features.
 struct NewtonInverse {
@@ -22,4 +22,4 @@ std::optional<NewtonInverse> newton_inverse(const FeatureModel& model, const Eig
                                             const Eigen::Vector4d& guess, const Scales& scales,
                                             int max_iterations = 30);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/angles.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double shortest_interval_s = 1e-3;
@@ -218,4 +218,4 @@ std::optional<Estimate> OffsetObserver::estimate(const FeatureModel& model, cons
   return now;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -14,7 +14,7 @@
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/play.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 enum class Update {
   accepted,
@@ -89,4 +89,4 @@ class OffsetObserver {
   Eigen::Vector4d last_outlier_ = Eigen::Vector4d::Zero();  ///< the offset it would have meant
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

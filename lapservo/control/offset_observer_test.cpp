@@ -6,7 +6,7 @@
 #include "lapservo/control/test_theatre.h"
 #include "lapservo/control/tracking_law.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using testing::TestRig;
@@ -228,4 +228,4 @@ TEST(OffsetObserver, RefusesWhatIsNotANumber) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

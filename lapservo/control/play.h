@@ -1,6 +1,6 @@
 #pragma once
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Backlash of one joint: the motor takes the instrument along only when it presses against one side of a gap. The
 /// state does not depend on the gap's width (the turning point and the side pressed since), so that the width may
@@ -32,4 +32,4 @@ class Play {
   int side_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

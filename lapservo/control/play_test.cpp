@@ -7,7 +7,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // The definition: the instrument stays where it is unless the motor takes it along.
@@ -45,4 +45,4 @@ TEST(Play, FollowsAWidthThatChanges) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/angles.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 ProbingMotion::ProbingMotion(const ProbingConfig& config, const JointLimits& limits, const Eigen::Vector4d& q_joint)
     : joint_time_s_(config.joint_time_s) {
@@ -64,4 +64,4 @@ std::optional<ProbedModel> ProbingFit::solve() const {
   return model;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/motion_limits.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The small motion by which an uncalibrated controller learns what its joints do in the image: x(t) = distance / 2
 /// (1 - cos(2 pi t / T)), joint after joint, away from the nearer joint limit; then rest until the last of it has
@@ -65,4 +65,4 @@ class ProbingFit {
   std::array<AffineFit, candidates> fits_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 bool in_view(const FeatureModel& model, const ImageWindow& window, const Eigen::Vector4d& q) {
@@ -87,4 +87,4 @@ JointVector random_start(const Trajectory& trajectory, double duration_s, const 
   throw InputError(source, why);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/joint_vector.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Measured joints at a random place from which the trajectory can be followed, for a simulated arm whose instrument
 /// is at the measured joints plus `joint_offset`: both ends of the marker lie in the window, the joints within the
@@ -18,4 +18,4 @@ JointVector random_start(const Trajectory& trajectory, double duration_s, const 
                          const ControllerConfig& config, const Eigen::Vector4d& joint_offset, Random& random,
                          const std::string& source);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

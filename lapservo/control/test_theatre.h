@@ -15,6 +15,7 @@
 #include "lapservo/kinematics/feature_map.h"
 
 namespace lapservo::testing {
+using namespace internal;
 
 /// A rig for tests: the one of the paper's trajectory.
 struct TestRig : ImageModel {

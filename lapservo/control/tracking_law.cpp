@@ -7,7 +7,7 @@
 
 #include "lapservo/core/angles.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 TrackingGains paper_gains(double control_period_s) {
   return {Eigen::Vector4d(0.032, 0.008, 0.0008, 0.01) / control_period_s};
@@ -55,4 +55,4 @@ Eigen::Vector4d paper_velocity(const Eigen::Matrix4d& jacobian, const TrackingGa
   return jacobian.inverse() * wanted_feature_rate(gains, features, desired, desired_rate);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

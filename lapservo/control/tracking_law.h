@@ -5,7 +5,7 @@
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Section V-D's gains: K_s = 0.032, K_r = 0.008, K_l = 0.0008, K_d = 0.01. The paper gives no unit of time. Per second
 /// they would mean time constants of 31 s to 21 minutes beside a trajectory of 12.6 s, so they are read per control
@@ -45,4 +45,4 @@ Eigen::Vector4d paper_velocity(const Eigen::Matrix4d& jacobian, const TrackingGa
                                const Eigen::Vector4d& features, const Eigen::Vector4d& desired,
                                const Eigen::Vector4d& desired_rate);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 Eigen::Matrix4d random_matrix(Random& random) {
@@ -107,4 +107,4 @@ TEST(DampedInverse, StaysBoundedAndContinuousThroughSingularities) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,6 +11,7 @@
 #include "lapservo/core/error.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 constexpr std::array<const char*, 4> feature_names{"s_rad", "r_px", "l_px", "d_px"};

@@ -9,6 +9,7 @@
 #include "lapservo/core/error.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 constexpr std::array<const char*, 4> end_names{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};

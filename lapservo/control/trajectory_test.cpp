@@ -11,7 +11,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 /// rate is the derivative of features and acceleration that of rate, at times that are no corners.
@@ -158,4 +158,4 @@ TEST_F(TrajectoryCheck, NamesTimeAndLimit) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 UncalibratedEstimator::UncalibratedEstimator(const ControllerConfig& config)
     : scales_(config.scales),
@@ -67,4 +67,4 @@ std::optional<Estimate> UncalibratedEstimator::at(double, const Eigen::Vector4d&
   return now;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 #include "lapservo/control/jacobian_estimator.h"
 #include "lapservo/control/probing.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Without any model: a small probing motion tells the Jacobian and the delay, and JacobianEstimator keeps learning.
 class UncalibratedEstimator : public Estimator {
@@ -35,4 +35,4 @@ class UncalibratedEstimator : public Estimator {
   double last_image_s_ = 0;  ///< stamp of the last one used
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

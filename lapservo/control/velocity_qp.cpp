@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using UpTo4 = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
@@ -103,4 +103,4 @@ QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4
   return solution;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// normal . x <= bound
 struct HalfSpace {
@@ -40,4 +40,4 @@ struct QpSolution {
 QpSolution solve_velocity_qp(const Eigen::Matrix4d& weight, const Eigen::Vector4d& wanted, const HalfSpaces& limits,
                              const Eigen::Vector4d& feasible_start);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

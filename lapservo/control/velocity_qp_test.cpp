@@ -8,7 +8,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 struct Problem {
@@ -130,4 +130,4 @@ TEST(VelocityQp, ReturnsTheWantedPointWhenItIsFeasible) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/control/tracking_law.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 TrackingGains exact_gains(const ControllerConfig& config) {
@@ -183,4 +183,4 @@ Eigen::Vector4d VisualController::slow_to_rate(const Eigen::Vector4d& velocity) 
   return times > 1 ? Eigen::Vector4d(velocity / times) : velocity;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

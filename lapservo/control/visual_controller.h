@@ -17,7 +17,7 @@
 #include "lapservo/control/trajectory.h"
 #include "lapservo/robot/joint_path.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The visual servo controller: joint readings, images and desired features in, joint velocities and setpoints out.
 /// One call a period; no allocation in it; every number that leaves is finite; setpoints never leave the joint limits
@@ -74,4 +74,4 @@ class VisualController {
   double usable_s_ = 0;                                 ///< when the last usable one arrived
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

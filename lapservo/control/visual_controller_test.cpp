@@ -10,7 +10,7 @@
 #include "lapservo/control/test_theatre.h"
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using testing::Flaws;
@@ -586,4 +586,4 @@ TEST(VisualController, SaysWhatIsWrongWithAConfiguration) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 inline constexpr double pi = std::numbers::pi;
 inline constexpr double two_pi = 2 * std::numbers::pi;
@@ -29,4 +29,4 @@ inline double wrap_two_pi(double angle_rad) {
   return wrapped >= two_pi ? 0.0 : wrapped;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 11;
@@ -50,4 +50,4 @@ TEST(Angles, DegreesAndRadiansAreInverse) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

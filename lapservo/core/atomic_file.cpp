@@ -5,7 +5,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace fs = std::filesystem;
 
 AtomicFile::AtomicFile(const fs::path& path)
@@ -29,4 +29,4 @@ void write_file(const fs::path& path, std::string_view text) {
   file.commit();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/output_target.h"
 #include "lapservo/core/temporary_file.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A file that appears whole or not at all: written under no or a temporary name, put in its place by commit(). Without
 /// commit() whatever stood at `path` before stays, and nothing else is left. What is no regular file is written into as
@@ -34,4 +34,4 @@ class AtomicFile {
 /// Writes the whole text in that way.
 void write_file(const std::filesystem::path& path, std::string_view text);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/input_file.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 std::string_view trimmed(std::string_view text) {
@@ -167,4 +167,4 @@ double CsvTable::number(std::size_t row, std::string_view column) const {
   return *value;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

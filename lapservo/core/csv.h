@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A comma-separated table with one header line, as all our files have; a row is a line, fields may stand in double
 /// quotes and then hold line ends. CRLF and a byte order mark are tolerated. Every row has as many fields as the
@@ -43,4 +43,4 @@ std::string csv_field(std::string_view text);
 /// The whole text as one finite number, or nullopt.
 std::optional<double> parse_finite(std::string_view text);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using testing::input_error;
 
@@ -139,4 +139,4 @@ TEST(ParseFinite, TakesTheWholeTextAsOneFiniteNumberOrNothing) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

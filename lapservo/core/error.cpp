@@ -33,9 +33,17 @@ std::string message(std::string_view source, std::string_view field, std::string
 
 InputError::InputError(std::string_view source, std::string_view field, std::string_view value,
                        std::string_view expected)
-    : std::runtime_error(printable(message(source, field, value, expected))) {}
+    : std::runtime_error(printable(message(source, field, value, expected))),
+      parts_(std::make_shared<const Parts>(
+          Parts{std::string(source), std::string(field), std::string(value), std::string(expected), ""})) {}
 
 InputError::InputError(std::string_view source, std::string_view problem)
-    : std::runtime_error(printable(std::string(source).append(": ").append(problem))) {}
+    : std::runtime_error(printable(std::string(source).append(": ").append(problem))),
+      parts_(std::make_shared<const Parts>(Parts{std::string(source), "", "", "", std::string(problem)})) {}
+
+InputError InputError::with_source(std::string_view source) const {
+  if (parts_->expectation.empty()) return {source, parts_->problem};
+  return {source, parts_->field, parts_->value, parts_->expectation};
+}
 
 }  // namespace lapservo

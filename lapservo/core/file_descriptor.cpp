@@ -3,7 +3,7 @@
 #include <cerrno>
 #include <unistd.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 FileDescriptor::~FileDescriptor() {
   if (is_open()) ::close(number_);
@@ -37,4 +37,4 @@ int DescriptorBuffer::sync() {
   return error_ == 0 ? 0 : -1;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

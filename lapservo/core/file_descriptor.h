@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// An open file of the operating system, closed with the object. Moves, does not copy.
 class FileDescriptor {
@@ -44,4 +44,4 @@ class DescriptorBuffer : public std::streambuf {
   std::vector<char> room_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <type_traits>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A vector of up to `Capacity` elements that lives where it is declared: what a frame's work gathers, without the
 /// heap. For plain elements, which need no destruction.
@@ -47,4 +47,4 @@ class InplaceVector {
   std::size_t size_ = 0;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

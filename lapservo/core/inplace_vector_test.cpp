@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 TEST(InplaceVector, HoldsWhatWasPushedInOrder) {
@@ -41,4 +41,4 @@ TEST(InplaceVector, CopiesShareNothing) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

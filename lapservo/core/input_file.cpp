@@ -10,7 +10,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int patience_ms = 5000;
@@ -78,4 +78,4 @@ std::string read_input(const std::filesystem::path& path, std::size_t largest_by
   return InputFile(path, largest_bytes, expected).read();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

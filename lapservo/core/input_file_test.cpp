@@ -12,7 +12,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -66,4 +66,4 @@ TEST(ReadInput, WaitsForAPipeButNotForEver) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

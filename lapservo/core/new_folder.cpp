@@ -9,7 +9,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -48,4 +48,4 @@ NewFolder::~NewFolder() {
   remove_empty(made_);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

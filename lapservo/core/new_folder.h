@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A folder to write into, made with its parents where it is missing. Those made here are removed again when they are
 /// empty in the end.
@@ -22,4 +22,4 @@ class NewFolder {
   std::vector<std::filesystem::path> made_;  // parents first
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 using testing::input_error;
@@ -46,4 +46,4 @@ TEST(NewFolder, ThatCanNotBeMadeLeavesNothing) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -130,4 +130,4 @@ void put_in_place(const OutputTarget& target, int descriptor, const fs::path& te
   sync_folder(target.folder());
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

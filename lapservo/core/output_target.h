@@ -7,7 +7,7 @@
 
 #include "lapservo/core/file_descriptor.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Where a result is to go, found out before the work. A regular file, there or not yet, is replaced as a whole when
 /// the result is complete; anything else that can be written (a FIFO, a terminal, /dev/null, /dev/stdout) is opened and
@@ -33,4 +33,4 @@ FileDescriptor open_stream(const OutputTarget& target);
 /// Throws InputError; what stood there then still does.
 void put_in_place(const OutputTarget& target, int descriptor, const std::filesystem::path& temporary);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 using testing::input_error;
@@ -71,4 +71,4 @@ TEST(OutputTarget, AFileThatMayNotBeWrittenIsNotReplaced) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

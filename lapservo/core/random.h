@@ -5,7 +5,7 @@
 
 #include "lapservo/core/angles.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Seeded random numbers, the same on every platform and standard library (unlike std::normal_distribution).
 /// Generator: splitmix64 (Steele, Lea, Flood 2014).
@@ -36,4 +36,4 @@ class Random {
   std::uint64_t state_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

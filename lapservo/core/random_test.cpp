@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 12;
@@ -77,4 +77,4 @@ TEST(Random, SuccessiveNormalsAreUncorrelated) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/temporary_file.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -103,4 +103,4 @@ void RowFile::commit() {
   part_.clear();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

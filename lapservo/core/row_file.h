@@ -6,7 +6,7 @@
 
 #include "lapservo/core/output_target.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A table of a long run, which may be killed: each row is written when it comes, to `PATH.part`, which commit() puts
 /// in the place of PATH. Without commit() it is removed, and what stood at PATH stays; but of a killed process, or of
@@ -38,4 +38,4 @@ class RowFile {
   bool begun_ = false;  ///< whether the header is written
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

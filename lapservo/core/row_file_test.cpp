@@ -12,7 +12,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 using testing::input_error;
@@ -125,4 +125,4 @@ TEST(RowFile, AStreamThatTakesNothingIsAnErrorAtOnce) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

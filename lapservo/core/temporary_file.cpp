@@ -10,7 +10,7 @@
 #include <system_error>
 #include <unistd.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -74,4 +74,4 @@ void TemporaryFile::commit() {
   path_.clear();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 
 #include "lapservo/core/output_target.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A file beside its target until it is complete. It has no name where the file system knows such files, so that
 /// nothing is left of a process that is killed. Else it is named `.lapservo-PID-N` with the target's extension, and
@@ -36,4 +36,4 @@ class TemporaryFile {
 /// Locks an open file or folder for as long as it is open. False when somebody else has it.
 bool lock(const FileDescriptor& file);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 using testing::TemporaryFolder;
@@ -64,4 +64,4 @@ TEST(TemporaryFile, WithoutANameIsNotSeen) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/experiments/statistics.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A row of the report for the results of each method (anything with a `method`), said by `text_of`.
 template <class Results, class TextOf>
@@ -25,4 +25,4 @@ inline std::string mean_and_deviation(const Spread& spread, const char* unit) {
   return fmt::format("{} \u00b1 {} {}", with_digits(spread.mean, 3), with_digits(spread.deviation, 2), unit);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

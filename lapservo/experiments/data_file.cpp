@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 Field::Field(double number) : text_(std::isfinite(number) ? fmt::format("{:.9g}", number) : "") {}
 
@@ -29,4 +29,4 @@ void DataFile::row(const std::vector<Field>& fields) {
   file_.stream() << '\n';
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

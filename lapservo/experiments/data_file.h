@@ -8,7 +8,7 @@
 
 #include "lapservo/core/atomic_file.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A field of a CSV: a word, a number (the empty field when absent or not finite), a count.
 class Field {
@@ -38,4 +38,4 @@ class DataFile {
   std::size_t columns_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

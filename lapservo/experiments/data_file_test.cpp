@@ -11,7 +11,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/time_series.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -62,4 +62,4 @@ TEST_F(InFolder, ARunComesBackAndIsPlotted) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -18,7 +18,7 @@
 #include "lapservo/experiments/tracking.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -244,4 +244,4 @@ TEST(Tracking, StoppedInItsSecondRunKeepsTheFirst) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 
 #include "lapservo/core/atomic_file.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr const char* page_css = R"(
@@ -237,4 +237,4 @@ void write_report(const std::filesystem::path& path, const Report& report) {
   write_file(path, html_from(report));
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

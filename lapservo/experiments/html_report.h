@@ -9,7 +9,7 @@
 
 #include "lapservo/experiments/svg_plot.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A figure of the paper's beside ours.
 struct Comparison {
@@ -64,4 +64,4 @@ std::string html_from(const Report& report);
 /// Appears whole or not at all. Throws InputError when it can't be written.
 void write_report(const std::filesystem::path& path, const Report& report);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/test_markup.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -139,4 +139,4 @@ TEST(HtmlReport, DoesNotBreakValues) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,9 +12,10 @@
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/io/overlay.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int light_count = static_cast<int>(IlluminationResult::lights.size());
@@ -266,4 +267,4 @@ ReportSection section_of(const IlluminationResult& result, const ExperimentSetup
   return section;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 #include "lapservo/experiments/statistics.h"
 #include "lapservo/vision/observation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The paper's section V-B: do the four points stay where they are when the lamps are turned down?
 struct IlluminationResult {
@@ -53,4 +53,4 @@ void write_data(const IlluminationResult& result, const std::filesystem::path& f
 
 ReportSection section_of(const IlluminationResult& result, const ExperimentSetup& setup);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 void in_parallel(int count, const std::function<std::function<void(int index)>()>& make_worker,
                  const KeepGoing& keep_going) {
@@ -40,4 +40,4 @@ void in_parallel(int count, const std::function<std::function<void(int index)>()
   if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Thrown when the user asked to stop.
 struct Interrupted {};
@@ -17,4 +17,4 @@ using KeepGoing = std::function<bool(int done, int total)>;
 void in_parallel(int count, const std::function<std::function<void(int index)>()>& make_worker,
                  const KeepGoing& keep_going);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

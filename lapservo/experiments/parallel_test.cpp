@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 const KeepGoing always = [](int, int) { return true; };
@@ -48,4 +48,4 @@ TEST(InParallel, PassesAnErrorOn) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

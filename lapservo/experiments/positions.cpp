@@ -8,7 +8,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/kinematics/visibility.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double nearest_m = 0.06, farthest_m = 0.13;
@@ -65,4 +65,4 @@ std::vector<RcmCoordinates> spread_positions(const Rig& rig, int count, Random& 
   return chosen;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

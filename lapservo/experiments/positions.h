@@ -6,7 +6,7 @@
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Whether the whole visible side of the marker lies in the image, 30 px or more from its border, and the shaft leans
 /// at most 20 degrees towards or away from the camera.
@@ -20,4 +20,4 @@ std::vector<RcmCoordinates> spread_positions(const Rig& rig, int count, Random& 
 /// Image of the middle of the marker on the centre line, raw pixels.
 Eigen::Vector2d marker_middle_px(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

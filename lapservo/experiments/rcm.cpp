@@ -10,11 +10,12 @@
 #include "lapservo/experiments/data_file.h"
 #include "lapservo/experiments/positions.h"
 #include "lapservo/experiments/stage.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Result = RcmResult;
@@ -341,4 +342,4 @@ ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) 
   return section;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/experiments/statistics.h"
 #include "lapservo/rcm/line_observation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The paper's section V-B, second half: the image of the RCM from where the shaft's centre lines meet, against the
 /// truth, with the RCM in view; ideal pixels. The paper has one set of 20 positions; here there are ten.
@@ -72,4 +72,4 @@ std::vector<RcmResult::Intersection> intersections_of(const std::vector<RcmResul
 /// Sums up estimates that are there.
 RcmResult::Estimates summed_up(std::vector<RcmResult::Estimate> estimates);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/experiments/stage.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Result = RotationResult;
@@ -312,4 +312,4 @@ ReportSection section_of(const RotationResult& result, const ExperimentSetup& se
   return section;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/experiments/setup.h"
 #include "lapservo/experiments/statistics.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The paper's section V-C: ten trials, each a pure rotation by a full turn from its own initial rotation. The paper
 /// has one set of ten; here there are three, each with positions, a background and noise of its own.
@@ -60,4 +60,4 @@ Pooled pooled(std::span<const double> means, std::span<const double> deviations)
 /// Sums up samples that are there.
 RotationResult::OfMethod summed_up(Method method, std::vector<RotationResult::Sample> samples);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -2,7 +2,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 Rig single_instrument(Rig rig, const std::string& source) {
   if (rig.instruments.empty()) throw InputError(source, "has no instruments, expected one");
@@ -30,4 +30,4 @@ int method_color(Method method) {
   return method == Method::centerline ? 1 : 0;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// What every experiment is given.
 struct ExperimentSetup {
@@ -36,4 +36,4 @@ std::string method_word(Method method);
 /// The colour of a method's series in every plot.
 int method_color(Method method);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

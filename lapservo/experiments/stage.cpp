@@ -3,7 +3,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/sim/shaft_lighting.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 Stage::Stage(const Rig& rig, cv::Mat tissue) : rig_(rig), tissue_(std::move(tissue)) {}
 
@@ -38,4 +38,4 @@ std::uint64_t frame_seed(std::uint64_t experiment_seed, int frame) {
   return random.bits() + static_cast<std::uint64_t>(frame);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 #include "lapservo/sim/renderer.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The built-in simulator for one thread: the first instrument of a rig before seeded tissue, with the usual sensor.
 /// The camera's exposure stays as it is; the lamps beside it can be turned down.
@@ -47,4 +47,4 @@ class Eyes {
 /// The seed of a frame's noise: differs for every frame of every experiment.
 std::uint64_t frame_seed(std::uint64_t experiment_seed, int frame);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 Spread spread_of(std::vector<double> values) {
   Spread spread;
@@ -54,4 +54,4 @@ std::vector<double> distances_to_centroid(const std::vector<Eigen::Vector2d>& po
   return distances;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

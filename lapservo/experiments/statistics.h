@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Of a list of numbers: all zero when it is empty.
 struct Spread {
@@ -30,4 +30,4 @@ std::string with_digits(double value, int digits);
 /// Distance of each point to the centroid of all.
 std::vector<double> distances_to_centroid(const std::vector<Eigen::Vector2d>& points);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

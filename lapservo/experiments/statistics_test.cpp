@@ -6,7 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 72;
@@ -78,4 +78,4 @@ TEST(WithDigits, NeverHasAnExponent) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 
 #include "lapservo/experiments/statistics.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double width_px = 480, height_px = 320, font_px = 14, character_px = 7.9;
@@ -539,4 +539,4 @@ std::string plot_css() {
   return css;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

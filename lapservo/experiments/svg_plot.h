@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// How a series is drawn. Its colour and the shape of its points follow from `Series::color`. `boxes`: the points of
 /// equal x as one box from quartile to quartile with its median; whiskers to the farthest point within 1.5 times the
@@ -72,4 +72,4 @@ Series thinned(const Series& series, int columns);
 /// Text for HTML and SVG, in elements and in quoted attributes.
 std::string escaped(const std::string& text);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

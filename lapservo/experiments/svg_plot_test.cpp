@@ -10,7 +10,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/experiments/test_markup.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 71;
@@ -210,4 +210,4 @@ TEST(Svg, LimitsLeaveOutliersOutAndCountThem) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

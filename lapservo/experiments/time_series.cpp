@@ -4,7 +4,7 @@
 
 #include "lapservo/experiments/data_file.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 const TimeTable::Column& TimeTable::column(const std::string& name) const {
   for (const Column& candidate : columns)
@@ -44,4 +44,4 @@ Plot time_plot(std::string title, std::string label, std::string unit, std::vect
           false};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 
 #include "lapservo/experiments/svg_plot.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A run: what was recorded at each instant.
 struct TimeTable {
@@ -32,4 +32,4 @@ Series over_time(const TimeTable& table, const std::string& column, std::string 
 /// Lines over time: the x axis is "time [s]".
 Plot time_plot(std::string title, std::string label, std::string unit, std::vector<Series> series);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

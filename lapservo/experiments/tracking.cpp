@@ -23,7 +23,7 @@
 #include "lapservo/sim/simulator.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = tracking_period_s, window_margin_px = 20;
@@ -248,4 +248,4 @@ void write_data(const TrackingResult& result, const std::filesystem::path& folde
   for (const TrackingRun& run : result.runs) write_data(run.table, folder / ("tracking_" + run.scenario.id + ".csv"));
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/experiments/setup.h"
 #include "lapservo/experiments/time_series.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// One run of the closed loop in the simulator.
 struct TrackingScenario {
@@ -60,4 +60,4 @@ void write_data(const TrackingResult& result, const std::filesystem::path& folde
 
 ReportSection section_of(const TrackingResult& result, const ExperimentSetup& setup);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

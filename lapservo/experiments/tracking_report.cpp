@@ -11,7 +11,7 @@
 #include "lapservo/experiments/tracking.h"
 #include "lapservo/sim/simulator.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 struct FeatureName {
@@ -231,4 +231,4 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
   return section;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

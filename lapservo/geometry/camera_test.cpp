@@ -11,7 +11,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 21;
@@ -146,4 +146,4 @@ TEST(Camera, ContainsTheCentresOfItsPixels) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 std::optional<CylinderView> view_cylinder(const Rigid3& camera_from_cylinder, double radius_m) {
   const Eigen::Vector3d camera_in_cylinder = camera_from_cylinder.inverse().translation;
@@ -12,4 +12,4 @@ std::optional<CylinderView> view_cylinder(const Rigid3& camera_from_cylinder, do
                       distance_m};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

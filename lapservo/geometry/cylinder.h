@@ -7,7 +7,7 @@
 
 #include "lapservo/geometry/rigid3.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A circular cylinder as the camera sees it. Its own frame has z along the axis (distal); azimuths are measured in
 /// it from x, right-handed about z.
@@ -25,4 +25,4 @@ inline Eigen::Vector3d surface_point(double radius_m, double azimuth_rad, double
   return {radius_m * std::cos(azimuth_rad), radius_m * std::sin(azimuth_rad), along_m};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 22;
@@ -100,4 +100,4 @@ TEST(Rigid3, InverseAndProductFormAGroup) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 std::vector<Response> responses() {
@@ -67,4 +67,4 @@ TEST(Response, TheTableHoldsTheLightOfEachValue) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

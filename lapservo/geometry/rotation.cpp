@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   constexpr double nearly_opposite = -1 + 1e-12;
@@ -21,4 +21,4 @@ Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Ve
   return rotation.normalized();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

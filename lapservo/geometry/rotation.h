@@ -2,11 +2,11 @@
 
 #include <Eigen/Geometry>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The shortest rotation that takes the direction `from` to that of `to`, neither zero; of opposite directions one of
 /// many. Eigen's FromTwoVectors is a template around a singular value decomposition: each file that calls it compiles
 /// one, for a minute under sanitizers.
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 31;
@@ -38,4 +38,4 @@ TEST(RotationBetween, OfEqualDirectionsIsNoneAndOfOppositeOnesHalfATurn) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

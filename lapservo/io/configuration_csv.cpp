@@ -6,7 +6,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 std::size_t index_of(const std::string& name, const Rig& rig, const std::string& source) {
@@ -43,4 +43,4 @@ std::vector<Configurations> read_configurations(const std::filesystem::path& pat
   return configurations_from(CsvTable::read(path), rig, path.string());
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

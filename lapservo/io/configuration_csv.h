@@ -7,7 +7,7 @@
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Where every instrument of a rig is in one frame, in the rig's order.
 using Configurations = std::vector<RcmCoordinates>;
@@ -19,4 +19,4 @@ using Configurations = std::vector<RcmCoordinates>;
 std::vector<Configurations> configurations_from(const CsvTable& table, const Rig& rig, const std::string& source);
 std::vector<Configurations> read_configurations(const std::filesystem::path& path, const Rig& rig);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

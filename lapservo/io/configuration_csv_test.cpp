@@ -4,7 +4,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 Rig two_instruments() {
@@ -45,4 +45,4 @@ TEST(ConfigurationCsv, RefusesWhatWouldLeaveAnInstrumentNowhere) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

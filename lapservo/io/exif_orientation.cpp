@@ -4,7 +4,7 @@
 #include <cstring>
 #include <string_view>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using Bytes = std::span<const std::uint8_t>;
 
@@ -84,4 +84,4 @@ std::optional<int> exif_orientation(Bytes picture) {
   return of_tiff(picture);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -4,10 +4,10 @@
 #include <optional>
 #include <span>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The orientation (1 upright, 2 to 8 turned or mirrored) that a JPEG, PNG, TIFF or WebP asks its viewers for, by EXIF
 /// or TIFF tag 0x0112; nullopt where it says nothing that can be understood.
 std::optional<int> exif_orientation(std::span<const std::uint8_t> picture);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

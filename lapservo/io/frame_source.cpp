@@ -14,6 +14,7 @@
 #include "lapservo/io/video_reader.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

@@ -17,7 +17,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -125,4 +125,4 @@ TEST(OpenFrameSource, NamesWhatCanNotBeRead) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,13 +11,16 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/input_file.h"
 #include "lapservo/io/exif_orientation.h"
+#include "lapservo/io/image_encoding.h"
 #include "lapservo/io/jpeg_picture.h"
 #include "lapservo/io/png_picture.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
@@ -89,15 +92,6 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
       throw InputError(source, "is a truncated JPEG, expected a whole picture");
     check_size(jpeg_size(bytes), source);
   }
-}
-
-std::vector<std::uint8_t> encode_image(const fs::path& name, const cv::Mat& image) {
-  std::vector<std::uint8_t> bytes;
-  try {
-    if (has_image_extension(name) && cv::imencode(name.extension().string(), image, bytes)) return bytes;
-  } catch (const cv::Exception&) {
-  }
-  throw InputError(name.string(), "can't be written as a picture");
 }
 
 DecodedPicture decode(std::span<const std::uint8_t> bytes) {
@@ -196,13 +190,7 @@ cv::Mat read_image(const fs::path& path) {
 
 void write_image(const fs::path& path, const cv::Mat& image) {
   AtomicFile file(path);
-  write_image(file, path, image);
-}
-
-void write_image(AtomicFile& file, const fs::path& name, const cv::Mat& image) {
-  const auto bytes = encode_image(name, image);
-  file.stream().write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  file.commit();
+  write_open_image(file, path, image);
 }
 
 }  // namespace lapservo

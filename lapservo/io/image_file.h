@@ -8,7 +8,6 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/core/atomic_file.h"
 #include "lapservo/vision/observation.h"
 
 namespace lapservo {
@@ -43,7 +42,4 @@ cv::Mat bgr8_from(const cv::Mat& image, const std::string& source);
 
 /// Writes whole or not at all: see AtomicFile. Throws InputError when that fails.
 void write_image(const std::filesystem::path& path, const cv::Mat& image);
-/// The same into a file that is open already; `name` says the format by its ending.
-void write_image(AtomicFile& file, const std::filesystem::path& name, const cv::Mat& image);
-
 }  // namespace lapservo

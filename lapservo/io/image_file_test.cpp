@@ -16,7 +16,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using Bytes = std::vector<std::uint8_t>;
 using testing::input_error;
@@ -257,4 +257,4 @@ TEST(HasImageExtension, GoesByTheNamesEndInAnyCase) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <jpeglib.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int most_scans = 64;  // of a progressive picture; some files have thousands, to take minutes
@@ -80,4 +80,4 @@ DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes) {
   return picture;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

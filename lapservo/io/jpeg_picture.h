@@ -6,7 +6,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// What a decoder made of a file: a picture in 8-bit BGR (empty when not even its header could be read), and the first
 /// thing it complained of (empty: nothing).
@@ -18,4 +18,4 @@ struct DecodedPicture {
 /// By libjpeg, whose warnings OpenCV swallows.
 DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 
 #include "lapservo/core/csv.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 void append(std::string& row, std::optional<double> value, int decimals) {
@@ -62,4 +62,4 @@ void ObservationCsv::add(int frame, double time_s, const std::string& file, cons
   file_.add(observation_csv_row(frame, time_s, file, instrument, observation));
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 #include "lapservo/core/row_file.h"
 #include "lapservo/vision/observation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The header line of an observation CSV (docs/conventions.md, "lapservo track"), without the line's end.
 extern const char* const observation_csv_header;
@@ -29,4 +29,4 @@ class ObservationCsv {
   RowFile file_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -18,7 +18,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 59;
@@ -179,4 +179,4 @@ TEST(ObservationCsv, SaysAtOnceThatItCanNotBeWritten) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,9 +10,11 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/features.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 const cv::Scalar white(255, 255, 255), dark(20, 20, 20), outline_color(255, 255, 255), boundary_color(40, 220, 255),

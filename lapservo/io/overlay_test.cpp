@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using What = Observation::Refused::What;
@@ -79,4 +80,4 @@ TEST(Overlay, DrawsWhatWasRefused) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,17 +5,18 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/new_folder.h"
+#include "lapservo/io/image_encoding.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/video_writer.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
 class PictureOverlay : public OverlayWriter {
  public:
   explicit PictureOverlay(const fs::path& path) : path_(path), file_(path) {}
-  void add(const Frame&, const cv::Mat& overlay) override { write_image(file_, path_, overlay); }
+  void add(const Frame&, const cv::Mat& overlay) override { write_open_image(file_, path_, overlay); }
   void commit() override {}
 
  private:
@@ -61,4 +62,4 @@ std::unique_ptr<OverlayWriter> open_overlay_writer(const fs::path& path, const F
   return std::make_unique<VideoOverlay>(path, source.frames_per_second());
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

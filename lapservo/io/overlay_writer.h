@@ -7,7 +7,7 @@
 
 #include "lapservo/io/frame_source.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Where `--overlay PATH` goes: a picture for a picture (when PATH ends like one), a folder of pictures for pictures, a
 /// video for videos and cameras. Pictures appear whole, one by one; a video when committed.
@@ -21,4 +21,4 @@ class OverlayWriter {
 /// Throws InputError at once when PATH can't be written.
 std::unique_ptr<OverlayWriter> open_overlay_writer(const std::filesystem::path& path, const FrameSource& source);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 struct Source {
@@ -81,4 +81,4 @@ DecodedPicture decode_png(std::span<const std::uint8_t> bytes) {
   return picture;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,10 +5,10 @@
 
 #include "lapservo/io/jpeg_picture.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// By libpng, every checksum compared: grey repeated over the channels, palettes looked up, alpha dropped, 16 bits
 /// rounded to 8.
 DecodedPicture decode_png(std::span<const std::uint8_t> bytes);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -16,7 +16,7 @@ extern "C" {
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using Clock = std::chrono::steady_clock;
 
@@ -194,4 +194,4 @@ std::string VideoReader::complaint() const {
   return state_->complaint();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The frames of a video file, by FFmpeg's libraries: OpenCV hides what their decoders complain of.
 class VideoReader {
@@ -37,4 +37,4 @@ class VideoReader {
   std::unique_ptr<State> state_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

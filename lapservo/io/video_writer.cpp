@@ -7,7 +7,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -59,4 +59,4 @@ void VideoWriter::commit() {
   temporary_->commit();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -13,7 +13,7 @@ namespace cv {
 class VideoWriter;
 }
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A video that appears whole or not at all; its kind goes by the name's ending (.mp4, .avi, .mkv). It must be a
 /// regular file, as an index is written in the end. See OutputTarget.
@@ -39,4 +39,4 @@ class VideoWriter {
   int frames_ = 0;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

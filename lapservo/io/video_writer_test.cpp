@@ -11,7 +11,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 using testing::input_error;
@@ -89,4 +89,4 @@ TEST(VideoWriter, RefusesWhatCanNotHoldOne) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,8 +6,9 @@
 #include <Eigen/Geometry>
 
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/centre_line.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double smallest_px = 1e-6;  // lengths below it give no direction
@@ -115,4 +116,4 @@ FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q) {
   return {Undefined::none, point};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,11 +8,10 @@
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/rigid3.h"
-#include "lapservo/kinematics/features.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/marker/marker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// All that decides how one instrument's configuration appears in the image.
 struct ImageModel {
@@ -59,4 +58,4 @@ struct FeatureMapResult {
 /// Jacobian is the one-sided derivative of the side that wrap_two_pi puts tau on (tau = 0: the upper edge).
 FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

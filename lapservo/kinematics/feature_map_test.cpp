@@ -6,9 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/test_models.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double step_by_joint[4] = {1e-6, 1e-6, 1e-7, 1e-6};
@@ -159,4 +160,4 @@ TEST(FeatureMap, SaysWhyItIsUndefined) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,6 +7,7 @@
 #include "lapservo/kinematics/feature_map.h"
 
 namespace lapservo::testing {
+using namespace internal;
 
 /// Rigs that differ in camera, marker and where the RCM lies: outside the image, inside it, and behind the camera.
 /// The first is configs/paper.yaml.

@@ -4,7 +4,7 @@
 
 #include "lapservo/geometry/cylinder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 bool marker_in_view(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled,
                     const ViewLimits& limits) {
@@ -24,4 +24,4 @@ bool marker_in_view(const Camera& camera, const Marker& marker, const Rigid3& ca
   return true;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

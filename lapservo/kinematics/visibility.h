@@ -4,7 +4,7 @@
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/marker/marker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 struct ViewLimits {
   double steepest_rad;  ///< how far the shaft may lean towards or away from the camera
@@ -15,4 +15,4 @@ struct ViewLimits {
 bool marker_in_view(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled,
                     const ViewLimits& limits);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/kinematics/test_models.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double any_steepness_rad = 1.57;
@@ -99,4 +99,4 @@ TEST(Visibility, IsNotMistakenWhereTheLensFoldsBack) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double points_per_mm = 72 / 25.4, png_px_per_mm = 8;
@@ -108,4 +108,4 @@ void Canvas::finish() {
   file_.commit();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/marker/drawing.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 struct PointMm {
   double x, y;
@@ -40,4 +40,4 @@ class Canvas {
   bool png_ = false;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 
 #include "lapservo/core/angles.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // With t = tau / 2 pi: l_i = upper_i + t slope_i, and r - 1 = l1 l3 / (l2 L).
@@ -97,4 +97,4 @@ double CrossRatioDecoder::tau_rad(double cross_ratio) const {
   return two_pi * std::clamp(t, 0.0, 1.0);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -4,7 +4,7 @@
 
 #include "lapservo/marker/marker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// tau from a cross-ratio (eq. 18). For the linear family (l1 : l2 constant) the map is linear and exact; for every
 /// other design r - 1 = l1 l3 / (l2 L) is a ratio of polynomials in tau, inverted in closed form.
@@ -27,4 +27,4 @@ class CrossRatioDecoder {
 /// Empty when the cross-ratio runs strictly monotonically over tau; else why and where it does not.
 std::string decoding_problem(const Marker& marker);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

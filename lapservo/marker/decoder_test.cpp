@@ -19,7 +19,7 @@
 #include "lapservo/marker/marker.h"
 #include "lapservo/testing/markers.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using testing::marker_with;
 using testing::random_linear_marker;
@@ -256,4 +256,4 @@ TEST(SameColourOrder, CyclicOrdersDifferAndSmallShadesDoNot) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

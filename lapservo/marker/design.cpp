@@ -12,7 +12,7 @@
 #include "lapservo/marker/decoder.h"
 #include "lapservo/marker/length_code.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double rounding_m = 1e-4;
@@ -120,4 +120,4 @@ Marker design_marker(const DesignSpec& spec) {
   return *marker;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

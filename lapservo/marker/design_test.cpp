@@ -16,7 +16,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/markers.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using testing::marker_with;
 
@@ -140,4 +140,4 @@ TEST(InLinearFamily, MeansThatTheCrossRatioRunsStraight) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

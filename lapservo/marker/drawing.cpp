@@ -10,7 +10,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/marker/canvas.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Anchor = Canvas::Anchor;
@@ -195,4 +195,4 @@ void write_marker_picture(const std::filesystem::path& path, const std::string& 
   canvas.finish();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -32,7 +32,7 @@ extern "C" const char* __lsan_default_suppressions() {  // NOLINT(bugprone-reser
   return "leak:libfontconfig\n";
 }
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -372,4 +372,4 @@ TEST(PrintColor, HasTheHueAndIsPrintable) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

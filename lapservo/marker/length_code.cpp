@@ -9,7 +9,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/marker/decoder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double least_change = 1e-6;  // of the marker's length: less is rounding
@@ -72,4 +72,4 @@ CodeErrors perspective_errors(const Marker& marker, std::size_t band, double tau
   return errors;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 #include "lapservo/marker/marker.h"
 #include "lapservo/marker/sensitivity.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// tau from the length of one band along the shaft (eq. 16). Exact for every band whose edges slope, but the length
 /// must be known in metres, and an image tells lengths only as well as depth and inclination are known. The
@@ -47,4 +47,4 @@ struct CodeErrors {
 CodeErrors perspective_errors(const Marker& marker, std::size_t band, double tau_rad, const Viewing& viewing,
                               const Misjudged& misjudged);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

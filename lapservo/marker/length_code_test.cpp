@@ -12,7 +12,7 @@
 #include "lapservo/marker/decoder.h"
 #include "lapservo/testing/markers.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using testing::marker_with;
 
@@ -115,4 +115,4 @@ TEST(PerspectiveErrors, HaveNoCrossRatioWhereItTurnsBack) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

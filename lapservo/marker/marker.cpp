@@ -8,6 +8,7 @@
 #include "lapservo/core/angles.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 constexpr double smallest_diameter_m = 0.5e-3, largest_diameter_m = 0.1;

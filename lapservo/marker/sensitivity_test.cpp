@@ -15,7 +15,7 @@
 #include "lapservo/marker/marker.h"
 #include "lapservo/testing/markers.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using testing::marker_with;
 
@@ -136,4 +136,4 @@ TEST(PredictedSigma, OfTheSurfaceIsManyTimesBetterThanTheCentreLine) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/rcm/projected_rcm.h"
 #include "lapservo/rcm/test_lines.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 91;
@@ -61,4 +61,4 @@ TEST(DistinctLines, OfManyNoMoreThanAskedForInLinearTime) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/rcm/test_lines.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 TEST(LineObservation, LinesThroughAPointMeetThere) {
@@ -58,4 +58,4 @@ TEST(LineObservation, FacingGeneratrixPassesThroughTheImageOfTheAxis) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 struct Sum {
@@ -49,4 +49,4 @@ std::optional<PairwiseMean> mean_of_intersections(std::span<const LineObservatio
   return PairwiseMean{total.points_px / total.count, jackknife(total, by_line), static_cast<std::size_t>(total.count)};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

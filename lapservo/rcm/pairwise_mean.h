@@ -8,7 +8,7 @@
 
 #include "lapservo/rcm/line_observation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 struct PairwiseMean {
   Eigen::Vector2d point_px = Eigen::Vector2d::Zero();
@@ -23,4 +23,4 @@ struct PairwiseMean {
 /// estimate_projected_rcm(). nullopt when no two usable lines meet. Takes time with the square of the lines.
 std::optional<PairwiseMean> mean_of_intersections(std::span<const LineObservation> lines);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

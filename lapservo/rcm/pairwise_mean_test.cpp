@@ -4,7 +4,7 @@
 
 #include "lapservo/rcm/test_lines.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 TEST(PairwiseMean, IsExactWithoutNoise) {
@@ -56,4 +56,4 @@ TEST(PairwiseMean, NeedsTwoLinesThatMeet) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

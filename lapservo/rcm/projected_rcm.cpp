@@ -11,7 +11,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t fewest_for_outliers = 6;
@@ -251,4 +251,4 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
   return estimate;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/test_lines.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Lines = std::vector<LineObservation>;
@@ -262,4 +262,4 @@ TEST(ProjectedRcm, SaysWhyThereIsNone) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

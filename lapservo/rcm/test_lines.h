@@ -10,6 +10,7 @@
 #include "lapservo/rcm/line_observation.h"
 
 namespace lapservo::testing {
+using namespace internal;
 
 /// Lines through a point, seen over a stretch of 200 to 500 px that begins 300 to 900 px from it, within a fan.
 inline std::vector<LineObservation> fan_of_lines(const Eigen::Vector2d& through_px, std::size_t count, double fan_rad,

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::string_view sigma_prefix = "sigma_";
@@ -77,4 +77,4 @@ void expect_keys(const YamlField& map, const KnownKeys& known) {
   }
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

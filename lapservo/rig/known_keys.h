@@ -5,7 +5,7 @@
 
 #include "lapservo/rig/yaml_field.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The keys that a map may have.
 struct KnownKeys {
@@ -19,4 +19,4 @@ struct KnownKeys {
 /// missing or no map, nothing is said: who reads its fields will.
 void expect_keys(const YamlField& map, const KnownKeys& known);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

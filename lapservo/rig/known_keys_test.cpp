@@ -6,7 +6,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 const KnownKeys known{{"name"}, {"seam_rad", "hues_deg"}};
@@ -47,4 +47,4 @@ TEST(KnownKeys, RefusesWhatHidesSomething) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/rig/known_keys.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 std::vector<double> rising_from_0_to_1(const YamlField& field) {
@@ -46,4 +46,4 @@ Response parse_response(const YamlField& field) {
   return {Response::Kind::power, *gamma};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

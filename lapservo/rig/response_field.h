@@ -3,10 +3,10 @@
 #include "lapservo/geometry/response.h"
 #include "lapservo/rig/yaml_field.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A camera's `response` (docs/conventions.md, "rig.yaml"): srgb, rec709, linear, gamma:VALUE or a table; srgb when it
 /// is missing.
 Response parse_response(const YamlField& field);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

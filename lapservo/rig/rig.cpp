@@ -14,6 +14,7 @@
 #include "lapservo/rig/yaml_field.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 

@@ -6,7 +6,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 std::string refusal(const std::string& yaml) {
@@ -23,4 +23,4 @@ TEST(RigRobustness, AnEndlessCameraFileIsRefused) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -15,7 +15,7 @@
 #include "lapservo/testing/sample_frames.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 using testing::input_error;
@@ -509,4 +509,4 @@ TEST(LoadRig, TakesTheExamplesThatWeShip) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // {} writes the shortest text that reads back as the same number.
@@ -83,4 +83,4 @@ std::string rig_yaml(const Rig& rig) {
   return text;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -4,9 +4,9 @@
 
 #include "lapservo/rig/rig.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The rig as YAML that parse_rig() reads back to the last bit, its camera included, whatever files it came from.
 std::string rig_yaml(const Rig& rig);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr auto markers = R"(instruments:
@@ -107,4 +107,4 @@ TEST(RigWriter, ARigWhoseCameraHasAFileStandsOnItsOwn) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

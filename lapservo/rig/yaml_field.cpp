@@ -10,7 +10,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/input_file.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -143,4 +143,4 @@ double YamlField::number_between(double low, double high, std::string_view expec
   return value;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -14,7 +14,7 @@ namespace YAML {
 class Node;
 }
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A value in a YAML file, or the place where one is missing. It knows where it stands, so every complaint is an
 /// InputError that names file, field, value and what was expected.
@@ -65,4 +65,4 @@ class YamlField {
   std::shared_ptr<const YAML::Node> node_;  // behind a pointer, so that who includes this needs no yaml-cpp
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

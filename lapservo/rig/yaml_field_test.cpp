@@ -8,7 +8,7 @@
 
 #include "lapservo/testing/input_error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 using testing::input_error;
 
@@ -55,4 +55,4 @@ TEST(YamlField, NamesTheKindOfFileThatWasExpected) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

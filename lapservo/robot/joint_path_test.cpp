@@ -4,7 +4,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = 1.0 / 60;
@@ -73,4 +73,4 @@ TEST(JointPath, BrakesWhenTheControllerIsLate) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

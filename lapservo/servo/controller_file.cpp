@@ -10,6 +10,7 @@
 #include "lapservo/rig/yaml_field.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 Eigen::Vector4d four(const YamlField& field) {

@@ -8,7 +8,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 ControllerConfig unusual() {
@@ -90,4 +90,4 @@ TEST(ControllerFile, RefusesWhatIsTooLargeOrNestsTooDeeply) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Watches the errors s_rad, r_px, l_px, d_px of a run: converged when all are within 5 mrad and 1 px for a second.
 class Convergence {
@@ -34,4 +34,4 @@ class Convergence {
   long count_ = 0;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = 0.1;
@@ -36,4 +36,4 @@ TEST(Convergence, CountsWhatComesAfter) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,6 +5,7 @@
 #include "lapservo/kinematics/feature_map.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 // Of features whose fit had no configuration to carry its covariance over: s_rad, r_px, l_px, d_px.

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/feature_model.h"
-#include "lapservo/control/offset_observer.h"
+#include "lapservo/control/image_measurement.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/observation.h"
 

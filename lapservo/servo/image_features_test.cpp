@@ -3,12 +3,12 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/servo/image_window.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 const Eigen::Vector4d somewhere(0.05, 1.57, 0.064, 1.2);
@@ -101,4 +101,4 @@ TEST(ImageFeatures, TheWindowLiesInThePicture) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -3,7 +3,7 @@
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/servo.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 std::optional<ReplayDifference> replay(const std::vector<LoggedTick>& log, const Rig& rig,
                                        const ControllerConfig& controller) {
@@ -17,4 +17,4 @@ std::optional<ReplayDifference> replay(const std::vector<LoggedTick>& log, const
   return std::nullopt;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

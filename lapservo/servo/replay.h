@@ -9,7 +9,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/servo/servo_log.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Puts a log's inputs through a servo of the same configuration again. The first tick whose decision differs in any
 /// bit, or nullopt.
@@ -20,4 +20,4 @@ struct ReplayDifference {
 std::optional<ReplayDifference> replay(const std::vector<LoggedTick>& log, const Rig& rig,
                                        const ControllerConfig& controller);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

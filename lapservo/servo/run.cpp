@@ -6,8 +6,10 @@
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/servo.h"
+#include "lapservo/servo/track_images.h"
 
 namespace lapservo {
+using namespace internal;
 
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer) {

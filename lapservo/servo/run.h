@@ -12,6 +12,7 @@
 #include "lapservo/servo/servo_decision.h"
 #include "lapservo/servo/tracked_image.h"
 #include "lapservo/stream/image_stream.h"
+#include "lapservo/vision/tracker.h"
 
 namespace lapservo {
 

@@ -1,6 +1,9 @@
 #include "lapservo/servo/run.h"
 
 #include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <mutex>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -9,6 +12,7 @@
 #include "lapservo/control/random_start.h"
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/control/trajectory_check.h"
+#include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
@@ -19,7 +23,7 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // The trajectory as the half-size camera sees it.
@@ -35,6 +39,7 @@ struct Case {
   double latency_s = 0.08, duration_s = 8;
   std::optional<Interval> hidden, faulted;
   ControlMode mode = ControlMode::fused;
+  TrackingThread thread = TrackingThread::callers;
 };
 
 struct Record {
@@ -57,6 +62,7 @@ RunConfig config_of(const Rig& rig, const Case& c) {
   config.rig = rig;
   config.controller.mode = c.mode;
   config.controller.window = image_window(rig.camera, 10);
+  config.tracking_thread = c.thread;
   return config;
 }
 
@@ -83,6 +89,48 @@ class Watcher : public RunObserver {
   Simulator& simulator_;
 };
 
+// So long a wait means that something hangs.
+constexpr std::chrono::seconds hangs(60);
+
+// The simulator for a tracker with a thread of its own. Simulated time waits until all that arrived has been tracked,
+// so that the run does not depend on how fast the computer is.
+class InStep : public Robot, public ImageStream, public Clock {
+ public:
+  explicit InStep(Simulator& simulator) : simulator_(simulator) {}
+
+  JointState state() override {
+    const std::lock_guard lock(mutex_);
+    return simulator_.state();
+  }
+  void send(const JointPath& path) override {
+    const std::lock_guard lock(mutex_);
+    simulator_.send(path);
+  }
+  std::optional<StampedImage> newest() override {
+    const std::lock_guard lock(mutex_);
+    auto image = simulator_.newest();
+    vision_is_idle_ = !image;  // whoever asks for the next image has told of the one before
+    changed_.notify_all();
+    return image;
+  }
+  double now_s() const override {
+    const std::lock_guard lock(mutex_);
+    return simulator_.now_s();
+  }
+  void sleep_until(double time_s) override {
+    std::unique_lock lock(mutex_);
+    simulator_.sleep_until(time_s);
+    vision_is_idle_ = false;
+    EXPECT_TRUE(changed_.wait_for(lock, hangs, [this] { return vision_is_idle_; }));
+  }
+
+ private:
+  Simulator& simulator_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  bool vision_is_idle_ = false;
+};
+
 PastRun run_case(const Case& c) {
   const Rig rig = testing::small_test_rig();
   const RunConfig config = config_of(rig, c);
@@ -96,7 +144,12 @@ PastRun run_case(const Case& c) {
                                    simulated.arm.joint_offset, random, "trajectory"));
   if (c.hidden) simulator.cover_marker(*c.hidden);
   Watcher watcher(c, rig, simulator);
-  run(simulator, simulator, simulator, config, trajectory, c.duration_s, watcher);
+  if (c.thread == TrackingThread::own) {
+    InStep in_step(simulator);
+    run(in_step, in_step, in_step, config, trajectory, c.duration_s, watcher);
+  } else {
+    run(simulator, simulator, simulator, config, trajectory, c.duration_s, watcher);
+  }
   return std::move(watcher.done);
 }
 
@@ -200,6 +253,111 @@ TEST(Run, RepeatsAndReplaysBitForBit) {
   }
 }
 
+// Only where the tracking is done differs.
+TEST(Run, ConvergesAsWellWhenItTracksInItsOwnThread) {
+  Case c;
+  c.duration_s = 4;
+  const PastRun callers = run_case(c);
+  c.thread = TrackingThread::own;
+  const PastRun own = run_case(c);
+  ASSERT_EQ(own.records.size(), callers.records.size());
+  for (std::size_t i = 0; i < own.records.size(); ++i)
+    ASSERT_EQ(decision_fields(own.records[i].decision), decision_fields(callers.records[i].decision)) << i;
+  const Eigen::Vector4d last = own.error(own.records.size() - 1).cwiseAbs();
+  EXPECT_LT(last[0], 5e-3);
+  EXPECT_LT(last.tail<3>().maxCoeff(), 1);
+}
+
+// Vision that is at its first image until somebody ends it.
+class EndlessVision : public ImageStream {
+ public:
+  std::optional<StampedImage> newest() override {
+    std::unique_lock lock(mutex_);
+    begun_ = true;
+    changed_.notify_all();
+    if (!changed_.wait_for(lock, hangs / 6, [this] { return ended_; })) gave_up_ = true;
+    return std::nullopt;
+  }
+  void wait_until_begun() {
+    std::unique_lock lock(mutex_);
+    EXPECT_TRUE(changed_.wait_for(lock, hangs, [this] { return begun_; }));
+  }
+  void end() {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+    changed_.notify_all();
+  }
+  bool gave_up() const { return gave_up_; }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool begun_ = false, ended_ = false, gave_up_ = false;
+};
+
+// Ends vision with the last of its ticks.
+class TicksDuringVision : public RunObserver {
+ public:
+  TicksDuringVision(EndlessVision& vision, int ticks) : vision_(vision), ticks_(ticks) {}
+  bool on_tick(const ControlTick& tick) override {
+    vision_.wait_until_begun();
+    sent += tick.decision.send;
+    if (++done == ticks_) vision_.end();
+    return true;
+  }
+  int done = 0, sent = 0;
+
+ private:
+  EndlessVision& vision_;
+  int ticks_;
+};
+
+TEST(Run, SetPointsDoNotWaitForVisionInItsOwnThread) {
+  constexpr int ticks = 60;
+  const Rig rig = testing::small_test_rig();
+  SimulatorConfig simulated;
+  simulated.endoscope.pictures = false;
+  Simulator simulator(rig, simulated, {0.05, 1.57, 0.064, 1.2});
+  Case c;
+  c.thread = TrackingThread::own;
+  EndlessVision vision;
+  TicksDuringVision watcher(vision, ticks);
+  run(simulator, vision, simulator, config_of(rig, c), small_trajectory(), 1, watcher);
+  EXPECT_FALSE(vision.gave_up());
+  EXPECT_EQ(watcher.done, ticks);
+  EXPECT_EQ(watcher.sent, ticks);
+}
+
+// A camera whose third image is of another size.
+class WrongThirdImage : public ImageStream {
+ public:
+  explicit WrongThirdImage(const Rig& rig) : right_(rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar()) {}
+  std::optional<StampedImage> newest() override {
+    return StampedImage{0, ++images_ < 3 ? right_ : right_(cv::Rect(0, 0, 20, 10))};
+  }
+
+ private:
+  cv::Mat right_;
+  int images_ = 0;
+};
+
+TEST(Run, WhatVisionThrowsInItsOwnThreadEndsTheRun) {
+  class Whoever : public RunObserver {
+    bool on_tick(const ControlTick&) override { return true; }
+  } nobody;
+  const Rig rig = testing::small_test_rig();
+  SimulatorConfig simulated;
+  simulated.endoscope.pictures = false;
+  Simulator simulator(rig, simulated, {0.05, 1.57, 0.064, 1.2});
+  SteadyClock clock;
+  Case c;
+  c.thread = TrackingThread::own;
+  WrongThirdImage camera(rig);
+  const std::string said = testing::input_error(
+      [&] { run(simulator, camera, clock, config_of(rig, c), small_trajectory(), hangs.count(), nobody); });
+  EXPECT_EQ(said, "image: size: is 20x10, expected 640x360 as in the rig");
+}
+
 TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
   const Rig rig = testing::paper_test_rig();
   ControllerConfig controller;
@@ -218,4 +376,4 @@ TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // An arm that did not follow may go on after it has stood still for so long; by how much a joint may move in that time.
@@ -50,4 +50,4 @@ void Servo::start_anew_when_at_rest(const ServoInput& input, HoldReason reason) 
   }
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 #include "lapservo/control/visual_controller.h"
 #include "lapservo/servo/servo_decision.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The loop's one step, the same for a real arm, a simulated one and a replay: it goes by nothing but its inputs.
 class Servo {
@@ -27,4 +27,4 @@ class Servo {
   Eigen::Vector4d q_then_ = Eigen::Vector4d::Zero();
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Names = std::array<std::string_view, 4>;
@@ -221,4 +221,4 @@ std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path) {
   return ticks;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 #include "lapservo/core/row_file.h"
 #include "lapservo/servo/servo_decision.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Where the instrument truly is, which only a simulation knows.
 struct InstrumentTruth {
@@ -46,4 +46,4 @@ std::vector<std::string> decision_fields(const ServoDecision& decision);
 /// Throws InputError naming file, line and column.
 std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

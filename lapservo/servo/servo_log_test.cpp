@@ -12,7 +12,7 @@
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::uint64_t seed = 5;
@@ -132,4 +132,4 @@ TEST(ServoLog, NamesWhatIsWrong) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

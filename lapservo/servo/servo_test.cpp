@@ -7,7 +7,7 @@
 #include "lapservo/servo/image_features.h"
 #include "lapservo/testing/rigs.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = 1.0 / 60;
@@ -140,4 +140,4 @@ TEST(Servo, WithoutImagesItHolds) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 const Eigen::Vector4d start(0.1, 1.5, 0.1, 0);
@@ -146,4 +146,4 @@ TEST(Arm, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

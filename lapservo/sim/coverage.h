@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The part of a pixel where a function is negative.
 struct Coverage {
@@ -37,4 +37,4 @@ inline Coverage negative_part(const std::array<float, 4>& f) {
   return {0.5F * twice_area, x / (3 * twice_area), y / (3 * twice_area)};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/geometry/response.h"
 #include "lapservo/sim/scene.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 // For tests: looks at pictures without any of the vision code.
 
@@ -65,4 +65,4 @@ inline std::optional<double> crossing_px(const cv::Mat& light, const Eigen::Vect
   return nearest;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

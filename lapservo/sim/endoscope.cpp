@@ -11,6 +11,7 @@
 #include "lapservo/sim/render_queue.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 // Moments that are equal but for rounding.
@@ -33,11 +34,15 @@ const EndoscopeConfig& EndoscopeConfig::checked() const {
   return *this;
 }
 
+struct Endoscope::Queue : RenderQueue {
+  using RenderQueue::RenderQueue;
+};
+
 Endoscope::Endoscope(const Camera& camera, const std::vector<ShaftModel>& shafts, const cv::Mat& background,
                      const RenderOptions& options, const EndoscopeConfig& config, std::uint64_t seed)
     : config_(config.checked()), gains_(options.sensor.gains), seed_(seed) {
   if (config.pictures)
-    queue_ = std::make_unique<RenderQueue>(Renderer(camera, shafts, background, options), config.render_threads);
+    queue_ = std::make_unique<Queue>(Renderer(camera, shafts, background, options), config.render_threads);
 }
 
 Endoscope::~Endoscope() = default;

@@ -13,8 +13,6 @@
 
 namespace lapservo {
 
-class RenderQueue;
-
 struct EndoscopeConfig {
   double frame_rate_hz = 60;
   double exposure_s = 0;         ///< shutter open for so long; 0: frozen, without motion blur
@@ -59,6 +57,7 @@ class Endoscope {
   void set_light(float light) { light_ = light; }
 
  private:
+  struct Queue;
   struct OnTheWay {
     EndoscopePicture picture;
     std::future<cv::Mat> rendered;
@@ -71,7 +70,7 @@ class Endoscope {
   long next_ = 0;
   double last_stamp_s_ = 0;
   std::deque<OnTheWay> on_the_way_;
-  std::unique_ptr<RenderQueue> queue_;
+  std::unique_ptr<Queue> queue_;
 };
 
 }  // namespace lapservo

@@ -7,7 +7,7 @@
 
 #include "lapservo/core/error.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 EndoscopeConfig without_pictures() {
@@ -108,4 +108,4 @@ TEST(Endoscope, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 Optics::Optics(double blur_px) {
   const int reach = std::max(0, static_cast<int>(std::ceil(4 * blur_px - 0.5)));
@@ -49,4 +49,4 @@ const float* Optics::row(const cv::Mat& light, int v, int begin, int end) {
   return out;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -4,7 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Gaussian blur of an image of light (CV_32FC3), one row of a part at a time, so that only what changed is blurred.
 /// Beyond the image's border its outermost pixels go on.
@@ -22,4 +22,4 @@ class Optics {
   std::vector<float> column_, row_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double step_px = 4;
@@ -72,4 +72,4 @@ std::vector<Span> outline(const Camera& camera, double half_field_rad, const Sha
   return bands;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include "lapservo/geometry/camera.h"
 #include "lapservo/sim/scene.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Columns `begin` to `end` (exclusive) of a band of rows; empty when they meet.
 struct Span {
@@ -32,4 +32,4 @@ struct Disc {
 Disc disc_around_ball(const Camera& camera, double half_field_rad, const Eigen::Vector3d& centre_in_camera,
                       double radius_m);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

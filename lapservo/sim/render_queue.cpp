@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 cv::Mat done(Renderer& renderer, const RenderJob& job) {
@@ -57,4 +57,4 @@ void RenderQueue::work(Renderer& renderer) {
   }
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

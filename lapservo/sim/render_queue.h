@@ -12,7 +12,7 @@
 
 #include "lapservo/sim/renderer.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 struct RenderJob {
   Exposure exposure;
@@ -44,4 +44,4 @@ class RenderQueue {
   std::vector<std::thread> threads_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

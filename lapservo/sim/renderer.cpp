@@ -10,6 +10,7 @@
 #include "lapservo/sim/shaft_painter.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 constexpr float smoke_light = 0.35F;

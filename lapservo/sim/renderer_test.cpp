@@ -9,13 +9,13 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/sim/edge_probe.h"
 #include "lapservo/sim/shaft_lighting.h"
 #include "lapservo/sim/shaft_tracer.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 Camera small_camera() {
@@ -202,4 +202,4 @@ TEST(Lighting, TurnedDownLampsLeaveTheAmbientPart) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -14,7 +14,7 @@
 #include "lapservo/sim/renderer.h"
 #include "lapservo/testing/sample_frames.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -138,4 +138,4 @@ TEST_F(Samples, BlurIsAlike) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int value_unit = 64, sigma_unit = 512, deviate_unit = 8192;
@@ -88,4 +88,4 @@ cv::Mat SensorEncoder::expose(const Encoded& encoded, std::uint64_t seed) const 
   return image;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/geometry/response.h"
 #include "lapservo/sim/scene.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Turns linear light into encoded 8-bit pixels with noise. The noise is drawn from a table of normal deviates (cut at
 /// four sigma), read from a fresh place for every row of every frame; it is added to the encoded value with the slope
@@ -41,4 +41,4 @@ class SensorEncoder {
   std::vector<std::int32_t> row_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include "lapservo/sim/edge_probe.h"
 #include "lapservo/sim/optics.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 struct Spread {
@@ -108,4 +108,4 @@ TEST(Optics, APartIsBlurredAsInTheWhole) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

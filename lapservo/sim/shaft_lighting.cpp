@@ -6,7 +6,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/response.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 Light printed_color(double hue_deg) {
   constexpr double saturation = 0.91, value = 0.84;
@@ -93,4 +93,4 @@ Lit ShaftLighting::on_side(float azimuth_rad, float along_m) {
   return {mix(&Lit::matt), mix(&Lit::gloss)};
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 #include "lapservo/sim/scene.h"
 #include "lapservo/sim/shaft_tracer.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Light that leaves a point towards the camera: reflectance * matt + gloss.
 struct Lit {
@@ -48,4 +48,4 @@ std::array<Light, 8> reflectances(const Marker& marker);
 /// Reflectance in linear light of a printed hue: HSV(hue, 0.91, 0.84) in sRGB values, b g r.
 Light printed_color(double hue_deg);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

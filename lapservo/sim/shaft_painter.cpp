@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t samples_a_pixel = 32;
@@ -250,4 +250,4 @@ ShaftPainter::Paint ShaftPainter::sampled(const Corners& at) {
   return paint;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 #include "lapservo/sim/shaft_lighting.h"
 #include "lapservo/sim/shaft_tracer.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Rays (z = 1) through the corners of raw pixels.
 class PixelRays {
@@ -69,4 +69,4 @@ class ShaftPainter {
   RayRow above_, below_, samples_, single_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 
 #include "lapservo/core/angles.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr float nearest_m = 1e-3F;
@@ -167,4 +167,4 @@ Eigen::Vector3f ShaftTracer::point_on_ray(float x, float y, float depth_m) const
   return camera_ + depth_m * (rotation_ * Eigen::Vector3f(x, y, 1));
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

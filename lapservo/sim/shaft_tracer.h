@@ -8,7 +8,7 @@
 
 #include "lapservo/sim/scene.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// What a camera ray meets first on a shaft. `film_edge` is the face of the film at the marker's two ends.
 enum class Part : std::uint8_t { nothing, band_0, band_1, band_2, shaft, film_edge, tip, blood };
@@ -74,4 +74,4 @@ class ShaftTracer {
   std::vector<Blotch> blotches_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

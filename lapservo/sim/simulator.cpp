@@ -9,6 +9,7 @@
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 constexpr double same_s = 1e-9;  // moments that are equal but for rounding

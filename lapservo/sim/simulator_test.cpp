@@ -6,11 +6,11 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/sim/edge_probe.h"
 #include "lapservo/testing/sample_frames.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // The example's scene, a third as large.
@@ -188,4 +188,4 @@ TEST(Simulator, RefusesNonsense) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,7 +7,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // Smooth noise in about [-1, 1]: octaves of a random grid, interpolated.
@@ -85,4 +85,4 @@ cv::Mat make_tissue(int width_px, int height_px, std::uint64_t seed) {
   return light;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

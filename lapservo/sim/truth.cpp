@@ -4,9 +4,10 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/features.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 TruthCsv::TruthCsv(const std::filesystem::path& path) : file_(path) {
   file_.stream() << "file,instrument,condition,theta_rad,phi_rad,rho_m,psi_rad,tau_rad,"
@@ -32,4 +33,4 @@ void TruthCsv::add(const std::string& file, const std::string& condition, const 
   file_.stream() << row << '\n';
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

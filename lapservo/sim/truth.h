@@ -7,7 +7,7 @@
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The truth.csv beside rendered frames: what is where, per frame and instrument. The columns of ../shared/frames.
 class TruthCsv {
@@ -22,4 +22,4 @@ class TruthCsv {
   AtomicFile file_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

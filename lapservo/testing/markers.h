@@ -6,6 +6,7 @@
 #include "lapservo/marker/marker.h"
 
 namespace lapservo::testing {
+using namespace internal;
 
 inline Marker marker_with(const std::array<double, 3>& upper_m, const std::array<double, 3>& lower_m) {
   Marker marker;

@@ -9,7 +9,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double hidden = -0.35, wrong = -1, beside = -1, rightly_empty = 0.15;
@@ -133,4 +133,4 @@ std::vector<PoseUnknowns> search_agreement(const Scene& scene, const PoseUnknown
   return best;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

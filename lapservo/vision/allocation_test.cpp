@@ -56,7 +56,7 @@ int posix_memalign(void** pointer, std::size_t alignment, std::size_t size) {
 
 }  // extern "C"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 /// Allocations while a tracker that has warmed up sees some frames of a slow motion.
@@ -100,4 +100,4 @@ TEST(Allocation, does_not_happen_with_three_instruments) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

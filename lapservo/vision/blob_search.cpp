@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 namespace {
 
@@ -114,4 +114,4 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes
   return blobs;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 #include "lapservo/vision/color_classes.h"
 #include "lapservo/vision/image_view.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Pixels of the markers' colours that lie together, sampled on a sparse grid.
 struct Blob {
@@ -21,4 +21,4 @@ struct Blob {
 /// All groups of coloured samples of at least `least_samples`, largest first. Touches one pixel in grid_px^2 only.
 std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int least_samples);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

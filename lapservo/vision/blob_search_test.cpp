@@ -11,7 +11,7 @@
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int width_px = 640, height_px = 480, grid_px = 8, least_samples = 8;
@@ -136,4 +136,4 @@ TEST(BlobSearch, LooksAtTheGivenPartOnly) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 BlurredEdge integrate(double u) {
@@ -35,4 +35,4 @@ const BlurredEdges& BlurredEdges::instance() {
   return table;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Edges as a Gaussian blur of one pixel sigma leaves them, at a distance u from the edge in sigmas (inside: u > 0):
 /// the convolution of the normal density with the step, the square root and the 3/2 power of max(0, u). The last two
@@ -45,4 +45,4 @@ class BlurredEdges {
   std::array<BlurredEdge, static_cast<std::size_t>((last_u - first_u) * per_sigma) + 2> entries_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

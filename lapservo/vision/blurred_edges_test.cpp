@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // The normal density convolved with `edge` at u, by Simpson's rule in s with t = s^2, which smooths the kink at 0.
@@ -61,4 +61,4 @@ TEST(BlurredEdges, AreNothingFarOutside) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

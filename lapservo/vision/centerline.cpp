@@ -12,9 +12,10 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double boundary_sigma_px = 0.7;
@@ -303,4 +304,4 @@ std::vector<Observation> CenterlineMethod::observe(const cv::Mat& image_bgr) con
   return observations;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

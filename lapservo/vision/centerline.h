@@ -8,7 +8,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/observation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Method::centerline: the paper's Algorithm 1, the baseline to compare with. Segmentation in HSV, morphological
 /// opening, the middle line between the shaft's two sides, the colour boundaries where that line crosses them (to the
@@ -26,4 +26,4 @@ class CenterlineMethod {
   std::vector<CrossRatioDecoder> decoders_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

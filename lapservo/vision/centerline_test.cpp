@@ -9,7 +9,7 @@
 #include "lapservo/kinematics/features.h"
 #include "lapservo/vision/theatre.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::Shot;
@@ -73,4 +73,4 @@ TEST(Centerline, FindsNothingInTissue) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -14,7 +14,7 @@
 #include "lapservo/vision/line_segmentation.h"
 #include "lapservo/vision/normal_equations.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int line_count = 13, station_count = 15, samples_along = 128;
@@ -281,4 +281,4 @@ CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOp
   return fit;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

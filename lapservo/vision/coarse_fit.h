@@ -3,7 +3,7 @@
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 struct CoarseFitOptions {
   double lateral_reach_px = 24;  ///< how far beyond the predicted silhouettes the shaft's sides are looked for
@@ -25,4 +25,4 @@ struct CoarseFit {
 /// off.
 CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOptions& options);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,11 +6,11 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/theatre.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::Shot;
@@ -129,4 +129,4 @@ TEST(InitialPoses, AreNoneForABlobWithoutTheMarkersColoursInTheirOrder) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double merge_deg = 20;         // hues this close are one colour to the camera
@@ -57,4 +57,4 @@ ColorClasses::ColorClasses(const std::vector<Instrument>& instruments) {
       }
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 
 #include "lapservo/rig/rig.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Which of the markers' colours a pixel has: 0 for none, else 1, 2, ... for the rig's distinct hues. A pixel has a
 /// colour when it is colourful and its HSV hue lies nearer to it than half the way to the next, so that exposure,
@@ -38,4 +38,4 @@ class ColorClasses {
   std::vector<std::uint8_t> table_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/geometry/response.h"
 #include "lapservo/sim/shaft_lighting.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Hues = std::array<double, 3>;
@@ -150,4 +150,4 @@ TEST(ColorClasses, InstrumentsShareTheClassesOfTheirHues) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -17,7 +17,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace lapservo {
+namespace lapservo::internal {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -388,11 +388,11 @@ EdgeFits locate_limbs(const LightImage& image, std::span<const EdgeLine> lines, 
 }
 
 }  // namespace HWY_NAMESPACE
-}  // namespace lapservo
+}  // namespace lapservo::internal
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace lapservo {
+namespace lapservo::internal {
 
 HWY_EXPORT(locate_steps);
 HWY_EXPORT(locate_limbs);
@@ -428,5 +428,5 @@ EdgeFits locate_limbs(const LightImage& light, std::span<const EdgeLine> lines, 
   return HWY_DYNAMIC_DISPATCH(locate_limbs)(light, lines, iterations);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal
 #endif

@@ -6,7 +6,7 @@
 #include "lapservo/vision/edge_profile.h"
 #include "lapservo/vision/light_image.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A line in the raw image across an edge, sampled every pixel. All of it must lie inside the image
 /// (LightImage::contains).
@@ -31,4 +31,4 @@ EdgeFit locate_limb(const LightImage& light, const EdgeLine& line, int iteration
 EdgeFits locate_steps(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
 EdgeFits locate_limbs(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double edge_px = 60.3, blur_px = 1.2, radius_px = 45;
@@ -147,4 +147,4 @@ INSTANTIATE_TEST_SUITE_P(Shapes, EdgeLines, ::testing::Bool(),
                          [](const auto& chosen) { return chosen.param ? "limb" : "step"; });
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/vision/edge_lines.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int most_lines = EdgeMeasurements::most_lines, stations = EdgeMeasurements::most_stations;
@@ -341,4 +341,4 @@ EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, cons
   return out;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

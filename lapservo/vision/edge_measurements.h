@@ -9,7 +9,7 @@
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Width of the blur (one sigma) along the boundaries' normals and across the shaft's sides: motion makes them differ.
 /// Carried from frame to frame.
@@ -67,4 +67,4 @@ struct EdgeMeasurements {
 EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,
                                const Effort& effort, const EdgeBlur& blur);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

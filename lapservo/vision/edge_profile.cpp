@@ -7,7 +7,7 @@
 
 #include "lapservo/vision/blurred_edges.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // At every sample: the model's linear basis (a constant, then `Shapes`), and the shapes' derivatives by the edge's
@@ -146,4 +146,4 @@ EdgeFit fit_limb(const EdgeProfile& profile, float blur_px, float radius_px, int
   return iterate(profile, iterations, [&](float edge_px) { return limb_basis(profile, edge_px, blur_px, radius_px); });
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstddef>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Light along a short line across an edge: sample i lies at (first_px + i) px from where the edge is expected.
 struct EdgeProfile {
@@ -38,4 +38,4 @@ EdgeFit fit_step(const EdgeProfile& profile, float blur_px, int iterations);
 /// edge of such a limb lies inside the true one; this finds the true one.
 EdgeFit fit_limb(const EdgeProfile& profile, float blur_px, float radius_px, int iterations);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Shape = std::function<double(double)>;  // light at a distance from the edge, 0 to 1
@@ -178,4 +178,4 @@ TEST(EdgeProfile, WhatIsNoEdgeIsNotOne) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

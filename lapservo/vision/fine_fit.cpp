@@ -9,7 +9,7 @@
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/normal_equations.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole.
@@ -164,4 +164,4 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   return fit;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

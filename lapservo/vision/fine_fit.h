@@ -8,7 +8,7 @@
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 struct FineFit {
   bool converged = false;
@@ -33,4 +33,4 @@ struct FineFit {
 /// pixel in linear light, with a robust loss. `start` must be good to some pixels.
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

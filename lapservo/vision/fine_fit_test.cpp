@@ -9,7 +9,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/vision/theatre.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::fit_from;
@@ -157,4 +157,4 @@ TEST(FineFit, DoesNotConvergeWhereNothingIs) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

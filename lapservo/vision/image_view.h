@@ -5,7 +5,7 @@
 
 #include <opencv2/core.hpp>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A borrowed 8-bit BGR image.
 struct ImageView {
@@ -20,4 +20,4 @@ struct ImageView {
   bool contains(int u, int v) const { return u >= 0 && v >= 0 && u < width_px && v < height_px; }
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

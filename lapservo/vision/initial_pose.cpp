@@ -8,10 +8,10 @@
 #include <Eigen/Eigenvalues>
 
 #include "lapservo/geometry/rotation.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/line_segmentation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // The shaft in the ideal image: x along its axis from `origin` (towards the tip), y across.
@@ -287,4 +287,4 @@ std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
   return poses;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

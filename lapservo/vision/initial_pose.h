@@ -8,7 +8,7 @@
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Rough poses (rotation unknown, psi = 0) of a marker that a blob may be: the shaft's sides are two lines fitted to
 /// the blob's outline; their distance gives the depth, the ends of the colours the place along the axis. With
@@ -17,4 +17,4 @@ namespace lapservo {
 std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
                                         const std::optional<Rigid3>& camera_from_rcm);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

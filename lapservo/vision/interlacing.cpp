@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int taps = 4, chunk_px = 16, channels = 3;
@@ -187,4 +187,4 @@ const cv::Mat& EvenField::of(const cv::Mat& frame_bgr) {
   return field_bgr_;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

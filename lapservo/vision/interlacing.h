@@ -11,7 +11,7 @@
 #include "lapservo/vision/image_view.h"
 #include "lapservo/vision/observation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Pixels u_begin <= u < u_end, v_begin <= v < v_end.
 struct PixelBox {
@@ -53,4 +53,4 @@ class EvenField {
   cv::Mat field_bgr_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -9,7 +9,7 @@
 #include "lapservo/vision/theatre.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::usual_shot;
@@ -133,4 +133,4 @@ TEST(Interlacing, TheEvenFieldKeepsItsRowsAndInterpolatesLight) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

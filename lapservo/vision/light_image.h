@@ -7,7 +7,7 @@
 #include "lapservo/geometry/response.h"
 #include "lapservo/vision/image_view.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// A frame in linear light, decoded where it is looked at. Optical blur acts on light, so edges are located in it.
 class LightImage {
@@ -54,4 +54,4 @@ class LightImage {
   const std::array<float, 256>& light_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 cv::Mat random_image(std::uint64_t seed, int width_px, int height_px, int highest) {
@@ -88,4 +88,4 @@ TEST(LightImage, ReadsNothingOutsideOfWhatItContains) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 
 #include "lapservo/vision/scene.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// What segment_line gains from a sample of a colour in a state: 0 shaft, 1..3 the bands, 4 shaft. Internal.
 inline float line_reward(std::size_t state, std::uint8_t color, const std::array<std::uint8_t, 3>& bands) {
@@ -16,4 +16,4 @@ inline float line_reward(std::size_t state, std::uint8_t color, const std::array
   return color == 0 ? -0.35F : -1;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 
 #include "lapservo/vision/line_reward.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t max_samples = 512;
@@ -71,4 +71,4 @@ LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::
   return segmentation;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

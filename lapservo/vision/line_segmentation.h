@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// The four colour boundaries along a line of colour classes, in samples: boundary k lies at index[k] - 0.5, between
 /// samples. `seen` when the samples on both its sides are what they should be.
@@ -18,4 +18,4 @@ struct LineSegmentation {
 /// Scene::outside counts for nothing. At most 512 samples.
 LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

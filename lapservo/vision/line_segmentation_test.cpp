@@ -10,7 +10,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/vision/line_reward.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using Line = std::vector<std::uint8_t>;
@@ -125,4 +125,4 @@ TEST(LineSegmentation, SeesNoWholeMarkerInAnotherOrderOfItsColours) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 
 #include <Eigen/Cholesky>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 UnknownMatrix NormalEquations::information() const {
   UnknownMatrix information(unknowns_, unknowns_);
@@ -33,4 +33,4 @@ std::optional<UnknownMatrix> inverse_of(const UnknownMatrix& information) {
   return scale.asDiagonal() * inverse * scale.asDiagonal();
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Gauss-Newton's normal equations of a few unknowns, gathered one scalar measurement at a time.
 class NormalEquations {
@@ -49,4 +49,4 @@ inline double cauchy_weight(double residual_sigmas, double scale_sigmas) {
   return 1 / (1 + x * x);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

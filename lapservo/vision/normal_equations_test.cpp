@@ -5,7 +5,7 @@
 
 #include "lapservo/core/random.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 struct Problem {
@@ -81,4 +81,4 @@ TEST(NormalEquations, TheCauchyWeightIsThatOfItsLoss) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

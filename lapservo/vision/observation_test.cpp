@@ -8,10 +8,11 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/theatre.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::Shot;
@@ -159,4 +160,4 @@ TEST(Observation, IsFiniteForEveryStatus) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

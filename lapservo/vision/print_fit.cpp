@@ -13,7 +13,7 @@
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/normal_equations.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // How often a print is not the rig's, and how far it is off then, each half as often as the one before. An exact
@@ -288,4 +288,4 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_
   return fit;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

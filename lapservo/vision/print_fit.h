@@ -6,7 +6,7 @@
 #include "lapservo/vision/edge_measurements.h"
 #include "lapservo/vision/shaft_pose.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
 /// says, and by how much it is to be taken larger still before the print is blamed: smear and compression move
@@ -36,4 +36,4 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_
 /// do not count.
 double scatter_sigmas(std::span<const Measurement> measurements);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

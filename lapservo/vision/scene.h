@@ -8,7 +8,7 @@
 #include "lapservo/vision/color_classes.h"
 #include "lapservo/vision/image_view.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// One frame and the one instrument that is looked for in it. Borrows everything.
 struct Scene {
@@ -33,4 +33,4 @@ struct Scene {
   bool is_ours(std::uint8_t color) const { return color == bands[0] || color == bands[1] || color == bands[2]; }
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace lapservo {
+namespace lapservo::internal {
 
 PoseUnknowns PoseUnknowns::rcm(const Rigid3& camera_from_rcm, const RcmCoordinates& q) {
   PoseUnknowns unknowns;
@@ -65,4 +65,4 @@ PoseUnknowns PoseUnknowns::with_psi(double psi_rad) const {
   return rcm(*camera_from_rcm_, q);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Where a shaft with its marker is: the unrolled frame (z along the axis to the tip, origin at the marker's proximal
 /// end) and the rotation about the axis in its azimuths.
@@ -56,4 +56,4 @@ class PoseUnknowns {
   std::array<Twist, 5> twists_{};
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

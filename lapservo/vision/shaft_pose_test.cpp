@@ -7,7 +7,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 Eigen::Vector3d random_vector(Random& random) {
@@ -87,4 +87,4 @@ TEST(PoseUnknowns, ThroughTheRcmTheyAreQ) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -6,13 +6,14 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/agreement_search.h"
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/verification.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr int grid_px = 8, least_samples = 8, most_blobs = 6;
@@ -257,4 +258,4 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
   return observations_;
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -12,7 +12,7 @@
 #include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/observation.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// Method::surface: coarse search for the markers' colours, then a fit over all visible generatrices.
 ///
@@ -57,4 +57,4 @@ class SurfaceTracker {
   std::vector<Observation> observations_;
 };
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

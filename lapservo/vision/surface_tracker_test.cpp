@@ -8,10 +8,11 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/theatre.h"
 #include "lapservo/vision/tracker.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::Shot;
@@ -260,4 +261,4 @@ TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -7,9 +7,10 @@
 
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo::theatre {
+namespace lapservo::internal::theatre {
 namespace {
 
 struct Port {
@@ -138,4 +139,4 @@ FineFit fit_from(const Shot& shot, const PoseUnknowns& start) {
   return fit_finely(shot.sight.scene(), shot.sight.light(), start, {});
 }
 
-}  // namespace lapservo::theatre
+}  // namespace lapservo::internal::theatre

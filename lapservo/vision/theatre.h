@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
@@ -15,7 +15,7 @@
 #include "lapservo/vision/shaft_pose.h"
 
 /// Rendered frames with known truth, for this folder's tests only.
-namespace lapservo::theatre {
+namespace lapservo::internal::theatre {
 
 /// 960x540, up to three instruments through ports left, right and above; their markers share colours in other orders.
 Rig usual_rig(std::size_t instruments = 1);
@@ -71,4 +71,4 @@ const Shot& usual_shot(std::uint64_t seed);
 /// The fine fit to a shot, of a frame on its own.
 FineFit fit_from(const Shot& shot, const PoseUnknowns& start);
 
-}  // namespace lapservo::theatre
+}  // namespace lapservo::internal::theatre

@@ -10,6 +10,7 @@
 #include "lapservo/vision/surface_tracker.h"
 
 namespace lapservo {
+using namespace internal;
 namespace {
 
 std::string size_text(int width_px, int height_px) {

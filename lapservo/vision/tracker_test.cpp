@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 // `for (const Observation& o : Tracker(rig).track(image))` once read freed memory.
@@ -19,4 +19,4 @@ TEST(Tracker, OneThatIsATemporaryGivesItsObservationsAway) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

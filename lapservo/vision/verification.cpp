@@ -8,7 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 constexpr double largest_sigma_psi_rad = 0.02;  // five sigma: a tenth of a radian
@@ -146,4 +146,4 @@ Status judge(const Scene& scene, const FineFit& fit) {
   return judge_sigma(fit, agreement);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -5,7 +5,7 @@
 #include "lapservo/vision/observation.h"
 #include "lapservo/vision/scene.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 /// How well the frame's colours agree with the marker at a pose, over a grid of its visible surface.
 struct ColorAgreement {
@@ -21,4 +21,4 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose);
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
 Status judge(const Scene& scene, const FineFit& fit);
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/vision/theatre.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 using theatre::fit_from;
@@ -118,4 +118,4 @@ TEST(Verification, TissueIsNotOk) {
 }
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

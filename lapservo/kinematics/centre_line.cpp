@@ -1,4 +1,4 @@
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 
 #include <cmath>
 #include <cstddef>
@@ -6,7 +6,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 
 std::optional<CentreLine> centre_line(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled,
                                       double psi_rad) {
@@ -41,4 +41,4 @@ std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigi
   return camera.ideal_from_point(camera_from_rcm.translation);
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -1,4 +1,4 @@
-#include "lapservo/servo/tracked_image.h"
+#include "lapservo/servo/track_images.h"
 
 #include <atomic>
 #include <chrono>
@@ -9,7 +9,7 @@
 
 #include "lapservo/servo/image_features.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 
 class CallersTracking : public TrackedImageStream {
@@ -87,4 +87,4 @@ std::unique_ptr<TrackedImageStream> track_images(ImageStream& images, const Rig&
   return std::make_unique<OwnThreadTracking>(std::move(tracking));
 }
 
-}  // namespace lapservo
+}  // namespace lapservo::internal

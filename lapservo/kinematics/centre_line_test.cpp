@@ -1,4 +1,4 @@
-#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/centre_line.h"
 
 #include <array>
 #include <cmath>
@@ -19,7 +19,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/testing/sample_frames.h"
 
-namespace lapservo {
+namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
@@ -245,4 +245,4 @@ INSTANTIATE_TEST_SUITE_P(Frames, SampleTruth,
                          [](const auto& parameter) { return std::string(parameter.param); });
 
 }  // namespace
-}  // namespace lapservo
+}  // namespace lapservo::internal

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/geometry/rigid3.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/marker/marker.h"
+
+namespace lapservo::internal {
+
+/// The marker on the centre line: the images of e0..e3 on the facing generatrix, where the plane through the shaft's
+/// axis and the camera centre meets the surface (docs/conventions.md, "What the centre line shows").
+struct CentreLine {
+  double facing_azimuth_rad;  ///< gamma, in the unrolled frame
+  double tau_rad;             ///< gamma - psi - seam, in [0, 2 pi)
+  std::array<Eigen::Vector3d, 4> points_in_camera_m;
+  std::array<Eigen::Vector2d, 4> ideal_px;
+};
+
+/// nullopt when the camera centre lies inside the shaft or a point behind the camera.
+std::optional<CentreLine> centre_line(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled,
+                                      double psi_rad);
+
+/// `r_px` is absent when the RCM's image is unknown.
+Features features_of(const std::array<Eigen::Vector2d, 4>& edges_ideal_px,
+                     const std::optional<Eigen::Vector2d>& rcm_ideal_px);
+
+/// Image of the RCM; algebraic (mirrored) when it lies behind the camera, nullopt when in its focal plane.
+std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigid3& camera_from_rcm);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,56 @@
+#pragma once
+
+/// All that a program which sees or steers an instrument calls. Units and frames: docs/conventions.md; a robot, a
+/// camera or a trajectory of your own: docs/extending.md. What stands in lapservo::internal may change any day.
+
+// What goes wrong with files and configurations; joints and image features by name.
+#include "lapservo/core/error.h"
+#include "lapservo/core/joint_vector.h"
+
+// What stands before the camera: load_rig(), Rig, Camera, Marker.
+#include "lapservo/geometry/camera.h"
+#include "lapservo/geometry/response.h"
+#include "lapservo/geometry/rigid3.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/marker/marker.h"
+#include "lapservo/rig/rig.h"
+
+// Seeing: Tracker makes Observations of pictures, which come from files, videos and cameras.
+#include "lapservo/io/frame_source.h"
+#include "lapservo/io/image_file.h"
+#include "lapservo/io/overlay.h"
+#include "lapservo/vision/observation.h"
+#include "lapservo/vision/tracker.h"
+
+// The ports, to be implemented for an arm and a camera: Robot, ImageStream, Clock.
+#include "lapservo/robot/clock.h"
+#include "lapservo/robot/joint_path.h"
+#include "lapservo/robot/operating_state.h"
+#include "lapservo/robot/robot.h"
+#include "lapservo/robot/steady_clock.h"
+#include "lapservo/stream/image_stream.h"
+
+// Steering: run() follows a Trajectory as ControllerConfig says and tells a RunObserver of every ControlTick.
+#include "lapservo/control/control_step.h"
+#include "lapservo/control/controller_config.h"
+#include "lapservo/control/estimate.h"
+#include "lapservo/control/feature_model.h"
+#include "lapservo/control/hold_reason.h"
+#include "lapservo/control/image_measurement.h"
+#include "lapservo/control/paper_trajectory.h"
+#include "lapservo/control/trajectory.h"
+#include "lapservo/control/trajectory_check.h"
+#include "lapservo/servo/controller_file.h"
+#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
+#include "lapservo/servo/run.h"
+#include "lapservo/servo/servo_decision.h"
+#include "lapservo/servo/tracked_image.h"
+
+// In place of arm and camera: Simulator, and the Renderer behind it.
+#include "lapservo/sim/arm.h"
+#include "lapservo/sim/endoscope.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/sim/scene.h"
+#include "lapservo/sim/simulator.h"

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/rig/rig.h"
+#include "lapservo/servo/tracked_image.h"
+#include "lapservo/stream/image_stream.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+
+/// Tracked images as they come, by whichever thread tracks.
+class TrackedImageStream {
+ public:
+  virtual ~TrackedImageStream() = default;
+  /// The newest one since the last call, if any.
+  virtual std::optional<TrackedImage> newest() = 0;
+};
+
+/// Tracks a rig's instruments in the images of a stream, which must outlive it. `rcm_px`: see measurement_of(). An
+/// exception of the stream or the tracker leaves from newest().
+std::unique_ptr<TrackedImageStream> track_images(ImageStream& images, const Rig& rig, const TrackerOptions& options,
+                                                 const std::optional<Eigen::Vector2d>& rcm_px, TrackingThread thread);
+
+}  // namespace lapservo::internal
