@@ -59,8 +59,7 @@ std::optional<fs::path> sample_folder() {
   return lapservo::testing::sample_frames();
 }
 
-std::vector<TrueFrame> sample_frames(const std::string& set) {
-  const fs::path folder = sample_folder().value() / set;
+std::vector<TrueFrame> frames_in(const fs::path& folder) {
   const CsvTable table = CsvTable::read(folder / "truth.csv");
   std::vector<TrueFrame> frames;
   std::string last_file;
@@ -84,6 +83,14 @@ std::vector<TrueFrame> sample_frames(const std::string& set) {
     frames.back().truths.push_back(truth);
   }
   return frames;
+}
+
+std::vector<TrueFrame> sample_frames(const std::string& set) {
+  return frames_in(sample_folder().value() / set);
+}
+
+std::vector<TrueFrame> stored_frames(const std::string& set) {
+  return frames_in(lapservo::testing::source_folder() / "acceptance/frames" / set);
 }
 
 Score score_single(const std::vector<TrueFrame>& frames) {

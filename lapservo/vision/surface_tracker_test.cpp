@@ -35,7 +35,7 @@ void expect_right(const Observation& o, const RcmCoordinates& truth) {
   EXPECT_LT(std::abs(wrap_pi(o.rcm->q.psi_rad - truth.psi_rad)), 0.01);
 }
 
-// Instruments that cross would hide one another: apart by a hand's breadth in the image.
+// Instruments that cross would hide one another: their middles 320 px apart in the image.
 std::vector<RcmCoordinates> apart(const Rig& rig, Random& random) {
   for (;;) {
     std::vector<RcmCoordinates> all;
@@ -160,7 +160,7 @@ TEST(SurfaceTracker, InstrumentsKeepTheirNamesInAnyOrderOfTheRig) {
 // it, or is not said; what needs no registration stays right.
 TEST(SurfaceTracker, AWrongRegistrationIsNoWrongRotation) {
   const Rig rig = theatre::usual_rig();
-  int with_q = 0;
+  int seen = 0, with_q = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -172,13 +172,15 @@ TEST(SurfaceTracker, AWrongRegistrationIsNoWrongRotation) {
       moved.instruments[0].camera_from_rcm->translation += shift_m * away;
       const Observation o = Tracker(moved).track(shot.bgr)[0];
       if (o.status != Status::ok) continue;
+      ++seen;
       EXPECT_LT(std::abs(wrap_pi(o.tau_rad - line.tau_rad)), std::max(0.05, 5 * o.sigma_tau_rad)) << shift_m;
       EXPECT_LT((o.edges_ideal_px[0] - line.ideal_px[0]).norm(), 1.5) << shift_m;
       EXPECT_LT((o.edges_ideal_px[3] - line.ideal_px[3]).norm(), 1.5) << shift_m;
       with_q += o.rcm.has_value();
     }
   }
-  EXPECT_LT(with_q, 20);
+  EXPECT_GE(seen, 16);
+  EXPECT_LT(with_q, seen);
 }
 
 TEST(SurfaceTracker, AMirroredPictureOrAnotherInstrumentIsNotOurs) {
