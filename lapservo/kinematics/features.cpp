@@ -36,6 +36,21 @@ Features features_of(const std::array<Eigen::Vector2d, 4>& e, const std::optiona
   return f;
 }
 
+Eigen::Matrix4d features_covariance(const std::array<Eigen::Vector2d, 4>& e, const EdgesCovariance& covariance_px2,
+                                    const std::optional<Eigen::Vector2d>& rcm_ideal_px) {
+  const Eigen::Vector2d whole = e[3] - e[0], inner = e[2] - e[0];
+  Eigen::Matrix<double, 4, 8> by_points = Eigen::Matrix<double, 4, 8>::Zero();
+  const auto point = [&](int feature, Eigen::Index k) { return by_points.block<1, 2>(feature, 2 * k); };
+  point(0, 3) = Eigen::RowVector2d(whole.y(), -whole.x()) / whole.squaredNorm();
+  point(2, 3) = whole.normalized().transpose();
+  point(3, 2) = inner.normalized().transpose();
+  for (const int feature : {0, 2, 3}) point(feature, 0) = -(point(feature, 2) + point(feature, 3));
+  if (rcm_ideal_px) point(1, 0) = (e[0] - *rcm_ideal_px).normalized().transpose();
+  const Eigen::Matrix4d covariance = by_points * covariance_px2 * by_points.transpose();
+  // Symmetric to the last bit: a log holds one half of it.
+  return 0.5 * (covariance + covariance.transpose());
+}
+
 std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigid3& camera_from_rcm) {
   if (!(std::abs(camera_from_rcm.translation.z()) > 1e-6)) return std::nullopt;
   return camera.ideal_from_point(camera_from_rcm.translation);

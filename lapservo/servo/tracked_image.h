@@ -33,7 +33,8 @@ enum class TrackingThread {
   own,      ///< newest() never waits for vision: what a real arm wants
 };
 
-/// Tracks a rig's instruments in the images of a stream, which must outlive it. `rcm_px`: see measurement_of(). An
+/// Tracks a rig's instruments in the images of a stream, which must outlive it. `rcm_px`: the RCM's image
+/// where the rig has no camera_from_rcm. An
 /// exception of the stream or the tracker leaves from newest().
 std::unique_ptr<TrackedImageStream> track_images(ImageStream& images, const Rig& rig, const TrackerOptions& options,
                                                  const std::optional<Eigen::Vector2d>& rcm_px, TrackingThread thread);

@@ -49,7 +49,10 @@ struct Observation {
   double sigma_tau_rad = 0;
   std::array<Eigen::Vector2d, 4> edges_ideal_px = zero_points();  ///< e0..e3 on the centre line
   std::array<Eigen::Vector2d, 4> edges_raw_px = zero_points();
-  Features features;
+  /// Of edges_ideal_px, as the image alone or with camera_from_rcm was fitted; to first order. Singular: the points lie
+  /// on a line and move with the pose.
+  EdgesCovariance edges_covariance_px2 = EdgesCovariance::Zero();
+  Features features;  ///< their covariance: features_covariance()
 
   /// Where the fitted shaft lies, to start the next frame from and to draw. camera_from_unrolled, psi.
   Rigid3 camera_from_unrolled;

@@ -36,8 +36,9 @@ bool all_finite(const Observation& o) {
     finite = finite && o.edges_ideal_px[k].allFinite() && o.edges_raw_px[k].allFinite();
   if (o.rcm) finite = finite && o.rcm->q.vector().allFinite() && o.rcm->covariance.allFinite();
   if (o.status == Status::ok)
-    finite = finite && std::isfinite(o.features.s_rad) && std::isfinite(o.features.r_px.value_or(0)) &&
-             std::isfinite(o.features.l_px) && std::isfinite(o.features.d_px) && std::isfinite(o.features.cross_ratio);
+    finite = finite && o.edges_covariance_px2.allFinite() && std::isfinite(o.features.s_rad) &&
+             std::isfinite(o.features.r_px.value_or(0)) && std::isfinite(o.features.l_px) &&
+             std::isfinite(o.features.d_px) && std::isfinite(o.features.cross_ratio);
   return finite;
 }
 
@@ -112,6 +113,36 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
       squares += std::pow(wrap_pi(line->tau_rad - o.tau_rad), 2);
     }
     EXPECT_NEAR(o.sigma_tau_rad, std::sqrt(squares / samples), 0.04 * o.sigma_tau_rad);
+  }
+}
+
+// Errors over their sigmas are 1 in the mean square for each feature, over places, rotations and noise. Without
+// camera_from_rcm r counts from the RCM's image, as it does for the servo.
+TEST(Observation, ErrorsOfTheFeaturesAreAsTheirCovarianceSays) {
+  constexpr int shots = 40;
+  const Rig rig = theatre::usual_rig();
+  Rig unregistered = rig;
+  unregistered.instruments[0].camera_from_rcm.reset();
+  const auto rcm_px = projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm);
+  const auto vector = [&](const std::array<Eigen::Vector2d, 4>& edges_px) {
+    const Features f = features_of(edges_px, rcm_px);
+    return Eigen::Vector4d(f.s_rad, *f.r_px, f.l_px, f.d_px);
+  };
+  for (const Rig* known : {&rig, static_cast<const Rig*>(&unregistered)}) {
+    SCOPED_TRACE(known == &rig ? "with the RCM" : "without");
+    Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+    for (std::uint64_t seed = 101; seed < 101 + shots; ++seed) {
+      const Shot& shot = usual_shot(seed);
+      const Observation o = Tracker(*known).track(shot.bgr)[0];
+      ASSERT_EQ(o.status, Status::ok) << seed;
+      const Eigen::Matrix4d covariance = features_covariance(o.edges_ideal_px, o.edges_covariance_px2, rcm_px);
+      Eigen::Vector4d error = vector(o.edges_ideal_px) - vector(shot.line().ideal_px);
+      error[0] = wrap_pi(error[0]);
+      squares += error.cwiseAbs2().cwiseQuotient(covariance.diagonal());
+    }
+    const Eigen::Vector4d sigmas = (squares / shots).cwiseSqrt();
+    EXPECT_GT(sigmas.minCoeff(), 0.6) << sigmas.transpose();
+    EXPECT_LT(sigmas.maxCoeff(), 1.5) << sigmas.transpose();
   }
 }
 

@@ -31,19 +31,39 @@ bool contradicts_registration(const FineFit& free) {
          free.psi_variance_by_print <= print_share_against_registration * free.covariance(psi, psi);
 }
 
-// Standard deviation of tau: gamma moves with the pose, psi is its last unknown.
-double sigma_tau(const Scene& scene, const FineFit& fit, double tau_rad) {
+// How sure the fit is of what the centre line shows.
+struct LineSigma {
+  double tau_rad = 0;
+  EdgesCovariance edges_px2;
+};
+
+// To first order, by differences: gamma moves with the pose, psi is its last unknown.
+LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fit) {
   const int n = fit.unknowns.size();
-  UnknownVector gradient = UnknownVector::Zero(n);
-  for (int i = 0; i < n; ++i) {
-    constexpr double step = 1e-6;
+  UnknownVector tau = UnknownVector::Zero(n);
+  Eigen::Matrix<double, 8, Eigen::Dynamic, 0, 8, max_unknowns> edges;
+  edges.setZero(8, n);
+  const auto after = [&](int unknown, double step) {
     UnknownVector change = UnknownVector::Zero(n);
-    change[i] = step;
+    change[unknown] = step;
     const ShaftPose pose = fit.unknowns.changed_by(change).pose();
-    if (const auto line = centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad))
-      gradient[i] = wrap_pi(line->tau_rad - tau_rad) / step;
+    return centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
+  };
+  for (int i = 0; i < n; ++i) {
+    double step = 1e-6;
+    auto moved = after(i, step);
+    // Over the seam the inner boundaries jump.
+    if (moved && std::abs(moved->tau_rad - line.tau_rad) > pi) moved = after(i, step = -step);
+    if (!moved) continue;
+    tau[i] = wrap_pi(moved->tau_rad - line.tau_rad) / step;
+    for (std::size_t k = 0; k < 4; ++k)
+      edges.block<2, 1>(2 * static_cast<Eigen::Index>(k), i) = (moved->ideal_px[k] - line.ideal_px[k]) / step;
   }
-  return std::sqrt(gradient.dot(fit.covariance * gradient));
+  LineSigma sigma;
+  sigma.tau_rad = std::sqrt(tau.dot(fit.covariance * tau));
+  const Eigen::Matrix<double, 8, Eigen::Dynamic, 0, 8, max_unknowns> weighted = edges.lazyProduct(fit.covariance);
+  sigma.edges_px2 = weighted.lazyProduct(edges.transpose());
+  return sigma;
 }
 
 // q of a freely fitted shaft that misses the RCM: the shaft from the RCM to the marker's proximal end. The angle
@@ -77,9 +97,11 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
     return observation;
   }
   observation.status = Status::ok;
+  const LineSigma sigma = sigma_of(*line, scene, fit);
   observation.tau_rad = line->tau_rad;
-  observation.sigma_tau_rad = sigma_tau(scene, fit, line->tau_rad);
+  observation.sigma_tau_rad = sigma.tau_rad;
   observation.edges_ideal_px = line->ideal_px;
+  observation.edges_covariance_px2 = sigma.edges_px2;
   for (std::size_t k = 0; k < 4; ++k) observation.edges_raw_px[k] = scene.camera.raw_from_ideal(line->ideal_px[k]);
   observation.features =
       features_of(line->ideal_px, camera_from_rcm ? projected_rcm_px(scene.camera, *camera_from_rcm) : std::nullopt);
