@@ -36,17 +36,7 @@ using namespace lapservo;
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr double longest_s = 30;  // sanitizers make everything several times slower
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr double longest_s = 30;
-#else
-constexpr double longest_s = 5;
-#endif
-#else
-constexpr double longest_s = 5;
-#endif
+constexpr double longest_s = LAPSERVO_CAMPAIGN_LONGEST_S;  // a case may take
 constexpr double largest_error_rad = 0.1;
 
 // What the cases of one kind came to.
