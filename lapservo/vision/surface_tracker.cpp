@@ -10,25 +10,18 @@
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/light_image.h"
+#include "lapservo/vision/limits.h"
 #include "lapservo/vision/verification.h"
 
 namespace lapservo {
 namespace {
 
-constexpr int grid_px = 8, least_samples = 8, most_blobs = 6;
-constexpr double least_rotation_score = 0.5, rival_ratio = 0.93;
-// From the last frame, and a second time from a pose that is good to a few pixels.
-constexpr CoarseFitOptions from_memory{.along_reach = 0.2, .rounds = 1, .search_rotation = false};
-constexpr CoarseFitOptions near_by{.lateral_reach_px = 12, .along_reach = 0.125, .rounds = 1, .search_rotation = false};
-// To contradict camera_from_rcm, the marker must be seen well.
-constexpr double share_against_registration = 0.7;
-// And its print be as the rig says: one that is not contradicts any registration.
-constexpr double print_share_against_registration = 0.25;
+constexpr int grid_px = 8;
 
 bool contradicts_registration(const FineFit& free) {
   const Eigen::Index psi = free.unknowns.size() - 1;
-  return free.located_share() > share_against_registration &&
-         free.psi_variance_by_print <= print_share_against_registration * free.covariance(psi, psi);
+  return free.located_share() > registration_limits.well_seen_share &&
+         free.psi_variance_by_print <= registration_limits.most_print_share * free.covariance(psi, psi);
 }
 
 // How sure the fit is of what the centre line shows.
@@ -70,7 +63,6 @@ LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fi
 // between it and the fitted axis is how wrong each angle may be; where that is too much, q is unknown.
 std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scene, const FineFit& fit,
                                                                const Rigid3& camera_from_rcm, double tau_rad) {
-  constexpr double largest_mismatch_rad = 0.03;
   const Rigid3& fitted = fit.unknowns.pose().camera_from_unrolled;
   auto q = configuration_through(camera_from_rcm, fitted.translation);
   if (!q) return std::nullopt;
@@ -79,7 +71,7 @@ std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scen
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
   const double mismatch_rad = std::atan2((fitted.rotation * z).cross(through_rcm.rotation * z).norm(),
                                          (fitted.rotation * z).dot(through_rcm.rotation * z));
-  if (!view || !(mismatch_rad < largest_mismatch_rad)) return std::nullopt;
+  if (!view || !(mismatch_rad < registration_limits.largest_mismatch_rad)) return std::nullopt;
   q->psi_rad = view->facing_azimuth_rad - tau_rad - scene.marker.seam_rad;
   const double angle_variance =
       mismatch_rad * mismatch_rad + fit.covariance(fit.unknowns.size() - 1, fit.unknowns.size() - 1);
@@ -159,7 +151,7 @@ SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImag
   const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
   const FineFit near = fit_finely(scene, light, expected, memory.blur);
   if (judge(scene, near) == Status::ok) return {Status::ok, near, {}};
-  const CoarseFit coarse = fit_coarsely(scene, expected, from_memory);
+  const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
   if (!coarse.found) return {};
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
   const Status status = judge(scene, fit);
@@ -169,13 +161,14 @@ SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImag
 SurfaceTracker::Found SurfaceTracker::try_start(const Scene& scene, const LightImage& light,
                                                 const PoseUnknowns& start) const {
   const CoarseFit coarse = fit_coarsely(scene, start, {});
-  if (!coarse.found || coarse.rotation_score < least_rotation_score) return {};
-  if (coarse.rival_score > rival_ratio * coarse.rotation_score) return refusal(Status::ambiguous, coarse.unknowns);
+  if (!coarse.found || coarse.rotation_score < detection_limits.least_rotation_score) return {};
+  if (coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
+    return refusal(Status::ambiguous, coarse.unknowns);
   const FineFit first = fit_finely(scene, light, coarse.unknowns, {});
   const Status judged = judge(scene, first);
   if (judged == Status::ok) return {judged, first, {}};
   if (judged == Status::marker_mismatch) return refusal(judged, first.unknowns);
-  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, near_by);
+  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, detection_limits.near_by);
   if (!nearer.found) return {};
   const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
   const Status status = judge(scene, fit);
@@ -207,20 +200,18 @@ SurfaceTracker::Found SurfaceTracker::detect(const Scene& scene, const LightImag
 // tell which is ours.
 bool SurfaceTracker::has_rival(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
                                const FineFit& fit) const {
-  constexpr double apart_radii = 1;
   const auto middle = [&](const PoseUnknowns& unknowns) {
     const Eigen::Vector3d along(0, 0, scene.marker.length_m() / 2);
     return scene.camera.raw_from_point(unknowns.pose().camera_from_unrolled * along);
   };
-  const double radius_px =
-      scene.marker.radius_m() / fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
+  const double apart_px = detection_limits.rival_apart_radii * scene.marker.radius_m() /
+                          fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
   for (const Blob& blob : blobs)
     for (const PoseUnknowns& start : initial_poses(scene, blob, std::nullopt)) {
-      if ((middle(start) - middle(fit.unknowns)).norm() < apart_radii * radius_px) continue;
+      if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
       const Found other = try_start(scene, light, start);
       if (other.status == Status::marker_mismatch) return true;
-      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_radii * radius_px)
-        return true;
+      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return true;
     }
   return false;
 }
@@ -252,8 +243,8 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     if (!found.fit) {
       memory_[i].reset();
       if (!blobs) {
-        blobs = find_blobs(image, classes_, grid_px, least_samples);
-        if (blobs->size() > most_blobs) blobs->resize(most_blobs);
+        blobs = find_blobs(image, classes_, grid_px, detection_limits.least_samples);
+        if (blobs->size() > detection_limits.most_blobs) blobs->resize(detection_limits.most_blobs);
       }
       found = detect(scene, light, *blobs, camera_from_rcm);
       if (found.fit && !camera_from_rcm && has_rival(scene, light, *blobs, *found.fit))
