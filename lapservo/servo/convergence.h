@@ -17,7 +17,7 @@ class Convergence {
     if (!since_s_) return;
     squares_ += error.cwiseAbs2();
     ++count_;
-    if (time_s - *since_s_ >= for_s) reached_s_ = since_s_;
+    if (!reached_s_ && time_s - *since_s_ >= for_s) reached_s_ = *since_s_;
   }
 
   /// Start of the first such second.
