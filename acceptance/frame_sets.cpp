@@ -11,6 +11,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/kinematics/visibility.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/sample_frames.h"
 
@@ -136,8 +137,7 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
   Random random(set.seed);
   std::vector<ShaftModel> shafts;
   for (const Instrument& instrument : rig.instruments) {
-    ShaftModel shaft;
-    shaft.marker = instrument.marker;
+    ShaftModel shaft = shaft_of(instrument);
     shaft.blotches = blotches(instrument.marker, set.blood, random);
     shafts.push_back(shaft);
   }
@@ -153,7 +153,7 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
       std::vector<ShaftPlacement> placed;
       for (std::size_t i = 0; i < now.size(); ++i) {
         const auto q = RcmCoordinates::from_vector(now[i].vector() + share * (next[i].vector() - now[i].vector()));
-        placed.push_back({*rig.instruments[i].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad});
+        placed.push_back(placement_of(rig.instruments[i], q));
       }
       exposure.push_back(placed);
     }

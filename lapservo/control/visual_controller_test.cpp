@@ -528,13 +528,13 @@ TEST_P(Holding, NamesEveryReason) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, Holding, ::testing::Values(ControlMode::fused, ControlMode::paper),
-                         [](const auto& mode) { return std::string(mode_word(mode.param)); });
+                         [](const auto& mode) { return std::string(to_string(mode.param)); });
 
 TEST(VisualController, NothingMakesItLeaveItsLimits) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   for (const ControlMode mode : {ControlMode::fused, ControlMode::paper, ControlMode::uncalibrated}) {
     for (std::uint64_t seed = 1; seed <= 15; ++seed) {
-      SCOPED_TRACE(std::string(mode_word(mode)) + " seed " + std::to_string(seed));
+      SCOPED_TRACE(std::string(to_string(mode)) + " seed " + std::to_string(seed));
       Random chance(seed);
       Flaws flaws = usual_flaws();
       flaws.hidden = [&](double) { return chance.uniform() < 0.1; };
@@ -584,8 +584,8 @@ TEST(VisualController, SaysWhatIsWrongWithAConfiguration) {
   config.observer.delay_s = 1;
   EXPECT_NE(message(config).find("observer.delay_s"), std::string::npos);
   EXPECT_THROW(VisualController({}, {}), InputError) << "a model is needed";
-  EXPECT_EQ(mode_from_word("default"), ControlMode::fused);
-  EXPECT_FALSE(mode_from_word("magic"));
+  EXPECT_EQ(control_mode_from_string("default"), ControlMode::fused);
+  EXPECT_FALSE(control_mode_from_string("magic"));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "lapservo/experiments/rcm.h"
 #include "lapservo/experiments/rotation.h"
 #include "lapservo/experiments/stage.h"
+#include "lapservo/rig/single_instrument.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo {

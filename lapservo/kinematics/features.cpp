@@ -5,6 +5,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
 
 namespace lapservo {
 
@@ -14,7 +15,7 @@ std::optional<CentreLine> centre_line(const Camera& camera, const Marker& marker
   if (!view) return std::nullopt;
   CentreLine line;
   line.facing_azimuth_rad = view->facing_azimuth_rad;
-  line.tau_rad = wrap_two_pi(view->facing_azimuth_rad - psi_rad - marker.seam_rad);
+  line.tau_rad = wrap_two_pi(marker_azimuth_rad(marker, view->facing_azimuth_rad, psi_rad));
   const auto along_m = boundaries_m(marker, line.tau_rad);
   for (std::size_t k = 0; k < 4; ++k) {
     line.points_in_camera_m[k] =

@@ -91,7 +91,7 @@ TEST(ImageFeatures, WhatIsNotOkIsNotFound) {
   for (const Status status : {Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit,
                               Status::uncertain, Status::interlaced}) {
     observation.status = status;
-    EXPECT_FALSE(measurement_of(observation, 0, rcm_image_px(rig, {})).found) << status_word(status);
+    EXPECT_FALSE(measurement_of(observation, 0, rcm_image_px(rig, {})).found) << to_string(status);
   }
 }
 

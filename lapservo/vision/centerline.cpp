@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo {
@@ -205,7 +206,7 @@ std::optional<RcmCoordinates> configuration_from(const Camera& camera, const Ins
   const auto line = centre_line(camera, instrument.marker, unrolled, 0);
   if (!line) return std::nullopt;
   return RcmCoordinates{wrap_pi(x[0]), x[1], x[2],
-                        wrap_pi(line->facing_azimuth_rad - tau_rad - instrument.marker.seam_rad)};
+                        wrap_pi(rotation_rad(instrument.marker, line->facing_azimuth_rad, tau_rad))};
 }
 
 double tau_from(const CrossRatioDecoder& decoder, const Edges& e) {

@@ -11,6 +11,8 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/heaviest_stretch.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/line_segmentation.h"
 #include "lapservo/vision/normal_equations.h"
@@ -40,26 +42,12 @@ Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azi
   return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
 }
 
-// The stretch [first, last] of a section with the most marker colour in it (maximum subarray).
-struct Stretch {
-  int first = 0, last = -1;
-};
-Stretch most_colorful_stretch(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands) {
-  Stretch best, current{0, -1};
-  float best_sum = 0, sum = 0;
-  for (int i = 0; i < static_cast<int>(classes.size()); ++i) {
+// The stretch of a section with the most marker colour in it.
+Stretch<float> most_colorful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
+  return heaviest_stretch(0, static_cast<int>(classes.size()), [&](int i) {
     const std::uint8_t color = classes[static_cast<std::size_t>(i)];
-    const bool ours = color == bands[0] || color == bands[1] || color == bands[2];
-    sum += ours ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
-    if (sum <= 0) {
-      sum = 0;
-      current.first = i + 1;
-    } else if (sum > best_sum) {
-      best_sum = sum;
-      best = {current.first, i};
-    }
-  }
-  return best;
+    return scene.is_ours(color) ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
+  });
 }
 
 // Sections across the shaft: where its colours begin and end.
@@ -80,7 +68,7 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), most_reach);
     classes.clear();
     for (int i = -reach; i <= reach; ++i) classes.push_back(scene.class_at(middle + i * step_px * across));
-    const Stretch stretch = most_colorful_stretch(classes, scene.bands);
+    const Stretch<float> stretch = most_colorful_stretch(classes, scene);
     const double width_px = (stretch.last - stretch.first + 1) * step_px;
     if (width_px < detection_limits.narrowest_section * 2 * half_px ||
         width_px > detection_limits.widest_section * 2 * half_px)
@@ -177,7 +165,8 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
   for (const BoundaryPoint& b : boundaries) {
     const bool inner = b.boundary == 1 || b.boundary == 2;
     if (inner && !with_rotation) continue;
-    const double along_m = boundaries_m(scene.marker, b.azimuth_rad - pose.psi_rad - scene.marker.seam_rad)[b.boundary];
+    const double along_m =
+        boundaries_m(scene.marker, marker_azimuth_rad(scene.marker, b.azimuth_rad, pose.psi_rad))[b.boundary];
     const double slope_m = slopes_m[b.boundary];
     const Eigen::Vector3d tangent = scene.marker.radius_m() * azimuth_direction(b.azimuth_rad) + slope_m * axes.col(2);
     add_curve_distance(scene, unknowns, point_on(pose, scene.marker, b.azimuth_rad, along_m), tangent, -slope_m,
@@ -207,7 +196,8 @@ class RotationScore {
   double at(double psi_rad) const {
     int score = 0;
     for (std::size_t i = 0; i < line_count; ++i) {
-      const auto ends_m = boundaries_m(scene_.marker, surface_.lines[i].azimuth_rad - psi_rad - scene_.marker.seam_rad);
+      const auto ends_m =
+          boundaries_m(scene_.marker, marker_azimuth_rad(scene_.marker, surface_.lines[i].azimuth_rad, psi_rad));
       std::array<const std::array<int, 3>*, 4> sums;
       for (std::size_t k = 0; k < 4; ++k) sums[k] = &sums_[i][index(ends_m[k])];
       for (std::size_t band = 0; band < 3; ++band) score += (*sums[band + 1])[band] - (*sums[band])[band];

@@ -7,6 +7,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/edge_lines.h"
 #include "lapservo/vision/limits.h"
 
@@ -67,7 +68,7 @@ struct Frame {
     return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
                     edge_limits.film_most_lit);
   }
-  double tau(double azimuth_rad) const { return azimuth_rad - unknowns.pose().psi_rad - marker().seam_rad; }
+  double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
 
   // The line through a point of the image, when all of it can be sampled.
   std::optional<EdgeLine> edge_line(const Eigen::Vector2d& centre_px, const Eigen::Vector2d& direction, int before,

@@ -8,14 +8,14 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo {
 namespace {
 
-using theatre::Shot;
-using theatre::usual_shot;
+using scenes::Shot;
+using scenes::usual_shot;
 
 Observation observe(const Shot& shot, bool with_rcm) {
   Rig rig = shot.rig;
@@ -24,7 +24,7 @@ Observation observe(const Shot& shot, bool with_rcm) {
 }
 
 Shot distorted_shot(std::uint64_t seed) {
-  Rig rig = theatre::usual_rig();
+  Rig rig = scenes::usual_rig();
   rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
   return Shot(seed, {}, rig);
 }
@@ -47,7 +47,7 @@ TEST(Observation, EveryStatusHasAWordOfItsOwn) {
   for (const Status status :
        {Status::ok, Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit,
         Status::uncertain, Status::marker_mismatch, Status::damaged, Status::few_colors, Status::interlaced}) {
-    const std::string_view word = status_word(status);
+    const std::string_view word = to_string(status);
     EXPECT_FALSE(word.empty());
     EXPECT_EQ(word.find_first_of(" ,\"\n"), std::string_view::npos) << word;
     EXPECT_TRUE(words.insert(word).second) << word;
@@ -75,7 +75,7 @@ void expect_consistent(const Shot& shot, bool with_rcm) {
   EXPECT_EQ(o.features.r_px.has_value(), with_rcm);
   ASSERT_EQ(o.rcm.has_value(), with_rcm);
   if (!with_rcm) return;
-  const ShaftPose pose = theatre::pose_of(shot.rig, 0, o.rcm->q);
+  const ShaftPose pose = scenes::pose_of(shot.rig, 0, o.rcm->q);
   EXPECT_LT((pose.camera_from_unrolled.translation - o.camera_from_unrolled.translation).norm(), 1e-12);
   EXPECT_NEAR(wrap_pi(pose.psi_rad - o.psi_rad), 0, 1e-12);
   EXPECT_LT(std::abs(o.rcm->q.psi_rad), pi + 1e-12);
@@ -106,7 +106,7 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
     for (int i = 0; i < samples; ++i) {
       const Eigen::Vector4d deviate(random.normal(), random.normal(), random.normal(), random.normal());
       const auto q = RcmCoordinates::from_vector(o.rcm->q.vector() + root * deviate);
-      const ShaftPose pose = theatre::pose_of(shot.rig, 0, q);
+      const ShaftPose pose = scenes::pose_of(shot.rig, 0, q);
       const auto line =
           centre_line(shot.rig.camera, shot.rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad);
       ASSERT_TRUE(line);
@@ -120,7 +120,7 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
 // camera_from_rcm r counts from the RCM's image, as it does for the servo.
 TEST(Observation, ErrorsOfTheFeaturesAreAsTheirCovarianceSays) {
   constexpr int shots = 40;
-  const Rig rig = theatre::usual_rig();
+  const Rig rig = scenes::usual_rig();
   Rig unregistered = rig;
   unregistered.instruments[0].camera_from_rcm.reset();
   const auto rcm_px = projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm);
@@ -148,11 +148,11 @@ TEST(Observation, ErrorsOfTheFeaturesAreAsTheirCovarianceSays) {
 
 // Whatever is shown: a status, and nothing that is not a number.
 TEST(Observation, IsFiniteForEveryStatus) {
-  const Rig rig = theatre::usual_rig(3);
+  const Rig rig = scenes::usual_rig(3);
   Random random(1);
   std::vector<RcmCoordinates> q;
-  for (std::size_t i = 0; i < 3; ++i) q.push_back(theatre::random_configuration(rig, i, random));
-  const cv::Mat usual = theatre::render(rig, q, 1);
+  for (std::size_t i = 0; i < 3; ++i) q.push_back(scenes::random_configuration(rig, i, random));
+  const cv::Mat usual = scenes::render(rig, q, 1);
   const cv::Size size = usual.size();
   std::vector<cv::Mat> images{cv::Mat::zeros(size, CV_8UC3), cv::Mat(size, CV_8UC3, cv::Scalar::all(255)),
                               cv::Mat(size, CV_8UC3, cv::Scalar(20, 200, 110)), usual};

@@ -6,6 +6,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/agreement_search.h"
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/initial_pose.h"
@@ -72,7 +73,7 @@ std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scen
   const double mismatch_rad = std::atan2((fitted.rotation * z).cross(through_rcm.rotation * z).norm(),
                                          (fitted.rotation * z).dot(through_rcm.rotation * z));
   if (!view || !(mismatch_rad < registration_limits.largest_mismatch_rad)) return std::nullopt;
-  q->psi_rad = view->facing_azimuth_rad - tau_rad - scene.marker.seam_rad;
+  q->psi_rad = rotation_rad(scene.marker, view->facing_azimuth_rad, tau_rad);
   const double angle_variance =
       mismatch_rad * mismatch_rad + fit.covariance(fit.unknowns.size() - 1, fit.unknowns.size() - 1);
   const double rho_variance = mismatch_rad * mismatch_rad * q->rho_m * q->rho_m + fit.covariance(4, 4);

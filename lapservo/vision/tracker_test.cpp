@@ -5,12 +5,12 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 
 namespace lapservo {
 namespace {
 
-using theatre::usual_shot;
+using scenes::usual_shot;
 
 // `for (const Observation& o : Tracker(rig).track(image))` once read freed memory.
 TEST(Tracker, OneThatIsATemporaryGivesItsObservationsAway) {
