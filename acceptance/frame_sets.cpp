@@ -12,6 +12,7 @@
 #include "lapservo/io/image_file.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/visibility.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/sample_frames.h"
 
@@ -61,8 +62,7 @@ std::optional<fs::path> sample_folder() {
   return lapservo::testing::sample_frames();
 }
 
-std::vector<TrueFrame> sample_frames(const std::string& set) {
-  const fs::path folder = sample_folder().value() / set;
+std::vector<TrueFrame> frames_in(const fs::path& folder) {
   const CsvTable table = CsvTable::read(folder / "truth.csv");
   std::vector<TrueFrame> frames;
   std::string last_file;
@@ -86,6 +86,14 @@ std::vector<TrueFrame> sample_frames(const std::string& set) {
     frames.back().truths.push_back(truth);
   }
   return frames;
+}
+
+std::vector<TrueFrame> sample_frames(const std::string& set) {
+  return frames_in(sample_folder().value() / set);
+}
+
+std::vector<TrueFrame> stored_frames(const std::string& set) {
+  return frames_in(lapservo::testing::source_folder() / "acceptance/frames" / set);
 }
 
 Score score_single(const std::vector<TrueFrame>& frames) {
@@ -131,8 +139,7 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
   Random random(set.seed);
   std::vector<ShaftModel> shafts;
   for (const Instrument& instrument : rig.instruments) {
-    ShaftModel shaft;
-    shaft.marker = instrument.marker;
+    ShaftModel shaft = shaft_of(instrument);
     shaft.blotches = blotches(instrument.marker, set.blood, random);
     shafts.push_back(shaft);
   }
@@ -148,7 +155,7 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
       std::vector<ShaftPlacement> placed;
       for (std::size_t i = 0; i < now.size(); ++i) {
         const auto q = RcmCoordinates::from_vector(now[i].vector() + share * (next[i].vector() - now[i].vector()));
-        placed.push_back({*rig.instruments[i].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad});
+        placed.push_back(placement_of(rig.instruments[i], q));
       }
       exposure.push_back(placed);
     }

@@ -48,8 +48,14 @@ double largest(const std::vector<double>& values);
 /// The folder of ray-traced samples, when it is there: LAPSERVO_FRAMES or ../shared/frames.
 std::optional<std::filesystem::path> sample_folder();
 
-/// The frames of one of its sets, in order. A frame's rig is NNNN.rig.yaml or rig.yaml.
+/// The frames of a folder with truth.csv, in order. A frame's rig is NNNN.rig.yaml or rig.yaml.
+std::vector<TrueFrame> frames_in(const std::filesystem::path& folder);
+
+/// Those of one of the samples' sets.
 std::vector<TrueFrame> sample_frames(const std::string& set);
+
+/// Those of a set under acceptance/frames, which are in this repository.
+std::vector<TrueFrame> stored_frames(const std::string& set);
 
 /// Every frame on its own.
 Score score_single(const std::vector<TrueFrame>& frames);

@@ -50,7 +50,7 @@ struct Tally {
   // The seam's error is none that a picture could show.
   void add(const Observation& o, double true_psi_rad, double seam_error_rad) {
     ++frames;
-    ++statuses[std::string(status_word(o.status))];
+    ++statuses[std::string(to_string(o.status))];
     if (o.status != Status::ok || !o.rcm) return;
     const double error_rad = wrap_pi(o.rcm->q.psi_rad - true_psi_rad - seam_error_rad);
     wrong += std::abs(error_rad) > 0.1;

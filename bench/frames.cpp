@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/geometry/rotation.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo::bench {
@@ -85,13 +86,7 @@ Rig fixed_marker_rig(cv::Size size_px) {
 }
 
 Renderer make_renderer(const Rig& rig) {
-  std::vector<ShaftModel> shafts;
-  for (const Instrument& instrument : rig.instruments) {
-    ShaftModel shaft;
-    shaft.marker = instrument.marker;
-    shafts.push_back(shaft);
-  }
-  return Renderer(rig.camera, shafts, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
+  return Renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
 }
 
 std::vector<RcmCoordinates> configurations(const Rig& rig, int index) {
@@ -109,8 +104,7 @@ std::vector<RcmCoordinates> configurations(const Rig& rig, int index) {
 std::vector<ShaftPlacement> placements(const Rig& rig, int index) {
   std::vector<ShaftPlacement> placed;
   const auto all = configurations(rig, index);
-  for (std::size_t i = 0; i < all.size(); ++i)
-    placed.push_back({*rig.instruments[i].camera_from_rcm * rcm_from_unrolled(all[i]), all[i].psi_rad});
+  for (std::size_t i = 0; i < all.size(); ++i) placed.push_back(placement_of(rig.instruments[i], all[i]));
   return placed;
 }
 

@@ -10,6 +10,7 @@
 #include "fuzz/small_rig.h"
 #include "lapservo/io/observation_csv.h"
 #include "lapservo/io/overlay.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/vision/tracker.h"
@@ -24,12 +25,8 @@ using fuzz::require;
 
 std::vector<cv::Mat> pictures() {
   const Rig rig = fuzz::small_rig(true, false);
-  std::vector<ShaftModel> shafts;
-  for (const Instrument& instrument : rig.instruments) shafts.push_back({.marker = instrument.marker});
-  Renderer renderer(rig.camera, shafts, make_tissue(rig.camera.width_px, rig.camera.height_px, 1));
-  const auto place = [&](const RcmCoordinates& q) {
-    return ShaftPlacement{*rig.instruments[0].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
-  };
+  Renderer renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 1));
+  const auto place = [&](const RcmCoordinates& q) { return placement_of(rig.instruments[0], q); };
   std::vector<cv::Mat> rendered;
   for (const double psi_rad : {0.3, 1.8, 3.2, 5.0})
     rendered.push_back(renderer.render(

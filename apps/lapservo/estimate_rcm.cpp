@@ -98,7 +98,7 @@ Result weighted_result(const std::vector<LineObservation>& lines, const Options&
       estimate_projected_rcm(lines, {known ? NoiseScale::known : NoiseScale::estimated, options.common_px});
   Result result;
   result.method = "weighted";
-  result.status = rcm_status_word(estimate.status);
+  result.status = to_string(estimate.status);
   result.lines = estimate.lines, result.outliers = estimate.outliers;
   if (estimate.status != RcmStatus::ok) return result;
   result.point_px = estimate.point_px;
@@ -116,11 +116,9 @@ Result pairwise_result(const std::vector<LineObservation>& lines, const Result& 
   Result result;
   result.method = "pairwise";
   result.lines = static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), is_usable));
-  const bool parallel = weighted.status == rcm_status_word(RcmStatus::parallel);
+  const bool parallel = weighted.status == to_string(RcmStatus::parallel);
   const auto mean = parallel ? std::nullopt : mean_of_intersections(lines);
-  result.status = rcm_status_word(mean               ? RcmStatus::ok
-                                  : result.lines < 2 ? RcmStatus::too_few_lines
-                                                     : RcmStatus::parallel);
+  result.status = to_string(mean ? RcmStatus::ok : result.lines < 2 ? RcmStatus::too_few_lines : RcmStatus::parallel);
   if (!mean) return result;
   result.point_px = mean->point_px;
   result.covariance_px2 = mean->covariance_px2;

@@ -21,6 +21,7 @@
 #include "lapservo/experiments/rotation.h"
 #include "lapservo/experiments/tracking.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/rig/single_instrument.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -69,8 +70,7 @@ ExperimentSetup setup_of(const Options& options) {
   ExperimentSetup setup;
   setup.rig = single_instrument(options.rig.empty() ? paper_rig() : load_rig(options.rig), options.rig);
   setup.seed = options.seed;
-  if (options.method == "centerline") setup.methods = {Method::centerline};
-  if (options.method == "surface") setup.methods = {Method::surface};
+  if (const auto method = method_from_string(options.method)) setup.methods = {*method};
   setup.options = fmt::format(" --seed {}", options.seed);
   if (!options.rig.empty()) setup.options += " --rig " + options.rig;
   if (options.method != "both") setup.options += " --method " + options.method;

@@ -13,12 +13,14 @@
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
+#include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/marker/design.h"
 #include "lapservo/marker/drawing.h"
 #include "lapservo/marker/length_code.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -67,14 +69,13 @@ Marker given_marker(const DesignOptions& options) {
   return marker;
 }
 
-std::string yaml_of(const Marker& marker) {
-  const auto list = [](const std::array<double, 3>& v) {
-    return fmt::format("[{:.8g}, {:.8g}, {:.8g}]", v[0], v[1], v[2]);
-  };
-  return fmt::format(
-      "marker:\n  diameter_m: {:.6g}\n  hues_deg: {}\n  bands_upper_m: {}\n  bands_lower_m: {}\n  seam_rad: {:.6g}\n",
-      marker.diameter_m, list(marker.hues_deg), list(marker.bands_upper_m), list(marker.bands_lower_m),
-      marker.seam_rad);
+// To eight digits, as it is written down.
+std::string yaml_of(Marker marker) {
+  const auto round = [](double& value) { value = parse_finite(fmt::format("{:.8g}", value)).value(); };
+  for (auto* bands : {&marker.bands_upper_m, &marker.bands_lower_m})
+    for (double& length_m : *bands) round(length_m);
+  round(marker.diameter_m), round(marker.seam_rad);
+  return "marker:\n" + marker_yaml(marker, 2);
 }
 
 void print_sigmas(const Marker& marker, const Viewing& viewing) {

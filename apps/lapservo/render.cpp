@@ -25,6 +25,7 @@
 #include "lapservo/io/video_writer.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/kinematics/visibility.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/sim/truth.h"
@@ -41,10 +42,6 @@ struct Options {
   bool moving = false, video = false, force = false;
   double fps = 30, light = 1, smoke = 0, blood = 0, noise = 1, blur_px = 0.8, motion = 0, film_mm = 0.1;
 };
-
-ShaftPlacement placement_of(const Instrument& instrument, const RcmCoordinates& q) {
-  return {*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
-}
 
 RcmCoordinates random_configuration(const Camera& camera, const Instrument& instrument, const std::string& rig,
                                     Random& random) {
@@ -115,8 +112,7 @@ Renderer make_renderer(const Rig& rig, const Options& options) {
   Random random(options.seed + 1);
   std::vector<ShaftModel> shafts;
   for (const Instrument& instrument : rig.instruments) {
-    ShaftModel shaft;
-    shaft.marker = instrument.marker;
+    ShaftModel shaft = shaft_of(instrument);
     shaft.film_m = 1e-3 * options.film_mm;
     shaft.blotches = blotches(instrument.marker, options.blood, random);
     shafts.push_back(std::move(shaft));

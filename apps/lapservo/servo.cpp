@@ -28,6 +28,7 @@
 #include "lapservo/experiments/setup.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/rig/single_instrument.h"
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
@@ -60,7 +61,7 @@ Eigen::Vector4d four(const std::vector<double>& values) {
 
 ControllerConfig controller_of(const Options& options, const Rig& rig) {
   ControllerConfig config;
-  const auto mode = mode_from_word(options.method);
+  const auto mode = control_mode_from_string(options.method);
   if (!mode) throw InputError("--method", "is " + options.method + ", expected default, paper or uncalibrated");
   if (*mode == ControlMode::paper) config = paper_controller(1 / options.fps);
   config.mode = *mode;
@@ -268,7 +269,7 @@ int simulate(const Options& options) {
                   static_cast<int>(std::lround(options.duration_s / config.controller.period_s)));
   lapservo::run(simulator, simulator, simulator, config, trajectory, options.duration_s, watcher);
   const Summary& summary = watcher.finish();
-  std::printf("method %s, seen by %s\n%s\n", std::string(mode_word(config.controller.mode)).c_str(),
+  std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
               summary.text().c_str());
   if (folder) {

@@ -95,7 +95,7 @@ class RigByFrame {
     inputs.add_rig(path, rig_);
     refuse_outputs(options_, inputs);
     path_ = path;
-    const Method method = options_.method == "centerline" ? Method::centerline : Method::surface;
+    const Method method = method_from_string(options_.method).value();
     tracker_.emplace(rig_, TrackerOptions{method, options_.single, options_.deinterlace});
   }
 

@@ -25,6 +25,7 @@
 #include "lapservo/io/frame_source.h"
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/rigs.h"
@@ -37,17 +38,7 @@ using namespace lapservo::internal;
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr double longest_s = 30;  // sanitizers make everything several times slower
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-constexpr double longest_s = 30;
-#else
-constexpr double longest_s = 5;
-#endif
-#else
-constexpr double longest_s = 5;
-#endif
+constexpr double longest_s = LAPSERVO_CAMPAIGN_LONGEST_S;  // a case may take
 constexpr double largest_error_rad = 0.1;
 
 // What the cases of one kind came to.
@@ -112,9 +103,7 @@ struct Sample {
 
 std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
   const Instrument& instrument = rig.instruments.front();
-  ShaftModel shaft;
-  shaft.marker = instrument.marker;
-  Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 1));
+  Renderer renderer(rig.camera, {shaft_of(instrument)}, make_tissue(rig.camera.width_px, rig.camera.height_px, 1));
   std::vector<cv::Mat> frames;
   std::vector<double> psi_rad;
   const cv::Size size(rig.camera.width_px, rig.camera.height_px);
@@ -122,7 +111,7 @@ std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
     RcmCoordinates q = configuration_through(*instrument.camera_from_rcm, {-0.012, 0.004, 0.1}).value();
     q.psi_rad = 1;
     q.psi_rad += 0.1 * i;
-    frames.push_back(renderer.render({{*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad}}, 7));
+    frames.push_back(renderer.render({placement_of(instrument, q)}, 7));
     psi_rad.push_back(q.psi_rad);
   }
   std::vector<Sample> all;

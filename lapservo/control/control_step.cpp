@@ -1,17 +1,19 @@
 #include "lapservo/control/control_step.h"
 
+#include "lapservo/core/words.h"
+
 namespace lapservo {
+using namespace internal;
+namespace {
+
+constexpr Words<ControlAction, 3> words{
+    {{ControlAction::track, "track"}, {ControlAction::probe, "probe"}, {ControlAction::hold, "hold"}}};
+static_assert(names_all(words, ControlAction::hold));
+
+}  // namespace
 
 std::string_view to_string(ControlAction action) {
-  switch (action) {
-    case ControlAction::track:
-      return "track";
-    case ControlAction::probe:
-      return "probe";
-    case ControlAction::hold:
-      return "hold";
-  }
-  return "";
+  return word_of(words, action);
 }
 
 }  // namespace lapservo

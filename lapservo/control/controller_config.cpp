@@ -7,6 +7,7 @@
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/words.h"
 
 namespace lapservo {
 using namespace internal;
@@ -83,25 +84,20 @@ void check_learning(const ControllerConfig& config) {
   require_positive("probing.joint_time_s", config.probing.joint_time_s);
 }
 
+constexpr Words<ControlMode, 4> mode_words{{{ControlMode::fused, "default"},
+                                            {ControlMode::fused, "fused"},
+                                            {ControlMode::paper, "paper"},
+                                            {ControlMode::uncalibrated, "uncalibrated"}}};
+static_assert(names_all(mode_words, ControlMode::uncalibrated));
+
 }  // namespace
 
-std::string_view mode_word(ControlMode mode) {
-  switch (mode) {
-    case ControlMode::fused:
-      return "default";
-    case ControlMode::paper:
-      return "paper";
-    case ControlMode::uncalibrated:
-      return "uncalibrated";
-  }
-  return "";
+std::string_view to_string(ControlMode mode) {
+  return word_of(mode_words, mode);
 }
 
-std::optional<ControlMode> mode_from_word(std::string_view word) {
-  if (word == "default" || word == "fused") return ControlMode::fused;
-  if (word == "paper") return ControlMode::paper;
-  if (word == "uncalibrated") return ControlMode::uncalibrated;
-  return std::nullopt;
+std::optional<ControlMode> control_mode_from_string(std::string_view word) {
+  return read_word(mode_words, word);
 }
 
 ControllerConfig paper_controller(double period_s) {

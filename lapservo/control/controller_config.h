@@ -12,9 +12,9 @@ enum class ControlMode {
   paper,         ///< eq. (21) as it stands, on the latest image alone
   uncalibrated,  ///< no model: the Jacobian is probed, then learnt on the way
 };
-std::string_view mode_word(ControlMode mode);
+std::string_view to_string(ControlMode mode);
 /// "default" and "fused", "paper", "uncalibrated"; nullopt for anything else.
-std::optional<ControlMode> mode_from_word(std::string_view word);
+std::optional<ControlMode> control_mode_from_string(std::string_view word);
 
 /// Typical sizes, by which radians, metres and pixels are compared.
 struct Scales {

@@ -17,7 +17,7 @@ void Estimator::advance_probing(double) {}
 
 std::unique_ptr<Estimator> make_estimator(const ControllerConfig& config, const FeatureModel& model) {
   if (!model && config.mode != ControlMode::uncalibrated)
-    throw InputError("controller", "mode", std::string(mode_word(config.mode)), "a model (camera_from_rcm in the rig)");
+    throw InputError("controller", "mode", std::string(to_string(config.mode)), "a model (camera_from_rcm in the rig)");
   switch (config.mode) {
     case ControlMode::fused:
       return std::make_unique<FusedEstimator>(config, model);

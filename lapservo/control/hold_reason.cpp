@@ -1,37 +1,30 @@
 #include "lapservo/control/hold_reason.h"
 
+#include "lapservo/core/words.h"
+
 namespace lapservo {
+using namespace internal;
+namespace {
+
+constexpr Words<HoldReason, 13> words{{{HoldReason::none, "none"},
+                                       {HoldReason::no_image_yet, "no_image_yet"},
+                                       {HoldReason::marker_lost, "marker_lost"},
+                                       {HoldReason::stale_image, "stale_image"},
+                                       {HoldReason::outlier, "outlier"},
+                                       {HoldReason::no_history, "no_history"},
+                                       {HoldReason::not_modelled, "not_modelled"},
+                                       {HoldReason::singular, "singular"},
+                                       {HoldReason::not_following, "not_following"},
+                                       {HoldReason::not_learnt, "not_learnt"},
+                                       {HoldReason::bad_time, "bad_time"},
+                                       {HoldReason::non_finite, "non_finite"},
+                                       {HoldReason::arm_not_enabled, "arm_not_enabled"}}};
+static_assert(names_all(words, HoldReason::arm_not_enabled));
+
+}  // namespace
 
 std::string_view to_string(HoldReason reason) {
-  switch (reason) {
-    case HoldReason::none:
-      return "none";
-    case HoldReason::no_image_yet:
-      return "no_image_yet";
-    case HoldReason::marker_lost:
-      return "marker_lost";
-    case HoldReason::stale_image:
-      return "stale_image";
-    case HoldReason::outlier:
-      return "outlier";
-    case HoldReason::no_history:
-      return "no_history";
-    case HoldReason::not_modelled:
-      return "not_modelled";
-    case HoldReason::singular:
-      return "singular";
-    case HoldReason::not_following:
-      return "not_following";
-    case HoldReason::not_learnt:
-      return "not_learnt";
-    case HoldReason::bad_time:
-      return "bad_time";
-    case HoldReason::non_finite:
-      return "non_finite";
-    case HoldReason::arm_not_enabled:
-      return "arm_not_enabled";
-  }
-  return "";
+  return word_of(words, reason);
 }
 
 }  // namespace lapservo

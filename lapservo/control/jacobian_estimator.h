@@ -10,11 +10,11 @@
 namespace lapservo::internal {
 
 /// Learns image and Jacobian online from joint readings and features alone: no camera, marker or registration. The
-/// model is y(q) = y0 + G (q - q0) about the latest image's joints q0; y0 and the rows of G follow random walks whose
-/// steps grow with the motion since the image before, so old motion is forgotten by distance, not by time, and nothing
-/// is forgotten at rest (no wind-up, and no noise is learnt). It is recursive least squares, in the form of a Kalman
-/// filter with one 5x5 covariance shared by all eight outputs, since their regressors and scaled noise are the same;
-/// with no memory (bend -> infinity) it becomes Broyden's rank-one update.
+/// model is y(q) = y0 + G (q - q0) about the latest image's joints q0. G follows a random walk whose steps grow with
+/// the motion since the image before, so what was learnt of it is forgotten by distance, not by time, and at rest not
+/// at all (no wind-up, and no noise is learnt); y0 walks by time too. It is recursive least squares, in the form of a
+/// Kalman filter with one 5x5 covariance shared by all eight outputs, since their regressors and scaled noise are the
+/// same. The more a step of G outweighs all else (bend -> infinity), the nearer it comes to Broyden's rank-one update.
 /// Compare Jagersand, Fuentes and Nelson 1997, Hosoda and Asada 1994.
 class JacobianEstimator {
  public:

@@ -100,6 +100,7 @@ TEST(VelocityQp, IsFeasibleAndAsGoodAsBruteForce) {
 
 /// Stationarity, sign of the multipliers and complementary slackness over many more problems.
 TEST(VelocityQp, NoFeasibleDirectionImprovesTheSolution) {
+  int directions = 0;
   for (std::uint64_t seed = 1; seed <= 5000; ++seed) {
     Random random(seed);
     const Problem p = random_problem(random);
@@ -113,8 +114,10 @@ TEST(VelocityQp, NoFeasibleDirectionImprovesTheSolution) {
       for (int halvings = 0; halvings < 30 && worst_violation(p, z) > 0; ++halvings) z = (z + p.start) / 2;
       if (worst_violation(p, z) > 0) continue;
       ASSERT_GE(gradient.dot(z - solution.x), -1e-6 * (1 + gradient.norm())) << "seed " << seed;
+      ++directions;
     }
   }
+  EXPECT_GT(directions, 20000);
 }
 
 TEST(VelocityQp, ReturnsTheWantedPointWhenItIsFeasible) {

@@ -1,6 +1,7 @@
 #include "lapservo/control/visual_controller.h"
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -283,55 +284,57 @@ Sinusoids one_joint_at_a_time() {
   return f;
 }
 
-TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
+/// The usual flaws with play in rho and psi.
+Flaws with_backlash(double latency_s, bool delay_known) {
+  Flaws flaws = usual_flaws();
+  flaws.backlash = {0, 0, 0.0001, 0.02};
+  flaws.latency_s = latency_s;
+  flaws.delay_known = delay_known;
+  return flaws;
+}
+
+/// Runs that learn the play at each latency, known or estimated, and what more is to be said of them.
+void expect_backlash_learnt(const Trajectory& trajectory, double duration_s,
+                            const std::function<void(const std::vector<Moment>&, const Flaws&)>& law) {
   for (const bool known : {true, false}) {
-    Eigen::Vector4d rms_at_zero = Eigen::Vector4d::Zero();
     for (const double latency_s : {0.0, 0.08, 0.15, 0.25}) {
       SCOPED_TRACE(std::string(known ? "known " : "estimated ") + std::to_string(latency_s));
-      Flaws flaws = usual_flaws();
-      flaws.backlash = {0, 0, 0.0001, 0.02};
-      flaws.latency_s = latency_s;
-      flaws.delay_known = known;
+      const Flaws flaws = with_backlash(latency_s, known);
       const ControllerConfig config = testing::test_config(flaws);
-      ControllerConfig unlearnt = config;
-      unlearnt.observer.backlash.largest.setZero();
-      const auto trajectory = sinusoids(one_joint_at_a_time());
-      const auto done = run(config, testing::model_of({}), flaws, trajectory, 40, 3);
-      const auto before = run(unlearnt, testing::model_of({}), flaws, trajectory, 40, 3);
+      const auto done = run(config, testing::model_of({}), flaws, trajectory, duration_s, 3);
       const Eigen::Vector4d width = done.moments.back().step.estimate->gap.width;
       for (const int i : {2, 3}) EXPECT_NEAR(width[i], flaws.backlash[i], 0.15 * flaws.backlash[i]) << i;
       EXPECT_TRUE(width.head<2>().isZero());
-      const Eigen::Vector4d rms = rms_after(done.moments, 15);
-      const Eigen::Vector4d rms_unlearnt = rms_after(before.moments, 15);
-      EXPECT_LT(rms[1], rms_unlearnt[1] / 4);
-      EXPECT_LT(rms[3], rms_unlearnt[3] / 3);
-      if (latency_s == 0) rms_at_zero = rms;
-      if (latency_s <= 0.15) {
-        EXPECT_LT(rms.cwiseQuotient(rms_at_zero).maxCoeff(), 1.2);
-      }
       expect_all_limits_kept(done, config);
+      law(done.moments, flaws);
     }
   }
 }
 
+TEST(VisualController, LearnsBacklashSoThatReversalsLeaveLittleError) {
+  const auto trajectory = sinusoids(one_joint_at_a_time());
+  Eigen::Vector4d rms_at_zero = Eigen::Vector4d::Zero();
+  expect_backlash_learnt(trajectory, 40, [&](const std::vector<Moment>& moments, const Flaws& flaws) {
+    ControllerConfig unlearnt = testing::test_config(flaws);
+    unlearnt.observer.backlash.largest.setZero();
+    const auto before = run(unlearnt, testing::model_of({}), flaws, trajectory, 40, 3);
+    const Eigen::Vector4d rms = rms_after(moments, 15);
+    const Eigen::Vector4d rms_unlearnt = rms_after(before.moments, 15);
+    EXPECT_LT(rms[1], rms_unlearnt[1] / 4);
+    EXPECT_LT(rms[3], rms_unlearnt[3] / 3);
+    if (flaws.latency_s == 0) rms_at_zero = rms;
+    if (flaws.latency_s <= 0.15) {
+      EXPECT_LT(rms.cwiseQuotient(rms_at_zero).maxCoeff(), 1.2);
+    }
+  });
+}
+
 // All joints turn at once there, twice a period.
 TEST(VisualController, LearnsBacklashOnThePapersTrajectoryToo) {
-  for (const bool known : {true, false}) {
-    for (const double latency_s : {0.0, 0.08, 0.15, 0.25}) {
-      SCOPED_TRACE(std::string(known ? "known " : "estimated ") + std::to_string(latency_s));
-      Flaws flaws = usual_flaws();
-      flaws.backlash = {0, 0, 0.0001, 0.02};
-      flaws.latency_s = latency_s;
-      flaws.delay_known = known;
-      const ControllerConfig config = testing::test_config(flaws);
-      const auto done = run(config, testing::model_of({}), flaws, sinusoids(paper_sinusoids()), 60, 3);
-      const Eigen::Vector4d width = done.moments.back().step.estimate->gap.width;
-      for (const int i : {2, 3}) EXPECT_NEAR(width[i], flaws.backlash[i], 0.15 * flaws.backlash[i]) << i;
-      EXPECT_LT(rms_after(done.moments, 30)[0], 1e-4);
-      EXPECT_LT(rms_after(done.moments, 30).tail<3>().maxCoeff(), 0.1);
-      expect_all_limits_kept(done, config);
-    }
-  }
+  expect_backlash_learnt(sinusoids(paper_sinusoids()), 60, [](const std::vector<Moment>& moments, const Flaws&) {
+    EXPECT_LT(rms_after(moments, 30)[0], 1e-4);
+    EXPECT_LT(rms_after(moments, 30).tail<3>().maxCoeff(), 0.1);
+  });
 }
 
 TEST(VisualController, RestsAtASetPointWithBacklashLearnt) {
@@ -525,13 +528,13 @@ TEST_P(Holding, NamesEveryReason) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, Holding, ::testing::Values(ControlMode::fused, ControlMode::paper),
-                         [](const auto& mode) { return std::string(mode_word(mode.param)); });
+                         [](const auto& mode) { return std::string(to_string(mode.param)); });
 
 TEST(VisualController, NothingMakesItLeaveItsLimits) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   for (const ControlMode mode : {ControlMode::fused, ControlMode::paper, ControlMode::uncalibrated}) {
     for (std::uint64_t seed = 1; seed <= 15; ++seed) {
-      SCOPED_TRACE(std::string(mode_word(mode)) + " seed " + std::to_string(seed));
+      SCOPED_TRACE(std::string(to_string(mode)) + " seed " + std::to_string(seed));
       Random chance(seed);
       Flaws flaws = usual_flaws();
       flaws.hidden = [&](double) { return chance.uniform() < 0.1; };
@@ -581,8 +584,8 @@ TEST(VisualController, SaysWhatIsWrongWithAConfiguration) {
   config.observer.delay_s = 1;
   EXPECT_NE(message(config).find("observer.delay_s"), std::string::npos);
   EXPECT_THROW(VisualController({}, {}), InputError) << "a model is needed";
-  EXPECT_EQ(mode_from_word("default"), ControlMode::fused);
-  EXPECT_FALSE(mode_from_word("magic"));
+  EXPECT_EQ(control_mode_from_string("default"), ControlMode::fused);
+  EXPECT_FALSE(control_mode_from_string("magic"));
 }
 
 }  // namespace

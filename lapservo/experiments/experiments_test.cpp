@@ -16,6 +16,7 @@
 #include "lapservo/experiments/rotation.h"
 #include "lapservo/experiments/stage.h"
 #include "lapservo/experiments/tracking.h"
+#include "lapservo/rig/single_instrument.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo::internal {

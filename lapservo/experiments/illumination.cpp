@@ -228,12 +228,13 @@ void write_data(const IlluminationResult& result, const std::filesystem::path& f
                 {"method", "position", "light_percent", "point", "u_px", "v_px", "to_centroid_px", "to_truth_px"});
   for (const auto& of_method : result.methods)
     for (const Result::Point& p : of_method.points)
-      file.row({method_word(of_method.method), p.position, 100 * Result::lights[static_cast<std::size_t>(p.light)],
-                fmt::format("e{}", p.point), p.raw_px.x(), p.raw_px.y(), p.to_centroid_px, p.to_truth_px});
+      file.row({std::string(to_string(of_method.method)), p.position,
+                100 * Result::lights[static_cast<std::size_t>(p.light)], fmt::format("e{}", p.point), p.raw_px.x(),
+                p.raw_px.y(), p.to_centroid_px, p.to_truth_px});
   DataFile largest(folder / "illumination_largest.csv", {"method", "position", "point", "largest_to_centroid_px"});
   for (const auto& of_method : result.methods)
     for (const Result::Largest& l : of_method.largest)
-      largest.row({method_word(of_method.method), l.position, fmt::format("e{}", l.point), l.px});
+      largest.row({std::string(to_string(of_method.method)), l.position, fmt::format("e{}", l.point), l.px});
   file.commit();
   largest.commit();
 }

@@ -284,7 +284,7 @@ void write_data(const RcmResult& result, const std::filesystem::path& folder) {
                          {"method", "set", "first_position", "second_position", "u_px", "v_px", "true_u_px",
                           "true_v_px", "distance_px", "angle_rad"});
   for (const auto& of_method : result.methods) {
-    const std::string word = method_word(of_method.method);
+    const std::string word(to_string(of_method.method));
     for (const Result::Intersection& at : of_method.intersections)
       intersections.row({word, at.set, at.first, at.second, at.px.x(), at.px.y(), result.true_px.x(),
                          result.true_px.y(), at.distance_px, at.angle_rad});

@@ -274,7 +274,7 @@ void write_data(const RotationResult& result, const std::filesystem::path& folde
   DataFile trials(folder / "rotation_trials.csv", {"method", "set", "trial", "initial_rad", "found", "mean_error_rad",
                                                    "std_error_rad", "rms_error_rad", "largest_error_rad"});
   for (const auto& of_method : result.methods) {
-    const std::string word = method_word(of_method.method);
+    const std::string word(to_string(of_method.method));
     for (const Result::Sample& s : of_method.samples)
       samples.row({word, s.set, s.trial, s.step, s.time_s(), s.true_rad, s.measured_rad, s.error_rad(), s.sigma_rad});
     for (int i = 0; i < all_trials; ++i) {

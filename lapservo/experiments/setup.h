@@ -23,16 +23,11 @@ struct ExperimentSetup {
 /// The rig of configs/paper.yaml, on which the paper's trajectory is feasible.
 Rig paper_rig();
 
-/// The rig with its first instrument only, which the experiments use. Throws InputError naming `source` when that has
-/// no camera_from_rcm.
-Rig single_instrument(Rig rig, const std::string& source);
-
 /// For trackers that must not know where the RCM is.
 Rig without_registration(Rig rig);
 
-/// "the paper's method" or "the default", and the word of the command line.
+/// "the paper's method" or "the default".
 std::string method_title(Method method);
-std::string method_word(Method method);
 /// The colour of a method's series in every plot.
 int method_color(Method method);
 

@@ -1,6 +1,7 @@
 #include "lapservo/experiments/stage.h"
 
 #include "lapservo/core/random.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/shaft_lighting.h"
 
 namespace lapservo::internal {
@@ -10,17 +11,15 @@ Stage::Stage(const Rig& rig, cv::Mat tissue) : rig_(rig), tissue_(std::move(tiss
 cv::Mat Stage::render(const RcmCoordinates& q, double lamp_power, std::uint64_t seed) {
   const Instrument& instrument = rig_.instruments[0];
   if (!renderer_ || lamp_power != lamp_power_) {
-    ShaftModel shaft;
-    shaft.marker = instrument.marker;
     const double lamps_share = (1 - ambient_share) * lamp_power;
     RenderOptions options;
     options.lighting.ambient = static_cast<float>(ambient_share) * options.lighting.diffuse;
     options.lighting = at_power(options.lighting, static_cast<float>(lamps_share));
-    renderer_ =
-        std::make_unique<Renderer>(rig_.camera, std::vector{shaft}, tissue_ * (lamps_share + ambient_share), options);
+    renderer_ = std::make_unique<Renderer>(rig_.camera, std::vector{shaft_of(instrument)},
+                                           tissue_ * (lamps_share + ambient_share), options);
     lamp_power_ = lamp_power;
   }
-  return renderer_->render({{*instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad}}, seed);
+  return renderer_->render({placement_of(instrument, q)}, seed);
 }
 
 Eyes::Eyes(const Rig& rig, const std::vector<Method>& methods) {

@@ -28,13 +28,16 @@ Rigid3 random_shaft(Random& random) {
 template <typename Law>
 void for_random_shafts(const Law& law) {
   Random random(seed);
+  int checked = 0;
   for (int i = 0; i < 300; ++i) {
     SCOPED_TRACE("seed " + std::to_string(seed) + ", shaft " + std::to_string(i));
     const Rigid3 camera_from_cylinder = random_shaft(random);
     const auto view = view_cylinder(camera_from_cylinder, radius_m);
     if (!view) continue;  // the camera sits inside the extended shaft
     law(camera_from_cylinder, *view, random.uniform(-0.05, 0.05));
+    ++checked;
   }
+  EXPECT_GT(checked, 200);
 }
 
 Eigen::Vector3d normal_in_camera(const Rigid3& camera_from_cylinder, double azimuth_rad) {

@@ -33,7 +33,7 @@ const char* const observation_csv_header =
 std::string observation_csv_row(int frame, double time_s, const std::string& file, const std::string& instrument,
                                 const Observation& observation) {
   std::string row = fmt::format("{},{:.6f},{},{},{}", frame, time_s, csv_field(file), csv_field(instrument),
-                                status_word(observation.status));
+                                to_string(observation.status));
   if (observation.status != Status::ok) return row.append(23, ',');
   const auto& rcm = observation.rcm;
   const auto of_q = [&](auto get) { return rcm ? std::optional<double>(get(*rcm)) : std::nullopt; };

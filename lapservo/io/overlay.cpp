@@ -12,6 +12,7 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/features.h"
+#include "lapservo/marker/azimuths.h"
 
 namespace lapservo {
 using namespace internal;
@@ -122,7 +123,7 @@ class DrawnMarker {
     double last_tau = -1;
     for (int i = 0; i <= steps; ++i) {
       const double across = 2.0 * i / steps - 1;
-      const double tau = wrap_two_pi(azimuth_rad(across) - psi_rad_ - marker_.seam_rad);
+      const double tau = wrap_two_pi(marker_azimuth_rad(marker_, azimuth_rad(across), psi_rad_));
       if (last_tau >= 0 && std::abs(tau - last_tau) > pi) {  // the seam: boundaries jump there
         stroke(pen, curve, style, boundary_color);
         curve.clear();
@@ -219,7 +220,7 @@ cv::Mat draw_overlay(const cv::Mat& bgr, const Rig& rig, const std::vector<Obser
     }
     const bool seen = o.refused.what != Observation::Refused::What::nothing;
     if (seen) draw_refused(pen, rig.camera, rig.instruments[i], o.refused);
-    pen.label(fmt::format("{}: {}{}", rig.instruments[i].name, status_word(o.status), seen ? " (dashed)" : ""),
+    pen.label(fmt::format("{}: {}{}", rig.instruments[i].name, to_string(o.status), seen ? " (dashed)" : ""),
               {12 * pen.scale(), status_y});
     status_y += line_height * pen.scale();
   }

@@ -5,6 +5,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
 
 namespace lapservo::internal {
 
@@ -14,7 +15,7 @@ std::optional<CentreLine> centre_line(const Camera& camera, const Marker& marker
   if (!view) return std::nullopt;
   CentreLine line;
   line.facing_azimuth_rad = view->facing_azimuth_rad;
-  line.tau_rad = wrap_two_pi(view->facing_azimuth_rad - psi_rad - marker.seam_rad);
+  line.tau_rad = wrap_two_pi(marker_azimuth_rad(marker, view->facing_azimuth_rad, psi_rad));
   const auto along_m = boundaries_m(marker, line.tau_rad);
   for (std::size_t k = 0; k < 4; ++k) {
     line.points_in_camera_m[k] =
@@ -34,6 +35,21 @@ Features features_of(const std::array<Eigen::Vector2d, 4>& e, const std::optiona
   f.d_px = (e[2] - e[0]).norm();
   f.cross_ratio = cross_ratio((e[1] - e[0]).norm(), (e[2] - e[1]).norm(), (e[3] - e[2]).norm());
   return f;
+}
+
+Eigen::Matrix4d features_covariance(const std::array<Eigen::Vector2d, 4>& e, const EdgesCovariance& covariance_px2,
+                                    const std::optional<Eigen::Vector2d>& rcm_ideal_px) {
+  const Eigen::Vector2d whole = e[3] - e[0], inner = e[2] - e[0];
+  Eigen::Matrix<double, 4, 8> by_points = Eigen::Matrix<double, 4, 8>::Zero();
+  const auto point = [&](int feature, Eigen::Index k) { return by_points.block<1, 2>(feature, 2 * k); };
+  point(0, 3) = Eigen::RowVector2d(whole.y(), -whole.x()) / whole.squaredNorm();
+  point(2, 3) = whole.normalized().transpose();
+  point(3, 2) = inner.normalized().transpose();
+  for (const int feature : {0, 2, 3}) point(feature, 0) = -(point(feature, 2) + point(feature, 3));
+  if (rcm_ideal_px) point(1, 0) = (e[0] - *rcm_ideal_px).normalized().transpose();
+  const Eigen::Matrix4d covariance = by_points * covariance_px2 * by_points.transpose();
+  // Symmetric to the last bit: a log holds one half of it.
+  return 0.5 * (covariance + covariance.transpose());
 }
 
 std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigid3& camera_from_rcm) {

@@ -29,6 +29,12 @@ std::optional<CentreLine> centre_line(const Camera& camera, const Marker& marker
 Features features_of(const std::array<Eigen::Vector2d, 4>& edges_ideal_px,
                      const std::optional<Eigen::Vector2d>& rcm_ideal_px);
 
+/// Covariance of s_rad, r_px, l_px, d_px, to first order, of points with that covariance. r's row and column are zero
+/// where the RCM's image is unknown; where it is known, it counts as exact.
+Eigen::Matrix4d features_covariance(const std::array<Eigen::Vector2d, 4>& edges_ideal_px,
+                                    const EdgesCovariance& covariance_px2,
+                                    const std::optional<Eigen::Vector2d>& rcm_ideal_px);
+
 /// Image of the RCM; algebraic (mirrored) when it lies behind the camera, nullopt when in its focal plane.
 std::optional<Eigen::Vector2d> projected_rcm_px(const Camera& camera, const Rigid3& camera_from_rcm);
 

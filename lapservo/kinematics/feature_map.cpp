@@ -67,26 +67,6 @@ Undefined why_no_centre_line(const Marker& marker, const Rigid3& camera_from_unr
 
 }  // namespace
 
-std::string_view undefined_word(Undefined reason) {
-  switch (reason) {
-    case Undefined::none:
-      return "none";
-    case Undefined::bad_configuration:
-      return "bad_configuration";
-    case Undefined::rcm_in_focal_plane:
-      return "rcm_in_focal_plane";
-    case Undefined::camera_inside_shaft:
-      return "camera_inside_shaft";
-    case Undefined::behind_camera:
-      return "behind_camera";
-    case Undefined::foreshortened:
-      return "foreshortened";
-    case Undefined::at_projected_rcm:
-      return "at_projected_rcm";
-  }
-  return "none";
-}
-
 FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q) {
   if (!q.vector().allFinite()) return {Undefined::bad_configuration, {}};
   const auto rcm_px = projected_rcm_px(model.camera, model.camera_from_rcm);

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <optional>
-#include <string_view>
 
 #include <Eigen/Core>
 
@@ -30,7 +29,6 @@ enum class Undefined {
   foreshortened,        ///< e0 and e3 coincide in the image (seen along the generatrix): s has no value
   at_projected_rcm,     ///< e0 lies on the projected RCM: r has a kink there
 };
-std::string_view undefined_word(Undefined reason);
 
 /// f(q) = [s_rad r_px l_px d_px] and what belongs to it.
 struct FeaturePoint {

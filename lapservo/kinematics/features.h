@@ -2,6 +2,8 @@
 
 #include <optional>
 
+#include <Eigen/Core>
+
 namespace lapservo {
 
 /// Image features on ideal pixels (eq. 12-15). `r_px` is NaN-free: absent when the RCM's image is unknown.
@@ -12,5 +14,8 @@ struct Features {
   double d_px = 0;             ///< |e2 - e0|
   double cross_ratio = 0;      ///< of |e1 - e0|, |e2 - e1|, |e3 - e2|
 };
+
+/// Of four points as one vector, e0 u, v to e3 u, v [px^2].
+using EdgesCovariance = Eigen::Matrix<double, 8, 8>;
 
 }  // namespace lapservo

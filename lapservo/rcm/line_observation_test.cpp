@@ -41,6 +41,7 @@ TEST(LineObservation, FacingGeneratrixPassesThroughTheImageOfTheAxis) {
   constexpr std::uint64_t seed = 62;
   Random random(seed);
   const Camera camera{1280, 720, 1100, 1050, 639.5, 359.5, {}, {}};
+  int checked = 0;
   for (int trial = 0; trial < 200; ++trial) {
     const Eigen::Quaterniond turn =
         Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized();
@@ -54,7 +55,9 @@ TEST(LineObservation, FacingGeneratrixPassesThroughTheImageOfTheAxis) {
     const Eigen::Vector2d from = image(0.02), along = (image(0.06) - from).normalized();
     const Eigen::Vector2d arm = camera.ideal_from_point(camera_from_shaft.translation) - from;
     EXPECT_NEAR(along.x() * arm.y() - along.y() * arm.x(), 0, 1e-8) << "seed " << seed << ", radius " << radius_m;
+    ++checked;
   }
+  EXPECT_GT(checked, 100);
 }
 
 }  // namespace

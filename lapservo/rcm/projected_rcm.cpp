@@ -10,6 +10,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "lapservo/core/random.h"
+#include "lapservo/core/words.h"
 
 namespace lapservo::internal {
 namespace {
@@ -188,20 +189,16 @@ double larger_sigma(const Eigen::Matrix2d& covariance) {
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly).eigenvalues()[1]);
 }
 
+constexpr Words<RcmStatus, 4> words{{{RcmStatus::ok, "ok"},
+                                     {RcmStatus::too_few_lines, "too_few_lines"},
+                                     {RcmStatus::parallel, "parallel"},
+                                     {RcmStatus::not_converged, "not_converged"}}};
+static_assert(names_all(words, RcmStatus::not_converged));
+
 }  // namespace
 
-std::string_view rcm_status_word(RcmStatus status) {
-  switch (status) {
-    case RcmStatus::ok:
-      return "ok";
-    case RcmStatus::too_few_lines:
-      return "too_few_lines";
-    case RcmStatus::parallel:
-      return "parallel";
-    case RcmStatus::not_converged:
-      return "not_converged";
-  }
-  return "not_converged";
+std::string_view to_string(RcmStatus status) {
+  return word_of(words, status);
 }
 
 RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const RcmOptions& options) {

@@ -31,7 +31,7 @@ enum class RcmStatus {
   parallel,       ///< where the lines meet is less certain than their distance from there, or they don't meet
   not_converged,
 };
-std::string_view rcm_status_word(RcmStatus status);
+std::string_view to_string(RcmStatus status);
 
 /// The projected RCM; all but status and lines is meaningful only when status is ok.
 struct RcmEstimate {

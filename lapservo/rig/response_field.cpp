@@ -4,7 +4,7 @@
 #include <string>
 
 #include "lapservo/core/csv.h"
-#include "lapservo/rig/known_keys.h"
+#include "lapservo/core/known_keys.h"
 
 namespace lapservo::internal {
 namespace {

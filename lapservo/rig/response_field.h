@@ -1,7 +1,7 @@
 #pragma once
 
+#include "lapservo/core/yaml_field.h"
 #include "lapservo/geometry/response.h"
-#include "lapservo/rig/yaml_field.h"
 
 namespace lapservo::internal {
 

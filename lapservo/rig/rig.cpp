@@ -8,10 +8,10 @@
 #include <string>
 #include <utility>
 
+#include "lapservo/core/known_keys.h"
+#include "lapservo/core/yaml_field.h"
 #include "lapservo/marker/decoder.h"
-#include "lapservo/rig/known_keys.h"
 #include "lapservo/rig/response_field.h"
-#include "lapservo/rig/yaml_field.h"
 
 namespace lapservo {
 using namespace internal;

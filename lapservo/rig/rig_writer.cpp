@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -57,13 +58,8 @@ std::string camera_yaml(const Camera& camera) {
 }
 
 std::string instrument_yaml(const Instrument& instrument) {
-  const Marker& marker = instrument.marker;
-  std::string text = fmt::format(
-      "  - name: {}\n    marker:\n      diameter_m: {}\n      hues_deg: {}\n      bands_upper_m: {}\n"
-      "      bands_lower_m: {}\n      seam_rad: {}\n",
-      quoted(instrument.name), marker.diameter_m, list_of(marker.hues_deg), list_of(marker.bands_upper_m),
-      list_of(marker.bands_lower_m), marker.seam_rad);
-  if (marker.tolerance_m > 0) text += fmt::format("      tolerance_m: {}\n", marker.tolerance_m);
+  std::string text =
+      fmt::format("  - name: {}\n    marker:\n{}", quoted(instrument.name), marker_yaml(instrument.marker, 6));
   if (instrument.camera_from_rcm) {
     const auto& [rotation, translation] = *instrument.camera_from_rcm;
     text += fmt::format("    camera_from_rcm:\n      translation_m: {}\n      quaternion_xyzw: {}\n",
@@ -76,6 +72,20 @@ std::string instrument_yaml(const Instrument& instrument) {
 }
 
 }  // namespace
+
+std::string marker_yaml(const Marker& marker, int indent) {
+  std::string text;
+  const auto add = [&](std::string_view key, const std::string& value) {
+    text += fmt::format("{:{}}{}: {}\n", "", indent, key, value);
+  };
+  add("diameter_m", fmt::format("{}", marker.diameter_m));
+  add("hues_deg", list_of(marker.hues_deg));
+  add("bands_upper_m", list_of(marker.bands_upper_m));
+  add("bands_lower_m", list_of(marker.bands_lower_m));
+  add("seam_rad", fmt::format("{}", marker.seam_rad));
+  if (marker.tolerance_m > 0) add("tolerance_m", fmt::format("{}", marker.tolerance_m));
+  return text;
+}
 
 std::string rig_yaml(const Rig& rig) {
   std::string text = camera_yaml(rig.camera) + "instruments:\n";

@@ -1,26 +1,25 @@
 #include "lapservo/robot/operating_state.h"
 
+#include "lapservo/core/words.h"
+
 namespace lapservo {
+using namespace internal;
+namespace {
+
+constexpr Words<OperatingState, 4> words{{{OperatingState::disabled, "DISABLED"},
+                                          {OperatingState::enabled, "ENABLED"},
+                                          {OperatingState::paused, "PAUSED"},
+                                          {OperatingState::fault, "FAULT"}}};
+static_assert(names_all(words, OperatingState::fault));
+
+}  // namespace
 
 std::string_view to_string(OperatingState state) {
-  switch (state) {
-    case OperatingState::disabled:
-      return "DISABLED";
-    case OperatingState::enabled:
-      return "ENABLED";
-    case OperatingState::paused:
-      return "PAUSED";
-    case OperatingState::fault:
-      return "FAULT";
-  }
-  return "FAULT";
+  return word_of(words, state);
 }
 
 std::optional<OperatingState> operating_state_from_string(std::string_view word) {
-  for (const OperatingState state :
-       {OperatingState::disabled, OperatingState::enabled, OperatingState::paused, OperatingState::fault})
-    if (to_string(state) == word) return state;
-  return std::nullopt;
+  return read_word(words, word);
 }
 
 }  // namespace lapservo

@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/rig/known_keys.h"
-#include "lapservo/rig/yaml_field.h"
+#include "lapservo/core/known_keys.h"
+#include "lapservo/core/yaml_field.h"
 
 namespace lapservo {
 using namespace internal;
@@ -42,7 +42,7 @@ ImageWindow read_window(const YamlField& map, ImageWindow window) {
 
 ControlMode read_mode(const YamlField& field) {
   constexpr auto expected = "default, paper or uncalibrated";
-  const auto mode = mode_from_word(field.text(expected));
+  const auto mode = control_mode_from_string(field.text(expected));
   if (!mode) field.fail(field.value_text(), expected);
   return *mode;
 }
@@ -76,7 +76,7 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
 }
 
 std::string controller_yaml(const ControllerConfig& config) {
-  std::string text = fmt::format("mode: {}\nperiod_s: {}\ngains_per_s: {}\ndelay_s: {}\n", mode_word(config.mode),
+  std::string text = fmt::format("mode: {}\nperiod_s: {}\ngains_per_s: {}\ndelay_s: {}\n", to_string(config.mode),
                                  config.period_s, list_of(config.gains.per_s),
                                  config.observer.delay_s ? fmt::format("{}", *config.observer.delay_s) : "estimate");
   text +=

@@ -13,7 +13,8 @@ namespace lapservo {
 /// and expectation.
 ControllerConfig load_controller(const std::filesystem::path& path, const ControllerConfig& base);
 
-/// Text that load_controller reads back to the same bits.
+/// Text of these keys, from which load_controller reads their values back to the same bits. What a file cannot set
+/// (scales, observer but for its delay, Jacobian, probing, damping, when to hold) is not in it.
 std::string controller_yaml(const ControllerConfig& config);
 
 }  // namespace lapservo

@@ -12,24 +12,25 @@ class Convergence {
  public:
   void add(double time_s, const Eigen::Vector4d& error) {
     const bool within = std::abs(error[0]) <= close_rad && error.tail<3>().cwiseAbs().maxCoeff() <= close_px;
-    if (!reached_s_ && !within) since_s_.reset(), squares_.setZero(), count_ = 0;
-    if (!reached_s_ && within && !since_s_) since_s_ = time_s;
-    if (!since_s_) return;
+    if (!reached_ && !within) close_ = false, squares_.setZero(), count_ = 0;
+    if (!reached_ && within && !close_) close_ = true, since_s_ = time_s;
+    if (!close_) return;
     squares_ += error.cwiseAbs2();
     ++count_;
-    if (time_s - *since_s_ >= for_s) reached_s_ = since_s_;
+    reached_ = reached_ || time_s - since_s_ >= for_s;
   }
 
   /// Start of the first such second.
-  std::optional<double> reached_s() const { return reached_s_; }
+  std::optional<double> reached_s() const { return reached_ ? std::optional(since_s_) : std::nullopt; }
   /// Of all errors from then on; zero before.
   Eigen::Vector4d rms_since() const {
-    return reached_s_ ? Eigen::Vector4d((squares_ / static_cast<double>(count_)).cwiseSqrt()) : Eigen::Vector4d::Zero();
+    return reached_ ? Eigen::Vector4d((squares_ / static_cast<double>(count_)).cwiseSqrt()) : Eigen::Vector4d::Zero();
   }
 
  private:
   static constexpr double close_px = 1, close_rad = 5e-3, for_s = 1;
-  std::optional<double> since_s_, reached_s_;
+  bool close_ = false, reached_ = false;
+  double since_s_ = 0;  ///< close
   Eigen::Vector4d squares_ = Eigen::Vector4d::Zero();
   long count_ = 0;
 };

@@ -1,16 +1,13 @@
 #include "lapservo/servo/image_features.h"
 
-#include <cstddef>
-
 #include "lapservo/kinematics/feature_map.h"
+#include "lapservo/kinematics/features.h"
 
 namespace lapservo {
 using namespace internal;
 namespace {
 
-// Of features whose fit had no configuration to carry its covariance over: s_rad, r_px, l_px, d_px.
-const Eigen::Vector4d usual_sigma(5e-4, 0.15, 0.15, 0.15);
-// What the fit's covariance does not know: the lens, the print, the registration.
+// What the fit's covariance does not know: the lens, the print, the registration; s_rad, r_px, l_px, d_px.
 const Eigen::Vector4d least_sigma(5e-5, 0.02, 0.02, 0.02);
 
 Eigen::Vector4d both_ends(const Eigen::Vector2d& first, const Eigen::Vector2d& last) {
@@ -37,26 +34,24 @@ FeatureModel feature_model(const Rig& rig) {
   };
 }
 
-ImageMeasurement measurement_of(const Observation& observation, const FeatureModel& model, double stamp_s,
+std::optional<Eigen::Vector2d> rcm_image_px(const Rig& rig, const std::optional<Eigen::Vector2d>& estimated_px) {
+  const auto& camera_from_rcm = rig.instruments.at(0).camera_from_rcm;
+  return camera_from_rcm ? projected_rcm_px(rig.camera, *camera_from_rcm) : estimated_px;
+}
+
+ImageMeasurement measurement_of(const Observation& observation, double stamp_s,
                                 const std::optional<Eigen::Vector2d>& rcm_px) {
   ImageMeasurement measurement;
   measurement.time_s = stamp_s;
-  std::optional<double> r_px = observation.features.r_px;
-  if (!r_px && rcm_px) r_px = (observation.edges_ideal_px[0] - *rcm_px).norm();
-  measurement.found = observation.status == Status::ok && r_px;
-  if (!measurement.found) return measurement;
+  if (observation.status != Status::ok || !rcm_px) return measurement;
+  const auto& edges_px = observation.edges_ideal_px;
   const Features& f = observation.features;
-  measurement.features << f.s_rad, *r_px, f.l_px, f.d_px;
-  measurement.ends_px = both_ends(observation.edges_ideal_px[0], observation.edges_ideal_px[3]);
-  measurement.covariance = usual_sigma.cwiseAbs2().asDiagonal();
-  if (!observation.rcm) return measurement;
-  measurement.q = observation.rcm->q.vector();
-  if (const auto state = model ? model(*measurement.q) : std::nullopt) {
-    measurement.covariance = feature_covariance(*state, observation.rcm->covariance);
-    measurement.covariance += least_sigma.cwiseAbs2().asDiagonal();
-    // Symmetric to the last bit: a log holds one half of it.
-    measurement.covariance = (0.5 * (measurement.covariance + measurement.covariance.transpose())).eval();
-  }
+  measurement.features << f.s_rad, (edges_px[0] - *rcm_px).norm(), f.l_px, f.d_px;
+  measurement.ends_px = both_ends(edges_px[0], edges_px[3]);
+  measurement.covariance = features_covariance(edges_px, observation.edges_covariance_px2, rcm_px);
+  measurement.covariance += least_sigma.cwiseAbs2().asDiagonal();
+  measurement.found = measurement.covariance.allFinite();
+  if (observation.rcm) measurement.q = observation.rcm->q.vector();
   return measurement;
 }
 

@@ -15,10 +15,12 @@ namespace lapservo {
 /// Empty when the rig has no camera_from_rcm.
 FeatureModel feature_model(const Rig& rig);
 
-/// What an observation tells the controller. Found only when all four features are known: r from the observation, or
-/// from `rcm_px` (the RCM's image in ideal pixels, see estimate-rcm) where the rig has no camera_from_rcm. The
-/// covariance is that of the fit, carried to the features; without camera_from_rcm a usual one.
-ImageMeasurement measurement_of(const Observation& observation, const FeatureModel& model, double stamp_s,
+/// What an observation tells the controller. Found only when all four features are known, r from `rcm_px`, the RCM's
+/// image in ideal pixels. The covariance is that of the points that were fitted, carried to the features.
+ImageMeasurement measurement_of(const Observation& observation, double stamp_s,
                                 const std::optional<Eigen::Vector2d>& rcm_px);
+
+/// The RCM's image by the rig's first instrument; where that has no camera_from_rcm, `estimated_px` (see estimate-rcm).
+std::optional<Eigen::Vector2d> rcm_image_px(const Rig& rig, const std::optional<Eigen::Vector2d>& estimated_px);
 
 }  // namespace lapservo

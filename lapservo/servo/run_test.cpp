@@ -155,10 +155,12 @@ PastRun run_case(const Case& c) {
 
 void expect_within_limits(const PastRun& done, const ControllerConfig& config) {
   constexpr double slack = 1e-9;
+  std::size_t sent = 0;
   for (std::size_t i = 1; i < done.records.size(); ++i) {
     const MotionState &before = done.records[i - 1].decision.control.setpoint,
                       &now = done.records[i].decision.control.setpoint;
     if (!done.records[i - 1].decision.send || !done.records[i].decision.send) continue;
+    ++sent;
     const Eigen::Array4d step = (now.position - before.position).cwiseAbs(),
                          change = (now.velocity - before.velocity).cwiseAbs();
     EXPECT_TRUE((step <= config.limits.rate.array() * config.period_s + slack).all()) << i;
@@ -166,6 +168,7 @@ void expect_within_limits(const PastRun& done, const ControllerConfig& config) {
     EXPECT_TRUE((now.position.array() <= config.limits.upper.array() + slack).all()) << i;
     EXPECT_TRUE((now.position.array() >= config.limits.lower.array() - slack).all()) << i;
   }
+  EXPECT_GT(2 * sent, done.records.size());
 }
 
 TEST(Run, FollowsThePapersTrajectoryFromARandomStart) {

@@ -16,20 +16,19 @@ class CallersTracking : public TrackedImageStream {
  public:
   CallersTracking(ImageStream& images, const Rig& rig, const TrackerOptions& options,
                   const std::optional<Eigen::Vector2d>& rcm_px)
-      : images_(images), model_(feature_model(rig)), tracker_(rig, options), rcm_px_(rcm_px) {}
+      : images_(images), tracker_(rig, options), rcm_px_(rcm_image_px(rig, rcm_px)) {}
 
   std::optional<TrackedImage> newest() override {
     auto image = images_.newest();
     if (!image) return std::nullopt;
     TrackedImage tracked{std::move(*image), {}, {}};
     tracked.observations = tracker_.track(tracked.image.bgr);
-    tracked.measurement = measurement_of(tracked.observations[0], model_, tracked.image.time_s, rcm_px_);
+    tracked.measurement = measurement_of(tracked.observations[0], tracked.image.time_s, rcm_px_);
     return tracked;
   }
 
  private:
   ImageStream& images_;
-  FeatureModel model_;
   Tracker tracker_;
   std::optional<Eigen::Vector2d> rcm_px_;
 };

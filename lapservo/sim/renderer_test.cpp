@@ -68,6 +68,7 @@ TEST(Renderer, BoundariesLieWhereKinematicsSays) {
     Camera camera = small_camera();
     if (distorted) camera.distortion = {-0.28, 0.09, 0.0006, -0.0004, 0};
     Renderer renderer(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
+    int checked = 0;
     for (int trial = 0; trial < 30; ++trial) {
       const ShaftPlacement placement = across_the_view(random.uniform(-pi, pi), random.uniform(-pi, pi));
       const auto line = centre_line(camera, marker(), placement.camera_from_unrolled, placement.psi_rad).value();
@@ -82,7 +83,9 @@ TEST(Renderer, BoundariesLieWhereKinematicsSays) {
         // The ends are seen slantwise over the film's edge, and the light falls off along them.
         EXPECT_NEAR(*off_px, 0, k == 0 || k == 3 ? 0.15 : 0.06) << "trial " << trial << " boundary " << k;
       }
+      ++checked;
     }
+    EXPECT_GT(checked, 20);
   }
 }
 

@@ -11,6 +11,7 @@
 #include "lapservo/kinematics/rcm_coordinates.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/edge_probe.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/testing/sample_frames.h"
 
@@ -30,8 +31,6 @@ std::vector<Pair> pairs(const fs::path& folder) {
   const CsvTable truth = CsvTable::read(folder / "truth.csv");
   const Rig rig = load_rig(folder / "rig.yaml");
   const Camera& camera = rig.camera;
-  ShaftModel shaft;
-  shaft.marker = rig.instruments[0].marker;
   std::vector<Pair> found;
   for (std::size_t row = 0; row < truth.rows(); ++row) {
     const std::string& condition = truth.text(row, "condition");
@@ -49,10 +48,10 @@ std::vector<Pair> pairs(const fs::path& folder) {
     RenderOptions options;
     options.sensor.gains = Light::Constant(gain);
     const cv::Mat background(camera.height_px, camera.width_px, CV_32FC3, cv::Scalar::all(0.2));
-    Renderer renderer(camera, {shaft}, background, options);
+    Renderer renderer(camera, {shaft_of(rig.instruments[0])}, background, options);
     const RcmCoordinates q{truth.number(row, "theta_rad"), truth.number(row, "phi_rad"), truth.number(row, "rho_m"),
                            truth.number(row, "psi_rad")};
-    pair.rendered = renderer.render({{*rig.instruments[0].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad}}, row);
+    pair.rendered = renderer.render({placement_of(rig.instruments[0], q)}, row);
     pair.gain = gain;
     found.push_back(pair);
   }

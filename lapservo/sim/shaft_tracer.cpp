@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/marker/azimuths.h"
 
 namespace lapservo::internal {
 namespace {
@@ -44,7 +45,7 @@ ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placemen
   length_m_ = static_cast<float>(marker.length_m());
   shaft_start_m_ = static_cast<float>(-model.shaft_before_m);
   shaft_end_m_ = static_cast<float>(marker.length_m() + model.shaft_beyond_m);
-  tau_facing_ = static_cast<float>(wrap_two_pi(facing_rad - placement.psi_rad - marker.seam_rad));
+  tau_facing_ = static_cast<float>(wrap_two_pi(marker_azimuth_rad(marker, facing_rad, placement.psi_rad)));
   const auto at_seam = boundaries_m(marker, 0), slopes = boundary_slopes_m(marker);
   e1_m_ = static_cast<float>(at_seam[1]);
   e2_m_ = static_cast<float>(at_seam[2]);

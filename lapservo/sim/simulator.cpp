@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "lapservo/core/error.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo {
@@ -20,12 +21,6 @@ const Instrument& first_instrument(const Rig& rig) {
     throw InputError("simulator", "instruments[0].camera_from_rcm", "missing",
                      "a transform: it says where the instrument is");
   return rig.instruments.front();
-}
-
-ShaftModel shaft_of(const Instrument& instrument) {
-  ShaftModel shaft;
-  shaft.marker = instrument.marker;
-  return shaft;
 }
 
 Endoscope make_endoscope(const Rig& rig, const SimulatorConfig& config) {

@@ -8,6 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
 
 namespace lapservo::internal {
 namespace {
@@ -29,7 +30,7 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
   };
   for (int i = 0; i < lines; ++i) {
     const double azimuth_rad = view->facing_azimuth_rad + 0.85 * view->half_visible_rad * (2.0 * i / (lines - 1) - 1);
-    const auto ends_m = boundaries_m(scene.marker, azimuth_rad - pose.psi_rad - scene.marker.seam_rad);
+    const auto ends_m = boundaries_m(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
     for (int k = -margin; k < places + margin; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
       const std::uint8_t color = color_at(radius_m, azimuth_rad, along_m);

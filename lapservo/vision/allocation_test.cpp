@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
 namespace {
@@ -62,7 +62,7 @@ namespace {
 /// Allocations while a tracker that has warmed up sees some frames of a slow motion.
 int allocations_when_tracked(std::size_t instruments) {
   constexpr int warm_up = 3, frames = 8;
-  const Rig rig = theatre::usual_rig(instruments);
+  const Rig rig = scenes::usual_rig(instruments);
   const std::vector<Eigen::Vector3d> places_m{{-0.02, 0.01, 0.1}, {0.04, 0, 0.1}, {0.006, -0.03, 0.1}};
   std::vector<RcmCoordinates> configurations;
   for (std::size_t i = 0; i < instruments; ++i)
@@ -71,7 +71,7 @@ int allocations_when_tracked(std::size_t instruments) {
   int counted = 0;
   for (int frame = 0; frame < frames; ++frame) {
     for (RcmCoordinates& q : configurations) q.psi_rad += 0.03, q.theta_rad += 0.002;
-    const cv::Mat image = theatre::render(rig, configurations, static_cast<std::uint64_t>(frame));
+    const cv::Mat image = scenes::render(rig, configurations, static_cast<std::uint64_t>(frame));
     allocations = 0;
     counting = frame >= warm_up;
     const std::vector<Observation>& observations = tracker.track(image);

@@ -7,13 +7,13 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/features.h"
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
 namespace {
 
-using theatre::Shot;
-using theatre::usual_shot;
+using scenes::Shot;
+using scenes::usual_shot;
 
 // Where tau wraps, so does the cross-ratio: a pixel's noise may take the reading to the other end.
 bool near_the_seam(const Shot& shot) {
@@ -59,7 +59,7 @@ TEST(Centerline, WithoutTheRcmTellsTauAlone) {
 
 TEST(Centerline, KnowsInstrumentsByTheirOrderOfColours) {
   const Shot& shot = usual_shot(2);
-  Rig rig = theatre::usual_rig(3);
+  Rig rig = scenes::usual_rig(3);
   const auto observations = CenterlineMethod(rig).observe(shot.bgr);
   EXPECT_EQ(observations[0].status, Status::ok);
   EXPECT_NE(observations[1].status, Status::ok);
@@ -67,9 +67,9 @@ TEST(Centerline, KnowsInstrumentsByTheirOrderOfColours) {
 }
 
 TEST(Centerline, FindsNothingInTissue) {
-  const Rig rig = theatre::usual_rig();
+  const Rig rig = scenes::usual_rig();
   for (const std::uint64_t seed : {1, 2, 3})
-    EXPECT_NE(CenterlineMethod(rig).observe(theatre::render_nothing(rig, seed))[0].status, Status::ok) << seed;
+    EXPECT_NE(CenterlineMethod(rig).observe(scenes::render_nothing(rig, seed))[0].status, Status::ok) << seed;
 }
 
 }  // namespace

@@ -11,6 +11,9 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/heaviest_stretch.h"
+#include "lapservo/vision/limits.h"
 #include "lapservo/vision/line_segmentation.h"
 #include "lapservo/vision/normal_equations.h"
 
@@ -18,10 +21,6 @@ namespace lapservo::internal {
 namespace {
 
 constexpr int line_count = 13, station_count = 15, samples_along = 128;
-constexpr double line_reach = 0.74;  // of the visible half angle: beyond, bands are too foreshortened and dark
-constexpr double side_sigma_px = 2.0, boundary_sigma_px = 1.5;
-constexpr double limb_inset_px = 1.0;  // the limb is dark, its colour ends inside the true silhouette
-constexpr int smallest_boundary_count = 10;
 constexpr int most_reach = 200;  // samples on each side of a section's middle
 
 // Measured image points that lie on the marker's outline or boundaries, attached to where they belong on its surface.
@@ -43,26 +42,12 @@ Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azi
   return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
 }
 
-// The stretch [first, last] of a section with the most marker colour in it (maximum subarray).
-struct Stretch {
-  int first = 0, last = -1;
-};
-Stretch most_colorful_stretch(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands) {
-  Stretch best, current{0, -1};
-  float best_sum = 0, sum = 0;
-  for (int i = 0; i < static_cast<int>(classes.size()); ++i) {
+// The stretch of a section with the most marker colour in it.
+Stretch<float> most_colorful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
+  return heaviest_stretch(0, static_cast<int>(classes.size()), [&](int i) {
     const std::uint8_t color = classes[static_cast<std::size_t>(i)];
-    const bool ours = color == bands[0] || color == bands[1] || color == bands[2];
-    sum += ours ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
-    if (sum <= 0) {
-      sum = 0;
-      current.first = i + 1;
-    } else if (sum > best_sum) {
-      best_sum = sum;
-      best = {current.first, i};
-    }
-  }
-  return best;
+    return scene.is_ours(color) ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
+  });
 }
 
 // Sections across the shaft: where its colours begin and end.
@@ -83,13 +68,15 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), most_reach);
     classes.clear();
     for (int i = -reach; i <= reach; ++i) classes.push_back(scene.class_at(middle + i * step_px * across));
-    const Stretch stretch = most_colorful_stretch(classes, scene.bands);
+    const Stretch<float> stretch = most_colorful_stretch(classes, scene);
     const double width_px = (stretch.last - stretch.first + 1) * step_px;
-    if (width_px < 0.5 * 2 * half_px || width_px > 1.4 * 2 * half_px) continue;
+    if (width_px < detection_limits.narrowest_section * 2 * half_px ||
+        width_px > detection_limits.widest_section * 2 * half_px)
+      continue;
     const auto add = [&](int inner, int outer, double side) {
       if (outer < 0 || outer >= static_cast<int>(classes.size())) return;
       if (classes[static_cast<std::size_t>(outer)] == Scene::outside) return;
-      const double t_px = (inner - reach + 0.5 * side) * step_px + side * limb_inset_px;
+      const double t_px = (inner - reach + 0.5 * side) * step_px + side * detection_limits.limb_inset_px;
       points.push_back({middle + t_px * across, side, along_m});
     };
     add(stretch.first, stretch.first - 1, -1);
@@ -116,7 +103,7 @@ SampledSurface sample_surface(const Scene& scene, const ShaftPose& pose, const C
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   for (int i = 0; i < line_count; ++i) {
     SampledLine& line = surface.lines[static_cast<std::size_t>(i)];
-    const double fraction = line_reach * (2.0 * i / (line_count - 1) - 1);
+    const double fraction = detection_limits.line_reach * (2.0 * i / (line_count - 1) - 1);
     line.azimuth_rad = view.facing_azimuth_rad + fraction * view.half_visible_rad;
     const Eigen::Vector3d base = point_on(pose, scene.marker, line.azimuth_rad, 0);
     for (int k = 0; k < samples_along; ++k) {
@@ -155,7 +142,7 @@ void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const 
   UnknownVector row = unknowns.row(point, pull);
   const Eigen::Vector3d axis = unknowns.pose().camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   row[row.size() - 1] = psi_speed_m * pull.dot(axis);
-  equations.add(row, residual_px, cauchy_weight(residual_px / sigma_px, 2.5) / (sigma_px * sigma_px));
+  equations.add(row, residual_px, cauchy_weight(residual_px / sigma_px, cauchy_scale_sigmas) / (sigma_px * sigma_px));
 }
 
 // One Gauss-Newton step on measured points. Inner boundaries count only once the rotation is known.
@@ -172,17 +159,18 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
   for (const SidePoint& side : sides) {
     const double azimuth_rad = view->facing_azimuth_rad + side.side * view->half_visible_rad;
     add_curve_distance(scene, unknowns, point_on(pose, scene.marker, azimuth_rad, side.along_m), axes.col(2), 0,
-                       side.raw_px, side_sigma_px, equations);
+                       side.raw_px, detection_limits.side_sigma_px, equations);
   }
   const auto slopes_m = boundary_slopes_m(scene.marker);
   for (const BoundaryPoint& b : boundaries) {
     const bool inner = b.boundary == 1 || b.boundary == 2;
     if (inner && !with_rotation) continue;
-    const double along_m = boundaries_m(scene.marker, b.azimuth_rad - pose.psi_rad - scene.marker.seam_rad)[b.boundary];
+    const double along_m =
+        boundaries_m(scene.marker, marker_azimuth_rad(scene.marker, b.azimuth_rad, pose.psi_rad))[b.boundary];
     const double slope_m = slopes_m[b.boundary];
     const Eigen::Vector3d tangent = scene.marker.radius_m() * azimuth_direction(b.azimuth_rad) + slope_m * axes.col(2);
     add_curve_distance(scene, unknowns, point_on(pose, scene.marker, b.azimuth_rad, along_m), tangent, -slope_m,
-                       b.raw_px, boundary_sigma_px, equations);
+                       b.raw_px, detection_limits.boundary_sigma_px, equations);
   }
   const PoseUnknowns next = unknowns.changed_by(equations.solve(1e-4));
   return next.pose().camera_from_unrolled.translation.allFinite() ? std::optional(next) : std::nullopt;
@@ -208,7 +196,8 @@ class RotationScore {
   double at(double psi_rad) const {
     int score = 0;
     for (std::size_t i = 0; i < line_count; ++i) {
-      const auto ends_m = boundaries_m(scene_.marker, surface_.lines[i].azimuth_rad - psi_rad - scene_.marker.seam_rad);
+      const auto ends_m =
+          boundaries_m(scene_.marker, marker_azimuth_rad(scene_.marker, surface_.lines[i].azimuth_rad, psi_rad));
       std::array<const std::array<int, 3>*, 4> sums;
       for (std::size_t k = 0; k < 4; ++k) sums[k] = &sums_[i][index(ends_m[k])];
       for (std::size_t band = 0; band < 3; ++band) score += (*sums[band + 1])[band] - (*sums[band])[band];
@@ -263,7 +252,8 @@ CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOp
         sample_surface(scene, fit.unknowns.pose(), *view, std::max(0.12, options.along_reach * narrowing));
     const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
     fit.boundaries_seen = static_cast<int>(boundaries.size());
-    if (fit.boundaries_seen < smallest_boundary_count || sides.size() < 4) return fit;
+    if (fit.boundaries_seen < detection_limits.fewest_boundaries || sides.size() < detection_limits.fewest_sides)
+      return fit;
     if (options.search_rotation && round == 1) {
       const RotationSearch search = search_rotation(scene, surface);
       fit.unknowns = fit.unknowns.with_psi(search.psi_rad);

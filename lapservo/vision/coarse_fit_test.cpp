@@ -7,15 +7,15 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/testing/scenes.h"
 #include "lapservo/vision/initial_pose.h"
-#include "lapservo/vision/theatre.h"
 
 namespace lapservo::internal {
 namespace {
 
-using theatre::Shot;
-using theatre::Sight;
-using theatre::usual_shot;
+using scenes::Shot;
+using scenes::Sight;
+using scenes::usual_shot;
 
 // Farthest that a boundary on the centre line lies from its true place.
 double miss_px(const Shot& shot, const ShaftPose& pose) {
@@ -73,7 +73,7 @@ TEST(CoarseFit, KeepsAGivenRotationWhenNotAskedToSearch) {
 
 TEST(CoarseFit, FindsNothingInTissueNorFarFromTheMarker) {
   const Shot& shot = usual_shot(2);
-  const Sight empty(shot.rig, theatre::render_nothing(shot.rig, 3));
+  const Sight empty(shot.rig, scenes::render_nothing(shot.rig, 3));
   EXPECT_FALSE(fit_coarsely(empty.scene(), shot.truth(true), {}).found);
   UnknownVector offset = UnknownVector::Zero(6);
   offset[1] = 1.5;
@@ -108,7 +108,7 @@ TEST(InitialPoses, LieNearTheTruth) {
         const auto line =
             centre_line(shot.rig.camera, shot.rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad);
         ASSERT_TRUE(line);
-        const ShaftPose truth = theatre::pose_of(shot.rig, 0, shot.q);
+        const ShaftPose truth = scenes::pose_of(shot.rig, 0, shot.q);
         const auto expected =
             centre_line(shot.rig.camera, shot.rig.instruments[0].marker, truth.camera_from_unrolled, truth.psi_rad);
         nearest_px = std::min(nearest_px, std::max((line->ideal_px[0] - expected->ideal_px[0]).norm(),

@@ -4,12 +4,10 @@
 #include <cmath>
 #include <optional>
 
+#include "lapservo/vision/limits.h"
+
 namespace lapservo::internal {
 namespace {
-
-constexpr double merge_deg = 20;         // hues this close are one colour to the camera
-constexpr double widest_reach_deg = 34;  // tissue is red and yellow, its vessels violet: no hue reaches further
-constexpr double least_saturation = 0.18, least_chroma = 22;  // of 255; smoke leaves a quarter of the saturation
 
 double hue_gap_deg(double a_deg, double b_deg) {
   return std::abs(std::remainder(a_deg - b_deg, 360.0));
@@ -18,7 +16,7 @@ double hue_gap_deg(double a_deg, double b_deg) {
 // HSV hue of encoded values, or nullopt for what is too grey or too dark to have one.
 std::optional<double> hue_of(double b, double g, double r) {
   const double highest = std::max({b, g, r}), chroma = highest - std::min({b, g, r});
-  if (chroma < least_chroma || chroma < least_saturation * highest) return std::nullopt;
+  if (chroma < color_limits.least_chroma || chroma < color_limits.least_saturation * highest) return std::nullopt;
   if (highest == r) return 60 * (g - b) / chroma;
   if (highest == g) return 120 + 60 * (b - r) / chroma;
   return 240 + 60 * (r - g) / chroma;
@@ -31,15 +29,16 @@ ColorClasses::ColorClasses(const std::vector<Instrument>& instruments) {
     std::array<std::uint8_t, 3> band_classes{};
     for (std::size_t band = 0; band < 3; ++band) {
       const double hue_deg = instrument.marker.hues_deg[band];
-      auto same = std::find_if(hues_deg_.begin(), hues_deg_.end(),
-                               [&](double other_deg) { return hue_gap_deg(hue_deg, other_deg) < merge_deg; });
+      auto same = std::find_if(hues_deg_.begin(), hues_deg_.end(), [&](double other_deg) {
+        return hue_gap_deg(hue_deg, other_deg) < color_limits.merge_deg;
+      });
       if (same == hues_deg_.end()) same = hues_deg_.insert(hues_deg_.end(), hue_deg);
       band_classes[band] = static_cast<std::uint8_t>(1 + (same - hues_deg_.begin()));
     }
     bands_.push_back(band_classes);
   }
 
-  std::vector<double> reach_deg(hues_deg_.size(), widest_reach_deg);
+  std::vector<double> reach_deg(hues_deg_.size(), color_limits.widest_reach_deg);
   for (std::size_t i = 0; i < hues_deg_.size(); ++i)
     for (std::size_t j = 0; j < hues_deg_.size(); ++j)
       if (i != j) reach_deg[i] = std::min(reach_deg[i], hue_gap_deg(hues_deg_[i], hues_deg_[j]) / 2);

@@ -62,6 +62,7 @@ TEST(ColorClasses, TheTableIsTheNearestHueWithinItsReach) {
   for (const Hues& hues_deg : designs) {
     const ColorClasses classes = classes_of({hues_deg});
     Random random(1);
+    int ours_checked = 0, others_checked = 0;
     for (int i = 0; i < 30000; ++i) {
       Bgr pixel;
       for (std::uint8_t& channel : pixel) channel = static_cast<std::uint8_t>(random.uniform(0, 256));
@@ -72,12 +73,16 @@ TEST(ColorClasses, TheTableIsTheNearestHueWithinItsReach) {
         const double gap = gap_deg(hue_deg_of(pixel), hues_deg[band]), reach = reach_deg(hues_deg, band);
         const bool ours = classes(pixel.data()) == classes.of_band(0, band);
         if (gap < reach - slack_deg) {
+          ++ours_checked;
           EXPECT_TRUE(ours) << "seed 1, hue " << hue_deg_of(pixel) << " for " << hues_deg[band];
         } else if (gap > reach + slack_deg) {
+          ++others_checked;
           EXPECT_FALSE(ours) << "seed 1, hue " << hue_deg_of(pixel) << " for " << hues_deg[band];
         }
       }
     }
+    EXPECT_GT(ours_checked, 1000);
+    EXPECT_GT(others_checked, 1000);
   }
 }
 

@@ -7,19 +7,14 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/edge_lines.h"
+#include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr int most_lines = EdgeMeasurements::most_lines, stations = EdgeMeasurements::most_stations;
-constexpr int fewest_lines = 12;
-constexpr double line_reach = 0.9;  // of the visible half width: beyond, light and resolution are gone
-// What the model leaves out (shading across the blur, lens, print) of every single measurement.
-constexpr double single_floor_px = 0.04;
-// Interpolated samples are smoother than the pixels are noisy.
-constexpr double interpolation_noise = 1.6;
-constexpr double ambient_share = 0.18, most_lit = 2;  // of the film's edge
 
 // A direction around the shaft, in the unrolled frame and in the camera's.
 struct Generatrix {
@@ -67,10 +62,13 @@ struct Frame {
     const double beyond = k == 0 ? -to_camera.z() : to_camera.z();
     if (beyond <= 0) return 0;
     const double distance_m = to_camera.norm();
-    const auto lit = [](double cosine) { return ambient_share + (1 - ambient_share) * std::max(0.0, cosine); };
-    return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m), most_lit);
+    const auto lit = [](double cosine) {
+      return edge_limits.film_ambient_share + (1 - edge_limits.film_ambient_share) * std::max(0.0, cosine);
+    };
+    return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
+                    edge_limits.film_most_lit);
   }
-  double tau(double azimuth_rad) const { return azimuth_rad - unknowns.pose().psi_rad - marker().seam_rad; }
+  double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
 
   // The line through a point of the image, when all of it can be sampled.
   std::optional<EdgeLine> edge_line(const Eigen::Vector2d& centre_px, const Eigen::Vector2d& direction, int before,
@@ -117,7 +115,6 @@ bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_p
 std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
                                             const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
                                             double blur_px) {
-  constexpr double least_cosine = 0.3;
   const double film_light = frame.film_light(k, generatrix);
   const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - film_light * frame.film_m * generatrix.outwards;
   if (!(point.z() > 1e-3)) return std::nullopt;
@@ -131,7 +128,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
       (frame.marker().radius_m() * (image.d_px_d_point * generatrix.around) + slope_m * axis_px).normalized();
   const Eigen::Vector2d normal(-tangent.y(), tangent.x());
   place.normal_cosine = normal.dot(place.along);
-  if (!(std::abs(place.normal_cosine) > least_cosine)) return std::nullopt;
+  if (!(std::abs(place.normal_cosine) > edge_limits.least_normal_cosine)) return std::nullopt;
 
   double gap_px = 1e9;
   if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
@@ -175,7 +172,7 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
     values.clear();
     for (const Candidate& candidate : candidates)
       if (candidate.colors_agree) values.push_back(candidate.edge->step[c]);
-    if (values.size() < 3) return;
+    if (values.size() < edge_limits.fewest_alike) return;
     typical[c] = median(values);
   }
   values.clear();
@@ -188,14 +185,17 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
   const float typical_square = dot(typical, typical);
   for (const auto& [place, edge, agree] : candidates) {
     const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
-    const bool alike = projection > 0.25F * typical_square && projection * projection > 0.7F * square * typical_square;
-    if (!alike || edge->residual_variance > 0.05F * square + 9 * typical_variance) continue;
-    const double variance = 0.5 * (edge->residual_variance + typical_variance) * interpolation_noise;
+    const bool alike = projection > edge_limits.least_step * typical_square &&
+                       projection * projection > edge_limits.least_alike * square * typical_square;
+    if (!alike || edge->residual_variance >
+                      edge_limits.most_residual * square + edge_limits.most_residual_variances * typical_variance)
+      continue;
+    const double variance = 0.5 * (edge->residual_variance + typical_variance) * edge_limits.interpolation_noise;
     const double cosine = place->normal_cosine;
     Measurement measurement = place->measurement;
     measurement.residual_px = edge->offset_px * cosine;
-    measurement.sigma_px =
-        std::sqrt(variance / edge->information * cosine * cosine + single_floor_px * single_floor_px);
+    measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
+                                     edge_limits.single_floor_px * edge_limits.single_floor_px);
     out.all.push_back(measurement);
     out.boundary_blur.add(*edge, variance);
   }
@@ -203,20 +203,21 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
 
 void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
-  out.lines = std::max(fewest_lines, std::min(static_cast<int>(1.2 * radius_px), most_lines) / effort.thinning);
+  out.lines =
+      std::max(edge_limits.fewest_lines, std::min(static_cast<int>(1.2 * radius_px), most_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
   const double sine_of_half = std::sin(frame.view.half_visible_rad);
   InplaceVector<BoundaryPlace, 4 * most_lines> places;
   InplaceVector<EdgeLine, 4 * most_lines> lines;
   for (int i = 0; i < out.lines; ++i) {
-    const double sine = line_reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
+    const double sine = edge_limits.line_reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
     const Generatrix generatrix = frame.generatrix(frame.view.facing_azimuth_rad + std::asin(sine));
     const double tau_rad = frame.tau(generatrix.azimuth_rad);
     const auto along_m = boundaries_m(frame.marker(), tau_rad);
     const double seam_px = std::abs(wrap_pi(tau_rad)) * radius_px * std::sqrt(1 - sine * sine);
     for (std::size_t k = 0; k < 4; ++k) {
       const bool inner = k == 1 || k == 2;
-      if (inner && seam_px < 2.5 * blur_px + 1.5) continue;
+      if (inner && seam_px < edge_limits.seam_blurs * blur_px + edge_limits.seam_px) continue;
       const auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur_px);
       if (!place) continue;
       ++out.in_image[k];
@@ -290,7 +291,6 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
 }
 
 void measure_sides(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
-  constexpr double largest_sigma_px = 2;
   const int count = stations / effort.thinning;
   const std::array<Side, 2> sides{Side(frame, -1), Side(frame, 1)};
   InplaceVector<SidePlace, 2 * stations> places;
@@ -308,16 +308,17 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
   InplaceVector<float, 2 * stations> variances;
   for (const EdgeFit& edge : edges)
     if (edge.converged) variances.push_back(edge.residual_variance);
-  if (variances.size() < 4) return;
+  if (variances.size() < edge_limits.fewest_side_edges) return;
   const double typical_variance = median(variances);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const EdgeFit& edge = edges[i];
     if (!edge.converged) continue;
-    const double variance = 0.5 * (edge.residual_variance + typical_variance) * interpolation_noise;
+    const double variance = 0.5 * (edge.residual_variance + typical_variance) * edge_limits.interpolation_noise;
     Measurement measurement = places[i].measurement;
     measurement.residual_px = edge.offset_px;
-    measurement.sigma_px = std::sqrt(variance / edge.information + 4 * single_floor_px * single_floor_px);
-    if (measurement.sigma_px > largest_sigma_px) continue;
+    measurement.sigma_px =
+        std::sqrt(variance / edge.information + 4 * edge_limits.single_floor_px * edge_limits.single_floor_px);
+    if (measurement.sigma_px > edge_limits.largest_side_sigma_px) continue;
     out.all.push_back(measurement);
     out.side_blur.add(edge, variance);
   }
@@ -327,7 +328,9 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
 
 double BlurEvidence::improved(double blur_px) const {
   if (!(information > 0)) return blur_px;
-  return std::clamp(blur_px + gradient / information, std::max(0.5, 0.6 * blur_px), std::min(8.0, 1.7 * blur_px));
+  return std::clamp(blur_px + gradient / information,
+                    std::max(edge_limits.least_blur_px, edge_limits.least_blur_change * blur_px),
+                    std::min(edge_limits.largest_blur_px, edge_limits.largest_blur_change * blur_px));
 }
 
 EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,

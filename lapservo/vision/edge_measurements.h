@@ -17,10 +17,11 @@ struct EdgeBlur {
   double boundaries_px = 1.2, sides_px = 1.2;
 };
 
-/// The film that carries the marker stands out from the shaft. Seen from beyond an end, its edge shows too and moves
-/// the apparent end inwards (towards the axis) by the film's thickness, as far as the edge is lit compared with the
-/// outside: diffusely from the camera, with some ambient light. The rig does not say how thick it is, so each fit
-/// estimates it.
+/// Thickness of the film that carries the marker and stands out from the shaft, before a fit: mean and standard
+/// deviation. Where an end is seen from beyond, the cut edge of the film is seen too, and the boundary that is measured
+/// lies below the film's outside, nearer to the axis: by the thickness where the edge is as bright as the outside, by
+/// less or more as it is darker or brighter (lit diffusely from the camera, with some ambient light). The rig does not
+/// say how thick the film is, so each fit estimates it.
 inline constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.04e-3;
 
 /// How far one point of an edge in the image lies from where a pose has it.

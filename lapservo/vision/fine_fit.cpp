@@ -7,21 +7,12 @@
 #include <span>
 
 #include "lapservo/core/inplace_vector.h"
+#include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
 
 namespace lapservo::internal {
 namespace {
 
-// What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole.
-constexpr double common_boundary_px = 0.007, common_side_px = 0.02;
-// And as a share of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. A limb that motion smears
-// is worst: the part of its blur that the boundaries do not have.
-constexpr double usual_blur_px = 1.2, common_share_of_blur = 0.05, side_share_of_smear = 0.15;
-// Where most of a marker is hidden, some of what was taken for its boundaries are the blood's.
-constexpr double usual_share = 0.7, doubt_of_hidden = 4;
-constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
-// A fit has settled when a pass moves no point and no smear (Change) farther than this.
-constexpr double settled_px = 1.5;
 constexpr int most_passes = 3;
 
 double robust_weight(const Measurement& m, double residual_px) {
@@ -33,7 +24,6 @@ double robust_weight(const Measurement& m, double residual_px) {
 template <int Size>
 UnknownVector solve(std::span<const Measurement> measurements, double film_prior) {
   constexpr int most_iterations = 4;
-  constexpr double settled_sigmas = 0.01;
   using Row = Eigen::Matrix<double, Size, 1>;
   Row step = Row::Zero();
   for (int i = 0; i < most_iterations; ++i) {
@@ -45,7 +35,8 @@ UnknownVector solve(std::span<const Measurement> measurements, double film_prior
     }
     const Row next = equations.solve(1e-9), change = next - step;
     step = next;
-    if (change.dot(equations.information() * change) < settled_sigmas * settled_sigmas) break;
+    if (change.dot(equations.information() * change) < fine_fit_limits.settled_sigmas * fine_fit_limits.settled_sigmas)
+      break;
   }
   return step;
 }
@@ -62,14 +53,15 @@ double median_sigma_px(std::span<const Measurement> measurements) {
 
 // What each boundary and side as a whole may be off, and the noise as it is.
 CommonErrors common_errors(std::span<const Measurement> measurements, const EdgeBlur& blur) {
-  constexpr double usual_sigma_px = 0.05;  // of an edge; compressed ones have three times that
-  const double smear_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, usual_blur_px));
-  const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - usual_blur_px);
-  return {common_boundary_px + common_share_of_blur * std::max(0.0, blur.boundaries_px - usual_blur_px),
-          common_side_px + common_share_of_blur * std::max(0.0, blur.sides_px - usual_blur_px) +
-              side_share_of_smear * smear_px,
+  const FineFitLimits& limits = fine_fit_limits;
+  const double smear_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
+  const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - limits.usual_blur_px);
+  return {limits.common_boundary_px +
+              limits.common_share_of_blur * std::max(0.0, blur.boundaries_px - limits.usual_blur_px),
+          limits.common_side_px + limits.common_share_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
+              limits.side_share_of_smear * smear_px,
           std::max(1.0, scatter_sigmas(measurements)),
-          std::max(1.0, median_sigma_px(measurements) / usual_sigma_px) + beyond_px};
+          std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px};
 }
 
 // What a pass changed.
@@ -79,17 +71,16 @@ struct Change {
   double smear_px = 0;    // by how much a blur beyond a lens's did
 
   void add_blur(double before_px, double after_px) {
-    constexpr double sharp_px = 1.8;  // where few sides are left, a sharp blur may flicker
     blur_share = std::max(blur_share, std::abs(after_px / before_px - 1));
-    if (std::max(before_px, after_px) > sharp_px) smear_px = std::max(smear_px, std::abs(after_px - before_px));
+    if (std::max(before_px, after_px) > fine_fit_limits.sharp_blur_px)
+      smear_px = std::max(smear_px, std::abs(after_px - before_px));
   }
   // Motion's smear may be no blur, which then never settles.
   bool settled() const {
-    constexpr double smear_weight = 5;
-    return std::max(points_px, smear_weight * smear_px) < settled_px;
+    return std::max(points_px, fine_fit_limits.smear_weight * smear_px) < fine_fit_limits.settled_px;
   }
   // Whether edges located with the blur before are good enough for the last pass.
-  bool sharp() const { return blur_share < 0.1; }
+  bool sharp() const { return blur_share < fine_fit_limits.settled_blur; }
 };
 
 }  // namespace
@@ -155,7 +146,8 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
     if (m.group < 4) squares += sigmas * sigmas, ++inliers;
   }
   fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
-  const double doubt = 1 + doubt_of_hidden * std::max(0.0, usual_share - fit.located_share());
+  const double doubt =
+      1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_share - fit.located_share());
   fit.covariance = doubt * doubt * print->covariance;
   fit.print_off_probability = print->off_probability;
   fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;

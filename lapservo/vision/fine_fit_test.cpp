@@ -7,15 +7,15 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
 namespace {
 
-using theatre::fit_from;
-using theatre::Shot;
-using theatre::Sight;
-using theatre::usual_shot;
+using scenes::fit_from;
+using scenes::Shot;
+using scenes::Sight;
+using scenes::usual_shot;
 
 // As far off as a coarse fit may leave it: up to three pixels.
 UnknownVector random_offset(Random& random, int unknowns) {
@@ -144,11 +144,11 @@ TEST(FineFit, SigmasGrowWithTheNoise) {
 }
 
 TEST(FineFit, DoesNotConvergeWhereNothingIs) {
-  const Rig rig = theatre::usual_rig();
-  const Sight sight(rig, theatre::render_nothing(rig, 4));
+  const Rig rig = scenes::usual_rig();
+  const Sight sight(rig, scenes::render_nothing(rig, 4));
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     Random random(seed);
-    const RcmCoordinates q = theatre::random_configuration(rig, 0, random);
+    const RcmCoordinates q = scenes::random_configuration(rig, 0, random);
     const auto start = PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q);
     const FineFit fit = fit_finely(sight.scene(), sight.light(), start, {});
     const int located = fit.used[0] + fit.used[1] + fit.used[2] + fit.used[3];

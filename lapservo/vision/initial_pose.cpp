@@ -9,6 +9,8 @@
 
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/vision/heaviest_stretch.h"
+#include "lapservo/vision/limits.h"
 #include "lapservo/vision/line_segmentation.h"
 
 namespace lapservo::internal {
@@ -112,26 +114,13 @@ struct Section {
 std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, double x, double reach_px,
                                   double step_px) {
   const int reach = static_cast<int>(reach_px / step_px);
-  double best = 0, sum = 0;
-  int first = -reach, best_first = 0, best_last = -1;
-  bool outside = false;
-  for (int i = -reach; i <= reach; ++i) {
-    const std::uint8_t color = scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px)));
-    sum += scene.is_ours(color) ? 1 : -0.8;
-    if (sum <= 0) {
-      sum = 0;
-      first = i + 1;
-    } else if (sum > best) {
-      best = sum, best_first = first, best_last = i;
-    }
-  }
-  const auto beyond = [&](int i) {
-    return scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px))) == Scene::outside;
-  };
-  outside = beyond(best_first - 1) || beyond(best_last + 1);
-  if (best * step_px < 4 || outside) return std::nullopt;
-  constexpr double limb_inset_px = 1;
-  return Section{(best_first - 0.5) * step_px - limb_inset_px, (best_last + 0.5) * step_px + limb_inset_px};
+  const auto color_at = [&](int i) { return scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px))); };
+  const Stretch<double> colored =
+      heaviest_stretch(-reach, reach + 1, [&](int i) { return scene.is_ours(color_at(i)) ? 1 : -0.8; });
+  const bool outside = color_at(colored.first - 1) == Scene::outside || color_at(colored.last + 1) == Scene::outside;
+  if (colored.sum * step_px < 4 || outside) return std::nullopt;
+  return Section{(colored.first - 0.5) * step_px - detection_limits.limb_inset_px,
+                 (colored.last + 0.5) * step_px + detection_limits.limb_inset_px};
 }
 
 std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, Eigen::Vector2d along) {

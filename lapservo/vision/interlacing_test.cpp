@@ -6,13 +6,13 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
 namespace {
 
-using theatre::usual_shot;
+using scenes::usual_shot;
 
 cv::Mat woven(const cv::Mat& even, const cv::Mat& odd) {
   cv::Mat frame = even.clone();
@@ -22,7 +22,7 @@ cv::Mat woven(const cv::Mat& even, const cv::Mat& odd) {
 
 // By how much a coordinate of q changes for the marker's surface to move by so many pixels.
 Eigen::Vector4d step_of(const Rig& rig, const RcmCoordinates& q, int coordinate, double px) {
-  const double depth_m = theatre::pose_of(rig, 0, q).camera_from_unrolled.translation.z();
+  const double depth_m = scenes::pose_of(rig, 0, q).camera_from_unrolled.translation.z();
   const double shift_m = px * depth_m / rig.camera.fx_px;
   const Eigen::Vector4d per_m(1 / q.rho_m, 1 / q.rho_m, 1, 1 / rig.instruments[0].marker.radius_m());
   return shift_m * per_m[coordinate] * Eigen::Vector4d::Unit(coordinate);
@@ -34,9 +34,9 @@ struct Woven {
 };
 
 Woven woven_shot(std::uint64_t seed, int coordinate, double px) {
-  const theatre::Shot& shot = usual_shot(seed);
+  const scenes::Shot& shot = usual_shot(seed);
   const auto moved = RcmCoordinates::from_vector(shot.q.vector() + step_of(shot.rig, shot.q, coordinate, px));
-  return {shot.q, woven(shot.bgr, theatre::render(shot.rig, {moved}, seed + 100))};
+  return {shot.q, woven(shot.bgr, scenes::render(shot.rig, {moved}, seed + 100))};
 }
 
 double psi_error(const Observation& o, const RcmCoordinates& truth) {
@@ -44,7 +44,7 @@ double psi_error(const Observation& o, const RcmCoordinates& truth) {
 }
 
 TEST(Interlacing, TwoMomentsAreNotTakenForOne) {
-  const Rig rig = theatre::usual_rig();
+  const Rig rig = scenes::usual_rig();
   for (int coordinate = 0; coordinate < 4; ++coordinate)
     for (const double px : {5.0, 8.0, 12.0, 20.0, 30.0})
       for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -53,7 +53,7 @@ TEST(Interlacing, TwoMomentsAreNotTakenForOne) {
         const Woven shot = woven_shot(seed, coordinate, px);
         const Observation o = Tracker(rig).track(shot.frame)[0];
         if (coordinate < 3 && px < 20) {
-          EXPECT_EQ(o.status, Status::interlaced) << status_word(o.status);
+          EXPECT_EQ(o.status, Status::interlaced) << to_string(o.status);
         }
         if (o.status == Status::ok) {
           EXPECT_LT(std::abs(psi_error(o, shot.q)), 0.1);
@@ -62,7 +62,7 @@ TEST(Interlacing, TwoMomentsAreNotTakenForOne) {
 }
 
 TEST(Interlacing, OneFieldTellsItsMoment) {
-  Rig rig = theatre::usual_rig();
+  Rig rig = scenes::usual_rig();
   rig.camera.deinterlace = true;
   double squares = 0;
   int count = 0;
@@ -78,7 +78,7 @@ TEST(Interlacing, OneFieldTellsItsMoment) {
 }
 
 TEST(Interlacing, TheOptionAndTheRigSayTheSame) {
-  Rig rig = theatre::usual_rig();
+  Rig rig = scenes::usual_rig();
   const Woven shot = woven_shot(1, 0, 15);
   const Observation by_option = Tracker(rig, {.deinterlace = true}).track(shot.frame)[0];
   rig.camera.deinterlace = true;
@@ -89,7 +89,7 @@ TEST(Interlacing, TheOptionAndTheRigSayTheSame) {
 }
 
 TEST(Interlacing, NoiseBlurAndDarknessAreNoFields) {
-  const Rig rig = theatre::usual_rig();
+  const Rig rig = scenes::usual_rig();
   RenderOptions noisy, blurred, sharp, dark;
   noisy.sensor.read_noise *= 4;
   blurred.sensor.blur_px = 2.2;
@@ -97,7 +97,7 @@ TEST(Interlacing, NoiseBlurAndDarknessAreNoFields) {
   dark.sensor.gains = Light::Constant(0.15F);
   for (const RenderOptions& options : {RenderOptions{}, noisy, blurred, sharp, dark})
     for (std::uint64_t seed = 1; seed <= 4; ++seed) {
-      const theatre::Shot shot(seed, options);
+      const scenes::Shot shot(seed, options);
       EXPECT_EQ(Tracker(rig).track(shot.bgr)[0].status, Status::ok) << "seed " << seed;
     }
 }

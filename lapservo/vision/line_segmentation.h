@@ -6,8 +6,8 @@
 
 namespace lapservo::internal {
 
-/// The four colour boundaries along a line of colour classes, in samples: boundary k lies at index[k] - 0.5, between
-/// samples. `seen` when the samples on both its sides are what they should be.
+/// The four colour boundaries along a line of colour classes: position[k] samples lie before boundary k, all of them
+/// before one that the line does not reach. `seen` when the samples on both its sides are what they should be.
 struct LineSegmentation {
   std::array<double, 4> position{};
   std::array<bool, 4> seen{};

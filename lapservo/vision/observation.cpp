@@ -1,33 +1,28 @@
 #include "lapservo/vision/observation.h"
 
-namespace lapservo {
+#include "lapservo/core/words.h"
 
-std::string_view status_word(Status status) {
-  switch (status) {
-    case Status::ok:
-      return "ok";
-    case Status::no_marker:
-      return "no_marker";
-    case Status::cut:
-      return "cut";
-    case Status::occluded:
-      return "occluded";
-    case Status::ambiguous:
-      return "ambiguous";
-    case Status::poor_fit:
-      return "poor_fit";
-    case Status::damaged:
-      return "damaged";
-    case Status::few_colors:
-      return "few_colors";
-    case Status::uncertain:
-      return "uncertain";
-    case Status::marker_mismatch:
-      return "marker_mismatch";
-    case Status::interlaced:
-      return "interlaced";
-  }
-  return "no_marker";
+namespace lapservo {
+using namespace internal;
+namespace {
+
+constexpr Words<Status, 11> words{{{Status::ok, "ok"},
+                                   {Status::no_marker, "no_marker"},
+                                   {Status::cut, "cut"},
+                                   {Status::occluded, "occluded"},
+                                   {Status::ambiguous, "ambiguous"},
+                                   {Status::poor_fit, "poor_fit"},
+                                   {Status::uncertain, "uncertain"},
+                                   {Status::marker_mismatch, "marker_mismatch"},
+                                   {Status::damaged, "damaged"},
+                                   {Status::few_colors, "few_colors"},
+                                   {Status::interlaced, "interlaced"}}};
+static_assert(names_all(words, Status::interlaced));
+
+}  // namespace
+
+std::string_view to_string(Status status) {
+  return word_of(words, status);
 }
 
 }  // namespace lapservo

@@ -11,7 +11,7 @@
 
 namespace lapservo {
 
-/// Why there is, or is not, an observation. Words for files: status_word().
+/// Why there is, or is not, an observation. Words for files: to_string().
 enum class Status {
   ok,
   no_marker,        ///< nothing in the image has the marker's colours in its order
@@ -25,7 +25,7 @@ enum class Status {
   few_colors,       ///< the picture has no more colours than a palette: its pixels are not the camera's
   interlaced,       ///< the frame is made of two fields, of two moments: use --deinterlace
 };
-std::string_view status_word(Status status);
+std::string_view to_string(Status status);
 
 /// Four points at zero: Eigen's own default is whatever memory holds.
 inline std::array<Eigen::Vector2d, 4> zero_points() {
@@ -49,7 +49,10 @@ struct Observation {
   double sigma_tau_rad = 0;
   std::array<Eigen::Vector2d, 4> edges_ideal_px = zero_points();  ///< e0..e3 on the centre line
   std::array<Eigen::Vector2d, 4> edges_raw_px = zero_points();
-  Features features;
+  /// Of edges_ideal_px, as the image alone or with camera_from_rcm was fitted; to first order. Singular: the points lie
+  /// on a line and move with the pose.
+  EdgesCovariance edges_covariance_px2 = EdgesCovariance::Zero();
+  Features features;  ///< their covariance: features_covariance()
 
   /// Where the fitted shaft lies, to start the next frame from and to draw. camera_from_unrolled, psi.
   Rigid3 camera_from_unrolled;

@@ -9,14 +9,14 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
 namespace {
 
-using theatre::Shot;
-using theatre::usual_shot;
+using scenes::Shot;
+using scenes::usual_shot;
 
 Observation observe(const Shot& shot, bool with_rcm) {
   Rig rig = shot.rig;
@@ -25,7 +25,7 @@ Observation observe(const Shot& shot, bool with_rcm) {
 }
 
 Shot distorted_shot(std::uint64_t seed) {
-  Rig rig = theatre::usual_rig();
+  Rig rig = scenes::usual_rig();
   rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
   return Shot(seed, {}, rig);
 }
@@ -37,8 +37,9 @@ bool all_finite(const Observation& o) {
     finite = finite && o.edges_ideal_px[k].allFinite() && o.edges_raw_px[k].allFinite();
   if (o.rcm) finite = finite && o.rcm->q.vector().allFinite() && o.rcm->covariance.allFinite();
   if (o.status == Status::ok)
-    finite = finite && std::isfinite(o.features.s_rad) && std::isfinite(o.features.r_px.value_or(0)) &&
-             std::isfinite(o.features.l_px) && std::isfinite(o.features.d_px) && std::isfinite(o.features.cross_ratio);
+    finite = finite && o.edges_covariance_px2.allFinite() && std::isfinite(o.features.s_rad) &&
+             std::isfinite(o.features.r_px.value_or(0)) && std::isfinite(o.features.l_px) &&
+             std::isfinite(o.features.d_px) && std::isfinite(o.features.cross_ratio);
   return finite;
 }
 
@@ -47,7 +48,7 @@ TEST(Observation, EveryStatusHasAWordOfItsOwn) {
   for (const Status status :
        {Status::ok, Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit,
         Status::uncertain, Status::marker_mismatch, Status::damaged, Status::few_colors, Status::interlaced}) {
-    const std::string_view word = status_word(status);
+    const std::string_view word = to_string(status);
     EXPECT_FALSE(word.empty());
     EXPECT_EQ(word.find_first_of(" ,\"\n"), std::string_view::npos) << word;
     EXPECT_TRUE(words.insert(word).second) << word;
@@ -75,7 +76,7 @@ void expect_consistent(const Shot& shot, bool with_rcm) {
   EXPECT_EQ(o.features.r_px.has_value(), with_rcm);
   ASSERT_EQ(o.rcm.has_value(), with_rcm);
   if (!with_rcm) return;
-  const ShaftPose pose = theatre::pose_of(shot.rig, 0, o.rcm->q);
+  const ShaftPose pose = scenes::pose_of(shot.rig, 0, o.rcm->q);
   EXPECT_LT((pose.camera_from_unrolled.translation - o.camera_from_unrolled.translation).norm(), 1e-12);
   EXPECT_NEAR(wrap_pi(pose.psi_rad - o.psi_rad), 0, 1e-12);
   EXPECT_LT(std::abs(o.rcm->q.psi_rad), pi + 1e-12);
@@ -106,7 +107,7 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
     for (int i = 0; i < samples; ++i) {
       const Eigen::Vector4d deviate(random.normal(), random.normal(), random.normal(), random.normal());
       const auto q = RcmCoordinates::from_vector(o.rcm->q.vector() + root * deviate);
-      const ShaftPose pose = theatre::pose_of(shot.rig, 0, q);
+      const ShaftPose pose = scenes::pose_of(shot.rig, 0, q);
       const auto line =
           centre_line(shot.rig.camera, shot.rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad);
       ASSERT_TRUE(line);
@@ -116,13 +117,43 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
   }
 }
 
+// Errors over their sigmas are 1 in the mean square for each feature, over places, rotations and noise. Without
+// camera_from_rcm r counts from the RCM's image, as it does for the servo.
+TEST(Observation, ErrorsOfTheFeaturesAreAsTheirCovarianceSays) {
+  constexpr int shots = 40;
+  const Rig rig = scenes::usual_rig();
+  Rig unregistered = rig;
+  unregistered.instruments[0].camera_from_rcm.reset();
+  const auto rcm_px = projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm);
+  const auto vector = [&](const std::array<Eigen::Vector2d, 4>& edges_px) {
+    const Features f = features_of(edges_px, rcm_px);
+    return Eigen::Vector4d(f.s_rad, *f.r_px, f.l_px, f.d_px);
+  };
+  for (const Rig* known : {&rig, static_cast<const Rig*>(&unregistered)}) {
+    SCOPED_TRACE(known == &rig ? "with the RCM" : "without");
+    Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+    for (std::uint64_t seed = 101; seed < 101 + shots; ++seed) {
+      const Shot& shot = usual_shot(seed);
+      const Observation o = Tracker(*known).track(shot.bgr)[0];
+      ASSERT_EQ(o.status, Status::ok) << seed;
+      const Eigen::Matrix4d covariance = features_covariance(o.edges_ideal_px, o.edges_covariance_px2, rcm_px);
+      Eigen::Vector4d error = vector(o.edges_ideal_px) - vector(shot.line().ideal_px);
+      error[0] = wrap_pi(error[0]);
+      squares += error.cwiseAbs2().cwiseQuotient(covariance.diagonal());
+    }
+    const Eigen::Vector4d sigmas = (squares / shots).cwiseSqrt();
+    EXPECT_GT(sigmas.minCoeff(), 0.6) << sigmas.transpose();
+    EXPECT_LT(sigmas.maxCoeff(), 1.5) << sigmas.transpose();
+  }
+}
+
 // Whatever is shown: a status, and nothing that is not a number.
 TEST(Observation, IsFiniteForEveryStatus) {
-  const Rig rig = theatre::usual_rig(3);
+  const Rig rig = scenes::usual_rig(3);
   Random random(1);
   std::vector<RcmCoordinates> q;
-  for (std::size_t i = 0; i < 3; ++i) q.push_back(theatre::random_configuration(rig, i, random));
-  const cv::Mat usual = theatre::render(rig, q, 1);
+  for (std::size_t i = 0; i < 3; ++i) q.push_back(scenes::random_configuration(rig, i, random));
+  const cv::Mat usual = scenes::render(rig, q, 1);
   const cv::Size size = usual.size();
   std::vector<cv::Mat> images{cv::Mat::zeros(size, CV_8UC3), cv::Mat(size, CV_8UC3, cv::Scalar::all(255)),
                               cv::Mat(size, CV_8UC3, cv::Scalar(20, 200, 110)), usual};

@@ -11,17 +11,13 @@
 #include <Eigen/LU>
 
 #include "lapservo/core/inplace_vector.h"
+#include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
 
 namespace lapservo::internal {
 namespace {
 
-// How often a print is not the rig's, and how far it is off then, each half as often as the one before. An exact
-// print's sigma grows by a tenth; where a frame tells nothing of the print, this adds 20 mrad to psi's.
-constexpr double off_share = 0.1;
-constexpr std::array print_sigmas_mm{0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64};
-constexpr double least_weight = 1e-6;  // less is too unlikely to count
-constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
+constexpr auto& print_sigmas_mm = print_limits.sigmas_mm;
 constexpr double mm = 1e-3;  // the print's errors are in millimetres here
 
 // e0, e1 at both edges, e2 at both edges, e3: the ends are circles.
@@ -246,8 +242,8 @@ std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& eviden
     gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
   const double best = *std::max_element(gains.begin(), gains.end());
   std::array<double, print_sigmas_mm.size() + 1> weights{};
-  weights[0] = (1 - off_share) * std::exp(gains[0] - best);
-  double share = off_share / 2;
+  weights[0] = (1 - print_limits.off_share) * std::exp(gains[0] - best);
+  double share = print_limits.off_share / 2;
   for (std::size_t i = 1; i < gains.size(); ++i, share /= 2) weights[i] = share * std::exp(gains[i] - best);
   return weights;
 }
@@ -271,7 +267,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_
   Mixture mixture(pose_unknowns + 1);
   mixture.add(*tolerated, weights[0]);
   for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i) {
-    if (weights[i + 1] < least_weight) continue;
+    if (weights[i + 1] < print_limits.least_weight) continue;
     const auto off = solved(sums, std::hypot(print_sigmas_mm[i], tolerance_mm));
     if (!off) return std::nullopt;
     mixture.add(*off, weights[i + 1]);

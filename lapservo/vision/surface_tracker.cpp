@@ -7,51 +7,64 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/agreement_search.h"
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/light_image.h"
+#include "lapservo/vision/limits.h"
 #include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
 namespace {
 
-constexpr int grid_px = 8, least_samples = 8, most_blobs = 6;
-constexpr double least_rotation_score = 0.5, rival_ratio = 0.93;
-// From the last frame, and a second time from a pose that is good to a few pixels.
-constexpr CoarseFitOptions from_memory{.along_reach = 0.2, .rounds = 1, .search_rotation = false};
-constexpr CoarseFitOptions near_by{.lateral_reach_px = 12, .along_reach = 0.125, .rounds = 1, .search_rotation = false};
-// To contradict camera_from_rcm, the marker must be seen well.
-constexpr double share_against_registration = 0.7;
-// And its print be as the rig says: one that is not contradicts any registration.
-constexpr double print_share_against_registration = 0.25;
+constexpr int grid_px = 8;
 
 bool contradicts_registration(const FineFit& free) {
   const Eigen::Index psi = free.unknowns.size() - 1;
-  return free.located_share() > share_against_registration &&
-         free.psi_variance_by_print <= print_share_against_registration * free.covariance(psi, psi);
+  return free.located_share() > registration_limits.well_seen_share &&
+         free.psi_variance_by_print <= registration_limits.most_print_share * free.covariance(psi, psi);
 }
 
-// Standard deviation of tau: gamma moves with the pose, psi is its last unknown.
-double sigma_tau(const Scene& scene, const FineFit& fit, double tau_rad) {
+// How sure the fit is of what the centre line shows.
+struct LineSigma {
+  double tau_rad = 0;
+  EdgesCovariance edges_px2;
+};
+
+// To first order, by differences: gamma moves with the pose, psi is its last unknown.
+LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fit) {
   const int n = fit.unknowns.size();
-  UnknownVector gradient = UnknownVector::Zero(n);
-  for (int i = 0; i < n; ++i) {
-    constexpr double step = 1e-6;
+  UnknownVector tau = UnknownVector::Zero(n);
+  Eigen::Matrix<double, 8, Eigen::Dynamic, 0, 8, max_unknowns> edges;
+  edges.setZero(8, n);
+  const auto after = [&](int unknown, double step) {
     UnknownVector change = UnknownVector::Zero(n);
-    change[i] = step;
+    change[unknown] = step;
     const ShaftPose pose = fit.unknowns.changed_by(change).pose();
-    if (const auto line = centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad))
-      gradient[i] = wrap_pi(line->tau_rad - tau_rad) / step;
+    return centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
+  };
+  for (int i = 0; i < n; ++i) {
+    double step = 1e-6;
+    auto moved = after(i, step);
+    // Over the seam the inner boundaries jump.
+    if (moved && std::abs(moved->tau_rad - line.tau_rad) > pi) moved = after(i, step = -step);
+    if (!moved) continue;
+    tau[i] = wrap_pi(moved->tau_rad - line.tau_rad) / step;
+    for (std::size_t k = 0; k < 4; ++k)
+      edges.block<2, 1>(2 * static_cast<Eigen::Index>(k), i) = (moved->ideal_px[k] - line.ideal_px[k]) / step;
   }
-  return std::sqrt(gradient.dot(fit.covariance * gradient));
+  LineSigma sigma;
+  sigma.tau_rad = std::sqrt(tau.dot(fit.covariance * tau));
+  const Eigen::Matrix<double, 8, Eigen::Dynamic, 0, 8, max_unknowns> weighted = edges.lazyProduct(fit.covariance);
+  sigma.edges_px2 = weighted.lazyProduct(edges.transpose());
+  return sigma;
 }
 
 // q of a freely fitted shaft that misses the RCM: the shaft from the RCM to the marker's proximal end. The angle
 // between it and the fitted axis is how wrong each angle may be; where that is too much, q is unknown.
 std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scene, const FineFit& fit,
                                                                const Rigid3& camera_from_rcm, double tau_rad) {
-  constexpr double largest_mismatch_rad = 0.03;
   const Rigid3& fitted = fit.unknowns.pose().camera_from_unrolled;
   auto q = configuration_through(camera_from_rcm, fitted.translation);
   if (!q) return std::nullopt;
@@ -60,8 +73,8 @@ std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scen
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
   const double mismatch_rad = std::atan2((fitted.rotation * z).cross(through_rcm.rotation * z).norm(),
                                          (fitted.rotation * z).dot(through_rcm.rotation * z));
-  if (!view || !(mismatch_rad < largest_mismatch_rad)) return std::nullopt;
-  q->psi_rad = view->facing_azimuth_rad - tau_rad - scene.marker.seam_rad;
+  if (!view || !(mismatch_rad < registration_limits.largest_mismatch_rad)) return std::nullopt;
+  q->psi_rad = rotation_rad(scene.marker, view->facing_azimuth_rad, tau_rad);
   const double angle_variance =
       mismatch_rad * mismatch_rad + fit.covariance(fit.unknowns.size() - 1, fit.unknowns.size() - 1);
   const double rho_variance = mismatch_rad * mismatch_rad * q->rho_m * q->rho_m + fit.covariance(4, 4);
@@ -78,9 +91,11 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
     return observation;
   }
   observation.status = Status::ok;
+  const LineSigma sigma = sigma_of(*line, scene, fit);
   observation.tau_rad = line->tau_rad;
-  observation.sigma_tau_rad = sigma_tau(scene, fit, line->tau_rad);
+  observation.sigma_tau_rad = sigma.tau_rad;
   observation.edges_ideal_px = line->ideal_px;
+  observation.edges_covariance_px2 = sigma.edges_px2;
   for (std::size_t k = 0; k < 4; ++k) observation.edges_raw_px[k] = scene.camera.raw_from_ideal(line->ideal_px[k]);
   observation.features =
       features_of(line->ideal_px, camera_from_rcm ? projected_rcm_px(scene.camera, *camera_from_rcm) : std::nullopt);
@@ -138,7 +153,7 @@ SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImag
   const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
   const FineFit near = fit_finely(scene, light, expected, memory.blur);
   if (judge(scene, near) == Status::ok) return {Status::ok, near, {}};
-  const CoarseFit coarse = fit_coarsely(scene, expected, from_memory);
+  const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
   if (!coarse.found) return {};
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
   const Status status = judge(scene, fit);
@@ -148,13 +163,14 @@ SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImag
 SurfaceTracker::Found SurfaceTracker::try_start(const Scene& scene, const LightImage& light,
                                                 const PoseUnknowns& start) const {
   const CoarseFit coarse = fit_coarsely(scene, start, {});
-  if (!coarse.found || coarse.rotation_score < least_rotation_score) return {};
-  if (coarse.rival_score > rival_ratio * coarse.rotation_score) return refusal(Status::ambiguous, coarse.unknowns);
+  if (!coarse.found || coarse.rotation_score < detection_limits.least_rotation_score) return {};
+  if (coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
+    return refusal(Status::ambiguous, coarse.unknowns);
   const FineFit first = fit_finely(scene, light, coarse.unknowns, {});
   const Status judged = judge(scene, first);
   if (judged == Status::ok) return {judged, first, {}};
   if (judged == Status::marker_mismatch) return refusal(judged, first.unknowns);
-  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, near_by);
+  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, detection_limits.near_by);
   if (!nearer.found) return {};
   const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
   const Status status = judge(scene, fit);
@@ -186,20 +202,18 @@ SurfaceTracker::Found SurfaceTracker::detect(const Scene& scene, const LightImag
 // tell which is ours.
 bool SurfaceTracker::has_rival(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
                                const FineFit& fit) const {
-  constexpr double apart_radii = 1;
   const auto middle = [&](const PoseUnknowns& unknowns) {
     const Eigen::Vector3d along(0, 0, scene.marker.length_m() / 2);
     return scene.camera.raw_from_point(unknowns.pose().camera_from_unrolled * along);
   };
-  const double radius_px =
-      scene.marker.radius_m() / fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
+  const double apart_px = detection_limits.rival_apart_radii * scene.marker.radius_m() /
+                          fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
   for (const Blob& blob : blobs)
     for (const PoseUnknowns& start : initial_poses(scene, blob, std::nullopt)) {
-      if ((middle(start) - middle(fit.unknowns)).norm() < apart_radii * radius_px) continue;
+      if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
       const Found other = try_start(scene, light, start);
       if (other.status == Status::marker_mismatch) return true;
-      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_radii * radius_px)
-        return true;
+      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return true;
     }
   return false;
 }
@@ -231,8 +245,8 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     if (!found.fit) {
       memory_[i].reset();
       if (!blobs) {
-        blobs = find_blobs(image, classes_, grid_px, least_samples);
-        if (blobs->size() > most_blobs) blobs->resize(most_blobs);
+        blobs = find_blobs(image, classes_, grid_px, detection_limits.least_samples);
+        if (blobs->size() > detection_limits.most_blobs) blobs->resize(detection_limits.most_blobs);
       }
       found = detect(scene, light, *blobs, camera_from_rcm);
       if (found.fit && !camera_from_rcm && has_rival(scene, light, *blobs, *found.fit))

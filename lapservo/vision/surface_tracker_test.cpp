@@ -9,14 +9,14 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
 namespace {
 
-using theatre::Shot;
-using theatre::usual_shot;
+using scenes::Shot;
+using scenes::usual_shot;
 
 Eigen::Vector4d q_error(const RcmCoordinates& seen, const RcmCoordinates& expected) {
   Eigen::Vector4d error = seen.vector() - expected.vector();
@@ -30,20 +30,20 @@ double normalised_square(const Eigen::Vector4d& error, const Eigen::Matrix4d& co
 }
 
 void expect_right(const Observation& o, const RcmCoordinates& truth) {
-  ASSERT_EQ(o.status, Status::ok) << status_word(o.status);
+  ASSERT_EQ(o.status, Status::ok) << to_string(o.status);
   ASSERT_TRUE(o.rcm);
   EXPECT_LT(normalised_square(q_error(o.rcm->q, truth), o.rcm->covariance), 4);
   EXPECT_LT(std::abs(wrap_pi(o.rcm->q.psi_rad - truth.psi_rad)), 0.01);
 }
 
-// Instruments that cross would hide one another: apart by a hand's breadth in the image.
+// Instruments that cross would hide one another: their middles 320 px apart in the image.
 std::vector<RcmCoordinates> apart(const Rig& rig, Random& random) {
   for (;;) {
     std::vector<RcmCoordinates> all;
     std::vector<Eigen::Vector2d> centres;
     for (std::size_t i = 0; i < rig.instruments.size(); ++i) {
-      all.push_back(theatre::random_configuration(rig, i, random));
-      const Rigid3 pose = theatre::pose_of(rig, i, all.back()).camera_from_unrolled;
+      all.push_back(scenes::random_configuration(rig, i, random));
+      const Rigid3 pose = scenes::pose_of(rig, i, all.back()).camera_from_unrolled;
       centres.push_back(rig.camera.ideal_from_point(pose * Eigen::Vector3d(0, 0, 0.012)));
     }
     bool clear = true;
@@ -55,7 +55,7 @@ std::vector<RcmCoordinates> apart(const Rig& rig, Random& random) {
 
 std::vector<RcmCoordinates> slow_motion(const Rig& rig, std::uint64_t seed, int frames) {
   Random random(seed);
-  const RcmCoordinates start = theatre::random_configuration(rig, 0, random);
+  const RcmCoordinates start = scenes::random_configuration(rig, 0, random);
   std::vector<RcmCoordinates> motion;
   for (int i = 0; i < frames; ++i) {
     RcmCoordinates q = start;
@@ -66,7 +66,7 @@ std::vector<RcmCoordinates> slow_motion(const Rig& rig, std::uint64_t seed, int 
 }
 
 TEST(SurfaceTracker, FindsAnInstrumentAnew) {
-  const Rig rig = theatre::usual_rig();
+  const Rig rig = scenes::usual_rig();
   SurfaceTracker tracker(rig, true);
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -76,7 +76,7 @@ TEST(SurfaceTracker, FindsAnInstrumentAnew) {
 
 // The camera turned upside down sees the picture upside down, and the instrument where it was.
 TEST(SurfaceTracker, ATurnedCameraSeesTheSame) {
-  Rig rig = theatre::usual_rig();
+  Rig rig = scenes::usual_rig();
   rig.camera.distortion = {-0.2, 0.05, 0.0006, -0.0004, 0};
   Rig turned = rig;
   turned.camera.cx_px = rig.camera.width_px - 1 - rig.camera.cx_px;
@@ -105,12 +105,12 @@ TEST(SurfaceTracker, ATurnedCameraSeesTheSame) {
 }
 
 TEST(SurfaceTracker, FollowingTellsTheSameAsLookingAnew) {
-  const Rig rig = theatre::usual_rig();
+  const Rig rig = scenes::usual_rig();
   SurfaceTracker following(rig, false), anew(rig, true);
   const auto motion = slow_motion(rig, 4, 8);
   for (std::size_t i = 0; i < motion.size(); ++i) {
     SCOPED_TRACE("seed 4, frame " + std::to_string(i));
-    const cv::Mat image = theatre::render(rig, {motion[i]}, i);
+    const cv::Mat image = scenes::render(rig, {motion[i]}, i);
     const Observation followed = following.track(image)[0], found = anew.track(image)[0];
     expect_right(followed, motion[i]);
     expect_right(found, motion[i]);
@@ -119,8 +119,8 @@ TEST(SurfaceTracker, FollowingTellsTheSameAsLookingAnew) {
 }
 
 TEST(SurfaceTracker, FindsTheInstrumentAgainAfterItWasHidden) {
-  const Rig rig = theatre::usual_rig();
-  const cv::Mat hidden = theatre::render_nothing(rig, 2);
+  const Rig rig = scenes::usual_rig();
+  const cv::Mat hidden = scenes::render_nothing(rig, 2);
   SurfaceTracker tracker(rig, false);
   const auto expect_seen = [&](const Shot& shot) { expect_right(tracker.track(shot.bgr)[0], shot.q); };
   for (std::uint64_t seed = 1; seed <= 6; seed += 2) {
@@ -136,12 +136,12 @@ TEST(SurfaceTracker, FindsTheInstrumentAgainAfterItWasHidden) {
 }
 
 TEST(SurfaceTracker, InstrumentsKeepTheirNamesInAnyOrderOfTheRig) {
-  const Rig rig = theatre::usual_rig(3);
+  const Rig rig = scenes::usual_rig(3);
   for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
     const auto q = apart(rig, random);
-    const cv::Mat image = theatre::render(rig, q, seed);
+    const cv::Mat image = scenes::render(rig, q, seed);
     for (const std::array<std::size_t, 3>& order : {std::array<std::size_t, 3>{0, 1, 2}, {2, 0, 1}, {1, 0, 2}}) {
       Rig shuffled = rig;
       for (std::size_t i = 0; i < 3; ++i) shuffled.instruments[i] = rig.instruments[order[i]];
@@ -149,7 +149,7 @@ TEST(SurfaceTracker, InstrumentsKeepTheirNamesInAnyOrderOfTheRig) {
       for (std::size_t i = 0; i < 3; ++i) expect_right(observations[i], q[order[i]]);
     }
     // One of them gone: its place stays empty, whatever the others show.
-    const cv::Mat without = theatre::render(rig, {q[0], q[1]}, seed);
+    const cv::Mat without = scenes::render(rig, {q[0], q[1]}, seed);
     const auto observations = SurfaceTracker(rig, true).track(without);
     expect_right(observations[0], q[0]);
     expect_right(observations[1], q[1]);
@@ -160,8 +160,8 @@ TEST(SurfaceTracker, InstrumentsKeepTheirNamesInAnyOrderOfTheRig) {
 // The camera was moved after registration, or this is another theatre's rig: what is said of q says how far to trust
 // it, or is not said; what needs no registration stays right.
 TEST(SurfaceTracker, AWrongRegistrationIsNoWrongRotation) {
-  const Rig rig = theatre::usual_rig();
-  int with_q = 0;
+  const Rig rig = scenes::usual_rig();
+  int seen = 0, with_q = 0;
   for (std::uint64_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -173,17 +173,19 @@ TEST(SurfaceTracker, AWrongRegistrationIsNoWrongRotation) {
       moved.instruments[0].camera_from_rcm->translation += shift_m * away;
       const Observation o = Tracker(moved).track(shot.bgr)[0];
       if (o.status != Status::ok) continue;
+      ++seen;
       EXPECT_LT(std::abs(wrap_pi(o.tau_rad - line.tau_rad)), std::max(0.05, 5 * o.sigma_tau_rad)) << shift_m;
       EXPECT_LT((o.edges_ideal_px[0] - line.ideal_px[0]).norm(), 1.5) << shift_m;
       EXPECT_LT((o.edges_ideal_px[3] - line.ideal_px[3]).norm(), 1.5) << shift_m;
       with_q += o.rcm.has_value();
     }
   }
-  EXPECT_LT(with_q, 20);
+  EXPECT_GE(seen, 16);
+  EXPECT_LT(with_q, seen);
 }
 
 TEST(SurfaceTracker, AMirroredPictureOrAnotherInstrumentIsNotOurs) {
-  const Rig rig = theatre::usual_rig();
+  const Rig rig = scenes::usual_rig();
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const cv::Mat& image = usual_shot(seed).bgr;
@@ -200,7 +202,7 @@ TEST(SurfaceTracker, AMirroredPictureOrAnotherInstrumentIsNotOurs) {
 }
 
 TEST(Tracker, RefusesOtherImagesThanTheRigs) {
-  const Rig rig = theatre::usual_rig();
+  const Rig rig = scenes::usual_rig();
   Tracker tracker(rig);
   EXPECT_THROW(tracker.track(cv::Mat::zeros(540, 961, CV_8UC3)), InputError);
   EXPECT_THROW(tracker.track(cv::Mat::zeros(541, 960, CV_8UC3)), InputError);
@@ -219,7 +221,7 @@ Rig with_print_off(const Rig& rig) {
 }
 
 TEST(SurfaceTracker, SaysThatThePrintIsNotAsTheRigSays) {
-  const Rig rig = theatre::usual_rig(), printed = with_print_off(rig);
+  const Rig rig = scenes::usual_rig(), printed = with_print_off(rig);
   int said = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const Shot shot(seed, {}, printed);
@@ -233,13 +235,13 @@ TEST(SurfaceTracker, SaysThatThePrintIsNotAsTheRigSays) {
 
 // Who says how far the print may be off gets a pose with a sigma that holds.
 TEST(SurfaceTracker, AToleranceOfThePrintEntersSigma) {
-  Rig tolerant = theatre::usual_rig();
+  Rig tolerant = scenes::usual_rig();
   tolerant.instruments[0].marker.tolerance_m = 0.4e-3;
-  const Rig printed = with_print_off(theatre::usual_rig());
+  const Rig printed = with_print_off(scenes::usual_rig());
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const Shot shot(seed, {}, printed);
     const Observation o = Tracker(tolerant).track(shot.bgr)[0];
-    ASSERT_EQ(status_word(o.status), "ok") << "seed " << seed;
+    ASSERT_EQ(to_string(o.status), "ok") << "seed " << seed;
     const double sigma_rad = std::sqrt(o.rcm->covariance(3, 3));
     EXPECT_GT(sigma_rad, 0.08);
     EXPECT_LT(std::abs(wrap_pi(o.rcm->q.psi_rad - shot.q.psi_rad)), 2 * sigma_rad);
@@ -248,15 +250,15 @@ TEST(SurfaceTracker, AToleranceOfThePrintEntersSigma) {
 
 // Without the RCM nothing says which of two prints is the instrument's.
 TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
-  Rig both = theatre::usual_rig(2);
+  Rig both = scenes::usual_rig(2);
   both.instruments[1].marker = both.instruments[0].marker;
-  Rig one = theatre::usual_rig();
+  Rig one = scenes::usual_rig();
   one.instruments[0].camera_from_rcm.reset();
   Random random(5);
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const auto configurations = apart(both, random);
-    EXPECT_EQ(status_word(Tracker(one).track(theatre::render(both, configurations, seed))[0].status), "ambiguous");
-    EXPECT_EQ(status_word(Tracker(one).track(usual_shot(seed).bgr)[0].status), "ok");
+    EXPECT_EQ(to_string(Tracker(one).track(scenes::render(both, configurations, seed))[0].status), "ambiguous");
+    EXPECT_EQ(to_string(Tracker(one).track(usual_shot(seed).bgr)[0].status), "ok");
   }
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/words.h"
 #include "lapservo/vision/centerline.h"
 #include "lapservo/vision/image_view.h"
 #include "lapservo/vision/interlacing.h"
@@ -12,6 +13,9 @@
 namespace lapservo {
 using namespace internal;
 namespace {
+
+constexpr Words<Method, 2> method_words{{{Method::surface, "surface"}, {Method::centerline, "centerline"}}};
+static_assert(names_all(method_words, Method::centerline));
 
 std::string size_text(int width_px, int height_px) {
   return std::to_string(width_px) + "x" + std::to_string(height_px);
@@ -38,6 +42,14 @@ Observation refused_as_interlaced(const Observation& observation, Method method)
 }
 
 }  // namespace
+
+std::string_view to_string(Method method) {
+  return word_of(method_words, method);
+}
+
+std::optional<Method> method_from_string(std::string_view word) {
+  return read_word(method_words, word);
+}
 
 struct Tracker::State {
   State(const Rig& of_rig, TrackerOptions options)

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -14,10 +16,13 @@ enum class Method {
   surface,     ///< every visible generatrix, robust fit in linear light
   centerline,  ///< the paper's Algorithm 1
 };
+/// "surface", "centerline".
+std::string_view to_string(Method method);
+std::optional<Method> method_from_string(std::string_view word);
 
 struct TrackerOptions {
   Method method = Method::surface;
-  bool single = false;  ///< treat every frame on its own instead of starting from the frame before
+  bool single = false;       ///< treat every frame on its own instead of starting from the frame before
   bool deinterlace = false;  ///< track the field of the even rows; also when the rig's camera says so
 };
 

@@ -1,21 +1,35 @@
 #include "lapservo/vision/tracker.h"
 
-#include <type_traits>
-#include <utility>
+#include <cmath>
 
 #include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
 namespace {
 
+using scenes::usual_shot;
+
 // `for (const Observation& o : Tracker(rig).track(image))` once read freed memory.
 TEST(Tracker, OneThatIsATemporaryGivesItsObservationsAway) {
-  const bool by_value =
-      std::is_same_v<decltype(std::declval<Tracker>().track(std::declval<cv::Mat>())), std::vector<Observation>>;
-  const bool by_reference = std::is_same_v<decltype(std::declval<Tracker&>().track(std::declval<cv::Mat>())),
-                                           const std::vector<Observation>&>;
-  EXPECT_TRUE(by_value);
-  EXPECT_TRUE(by_reference);
+  const auto& shot = usual_shot(1);
+  int seen = 0;
+  for (const Observation& o : Tracker(shot.rig).track(shot.bgr)) {
+    ASSERT_EQ(o.status, Status::ok);
+    EXPECT_LT(std::abs(wrap_pi(o.rcm.value().q.psi_rad - shot.q.psi_rad)), 0.01);
+    ++seen;
+  }
+  EXPECT_EQ(seen, 1);
+}
+
+// Another than a temporary lends them: no copy a frame.
+TEST(Tracker, LendsTheSameObservationsFrameByFrame) {
+  const auto& shot = usual_shot(1);
+  Tracker tracker(shot.rig);
+  const Observation* const first = tracker.track(shot.bgr).data();
+  EXPECT_EQ(tracker.track(shot.bgr).data(), first);
 }
 
 }  // namespace

@@ -7,16 +7,13 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
 namespace {
 
-constexpr double largest_sigma_psi_rad = 0.02;  // five sigma: a tenth of a radian
-constexpr double least_matching = 0.3, most_wrong = 0.05, most_beyond = 0.5, most_beside = 0.2;
-constexpr double tolerance_of_complete = 1.6;
-constexpr double least_in_image = 0.25;
-constexpr double well_seen_share = 0.7;  // to blame the print
-constexpr double blurred_px = 1.5;       // colours mix so far on both sides of a boundary
+constexpr const JudgeLimits& limits = judge_limits;
 
 // Of the marker; at least a pixel.
 double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
@@ -28,28 +25,24 @@ double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azim
   return std::isfinite(length_px) ? std::max(1.0, length_px) : 1.0;
 }
 
-// A boundary that lies too far from its place is not located at all, and nothing contradicts what the others say; where
-// nothing hides the marker, that is the print.
+// The print's fault, not the scene's: nothing hides a boundary that is not where it should be.
 bool misses_a_boundary(const FineFit& fit, const ColorAgreement& agreement) {
-  constexpr double unhidden = 0.85, missed = 0.3, sharp_px = 1.8;
-  constexpr int enough = 10;
   bool missing = false;
-  for (std::size_t k = 0; k < 4; ++k) missing |= fit.in_image[k] >= enough && fit.used[k] < missed * fit.in_image[k];
-  return missing && agreement.matching > unhidden && fit.blur.boundaries_px < sharp_px;
+  for (std::size_t k = 0; k < 4; ++k)
+    missing |= fit.in_image[k] >= limits.enough_lines && fit.used[k] < limits.missed_share * fit.in_image[k];
+  return missing && agreement.matching > limits.unhidden_matching && fit.blur.boundaries_px < limits.unblurred_px;
 }
 
-// The rotation's sigma, where the rig's tolerance of the print adds to it no more than it should: who sets that wants
-// to live with it. By how much a print that is certainly off may be off is known from four numbers at best: ten sigma.
+// Sigma of psi, and whom to blame when it is too large: the print or the picture.
 Status judge_sigma(const FineFit& fit, const ColorAgreement& agreement) {
-  constexpr double certain = 0.999, slack = 1.5;
   const auto squared = [](double x) { return x * x; };
-  const bool off = fit.print_off_probability > certain;
-  const double limit = squared(off ? largest_sigma_psi_rad / 2 : largest_sigma_psi_rad);
+  const bool off = fit.print_off_probability > limits.certainly_off;
+  const double limit = squared(off ? limits.largest_sigma_print_off_rad : limits.largest_sigma_psi_rad);
   const Eigen::Index psi = fit.unknowns.size() - 1;
   const double variance = fit.covariance(psi, psi);
   if (fit.psi_variance_by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
-  if (variance < limit + slack * fit.psi_variance_by_tolerance) return Status::ok;
-  const bool well_seen = fit.located_share() > well_seen_share;
+  if (variance < limit + limits.tolerance_slack * fit.psi_variance_by_tolerance) return Status::ok;
+  const bool well_seen = fit.located_share() > limits.well_seen_share;
   return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
 }
 
@@ -63,13 +56,14 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
   if (!view) return agreement;
   const double length_m = scene.marker.length_m(), ring_m = 0.1 * length_m;
   const double guard_m =
-      length_m * std::max(0.02, blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
+      length_m *
+      std::max(limits.least_guard, limits.blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
   int total = 0, inside = 0, matching = 0, wrong = 0, outer = 0, beyond = 0, flank = 0, beside = 0;
   std::array<int, 2> ring{}, spilled{};
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = view->facing_azimuth_rad + 0.8 * view->half_visible_rad * (2.0 * i / (azimuths - 1) - 1);
-    const auto ends_m = boundaries_m(scene.marker, azimuth_rad - pose.psi_rad - scene.marker.seam_rad);
+    const auto ends_m = boundaries_m(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
     const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, 0);
     for (int k = -margin; k < places + margin; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
@@ -111,38 +105,44 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
 Status judge(const Scene& scene, const FineFit& fit) {
   if (!fit.converged) return Status::poor_fit;
   const ColorAgreement agreement = color_agreement(scene, fit.unknowns.pose());
-  if (agreement.in_image < least_in_image) return Status::cut;
-  // Where all boundaries show as they should, other colours are noise: the dark has plenty under a high gain.
+  if (agreement.in_image < limits.least_in_image) return Status::cut;
+
+  // Colours where they should not be.
   const double share = fit.located_share();
-  const double tolerance = agreement.matching > 0.6 && share > 0.9 ? tolerance_of_complete : 1;
-  if (agreement.wrong > tolerance * most_wrong || agreement.beyond > tolerance * most_beyond ||
-      agreement.beside > tolerance * most_beside)
+  const bool complete = agreement.matching > limits.complete_matching && share > limits.complete_share;
+  const double tolerance = complete ? limits.tolerance_of_complete : 1;
+  if (agreement.wrong > tolerance * limits.most_wrong || agreement.beyond > tolerance * limits.most_beyond ||
+      agreement.beside > tolerance * limits.most_beside)
     return Status::poor_fit;
-  if (agreement.matching < least_matching) return Status::occluded;
+
+  // Too little of the marker.
+  if (agreement.matching < limits.least_matching) return Status::occluded;
   const int inner_used = fit.used[1] + fit.used[2], outer_used = fit.used[0] + fit.used[3];
-  if (inner_used < std::max(6, fit.lines / 10) || outer_used < 4) return Status::occluded;
-  // Without the RCM, only both ends together fix the depth and with it everything else. With it they confirm what is
-  // left of a hidden marker.
-  constexpr double mostly_hidden = 0.5, partly_hidden = 0.7, most_spilled = 0.12;
-  const bool needs_both_ends = !fit.unknowns.q() || (share < mostly_hidden && agreement.in_image > 0.98);
-  if (needs_both_ends && std::min(fit.used[0], fit.used[3]) < std::max(6, fit.lines / 12))
-    return agreement.in_image < 0.98 ? Status::cut : Status::occluded;
-  // Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
-  // many, noisy.
-  if (share < partly_hidden && agreement.spilled > most_spilled) return Status::poor_fit;
-  const bool few_sides = 4 * fit.sides_used < fit.sides_in_image;
-  const double largest_rms_sigmas = 1.3 + (few_sides ? 0 : 5.5 * std::clamp(share - 0.7, 0.0, 0.2));
-  if (share < 0.2 || fit.inlier_rms_sigmas > largest_rms_sigmas) return Status::poor_fit;
-  // Smeared by motion across, the sides hold the shaft's place no more; and few boundaries need the sides beside them.
-  // A smeared end that most lines miss is not hidden: what they found is another.
-  // Beyond some width the smear's form, which nobody knows, decides where the edges are taken to be.
-  constexpr double smeared_px = 2, lost_px = 4.5;
-  constexpr int fewest_sides = 8;
+  if (inner_used < std::max(limits.fewest_inner, fit.lines / limits.inner_one_in) || outer_used < limits.fewest_outer)
+    return Status::occluded;
+  // With the RCM both ends confirm what is left of a hidden marker; without it they are needed always.
+  const bool in_image = agreement.in_image > limits.wholly_in_image;
+  const bool needs_both_ends = !fit.unknowns.q() || (share < limits.mostly_hidden && in_image);
+  if (needs_both_ends &&
+      std::min(fit.used[0], fit.used[3]) < std::max(limits.fewest_of_end, fit.lines / limits.end_one_in))
+    return agreement.in_image < limits.wholly_in_image ? Status::cut : Status::occluded;
+
+  // Boundaries and sides that agree badly.
+  if (share < limits.partly_hidden && agreement.spilled > limits.most_spilled) return Status::poor_fit;
+  const bool few_sides = limits.sides_one_in * fit.sides_used < fit.sides_in_image;
+  const double more_rms_sigmas =
+      few_sides ? 0 : limits.rms_per_share * std::clamp(share - limits.rms_from_share, 0.0, limits.rms_most_share);
+  if (share < limits.least_share || fit.inlier_rms_sigmas > limits.largest_rms_sigmas + more_rms_sigmas)
+    return Status::poor_fit;
+
+  // Motion's smear.
   const double smear_px = std::max(fit.blur.boundaries_px, fit.blur.sides_px);
-  const bool smeared = smear_px > smeared_px;
-  if (smear_px > lost_px) return Status::uncertain;
-  if (smeared && 5 * *std::min_element(fit.used.begin(), fit.used.end()) < 3 * fit.lines) return Status::uncertain;
-  if ((smeared || share < mostly_hidden) && fit.sides_used < fewest_sides) return Status::uncertain;
+  if (smear_px > limits.lost_px) return Status::uncertain;
+  const bool smeared = smear_px > limits.smeared_px;
+  const int least_used = *std::min_element(fit.used.begin(), fit.used.end());
+  if (smeared && limits.smeared_end_of * least_used < limits.smeared_end_parts * fit.lines) return Status::uncertain;
+  // Few boundaries need the sides beside them.
+  if ((smeared || share < limits.mostly_hidden) && fit.sides_used < limits.fewest_sides) return Status::uncertain;
   return judge_sigma(fit, agreement);
 }
 

@@ -6,15 +6,15 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
 namespace {
 
-using theatre::fit_from;
-using theatre::Shot;
-using theatre::Sight;
-using theatre::usual_shot;
+using scenes::fit_from;
+using scenes::Shot;
+using scenes::Sight;
+using scenes::usual_shot;
 
 FineFit fit_from_truth(const Shot& shot) {
   return fit_from(shot, shot.truth(true));
@@ -29,7 +29,7 @@ TEST(Verification, ARightPoseIsOk) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
     EXPECT_EQ(judge(shot.sight.scene(), fit_from_truth(shot)), Status::ok);
-    const ColorAgreement agreement = color_agreement(shot.sight.scene(), theatre::pose_of(shot.rig, 0, shot.q));
+    const ColorAgreement agreement = color_agreement(shot.sight.scene(), scenes::pose_of(shot.rig, 0, shot.q));
     EXPECT_GT(agreement.matching, 0.85);
     EXPECT_LT(agreement.wrong, 0.02);
     EXPECT_EQ(agreement.in_image, 1);
@@ -112,9 +112,9 @@ TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
 
 TEST(Verification, TissueIsNotOk) {
   const Shot& shot = usual_shot(1);
-  const Sight empty(shot.rig, theatre::render_nothing(shot.rig, 2));
+  const Sight empty(shot.rig, scenes::render_nothing(shot.rig, 2));
   EXPECT_NE(judge(empty.scene(), fit_from_truth(shot)), Status::ok);
-  EXPECT_LT(color_agreement(empty.scene(), theatre::pose_of(shot.rig, 0, shot.q)).matching, 0.05);
+  EXPECT_LT(color_agreement(empty.scene(), scenes::pose_of(shot.rig, 0, shot.q)).matching, 0.05);
 }
 
 }  // namespace

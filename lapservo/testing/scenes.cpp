@@ -1,4 +1,4 @@
-#include "lapservo/vision/theatre.h"
+#include "lapservo/testing/scenes.h"
 
 #include <cmath>
 #include <map>
@@ -8,9 +8,11 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 
-namespace lapservo::internal::theatre {
+namespace lapservo::scenes {
+using namespace internal;
 namespace {
 
 struct Port {
@@ -79,11 +81,8 @@ cv::Mat render(const Rig& rig, const std::vector<RcmCoordinates>& configurations
   std::vector<ShaftModel> shafts;
   std::vector<ShaftPlacement> placements;
   for (std::size_t i = 0; i < configurations.size(); ++i) {
-    ShaftModel shaft;
-    shaft.marker = rig.instruments[i].marker;
-    shafts.push_back(shaft);
-    const ShaftPose pose = pose_of(rig, i, configurations[i]);
-    placements.push_back({pose.camera_from_unrolled, pose.psi_rad});
+    shafts.push_back(shaft_of(rig.instruments[i]));
+    placements.push_back(placement_of(rig.instruments[i], configurations[i]));
   }
   return Renderer(rig.camera, shafts, tissue, options).render(placements, seed);
 }
@@ -139,4 +138,4 @@ FineFit fit_from(const Shot& shot, const PoseUnknowns& start) {
   return fit_finely(shot.sight.scene(), shot.sight.light(), start, {});
 }
 
-}  // namespace lapservo::internal::theatre
+}  // namespace lapservo::scenes

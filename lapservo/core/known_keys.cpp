@@ -1,4 +1,4 @@
-#include "lapservo/rig/known_keys.h"
+#include "lapservo/core/known_keys.h"
 
 #include <algorithm>
 #include <limits>

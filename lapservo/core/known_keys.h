@@ -3,7 +3,7 @@
 #include <string_view>
 #include <vector>
 
-#include "lapservo/rig/yaml_field.h"
+#include "lapservo/core/yaml_field.h"
 
 namespace lapservo::internal {
 

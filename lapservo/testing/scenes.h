@@ -14,8 +14,9 @@
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
-/// Rendered frames with known truth, for this folder's tests only.
-namespace lapservo::internal::theatre {
+/// Rendered frames of the simulator with known truth, and what vision takes apart of them. For tests.
+namespace lapservo::scenes {
+using namespace internal;
 
 /// 960x540, up to three instruments through ports left, right and above; their markers share colours in other orders.
 Rig usual_rig(std::size_t instruments = 1);
@@ -71,4 +72,4 @@ const Shot& usual_shot(std::uint64_t seed);
 /// The fine fit to a shot, of a frame on its own.
 FineFit fit_from(const Shot& shot, const PoseUnknowns& start);
 
-}  // namespace lapservo::internal::theatre
+}  // namespace lapservo::scenes

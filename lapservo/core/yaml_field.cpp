@@ -1,4 +1,4 @@
-#include "lapservo/rig/yaml_field.h"
+#include "lapservo/core/yaml_field.h"
 
 #include <optional>
 #include <string>
@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t largest_file_bytes = 1 << 20;
 
-// yaml-cpp recurses over nesting without a limit of its own: refuse what no file of ours needs before it parses.
+// yaml-cpp 0.7 follows 500 levels (its DepthGuard), each several frames of the stack; no file of ours needs 16.
 bool nests_too_deeply(std::string_view yaml) {
   int depth = 0;
   for (const char c : yaml) {

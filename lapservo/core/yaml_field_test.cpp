@@ -1,4 +1,4 @@
-#include "lapservo/rig/yaml_field.h"
+#include "lapservo/core/yaml_field.h"
 
 #include <array>
 #include <string>
