@@ -1,7 +1,7 @@
 #include "lapservo/servo/image_features.h"
 
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/feature_map.h"
-#include "lapservo/kinematics/features.h"
 
 namespace lapservo {
 using namespace internal;
