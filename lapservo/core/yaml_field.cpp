@@ -1,9 +1,11 @@
 #include "lapservo/core/yaml_field.h"
 
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include "lapservo/core/csv.h"
@@ -38,6 +40,26 @@ bool nests_too_deeply(std::string_view yaml) {
   return false;
 }
 
+class Unheard : public YAML::EventHandler {
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+// Not by YAML::LoadAll, which never ends where a token is left over between documents, as of ", a".
+bool holds_several_documents(const std::string& yaml) {
+  std::istringstream stream(yaml);
+  YAML::Parser parser(stream);
+  Unheard events;
+  return parser.HandleNextDocument(events) && parser.HandleNextDocument(events);
+}
+
 // yaml-cpp's words begin with its name.
 std::string syntax_problem(const YAML::Exception& error) {
   std::string text = error.what();
@@ -59,12 +81,11 @@ YamlField YamlField::parse(std::string_view yaml, const std::string& source, std
     throw InputError(source, "is larger than 1 MiB, expected a " + std::string(kind));
   if (nests_too_deeply(yaml)) throw InputError(source, "nests more deeply than a " + std::string(kind) + " does");
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(yaml));
-    if (documents.size() > 1)
-      throw InputError(source, "holds " + std::to_string(documents.size()) +
-                                   " documents, expected one: no line of three dashes in the midst of a " +
+    const std::string text(yaml);
+    if (holds_several_documents(text))
+      throw InputError(source, "holds several documents, expected one: no line of three dashes in the midst of a " +
                                    std::string(kind));
-    return {source, "", documents.empty() ? YAML::Node() : documents.front()};
+    return {source, "", YAML::Load(text)};
   } catch (const YAML::Exception& error) {
     throw InputError(source, "is not YAML: " + syntax_problem(error) + ", expected a " + std::string(kind));
   }

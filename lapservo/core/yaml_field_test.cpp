@@ -54,5 +54,13 @@ TEST(YamlField, NamesTheKindOfFileThatWasExpected) {
   EXPECT_EQ(input_error([] { parse(std::string(16, '[') + std::string(16, ']')); }), "");
 }
 
+// yaml-cpp 0.7's LoadAll never returns from the first two.
+TEST(YamlField, WhatIsLeftOverBetweenDocumentsIsRefused) {
+  for (const char* text : {", a", "a: 1\n--- b\n, c", "a: 1\n---\nb: 2", "a: 1\n---\nb: 2\n---\nc: 3"})
+    EXPECT_NE(input_error([&] { parse(text); }), "") << text;
+  for (const char* text : {"---\na: 1", "a: 1\n...\n", "# nothing", ""})
+    EXPECT_EQ(input_error([&] { parse(text); }), "") << text;
+}
+
 }  // namespace
 }  // namespace lapservo::internal

@@ -363,7 +363,7 @@ std::vector<Complaint> misunderstandings() {
       {"SeamForgotten", with("seam_rad: 0.25", "seam_rad:"),
        "instruments[0].marker.seam_rad: is empty, expected a value, or no such key"},
       {"SecondDocument", good + "---\n" + good,
-       "holds 2 documents, expected one: no line of three dashes in the midst of a rig file"},
+       "holds several documents, expected one: no line of three dashes in the midst of a rig file"},
       {"QuaternionWithADigitMissing", with("[0, 0, 0.6, 0.8]", "[0, 0, 0.6, 0.79]"),
        "instruments[0].camera_from_rcm.quaternion_xyzw: is of norm 0.992018, expected " + unit},
       {"MatrixOfTwoRows", with("rows: 3", "rows: 2"), "camera.camera_matrix.rows: is 2, expected 3"},
