@@ -182,7 +182,8 @@ class Evidence {
   }
 
  private:
-  PrintVector information_ = PrintVector::Zero(), squares_ = PrintVector::Zero();  // along the directions that are independent
+  PrintVector information_ = PrintVector::Zero(),
+              squares_ = PrintVector::Zero();  // along the directions that are independent
 };
 
 struct Solution {
