@@ -5,6 +5,7 @@
 #include <ceres/ceres.h>
 #include <cmath>
 #include <cstddef>
+#include <glog/logging.h>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -218,6 +219,7 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
     fixed.push_back(gap);
   if (!fixed.empty()) problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, fixed));
 
+  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres complains of, its results say
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   solver.max_num_iterations = 30;
