@@ -21,7 +21,7 @@ constexpr std::size_t most_per_sector = 2;
 constexpr double most_time_s = 1e9;
 
 constexpr std::size_t fewest_edges = 40, fewest_frames = 12, fewest_seam_views = 3;
-constexpr double widest_unseen_rad = 0.8;  // between neighbouring facing azimuths; a view measures +-0.9 rad
+constexpr double widest_unseen_rad = 0.9;  // between neighbouring facing azimuths; a view measures +-0.9 rad
 constexpr double most_blur_px = 4;
 constexpr int most_rounds = 16, gap_round = 7;
 constexpr double settled_m = 1e-6;
@@ -274,6 +274,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
 
   std::optional<Adjustment> last;
   bool settled = false, gap_judged = false;
+  std::optional<double> no_gap_sigma_rad;
   for (int i = 0; i < most_rounds && !settled; ++i) {
     if (progress) progress(i, most_rounds);
     const auto stage = std::min(static_cast<std::size_t>(i), rounds.size() - 1);
@@ -287,7 +288,9 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     gap_judged = true;
     const double gap_m = fit.marker().gap_rad * nominal.radius_m();
     const double sigma_m = std::sqrt((*last->covariance)(print_numbers - 1, print_numbers - 1)) * nominal.radius_m();
-    if (gap_m < std::max(least_gap_m, least_gap_sigmas * sigma_m)) fit.believe_no_gap(), settled = false;
+    if (gap_m >= std::max(least_gap_m, least_gap_sigmas * sigma_m)) continue;
+    no_gap_sigma_rad = sigma_m / nominal.radius_m();
+    fit.believe_no_gap(), settled = false;
   }
   last = fit.round(rounds.back(), true, true);
   if (!last) return refused(unsolvable);
@@ -301,6 +304,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   calibration.after_px = residuals_after.rms_px, calibration.after = residuals_after.residuals;
   calibration.marker = fit.marker();
   calibration.marker.sigmas = sigmas_of(*last->covariance, nominal.sigmas);
+  if (no_gap_sigma_rad) calibration.marker.sigmas.gap_rad = no_gap_sigma_rad;
   calibration.marker.tolerance_m = tolerance_of(PrintShape::of(fit.marker()), *last->covariance, fit.marker());
   if (const std::string problem = marker_problem(calibration.marker); !problem.empty())
     return refused("what was found is no marker: " + problem);

@@ -20,7 +20,7 @@ constexpr double mm = 1e-3;
 constexpr int frame_numbers = 7, film = 6;
 // After the print's numbers (lengths in mm): what all films are off by, in film_sigma_m, and all sides, the seam's
 // edges and each boundary, in all frames alike [px].
-constexpr int shared_film = print_numbers, sides = shared_film + 1, seam = sides + 1, boundaries = seam + 1;
+constexpr int shared_film = print_numbers, sides = shared_film + 1, seam = sides + 1, boundaries = seam + 2;
 constexpr int shared_numbers = boundaries + 4;
 constexpr int gap = print_numbers - 1;
 constexpr std::size_t upper_group = measurement_groups, groups = measurement_groups + 2;
@@ -30,7 +30,7 @@ constexpr std::size_t upper_group = measurement_groups, groups = measurement_gro
 constexpr double print_prior_mm = 2, gap_prior_rad = 0.5;
 // From the film on. Measured on rendered frames: sides up to 0.04 px, an end whose face is seen up to 0.1 px, inner
 // boundaries 0.01 px.
-constexpr std::array shared_sigmas{1.0, 0.03, 0.03, 0.05, 0.01, 0.01, 0.05};
+constexpr std::array shared_sigmas{1.0, 0.04, 0.03, 0.03, 0.05, 0.01, 0.01, 0.05};
 constexpr double zero = 1e-3;            // of these
 constexpr double common_seam_px = 0.03;  // of one frame
 
@@ -109,10 +109,10 @@ SharedRow shared_row(const Measurement& m, const PrintShape& shape, double cover
   return row;
 }
 
-SharedRow shared_row(const SeamEdge& edge) {
+SharedRow shared_row(const SeamEdge& edge, bool lower) {
   SharedRow row{};
   row[gap] = edge.by_gap_px;
-  row[seam] = 1;
+  row[lower ? seam + 1 : seam] = 1;
   return row;
 }
 
@@ -145,7 +145,7 @@ void add_frame(ceres::Problem& problem, const ViewMeasurements& frame, const Pri
   }
   const auto add_seam = [&](const std::optional<SeamEdge>& edge, std::size_t group) {
     if (!edge) return;
-    auto* cost = new LinearCost(edge->row, shared_row(*edge), edge->residual_px, edge->sigma_px);
+    auto* cost = new LinearCost(edge->row, shared_row(*edge, group != upper_group), edge->residual_px, edge->sigma_px);
     blocks.seam.push_back(cost);
     add(cost, group), used[group] = true;
   };
