@@ -20,10 +20,10 @@ constexpr double farthest_rad = 0.85;  // of the seam from the facing generatrix
 constexpr double visible_rad = 1.2;    // samples beyond are too foreshortened
 constexpr double turned_rad = 0.1;     // an edge's face that is seen by less than this is too thin to matter
 constexpr int stations = 40;
-constexpr std::size_t fewest_stations = 3;
+constexpr std::size_t min_stations = 3;
 constexpr double floor_px = 0.04;  // what the model leaves out
-constexpr double largest_sigma_px = 1;
-constexpr double least_explained = 0.8;  // of the light's variance that the edges leave unexplained without them
+constexpr double max_sigma_px = 1;
+constexpr double min_explained = 0.8;  // of the light's variance that the edges leave unexplained without them
 
 double normal_cdf(double x) {
   return 0.5 * std::erfc(-x / std::sqrt(2.0));
@@ -129,7 +129,7 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
       ++found->count[i];
     }
   }
-  std::erase_if(section.profiles, [](const Profile& p) { return p.stations < fewest_stations; });
+  std::erase_if(section.profiles, [](const Profile& p) { return p.stations < min_stations; });
   if (section.profiles.empty()) return std::nullopt;
   for (Profile& profile : section.profiles) profile.along_m /= profile.stations;
   return section;
@@ -248,7 +248,7 @@ std::optional<SeamFit> fit(const Section& section, double expected_gap_m, double
     if (step.norm() < 0.002 * pixel_m) break;
   }
   if (std::abs(best.upper_m) > 1.2 * reach_m) return std::nullopt;
-  if (residual.squaredNorm() > least_explained * worst_cost) return std::nullopt;
+  if (residual.squaredNorm() > min_explained * worst_cost) return std::nullopt;
   const double freedom =
       std::max<double>(1, 0.6 * static_cast<double>(residual.size()));  // colours, and neighbours share pixels
   best.covariance = residual.squaredNorm() / freedom * information.inverse();
@@ -305,13 +305,13 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
   const double found_upper_rad = turned_upper_rad + found->upper_m / radius_m;
   if (!free_gap || found_upper_rad < turned_rad) {
     edges.upper = edge_at(view, view.upper_rad, along_m, found->upper_m, found->covariance(0, 0), false);
-    if (edges.upper->sigma_px > largest_sigma_px) edges.upper.reset();
+    if (edges.upper->sigma_px > max_sigma_px) edges.upper.reset();
   }
   if (free_gap && found_upper_rad - edges.gap_rad > -turned_rad) {
     const double variance_m2 = found->covariance(0, 0) + found->covariance(1, 1) - 2 * found->covariance(0, 1);
     edges.lower = edge_at(view, view.upper_rad - marker.gap_rad, along_m, found->upper_m - found->gap_m + gap_m,
                           variance_m2, true);
-    if (edges.lower->sigma_px > largest_sigma_px) edges.lower.reset();
+    if (edges.lower->sigma_px > max_sigma_px) edges.lower.reset();
   }
   return edges;
 }
