@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -42,6 +43,14 @@ struct CompressedImageMessage {
   double stamp_s = 0;
   std::string format;
   std::vector<std::uint8_t> data;
+};
+
+/// sensor_msgs/CameraInfo of a camera with plumb_bob distortion, not rectified.
+struct CameraInfoMessage {
+  double stamp_s = 0;
+  std::uint32_t width = 0, height = 0;
+  std::vector<double> d;      ///< k1 k2 p1 p2 k3
+  std::array<double, 9> k{};  ///< row by row
 };
 
 }  // namespace lapservo::internal

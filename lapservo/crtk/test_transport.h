@@ -19,6 +19,10 @@ class TestTransport : public Transport {
   }
   Publisher<StringMessage> string_publisher(const std::string& topic) override { return keep(topic, strings_); }
   Publisher<ImageMessage> image_publisher(const std::string& topic) override { return keep(topic, images_); }
+  Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) override {
+    return keep(topic, compressed_);
+  }
+  Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) override { return keep(topic, infos_); }
 
   Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) override {
     return add(joint_handlers_[topic], std::move(handler));
@@ -73,6 +77,8 @@ class TestTransport : public Transport {
   std::map<std::string, std::vector<OperatingStateMessage>> states_;
   std::map<std::string, std::vector<StringMessage>> strings_;
   std::map<std::string, std::vector<ImageMessage>> images_;
+  std::map<std::string, std::vector<CompressedImageMessage>> compressed_;
+  std::map<std::string, std::vector<CameraInfoMessage>> infos_;
   std::map<std::string, Handlers<JointMessage>> joint_handlers_;
   std::map<std::string, Handlers<OperatingStateMessage>> state_handlers_;
   std::map<std::string, Handlers<StringMessage>> string_handlers_;

@@ -22,11 +22,13 @@ class Transport {
   /// Destroyed, no handler runs any more.
   using Subscription = std::shared_ptr<void>;
 
-  /// Publishers may be called from every thread and outlive neither the transport nor their topic.
+  /// Publishers may be called from every thread; a copy that lives keeps the topic alive.
   virtual Publisher<JointMessage> joint_publisher(const std::string& topic) = 0;
   virtual Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) = 0;
   virtual Publisher<StringMessage> string_publisher(const std::string& topic) = 0;
   virtual Publisher<ImageMessage> image_publisher(const std::string& topic) = 0;
+  virtual Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) = 0;
+  virtual Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) = 0;
 
   /// Messages that this transport's own publishers sent are left out.
   virtual Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) = 0;
