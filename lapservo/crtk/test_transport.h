@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lapservo/crtk/transport.h"
@@ -39,10 +40,22 @@ class TestTransport : public Transport {
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override {
     return add(compressed_handlers_[topic], std::move(handler));
   }
-  double stamp_now_s() const override { return 1000; }
+  double stamp_now_s() const override { return stamp_s; }
 
   void say(const std::string& topic, const JointMessage& message) { tell(joint_handlers_[topic], message); }
   void say(const std::string& topic, const OperatingStateMessage& message) { tell(state_handlers_[topic], message); }
+  void say(const std::string& topic, const StringMessage& message) { tell(string_handlers_[topic], message); }
+  /// Says all that was published since the last call.
+  void deliver() {
+    for (auto& [topic, messages] : std::exchange(joints_, {}))
+      for (const auto& message : messages) tell(joint_handlers_[topic], message);
+    for (auto& [topic, messages] : std::exchange(states_, {}))
+      for (const auto& message : messages) tell(state_handlers_[topic], message);
+    for (auto& [topic, messages] : std::exchange(images_, {}))
+      for (const auto& message : messages) tell(image_handlers_[topic], message);
+  }
+
+  double stamp_s = 1000;
 
   std::vector<JointMessage> joints(const std::string& topic) {
     const std::lock_guard lock(mutex_);

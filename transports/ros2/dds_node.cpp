@@ -1,6 +1,7 @@
 #include "transports/ros2/dds_node.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <map>
@@ -36,15 +37,27 @@ Qos qos_of(Delivery delivery) {
   return qos;
 }
 
-// Whole pictures in few packets, unless CYCLONEDDS_URI says otherwise; what it says comes last and counts.
+// Whole pictures in few packets, unless CYCLONEDDS_URI says otherwise; what it says comes last and counts. Loopback
+// often has no multicast: those on it are asked one by one.
 std::string configuration() {
-  std::string text = "<General><MaxMessageSize>65500B</MaxMessageSize>";
+  std::string general = "<MaxMessageSize>65500B</MaxMessageSize>", discovery;
   const char* const localhost = std::getenv("ROS_LOCALHOST_ONLY");
-  if (localhost && std::string(localhost) == "1")
-    text += "<Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces>";
-  text = "<CycloneDDS><Domain id=\"any\">" + text + "</General></Domain></CycloneDDS>";
+  if (localhost && std::string(localhost) == "1") {
+    general += "<Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces>";
+    discovery =
+        "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
+        "<Peers><Peer address=\"127.0.0.1\"/></Peers>";
+  }
+  const std::string text = "<CycloneDDS><Domain id=\"any\"><General>" + general + "</General><Discovery>" + discovery +
+                           "</Discovery></Domain></CycloneDDS>";
   const char* const own = std::getenv("CYCLONEDDS_URI");
   return own && *own ? text + "," + own : text;
+}
+
+// Errors only: it warns of every loopback without multicast.
+void log_sink(void*, const dds_log_data_t* data) {
+  if (data->priority & (DDS_LC_ERROR | DDS_LC_FATAL))
+    std::fprintf(stderr, "DDS: %.*s\n", static_cast<int>(data->size), data->message);
 }
 
 // One a process and number, configured before its first participant.
@@ -55,6 +68,7 @@ class Domains {
   }
   void need(std::uint32_t id) {
     const std::lock_guard lock(mutex_);
+    if (domains_.empty()) dds_set_log_sink(log_sink, nullptr);
     if (!domains_.count(id))
       domains_[id] = checked(dds_create_domain(id, configuration().c_str()), "domain (see CYCLONEDDS_URI)");
   }
