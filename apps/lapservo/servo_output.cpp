@@ -53,7 +53,8 @@ void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>&
     if (converged()) return;
     error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
   }
-  convergence_.add(tick.input.time_s, error);
+  if (!start_s_) start_s_ = tick.input.time_s;
+  convergence_.add(tick.input.time_s - *start_s_, error);
 }
 
 std::string Summary::text() const {

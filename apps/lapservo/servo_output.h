@@ -34,6 +34,7 @@ class Summary {
   std::string text() const;
 
  private:
+  std::optional<double> start_s_;
   long ticks_ = 0;
   std::map<std::string, long> held_;
   Convergence convergence_;

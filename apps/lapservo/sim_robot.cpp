@@ -50,6 +50,7 @@ int run(const Options& options) {
   simulated.seed = options.seed;
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.fps;
+  simulated.endoscope.real_time = true;
   Simulator simulator(rig, simulated, start_of(options, rig, simulated.arm));
   const auto transport = make_transport(options.transport, "lapservo_sim_robot", "--transport");
   SimRobotConfig config;

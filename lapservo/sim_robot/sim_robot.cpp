@@ -121,6 +121,7 @@ void SimRobot::apply(Eigen::Vector4d& target) {
 }
 
 void SimRobot::advance(double time_s) {
+  stamp_at_0_s_ = transport_.stamp_now_s() - time_s;
   apply(setpoint_);
   simulator_.servo_jp(setpoint_);
   simulator_.step(std::max(0.0, time_s - simulator_.now_s()));
@@ -136,7 +137,7 @@ void SimRobot::advance(double time_s) {
     next_state_s_ = time_s + config_.state_period_s;
     say_state();
   }
-  say_images(time_s);
+  say_images();
 }
 
 JointMessage SimRobot::message_of(const Eigen::Vector4d& q) const {
@@ -164,10 +165,9 @@ void SimRobot::say_state() {
   operating_state_(message);
 }
 
-void SimRobot::say_images(double time_s) {
+void SimRobot::say_images() {
   for (const SimulatedFrame& frame : simulator_.arrived()) {
-    const double stamp_s = transport_.stamp_now_s() - std::max(0.0, time_s - frame.picture.stamp_s);
-    ImageMessage message = image_of(frame.picture.bgr, stamp_s);
+    ImageMessage message = image_of(frame.picture.bgr, stamp_at_0_s_ + frame.picture.stamp_s);
     if (config_.alter_image) config_.alter_image(message);
     camera_info_(info_of(rig_.camera, message.stamp_s));
     image_(message);

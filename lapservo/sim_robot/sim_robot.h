@@ -57,7 +57,7 @@ class SimRobot {
   void apply(Eigen::Vector4d& target);
   void say_joints();
   void say_state();
-  void say_images(double time_s);
+  void say_images();
   JointMessage message_of(const Eigen::Vector4d& q) const;
 
   Transport& transport_;
@@ -68,7 +68,7 @@ class SimRobot {
   std::vector<std::string> names_;
   std::vector<double> wrist_;
   Eigen::Vector4d setpoint_;
-  double next_joints_s_ = 0, next_state_s_ = 0;
+  double next_joints_s_ = 0, next_state_s_ = 0, stamp_at_0_s_ = 0;
 
   mutable std::mutex mutex_;  // of what the transport's threads touch
   std::optional<Eigen::Vector4d> wanted_;

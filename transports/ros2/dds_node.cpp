@@ -37,8 +37,9 @@ Qos qos_of(Delivery delivery) {
   return qos;
 }
 
-// Whole pictures in few packets, unless CYCLONEDDS_URI says otherwise; what it says comes last and counts. Loopback
-// often has no multicast: those on it are asked one by one.
+// Whole pictures in few packets and a receive buffer for some of them (as far as net.core.rmem_max goes), unless
+// CYCLONEDDS_URI says otherwise; what it says comes last and counts. Loopback often has no multicast: those on it are
+// asked one by one.
 std::string configuration() {
   std::string general = "<MaxMessageSize>65500B</MaxMessageSize>", discovery;
   const char* const localhost = std::getenv("ROS_LOCALHOST_ONLY");
@@ -48,8 +49,9 @@ std::string configuration() {
         "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
         "<Peers><Peer address=\"127.0.0.1\"/></Peers>";
   }
-  const std::string text = "<CycloneDDS><Domain id=\"any\"><General>" + general + "</General><Discovery>" + discovery +
-                           "</Discovery></Domain></CycloneDDS>";
+  const std::string text =
+      "<CycloneDDS><Domain id=\"any\"><General>" + general + "</General><Discovery>" + discovery +
+      "</Discovery><Internal><SocketReceiveBufferSize min=\"default\" max=\"16MB\"/></Internal></Domain></CycloneDDS>";
   const char* const own = std::getenv("CYCLONEDDS_URI");
   return own && *own ? text + "," + own : text;
 }
