@@ -40,7 +40,7 @@ struct InterlockConfig {
   Joints joints;
   JointLimits limits;           ///< of q: positions and rates that no set-point exceeds
   double period_s = 1.0 / 500;  ///< between set-points
-  double max_age_s = 0.05;      ///< of joint states and set-points
+  double max_age_s = 0.07;      ///< of joint states and set-points
   bool motion_enabled = false;  ///< else it observes only: no set-point leaves, whatever is asked for
   /// Farther than this from its set-point an arm is not started: theta, phi [rad], rho [m], psi [rad].
   Eigen::Vector4d max_distance{0.05, 0.05, 0.005, 0.2};

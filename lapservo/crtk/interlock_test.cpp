@@ -11,7 +11,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double epoch_s = 1.7e9, tick_s = 0.002, joints_period_s = 0.004;
-constexpr double max_s = 0.05;
+const double max_s = InterlockConfig().max_age_s;
 
 Joints psm() {
   return {{"yaw", "pitch", "insertion", "roll"}, {1, -1, 1, 1}, {0, 1.5707963, -0.0156, 0}};
