@@ -338,6 +338,38 @@ TEST_F(Ros2Loop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
   EXPECT_LE(last_s, first_s + allowed_s);
 }
 
+TEST_F(Ros2Loop, StopsAndStartsAndTakesASetPointByTopic) {
+  Arm room(rig_);
+  Ros2Transport ears("ears");
+  Spy spy(ears);
+  const auto command = ears.string_publisher("/lapservo/PSM1/command");
+  const auto wish = ears.joint_publisher("/lapservo/PSM1/set_point");
+  const auto loop = servo(600);
+  ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+  command({now_s(), "stop"});
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("hold: held") != std::string::npos; })) << said("servo.txt");
+  sleep(rest_s + 0.2);
+  const double rested_s = now_s();
+  sleep(0.5);
+  EXPECT_FALSE(spy.moves_after(rested_s));
+  command({now_s(), "start"});
+  ASSERT_TRUE(wait_for([&] { return spy.moves_after(rested_s); })) << said("servo.txt");
+  const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
+  const Eigen::Vector4d there = paper_sinusoids().offset;
+  wish({now_s(), names, {there[0], 1e6, 200, 100}});
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("refused: set_point") != std::string::npos; }))
+      << said("servo.txt");
+  wish({now_s(), names, {there[0], there[1] / 2, there[2] / 2, there[3] / 2}});
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("a set-point came") != std::string::npos; }))
+      << said("servo.txt");
+  sleep(4);
+  loop->signal(SIGINT);
+  loop->wait();
+  const auto heard = spy.heard();
+  EXPECT_LT((heard.back().q - heard[heard.size() - 300].q).cwiseAbs().maxCoeff(), 2e-3);  // it rests there
+  spy.expect_no_jump();
+}
+
 TEST_F(Ros2Loop, SurvivesWhenEitherSideIsKilledOrStopped) {
   Ros2Transport ears("ears");
   Spy spy(ears);

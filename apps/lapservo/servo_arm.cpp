@@ -17,6 +17,7 @@
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/image_receiver.h"
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/loop_topics/loop_topics.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/image_features.h"
 
@@ -48,12 +49,32 @@ Transport::Subscription subscribe(Transport& transport, const std::string& topic
                                     [&](ImageMessage&& message) { images.receive(std::move(message), clock.now_s()); });
 }
 
+// The trajectory, until somebody wants a set-point instead. All in the loop's thread.
+class Goal {
+ public:
+  explicit Goal(Trajectory trajectory) : trajectory_(std::make_shared<Trajectory>(std::move(trajectory))) {}
+  Trajectory trajectory() const {
+    return {0, [current = trajectory_](double time_s) { return current->at(time_s); }};
+  }
+  void replace(Trajectory trajectory) { *trajectory_ = std::move(trajectory); }
+
+ private:
+  std::shared_ptr<Trajectory> trajectory_;
+};
+
 // What changes is said once, in one line; what somebody else does to the arm ends the run.
 class ArmWatcher : public RunObserver {
  public:
-  ArmWatcher(const ServoOptions& options, const Rig& rig, const CrtkRobot& robot, const ImageReceiver& images,
-             RunFolder* folder, LiveView* view)
-      : options_(options), rig_(rig), robot_(robot), images_(images), folder_(folder), view_(view) {}
+  ArmWatcher(const ServoOptions& options, const RunConfig& run, CrtkRobot& robot, const ImageReceiver& images,
+             LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view)
+      : options_(options),
+        run_(run),
+        robot_(robot),
+        images_(images),
+        topics_(topics),
+        goal_(goal),
+        folder_(folder),
+        view_(view) {}
 
   bool on_tick(const ControlTick& tick) override {
     if (!start_s_) start_s_ = tick.input.time_s;
@@ -63,9 +84,11 @@ class ArmWatcher : public RunObserver {
     const Blocked blocked = robot_.blocked();
     say_state(time_s, tick.decision.control, blocked);
     say_images(time_s);
+    topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
+    grant(topics_.wishes(), tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
     if (blocked == Blocked::foreign_command) return false;
-    return !interrupted() && (!view_ || show(*view_, tick, rig_));
+    return !interrupted() && (!view_ || show(*view_, tick, run_.rig));
   }
   const Summary& summary() const { return summary_; }
 
@@ -85,6 +108,19 @@ class ArmWatcher : public RunObserver {
     state_ = state;
     say(time_s, state);
   }
+  void grant(const LoopWishes& wishes, const ControlTick& tick, double time_s) {
+    if (wishes.hold) robot_.hold(*wishes.hold);
+    if (!wishes.set_point) return;
+    const Trajectory wanted = set_point(*wishes.set_point);
+    try {
+      if (run_.rig.instruments.front().camera_from_rcm)
+        refuse_infeasible(wanted, 1, feature_model(run_.rig), run_.controller, tick.input.joints.q, "set_point");
+      goal_.replace(wanted);
+      say(time_s, "a set-point came");
+    } catch (const InputError& error) {
+      say(time_s, std::string("refused: ") + error.what());
+    }
+  }
   void say_images(double time_s) {
     const std::string counts = images_.counts().text();
     if (counts == said_counts_ || time_s < next_counts_s_) return;
@@ -96,13 +132,15 @@ class ArmWatcher : public RunObserver {
     const auto set_point = robot_.set_point();
     if (!set_point || time_s < next_set_point_s_) return;
     next_set_point_s_ = time_s + 1;
-    say(time_s, "would send " + list_of(*rig_.instruments.front().joints, *set_point) + " (--enable-motion does)");
+    say(time_s, "would send " + list_of(*run_.rig.instruments.front().joints, *set_point) + " (--enable-motion does)");
   }
 
   const ServoOptions& options_;
-  const Rig& rig_;
-  const CrtkRobot& robot_;
+  const RunConfig& run_;
+  CrtkRobot& robot_;
   const ImageReceiver& images_;
+  LoopTopics& topics_;
+  Goal& goal_;
   RunFolder* folder_;
   LiveView* view_;
   Summary summary_;
@@ -169,8 +207,11 @@ int steer_arm(const ServoOptions& options) {
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, rig, config.controller);
 
-  ArmWatcher watcher(options, rig, robot, images, folder ? &*folder : nullptr, view ? &*view : nullptr);
-  lapservo::run(robot, images, clock, config, trajectory, options.duration_s, watcher);
+  LoopTopics topics(*transport, rig, "endoscope");
+  Goal goal(trajectory);
+  ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr,
+                     view ? &*view : nullptr);
+  lapservo::run(robot, images, clock, config, goal.trajectory(), options.duration_s, watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
   if (folder) folder->commit();

@@ -51,6 +51,11 @@ void CrtkRobot::send(const JointPath& path) {
   interlock_.follow(path);
 }
 
+void CrtkRobot::hold(bool on) {
+  const std::lock_guard lock(mutex_);
+  interlock_.hold(on);
+}
+
 Blocked CrtkRobot::blocked() const {
   const std::lock_guard lock(mutex_);
   return interlock_.blocked(clock_.now_s());

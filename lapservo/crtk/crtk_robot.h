@@ -27,6 +27,9 @@ class CrtkRobot : public Robot {
   JointState state() override;
   void send(const JointPath& path) override;
 
+  /// See Interlock::hold().
+  void hold(bool on);
+
   Blocked blocked() const;
   InterlockCounts counts() const;
   std::string operating_state() const;

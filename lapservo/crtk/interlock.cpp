@@ -15,7 +15,7 @@ constexpr double memory_s = 0.25;  // by which a set-point that was sent comes b
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
 constexpr double same_other = 4e-3;
 
-constexpr Words<Blocked, 12> words{{{Blocked::none, "none"},
+constexpr Words<Blocked, 13> words{{{Blocked::none, "none"},
                                     {Blocked::no_joint_states, "no_joint_states"},
                                     {Blocked::old_joint_states, "old_joint_states"},
                                     {Blocked::non_finite_joints, "non_finite_joints"},
@@ -25,6 +25,7 @@ constexpr Words<Blocked, 12> words{{{Blocked::none, "none"},
                                     {Blocked::not_homed, "not_homed"},
                                     {Blocked::busy, "busy"},
                                     {Blocked::far_from_setpoint, "far_from_setpoint"},
+                                    {Blocked::held, "held"},
                                     {Blocked::foreign_command, "foreign_command"},
                                     {Blocked::stopped, "stopped"}}};
 static_assert(names_all(words, Blocked::stopped));
@@ -128,7 +129,12 @@ bool Interlock::is_ours(const Reading& setpoint, double now_s) const {
 }
 
 void Interlock::follow(const JointPath& path) {
-  if (!must_start_anew_) path_ = path;
+  if (!must_start_anew_ && !held_) path_ = path;
+}
+
+void Interlock::hold(bool on) {
+  if (held_ && !on) forget_path();
+  held_ = on;
 }
 
 void Interlock::stop() {
@@ -148,13 +154,18 @@ Blocked Interlock::blocked(double now_s) const {
   if (!setpoint_ || now_s - setpoint_->time_s > config_.max_age_s) return Blocked::no_setpoint;
   const Eigen::Array4d distance = (setpoint_->q - measured_->q).array().abs();
   if (!moving_ && (distance > config_.max_distance.array()).any()) return Blocked::far_from_setpoint;
-  return Blocked::none;
+  return held_ ? Blocked::held : Blocked::none;
 }
 
 // From the moment on that something is amiss until the loop knows of it, nothing moves.
 void Interlock::watch(double now_s) {
-  if (blocked(now_s) == Blocked::none) return;
+  const Blocked why = blocked(now_s);
+  if (why == Blocked::none || why == Blocked::held) return;
   blocked_s_ = now_s;
+  forget_path();
+}
+
+void Interlock::forget_path() {
   if (!must_start_anew_) told_ = false;
   must_start_anew_ = true;
   moving_ = false;
@@ -169,7 +180,9 @@ JointState Interlock::state(double now_s) {
   const bool well = blocked(now_s) == Blocked::none;
   if (well && told_) must_start_anew_ = false;
   if (must_start_anew_) told_ = true;
-  if (!must_start_anew_) {
+  if (held_) {
+    state.operating_state = OperatingState::paused;
+  } else if (!must_start_anew_) {
     state.operating_state = OperatingState::enabled;
   } else if (const auto said = operating_state_from_string(operating_state_.state);
              said && *said != OperatingState::enabled) {

@@ -30,6 +30,7 @@ enum class Blocked {
   not_homed,
   busy,
   far_from_setpoint,  ///< the arm is not where its own set-point is
+  held,               ///< a person wants it to stand still
   foreign_command,    ///< somebody else moves the arm; stays until the end
   stopped,            ///< stays until the end
 };
@@ -75,6 +76,8 @@ class Interlock {
   /// The loop's wishes: Robot::send, and the end.
   void follow(const JointPath& path);
   void stop();
+  /// A person's wish: while it holds, new paths are not followed, so that the last one brakes to rest.
+  void hold(bool on);
 
   /// Robot::state. An arm that must not be moved now is not enabled, whatever it says itself.
   JointState state(double now_s);
@@ -105,6 +108,7 @@ class Interlock {
   std::optional<double> stamped(StampClock& clock, const JointMessage& message, double arrival_s);
   Eigen::Vector4d q_of(const JointMessage& message) const;
   void watch(double now_s);
+  void forget_path();
   void start(double now_s);
   bool is_ours(const Reading& setpoint, double now_s) const;
   Eigen::Vector4d within_limits(const Eigen::Vector4d& wanted) const;
@@ -116,7 +120,7 @@ class Interlock {
   std::optional<Reading> measured_, setpoint_;
   bool finite_ = true;
   OperatingStateMessage operating_state_;
-  bool operating_state_known_ = false, foreign_ = false, stopped_ = false;
+  bool operating_state_known_ = false, held_ = false, foreign_ = false, stopped_ = false;
   std::vector<std::string> names_;
   std::array<std::size_t, 4> places_{};
 

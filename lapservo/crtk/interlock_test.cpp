@@ -270,6 +270,22 @@ TEST(Interlock, BrakesWhenTheLoopIsGone) {
   EXPECT_TRUE(bench.setpoint.isApprox(rest, 1e-12));
 }
 
+TEST(Interlock, HeldItBrakesToRestAndGoesOnWhenReleased) {
+  Bench bench;
+  bench.control(0.5, slow);
+  bench.interlock.hold(true);
+  const int sent = bench.sent_count;
+  bench.control(0.5, slow);
+  EXPECT_GT(bench.sent_count, sent + 200);  // at rest, but held where it is
+  const Eigen::Vector4d rest = bench.setpoint;
+  bench.control(0.5, slow);
+  EXPECT_TRUE(bench.setpoint.isApprox(rest, 1e-12));
+  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::held);
+  bench.interlock.hold(false);
+  bench.control(0.5, slow);
+  EXPECT_GT((bench.setpoint - rest).norm(), 0.01);
+}
+
 TEST(Interlock, CountsWhatItDrops) {
   Bench bench;
   bench.pass(0.1);

@@ -25,6 +25,14 @@ class TestTransport : public Transport {
   }
   Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) override { return keep(topic, infos_); }
 
+  Publisher<PoseMessage> pose_publisher(const std::string& topic) override { return keep(topic, poses_); }
+  Publisher<DiagnosticMessage> diagnostic_publisher(const std::string& topic) override {
+    return keep(topic, diagnostics_);
+  }
+  Publisher<ObservationMessage> observation_publisher(const std::string& topic) override {
+    return keep(topic, observations_);
+  }
+
   Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) override {
     return add(joint_handlers_[topic], std::move(handler));
   }
@@ -45,6 +53,13 @@ class TestTransport : public Transport {
   void say(const std::string& topic, const JointMessage& message) { tell(joint_handlers_[topic], message); }
   void say(const std::string& topic, const OperatingStateMessage& message) { tell(state_handlers_[topic], message); }
   void say(const std::string& topic, const StringMessage& message) { tell(string_handlers_[topic], message); }
+  std::vector<PoseMessage> poses(const std::string& topic) { return poses_[topic]; }
+  std::vector<DiagnosticMessage> diagnostics(const std::string& topic) { return diagnostics_[topic]; }
+  std::vector<ObservationMessage> observations(const std::string& topic) { return observations_[topic]; }
+  std::vector<CompressedImageMessage> compressed_images(const std::string& topic) {
+    const std::lock_guard lock(mutex_);
+    return compressed_[topic];
+  }
   /// Says all that was published since the last call.
   void deliver() {
     for (auto& [topic, messages] : std::exchange(joints_, {}))
@@ -92,6 +107,9 @@ class TestTransport : public Transport {
   std::map<std::string, std::vector<ImageMessage>> images_;
   std::map<std::string, std::vector<CompressedImageMessage>> compressed_;
   std::map<std::string, std::vector<CameraInfoMessage>> infos_;
+  std::map<std::string, std::vector<PoseMessage>> poses_;
+  std::map<std::string, std::vector<DiagnosticMessage>> diagnostics_;
+  std::map<std::string, std::vector<ObservationMessage>> observations_;
   std::map<std::string, Handlers<JointMessage>> joint_handlers_;
   std::map<std::string, Handlers<OperatingStateMessage>> state_handlers_;
   std::map<std::string, Handlers<StringMessage>> string_handlers_;

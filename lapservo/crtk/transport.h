@@ -29,6 +29,9 @@ class Transport {
   virtual Publisher<ImageMessage> image_publisher(const std::string& topic) = 0;
   virtual Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) = 0;
   virtual Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) = 0;
+  virtual Publisher<PoseMessage> pose_publisher(const std::string& topic) = 0;
+  virtual Publisher<DiagnosticMessage> diagnostic_publisher(const std::string& topic) = 0;
+  virtual Publisher<ObservationMessage> observation_publisher(const std::string& topic) = 0;
 
   /// Messages that this transport's own publishers sent are left out.
   virtual Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) = 0;

@@ -147,6 +147,18 @@ Transport::Publisher<CameraInfoMessage> Ros2Transport::camera_info_publisher(con
   return implementation_->publisher<CameraInfoMessage>(topic, Delivery::reliable);
 }
 
+Transport::Publisher<PoseMessage> Ros2Transport::pose_publisher(const std::string& topic) {
+  return implementation_->publisher<PoseMessage>(topic, Delivery::reliable);
+}
+
+Transport::Publisher<DiagnosticMessage> Ros2Transport::diagnostic_publisher(const std::string& topic) {
+  return implementation_->publisher<DiagnosticMessage>(topic, Delivery::reliable);
+}
+
+Transport::Publisher<ObservationMessage> Ros2Transport::observation_publisher(const std::string& topic) {
+  return implementation_->publisher<ObservationMessage>(topic, Delivery::reliable);
+}
+
 Transport::Subscription Ros2Transport::subscribe_joints(const std::string& topic, Handler<JointMessage> handler) {
   return implementation_->subscribe<JointMessage>(topic, {Delivery::best_effort}, handler);
 }

@@ -21,6 +21,9 @@ class Ros2Transport : public Transport {
   Publisher<ImageMessage> image_publisher(const std::string& topic) override;
   Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) override;
   Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) override;
+  Publisher<PoseMessage> pose_publisher(const std::string& topic) override;
+  Publisher<DiagnosticMessage> diagnostic_publisher(const std::string& topic) override;
+  Publisher<ObservationMessage> observation_publisher(const std::string& topic) override;
 
   Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) override;
   Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> handler) override;

@@ -138,4 +138,48 @@ void Wire<CameraInfoMessage>::write(dds_entity_t writer, const CameraInfoMessage
   dds_write(writer, &wire);
 }
 
+void Wire<PoseMessage>::write(dds_entity_t writer, const PoseMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.header_.frame_id_ = pointer(message.frame);
+  const auto& [x, y, z] = message.position_m;
+  wire.pose_.pose_.position_ = {x, y, z};
+  const auto& q = message.quaternion_xyzw;
+  wire.pose_.pose_.orientation_ = {q[0], q[1], q[2], q[3]};
+  std::copy(message.covariance.begin(), message.covariance.end(), wire.pose_.covariance_);
+  dds_write(writer, &wire);
+}
+
+void Wire<DiagnosticMessage>::write(dds_entity_t writer, const DiagnosticMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  std::vector<diagnostic_msgs_msg_dds__KeyValue_> values;
+  for (const auto& [key, value] : message.values) values.push_back({pointer(key), pointer(value)});
+  static char no_hardware[1] = "";
+  diagnostic_msgs_msg_dds__DiagnosticStatus_ status{};
+  status.level_ = static_cast<std::uint8_t>(message.level);
+  status.name_ = pointer(message.name);
+  status.message_ = pointer(message.message);
+  status.hardware_id_ = no_hardware;
+  point(status.values_, values);
+  wire.status_._length = wire.status_._maximum = 1;
+  wire.status_._buffer = &status;
+  dds_write(writer, &wire);
+}
+
+void Wire<ObservationMessage>::write(dds_entity_t writer, const ObservationMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.header_.frame_id_ = pointer(message.frame);
+  wire.instrument_ = pointer(message.instrument);
+  wire.status_ = pointer(message.status);
+  wire.action_ = pointer(message.action);
+  wire.reason_ = pointer(message.reason);
+  const auto fill = [](const auto& values, double* to) { std::copy(values.begin(), values.end(), to); };
+  fill(message.q, wire.q_);
+  fill(message.q_covariance, wire.q_covariance_);
+  fill(message.features, wire.features_);
+  fill(message.feature_covariance, wire.feature_covariance_);
+  fill(message.edges_px, wire.edges_px_);
+  fill(message.error, wire.error_);
+  dds_write(writer, &wire);
+}
+
 }  // namespace lapservo::internal

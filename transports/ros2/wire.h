@@ -58,4 +58,25 @@ struct Wire<CameraInfoMessage> {
   static void write(dds_entity_t writer, const CameraInfoMessage& message);
 };
 
+template <>
+struct Wire<PoseMessage> {
+  using Type = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;
+  static const dds_topic_descriptor_t& descriptor() { return geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc; }
+  static void write(dds_entity_t writer, const PoseMessage& message);
+};
+
+template <>
+struct Wire<DiagnosticMessage> {
+  using Type = diagnostic_msgs_msg_dds__DiagnosticArray_;
+  static const dds_topic_descriptor_t& descriptor() { return diagnostic_msgs_msg_dds__DiagnosticArray__desc; }
+  static void write(dds_entity_t writer, const DiagnosticMessage& message);
+};
+
+template <>
+struct Wire<ObservationMessage> {
+  using Type = lapservo_msgs_msg_dds__Observation_;
+  static const dds_topic_descriptor_t& descriptor() { return lapservo_msgs_msg_dds__Observation__desc; }
+  static void write(dds_entity_t writer, const ObservationMessage& message);
+};
+
 }  // namespace lapservo::internal
