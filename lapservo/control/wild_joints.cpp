@@ -13,7 +13,7 @@ bool WildJoints::reachable(const Reading& from, const Reading& to) const {
   return (way <= at_once + 3 * rate_.array() * (to.time_s - from.time_s)).all();
 }
 
-WildJoints::Verdict WildJoints::judge(double time_s, const Eigen::Vector4d& q) {
+WildJoints::Verdict WildJoints::validate(double time_s, const Eigen::Vector4d& q) {
   const Reading now{time_s, q};
   const bool plausible = !started_ || reachable(believed_, now);
   staying_ = plausible ? 0 : staying_ > 0 && reachable(latest_, now) ? staying_ + 1 : 1;

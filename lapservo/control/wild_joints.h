@@ -5,7 +5,7 @@
 namespace lapservo::internal {
 
 /// Tells measured joints that no arm can have come to since the last ones: a bit that fell over, an encoder that was
-/// set. What only flashes up is passed over; where the joints stay for three readings, they are.
+/// set. What only flashes up is passed over; where the joints stay for three measured joints, they are.
 class WildJoints {
  public:
   /// `rate`: the joints' largest wanted speeds; three times as fast is believed.
@@ -17,7 +17,7 @@ class WildJoints {
     jumped,  ///< they have stayed where they seemed wild: what was measured before belongs to another place
   };
   /// Times that increase, finite joints.
-  Verdict judge(double time_s, const Eigen::Vector4d& q);
+  Verdict validate(double time_s, const Eigen::Vector4d& q);
 
  private:
   struct Reading {
@@ -29,7 +29,7 @@ class WildJoints {
   Eigen::Vector4d rate_;
   Reading believed_, latest_;
   bool started_ = false;
-  int staying_ = 0;  // readings in a row that agree with each other and not with what is believed
+  int staying_ = 0;  // measured joints in a row that agree with each other and not with what is believed
 };
 
 }  // namespace lapservo::internal
