@@ -8,7 +8,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double same = 0.02;  // of the feature scales: 0.1 mrad, 0.02 px
-// Theta and phi have no play worth its name; rho and psi count beyond the widest that is looked for.
+// Theta and phi have no backlash worth its name; rho and psi count beyond the widest that is looked for.
 const Eigen::Vector4d moved(5e-4, 5e-4, 6e-4, 0.12);
 constexpr double max_delay_s = 0.3, delay_step_s = 0.05;
 

@@ -13,7 +13,7 @@ namespace lapservo::internal {
 /// Tells a picture that is shown again under a new stamp from one of an instrument that stands still: its features are
 /// the same to a small part of what noise makes of them, while the measured joints moved between the exposures, however
 /// long the delay is. So a camera without noise before an arm at rest, or one that just starts, is not taken for
-/// frozen, nor a joint that crosses its play.
+/// frozen, nor a joint that crosses its backlash.
 class FrozenImage {
  public:
   explicit FrozenImage(const Scales& scales) : scales_(scales) {}

@@ -36,8 +36,8 @@ void ImageReceiver::receive(CompressedImageMessage&& message, double arrival_s) 
 
 void ImageReceiver::accept(double stamp_s, double arrival_s, Message&& message) {
   const std::lock_guard lock(mutex_);
-  const StampClock::Reading reading = clock_.read(stamp_s, arrival_s);
-  switch (reading.verdict) {
+  const StampClock::Reading measured = clock_.read(stamp_s, arrival_s);
+  switch (measured.verdict) {
     case StampVerdict::fresh:
       break;
     case StampVerdict::repeated:
@@ -52,7 +52,7 @@ void ImageReceiver::accept(double stamp_s, double arrival_s, Message&& message) 
   }
   count_gap(stamp_s);
   if (waiting_) ++counts_.skipped;
-  waiting_ = Waiting{reading.time_s, std::move(message)};
+  waiting_ = Waiting{measured.time_s, std::move(message)};
 }
 
 // The usual distance follows the shortest ones seen.

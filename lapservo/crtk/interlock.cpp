@@ -51,10 +51,10 @@ bool Interlock::well_formed(const JointMessage& message) {
 }
 
 std::optional<double> Interlock::stamped(StampClock& clock, const JointMessage& message, double arrival_s) {
-  const StampClock::Reading reading = clock.read(message.stamp_s, arrival_s);
-  switch (reading.verdict) {
+  const StampClock::Reading measured = clock.read(message.stamp_s, arrival_s);
+  switch (measured.verdict) {
     case StampVerdict::fresh:
-      return reading.time_s;
+      return measured.time_s;
     case StampVerdict::repeated:
       ++counts_.repeated;
       break;

@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo::internal {
 namespace {

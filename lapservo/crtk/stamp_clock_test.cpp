@@ -18,14 +18,14 @@ TEST(StampClock, TimesAreThoseOfTheFastestMessageAndNeverRunBackwards) {
   double last_s = 0;
   for (int k = 0; k < 1000; ++k) {
     const double sent_s = 5 + k * period_s, travel_s = 0.002 + 0.01 * std::abs(std::sin(random.normal()));
-    const auto reading = clock.read(epoch_s + sent_s, sent_s + travel_s);
-    ASSERT_EQ(reading.verdict, StampVerdict::fresh) << k;
-    EXPECT_LE(reading.time_s, sent_s + travel_s + 1e-6);
-    EXPECT_GE(reading.time_s, last_s);
+    const auto measured = clock.read(epoch_s + sent_s, sent_s + travel_s);
+    ASSERT_EQ(measured.verdict, StampVerdict::fresh) << k;
+    EXPECT_LE(measured.time_s, sent_s + travel_s + 1e-6);
+    EXPECT_GE(measured.time_s, last_s);
     if (k > 200) {
-      EXPECT_NEAR(reading.time_s, sent_s + 0.002, 0.002) << k;
+      EXPECT_NEAR(measured.time_s, sent_s + 0.002, 0.002) << k;
     }
-    last_s = reading.time_s;
+    last_s = measured.time_s;
   }
 }
 
@@ -50,9 +50,9 @@ TEST(StampClock, AClockThatWasSetCostsOneMessage) {
     for (int k = 0; k < 10; ++k)
       EXPECT_EQ(clock.read(epoch_s + k * period_s, 1 + k * period_s).verdict, StampVerdict::fresh);
     EXPECT_EQ(clock.read(epoch_s + jump_s + 10 * period_s, 1 + 10 * period_s).verdict, StampVerdict::jumped);
-    const auto reading = clock.read(epoch_s + jump_s + 11 * period_s, 1 + 11 * period_s);
-    EXPECT_EQ(reading.verdict, StampVerdict::fresh);
-    EXPECT_NEAR(reading.time_s, 1 + 11 * period_s, 1e-6);
+    const auto measured = clock.read(epoch_s + jump_s + 11 * period_s, 1 + 11 * period_s);
+    EXPECT_EQ(measured.verdict, StampVerdict::fresh);
+    EXPECT_NEAR(measured.time_s, 1 + 11 * period_s, 1e-6);
   }
 }
 

@@ -34,7 +34,7 @@ std::string topic(const Rig& rig, const std::string& name) {
   return "/lapservo/" + rig.instruments.front().name + "/" + name;
 }
 
-Rigid3 camera_from_marker(const Instrument& instrument, const RcmCoordinates& q) {
+Rigid3 camera_from_marker(const Instrument& instrument, const JointVector& q) {
   const double azimuth = q.psi_rad + instrument.marker.seam_rad;
   return *instrument.camera_from_rcm * rcm_from_unrolled(q) *
          Rigid3{Eigen::Quaterniond(Eigen::AngleAxisd(azimuth, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero()};
@@ -48,7 +48,7 @@ PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& s
   constexpr double step = 1e-6;
   for (int i = 0; i < 4; ++i) {
     const Rigid3 moved =
-        camera_from_marker(instrument, RcmCoordinates::from_vector(seen.q.vector() + step * Eigen::Vector4d::Unit(i)));
+        camera_from_marker(instrument, JointVector::from_vector(seen.q.vector() + step * Eigen::Vector4d::Unit(i)));
     const Eigen::AngleAxisd turn(moved.rotation * pose.rotation.conjugate());
     jacobian.col(i) << (moved.translation - pose.translation) / step, turn.axis() * (turn.angle() / step);
   }

@@ -14,7 +14,7 @@
 namespace lapservo::internal {
 namespace {
 
-const RcmCoordinates there{0.05, 1.57, 0.064, 1.2};
+const JointVector there{0.05, 1.57, 0.064, 1.2};
 
 ControlTick tick_of(const Rig& rig) {
   ControlTick tick;
@@ -94,7 +94,7 @@ TEST(LoopTopics, ThePosesCovarianceIsThatOfItsSamples) {
   for (int k = 0; k < count; ++k) {
     Eigen::Vector4d q = seen.q.vector();
     for (int i = 0; i < 4; ++i) q[i] += std::sqrt(seen.covariance(i, i)) * random.normal();
-    const PoseMessage pose = pose_message(instrument, {RcmCoordinates::from_vector(q), seen.covariance});
+    const PoseMessage pose = pose_message(instrument, {JointVector::from_vector(q), seen.covariance});
     const Eigen::AngleAxisd turn(rotation(pose) * rotation(mean).conjugate());
     Eigen::Matrix<double, 6, 1> error;
     for (int i = 0; i < 3; ++i)
