@@ -46,14 +46,14 @@ Marker real_print(const Marker& nominal, const Errors& errors, Random& random) {
 }
 
 // A turn about the shaft's axis, hardly moving otherwise.
-std::vector<std::vector<RcmCoordinates>> turn(const Rig& rig, int frames, std::uint64_t seed) {
-  const RcmCoordinates start = random_configurations(rig, 1, seed, steepest_rad)[0][0];
-  std::vector<std::vector<RcmCoordinates>> all;
+std::vector<std::vector<JointVector>> turn(const Rig& rig, int frames, std::uint64_t seed) {
+  const JointVector start = random_configurations(rig, 1, seed, steepest_rad)[0][0];
+  std::vector<std::vector<JointVector>> all;
   for (int i = 0; i < frames; ++i) {
-    const double share = static_cast<double>(i) / frames;
-    RcmCoordinates q = start;
-    q.theta_rad += 0.02 * std::sin(two_pi * share), q.phi_rad += 0.02 * std::cos(3 * two_pi * share);
-    q.psi_rad = wrap_pi(q.psi_rad + 1.05 * two_pi * share);
+    const double fraction = static_cast<double>(i) / frames;
+    JointVector q = start;
+    q.theta_rad += 0.02 * std::sin(two_pi * fraction), q.phi_rad += 0.02 * std::cos(3 * two_pi * fraction);
+    q.psi_rad = wrap_pi(q.psi_rad + 1.05 * two_pi * fraction);
     all.push_back({q});
   }
   return all;
@@ -102,7 +102,7 @@ class CalibrateMarker : public ::testing::TestWithParam<Errors> {
             turn_frames = from_environment("LAPSERVO_TURN_FRAMES", 90), held_out = 20;
   const Rig nominal = example_rig();
 
-  std::vector<TrueFrame> rendered(const Marker& print, std::vector<std::vector<RcmCoordinates>> places,
+  std::vector<TrueFrame> rendered(const Marker& print, std::vector<std::vector<JointVector>> places,
                                   std::uint64_t of_seed) const {
     RenderedSet set;
     set.rig = nominal;

@@ -17,16 +17,16 @@ namespace lapservo::internal {
 namespace {
 
 constexpr int sectors = 60;
-constexpr std::size_t most_per_sector = 2;
-constexpr double most_time_s = 1e9;
+constexpr std::size_t max_per_sector = 2;
+constexpr double max_time_s = 1e9;
 
-constexpr std::size_t fewest_frames = 12, fewest_seam_views = 3;
+constexpr std::size_t min_frames = 12, min_seam_views = 3;
 constexpr double widest_unseen_rad = 0.8;  // between neighbouring facing azimuths; a view measures +-0.9 rad
-constexpr double most_blur_px = 4;
-constexpr int most_rounds = 16;
+constexpr double max_blur_px = 4;
+constexpr int max_rounds = 16;
 constexpr double settled_m = 1e-6;
 // A gap narrower than this, or than three sigma, is none.
-constexpr double least_gap_m = 0.04e-3, least_gap_sigmas = 3;
+constexpr double min_gap_m = 0.04e-3, min_gap_sigmas = 3;
 
 // How far boundaries and the seam may lie from where a round believes them, and how much an outlier counts.
 struct Round {
@@ -149,11 +149,11 @@ std::size_t seam_views(const std::vector<ViewMeasurements>& measured) {
 // Why these frames can't tell the print; empty when they may.
 std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker) {
   char text[240];
-  if (frames.size() < fewest_frames) {
+  if (frames.size() < min_frames) {
     std::snprintf(text, sizeof text,
                   "%zu frames show the marker wholly, from different sides, and at least %zu are needed: film a slow "
                   "full turn about the shaft's axis, the whole marker in view",
-                  frames.size(), fewest_frames);
+                  frames.size(), min_frames);
     return text;
   }
   const double unseen_rad = widest_unseen(frames, marker);
@@ -166,12 +166,12 @@ std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker
     return text;
   }
   const auto blurred = std::count_if(frames.begin(), frames.end(), [](const KeyFrame& frame) {
-    return std::max(frame.sighting.blur.boundaries_px, frame.sighting.blur.sides_px) > most_blur_px;
+    return std::max(frame.sighting.blur.boundaries_px, frame.sighting.blur.sides_px) > max_blur_px;
   });
   if (2 * static_cast<std::size_t>(blurred) > frames.size()) {
     std::snprintf(text, sizeof text,
                   "%zd of %zu frames are blurred by more than %.0f px: turn more slowly, focus, or give more light",
-                  static_cast<std::ptrdiff_t>(blurred), frames.size(), most_blur_px);
+                  static_cast<std::ptrdiff_t>(blurred), frames.size(), max_blur_px);
     return text;
   }
   return {};
@@ -184,16 +184,16 @@ struct ResidualSummary {
 
 // Of the boundaries; what lies beyond five sigma and a print's errors is no boundary.
 ResidualSummary summary_of(const Adjustment& adjustment, const std::vector<ViewMeasurements>& measured,
-                           const Marker& marker, double largest_px) {
+                           const Marker& marker, double max_px) {
   ResidualSummary summary;
   double squares = 0;
   for (std::size_t i = 0; i < measured.size(); ++i)
     for (std::size_t k = 0; k < adjustment.residuals_px[i].size(); ++k) {
       const Measurement& m = measured[i].edges.all[k];
       const double residual_px = adjustment.residuals_px[i][k];
-      if (m.group >= 4 || std::abs(residual_px) > largest_px) continue;
+      if (m.group >= 4 || std::abs(residual_px) > max_px) continue;
       squares += residual_px * residual_px;
-      summary.residuals.push_back({m.group, m.turn_share * marker.covered_rad(), residual_px / m.along_px_per_m});
+      summary.residuals.push_back({m.group, m.turn_fraction * marker.covered_rad(), residual_px / m.along_px_per_m});
     }
   if (!summary.residuals.empty()) summary.rms_px = std::sqrt(squares / static_cast<double>(summary.residuals.size()));
   return summary;
@@ -216,7 +216,7 @@ bool KeyFrames::add(const cv::Mat& bgr, double time_s) {
   ++found_;
   auto& sector = sectors_[sector_of(sighting->tau_rad)];
   auto worst = sector.end();
-  if (sector.size() >= most_per_sector) {
+  if (sector.size() >= max_per_sector) {
     worst = std::min_element(sector.begin(), sector.end(), [](const KeyFrame& a, const KeyFrame& b) {
       return worth(a.sighting) < worth(b.sighting);
     });
@@ -225,7 +225,7 @@ bool KeyFrames::add(const cv::Mat& bgr, double time_s) {
   const Marker& marker = rig_.instruments[instrument_].marker;
   auto view = cropped_view(bgr, rig_.camera, marker, sighting->unknowns.pose().camera_from_unrolled);
   if (!view) return true;
-  KeyFrame frame{std::move(*view), *sighting, std::min(time_s, most_time_s)};
+  KeyFrame frame{std::move(*view), *sighting, std::min(time_s, max_time_s)};
   if (worst == sector.end())
     sector.push_back(std::move(frame));
   else
@@ -251,22 +251,22 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   MarkerCalibration calibration;
 
   // The rig's print first, to start the poses and to tell what it leaves.
-  constexpr double largest_before_px = 20;
+  constexpr double max_before_px = 20;
   auto before = fit.round(rounds[0], false);
   if (before) before = fit.round(rounds[0], false);
   if (!before) return refused(unsolvable);
-  const ResidualSummary residuals_before = summary_of(*before, fit.measured(), nominal, largest_before_px);
+  const ResidualSummary residuals_before = summary_of(*before, fit.measured(), nominal, max_before_px);
   calibration.before_px = residuals_before.rms_px, calibration.before = residuals_before.residuals;
 
   std::optional<Adjustment> last;
   bool settled = false;
-  for (int i = 0; i < most_rounds && !settled; ++i) {
-    if (progress) progress(i, most_rounds);
+  for (int i = 0; i < max_rounds && !settled; ++i) {
+    if (progress) progress(i, max_rounds);
     const auto stage = std::min(static_cast<std::size_t>(i), rounds.size() - 1);
     last = fit.round(rounds[stage], true);
     if (!last) return refused(unsolvable);
     if (i >= 2) fit.drop_misfits(*last);
-    if (fit.frames().size() < fewest_frames) return refused(unsolvable);
+    if (fit.frames().size() < min_frames) return refused(unsolvable);
     settled = stage + 1 == rounds.size() && last->print.head<print_numbers - 1>().cwiseAbs().maxCoeff() < settled_m &&
               std::abs(last->print[print_numbers - 1]) * nominal.radius_m() < settled_m;
     if (settled && fit.free_gap()) {
@@ -275,13 +275,13 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
       if (!final) return refused(unsolvable);
       const double gap_m = fit.marker().gap_rad * nominal.radius_m();
       const double sigma_m = std::sqrt((*final->covariance)(print_numbers - 1, print_numbers - 1)) * nominal.radius_m();
-      if (gap_m < std::max(least_gap_m, least_gap_sigmas * sigma_m)) fit.believe_no_gap(), settled = false;
+      if (gap_m < std::max(min_gap_m, min_gap_sigmas * sigma_m)) fit.believe_no_gap(), settled = false;
     }
   }
   last = fit.round(rounds.back(), true, true);
   if (!last) return refused(unsolvable);
   calibration.seam_views = seam_views(fit.measured());
-  if (calibration.seam_views < fewest_seam_views)
+  if (calibration.seam_views < min_seam_views)
     return refused(
         "the seam is not seen well enough to tell where the print begins: film it slowly passing the camera, without "
         "glare");

@@ -25,7 +25,7 @@ Marker real_print(const Marker& nominal, double gap_m) {
 
 struct Turn {
   int frames = 60;
-  double share = 1.05;
+  double fraction = 1.05;
   double blur_px = 0.8;
 };
 
@@ -34,15 +34,15 @@ KeyFrames turned(const Rig& nominal, const Marker& print, const Turn& turn) {
   Rig real = nominal;
   real.instruments[0].marker = print;
   Random random(4);
-  const RcmCoordinates start = scenes::random_configuration(nominal, 0, random);
+  const JointVector start = scenes::random_configuration(nominal, 0, random);
   RenderOptions options;
   options.sensor.blur_px = turn.blur_px;
   KeyFrames key_frames(nominal, 0);
   for (int i = 0; i < turn.frames; ++i) {
-    const double share = static_cast<double>(i) / turn.frames;
-    RcmCoordinates q = start;
-    q.theta_rad += 0.02 * std::sin(two_pi * share);
-    q.psi_rad = wrap_pi(q.psi_rad + turn.share * two_pi * share);
+    const double fraction = static_cast<double>(i) / turn.frames;
+    JointVector q = start;
+    q.theta_rad += 0.02 * std::sin(two_pi * fraction);
+    q.psi_rad = wrap_pi(q.psi_rad + turn.fraction * two_pi * fraction);
     key_frames.add(scenes::render(real, {q}, static_cast<std::uint64_t>(i), options), 0);
   }
   return key_frames;
@@ -87,7 +87,7 @@ TEST_F(CalibrateMarker, FindsThePrintAsItIs) {
     Random random(8);
     int believed = 0;
     for (int i = 0; i < 5; ++i) {
-      const RcmCoordinates q = scenes::random_configuration(rig, 0, random);
+      const JointVector q = scenes::random_configuration(rig, 0, random);
       const cv::Mat frame = scenes::render(real, {q}, static_cast<std::uint64_t>(100 + i));
       believed += Tracker(rig, {.single = true}).track(frame)[0].status == Status::ok;
       const Observation o = Tracker(better, {.single = true}).track(frame)[0];
@@ -110,7 +110,7 @@ TEST_F(CalibrateMarker, RefusesWhatCanNotTell) {
   const auto refusal = [&](const Turn& turn) {
     return calibrate_marker(rig, 0, turned(rig, print, turn).take()).refusal;
   };
-  EXPECT_NE(refusal({.frames = 40, .share = 0.6}).find("from all sides"), std::string::npos);
+  EXPECT_NE(refusal({.frames = 40, .fraction = 0.6}).find("from all sides"), std::string::npos);
   EXPECT_NE(refusal({.frames = 6}).find("at least"), std::string::npos);
   EXPECT_NE(refusal({.frames = 30, .blur_px = 6}), "");
   EXPECT_NE(calibrate_marker(rig, 0, {}).refusal, "");

@@ -101,10 +101,10 @@ SharedRow shared_row(const Measurement& m, const PrintShape& shape, double cover
   const std::size_t k = m.group;
   const double along = mm * m.along_px_per_m;
   row[boundaries + k] = 1;
-  if (k > 0) row[k - 1] = along * (1 - m.turn_share);
-  row[3 + k] = along * m.turn_share;
+  if (k > 0) row[k - 1] = along * (1 - m.turn_fraction);
+  row[3 + k] = along * m.turn_fraction;
   // A wider gap leaves less around the shaft for the same print.
-  row[gap] = m.along_px_per_m * (shape.lower_m[k] - shape.upper_m[k]) * m.turn_share / covered_rad;
+  row[gap] = m.along_px_per_m * (shape.lower_m[k] - shape.upper_m[k]) * m.turn_fraction / covered_rad;
   return row;
 }
 
@@ -123,7 +123,8 @@ struct FrameBlocks {
 };
 
 double common_sigma_px(std::size_t group, double blur_px) {
-  const double more_px = fine_fit_limits.common_share_of_blur * std::max(0.0, blur_px - fine_fit_limits.usual_blur_px);
+  const double more_px =
+      fine_fit_limits.common_fraction_of_blur * std::max(0.0, blur_px - fine_fit_limits.usual_blur_px);
   if (group < 4) return fine_fit_limits.common_boundary_px + more_px;
   return group < measurement_groups ? fine_fit_limits.common_side_px + more_px : common_seam_px + more_px;
 }

@@ -70,11 +70,11 @@ double tolerance_of(const PrintShape& shape, const PrintCovariance& covariance, 
   const Marker printed = shape.on(marker);
   double variance = 0, of_a_metre = 0;
   for (int i = 0; i < steps; ++i) {
-    const double share = (i + 0.5) / steps, tau_rad = share * printed.covered_rad();
+    const double fraction = (i + 0.5) / steps, tau_rad = fraction * printed.covered_rad();
     const auto by_boundaries = tau_by_boundaries(printed, tau_rad);
     PrintNumbers row = PrintNumbers::Zero();
     for (int k = 0; k < 4; ++k)
-      row += by_boundaries[static_cast<std::size_t>(k)] * ((1 - share) * upper_row(k) + share * lower_row(k));
+      row += by_boundaries[static_cast<std::size_t>(k)] * ((1 - fraction) * upper_row(k) + fraction * lower_row(k));
     variance += row.dot(covariance * row);
     const double unit_rad = predicted_print_error_rad(printed, tau_rad, 1);
     of_a_metre += unit_rad * unit_rad;

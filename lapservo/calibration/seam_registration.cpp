@@ -8,12 +8,12 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t fewest_frames = 8;
+constexpr std::size_t min_frames = 8;
 
 // The joint psi at a time; nullopt outside the recording, and across its pauses.
 std::optional<double> psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
@@ -23,8 +23,8 @@ std::optional<double> psi_at(const JointRecording& recording, const Joints& join
   const auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(1, next - recording.time_s.begin()));
   const double from_s = recording.time_s[i - 1], to_s = recording.time_s[i];
   if (to_s - from_s > longest_pause_s) return std::nullopt;
-  const double share = (time_s - from_s) / (to_s - from_s);
-  const double joint = (1 - share) * recording.joints[i - 1][3] + share * recording.joints[i][3];
+  const double fraction = (time_s - from_s) / (to_s - from_s);
+  const double joint = (1 - fraction) * recording.joints[i - 1][3] + fraction * recording.joints[i][3];
   return joints.sign[3] * joint + joints.offset[3];
 }
 
@@ -70,13 +70,13 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
       differences.push_back(psi_of(frame.sighting.unknowns.pose(), instrument.camera_from_rcm.value()) - *psi_rad);
   }
   result.frames = differences.size();
-  if (differences.size() < fewest_frames) {
+  if (differences.size() < min_frames) {
     char text[240];
     std::snprintf(
         text, sizeof text,
         "%zu frames lie within the recording of the joints, at least %zu are needed: the frames run from %.2f "
         "to %.2f s, the recording from %.2f to %.2f s",
-        differences.size(), fewest_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
+        differences.size(), min_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
     result.refusal = text;
     return result;
   }

@@ -39,7 +39,7 @@ struct Turn {
     calibration.marker = instrument.marker;
     for (int i = 0; i < 60; ++i) {
       const double time_s = 0.5 + 0.3 * i;
-      const RcmCoordinates q{0.3 * std::sin(time_s), 1.3, 0.1, psi_at(time_s)};
+      const JointVector q{0.3 * std::sin(time_s), 1.3, 0.1, psi_at(time_s)};
       // A free pose's own azimuths may lie anywhere: turned by some angle, psi is less by it.
       const double turned_rad = random.uniform(-3, 3);
       ShaftPose pose{instrument.camera_from_rcm.value() * rcm_from_unrolled(q), 0};

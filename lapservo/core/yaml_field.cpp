@@ -16,7 +16,7 @@ namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr std::size_t largest_file_bytes = 1 << 20;
+constexpr std::size_t max_file_bytes = 1 << 20;
 
 // yaml-cpp 0.7 follows 500 levels (its DepthGuard), each several frames of the stack; no file of ours needs 16.
 bool nests_too_deeply(std::string_view yaml) {
@@ -71,14 +71,13 @@ std::string syntax_problem(const YAML::Exception& error) {
 }  // namespace
 
 YamlField YamlField::read(const fs::path& path, std::string_view kind) {
-  const std::string text = read_input(path, largest_file_bytes, "a YAML file");
+  const std::string text = read_input(path, max_file_bytes, "a YAML file");
   if (text.empty()) throw InputError(path.string(), "is empty, expected a YAML file");
   return parse(text, path.string(), kind);
 }
 
 YamlField YamlField::parse(std::string_view yaml, const std::string& source, std::string_view kind) {
-  if (yaml.size() > largest_file_bytes)
-    throw InputError(source, "is larger than 1 MiB, expected a " + std::string(kind));
+  if (yaml.size() > max_file_bytes) throw InputError(source, "is larger than 1 MiB, expected a " + std::string(kind));
   if (nests_too_deeply(yaml)) throw InputError(source, "nests more deeply than a " + std::string(kind) + " does");
   try {
     const std::string text(yaml);

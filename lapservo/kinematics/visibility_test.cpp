@@ -9,7 +9,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/kinematics/test_models.h"
 
 namespace lapservo::internal {
@@ -70,9 +70,9 @@ TEST(Visibility, EndsWhereTheShaftLeansTooSteeply) {
     const double steepest_rad = random.uniform(0.1, 1), turn_rad = random.uniform(-pi, pi);
     const Eigen::Vector3d middle_m(random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01), 0.12);
     for (const double side : {-1.0, 1.0})
-      for (const double share : {0.99, 1.01}) {
-        const Rigid3 pose = leaning_shaft(model.marker, middle_m, side * share * steepest_rad, turn_rad);
-        EXPECT_EQ(marker_in_view(model.camera, model.marker, pose, {steepest_rad, 10}), share < 1)
+      for (const double fraction : {0.99, 1.01}) {
+        const Rigid3 pose = leaning_shaft(model.marker, middle_m, side * fraction * steepest_rad, turn_rad);
+        EXPECT_EQ(marker_in_view(model.camera, model.marker, pose, {steepest_rad, 10}), fraction < 1)
             << "seed " << seed << ", trial " << trial;
       }
   }

@@ -108,8 +108,8 @@ TEST(CrossRatioDecoder, InvertsAskewPrints) {
     if (!marker_problem(marker).empty() || !decoding_problem(marker).empty()) continue;
     ++decodable;
     const CrossRatioDecoder decoder(marker);
-    for (const double share : {0.001, 0.3, 0.6, 0.999}) {
-      const double tau_rad = share * marker.covered_rad();
+    for (const double fraction : {0.001, 0.3, 0.6, 0.999}) {
+      const double tau_rad = fraction * marker.covered_rad();
       EXPECT_NEAR(decoder.tau_rad(cross_ratio_at(marker, tau_rad)), tau_rad, 1e-6);
     }
     EXPECT_LE(decoder.tau_rad(100), marker.covered_rad());

@@ -36,12 +36,12 @@ std::array<double, 4> tau_by_boundaries(const Marker& marker, double tau_rad) {
 }
 
 double predicted_print_error_rad(const Marker& marker, double tau_rad, double print_error_m) {
-  const double share = wrap_two_pi(tau_rad) / marker.covered_rad();
+  const double fraction = wrap_two_pi(tau_rad) / marker.covered_rad();
   const auto by_boundaries = tau_by_boundaries(marker, tau_rad);
   double square = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     const bool inner = k == 1 || k == 2;
-    const double weight = inner ? (1 - share) * (1 - share) + share * share : 1;
+    const double weight = inner ? (1 - fraction) * (1 - fraction) + fraction * fraction : 1;
     square += weight * by_boundaries[k] * by_boundaries[k];
   }
   return print_error_m * std::sqrt(square);

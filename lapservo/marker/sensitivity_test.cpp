@@ -155,8 +155,8 @@ TEST(TauByBoundaries, IsWhatTheDecoderMistakes) {
 TEST(PredictedPrintError, IsTheSpreadOverRandomPrints) {
   const Marker marker = testing::marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
   const CrossRatioDecoder decoder(marker);
-  constexpr double error_m = 2e-6, share = 0.4;
-  const double tau_rad = share * two_pi;
+  constexpr double error_m = 2e-6, fraction = 0.4;
+  const double tau_rad = fraction * two_pi;
   Random random(5);
   double square = 0;
   constexpr int prints = 4000;
@@ -164,7 +164,7 @@ TEST(PredictedPrintError, IsTheSpreadOverRandomPrints) {
     auto e = boundaries_m(marker, tau_rad);
     for (std::size_t k = 0; k < 4; ++k) {
       const bool inner = k == 1 || k == 2;
-      e.at(k) += error_m * (inner ? (1 - share) * random.normal() + share * random.normal() : random.normal());
+      e.at(k) += error_m * (inner ? (1 - fraction) * random.normal() + fraction * random.normal() : random.normal());
     }
     const double off_rad = decoder.tau_rad(cross_ratio(e[1] - e[0], e[2] - e[1], e[3] - e[2])) - tau_rad;
     square += off_rad * off_rad / prints;

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int grid_px = 8;
 // A print that is off by half a millimetre leaves nine tenths of the surface with the colour that the rig's would have.
-constexpr double least_matching = 0.6, most_wrong = 0.15, most_beside = 0.2;
+constexpr double min_matching = 0.6, max_wrong = 0.15, max_beside = 0.2;
 
 std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unknowns, const EdgeBlur& blur,
                                     bool settled) {
@@ -25,8 +25,8 @@ std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unkn
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return std::nullopt;
   const ColorAgreement agreement = color_agreement(scene, pose);
-  if (agreement.in_image < 0.9 || agreement.matching < least_matching || agreement.wrong > most_wrong ||
-      agreement.beside > most_beside)
+  if (agreement.in_image < 0.9 || agreement.matching < min_matching || agreement.wrong > max_wrong ||
+      agreement.beside > max_beside)
     return std::nullopt;
   return Sighting{unknowns, blur, film_mean_m,
                   wrap_two_pi(marker_azimuth_rad(scene.marker, view->facing_azimuth_rad, pose.psi_rad)), settled};
@@ -54,13 +54,13 @@ std::optional<Sighting> MarkerSurvey::follow(const Scene& scene, const LightImag
 }
 
 std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImage& light) const {
-  auto blobs = find_blobs(scene.image, classes_, grid_px, detection_limits.least_samples);
-  if (blobs.size() > detection_limits.most_blobs) blobs.resize(detection_limits.most_blobs);
+  auto blobs = find_blobs(scene.image, classes_, grid_px, detection_limits.min_samples);
+  if (blobs.size() > detection_limits.max_blobs) blobs.resize(detection_limits.max_blobs);
   std::optional<Sighting> best;
   double best_score = 0;
   const auto try_start = [&](const PoseUnknowns& start) {
     const CoarseFit coarse = fit_coarsely(scene, PoseUnknowns::free(start.pose()), {});
-    if (!coarse.found || coarse.rotation_score < detection_limits.least_rotation_score ||
+    if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score ||
         coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
       return;
     const auto sighting = refined(scene, light, coarse, {});

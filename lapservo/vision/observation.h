@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/kinematics/features.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo {
 
@@ -40,7 +40,7 @@ struct Observation {
 
   /// Present when the instrument's camera_from_rcm is known; covariance in the order theta, phi, rho, psi.
   struct Rcm {
-    RcmCoordinates q;
+    JointVector q;
     Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   };
   std::optional<Rcm> rcm;

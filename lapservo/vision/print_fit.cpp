@@ -33,18 +33,18 @@ struct Line {
 
   double residual_px(const Measurement& m) const {
     const double unit = m.along_px_per_m != 0 ? m.along_px_per_m : 1;
-    return m.residual_px - unit * (at_start + slope * m.turn_share);
+    return m.residual_px - unit * (at_start + slope * m.turn_fraction);
   }
 };
 using Lines = std::array<Line, measurement_groups>;
 
 // Robust: from the median on, reweighted. A boundary that lies elsewhere as a whole is no outlier to itself; one with
-// few points is judged with the others, about zero.
+// few points is compared with the others, about zero.
 Line line_of(std::span<const Measurement> measurements, std::size_t group) {
   constexpr int iterations = 4;
   constexpr std::size_t fewest = 8;
   constexpr double usual_slope = 1 * mm;  // a turn
-  InplaceVector<double, EdgeMeasurements::most_lines> values;
+  InplaceVector<double, EdgeMeasurements::max_lines> values;
   for (const Measurement& m : measurements)
     if (m.group == group) values.push_back(m.residual_px / (group < 4 ? m.along_px_per_m : 1));
   if (values.size() < fewest) return {};
@@ -59,7 +59,7 @@ Line line_of(std::span<const Measurement> measurements, std::size_t group) {
       const double unit = group < 4 ? m.along_px_per_m : 1;
       const double weight = cauchy_weight(line.residual_px(m) / m.sigma_px, cauchy_scale_sigmas) * unit * unit /
                             (m.sigma_px * m.sigma_px);
-      const Eigen::Vector2d row(1, group < 4 ? m.turn_share : 0);
+      const Eigen::Vector2d row(1, group < 4 ? m.turn_fraction : 0);
       information += weight * row * row.transpose();
       gradient += weight * m.residual_px / unit * row;
     }
@@ -88,10 +88,10 @@ double scatter_sigmas(std::span<const Measurement> measurements, const Lines& li
 // d(residual)/d(print's errors) [px/mm]: of an inner boundary two.
 PrintVector print_row(const Measurement& m) {
   PrintVector row = PrintVector::Zero();
-  const double along = mm * m.along_px_per_m, share = m.turn_share;
+  const double along = mm * m.along_px_per_m, fraction = m.turn_fraction;
   if (m.group == 0) row[0] = along;
-  if (m.group == 1) row[1] = along * (1 - share), row[2] = along * share;
-  if (m.group == 2) row[3] = along * (1 - share), row[4] = along * share;
+  if (m.group == 1) row[1] = along * (1 - fraction), row[2] = along * fraction;
+  if (m.group == 2) row[3] = along * (1 - fraction), row[4] = along * fraction;
   if (m.group == 3) row[5] = along;
   return row;
 }
@@ -243,9 +243,9 @@ std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& eviden
     gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
   const double best = *std::max_element(gains.begin(), gains.end());
   std::array<double, print_sigmas_mm.size() + 1> weights{};
-  weights[0] = (1 - print_limits.off_share) * std::exp(gains[0] - best);
-  double share = print_limits.off_share / 2;
-  for (std::size_t i = 1; i < gains.size(); ++i, share /= 2) weights[i] = share * std::exp(gains[i] - best);
+  weights[0] = (1 - print_limits.off_fraction) * std::exp(gains[0] - best);
+  double fraction = print_limits.off_fraction / 2;
+  for (std::size_t i = 1; i < gains.size(); ++i, fraction /= 2) weights[i] = fraction * std::exp(gains[i] - best);
   return weights;
 }
 
@@ -268,7 +268,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_
   Mixture mixture(pose_unknowns + 1);
   mixture.add(*tolerated, weights[0]);
   for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i) {
-    if (weights[i + 1] < print_limits.least_weight) continue;
+    if (weights[i + 1] < print_limits.min_weight) continue;
     const auto off = solved(sums, std::hypot(print_sigmas_mm[i], tolerance_mm));
     if (!off) return std::nullopt;
     mixture.add(*off, weights[i + 1]);

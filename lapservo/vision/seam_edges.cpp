@@ -22,10 +22,10 @@ constexpr double farthest_rad = 0.85;  // of the seam from the facing generatrix
 constexpr double visible_rad = 1.2;    // samples beyond are too foreshortened
 constexpr double turned_rad = 0.1;     // an edge's face that is seen by less than this is too thin to matter
 constexpr int stations = 40;
-constexpr std::size_t fewest_stations = 3;
+constexpr std::size_t min_stations = 3;
 constexpr double floor_px = 0.04;  // what the model leaves out
-constexpr double largest_sigma_px = 1;
-constexpr double least_explained = 0.8;  // of the light's variance that the edges leave unexplained without them
+constexpr double max_sigma_px = 1;
+constexpr double min_explained = 0.8;  // of the light's variance that the edges leave unexplained without them
 
 double normal_cdf(double x) {
   return 0.5 * std::erfc(-x / std::sqrt(2.0));
@@ -71,8 +71,8 @@ class Luma {
  private:
   double light_at(double value) const {
     const auto i = static_cast<std::size_t>(std::clamp(value, 0.0, 254.0));
-    const double share = std::clamp(value - static_cast<double>(i), 0.0, 1.0);
-    return (1 - share) * static_cast<double>(light_[i]) + share * static_cast<double>(light_[i + 1]);
+    const double fraction = std::clamp(value - static_cast<double>(i), 0.0, 1.0);
+    return (1 - fraction) * static_cast<double>(light_[i]) + fraction * static_cast<double>(light_[i + 1]);
   }
   double value_of(double light) const {
     const auto next = std::upper_bound(light_.begin() + 1, light_.end() - 1, static_cast<float>(light));
@@ -172,7 +172,7 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
       ++found->count[i];
     }
   }
-  std::erase_if(section.profiles, [](const Profile& p) { return p.stations < fewest_stations; });
+  std::erase_if(section.profiles, [](const Profile& p) { return p.stations < min_stations; });
   if (section.profiles.empty()) return std::nullopt;
   for (Profile& profile : section.profiles) profile.along_m /= profile.stations;
   return section;
@@ -308,8 +308,7 @@ struct SeamFit {
 
 // Gauss-Newton with differences. `residuals` takes the upper edge's place and the gap. False when it fails.
 template <typename Residuals>
-bool refine(const Residuals& residuals, bool free_gap, double pixel_m, double largest_step_m, SeamFit& fit,
-            double& cost) {
+bool refine(const Residuals& residuals, bool free_gap, double pixel_m, double max_step_m, SeamFit& fit, double& cost) {
   const double delta_m = 0.02 * pixel_m;
   Eigen::VectorXd residual = residuals(fit.upper_m, fit.gap_m);
   Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
@@ -322,7 +321,7 @@ bool refine(const Residuals& residuals, bool free_gap, double pixel_m, double la
     information.diagonal() += Eigen::Vector2d(1e-12, free_gap ? 1e-12 : 1e9) * information.trace();
     Eigen::Vector2d step = -information.ldlt().solve(slopes.transpose() * residual);
     if (!step.allFinite()) return false;
-    step = step.cwiseMax(-largest_step_m).cwiseMin(largest_step_m);
+    step = step.cwiseMax(-max_step_m).cwiseMin(max_step_m);
     Eigen::VectorXd next = residuals(fit.upper_m + step[0], fit.gap_m + step[1]);
     if (next.squaredNorm() > residual.squaredNorm()) break;
     fit.upper_m += step[0], fit.gap_m += step[1], residual = std::move(next);
@@ -352,7 +351,7 @@ std::optional<SeamFit> fit(const Section& section, const Luma& luma, double expe
       if (cost < best_cost) best_cost = cost, best.upper_m = upper_m, best.gap_m = gap_m;
     }
   if (!refine(by_colors, free_gap, pixel_m, 2 * step_m, best, best_cost)) return std::nullopt;
-  if (std::abs(best.upper_m) > 1.2 * reach_m || best_cost > least_explained * worst_cost) return std::nullopt;
+  if (std::abs(best.upper_m) > 1.2 * reach_m || best_cost > min_explained * worst_cost) return std::nullopt;
   std::vector<Colors> known;
   for (const Profile& profile : section.profiles)
     known.push_back(colors_of(section, profile, basis(best.upper_m, best.gap_m)));
@@ -418,13 +417,13 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
   const double found_upper_rad = turned_upper_rad + found->upper_m / radius_m;
   if (!free_gap || found_upper_rad < turned_rad) {
     edges.upper = edge_at(view, view.upper_rad, along_m, found->upper_m, found->covariance(0, 0), false);
-    if (edges.upper->sigma_px > largest_sigma_px) edges.upper.reset();
+    if (edges.upper->sigma_px > max_sigma_px) edges.upper.reset();
   }
   if (free_gap && found_upper_rad - edges.gap_rad > -turned_rad) {
     const double variance_m2 = found->covariance(0, 0) + found->covariance(1, 1) - 2 * found->covariance(0, 1);
     edges.lower = edge_at(view, view.upper_rad - marker.gap_rad, along_m, found->upper_m - found->gap_m + gap_m,
                           variance_m2, true);
-    if (edges.lower->sigma_px > largest_sigma_px) edges.lower.reset();
+    if (edges.lower->sigma_px > max_sigma_px) edges.lower.reset();
   }
   return edges;
 }
