@@ -24,16 +24,20 @@ constexpr double steepest_rad = 0.35;
 #define NEED_SAMPLES() \
   if (!sample_folder()) GTEST_SKIP() << "no ray-traced samples: set LAPSERVO_FRAMES"
 
+void expect_pose_figures(const Score& score) {
+  EXPECT_LE(rms(score.theta_rad), 0.3 * mrad);
+  EXPECT_LE(rms(score.phi_rad), 0.3 * mrad);
+  EXPECT_LE(rms(score.rho_m), 0.03 * mm);
+  EXPECT_LE(rms(score.edge_px), 0.1);
+}
+
 void expect_rotation_figures(const Score& score) {
   EXPECT_EQ(score.found, score.expected);
   EXPECT_EQ(score.wrong, 0);
   EXPECT_LE(std::abs(mean(score.psi_rad)), 1.5 * mrad);
   EXPECT_LE(standard_deviation(score.psi_rad), 3 * mrad);
   EXPECT_LE(largest(score.psi_rad), 12 * mrad);
-  EXPECT_LE(rms(score.theta_rad), 0.3 * mrad);
-  EXPECT_LE(rms(score.phi_rad), 0.3 * mrad);
-  EXPECT_LE(rms(score.rho_m), 0.03 * mm);
-  EXPECT_LE(rms(score.edge_px), 0.1);
+  expect_pose_figures(score);
   EXPECT_GE(rms(score.psi_sigmas), 0.7);
   EXPECT_LE(rms(score.psi_sigmas), 1.5);
 }
@@ -187,10 +191,7 @@ TEST(Stored, RotationIsFoundWithAnHonestSigma) {
   const Score score = score_single(frames);
   expect_found_within(score, 1, 4 * mrad);
   EXPECT_LE(largest(score.psi_rad), 8 * mrad);
-  EXPECT_LE(rms(score.theta_rad), 0.3 * mrad);
-  EXPECT_LE(rms(score.phi_rad), 0.3 * mrad);
-  EXPECT_LE(rms(score.rho_m), 0.03 * mm);
-  EXPECT_LE(rms(score.edge_px), 0.1);
+  expect_pose_figures(score);
   EXPECT_GE(rms(score.psi_sigmas), 0.5);
   EXPECT_LE(rms(score.psi_sigmas), 1.5);
 }
