@@ -42,8 +42,8 @@ void expect_rotation_figures(const Score& score) {
   EXPECT_LE(rms(score.psi_sigmas), 1.5);
 }
 
-void expect_found_within(const Score& score, double found_share, double psi_rms_rad) {
-  EXPECT_GE(score.found_share(), found_share);
+void expect_found_within(const Score& score, double found_fraction, double psi_rms_rad) {
+  EXPECT_GE(score.found_fraction(), found_fraction);
   EXPECT_LE(rms(score.psi_rad), psi_rms_rad);
   EXPECT_EQ(score.wrong, 0);
 }
@@ -232,7 +232,7 @@ RenderedSet moving_set(std::uint64_t seed, int count, int times) {
   set.configurations.clear();
   for (int i = 0; i < count; ++i)
     set.configurations.push_back(
-        {RcmCoordinates::from_vector(from + (to - from) * (0.5 - 0.5 * std::cos(pi * times * i / (count - 1))))});
+        {JointVector::from_vector(from + (to - from) * (0.5 - 0.5 * std::cos(pi * times * i / (count - 1))))});
   return set;
 }
 
@@ -302,8 +302,8 @@ TEST(Rendered, AlmostNoLight) {
   expect_found_within(score_single(rendered_frames(set)), 0.5, 25 * mrad);
 }
 
-// Motion smears the marker over more than a band's width at worst: it may be lost, but is never guessed.
-TEST(Rendered, SmearedMarkersAreNotGuessed) {
+// Motion blurs the marker over more than a band's width at worst: it may be lost, but is never guessed.
+TEST(Rendered, BlurredMarkersAreNotGuessed) {
   RenderedSet set = moving_set(53, 40, 4);
   set.motion = 0.4;
   const auto frames = rendered_frames(set);
@@ -311,7 +311,7 @@ TEST(Rendered, SmearedMarkersAreNotGuessed) {
   Score tracked;
   for (const TrueFrame& frame : frames) tracked.add(frame, tracker.track(frame.bgr));
   EXPECT_EQ(tracked.wrong, 0);
-  EXPECT_GT(tracked.found_share(), 0.3);
+  EXPECT_GT(tracked.found_fraction(), 0.3);
   EXPECT_LE(rms(tracked.psi_sigmas), 5);
 }
 

@@ -111,9 +111,9 @@ Rig example_rig() {
 
 namespace {
 
-std::vector<Blotch> blotches(const Marker& marker, double share, Random& random) {
+std::vector<Blotch> blotches(const Marker& marker, double fraction, Random& random) {
   std::vector<Blotch> discs;
-  for (double covered = 0; covered < share;) {
+  for (double covered = 0; covered < fraction;) {
     const double radius_m = random.uniform(0.08, 0.22) * marker.diameter_m;
     discs.push_back({random.uniform(0, two_pi), random.uniform(0, marker.length_m()), radius_m});
     covered += pi * radius_m * radius_m / (pi * marker.diameter_m * marker.length_m());
@@ -121,7 +121,7 @@ std::vector<Blotch> blotches(const Marker& marker, double share, Random& random)
   return discs;
 }
 
-Truth truth_of(const Rig& rig, std::size_t i, const RcmCoordinates& q) {
+Truth truth_of(const Rig& rig, std::size_t i, const JointVector& q) {
   const Instrument& instrument = rig.instruments[i];
   const auto line =
       centre_line(rig.camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad).value();
@@ -151,10 +151,10 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
     Exposure exposure;
     const int moments = set.motion > 0 ? 9 : 1;
     for (int m = 0; m < moments; ++m) {
-      const double share = moments > 1 ? set.motion * (m / (moments - 1.0) - 0.5) : 0;
+      const double fraction = moments > 1 ? set.motion * (m / (moments - 1.0) - 0.5) : 0;
       std::vector<ShaftPlacement> placed;
       for (std::size_t i = 0; i < now.size(); ++i) {
-        const auto q = RcmCoordinates::from_vector(now[i].vector() + share * (next[i].vector() - now[i].vector()));
+        const auto q = JointVector::from_vector(now[i].vector() + fraction * (next[i].vector() - now[i].vector()));
         placed.push_back(placement_of(rig.instruments[i], q));
       }
       exposure.push_back(placed);
@@ -167,28 +167,15 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
   return frames;
 }
 
-std::vector<std::vector<RcmCoordinates>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
-                                                               double steepest_rad) {
+std::vector<std::vector<JointVector>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
+                                                            double steepest_rad) {
   Random random(seed);
-  constexpr double border_px = 40;
-  const auto acceptable = [&](const Instrument& instrument, const RcmCoordinates& q) {
-    return marker_in_view(rig.camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q),
-                          {steepest_rad, border_px});
-  };
-  std::vector<std::vector<RcmCoordinates>> configurations;
+  const ViewRange range{0.075, 0.12, {steepest_rad, 40}};
+  std::vector<std::vector<JointVector>> configurations;
   for (int frame = 0; frame < count; ++frame) {
-    std::vector<RcmCoordinates> of_frame;
-    for (const Instrument& instrument : rig.instruments) {
-      std::optional<RcmCoordinates> q;
-      for (int attempt = 0; attempt < 50000 && !q; ++attempt) {
-        const Eigen::Vector2d pixel(random.uniform(0, rig.camera.width_px), random.uniform(0, rig.camera.height_px));
-        q = configuration_through(*instrument.camera_from_rcm,
-                                  rig.camera.ray_from_ideal(pixel) * random.uniform(0.075, 0.12));
-        if (q) q->psi_rad = random.uniform(-pi, pi);
-        if (q && !acceptable(instrument, *q)) q.reset();
-      }
-      of_frame.push_back(q.value());
-    }
+    std::vector<JointVector> of_frame;
+    for (const Instrument& i : rig.instruments)
+      of_frame.push_back(random_configuration_in_view(rig.camera, i.marker, *i.camera_from_rcm, range, random).value());
     configurations.push_back(of_frame);
   }
   return configurations;

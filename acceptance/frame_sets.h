@@ -9,7 +9,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/vision/tracker.h"
@@ -19,7 +19,7 @@ namespace lapservo::acceptance {
 /// What is truly in a frame.
 struct Truth {
   std::string instrument, condition;
-  RcmCoordinates q;
+  JointVector q;
   double tau_rad = 0;
   std::array<Eigen::Vector2d, 4> edges_raw_px;
 };
@@ -37,7 +37,7 @@ struct Score {
   std::vector<std::array<Eigen::Vector2d, 4>> edges;  ///< of found ones, in order
 
   void add(const TrueFrame& frame, const std::vector<Observation>& observations);
-  double found_share() const { return expected ? static_cast<double>(found) / expected : 1; }
+  double found_fraction() const { return expected ? static_cast<double>(found) / expected : 1; }
 };
 
 double mean(const std::vector<double>& values);
@@ -63,10 +63,10 @@ Score score_single(const std::vector<TrueFrame>& frames);
 /// Frames rendered in front of seeded tissue: what a set looks like in our own renderer.
 struct RenderedSet {
   Rig rig;
-  std::vector<std::vector<RcmCoordinates>> configurations;  ///< per frame and instrument
+  std::vector<std::vector<JointVector>> configurations;  ///< per frame and instrument
   RenderOptions options;
-  double blood = 0;   ///< share of the marker covered
-  double motion = 0;  ///< share of the step to the next frame
+  double blood = 0;   ///< fraction of the marker covered
+  double motion = 0;  ///< fraction of the step to the next frame
   std::uint64_t seed = 1;
   std::function<cv::Mat(const cv::Mat&)> after;  ///< what the recorder does, when given
 };
@@ -76,7 +76,7 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set);
 Rig example_rig();
 
 /// Random configurations of it with the marker wholly in view, pointing at most `steepest` rad towards or away.
-std::vector<std::vector<RcmCoordinates>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
-                                                               double steepest_rad);
+std::vector<std::vector<JointVector>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
+                                                            double steepest_rad);
 
 }  // namespace lapservo::acceptance

@@ -63,7 +63,7 @@ struct Tally {
     errors_rad.insert(errors_rad.end(), other.errors_rad.begin(), other.errors_rad.end());
     errors_sigmas.insert(errors_sigmas.end(), other.errors_sigmas.begin(), other.errors_sigmas.end());
   }
-  double share(const std::string& status) const {
+  double fraction(const std::string& status) const {
     const auto found = statuses.find(status);
     return found == statuses.end() ? 0 : static_cast<double>(found->second) / frames;
   }
@@ -84,14 +84,14 @@ class Prints : public ::testing::Test {
   Random random{static_cast<std::uint64_t>(seed)};
 
   // In random places, or on the way between two.
-  std::vector<std::vector<RcmCoordinates>> places(int number, bool moving) const {
+  std::vector<std::vector<JointVector>> places(int number, bool moving) const {
     constexpr double step = 0.02;
     auto all =
         random_configurations(rig, moving ? 2 : poses, static_cast<std::uint64_t>(1000 * seed + number), steepest_rad);
     if (!moving) return all;
     const Eigen::Vector4d from = all[0][0].vector(), to = all[1][0].vector();
     all.clear();
-    for (int i = 0; i < poses; ++i) all.push_back({RcmCoordinates::from_vector(from + step * i * (to - from))});
+    for (int i = 0; i < poses; ++i) all.push_back({JointVector::from_vector(from + step * i * (to - from))});
     return all;
   }
 
@@ -125,7 +125,7 @@ TEST_F(Prints, ThatAreOffAreNotTrusted) {
   all.show("all");
   EXPECT_EQ(all.wrong, 0);
   EXPECT_LE(rms(all.errors_sigmas), 2);
-  EXPECT_GE(all.share("marker_mismatch"), 0.8);
+  EXPECT_GE(all.fraction("marker_mismatch"), 0.8);
 }
 
 TEST_F(Prints, ThatAreTrackedOrAskewAreNotTrustedEither) {
@@ -146,7 +146,7 @@ TEST_F(Prints, WithinTheToleranceAreFound) {
   Tally all;
   for (int i = 0; i < prints; ++i) all.add(seen(random_print(nominal, 0.06 * mm, false, random), tolerant, i, false));
   all.show("tolerated");
-  EXPECT_GE(all.share("ok"), 0.9);
+  EXPECT_GE(all.fraction("ok"), 0.9);
   EXPECT_LE(rms(all.errors_sigmas), 2);
 }
 

@@ -1,7 +1,7 @@
 #include <benchmark/benchmark.h>
 
 #include "lapservo/control/paper_trajectory.h"
-#include "lapservo/control/test_theatre.h"
+#include "lapservo/control/test_simulator.h"
 
 namespace lapservo {
 using namespace internal;
@@ -15,9 +15,9 @@ void BM_ControlStep(benchmark::State& state, ControlMode mode, bool delay_known)
   config.mode = mode;
   const testing::TestRig rig;
   VisualController controller(config, testing::model_of(rig));
-  testing::Theatre theatre(rig, flaws, {0.05, 1.57, 0.064, 1}, 1);
+  testing::TestSimulator simulator(rig, flaws, {0.05, 1.57, 0.064, 1}, 1);
   const Trajectory trajectory = sinusoids(paper_sinusoids());
-  theatre.run(controller, trajectory, 10);
+  simulator.run(controller, trajectory, 10);
   double time_s = 20;
   const Eigen::Vector4d q = controller.path().end().position;
   const FeatureState seen = exact_map(rig, q).value();

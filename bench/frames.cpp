@@ -89,8 +89,8 @@ Renderer make_renderer(const Rig& rig) {
   return Renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
 }
 
-std::vector<RcmCoordinates> configurations(const Rig& rig, int index) {
-  std::vector<RcmCoordinates> all;
+std::vector<JointVector> configurations(const Rig& rig, int index) {
+  std::vector<JointVector> all;
   for (std::size_t i = 0; i < rig.instruments.size(); ++i) {
     auto q = configuration_through(*rig.instruments[i].camera_from_rcm, ports[i].marker_m).value();
     q.theta_rad += 0.02 * std::sin(0.05 * index);

@@ -5,7 +5,7 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/core.hpp>
 
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
 
@@ -21,7 +21,7 @@ Rig fixed_marker_rig(cv::Size size_px);
 Renderer make_renderer(const Rig& rig);
 
 /// The instruments' configurations in frame `index` of a slow motion, and the placements for the renderer.
-std::vector<RcmCoordinates> configurations(const Rig& rig, int index);
+std::vector<JointVector> configurations(const Rig& rig, int index);
 std::vector<ShaftPlacement> placements(const Rig& rig, int index);
 
 /// Frames of that motion. Each also shows a printed tag of AprilTag's family 36h11 about as large as a marker, so that

@@ -3,7 +3,7 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/frames.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/sim/simulator.h"
 #include "lapservo/vision/tracker.h"
 

@@ -32,7 +32,7 @@ void read_as_configurations(const CsvTable& table) {
     const auto frames = configurations_from(table, rig, "fuzz.csv");
     require(frames.size() * rig.instruments.size() == table.rows(), "every row is used once");
     for (const Configurations& frame : frames)
-      for (const RcmCoordinates& q : frame) require(q.vector().allFinite(), "q is finite");
+      for (const JointVector& q : frame) require(q.vector().allFinite(), "q is finite");
   } catch (const InputError& error) {
     fuzz::require_one_line(error);
   }

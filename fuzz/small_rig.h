@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::fuzz {

@@ -26,7 +26,7 @@ using fuzz::require;
 std::vector<cv::Mat> pictures() {
   const Rig rig = fuzz::small_rig(true, false);
   Renderer renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 1));
-  const auto place = [&](const RcmCoordinates& q) { return placement_of(rig.instruments[0], q); };
+  const auto place = [&](const JointVector& q) { return placement_of(rig.instruments[0], q); };
   std::vector<cv::Mat> rendered;
   for (const double psi_rad : {0.3, 1.8, 3.2, 5.0})
     rendered.push_back(renderer.render(
@@ -99,7 +99,7 @@ void track(TrackedRig& tracked, const cv::Mat& image) {
   require(observations.size() == rig.instruments.size(), "one observation an instrument");
   for (const Observation& observation : observations) {
     fuzz::require_sound(observation);
-    const std::string row = observation_csv_row(0, 0, "0.png", "PSM1", observation);
+    const std::string row = observation_csv_row(0, 0, "0.png", observation);
     require(std::count(row.begin(), row.end(), ',') == 27, "a row has 28 fields");
   }
   require(draw_overlay(image, rig, observations).size() == image.size(), "an overlay has its picture's size");

@@ -12,7 +12,7 @@
 #include "lapservo/geometry/response.h"
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/kinematics/features.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/marker/marker.h"
 #include "lapservo/rig/rig.h"
 

@@ -45,7 +45,7 @@ void add_viewing(CLI::App* command, ViewingOptions& options) {
 
 struct DesignOptions {
   double diameter_mm = 8.4;
-  std::optional<double> length_mm, smallest_band_mm;
+  std::optional<double> length_mm, min_band_mm;
   std::vector<double> hues_deg{90, 180, 270}, upper_mm, lower_mm;
   std::string code = "cross-ratio", out;
   bool by_length() const { return code == "length"; }
@@ -90,7 +90,7 @@ void print_sigmas(const Marker& marker, const Viewing& viewing) {
 
 // Eq. (16) beside eq. (18): what noise leaves of each, and what a depth or an inclination that is not known does.
 void print_length_code(const Marker& marker, const Viewing& viewing) {
-  constexpr Misjudged depth{0.01, 0}, inclined{0, 10 * pi / 180};
+  constexpr ViewingError depth{0.01, 0}, inclined{0, 10 * pi / 180};
   const std::size_t band = most_telling_band(marker);
   const std::string problem = decoding_problem(marker);
   std::printf(
@@ -102,8 +102,8 @@ void print_length_code(const Marker& marker, const Viewing& viewing) {
     return problem.empty() ? fmt::format("{:{}.1f}", std::abs(value_rad) < 1e-6 ? 0 : 1e3 * value_rad, width)
                            : fmt::format("{:>{}}", "-", width);
   };
-  const auto error = [&](double tau_rad, const Misjudged& misjudged) {
-    return perspective_errors(marker, band, tau_rad, viewing, misjudged);
+  const auto error = [&](double tau_rad, const ViewingError& viewing_error) {
+    return perspective_errors(marker, band, tau_rad, viewing, viewing_error);
   };
   for (int i = 1; i < 8; ++i) {
     const double tau_rad = two_pi * i / 8;
@@ -136,7 +136,7 @@ int run_design(const DesignOptions& options) {
                     {options.hues_deg[0], options.hues_deg[1], options.hues_deg[2]},
                     viewing};
     if (options.length_mm) spec.length_m = 1e-3 * *options.length_mm;
-    if (options.smallest_band_mm) spec.smallest_band_m = 1e-3 * *options.smallest_band_mm;
+    if (options.min_band_mm) spec.min_band_m = 1e-3 * *options.min_band_mm;
     marker = design_marker(spec);
   }
   std::printf(
@@ -226,19 +226,19 @@ int run_show(const RigOptions& options) {
 
 void add_design(CLI::App* parent, Run& run_later) {
   auto options = std::make_shared<DesignOptions>();
-  CLI::App* command = parent->add_subcommand("design", "Choose the bands of a marker, or judge given ones.");
+  CLI::App* command = parent->add_subcommand("design", "Choose the bands of a marker, or evaluate given ones.");
   command->add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included")
       ->capture_default_str()
       ->check(number_between(0.5, 100.0));
   command->add_option("--length-mm", options->length_mm, "Length of the marker; default three diameters")
       ->check(number_between(1.0, 500.0));
-  command->add_option("--smallest-band-mm", options->smallest_band_mm, "No band is shorter; default 3 mm or 12 px")
+  command->add_option("--smallest-band-mm", options->min_band_mm, "No band is shorter; default 3 mm or 12 px")
       ->check(number_between(0.1, 200.0));
   command->add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
       ->check(finite_number())
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--bands-upper-mm", options->upper_mm, "Judge this design: lengths at the upper edge")
+  command->add_option("--bands-upper-mm", options->upper_mm, "Evaluate this design: lengths at the upper edge")
       ->check(finite_number())
       ->delimiter(',');
   command->add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge")

@@ -12,7 +12,7 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-constexpr double largest_seed = 9007199254740991;  // 2^53 - 1: whole in a double too
+constexpr double max_seed = 9007199254740991;  // 2^53 - 1: whole in a double too
 
 CLI::Validator checked(const std::string& expected, bool whole, double low, double high) {
   const auto problem = [=](const std::string& text) {
@@ -41,7 +41,7 @@ CLI::Validator finite_number() {
 }
 
 CLI::Validator seed_number() {
-  return checked("a whole number from 0 to 2^53 - 1", true, 0, largest_seed);
+  return checked("a whole number from 0 to 2^53 - 1", true, 0, max_seed);
 }
 
 }  // namespace lapservo::app

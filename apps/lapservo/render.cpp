@@ -23,7 +23,7 @@
 #include "lapservo/io/configuration_csv.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/video_writer.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
@@ -43,17 +43,12 @@ struct Options {
   double fps = 30, light = 1, smoke = 0, blood = 0, noise = 1, blur_px = 0.8, motion = 0, film_mm = 0.1;
 };
 
-RcmCoordinates random_configuration(const Camera& camera, const Instrument& instrument, const std::string& rig,
-                                    Random& random) {
-  const ViewLimits limits{.steepest_rad = std::atan(1.2), .border_px = 0.02 * camera.width_px};
-  for (int attempt = 0; attempt < 20000; ++attempt) {
-    const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
-    const Eigen::Vector3d point = camera.ray_from_ideal(pixel) * random.uniform(0.06, 0.14);
-    auto q = configuration_through(*instrument.camera_from_rcm, point);
-    if (!q || q->rho_m < 0.02 || std::sin(q->phi_rad) < 0.1) continue;
-    q->psi_rad = random.uniform(-pi, pi);
-    if (marker_in_view(camera, instrument.marker, placement_of(instrument, *q).camera_from_unrolled, limits)) return *q;
-  }
+JointVector random_configuration(const Camera& camera, const Instrument& instrument, const std::string& rig,
+                                 Random& random) {
+  const ViewRange range{0.06, 0.14, {.steepest_rad = std::atan(1.2), .border_px = 0.02 * camera.width_px}};
+  if (const auto q =
+          random_configuration_in_view(camera, instrument.marker, *instrument.camera_from_rcm, range, random))
+    return *q;
   throw InputError(
       rig, "instrument " + instrument.name + " is never wholly in view between 60 and 140 mm: check camera_from_rcm");
 }
@@ -74,11 +69,11 @@ std::vector<Configurations> random_configurations(const Rig& rig, const Options&
   for (int i = 0; i < options.count; ++i) {
     const double place = (knots - 1.0) * i / std::max(1, options.count - 1);
     const auto knot = std::min(static_cast<std::size_t>(place), drawn.size() - 2);
-    const double share = 0.5 - 0.5 * std::cos(pi * (place - static_cast<double>(knot)));
+    const double fraction = 0.5 - 0.5 * std::cos(pi * (place - static_cast<double>(knot)));
     Configurations frame;
     for (std::size_t k = 0; k < rig.instruments.size(); ++k)
       frame.push_back(
-          RcmCoordinates::from_vector((1 - share) * drawn[knot][k].vector() + share * drawn[knot + 1][k].vector()));
+          JointVector::from_vector((1 - fraction) * drawn[knot][k].vector() + fraction * drawn[knot + 1][k].vector()));
     path.push_back(std::move(frame));
   }
   return path;
@@ -96,11 +91,11 @@ cv::Mat background_light(const Camera& camera, const Options& options) {
   return light;
 }
 
-std::vector<Blotch> blotches(const Marker& marker, double share, Random& random) {
+std::vector<Blotch> blotches(const Marker& marker, double fraction, Random& random) {
   std::vector<Blotch> discs;
   const double surface_m2 = pi * marker.diameter_m * marker.length_m();
   double covered_m2 = 0;
-  while (covered_m2 < share * surface_m2) {
+  while (covered_m2 < fraction * surface_m2) {
     const double radius_m = random.uniform(0.08, 0.25) * marker.diameter_m;
     discs.push_back({random.uniform(0, two_pi), random.uniform(0, marker.length_m()), radius_m});
     covered_m2 += 0.8 * pi * radius_m * radius_m;
@@ -132,12 +127,12 @@ Exposure exposure_of(const Rig& rig, const std::vector<Configurations>& frames, 
   const Configurations &now = frames[index], &next = frames[std::min(index + 1, frames.size() - 1)];
   Exposure exposure;
   for (int m = 0; m < moments; ++m) {
-    const double share = moments > 1 ? motion * (static_cast<double>(m) / (moments - 1) - 0.5) : 0;
+    const double fraction = moments > 1 ? motion * (static_cast<double>(m) / (moments - 1) - 0.5) : 0;
     std::vector<ShaftPlacement> placements;
     for (std::size_t k = 0; k < now.size(); ++k)
       placements.push_back(
           placement_of(rig.instruments[k],
-                       RcmCoordinates::from_vector(now[k].vector() + share * (next[k].vector() - now[k].vector()))));
+                       JointVector::from_vector(now[k].vector() + fraction * (next[k].vector() - now[k].vector()))));
     exposure.push_back(std::move(placements));
   }
   return exposure;
@@ -225,7 +220,7 @@ void add_render(CLI::App& app, Run& run_later) {
   command->add_option("--blur-px", options->blur_px, "Sigma of the optical blur")
       ->capture_default_str()
       ->check(number_between(0.0, 20.0));
-  command->add_option("--motion", options->motion, "Motion blur: share of the step to the next frame, 0 to 1")
+  command->add_option("--motion", options->motion, "Motion blur: fraction of the step to the next frame, 0 to 1")
       ->capture_default_str()
       ->check(number_between(0.0, 1.0));
   command->add_option("--film-mm", options->film_mm, "Thickness of the film that carries the marker")

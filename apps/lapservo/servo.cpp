@@ -328,10 +328,10 @@ void add_servo(CLI::App& app, Run& run_later) {
       ->capture_default_str()
       ->check(number_between(0.1, 36000.0));
   command
-      ->add_option(
-          "--method", options->method,
-          "default: readings and images fused; paper: its law (eq. 21), gains and Algorithm 1; uncalibrated: learns "
-          "the Jacobian")
+      ->add_option("--method", options->method,
+                   "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
+                   "uncalibrated: learns "
+                   "the Jacobian")
       ->capture_default_str();
   command
       ->add_option("--tracker", options->tracker,
@@ -349,7 +349,7 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_flag("--force", options->force, OutputFolder::force_help);
   command->add_flag("--view", options->view, "Show it live");
   command->add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
-  command->add_option("--start", options->start, "sim: readings to start from, theta,phi,rho,psi; else random")
+  command->add_option("--start", options->start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
       ->check(finite_number())
       ->delimiter(',')
       ->expected(4);

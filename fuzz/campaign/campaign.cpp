@@ -23,7 +23,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
@@ -108,7 +108,7 @@ std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
   std::vector<double> psi_rad;
   const cv::Size size(rig.camera.width_px, rig.camera.height_px);
   for (int i = 0; i < 6; ++i) {
-    RcmCoordinates q = configuration_through(*instrument.camera_from_rcm, {-0.012, 0.004, 0.1}).value();
+    JointVector q = configuration_through(*instrument.camera_from_rcm, {-0.012, 0.004, 0.1}).value();
     q.psi_rad = 1;
     q.psi_rad += 0.1 * i;
     frames.push_back(renderer.render({placement_of(instrument, q)}, 7));
@@ -136,7 +136,7 @@ std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
 }
 
 // Frames of a damaged file are not where the truth has them once one is lost: the nearest of the truth's counts.
-double least_error_rad(double psi_rad, const std::vector<double>& truth) {
+double min_error_rad(double psi_rad, const std::vector<double>& truth) {
   double least = pi;
   for (const double true_rad : truth) least = std::min(least, std::abs(std::remainder(psi_rad - true_rad, two_pi)));
   return least;
@@ -156,7 +156,7 @@ std::string track_file(const fs::path& path, const Rig& rig, const Sample& sampl
         fuzz::require_sound(seen);
         if (seen.status != Status::ok) continue;
         if (worst == "nothing found") worst = "measured";
-        const double error_rad = least_error_rad(seen.rcm->q.psi_rad, sample.psi_rad);
+        const double error_rad = min_error_rad(seen.rcm->q.psi_rad, sample.psi_rad);
         if (error_rad > largest_error_rad)
           counts.broken(seed, sample.extension + ": ok with psi off by " + std::to_string(error_rad) + " rad");
       }

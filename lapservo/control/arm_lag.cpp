@@ -16,8 +16,8 @@ void ArmLag::add(const MotionState& setpoint, const Eigen::Vector4d& q_joint, do
 
 double ArmLag::seconds() const {
   constexpr double little = 1e-2;  // pulls the lag to 0 until the arm has moved about a tenth of the joint scale
-  constexpr double largest_s = 0.1;
-  return std::clamp(cross_ / (square_ + little), 0.0, largest_s);
+  constexpr double max_s = 0.1;
+  return std::clamp(cross_ / (square_ + little), 0.0, max_s);
 }
 
 }  // namespace lapservo::internal

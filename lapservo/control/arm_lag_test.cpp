@@ -22,9 +22,9 @@ double lag_found(double lag_s, double amplitude, std::uint64_t seed) {
     const MotionState setpoint{size * std::sin(t), size * std::cos(t)};
     arm = lag_s > 0 ? Eigen::Vector4d(setpoint.position + (arm - setpoint.position) * std::exp(-period_s / lag_s))
                     : setpoint.position;
-    Eigen::Vector4d reading = arm;
-    for (int i = 0; i < 4; ++i) reading[i] += 1e-4 * Scales{}.joints[i] * random.normal();
-    lag.add(setpoint, reading, period_s);
+    Eigen::Vector4d measured = arm;
+    for (int i = 0; i < 4; ++i) measured[i] += 1e-4 * Scales{}.joints[i] * random.normal();
+    lag.add(setpoint, measured, period_s);
   }
   return lag.seconds();
 }

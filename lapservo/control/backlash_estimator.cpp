@@ -23,19 +23,19 @@ void BacklashEstimator::follow(const Eigen::Vector4d& q_joint) {
   for (int i = 0; i < 4; ++i) follow(i, q_joint[i]);
 }
 
-void BacklashEstimator::follow(int index, double reading) {
+void BacklashEstimator::follow(int index, double measured) {
   Joint& joint = joints_[static_cast<std::size_t>(index)];
   const double largest = config_.largest[index];
   if (!(largest > 0)) return;
   if (joint.pressed) {
-    for (std::size_t k = 0; k < candidates; ++k) joint.grid[k].play.follow(reading, width(index, k));
+    for (std::size_t k = 0; k < candidates; ++k) joint.grid[k].backlash.follow(measured, width(index, k));
     return;
   }
-  joint.lowest = std::min(joint.lowest, reading);
-  joint.highest = std::max(joint.highest, reading);
-  const int side = reading - joint.lowest > largest ? 1 : joint.highest - reading > largest ? -1 : 0;
+  joint.lowest = std::min(joint.lowest, measured);
+  joint.highest = std::max(joint.highest, measured);
+  const int side = measured - joint.lowest > largest ? 1 : joint.highest - measured > largest ? -1 : 0;
   if (side == 0) return;
-  for (Candidate& candidate : joint.grid) candidate.play = Play(reading, side);
+  for (Candidate& candidate : joint.grid) candidate.backlash = Backlash(measured, side);
   joint.pressed = true;
   joint.since = 0;
 }
@@ -55,15 +55,16 @@ void BacklashEstimator::add(double time_s, const Eigen::Vector4d& rate, const Ei
     const double interval_s = joint.since > 0 ? std::max(0.0, time_s - joint.last_s) : 0.0;
     const double kept = std::exp(-interval_s / config_.forgetting_s);
     // A plain mean at first, a running one once the time constant has passed.
-    const double share = std::max(1 / (1 + joint.since), -std::expm1(-interval_s / config_.offset_time_s));
-    const double information = (1 - share) / std::max(covariance(i, i), 1e-6 * scales_.joints[i] * scales_.joints[i]);
+    const double fraction = std::max(1 / (1 + joint.since), -std::expm1(-interval_s / config_.offset_time_s));
+    const double information =
+        (1 - fraction) / std::max(covariance(i, i), 1e-6 * scales_.joints[i] * scales_.joints[i]);
     const Nuisance moved = nuisance - joint.mean;
-    joint.mean += share * moved;
+    joint.mean += fraction * moved;
     joint.normal = kept * joint.normal + information * moved * moved.transpose();
     for (std::size_t k = 0; k < candidates; ++k) {
       Candidate& candidate = joint.grid[k];
-      const double rest = q_image[i] - candidate.play.instrument(width(i, k)) - candidate.mean;
-      candidate.mean += share * rest;
+      const double rest = q_image[i] - candidate.backlash.instrument(width(i, k)) - candidate.mean;
+      candidate.mean += fraction * rest;
       candidate.squares = kept * candidate.squares + information * rest * rest;
       candidate.mixed = kept * candidate.mixed + information * rest * moved;
     }

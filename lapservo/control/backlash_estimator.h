@@ -6,36 +6,37 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/backlash.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
-#include "lapservo/control/play.h"
 
 namespace lapservo::internal {
 
 struct BacklashEstimate {
-  double width = 0;  ///< full play, rad or m
+  double width = 0;  ///< full backlash, rad or m
   double sigma = 0;
 };
 
-/// How wide the gaps between motors and instrument are, from the data. What the image shows beyond the readings is
-/// compared with what each of a grid of widths would have done to the readings so far; the lowest sum of squares is the
-/// likeliest width, refined by a parabola. Other things make image and readings differ too, so each sum is the least
-/// over what they can explain: an offset (a running mean is removed from everything alike), a wrong model (it adds
-/// multiples of the joints' positions) and a wrong delay (of the joint's velocity, which looks like backlash but for
-/// its shape). Readings that never reverse make all widths alike: then there is no estimate.
+/// How wide the gaps between motors and instrument are, from the data. What the image shows beyond the measured joints
+/// is compared with what each of a grid of widths would have done to the measured joints so far; the lowest sum of
+/// squares is the likeliest width, refined by a parabola. Other things make image and measured joints differ too, so
+/// each sum is the least over what they can explain: an offset (a running mean is removed from everything alike), a
+/// wrong model (it adds multiples of the joints' positions) and a wrong delay (of the joint's velocity, which looks
+/// like backlash but for its shape). Measured joints that never reverse make all widths alike: then there is no
+/// estimate.
 class BacklashEstimator {
  public:
   static constexpr std::size_t candidates = 21;  ///< 0 to the largest
 
   BacklashEstimator(const BacklashEstimatorConfig& config, const Scales& scales);
 
-  /// Readings, in order of time, up to those of the image in add().
+  /// Measured joints, in order of time, up to those of the image in add().
   void follow(const Eigen::Vector4d& q_joint);
-  /// An image that shows `q_image` (with the covariance of its noise) when the readings were the last ones followed and
-  /// changed at `rate`.
+  /// An image that shows `q_image` (with the covariance of its noise) when the measured joints were the last ones
+  /// followed and changed at `rate`.
   void add(double time_s, const Eigen::Vector4d& rate, const Eigen::Vector4d& q_image,
            const Eigen::Matrix4d& covariance);
-  /// The offset jumped, or readings are missing: keeps what is known, but compares nothing across.
+  /// The offset jumped, or measured joints are missing: keeps what is known, but compares nothing across.
   void interrupt();
 
   std::optional<BacklashEstimate> estimate(int joint) const;
@@ -44,8 +45,8 @@ class BacklashEstimator {
   /// What may differ without backlash: the joints' positions and the joint's own velocity.
   using Nuisance = Eigen::Matrix<double, 5, 1>;
   struct Candidate {
-    Play play;
-    double mean = 0;                    ///< of what image and this play differ by
+    Backlash backlash;
+    double mean = 0;                    ///< of what image and this backlash differ by
     double squares = 0;                 ///< of the rest
     Nuisance mixed = Nuisance::Zero();  ///< the rest by nuisances
   };
@@ -63,7 +64,7 @@ class BacklashEstimator {
   double width(int joint, std::size_t candidate) const {
     return config_.largest[joint] * static_cast<double>(candidate) / (candidates - 1);
   }
-  void follow(int joint, double reading);
+  void follow(int joint, double measured);
 
   BacklashEstimatorConfig config_;
   Scales scales_;

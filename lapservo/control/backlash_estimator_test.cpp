@@ -13,13 +13,13 @@ namespace {
 
 constexpr double period_s = 1.0 / 60;
 
-/// Readings, and images of what the instrument does with them: play, offsets, and what else may be wrong.
+/// Measured joints, and images of what the instrument does with them: backlash, offsets, and what else may be wrong.
 struct World {
   Eigen::Vector4d backlash{0, 0, 1e-4, 0.02};
   Eigen::Vector4d noise{3e-4, 3e-4, 2e-5, 3e-3};
   Eigen::Matrix4d model_error = Eigen::Matrix4d::Zero();  ///< in joint scales
   double delay_error_s = 0;
-  std::function<Eigen::Vector4d(double)> readings = [](double t) {
+  std::function<Eigen::Vector4d(double)> q_measured = [](double t) {
     return Eigen::Vector4d(0.05 * std::sin(0.7 * t), 0.03 * std::sin(0.5 * t), 0.006 * std::sin(two_pi / 10 * t),
                            0.7 * std::sin(two_pi / 12 * t + 1));
   };
@@ -28,19 +28,19 @@ struct World {
     const Scales scales;
     BacklashEstimator estimator({}, scales);
     Random random(seed);
-    std::array<Play, 4> plays;
-    for (int i = 0; i < 4; ++i) plays[static_cast<std::size_t>(i)] = Play(readings(0)[i]);
+    std::array<Backlash, 4> backlashes;
+    for (int i = 0; i < 4; ++i) backlashes[static_cast<std::size_t>(i)] = Backlash(q_measured(0)[i]);
     for (double t = 0; t < duration_s; t += period_s) {
-      const Eigen::Vector4d q = readings(t), then = readings(t - delay_error_s);
+      const Eigen::Vector4d q = q_measured(t), then = q_measured(t - delay_error_s);
       Eigen::Vector4d seen(0.035, -0.035, 0.003, 0.035);
       for (int i = 0; i < 4; ++i) {
-        Play& play = plays[static_cast<std::size_t>(i)];
-        play.follow(then[i], backlash[i]);
-        seen[i] += play.instrument(backlash[i]) + noise[i] * random.normal();
+        Backlash& state = backlashes[static_cast<std::size_t>(i)];
+        state.follow(then[i], backlash[i]);
+        seen[i] += state.instrument(backlash[i]) + noise[i] * random.normal();
       }
       seen += scales.joints.cwiseProduct(model_error * then.cwiseQuotient(scales.joints));
       estimator.follow(q);
-      estimator.add(t, (q - readings(t - 0.05)) / 0.05, seen, noise.cwiseAbs2().asDiagonal());
+      estimator.add(t, (q - q_measured(t - 0.05)) / 0.05, seen, noise.cwiseAbs2().asDiagonal());
     }
     return estimator;
   }
@@ -77,7 +77,7 @@ TEST(BacklashEstimator, FindsNoneWhereThereIsNone) {
 
 TEST(BacklashEstimator, IsSureOfNothingWithoutReversals) {
   World world;
-  world.readings = [](double t) -> Eigen::Vector4d { return Eigen::Vector4d(0.01, 0.01, 0.001, 0.1) * t; };
+  world.q_measured = [](double t) -> Eigen::Vector4d { return Eigen::Vector4d(0.01, 0.01, 0.001, 0.1) * t; };
   const BacklashEstimator estimator = world.watched(20, 3);
   for (const int i : {2, 3}) {
     const auto found = estimator.estimate(i);
@@ -113,7 +113,7 @@ TEST(BacklashEstimator, KeepsWhatItKnowsThroughAnInterruption) {
   const BacklashEstimate before = estimator.estimate(3).value();
   estimator.interrupt();
   for (double t = 20; t < 25; t += period_s) {
-    const Eigen::Vector4d q = world.readings(t);
+    const Eigen::Vector4d q = world.q_measured(t);
     estimator.follow(q);
     estimator.add(t, Eigen::Vector4d::Zero(), q + Eigen::Vector4d(0.3, 0.3, 0.01, 0.3),
                   world.noise.cwiseAbs2().asDiagonal());

@@ -25,7 +25,7 @@ struct ControlStep {
   ControlAction action = ControlAction::hold;
   HoldReason reason = HoldReason::none;                ///< none unless holding
   Eigen::Vector4d velocity = Eigen::Vector4d::Zero();  ///< to be reached, by a linear ramp, when the period ends
-  bool has_setpoint = false;                           ///< false before the first finite readings: send nothing
+  bool has_setpoint = false;                           ///< false before the first finite measured joints: send nothing
   MotionState setpoint;                                ///< of the arm when the period ends
   bool limited = false;                                ///< a limit keeps the motion from what the law wants
   std::optional<Estimate> estimate;                 ///< the instrument now; given while holding too, when there is one

@@ -62,7 +62,7 @@ void check_observer(const ObserverConfig& observer) {
   check_delay("observer.initial_delay_s", observer.initial_delay_s);
   require_positive("observer.bandwidth_rad_s", observer.bandwidth_rad_s);
   require_positive("observer.offset_walk", observer.offset_walk);
-  require_positive("observer.largest_offset", observer.largest_offset);
+  require_positive("observer.max_offset", observer.max_offset);
   require(observer.offset_per_motion >= 0, "observer.offset_per_motion", observer.offset_per_motion, "0 or more");
   require_positive("observer.gate_chi2", observer.gate_chi2);
   require(observer.reacquire_after >= 1, "observer.reacquire_after", observer.reacquire_after, "1 or more");
@@ -118,10 +118,10 @@ ControllerConfig checked(const ControllerConfig& config) {
   check_observer(config.observer);
   check_learning(config);
   require_positive("damping_threshold", config.damping_threshold);
-  require(config.least_singular_value >= 0, "least_singular_value", config.least_singular_value, "0 or more");
+  require(config.min_singular_value >= 0, "min_singular_value", config.min_singular_value, "0 or more");
   require_positive("stale_after_s", config.stale_after_s);
-  require_positive("largest_image_age_s", config.largest_image_age_s);
-  require_positive("largest_following_error", config.largest_following_error);
+  require_positive("max_image_age_s", config.max_image_age_s);
+  require_positive("max_following_error", config.max_following_error);
   return config;
 }
 

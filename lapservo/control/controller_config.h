@@ -8,7 +8,7 @@
 namespace lapservo {
 
 enum class ControlMode {
-  fused,         ///< the default: readings and late images fused by OffsetObserver
+  fused,         ///< the default: measured joints and late images fused by OffsetObserver
   paper,         ///< eq. (21) as it stands, on the latest image alone
   uncalibrated,  ///< no model: the Jacobian is probed, then learnt on the way
 };
@@ -41,13 +41,13 @@ struct ImageWindow {
 };
 
 struct DelayEstimatorConfig {
-  double forgetting_s = 20;        ///< time constant by which old frames lose weight
-  double offset_time_s = 2;        ///< time constant of the mean that is removed: slower differences don't count
-  double least_time_s = 1;         ///< no estimate before this much has been seen
-  double largest_sigma_s = 0.005;  ///< nor one less certain than this: then there was too little motion
-  /// Disagreement between readings and the true joints that is not noise: theta_rad, phi_rad, rho_m, psi_rad. Backlash
-  /// looks like additional delay, so insertion and roll count little.
-  Eigen::Vector4d reading_sigma{2e-4, 2e-4, 1e-3, 2e-2};
+  double forgetting_s = 20;    ///< time constant by which old frames lose weight
+  double offset_time_s = 2;    ///< time constant of the mean that is removed: slower differences don't count
+  double min_time_s = 1;       ///< no estimate before this much has been seen
+  double max_sigma_s = 0.005;  ///< nor one less certain than this: then there was too little motion
+  /// Disagreement between measured joints and the true joints that is not noise: theta_rad, phi_rad, rho_m, psi_rad.
+  /// Backlash looks like additional delay, so insertion and roll count little.
+  Eigen::Vector4d measured_sigma{2e-4, 2e-4, 1e-3, 2e-2};
 };
 
 struct BacklashEstimatorConfig {
@@ -55,23 +55,23 @@ struct BacklashEstimatorConfig {
   Eigen::Vector4d largest{0, 0, 5e-4, 0.1};
   double forgetting_s = 60;  ///< time constant by which old frames lose weight
   double offset_time_s = 2;  ///< time constant of the mean that is removed: slower differences don't count
-  double model_error = 0.3;  ///< what a wrong model makes of motion, a share of it: one sigma
+  double model_error = 0.3;  ///< what a wrong model makes of motion, a fraction of it: one sigma
   double delay_error_s = 0.01;
-  double largest_sigma = 0.03;  ///< share of the largest width: estimates less certain don't count
+  double max_sigma = 0.03;  ///< fraction of the largest width: estimates less certain don't count
 };
 
 struct ObserverConfig {
   std::optional<double> delay_s;  ///< known delay; absent: estimated from the data
   double initial_delay_s = 0.1;   ///< until there is an estimate
   double bandwidth_rad_s = 12;    ///< how fast the offset follows the image
-  /// Random walk of the offset between readings and truth, per square root of a second: theta, phi, rho, psi.
+  /// Random walk of the offset between measured joints and truth, per square root of a second: theta, phi, rho, psi.
   Eigen::Vector4d offset_walk{0.002, 0.002, 0.0003, 0.008};
-  /// The offset changes with motion too (a wrong camera model, backlash not learnt): by about this share of the
+  /// The offset changes with motion too (a wrong camera model, backlash not learnt): by about this fraction of the
   /// distance moved.
   double offset_per_motion = 0.3;
-  /// How far the offset may move the model's configuration from the readings; what a wrong model needs beyond that is
-  /// put into the features instead.
-  Eigen::Vector4d largest_offset{0.35, 0.35, 0.03, 0.8};
+  /// How far the offset may move the model's configuration from the measured joints; what a wrong model needs beyond
+  /// that is put into the features instead.
+  Eigen::Vector4d max_offset{0.35, 0.35, 0.03, 0.8};
   double gate_chi2 = 28.5;  ///< innovations beyond it are outliers: 1 in 100000 of 4 degrees of freedom
   int reacquire_after = 5;  ///< so many outliers in a row that agree with each other are the truth
   DelayEstimatorConfig delay_estimator;
@@ -105,12 +105,12 @@ struct ControllerConfig {
   ObserverConfig observer;  ///< its delay_s holds for all modes
   JacobianEstimatorConfig jacobian;
   ProbingConfig probing;
-  double damping_threshold = 1;        ///< of damped_inverse
-  double least_singular_value = 0.01;  ///< of the scaled Jacobian: below it the controller holds
-  double stale_after_s = 0.1;          ///< hold when no usable image arrived for so long
-  double largest_image_age_s = 0.6;    ///< at arrival, by its stamp
+  double damping_threshold = 1;      ///< of damped_inverse
+  double min_singular_value = 0.01;  ///< of the scaled Jacobian: below it the controller holds
+  double stale_after_s = 0.1;        ///< hold when no usable image arrived for so long
+  double max_image_age_s = 0.6;      ///< at arrival, by its stamp
   /// Hold when the arm is farther from its setpoint than this: theta_rad, phi_rad, rho_m, psi_rad.
-  Eigen::Vector4d largest_following_error{0.1, 0.1, 0.01, 0.4};
+  Eigen::Vector4d max_following_error{0.1, 0.1, 0.01, 0.4};
 };
 
 /// The paper's method: its law, its gains per control period, the rest as by default.

@@ -11,18 +11,18 @@ namespace lapservo::internal {
 void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const Eigen::Matrix4d& covariance,
                          const JointHistory& history) {
   if (history.size() == 0 || history.oldest_s() > stamp_s - step_s * (candidates - 1)) return;
-  const Eigen::Matrix4d noise = covariance + Eigen::Matrix4d(config_.reading_sigma.cwiseAbs2().asDiagonal());
+  const Eigen::Matrix4d noise = covariance + Eigen::Matrix4d(config_.measured_sigma.cwiseAbs2().asDiagonal());
   const Eigen::Matrix4d information = noise.inverse();
   const double interval_s = started_ ? std::max(0.0, stamp_s - last_stamp_s_) : 0.0;
   const double kept = std::exp(-interval_s / config_.forgetting_s);
   // A plain mean at first, a running one once the time constant has passed.
-  const double share = std::max(1 / (1 + weight_), -std::expm1(-interval_s / config_.offset_time_s));
+  const double fraction = std::max(1 / (1 + weight_), -std::expm1(-interval_s / config_.offset_time_s));
   for (std::size_t i = 0; i < candidates; ++i) {
     Candidate& candidate = grid_[i];
     const Eigen::Vector4d difference = q_image - *history.at(stamp_s - step_s * static_cast<double>(i));
     const Eigen::Vector4d before = difference - candidate.mean;
-    candidate.mean += share * before;
-    candidate.squares = kept * candidate.squares + (1 - share) * before.dot(information * before);
+    candidate.mean += fraction * before;
+    candidate.squares = kept * candidate.squares + (1 - fraction) * before.dot(information * before);
   }
   weight_ = kept * weight_ + 1;
   seen_s_ += interval_s;
@@ -31,7 +31,7 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
 }
 
 std::optional<DelayEstimate> DelayEstimator::estimate() const {
-  if (seen_s_ < config_.least_time_s) return std::nullopt;
+  if (seen_s_ < config_.min_time_s) return std::nullopt;
   const auto lowest = std::min_element(grid_.begin(), grid_.end(),
                                        [](const Candidate& a, const Candidate& b) { return a.squares < b.squares; });
   const auto index = static_cast<std::size_t>(lowest - grid_.begin());
@@ -41,12 +41,12 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   if (!(curvature > 0)) return std::nullopt;
   const double shift_s = (left - right) / (2 * step_s * curvature);
   const double delay_s = std::clamp(step_s * static_cast<double>(middle) + shift_s, 0.0, step_s * (candidates - 1));
-  // A sum of squares grows by 1 at one sigma. What the readings don't explain is taken as noise that persists over
-  // several frames.
+  // A sum of squares grows by 1 at one sigma. What the measured joints don't explain is taken as noise that persists
+  // over several frames.
   constexpr double frames_alike = 4;
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));
   const double sigma_s = std::sqrt(2 / curvature * misfit * frames_alike);
-  if (!(sigma_s <= config_.largest_sigma_s)) return std::nullopt;
+  if (!(sigma_s <= config_.max_sigma_s)) return std::nullopt;
   return DelayEstimate{delay_s, sigma_s};
 }
 

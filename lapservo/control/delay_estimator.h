@@ -16,10 +16,10 @@ struct DelayEstimate {
   double sigma_s = 0;
 };
 
-/// How old the image is, from the data: the image's joint positions are compared with the readings at each of a grid of
-/// delays. The offset between both is removed as a running mean; what remains is, for each candidate, a sum of squares,
-/// and the lowest sum is the likeliest delay, refined by a parabola through its neighbours. Its curvature is the
-/// information: without motion all candidates are alike, sigma is large and there is no estimate.
+/// How old the image is, from the data: the image's joint positions are compared with the measured joints at each of a
+/// grid of delays. The offset between both is removed as a running mean; what remains is, for each candidate, a sum of
+/// squares, and the lowest sum is the likeliest delay, refined by a parabola through its neighbours. Its curvature is
+/// the information: without motion all candidates are alike, sigma is large and there is no estimate.
 class DelayEstimator {
  public:
   static constexpr double step_s = 0.005;

@@ -18,8 +18,8 @@ Eigen::Vector4d joints_at(double time_s) {
 
 struct Scene {
   double delay_s = 0.1;
-  double play_rad = 0;  ///< of psi
-  double play_m = 0;    ///< of rho
+  double backlash_rad = 0;  ///< of psi
+  double backlash_m = 0;    ///< of rho
   bool moving = true;
   double jitter_s = 0;  ///< of the images' stamps, one standard deviation
 };
@@ -32,13 +32,13 @@ std::optional<DelayEstimate> estimate_after(const Scene& scene, double duration_
   const auto truth = [&](double t) { return scene.moving ? joints_at(t) : joints_at(0); };
   for (int k = 0; k < 60 * duration_s; ++k) {
     const double t = k / 60.0;
-    Eigen::Vector4d reading = truth(t);
-    for (int i = 0; i < 4; ++i) reading[i] += 1e-5 * random.normal();
-    history.push(t, reading);
+    Eigen::Vector4d measured = truth(t);
+    for (int i = 0; i < 4; ++i) measured[i] += 1e-5 * random.normal();
+    history.push(t, measured);
     Eigen::Vector4d seen = truth(t - scene.delay_s + scene.jitter_s * random.normal()) + offset;
     const Eigen::Vector4d ahead = truth(t - scene.delay_s + 1e-3) - truth(t - scene.delay_s);
-    seen[2] -= std::copysign(scene.play_m / 2, ahead[2]);
-    seen[3] -= std::copysign(scene.play_rad / 2, ahead[3]);
+    seen[2] -= std::copysign(scene.backlash_m / 2, ahead[2]);
+    seen[3] -= std::copysign(scene.backlash_rad / 2, ahead[3]);
     for (int i = 0; i < 4; ++i) seen[i] += noise[i] * random.normal();
     estimator.add(t, seen, noise.cwiseAbs2().asDiagonal(), history);
   }
@@ -48,9 +48,9 @@ std::optional<DelayEstimate> estimate_after(const Scene& scene, double duration_
 TEST(DelayEstimator, FindsTheDelayWithinHalfAFrame) {
   std::uint64_t seed = 0;
   for (const double delay_s : {0.0, 0.017, 0.06, 0.08, 0.15, 0.2, 0.25}) {
-    for (const double play : {0.0, 1.0}) {
+    for (const double backlash : {0.0, 1.0}) {
       SCOPED_TRACE(++seed);
-      const auto found = estimate_after({delay_s, 0.02 * play, 0.0002 * play, true, 0.003}, 20, seed);
+      const auto found = estimate_after({delay_s, 0.02 * backlash, 0.0002 * backlash, true, 0.003}, 20, seed);
       ASSERT_TRUE(found);
       EXPECT_NEAR(found->delay_s, delay_s, 0.5 / 60);
     }

@@ -6,13 +6,13 @@ namespace lapservo {
 
 /// Where the joints are in their gaps, as believed.
 struct GapState {
-  Eigen::Vector4d width = Eigen::Vector4d::Zero();  ///< full play of each joint
-  Eigen::Vector4d shift = Eigen::Vector4d::Zero();  ///< what it adds to the readings: -width/2 to width/2
+  Eigen::Vector4d width = Eigen::Vector4d::Zero();  ///< full backlash of each joint
+  Eigen::Vector4d shift = Eigen::Vector4d::Zero();  ///< what it adds to the measured joints: -width/2 to width/2
 };
 
 /// The instrument now.
 struct Estimate {
-  Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< readings through their play, plus offset
+  Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< measured joints through their backlash, plus offset
   GapState gap;
   Eigen::Matrix4d q_covariance = Eigen::Matrix4d::Zero();
   Eigen::Vector4d features = Eigen::Vector4d::Zero();  ///< unbiased in the image even if the model is wrong

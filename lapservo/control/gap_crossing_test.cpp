@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/control/play.h"
+#include "lapservo/control/backlash.h"
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
@@ -13,10 +13,10 @@ constexpr double period_s = 1.0 / 60;
 /// Psi asked to fall at a slow, steady rate after it rose: motor and instrument, without noise or lag.
 struct Crossing {
   double width = 0.02, motor = 1, velocity = 0;
-  Play play{1, 1};
+  Backlash backlash{1, 1};
   JointLimits limits;
 
-  double instrument() const { return play.instrument(width); }
+  double instrument() const { return backlash.instrument(width); }
   void advance(double wanted) {
     GapState gap;
     gap.width[3] = width;
@@ -27,7 +27,7 @@ struct Crossing {
     ASSERT_LE(std::abs(next), limits.rate[3]);
     motor += (velocity + next) / 2 * period_s;
     velocity = next;
-    play.follow(motor, width);
+    backlash.follow(motor, width);
   }
 };
 

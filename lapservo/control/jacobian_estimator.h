@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-/// Learns image and Jacobian online from joint readings and features alone: no camera, marker or registration. The
+/// Learns image and Jacobian online from measured joints and features alone: no camera, marker or registration. The
 /// model is y(q) = y0 + G (q - q0) about the latest image's joints q0. G follows a random walk whose steps grow with
 /// the motion since the image before, so what was learnt of it is forgotten by distance, not by time, and at rest not
 /// at all (no wind-up, and no noise is learnt); y0 walks by time too. It is recursive least squares, in the form of a

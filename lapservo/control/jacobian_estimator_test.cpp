@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/control/test_theatre.h"
+#include "lapservo/control/test_simulator.h"
 #include "lapservo/control/tracking_law.h"
 
 namespace lapservo::internal {

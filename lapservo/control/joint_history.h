@@ -8,13 +8,13 @@
 
 namespace lapservo::internal {
 
-/// The latest joint readings in order of time, so that an image can be compared with where the joints were when it was
+/// The latest measured joints in order of time, so that an image can be compared with where the joints were when it was
 /// taken. A ring of fixed size: 1 s at 1 kHz; no allocation.
 class JointHistory {
  public:
   static constexpr std::size_t capacity = 1024;
 
-  /// Readings that are not newer than the last one are ignored.
+  /// Measured joints that are not newer than the last one are ignored.
   void push(double time_s, const Eigen::Vector4d& q);
   void clear() { size_ = 0; }
 
@@ -27,7 +27,7 @@ class JointHistory {
   /// Linear interpolation; the newest reading for times after it, nullopt for times before the oldest.
   std::optional<Eigen::Vector4d> at(double time_s) const;
 
-  /// Calls visit(q) for the readings from after `from_s` up to `to_s`, in order.
+  /// Calls visit(q) for the measured joints from after `from_s` up to `to_s`, in order.
   template <class Visit>
   void visit(double from_s, double to_s, const Visit& visit) const {
     std::size_t first = size_;

@@ -22,7 +22,7 @@ Eigen::Matrix4d random_matrix(Random& random) {
   return matrix;
 }
 
-/// How far `state` lies beyond a joint limit or a rate limit, in shares of the range.
+/// How far `state` lies beyond a joint limit or a rate limit, in fractions of the range.
 double beyond(const JointLimits& limits, const MotionState& state) {
   const Eigen::Vector4d range = limits.upper - limits.lower;
   return std::max({(state.position - limits.upper).cwiseQuotient(range).maxCoeff(),

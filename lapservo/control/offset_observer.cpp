@@ -23,19 +23,19 @@ Eigen::Vector4d noise_for_bandwidth(const Eigen::Vector4d& walk, double bandwidt
   return walk * ((1 - gain) / (gain * gain));
 }
 
-void follow(std::array<Play, 4>& plays, const Eigen::Vector4d& q_joint, const Eigen::Vector4d& widths) {
-  for (int i = 0; i < 4; ++i) plays[static_cast<std::size_t>(i)].follow(q_joint[i], widths[i]);
+void follow(std::array<Backlash, 4>& backlashes, const Eigen::Vector4d& q_joint, const Eigen::Vector4d& widths) {
+  for (int i = 0; i < 4; ++i) backlashes[static_cast<std::size_t>(i)].follow(q_joint[i], widths[i]);
 }
 
-Eigen::Vector4d instrument(const std::array<Play, 4>& plays, const Eigen::Vector4d& widths) {
+Eigen::Vector4d instrument(const std::array<Backlash, 4>& backlashes, const Eigen::Vector4d& widths) {
   Eigen::Vector4d q;
-  for (int i = 0; i < 4; ++i) q[i] = plays[static_cast<std::size_t>(i)].instrument(widths[i]);
+  for (int i = 0; i < 4; ++i) q[i] = backlashes[static_cast<std::size_t>(i)].instrument(widths[i]);
   return q;
 }
 
-/// How the readings changed before `time_s`, per second.
+/// How the measured joints changed before `time_s`, per second.
 Eigen::Vector4d rate_before(const JointHistory& history, double time_s, const Eigen::Vector4d& q) {
-  constexpr double span_s = 0.05;  // long enough for the readings' resolution
+  constexpr double span_s = 0.05;  // long enough for the measured joints' resolution
   const auto before = history.at(time_s - span_s);
   return before ? Eigen::Vector4d((q - *before) / span_s) : Eigen::Vector4d::Zero();
 }
@@ -55,11 +55,11 @@ Update OffsetObserver::update(const FeatureModel& model, const JointHistory& his
   }
   const auto q_then = history.at(image.time_s - delay_s_);
   if (!q_then) return Update::no_history;
-  follow_readings(history, image.time_s - delay_s_, *q_then);
-  const Eigen::Vector4d played_then = instrument(plays_then_, backlash_);
-  if (!started_) return start(model, played_then, image);
-  const auto state = model(played_then + offset_);
-  if (!state) return start(model, played_then, image);
+  follow_measured(history, image.time_s - delay_s_, *q_then);
+  const Eigen::Vector4d q_driven_then = instrument(backlashes_then_, backlash_);
+  if (!started_) return start(model, q_driven_then, image);
+  const auto state = model(q_driven_then + offset_);
+  if (!state) return start(model, q_driven_then, image);
 
   const Eigen::Vector4d residual = feature_error(image.features, state->features + feature_offset_);
   const Eigen::Matrix4d inverse = damped_inverse(state->jacobian, scales_).inverse;
@@ -72,14 +72,14 @@ Update OffsetObserver::update(const FeatureModel& model, const JointHistory& his
                                                        config_.bandwidth_rad_s, interval_s)
                                        .asDiagonal());
   const Eigen::Matrix4d predicted =
-      covariance_ + Eigen::Matrix4d(walk_variance(since_s, played_then - played_then_).asDiagonal());
+      covariance_ + Eigen::Matrix4d(walk_variance(since_s, q_driven_then - q_driven_then_).asDiagonal());
   const Eigen::Matrix4d innovation_covariance = predicted + noise;
   const Eigen::LLT<Eigen::Matrix4d> factor(innovation_covariance);
   const double chi2 = innovation.dot(factor.solve(innovation));
   if (!std::isfinite(chi2)) return Update::non_finite;
   if (chi2 > config_.gate_chi2) {
     if (!agrees_with_last_outlier(offset_ + innovation, innovation_covariance)) return Update::outlier;
-    return start(model, played_then, image);
+    return start(model, q_driven_then, image);
   }
   outliers_ = 0;
   const Eigen::Matrix4d gain = factor.solve(predicted).transpose();  // both symmetric
@@ -93,47 +93,47 @@ Update OffsetObserver::update(const FeatureModel& model, const JointHistory& his
   if (!config_.delay_s) delay_estimator_.add(image.time_s, *q_then + seen_offset, seen_noise, history);
   if (delay_is_right()) {
     backlash_estimator_.add(image.time_s, rate_before(history, image.time_s - delay_s_, *q_then),
-                            played_then + seen_offset, seen_noise);
+                            q_driven_then + seen_offset, seen_noise);
   }
   updated_s_ = image.time_s;
-  played_then_ = played_then;
+  q_driven_then_ = q_driven_then;
   follow_delay(interval_s);
   follow_backlash(interval_s);
   return Update::accepted;
 }
 
-void OffsetObserver::follow_readings(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then) {
+void OffsetObserver::follow_measured(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then) {
   if (!started_) {
-    for (int i = 0; i < 4; ++i) plays_then_[static_cast<std::size_t>(i)] = Play(q_then[i]);
+    for (int i = 0; i < 4; ++i) backlashes_then_[static_cast<std::size_t>(i)] = Backlash(q_then[i]);
   }
   const auto follow_all = [this](const Eigen::Vector4d& q) {
-    follow(plays_then_, q, backlash_);
+    follow(backlashes_then_, q, backlash_);
     backlash_estimator_.follow(q);
   };
   if (started_) history.visit(followed_s_, time_s, follow_all);
   follow_all(q_then);
   followed_s_ = std::max(followed_s_, time_s);
-  plays_ = plays_then_;
-  history.visit(time_s, history.newest_s(), [this](const Eigen::Vector4d& q) { follow(plays_, q, backlash_); });
+  backlashes_ = backlashes_then_;
+  history.visit(time_s, history.newest_s(), [this](const Eigen::Vector4d& q) { follow(backlashes_, q, backlash_); });
 }
 
-Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& played_then,
+Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q_driven_then,
                              const ImageMeasurement& image) {
-  // From where the image says, then from where the readings say.
+  // From where the image says, then from where the measured joints say.
   std::optional<NewtonInverse> found;
   if (image.q) found = newton_inverse(model, image.features, *image.q, scales_);
   if (!found || !found->converged) {
-    const auto other = newton_inverse(model, image.features, played_then + offset_, scales_);
+    const auto other = newton_inverse(model, image.features, q_driven_then + offset_, scales_);
     if (!found || (other && other->converged)) found = other;
   }
   if (!found) return Update::not_modelled;
-  offset_ = found->q - played_then;
+  offset_ = found->q - q_driven_then;
   offset_[3] = wrap_pi(offset_[3]);  // the image knows no turns of psi
   feature_offset_.setZero();
   const auto state = model(found->q);
   if (!state) return Update::not_modelled;
   limit_offset(state->jacobian);
-  const auto limited = model(played_then + offset_);
+  const auto limited = model(q_driven_then + offset_);
   if (!limited) return Update::not_modelled;
   feature_offset_ = feature_error(image.features, limited->features);
   ends_offset_px_ = image.ends_px - limited->ends_px;
@@ -143,7 +143,7 @@ Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& p
       Eigen::Matrix4d(
           noise_for_bandwidth(config_.offset_walk.cwiseAbs2() / 60, config_.bandwidth_rad_s, 1.0 / 60).asDiagonal());
   updated_s_ = image.time_s;
-  played_then_ = played_then;
+  q_driven_then_ = q_driven_then;
   outliers_ = 0;
   started_ = true;
   backlash_estimator_.interrupt();
@@ -160,7 +160,7 @@ bool OffsetObserver::agrees_with_last_outlier(const Eigen::Vector4d& seen_offset
 }
 
 void OffsetObserver::limit_offset(const Eigen::Matrix4d& jacobian) {
-  const Eigen::Vector4d within = offset_.cwiseMax(-config_.largest_offset).cwiseMin(config_.largest_offset);
+  const Eigen::Vector4d within = offset_.cwiseMax(-config_.max_offset).cwiseMin(config_.max_offset);
   feature_offset_ += jacobian * (offset_ - within);
   offset_ = within;
 }
@@ -182,14 +182,14 @@ bool OffsetObserver::delay_is_right() const {
 
 void OffsetObserver::follow_backlash(double interval_s) {
   constexpr double time_constant_s = 1, sure = 3;
-  const Eigen::Vector4d before = instrument(plays_, backlash_);
+  const Eigen::Vector4d before = instrument(backlashes_, backlash_);
   for (int i = 0; i < 4; ++i) {
     const auto seen = backlash_estimator_.estimate(i);
-    if (!seen || seen->sigma > config_.backlash.largest_sigma * config_.backlash.largest[i]) continue;
+    if (!seen || seen->sigma > config_.backlash.max_sigma * config_.backlash.largest[i]) continue;
     const double width = seen->width > sure * seen->sigma ? seen->width : 0;
     backlash_[i] += -std::expm1(-interval_s / time_constant_s) * (width - backlash_[i]);
   }
-  offset_ -= instrument(plays_, backlash_) - before;
+  offset_ -= instrument(backlashes_, backlash_) - before;
 }
 
 std::optional<DelayEstimate> OffsetObserver::delay_estimate() const {
@@ -201,15 +201,15 @@ std::optional<Estimate> OffsetObserver::estimate(const FeatureModel& model, cons
                                                  double time_s) const {
   if (!started_) return std::nullopt;
   Estimate now;
-  Plays plays = plays_;
-  follow(plays, q_joint, backlash_);
-  now.gap = {backlash_, instrument(plays, backlash_) - q_joint};
+  Backlashes backlashes = backlashes_;
+  follow(backlashes, q_joint, backlash_);
+  now.gap = {backlash_, instrument(backlashes, backlash_) - q_joint};
   now.q = q_joint + now.gap.shift + offset_;
   const auto state = model(now.q);
   if (!state) return std::nullopt;
   const double age_s = std::max(0.0, time_s - updated_s_) + delay_s_;
   now.q_covariance =
-      covariance_ + Eigen::Matrix4d(walk_variance(age_s, q_joint + now.gap.shift - played_then_).asDiagonal());
+      covariance_ + Eigen::Matrix4d(walk_variance(age_s, q_joint + now.gap.shift - q_driven_then_).asDiagonal());
   now.features = state->features + feature_offset_;
   now.jacobian = state->jacobian;
   now.covariance = feature_covariance(*state, now.q_covariance);

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/backlash.h"
 #include "lapservo/control/backlash_estimator.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/delay_estimator.h"
@@ -12,7 +13,6 @@
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
-#include "lapservo/control/play.h"
 
 namespace lapservo::internal {
 
@@ -20,17 +20,17 @@ enum class Update {
   accepted,
   outlier,       ///< beyond the gate: ignored
   reacquired,    ///< the first one, or the last of several outliers that agree: started anew from it
-  no_history,    ///< there are no readings from the time when the image was taken
+  no_history,    ///< there are no measured joints from the time when the image was taken
   not_modelled,  ///< the model sees nothing where the instrument should be
   non_finite,
 };
 
-/// Fuses joint readings, which are fast and smooth but off (kinematic offsets, backlash), with the image, which is
+/// Fuses measured joints, which are fast and smooth but off (kinematic offsets, backlash), with the image, which is
 /// right but late. The state is the offset b such that the model at p(t - delay) + b shows the features seen at t: a
 /// slowly varying random walk, estimated by a Kalman filter with full covariance. Then the features now are those of
-/// the model at p(now) + b, so the delay does not enter the loop except through changes of b. Here p are the readings
-/// through a play as wide as BacklashEstimator has found it: nothing at first. When the width changes b changes against
-/// it, so that the estimate does not jump.
+/// the model at p(now) + b, so the delay does not enter the loop except through changes of b. Here p are the measured
+/// joints through a backlash as wide as BacklashEstimator has found it: nothing at first. When the width changes b
+/// changes against it, so that the estimate does not jump.
 ///
 /// The innovation is the difference in *features*, carried to q by the damped inverse of the model's Jacobian. The
 /// filter rests only where that difference is zero on average, so in steady state the features are unbiased whatever is
@@ -54,18 +54,18 @@ class OffsetObserver {
   /// What the data say; nullopt when the delay is given or there was too little motion.
   std::optional<DelayEstimate> delay_estimate() const;
   const Eigen::Vector4d& offset() const { return offset_; }
-  /// Full play between readings and instrument, joint by joint, as far as it has been learnt.
+  /// Full backlash between measured joints and instrument, joint by joint, as far as it has been learnt.
   const Eigen::Vector4d& backlash() const { return backlash_; }
   bool started() const { return started_; }
 
  private:
-  using Plays = std::array<Play, 4>;
+  using Backlashes = std::array<Backlash, 4>;
 
-  Update start(const FeatureModel& model, const Eigen::Vector4d& played_then, const ImageMeasurement& image);
+  Update start(const FeatureModel& model, const Eigen::Vector4d& q_driven_then, const ImageMeasurement& image);
   bool agrees_with_last_outlier(const Eigen::Vector4d& seen_offset, const Eigen::Matrix4d& innovation_covariance);
   void limit_offset(const Eigen::Matrix4d& jacobian);
   void follow_delay(double interval_s);
-  void follow_readings(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then);
+  void follow_measured(const JointHistory& history, double time_s, const Eigen::Vector4d& q_then);
   void follow_backlash(double interval_s);
   bool delay_is_right() const;
   Eigen::Vector4d walk_variance(double interval_s, const Eigen::Vector4d& moved) const;
@@ -75,12 +75,12 @@ class OffsetObserver {
   DelayEstimator delay_estimator_;
   BacklashEstimator backlash_estimator_;
   Eigen::Vector4d backlash_ = Eigen::Vector4d::Zero();
-  Plays plays_then_, plays_;  ///< at the last image, at the last reading before it came
-  double followed_s_ = 0;     ///< the time of plays_then_
+  Backlashes backlashes_then_, backlashes_;  ///< at the last image, at the last reading before it came
+  double followed_s_ = 0;                    ///< the time of backlashes_then_
   double delay_s_ = 0;
   bool started_ = false;
   double updated_s_ = 0;                                      ///< stamp of the last accepted image
-  Eigen::Vector4d played_then_ = Eigen::Vector4d::Zero();     ///< readings through their play at that image
+  Eigen::Vector4d q_driven_then_ = Eigen::Vector4d::Zero();   ///< measured joints through their backlash at that image
   Eigen::Vector4d offset_ = Eigen::Vector4d::Zero();          ///< b
   Eigen::Matrix4d covariance_ = Eigen::Matrix4d::Zero();      ///< of b
   Eigen::Vector4d feature_offset_ = Eigen::Vector4d::Zero();  ///< what b can't explain

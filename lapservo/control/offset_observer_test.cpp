@@ -3,7 +3,7 @@
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
-#include "lapservo/control/test_theatre.h"
+#include "lapservo/control/test_simulator.h"
 #include "lapservo/control/tracking_law.h"
 
 namespace lapservo::internal {
@@ -13,12 +13,12 @@ using testing::TestRig;
 
 constexpr double period_s = 1.0 / 60;
 
-Eigen::Vector4d readings_at(double time_s) {
+Eigen::Vector4d measured_at(double time_s) {
   return {0.05 + 0.05 * std::sin(0.7 * time_s), 1.57 + 0.03 * std::sin(0.5 * time_s),
           0.064 + 0.003 * std::sin(0.6 * time_s), 1 + 0.3 * std::sin(0.4 * time_s)};
 }
 
-/// Readings move, the offset wanders, images come late and noisy.
+/// Measured joints move, the offset wanders, images come late and noisy.
 class Observed {
  public:
   Observed(const ObserverConfig& config, const TestRig& model_rig, double delay_s, std::uint64_t seed)
@@ -27,7 +27,7 @@ class Observed {
   Update advance() {
     ++tick_;
     const double t = now_s();
-    for (int i = 0; i < 4; ++i) plays_[static_cast<std::size_t>(i)].follow(readings_at(t)[i], backlash[i]);
+    for (int i = 0; i < 4; ++i) backlashes_[static_cast<std::size_t>(i)].follow(measured_at(t)[i], backlash[i]);
     for (int i = 0; i < 4; ++i) offset[i] += walk[i] * std::sqrt(period_s) * random_.normal();
     const FeatureState state = exact_map(rig, q_true()).value();
     ImageMeasurement image;
@@ -38,7 +38,7 @@ class Observed {
     image.covariance = noise.cwiseAbs2().asDiagonal();
     image.ends_px = state.ends_px;
     images_.push_back(image);
-    history.push(t, readings_at(t));
+    history.push(t, measured_at(t));
     if (images_.front().time_s > t + 1e-9) return Update::no_history;
     const ImageMeasurement latest = images_.front();
     images_.pop_front();
@@ -47,10 +47,10 @@ class Observed {
   double now_s() const { return tick_ * period_s; }
   Eigen::Vector4d q_true() const {
     Eigen::Vector4d q = offset;
-    for (int i = 0; i < 4; ++i) q[i] += plays_[static_cast<std::size_t>(i)].instrument(backlash[i]);
+    for (int i = 0; i < 4; ++i) q[i] += backlashes_[static_cast<std::size_t>(i)].instrument(backlash[i]);
     return q;
   }
-  Estimate estimate() const { return observer.estimate(model, readings_at(now_s()), now_s()).value(); }
+  Estimate estimate() const { return observer.estimate(model, measured_at(now_s()), now_s()).value(); }
 
   TestRig rig;
   OffsetObserver observer;
@@ -65,7 +65,7 @@ class Observed {
   Random random_;
   std::deque<ImageMeasurement> images_;
   int tick_ = -1;
-  std::array<Play, 4> plays_;
+  std::array<Backlash, 4> backlashes_;
 };
 
 ObserverConfig known(double delay_s) {
@@ -195,8 +195,8 @@ TEST(OffsetObserver, RejectsAnOutlierAndReacquires) {
   EXPECT_LT((world.observer.offset() - world.offset).norm(), 0.02);
 }
 
-// An image tells the rotation within one turn, the readings count turns.
-TEST(OffsetObserver, TakesTheTurnOfTheReadings) {
+// An image tells the rotation within one turn, the measured joints count turns.
+TEST(OffsetObserver, TakesTheTurnOfTheMeasuredJoints) {
   const TestRig rig;
   const Scales scales;
   OffsetObserver observer(ObserverConfig{}, scales);

@@ -43,7 +43,7 @@ DampedInverse damped_inverse(const Eigen::Matrix4d& jacobian, const Scales& scal
     inverted[i] = sigma >= threshold ? 1 / sigma : sigma / (threshold * threshold);
   }
   DampedInverse result;
-  result.smallest_singular_value = svd.singularValues()[3];
+  result.min_singular_value = svd.singularValues()[3];
   result.inverse = scales.joints.asDiagonal() * svd.matrixV() * inverted.asDiagonal() * svd.matrixU().transpose() *
                    scales.features.cwiseInverse().asDiagonal();
   return result;

@@ -30,7 +30,7 @@ Eigen::Vector4d wanted_feature_rate(const TrackingGains& gains, const Eigen::Vec
 /// Inverse of a Jacobian, damped where it is nearly singular.
 struct DampedInverse {
   Eigen::Matrix4d inverse = Eigen::Matrix4d::Zero();  ///< d q / d features
-  double smallest_singular_value = 0;                 ///< of the scaled Jacobian
+  double min_singular_value = 0;                      ///< of the scaled Jacobian
 };
 
 /// The Jacobian is scaled to S_f^-1 J S_q and decomposed; a singular value sigma below `threshold` is inverted as

@@ -83,7 +83,7 @@ TEST(DampedInverse, IsTheInverseAwayFromSingularities) {
     const Eigen::Matrix4d jacobian = scales.features.asDiagonal() * scaled * scales.joints.cwiseInverse().asDiagonal();
     const double smallest = scaled.jacobiSvd().singularValues()[3];
     const auto damped = damped_inverse(jacobian, scales, 0.9 * smallest);
-    EXPECT_NEAR(damped.smallest_singular_value, smallest, 1e-9 * (1 + smallest));
+    EXPECT_NEAR(damped.min_singular_value, smallest, 1e-9 * (1 + smallest));
     EXPECT_TRUE((damped.inverse * jacobian).isApprox(Eigen::Matrix4d::Identity(), 1e-6));
   }
 }

@@ -140,9 +140,9 @@ Trajectory sinusoids(const Sinusoids& sinusoids) {
           }};
 }
 
-Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& largest_rate, double dwell_s) {
+Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& max_rate, double dwell_s) {
   if (points.size() < 2) throw InputError("trajectory", "points", std::to_string(points.size()), "two points or more");
-  require_positive("largest_rate", largest_rate);
+  require_positive("max_rate", max_rate);
   if (!(dwell_s >= 0)) throw InputError("trajectory", "dwell_s", std::to_string(dwell_s), "0 or more seconds");
   constexpr double peak_rate = 1.875;  // of the minimum-jerk motion over unit distance in unit time
   std::vector<Segment> segments;
@@ -153,7 +153,7 @@ Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::V
     require_finite("points", points[i]);
     Eigen::Vector4d change = points[i] - from;
     change[0] = wrap_pi(change[0]);
-    const double duration_s = peak_rate * change.cwiseAbs().cwiseQuotient(largest_rate).maxCoeff();
+    const double duration_s = peak_rate * change.cwiseAbs().cwiseQuotient(max_rate).maxCoeff();
     segments.push_back({start_s, duration_s, from, change});
     from += change;
     start_s += duration_s + dwell_s;

@@ -37,10 +37,9 @@ struct Sinusoids {
 Trajectory sinusoids(const Sinusoids& sinusoids);
 
 /// From point to point along straight lines in feature space, at rest in each, by minimum-jerk motions (quintic; Flash
-/// and Hogan 1985) that take just as long as keeps every feature within `largest_rate`. s takes the shorter way round.
+/// and Hogan 1985) that take just as long as keeps every feature within `max_rate`. s takes the shorter way round.
 /// Throws InputError for fewer than two points and rates that are not positive.
-Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& largest_rate,
-                      double dwell_s = 0);
+Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& max_rate, double dwell_s = 0);
 
 /// Natural cubic spline (twice continuously differentiable) through rows of time_s,s_rad,r_px,l_px,d_px with times that
 /// increase; starts at the first row's time. s is unwrapped. Throws InputError naming file, line and field.

@@ -45,7 +45,7 @@ std::optional<std::string> outside_window(const ImageWindow& window, const Eigen
 std::optional<std::string> broken_limit(const ControllerConfig& config, const FeatureState& state,
                                         const Eigen::Vector4d& q, const Eigen::Vector4d& rate) {
   const DampedInverse inverse = damped_inverse(state.jacobian, config.scales, config.damping_threshold);
-  if (inverse.smallest_singular_value < config.least_singular_value) return "the Jacobian is singular";
+  if (inverse.min_singular_value < config.min_singular_value) return "the Jacobian is singular";
   if (auto broken = broken_joint_limit(config.limits, q, inverse.inverse * rate)) return broken;
   if (config.window) return outside_window(*config.window, state.ends_px);
   return std::nullopt;

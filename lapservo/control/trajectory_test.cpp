@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/control/test_theatre.h"
+#include "lapservo/control/test_simulator.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
@@ -56,12 +56,12 @@ TEST(Trajectory, SetPointRests) {
 
 TEST(Trajectory, ViaPointsAreReachedWithinTheLargestRate) {
   const std::vector<Eigen::Vector4d> points{{3, 700, 300, 200}, {-3, 800, 350, 180}, {-2.8, 780, 350, 240}};
-  const Eigen::Vector4d largest_rate(0.1, 50, 20, 30);
-  const Trajectory trajectory = via_points(points, largest_rate, 0.5);
+  const Eigen::Vector4d max_rate(0.1, 50, 20, 30);
+  const Trajectory trajectory = via_points(points, max_rate, 0.5);
   expect_consistent(trajectory, 1e-3, trajectory.duration_s - 1e-3);
   double fastest = 0;
   for (double t = 0; t <= trajectory.duration_s; t += 0.001) {
-    fastest = std::max(fastest, trajectory.at(t).rate.cwiseAbs().cwiseQuotient(largest_rate).maxCoeff());
+    fastest = std::max(fastest, trajectory.at(t).rate.cwiseAbs().cwiseQuotient(max_rate).maxCoeff());
   }
   EXPECT_LE(fastest, 1 + 1e-9);
   EXPECT_GT(fastest, 0.999);

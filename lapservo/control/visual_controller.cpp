@@ -84,13 +84,13 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
   now_s_ = time_s;
   if (!all_finite(desired)) return HoldReason::non_finite;
   const Eigen::Array4d behind = (setpoint.position - q_joint).array().abs();
-  return (behind > config_.largest_following_error.array()).any() ? HoldReason::not_following : HoldReason::none;
+  return (behind > config_.max_following_error.array()).any() ? HoldReason::not_following : HoldReason::none;
 }
 
 HoldReason VisualController::update(const ImageMeasurement& image) {
   if (!all_finite(image)) return HoldReason::non_finite;
   if (!image.found) return HoldReason::marker_lost;
-  if (now_s_ - image.time_s > config_.largest_image_age_s) return HoldReason::stale_image;
+  if (now_s_ - image.time_s > config_.max_image_age_s) return HoldReason::stale_image;
   const HoldReason reason = estimator_->update(image, history_);
   if (reason == HoldReason::none) usable_s_ = now_s_;
   return reason;
@@ -130,7 +130,7 @@ VisualController::Law VisualController::tracking_law(const std::optional<Estimat
     return law;
   }
   const DampedInverse damped = damped_inverse(estimate->jacobian, config_.scales, config_.damping_threshold);
-  if (!(damped.smallest_singular_value >= config_.least_singular_value)) {
+  if (!(damped.min_singular_value >= config_.min_singular_value)) {
     law.reason = HoldReason::singular;
     return law;
   }

@@ -19,7 +19,7 @@
 
 namespace lapservo::internal {
 
-/// The visual servo controller: joint readings, images and desired features in, joint velocities and setpoints out.
+/// The visual servo controller: measured joints, images and desired features in, joint velocities and setpoints out.
 /// One call a period; no allocation in it; every number that leaves is finite; setpoints never leave the joint limits
 /// and never change faster than rate and acceleration limits allow, whatever comes in (limit_velocity has the proof).
 class VisualController {
@@ -28,8 +28,8 @@ class VisualController {
   /// not use it and takes an empty one.
   VisualController(const ControllerConfig& config, FeatureModel model);
 
-  /// Starts the setpoints anew at rest at the arm's readings; what was learnt from images is kept. Called by the first
-  /// step() too.
+  /// Starts the setpoints anew at rest at the arm's measured joints; what was learnt from images is kept. Called by the
+  /// first step() too.
   void reset(double time_s, const Eigen::Vector4d& q_joint);
 
   /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`.

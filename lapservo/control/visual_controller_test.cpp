@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/control/test_theatre.h"
+#include "lapservo/control/test_simulator.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo::internal {
@@ -17,7 +17,7 @@ namespace {
 using testing::Flaws;
 using testing::Moment;
 using testing::TestRig;
-using testing::Theatre;
+using testing::TestSimulator;
 
 const Eigen::Vector4d close_enough{0.005, 1, 1, 1};
 
@@ -39,8 +39,8 @@ Run run(const ControllerConfig& config, const FeatureModel& model, const Flaws& 
   Random random(seed);
   const TestRig rig;
   VisualController controller(config, model);
-  Theatre theatre(rig, flaws, testing::random_start(rig, config, flaws, random), seed);
-  Run result{theatre.run(controller, trajectory, duration_s), 0};
+  TestSimulator simulator(rig, flaws, testing::random_start(rig, config, flaws, random), seed);
+  Run result{simulator.run(controller, trajectory, duration_s), 0};
   result.delay_s = controller.delay_s();
   return result;
 }
@@ -210,7 +210,7 @@ TEST(VisualController, CopesWithDroppedFramesFastStepsAndTheirJitter) {
   }
 }
 
-TEST(VisualController, SendsNothingBeforeTheFirstReadings) {
+TEST(VisualController, SendsNothingBeforeTheFirstMeasuredJoints) {
   VisualController controller({}, testing::model_of({}));
   const auto nothing = controller.step(0, Eigen::Vector4d::Constant(NAN), {}, {});
   EXPECT_EQ(nothing.reason, HoldReason::non_finite);
@@ -227,8 +227,8 @@ TEST(VisualController, BrakesByItselfWhenNoStepComes) {
   const TestRig rig;
   VisualController controller(config, testing::model_of(rig));
   Random random(3);
-  Theatre theatre(rig, flaws, testing::random_start(rig, config, flaws, random), 3);
-  const auto moments = theatre.run(controller, sinusoids(paper_sinusoids()), 1);
+  TestSimulator simulator(rig, flaws, testing::random_start(rig, config, flaws, random), 3);
+  const auto moments = simulator.run(controller, sinusoids(paper_sinusoids()), 1);
   ASSERT_GT(moments.back().step.velocity.norm(), 0);
   EXPECT_TRUE(controller.path().at(moments.back().time_s + 1).velocity.isZero());
 }
@@ -277,14 +277,14 @@ TEST(VisualController, ConvergesInTheImageWithAWrongModel) {
   }
 }
 
-// The paper's swings at paces that differ, so that one joint turns at a time and what its play does shows most.
+// The paper's swings at paces that differ, so that one joint turns at a time and what its backlash does shows most.
 Sinusoids one_joint_at_a_time() {
   Sinusoids f = paper_sinusoids();
   f.omega_rad_s = {0.52, 0.63, 0.45, 0.70};
   return f;
 }
 
-/// The usual flaws with play in rho and psi.
+/// The usual flaws with backlash in rho and psi.
 Flaws with_backlash(double latency_s, bool delay_known) {
   Flaws flaws = usual_flaws();
   flaws.backlash = {0, 0, 0.0001, 0.02};
@@ -293,7 +293,7 @@ Flaws with_backlash(double latency_s, bool delay_known) {
   return flaws;
 }
 
-/// Runs that learn the play at each latency, known or estimated, and what more is to be said of them.
+/// Runs that learn the backlash at each latency, known or estimated, and what more is to be said of them.
 void expect_backlash_learnt(const Trajectory& trajectory, double duration_s,
                             const std::function<void(const std::vector<Moment>&, const Flaws&)>& law) {
   for (const bool known : {true, false}) {
@@ -344,9 +344,9 @@ TEST(VisualController, RestsAtASetPointWithBacklashLearnt) {
   const TestRig rig;
   Random random(3);
   VisualController controller(config, testing::model_of(rig));
-  Theatre theatre(rig, flaws, testing::random_start(rig, config, flaws, random), 3);
-  theatre.run(controller, sinusoids(paper_sinusoids()), 30);
-  const auto still = theatre.run(controller, set_point(paper_sinusoids().offset), 30);
+  TestSimulator simulator(rig, flaws, testing::random_start(rig, config, flaws, random), 3);
+  simulator.run(controller, sinusoids(paper_sinusoids()), 30);
+  const auto still = simulator.run(controller, set_point(paper_sinusoids().offset), 30);
   EXPECT_GT(still.back().step.estimate->gap.width[3], 0.015);
   EXPECT_LT(rms_after(still, 40).tail<3>().maxCoeff(), 0.1);
   // Motors don't go to and fro through their gaps: in 20 s psi travels less than a few widths.
@@ -355,7 +355,7 @@ TEST(VisualController, RestsAtASetPointWithBacklashLearnt) {
   EXPECT_LT(travel, 10 * flaws.backlash[3]);
 }
 
-/// The widest gap ever believed in, in shares of what is there: rho's and psi's.
+/// The widest gap ever believed in, in fractions of what is there: rho's and psi's.
 Eigen::Vector2d widest_gap(const std::vector<Moment>& moments, const Eigen::Vector2d& unit) {
   Eigen::Vector2d widest = Eigen::Vector2d::Zero();
   for (const Moment& m : moments) {

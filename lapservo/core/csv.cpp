@@ -102,8 +102,8 @@ std::string csv_field(std::string_view text) {
 }
 
 CsvTable CsvTable::read(const std::filesystem::path& path) {
-  constexpr std::size_t largest_bytes = std::size_t{256} << 20;
-  return parse(read_input(path, largest_bytes, "a CSV file"), path.string());
+  constexpr std::size_t max_bytes = std::size_t{256} << 20;
+  return parse(read_input(path, max_bytes, "a CSV file"), path.string());
 }
 
 CsvTable CsvTable::parse(std::string_view text, std::string source) {

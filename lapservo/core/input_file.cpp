@@ -33,12 +33,12 @@ class Descriptor {
 
 class InputFile {
  public:
-  InputFile(const std::filesystem::path& path, std::size_t largest_bytes, std::string_view expected)
-      : source_(path.string()), expected_(expected), largest_bytes_(largest_bytes), descriptor_(path) {
+  InputFile(const std::filesystem::path& path, std::size_t max_bytes, std::string_view expected)
+      : source_(path.string()), expected_(expected), max_bytes_(max_bytes), descriptor_(path) {
     struct stat about {};
     if (descriptor_.number() < 0 || ::fstat(descriptor_.number(), &about) != 0) fail("can't be opened");
     if (S_ISDIR(about.st_mode)) fail("is a folder");
-    if (S_ISREG(about.st_mode) && static_cast<std::size_t>(about.st_size) > largest_bytes) fail_too_large();
+    if (S_ISREG(about.st_mode) && static_cast<std::size_t>(about.st_size) > max_bytes) fail_too_large();
   }
 
   std::string read() {
@@ -50,7 +50,7 @@ class InputFile {
       if (count < 0 && (errno == EINTR || errno == EAGAIN)) continue;
       if (count < 0) fail("can't be read (" + std::system_category().message(errno) + ")");
       text.append(buffer.data(), static_cast<std::size_t>(count));
-      if (text.size() > largest_bytes_) fail_too_large();
+      if (text.size() > max_bytes_) fail_too_large();
     }
     return text;
   }
@@ -59,7 +59,7 @@ class InputFile {
   [[noreturn]] void fail(const std::string& problem) const {
     throw InputError(source_, problem + ", expected " + expected_);
   }
-  [[noreturn]] void fail_too_large() const { fail("is larger than " + std::to_string(largest_bytes_ >> 20) + " MiB"); }
+  [[noreturn]] void fail_too_large() const { fail("is larger than " + std::to_string(max_bytes_ >> 20) + " MiB"); }
   bool wait() const {
     pollfd waited{descriptor_.number(), POLLIN, 0};
     const int ready = ::poll(&waited, 1, patience_ms);
@@ -68,14 +68,14 @@ class InputFile {
   }
 
   std::string source_, expected_;
-  std::size_t largest_bytes_;
+  std::size_t max_bytes_;
   Descriptor descriptor_;
 };
 
 }  // namespace
 
-std::string read_input(const std::filesystem::path& path, std::size_t largest_bytes, std::string_view expected) {
-  return InputFile(path, largest_bytes, expected).read();
+std::string read_input(const std::filesystem::path& path, std::size_t max_bytes, std::string_view expected) {
+  return InputFile(path, max_bytes, expected).read();
 }
 
 }  // namespace lapservo::internal

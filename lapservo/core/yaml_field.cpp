@@ -16,7 +16,7 @@ namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr std::size_t largest_file_bytes = 1 << 20;
+constexpr std::size_t max_file_bytes = 1 << 20;
 
 // yaml-cpp 0.7 follows 500 levels (its DepthGuard), each several frames of the stack; no file of ours needs 16.
 bool nests_too_deeply(std::string_view yaml) {
@@ -60,25 +60,22 @@ bool holds_several_documents(const std::string& yaml) {
   return parser.HandleNextDocument(events) && parser.HandleNextDocument(events);
 }
 
-// yaml-cpp's words begin with its name.
 std::string syntax_problem(const YAML::Exception& error) {
-  std::string text = error.what();
-  constexpr std::string_view prefix = "yaml-cpp: ";
-  if (text.starts_with(prefix)) text.erase(0, prefix.size());
-  return text;
+  if (error.mark.is_null()) return error.msg;
+  return "line " + std::to_string(error.mark.line + 1) + ", column " + std::to_string(error.mark.column + 1) + ": " +
+         error.msg;
 }
 
 }  // namespace
 
 YamlField YamlField::read(const fs::path& path, std::string_view kind) {
-  const std::string text = read_input(path, largest_file_bytes, "a YAML file");
+  const std::string text = read_input(path, max_file_bytes, "a YAML file");
   if (text.empty()) throw InputError(path.string(), "is empty, expected a YAML file");
   return parse(text, path.string(), kind);
 }
 
 YamlField YamlField::parse(std::string_view yaml, const std::string& source, std::string_view kind) {
-  if (yaml.size() > largest_file_bytes)
-    throw InputError(source, "is larger than 1 MiB, expected a " + std::string(kind));
+  if (yaml.size() > max_file_bytes) throw InputError(source, "is larger than 1 MiB, expected a " + std::string(kind));
   if (nests_too_deeply(yaml)) throw InputError(source, "nests more deeply than a " + std::string(kind) + " does");
   try {
     const std::string text(yaml);

@@ -29,9 +29,9 @@ TEST(Positions, AreInViewSpreadOutAndRepeatable) {
   const Rig rig = paper_rig();
   Random random(seed), again(seed), alone(seed + 1);
   const auto positions = spread_positions(rig, 20, random), same = spread_positions(rig, 20, again);
-  std::vector<RcmCoordinates> plain;
+  std::vector<JointVector> plain;
   for (int i = 0; i < 20; ++i) plain.push_back(spread_positions(rig, 1, alone)[0]);
-  const auto nearest = [&](const std::vector<RcmCoordinates>& all) {
+  const auto nearest = [&](const std::vector<JointVector>& all) {
     double sum = 0;
     for (std::size_t i = 0; i < all.size(); ++i) {
       double least = HUGE_VAL;
@@ -164,7 +164,7 @@ TEST(Illumination, TakesTheLargestOfFour) {
 TEST(Stage, TurnedDownLampsLeaveTheAmbientPart) {
   const Rig rig = testing::small_test_rig();
   Random random(seed);
-  const RcmCoordinates q = spread_positions(rig, 1, random)[0];
+  const JointVector q = spread_positions(rig, 1, random)[0];
   const cv::Mat tissue(rig.camera.height_px, rig.camera.width_px, CV_32FC3, cv::Scalar::all(0.9));
   Stage stage(rig, tissue);
   const cv::Mat full = stage.render(q, 1, 1), dim = stage.render(q, 0.4, 1);
@@ -172,8 +172,8 @@ TEST(Stage, TurnedDownLampsLeaveTheAmbientPart) {
     const double value = frame.at<cv::Vec3b>(5, frame.cols - 5)[1] / 255.0;
     return rig.camera.response.light_from_value(value);
   };
-  const double share = Stage::ambient_share + 0.4 * (1 - Stage::ambient_share);
-  EXPECT_NEAR(light(dim) / light(full), share, 0.03);
+  const double fraction = Stage::ambient_fraction + 0.4 * (1 - Stage::ambient_fraction);
+  EXPECT_NEAR(light(dim) / light(full), fraction, 0.03);
 }
 
 // Errors drawn from the covariance that is stated have unit spread in its units, however oblong it is.

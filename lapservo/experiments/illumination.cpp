@@ -47,7 +47,7 @@ void add_position(std::vector<Result::Point>& points, const Sightings& sightings
   }
 }
 
-std::vector<Result::Largest> largest_distances(const std::vector<Result::Point>& points) {
+std::vector<Result::Largest> max_distances(const std::vector<Result::Point>& points) {
   std::map<std::pair<int, int>, std::vector<double>> by_point;
   for (const Result::Point& point : points) by_point[{point.position, point.point}].push_back(point.to_centroid_px);
   std::vector<Result::Largest> largest;
@@ -67,7 +67,7 @@ cv::Mat tile_of(const cv::Mat& picture, const Eigen::Vector2d& middle_px) {
   return tile;
 }
 
-cv::Mat example(const ExperimentSetup& setup, Stage& stage, const RcmCoordinates& q) {
+cv::Mat example(const ExperimentSetup& setup, Stage& stage, const JointVector& q) {
   Eyes eyes(setup.rig, {setup.methods.back()});
   const Eigen::Vector2d middle = marker_middle_px(setup.rig.camera, setup.rig.instruments[0], q);
   std::array<cv::Mat, 4> tiles;
@@ -196,7 +196,7 @@ IlluminationResult measure_illumination(const ExperimentSetup& setup) {
   for (std::size_t m = 0; m < setup.methods.size(); ++m) {
     std::vector<Result::Point> points;
     for (int i = 0; i < Result::positions; ++i) {
-      const RcmCoordinates& q = positions[static_cast<std::size_t>(i)];
+      const JointVector& q = positions[static_cast<std::size_t>(i)];
       const Rigid3 unrolled = *setup.rig.instruments[0].camera_from_rcm * rcm_from_unrolled(q);
       const auto truth = centre_line(camera, setup.rig.instruments[0].marker, unrolled, q.psi_rad);
       add_position(points, sightings, m, i, truth.value(), camera);
@@ -210,7 +210,7 @@ IlluminationResult measure_illumination(const ExperimentSetup& setup) {
 
 IlluminationResult::OfMethod summed_up(Method method, std::vector<IlluminationResult::Point> points) {
   Result::OfMethod of_method{method, std::move(points), {}, {}, {}, {}};
-  of_method.largest = largest_distances(of_method.points);
+  of_method.largest = max_distances(of_method.points);
   std::vector<double> largest, to_centroid, to_truth;
   for (const Result::Largest& of_point : of_method.largest) largest.push_back(of_point.px);
   for (const Result::Point& point : of_method.points) {
@@ -261,7 +261,7 @@ ReportSection section_of(const IlluminationResult& result, const ExperimentSetup
       fmt::format("The lamps are turned down, the camera\u2019s exposure stays: the shading and the gloss of the film "
                   "fade, what saturated near the lamps does no more, and there is less light over the same read noise. "
                   "{:.0f} % of the full light comes from elsewhere and stays, so the shading changes its shape too.",
-                  100 * Stage::ambient_share),
+                  100 * Stage::ambient_fraction),
       "The trackers do not know camera_from_rcm in this experiment, and look at each frame on its own."};
   section.command = "lapservo experiment illumination --out DIR" + setup.options;
   section.files = {"illumination.csv", "illumination_largest.csv"};

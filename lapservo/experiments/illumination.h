@@ -16,7 +16,7 @@ namespace lapservo::internal {
 /// The paper's section V-B: do the four points stay where they are when the lamps are turned down?
 struct IlluminationResult {
   static constexpr int positions = 20;
-  static constexpr std::array<double, 4> lights{0.4, 0.6, 0.8, 1.0};  ///< shares of the lamps' full power
+  static constexpr std::array<double, 4> lights{0.4, 0.6, 0.8, 1.0};  ///< fractions of the lamps' full power
   static constexpr double paper_mean_px = 1.49, paper_deviation_px = 1.23;
 
   /// One measurement.

@@ -12,37 +12,32 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double nearest_m = 0.06, farthest_m = 0.13;
-constexpr int most_attempts = 20000, candidates = 12;
+constexpr int candidates = 12;
+constexpr ViewLimits well_in_view{.steepest_rad = 0.35, .border_px = 30};
 
-RcmCoordinates random_position(const Rig& rig, Random& random) {
+JointVector random_position(const Rig& rig, Random& random) {
   const Instrument& instrument = rig.instruments[0];
-  const Camera& camera = rig.camera;
-  for (int attempt = 0; attempt < most_attempts; ++attempt) {
-    const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
-    auto q = configuration_through(*instrument.camera_from_rcm,
-                                   camera.ray_from_ideal(pixel) * random.uniform(nearest_m, farthest_m));
-    if (!q || q->rho_m < 0.02 || std::sin(q->phi_rad) < 0.1) continue;
-    q->psi_rad = random.uniform(-pi, pi);
-    if (marker_well_in_view(camera, instrument, *q)) return *q;
-  }
+  const ViewRange range{nearest_m, farthest_m, well_in_view};
+  if (const auto q =
+          random_configuration_in_view(rig.camera, instrument.marker, *instrument.camera_from_rcm, range, random))
+    return *q;
   throw InputError("rig", "instrument " + instrument.name +
                               " is hardly ever wholly in view between 60 and 130 mm: check camera_from_rcm");
 }
 
 }  // namespace
 
-bool marker_well_in_view(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q) {
-  return marker_in_view(camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q),
-                        {.steepest_rad = 0.35, .border_px = 30});
+bool marker_well_in_view(const Camera& camera, const Instrument& instrument, const JointVector& q) {
+  return marker_in_view(camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), well_in_view);
 }
 
-Eigen::Vector2d marker_middle_px(const Camera& camera, const Instrument& instrument, const RcmCoordinates& q) {
+Eigen::Vector2d marker_middle_px(const Camera& camera, const Instrument& instrument, const JointVector& q) {
   const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(q);
   return camera.raw_from_point(pose * Eigen::Vector3d(0, 0, instrument.marker.length_m() / 2));
 }
 
-std::vector<RcmCoordinates> spread_positions(const Rig& rig, int count, Random& random) {
-  std::vector<RcmCoordinates> chosen;
+std::vector<JointVector> spread_positions(const Rig& rig, int count, Random& random) {
+  std::vector<JointVector> chosen;
   std::vector<Eigen::Vector2d> places;
   const auto distance_to_chosen = [&places](const Eigen::Vector2d& place) {
     double least = HUGE_VAL;
@@ -50,11 +45,11 @@ std::vector<RcmCoordinates> spread_positions(const Rig& rig, int count, Random& 
     return least;
   };
   for (int i = 0; i < count; ++i) {
-    RcmCoordinates best;
+    JointVector best;
     Eigen::Vector2d place = Eigen::Vector2d::Zero();
     double farthest = -1;
     for (int k = 0; k < (i == 0 ? 1 : candidates); ++k) {
-      const RcmCoordinates q = random_position(rig, random);
+      const JointVector q = random_position(rig, random);
       const Eigen::Vector2d at = marker_middle_px(rig.camera, rig.instruments[0], q);
       if (const double distance = distance_to_chosen(at); distance > farthest)
         best = q, place = at, farthest = distance;

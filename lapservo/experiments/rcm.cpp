@@ -51,10 +51,10 @@ std::string estimator_name(bool pairwise) {
   return pairwise ? "mean of intersections" : "total least squares";
 }
 
-std::vector<double> distances_of(const Result::OfMethod& of_method, double least_angle_rad) {
+std::vector<double> distances_of(const Result::OfMethod& of_method, double min_angle_rad) {
   std::vector<double> distances;
   for (const Result::Intersection& at : of_method.intersections)
-    if (at.angle_rad >= least_angle_rad) distances.push_back(at.distance_px);
+    if (at.angle_rad >= min_angle_rad) distances.push_back(at.distance_px);
   return distances;
 }
 
@@ -101,11 +101,11 @@ Figure cloud_of_estimates(const Result::OfMethod& of_method) {
       fmt::format("One estimate from each of {} sets; both estimators, the same lines.", Result::sets));
 }
 
-// What share of the intersections lies within a distance.
-Plot shares_within(const Result& result) {
+// What fraction of the intersections lies within a distance.
+Plot fractions_within(const Result& result) {
   Plot plot{"Distances of the intersections from the true RCM",
             {"distance", "px", {}, {}, true},
-            {"share within", "%", 0, 100},
+            {"fraction within", "%", 0, 100},
             {},
             {{"half of them", 50}},
             false};
@@ -172,8 +172,8 @@ std::vector<Comparison> comparisons_of(const Result& result) {
   const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
     return compared(what, paper, result.methods, text_of);
   };
-  const auto quantile = [](double share) {
-    return [share](const auto& m) { return with_digits(quantile_of(distances_of(m, 0), share), 3) + " px"; };
+  const auto quantile = [](double fraction) {
+    return [fraction](const auto& m) { return with_digits(quantile_of(distances_of(m, 0), fraction), 3) + " px"; };
   };
   return {row("intersections of two lines: distance from the true RCM, mean \u00b1 std",
               fmt::format("{:.2f} \u00b1 {:.2f} px", Result::paper_mean_px, Result::paper_deviation_px),
@@ -243,9 +243,9 @@ RcmResult measure_rcm(const ExperimentSetup& setup) {
   const Rig rig = with_rcm_in_view(setup.rig);
   Result result{rig, projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm).value(), {}};
   Random random(setup.seed + 2);
-  std::vector<RcmCoordinates> positions;
+  std::vector<JointVector> positions;
   for (int set = 0; set < Result::sets; ++set)
-    for (const RcmCoordinates& q : spread_positions(rig, Result::positions, random)) positions.push_back(q);
+    for (const JointVector& q : spread_positions(rig, Result::positions, random)) positions.push_back(q);
   const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, setup.seed + 2);
   const Rig unregistered = without_registration(rig);  // to know the RCM would be to bring it in
 
@@ -321,7 +321,7 @@ ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) 
   section.comparisons = comparisons_of(result);
   for (const auto& of_method : result.methods)
     section.figures.push_back(cloud_of_intersections(of_method, result.true_px));
-  section.figures.push_back({shares_within(result), fmt::format("All {} sets.", Result::sets)});
+  section.figures.push_back({fractions_within(result), fmt::format("All {} sets.", Result::sets)});
   section.figures.push_back(
       {fan(result, result.rig.camera), "As " + method_title(result.methods.back().method) + " saw them."});
   for (const auto& of_method : result.methods) section.figures.push_back(cloud_of_estimates(of_method));

@@ -154,8 +154,8 @@ std::string range_of(const std::array<double, Result::trials>& figures) {
   return from_to(*least, *most);
 }
 
-std::string percent(double share) {
-  return fmt::format("{:.3g} %", 100 * share);
+std::string percent(double fraction) {
+  return fmt::format("{:.3g} %", 100 * fraction);
 }
 
 std::vector<Comparison> comparisons_of(const Result& result) {
@@ -222,18 +222,18 @@ RotationResult::OfMethod summed_up(Method method, std::vector<RotationResult::Sa
   for (const auto& of_trial : errors) of_method.by_trial.push_back(spread_of(of_trial));
   of_method.all = spread_of(all);
   of_method.in_sigmas = spread_of(in_sigmas);
-  of_method.under_100mrad = share_within(all, 0.1);
-  of_method.under_200mrad = share_within(all, 0.2);
+  of_method.under_100mrad = fraction_within(all, 0.1);
+  of_method.under_200mrad = fraction_within(all, 0.2);
   return of_method;
 }
 
 RotationResult measure_rotation(const ExperimentSetup& setup) {
   const Camera& camera = setup.rig.camera;
-  std::vector<RcmCoordinates> positions;
+  std::vector<JointVector> positions;
   std::vector<cv::Mat> tissues;
   for (int set = 0; set < Result::sets; ++set) {
     Random random(seed_of(setup, set));
-    for (const RcmCoordinates& q : spread_positions(setup.rig, Result::trials, random)) positions.push_back(q);
+    for (const JointVector& q : spread_positions(setup.rig, Result::trials, random)) positions.push_back(q);
     tissues.push_back(make_tissue(camera.width_px, camera.height_px, seed_of(setup, set)));
   }
 
@@ -244,7 +244,7 @@ RotationResult measure_rotation(const ExperimentSetup& setup) {
       const int set = frame / (Result::trials * Result::steps);
       if (set != stage_set) stage = std::make_shared<Stage>(setup.rig, tissues[static_cast<std::size_t>(set)]);
       stage_set = set;
-      RcmCoordinates q = positions[static_cast<std::size_t>(frame / Result::steps)];
+      JointVector q = positions[static_cast<std::size_t>(frame / Result::steps)];
       q.psi_rad = true_rotation_rad(frame);
       sightings[static_cast<std::size_t>(frame)] =
           eyes->observe(stage->render(q, 1, frame_seed(seed_of(setup, set), frame)));

@@ -36,7 +36,7 @@ struct RotationResult {
     std::vector<Sample> samples;          ///< of the frames where the instrument was found
     std::vector<Spread> by_trial;         ///< of the error, radians: those of the first set, then the next
     Spread all, in_sigmas;                ///< of all sets: the error, radians; the error over its sigma
-    double under_100mrad, under_200mrad;  ///< shares of the errors
+    double under_100mrad, under_200mrad;  ///< fractions of the errors
   };
   std::vector<OfMethod> methods;
 };

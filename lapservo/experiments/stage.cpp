@@ -8,15 +8,15 @@ namespace lapservo::internal {
 
 Stage::Stage(const Rig& rig, cv::Mat tissue) : rig_(rig), tissue_(std::move(tissue)) {}
 
-cv::Mat Stage::render(const RcmCoordinates& q, double lamp_power, std::uint64_t seed) {
+cv::Mat Stage::render(const JointVector& q, double lamp_power, std::uint64_t seed) {
   const Instrument& instrument = rig_.instruments[0];
   if (!renderer_ || lamp_power != lamp_power_) {
-    const double lamps_share = (1 - ambient_share) * lamp_power;
+    const double lamps_fraction = (1 - ambient_fraction) * lamp_power;
     RenderOptions options;
-    options.lighting.ambient = static_cast<float>(ambient_share) * options.lighting.diffuse;
-    options.lighting = at_power(options.lighting, static_cast<float>(lamps_share));
+    options.lighting.ambient = static_cast<float>(ambient_fraction) * options.lighting.diffuse;
+    options.lighting = at_power(options.lighting, static_cast<float>(lamps_fraction));
     renderer_ = std::make_unique<Renderer>(rig_.camera, std::vector{shaft_of(instrument)},
-                                           tissue_ * (lamps_share + ambient_share), options);
+                                           tissue_ * (lamps_fraction + ambient_fraction), options);
     lamp_power_ = lamp_power;
   }
   return renderer_->render({placement_of(instrument, q)}, seed);

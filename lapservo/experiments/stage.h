@@ -6,7 +6,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/vision/tracker.h"
@@ -18,13 +18,13 @@ namespace lapservo::internal {
 class Stage {
  public:
   /// Of the light at full power, what comes from elsewhere (the room, through the port) and does not change.
-  static constexpr double ambient_share = 0.04;
+  static constexpr double ambient_fraction = 0.04;
 
   /// `tissue`: make_tissue() of the camera's size, shared by the stages of an experiment.
   Stage(const Rig& rig, cv::Mat tissue);
 
   /// `lamp_power`: 1 is full. The same arguments give the same picture.
-  cv::Mat render(const RcmCoordinates& q, double lamp_power, std::uint64_t seed);
+  cv::Mat render(const JointVector& q, double lamp_power, std::uint64_t seed);
 
  private:
   Rig rig_;

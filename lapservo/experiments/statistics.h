@@ -18,11 +18,12 @@ struct Spread {
 };
 Spread spread_of(std::vector<double> values);
 
-/// The value below which a share of the numbers lies, between two of them on the straight line; 0 when there are none.
-double quantile_of(std::vector<double> values, double share);
+/// The value below which a fraction of the numbers lies, between two of them on the straight line; 0 when there are
+/// none.
+double quantile_of(std::vector<double> values, double fraction);
 
-/// Of the magnitudes, the share that is smaller than a bound; 0 when there are none.
-double share_within(const std::vector<double>& values, double bound);
+/// Of the magnitudes, the fraction that is smaller than a bound; 0 when there are none.
+double fraction_within(const std::vector<double>& values, double bound);
 
 /// A number with as many digits as asked for, or more where it takes more to say whole numbers; no exponent.
 std::string with_digits(double value, int digits);

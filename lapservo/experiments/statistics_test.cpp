@@ -64,9 +64,9 @@ TEST(Quantile, LiesBetweenTheNumbers) {
 }
 
 TEST(ShareWithin, CountsMagnitudes) {
-  EXPECT_DOUBLE_EQ(share_within({-0.05, 0.05, 0.15, -0.3}, 0.1), 0.5);
-  EXPECT_DOUBLE_EQ(share_within({-0.05, 0.05, 0.15, -0.3}, 0.2), 0.75);
-  EXPECT_EQ(share_within({}, 1), 0);
+  EXPECT_DOUBLE_EQ(fraction_within({-0.05, 0.05, 0.15, -0.3}, 0.1), 0.5);
+  EXPECT_DOUBLE_EQ(fraction_within({-0.05, 0.05, 0.15, -0.3}, 0.2), 0.75);
+  EXPECT_EQ(fraction_within({}, 1), 0);
 }
 
 TEST(WithDigits, NeverHasAnExponent) {

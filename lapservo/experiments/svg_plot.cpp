@@ -15,7 +15,7 @@ namespace {
 
 constexpr double width_px = 480, height_px = 320, font_px = 14, character_px = 7.9;
 constexpr double right_px = 14, bottom_px = 46, legend_row_px = 20;
-constexpr std::size_t most_hover_points = 150;
+constexpr std::size_t max_hover_points = 150;
 
 struct Range {
   double low, high;
@@ -29,8 +29,8 @@ struct Scale {
 
   double value(double v) const { return logarithmic ? std::log10(v) : v; }
   double operator()(double v) const {
-    const double low = value(range.low), share = (value(v) - low) / (value(range.high) - low);
-    return at_low_px + share * (at_high_px - at_low_px);
+    const double low = value(range.low), fraction = (value(v) - low) / (value(range.high) - low);
+    return at_low_px + fraction * (at_high_px - at_low_px);
   }
   bool drawable(double v) const { return std::isfinite(v) && (!logarithmic || v > 0); }
 };
@@ -232,7 +232,7 @@ std::string boxes_of(const Plot& plot, const Layout& layout, const Series& serie
 // A line's points have no marks, but tell their numbers all the same.
 std::string hover_points_of(const Plot& plot, const Layout& layout, const Series& series) {
   std::string text;
-  const std::size_t step = std::max<std::size_t>(1, (series.x.size() + most_hover_points - 1) / most_hover_points);
+  const std::size_t step = std::max<std::size_t>(1, (series.x.size() + max_hover_points - 1) / max_hover_points);
   for (std::size_t i = 0; i < series.x.size(); i += step)
     if (drawable(layout, series, i))
       text += fmt::format("<circle class=\"hover\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"7\"><title>{}</title></circle>\n",
@@ -517,7 +517,7 @@ void limit_to_most(Plot& plot, double room) {
       if (const double distance = std::hypot(series.x[i], series.y[i]); std::isfinite(distance))
         distances.push_back(distance);
   const double limit = room * quantile_of(distances, 0.9);
-  if (!(limit > 0) || share_within(distances, limit) == 1) return;
+  if (!(limit > 0) || fraction_within(distances, limit) == 1) return;
   for (Axis* axis : {&plot.x, &plot.y}) axis->low = -limit, axis->high = limit;
 }
 

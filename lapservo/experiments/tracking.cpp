@@ -58,7 +58,7 @@ Eigen::Vector2d estimate_rcm_px(const ExperimentSetup& setup) {
   Eyes eyes(unregistered, {Method::surface});
   std::vector<LineObservation> lines;
   int frame = 0;
-  for (const RcmCoordinates& q : spread_positions(setup.rig, positions, random)) {
+  for (const JointVector& q : spread_positions(setup.rig, positions, random)) {
     const Observation seen = eyes.observe(stage.render(q, 1, frame_seed(setup.seed + 17, frame++)))[0];
     if (seen.status == Status::ok)
       lines.push_back(line_between(seen.edges_ideal_px[0], seen.edges_ideal_px[3], nominal_sigma_px));
@@ -96,8 +96,8 @@ class Recorder : public RunObserver {
     put(control.limited);
     put(control.delay_s);
     run_.delay_s = control.delay_s;
-    run_.rate_share =
-        std::max(run_.rate_share, control.setpoint.velocity.cwiseAbs().cwiseQuotient(limits_.rate).maxCoeff());
+    run_.rate_fraction =
+        std::max(run_.rate_fraction, control.setpoint.velocity.cwiseAbs().cwiseQuotient(limits_.rate).maxCoeff());
     note_hold(tick.input.time_s, holds);
     return keep_going_();
   }
@@ -171,7 +171,7 @@ void sum_up(TrackingRun& run) {
 }
 
 // One for all runs: from where even the longest can be followed, by the paper's law, too.
-RcmCoordinates common_start(const ExperimentSetup& setup) {
+JointVector common_start(const ExperimentSetup& setup) {
   TrackingScenario longest = scenarios().front();
   for (const TrackingScenario& scenario : scenarios())
     if (scenario.duration_s > longest.duration_s && scenario.mode == ControlMode::paper) longest = scenario;
@@ -182,7 +182,7 @@ RcmCoordinates common_start(const ExperimentSetup& setup) {
 
 // Nothing when it was stopped.
 std::optional<TrackingRun> run_scenario(const TrackingScenario& scenario, const ExperimentSetup& setup,
-                                        const RcmCoordinates& start, const Eigen::Vector2d& rcm_px, int done_before,
+                                        const JointVector& start, const Eigen::Vector2d& rcm_px, int done_before,
                                         int total) {
   TrackingRun run;
   run.scenario = scenario;
@@ -228,7 +228,7 @@ ControllerConfig tracking_controller(const TrackingScenario& scenario, const Cam
 TrackingResult measure_tracking(const ExperimentSetup& setup) {
   TrackingResult result;
   result.estimated_rcm_px = estimate_rcm_px(setup);
-  const RcmCoordinates start = common_start(setup);
+  const JointVector start = common_start(setup);
   int total = 0, done = 0;
   for (const TrackingScenario& scenario : scenarios()) total += periods_of(scenario);
   for (const TrackingScenario& scenario : scenarios()) {

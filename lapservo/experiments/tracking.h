@@ -34,7 +34,7 @@ struct TrackingRun {
                   steady_largest = Eigen::Vector4d::Zero();
   Eigen::Vector4d decay_per_s = Eigen::Vector4d::Zero();  ///< of each feature's error at the start; NaN: not measured
   double delay_s = 0;                                     ///< as believed at the end
-  double rate_share = 0;                                  ///< largest setpoint rate as a share of its limit
+  double rate_fraction = 0;                               ///< largest setpoint rate as a fraction of its limit
   std::optional<double> held_s, resumed_s;                ///< after the marker was hidden, after it was back
   std::optional<double> back_s;                           ///< from the marker's return to within 1 px and 5 mrad
 };

@@ -85,16 +85,15 @@ Plot feature_plot(const TrackingRun& run, const FeatureName& feature) {
 
 // Of r, l and d, on the scale of what they are from a time on.
 Plot error_plot(const TrackingRun& run, double from_s) {
-  double largest_px = 0;
+  double max_px = 0;
   for (const char* column : {"error_r_px", "error_l_px", "error_d_px"})
     for (std::size_t i = 0; i < run.table.time_s.size(); ++i)
-      if (run.table.time_s[i] >= from_s)
-        largest_px = std::max(largest_px, std::abs(run.table.column(column).values[i]));
+      if (run.table.time_s[i] >= from_s) max_px = std::max(max_px, std::abs(run.table.column(column).values[i]));
   Plot plot = time_plot("Errors: " + run.scenario.title, "error", "px",
                         {over_time(run.table, "error_r_px", "r", 0), over_time(run.table, "error_l_px", "l", 1),
                          over_time(run.table, "error_d_px", "d", 2)});
-  plot.y.high = 1.1 * largest_px;
-  plot.y.low = -1.1 * largest_px;
+  plot.y.high = 1.1 * max_px;
+  plot.y.low = -1.1 * max_px;
   return plot;
 }
 
@@ -112,7 +111,7 @@ Table run_table(const TrackingResult& result) {
                           fmt::format("{:.0f}", 1000 * run.delay_s), converged_text(run),
                           fmt::format("{:.3f}", 1000 * run.steady_rms[0]), three(run.steady_rms, false),
                           three(run.steady_mean, true), three(run.steady_largest, false),
-                          fmt::format("{:.2f}", run.rate_share)});
+                          fmt::format("{:.2f}", run.rate_fraction)});
   return table;
 }
 
@@ -169,7 +168,8 @@ std::vector<Figure> figures(const TrackingResult& result) {
     figures.push_back(
         {figure_7(result, feature), &feature == features.data() ? "Figure 7: the errors, from a random start." : ""});
   for (const FeatureName& feature : features)
-    add("default", [&](const TrackingRun& run) { return feature_plot(run, feature); }, "");
+    add(
+        "default", [&](const TrackingRun& run) { return feature_plot(run, feature); }, "");
   add("default", errors, "The first seconds leave the scale.");
   add("uncalibrated", errors, "First it moves each joint a little to learn what that does in the image.");
   if (const TrackingRun* hidden = run_of(result, "hidden"))
@@ -195,8 +195,8 @@ std::vector<std::string> notes(const TrackingResult& result, const Eigen::Vector
               papers_per_s.maxCoeff(), ours_per_s.maxCoeff()),
           "Starts lie where the paper\u2019s law can lead home: on its way each feature has a pace of its own, and all "
           "four "
-          "must be possible together (d is a share of l that the marker\u2019s bands limit).",
-          "The default fuses the joint readings with the late image and estimates the delay by itself.",
+          "must be possible together (d is a fraction of l that the marker\u2019s bands limit).",
+          "The default fuses the measured joints with the late image and estimates the delay by itself.",
           fmt::format(
               "The uncalibrated run goes by the RCM\u2019s image as estimated from 20 positions: {:.1f}, {:.1f} px.",
               result.estimated_rcm_px.x(), result.estimated_rcm_px.y())};
@@ -216,9 +216,9 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
       "sees: "
       "{:.0f} frames/s, {:.0f} ms late, with noise, jitter and lost frames; an arm with lag, encoder steps, backlash, "
       "and "
-      "readings that are {:.0f} mm and {:.0f} degrees off. All errors are those of the true features.",
-      trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * ours.latency_s,
-      1000 * simulated.arm.joint_offset[2], deg_from_rad(simulated.arm.joint_offset[0]))};
+      "measured joints that are {:.0f} mm and {:.0f} degrees off. All errors are those of the true features.",
+      trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * ours.latency_s, 1000 * simulated.arm.joint_offset[2],
+      deg_from_rad(simulated.arm.joint_offset[0]))};
   for (const std::string& title : result.missing)
     section.unfinished += (section.unfinished.empty() ? "Stopped. Missing: " : ", ") + title;
   if (!result.missing.empty()) section.unfinished += ".";

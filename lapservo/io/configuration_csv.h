@@ -4,13 +4,13 @@
 #include <vector>
 
 #include "lapservo/core/csv.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
 
 /// Where every instrument of a rig is in one frame, in the rig's order.
-using Configurations = std::vector<RcmCoordinates>;
+using Configurations = std::vector<JointVector>;
 
 /// Configurations frame by frame from a table with the columns theta_rad, phi_rad, rho_m, psi_rad: a row per frame and
 /// instrument, in the rig's order unless a column `instrument` names them (in truth.csv it does).

@@ -24,8 +24,8 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-constexpr std::uint32_t largest_side_px = 16384;
-constexpr std::size_t largest_bytes = std::size_t{256} << 20;
+constexpr std::uint32_t max_side_px = 16384;
+constexpr std::size_t max_bytes = std::size_t{256} << 20;
 
 bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
@@ -65,7 +65,7 @@ PictureSize jpeg_size(std::span<const std::uint8_t> bytes) {
 }
 
 void check_size(const PictureSize& size, const std::string& source) {
-  if (size.width_px > largest_side_px || size.height_px > largest_side_px)
+  if (size.width_px > max_side_px || size.height_px > max_side_px)
     throw InputError(source, "size", std::to_string(size.width_px) + "x" + std::to_string(size.height_px),
                      "at most 16384 pixels a side");
 }
@@ -179,12 +179,12 @@ cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& sou
 }
 
 Picture read_picture(const fs::path& path) {
-  const std::string bytes = read_input(path, largest_bytes, "a picture");
+  const std::string bytes = read_input(path, max_bytes, "a picture");
   return decode_picture({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, path.string());
 }
 
 cv::Mat read_image(const fs::path& path) {
-  const std::string bytes = read_input(path, largest_bytes, "a picture");
+  const std::string bytes = read_input(path, max_bytes, "a picture");
   return decode_image({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, path.string());
 }
 

@@ -8,7 +8,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int most_scans = 64;  // of a progressive picture; some files have thousands, to take minutes
+constexpr int max_scans = 64;  // of a progressive picture; some files have thousands, to take minutes
 
 // The library leaves by longjmp, so nothing here or in read_rows() may have a destructor.
 struct Decoder {
@@ -39,8 +39,8 @@ void on_error(j_common_ptr info) {
 
 void on_progress(j_common_ptr info) {
   Decoder& decoder = decoder_of(info);
-  if (decoder.info.input_scan_number <= most_scans) return;
-  std::snprintf(decoder.complaint.data(), decoder.complaint.size(), "more than %d scans", most_scans);
+  if (decoder.info.input_scan_number <= max_scans) return;
+  std::snprintf(decoder.complaint.data(), decoder.complaint.size(), "more than %d scans", max_scans);
   std::longjmp(decoder.leave, 1);
 }
 

@@ -30,9 +30,8 @@ const char* const observation_csv_header =
     "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
     "s_rad,r_px,l_px,d_px,cross_ratio";
 
-std::string observation_csv_row(int frame, double time_s, const std::string& file, const std::string& instrument,
-                                const Observation& observation) {
-  std::string row = fmt::format("{},{:.6f},{},{},{}", frame, time_s, csv_field(file), csv_field(instrument),
+std::string observation_csv_row(int frame, double time_s, const std::string& file, const Observation& observation) {
+  std::string row = fmt::format("{},{:.6f},{},{},{}", frame, time_s, csv_field(file), csv_field(observation.instrument),
                                 to_string(observation.status));
   if (observation.status != Status::ok) return row.append(23, ',');
   const auto& rcm = observation.rcm;
@@ -57,9 +56,8 @@ std::string observation_csv_row(int frame, double time_s, const std::string& fil
 
 ObservationCsv::ObservationCsv(const std::filesystem::path& path) : file_(path, observation_csv_header) {}
 
-void ObservationCsv::add(int frame, double time_s, const std::string& file, const std::string& instrument,
-                         const Observation& observation) {
-  file_.add(observation_csv_row(frame, time_s, file, instrument, observation));
+void ObservationCsv::add(int frame, double time_s, const std::string& file, const Observation& observation) {
+  file_.add(observation_csv_row(frame, time_s, file, observation));
 }
 
 }  // namespace lapservo::internal

@@ -25,6 +25,7 @@ constexpr std::uint64_t seed = 59;
 
 Observation random_observation(Random& random) {
   Observation o;
+  o.instrument = "PSM1";
   o.status = Status::ok;
   o.rcm = Observation::Rcm{};
   o.rcm->q = {random.uniform(-pi, pi), random.uniform(0, pi), random.uniform(0.05, 0.2), random.uniform(-pi, pi)};
@@ -47,7 +48,7 @@ CsvTable table_of(const std::vector<std::string>& rows) {
 }
 
 CsvTable table_of(const Observation& observation) {
-  return table_of({observation_csv_row(3, 0.1, "0003.png", "PSM1", observation)});
+  return table_of({observation_csv_row(3, 0.1, "0003.png", observation)});
 }
 
 // docs/conventions.md, "Observations", word by word.
@@ -146,9 +147,11 @@ TEST(ObservationCsv, WhatIsNotFiniteIsUnknown) {
 }
 
 TEST(ObservationCsv, NamesMayHoldCommasAndQuotes) {
-  const CsvTable table = table_of({observation_csv_row(0, 0, "left, \"new\".png", "PSM 1", {})});
+  Observation observation;
+  observation.instrument = "PSM \"1\", left";
+  const CsvTable table = table_of({observation_csv_row(0, 0, "left, \"new\".png", observation)});
   EXPECT_EQ(table.text(0, "file"), "left, \"new\".png");
-  EXPECT_EQ(table.text(0, "instrument"), "PSM 1");
+  EXPECT_EQ(table.text(0, "instrument"), observation.instrument);
 }
 
 TEST(ObservationCsv, AppearsWholeWhenCommittedAndElseNotAtAll) {
@@ -156,13 +159,15 @@ TEST(ObservationCsv, AppearsWholeWhenCommittedAndElseNotAtAll) {
   Random random(seed);
   {
     ObservationCsv csv(folder / "dropped.csv");
-    csv.add(0, 0, "", "PSM1", random_observation(random));
+    csv.add(0, 0, "", random_observation(random));
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   ObservationCsv csv(folder / "obs.csv");
-  csv.add(0, 0, "", "PSM1", random_observation(random));
-  csv.add(0, 0, "", "PSM2", {});
-  csv.add(1, 1.0 / 30, "", "PSM1", random_observation(random));
+  csv.add(0, 0, "", random_observation(random));
+  Observation other;
+  other.instrument = "PSM2";
+  csv.add(0, 0, "", other);
+  csv.add(1, 1.0 / 30, "", random_observation(random));
   EXPECT_FALSE(std::filesystem::exists(folder / "obs.csv"));
   csv.commit();
   const CsvTable table = CsvTable::read(folder / "obs.csv");

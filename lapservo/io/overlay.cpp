@@ -38,7 +38,7 @@ class Pen {
     double along_px = 0;
     for (std::size_t i = 1; i < points.size(); ++i) {
       const Eigen::Vector2d step = points[i] - points[i - 1];
-      const int parts = std::clamp(static_cast<int>(step.norm() / dash_px * 4), 1, most_parts);
+      const int parts = std::clamp(static_cast<int>(step.norm() / dash_px * 4), 1, max_parts);
       for (int part = 0; part < parts; ++part) {
         if (std::fmod(along_px, 2 * dash_px) < dash_px)
           polyline({points[i - 1] + step * part / parts, points[i - 1] + step * (part + 1) / parts}, color);
@@ -82,7 +82,7 @@ class Pen {
   double scale() const { return scale_; }
 
  private:
-  static constexpr int bits = 4, most_parts = 2000;
+  static constexpr int bits = 4, max_parts = 2000;
   cv::Point at(const Eigen::Vector2d& p) const {
     const auto fixed = [](double x) { return static_cast<int>(std::lround(std::clamp(x, -2e4, 2e4) * (1 << bits))); };
     return {fixed(p.x()), fixed(p.y())};

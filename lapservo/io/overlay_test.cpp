@@ -10,7 +10,7 @@ namespace lapservo::internal {
 namespace {
 
 using What = Observation::Refused::What;
-const RcmCoordinates q{0.07, 1.57, 0.064, 1.2};
+const JointVector q{0.07, 1.57, 0.064, 1.2};
 
 Rig rig_with_rcm_in_view() {
   Rig rig = testing::paper_test_rig();

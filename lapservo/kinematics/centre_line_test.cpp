@@ -15,7 +15,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/testing/sample_frames.h"
 
@@ -29,11 +29,11 @@ Rig example_rig() {
   return load_rig(testing::source_folder() / "configs/example.yaml");
 }
 
-RcmCoordinates random_configuration(Random& random) {
+JointVector random_configuration(Random& random) {
   return {random.uniform(-0.3, 0.3), random.uniform(1.4, 1.7), random.uniform(0.08, 0.12), random.uniform(-4, 4)};
 }
 
-Rigid3 camera_from_unrolled(const Instrument& instrument, const RcmCoordinates& q) {
+Rigid3 camera_from_unrolled(const Instrument& instrument, const JointVector& q) {
   return *instrument.camera_from_rcm * rcm_from_unrolled(q);
 }
 
@@ -42,7 +42,7 @@ void for_random_configurations(const Law& law) {
   const Rig rig = example_rig();
   Random random(seed);
   for (int i = 0; i < 300; ++i) {
-    const RcmCoordinates q = random_configuration(random);
+    const JointVector q = random_configuration(random);
     SCOPED_TRACE("seed " + std::to_string(seed) + ", configuration " + std::to_string(i));
     const Instrument& instrument = rig.instruments.front();
     const auto line = centre_line(rig.camera, instrument.marker, camera_from_unrolled(instrument, q), q.psi_rad);
@@ -51,10 +51,10 @@ void for_random_configurations(const Law& law) {
   }
 }
 
-TEST(RcmCoordinates, TheAxisPointsFromTheRcmToTheMarker) {
+TEST(JointVector, TheAxisPointsFromTheRcmToTheMarker) {
   Random random(seed);
   for (int i = 0; i < 100; ++i) {
-    const RcmCoordinates q = random_configuration(random);
+    const JointVector q = random_configuration(random);
     const Rigid3 pose = rcm_from_unrolled(q);
     EXPECT_LT((pose * Eigen::Vector3d::Zero() - q.rho_m * shaft_axis_in_rcm(q)).norm(), 1e-12) << "seed " << seed;
     EXPECT_LT((pose.rotation * Eigen::Vector3d::UnitZ() - shaft_axis_in_rcm(q)).norm(), 1e-12) << "seed " << seed;
@@ -63,21 +63,21 @@ TEST(RcmCoordinates, TheAxisPointsFromTheRcmToTheMarker) {
 }
 
 // Rz(theta) Ry(phi), written out.
-TEST(RcmCoordinates, TheUnrolledFrameIsRzRy) {
-  const RcmCoordinates q{0.3, 1.2, 0.1, 0};
+TEST(JointVector, TheUnrolledFrameIsRzRy) {
+  const JointVector q{0.3, 1.2, 0.1, 0};
   const double ct = std::cos(0.3), st = std::sin(0.3), cp = std::cos(1.2), sp = std::sin(1.2);
   const Eigen::Matrix3d expected{{ct * cp, -st, ct * sp}, {st * cp, ct, st * sp}, {-sp, 0, cp}};
   EXPECT_LT((rcm_from_unrolled(q).rotation.toRotationMatrix() - expected).norm(), 1e-12);
 }
 
-TEST(RcmCoordinates, AConfigurationIsFoundThroughItsMarkersEnd) {
+TEST(JointVector, AConfigurationIsFoundThroughItsMarkersEnd) {
   Random random(seed);
   const Rigid3 camera_from_rcm = *example_rig().instruments.front().camera_from_rcm;
   for (int i = 0; i < 100; ++i) {
-    const RcmCoordinates q = random_configuration(random);
+    const JointVector q = random_configuration(random);
     const auto found = configuration_through(camera_from_rcm, (camera_from_rcm * rcm_from_unrolled(q)).translation);
     ASSERT_TRUE(found);
-    const RcmCoordinates unrolled{q.theta_rad, q.phi_rad, q.rho_m, 0};
+    const JointVector unrolled{q.theta_rad, q.phi_rad, q.rho_m, 0};
     EXPECT_LT((found->vector() - unrolled.vector()).norm(), 1e-9) << "seed " << seed;
   }
   EXPECT_FALSE(configuration_through(camera_from_rcm, camera_from_rcm.translation));
@@ -85,7 +85,7 @@ TEST(RcmCoordinates, AConfigurationIsFoundThroughItsMarkersEnd) {
 
 TEST(CentreLine, LiesOnTheImageOfTheAxis) {
   for_random_configurations(
-      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates& q, const CentreLine& line) {
+      [](const Camera& camera, const Instrument& instrument, const JointVector& q, const CentreLine& line) {
         const Rigid3 pose = camera_from_unrolled(instrument, q);
         const Eigen::Vector3d plane = pose.translation.cross(pose * Eigen::Vector3d::UnitZ()).normalized();
         for (const auto& ideal_px : line.ideal_px)
@@ -95,7 +95,7 @@ TEST(CentreLine, LiesOnTheImageOfTheAxis) {
 
 TEST(CentreLine, ItsPointsLieOnTheSurfaceWhereTheBandsEnd) {
   for_random_configurations(
-      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates& q, const CentreLine& line) {
+      [](const Camera& camera, const Instrument& instrument, const JointVector& q, const CentreLine& line) {
         const Rigid3 unrolled_from_camera = camera_from_unrolled(instrument, q).inverse();
         const auto along_m = boundaries_m(instrument.marker, line.tau_rad);
         for (std::size_t k = 0; k < 4; ++k) {
@@ -109,7 +109,7 @@ TEST(CentreLine, ItsPointsLieOnTheSurfaceWhereTheBandsEnd) {
 
 TEST(CentreLine, TurningTheInstrumentTurnsTauBackAndMovesNothingElse) {
   for_random_configurations(
-      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates& q, const CentreLine& line) {
+      [](const Camera& camera, const Instrument& instrument, const JointVector& q, const CentreLine& line) {
         const double turn_rad = 1.1;
         const auto turned =
             centre_line(camera, instrument.marker, camera_from_unrolled(instrument, q), q.psi_rad + turn_rad);
@@ -123,7 +123,7 @@ TEST(CentreLine, TurningTheInstrumentTurnsTauBackAndMovesNothingElse) {
 
 TEST(CentreLine, ASeamShiftsTauAsARotationDoes) {
   for_random_configurations(
-      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates& q, const CentreLine& line) {
+      [](const Camera& camera, const Instrument& instrument, const JointVector& q, const CentreLine& line) {
         Marker shifted = instrument.marker;
         shifted.seam_rad += 0.7;
         const auto other = centre_line(camera, shifted, camera_from_unrolled(instrument, q), q.psi_rad - 0.7);
@@ -153,7 +153,7 @@ TEST(CentreLine, IsAbsentBehindTheCameraAndAroundIt) {
 
 TEST(Features, CrossRatioInTheImageIsThatOnTheMarker) {
   for_random_configurations(
-      [](const Camera&, const Instrument& instrument, const RcmCoordinates&, const CentreLine& line) {
+      [](const Camera&, const Instrument& instrument, const JointVector&, const CentreLine& line) {
         EXPECT_NEAR(features_of(line.ideal_px, std::nullopt).cross_ratio,
                     cross_ratio_at(instrument.marker, line.tau_rad), 1e-9);
       });
@@ -210,7 +210,7 @@ TEST(Features, CovarianceIsThatOfSampledPoints) {
 
 TEST(Features, TheProjectedRcmLiesOnTheCentreLineUnlessInTheFocalPlane) {
   for_random_configurations(
-      [](const Camera& camera, const Instrument& instrument, const RcmCoordinates&, const CentreLine& line) {
+      [](const Camera& camera, const Instrument& instrument, const JointVector&, const CentreLine& line) {
         const auto rcm_px = projected_rcm_px(camera, *instrument.camera_from_rcm);
         ASSERT_TRUE(rcm_px);
         const Eigen::Vector2d along = (line.ideal_px[3] - line.ideal_px[0]).normalized();
@@ -246,7 +246,7 @@ Rig rig_of(const fs::path& folder, const CsvTable& truth, std::size_t row) {
 void expect_truth(const CsvTable& truth, std::size_t row, const Rig& rig) {
   const Instrument& instrument = instrument_of(rig, truth, row);
   const auto value = [&](const std::string& column) { return truth.number(row, column); };
-  const RcmCoordinates q{value("theta_rad"), value("phi_rad"), value("rho_m"), value("psi_rad")};
+  const JointVector q{value("theta_rad"), value("phi_rad"), value("rho_m"), value("psi_rad")};
   const auto line = centre_line(rig.camera, instrument.marker, camera_from_unrolled(instrument, q), q.psi_rad);
   ASSERT_TRUE(line);
   for (std::size_t k = 0; k < 4; ++k) {

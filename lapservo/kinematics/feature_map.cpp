@@ -11,7 +11,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr double smallest_px = 1e-6;  // lengths below it give no direction
+constexpr double min_px = 1e-6;  // lengths below it give no direction
 
 using PerJoint = Eigen::Matrix<double, 2, 4>;  // of an image point, by q
 
@@ -30,7 +30,7 @@ FacingAzimuth facing_azimuth_rates(const Eigen::Vector3d& w, const Eigen::Vector
 }
 
 // d(e_k)/dq for k = 0..3.
-std::array<PerJoint, 4> edge_rates(const ImageModel& model, const RcmCoordinates& q, const CentreLine& line) {
+std::array<PerJoint, 4> edge_rates(const ImageModel& model, const JointVector& q, const CentreLine& line) {
   const Eigen::Quaterniond camera_from_unrolled = model.camera_from_rcm.rotation * rcm_from_unrolled(q).rotation;
   const Eigen::Vector3d theta_axis(-std::sin(q.phi_rad), 0, std::cos(q.phi_rad));  // RCM's z, in unrolled axes
   const Eigen::Vector3d along = Eigen::Vector3d::UnitZ();
@@ -67,7 +67,7 @@ Undefined why_no_centre_line(const Marker& marker, const Rigid3& camera_from_unr
 
 }  // namespace
 
-FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q) {
+FeatureMapResult feature_map(const ImageModel& model, const JointVector& q) {
   if (!q.vector().allFinite()) return {Undefined::bad_configuration, {}};
   const auto rcm_px = projected_rcm_px(model.camera, model.camera_from_rcm);
   if (!rcm_px) return {Undefined::rcm_in_focal_plane, {}};
@@ -77,8 +77,8 @@ FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q) {
 
   const auto& e = line->ideal_px;
   const Eigen::Vector2d from_rcm = e[0] - *rcm_px, whole = e[3] - e[0], inner = e[2] - e[0];
-  if (!(whole.norm() > smallest_px && inner.norm() > smallest_px)) return {Undefined::foreshortened, {}};
-  if (!(from_rcm.norm() > smallest_px)) return {Undefined::at_projected_rcm, {}};
+  if (!(whole.norm() > min_px && inner.norm() > min_px)) return {Undefined::foreshortened, {}};
+  if (!(from_rcm.norm() > min_px)) return {Undefined::at_projected_rcm, {}};
 
   const auto rates = edge_rates(model, q, *line);
   const PerJoint whole_rate = rates[3] - rates[0];

@@ -7,7 +7,7 @@
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/rigid3.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/marker/marker.h"
 
 namespace lapservo::internal {
@@ -54,6 +54,6 @@ struct FeatureMapResult {
 ///
 /// d jumps where tau passes the seam (0 = 2 pi), by the difference between the print's upper and lower edge. There the
 /// Jacobian is the one-sided derivative of the side that wrap_two_pi puts tau on (tau = 0: the upper edge).
-FeatureMapResult feature_map(const ImageModel& model, const RcmCoordinates& q);
+FeatureMapResult feature_map(const ImageModel& model, const JointVector& q);
 
 }  // namespace lapservo::internal

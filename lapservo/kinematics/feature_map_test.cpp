@@ -14,17 +14,17 @@ namespace {
 
 constexpr double step_by_joint[4] = {1e-6, 1e-6, 1e-7, 1e-6};
 
-RcmCoordinates moved(const RcmCoordinates& q, Eigen::Index joint, double by) {
+JointVector moved(const JointVector& q, Eigen::Index joint, double by) {
   Eigen::Vector4d x = q.vector();
   x[joint] += by;
-  return RcmCoordinates::from_vector(x);
+  return JointVector::from_vector(x);
 }
 
 double from_seam(double tau_rad) {
   return std::abs(wrap_pi(tau_rad));
 }
 
-Eigen::Vector4d central_difference(const ImageModel& model, const RcmCoordinates& q, Eigen::Index joint) {
+Eigen::Vector4d central_difference(const ImageModel& model, const JointVector& q, Eigen::Index joint) {
   const double h = step_by_joint[joint];
   const auto ahead = feature_map(model, moved(q, joint, h)), back = feature_map(model, moved(q, joint, -h));
   Eigen::Vector4d df = ahead.point->f - back.point->f;
@@ -33,7 +33,7 @@ Eigen::Vector4d central_difference(const ImageModel& model, const RcmCoordinates
 }
 
 // Compares row by row: a row has one unit, but for the lever of each joint.
-void expect_jacobian(const ImageModel& model, const RcmCoordinates& q) {
+void expect_jacobian(const ImageModel& model, const JointVector& q) {
   const auto result = feature_map(model, q);
   ASSERT_TRUE(result.point);
   const Eigen::Matrix4d& jacobian = result.point->jacobian;
@@ -55,7 +55,7 @@ TEST(FeatureMap, JacobianIsTheDerivative) {
   int checked = 0;
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 400; ++trial) {
-      const RcmCoordinates q = testing::visible_configuration(model, random);
+      const JointVector q = testing::visible_configuration(model, random);
       if (from_seam(feature_map(model, q).point->tau_rad) < 1e-3) continue;
       SCOPED_TRACE(::testing::Message() << "seed " << seed << ", trial " << trial);
       expect_jacobian(model, q);
@@ -73,7 +73,7 @@ TEST(FeatureMap, EndsJacobianIsTheDerivativeOfTheEnds) {
   };
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 50; ++trial) {
-      const RcmCoordinates q = testing::visible_configuration(model, random);
+      const JointVector q = testing::visible_configuration(model, random);
       const auto here = feature_map(model, q);
       for (Eigen::Index joint = 0; joint < 4; ++joint) {
         const double h = step_by_joint[joint];
@@ -91,7 +91,7 @@ TEST(FeatureMap, ValueIsThatOfTheCentreLine) {
   Random random(seed);
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 50; ++trial) {
-      const RcmCoordinates q = testing::visible_configuration(model, random);
+      const JointVector q = testing::visible_configuration(model, random);
       const auto line =
           centre_line(model.camera, model.marker, model.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
       const Features expected = features_of(line->ideal_px, projected_rcm_px(model.camera, model.camera_from_rcm));
@@ -123,7 +123,7 @@ TEST(FeatureMap, JumpsInDAtTheSeamAndNowhereElse) {
   Random random(seed);
   for (const ImageModel& model : testing::image_models())
     for (int trial = 0; trial < 30; ++trial) {
-      RcmCoordinates q = testing::visible_configuration(model, random);
+      JointVector q = testing::visible_configuration(model, random);
       const double seam_psi_rad = q.psi_rad + feature_map(model, q).point->tau_rad;  // tau = 0 there
       constexpr double beside = 1e-4;
       q.psi_rad = seam_psi_rad - beside;
@@ -145,7 +145,7 @@ TEST(FeatureMap, JumpsInDAtTheSeamAndNowhereElse) {
 TEST(FeatureMap, SaysWhyItIsUndefined) {
   const auto models = testing::image_models();
   const ImageModel& model = models.front();
-  const RcmCoordinates q{0.05, 1.57, 0.065, -2};
+  const JointVector q{0.05, 1.57, 0.065, -2};
   ASSERT_EQ(feature_map(model, q).reason, Undefined::none);
 
   EXPECT_EQ(feature_map(model, {std::numeric_limits<double>::quiet_NaN(), 1.57, 0.065, 0}).reason,

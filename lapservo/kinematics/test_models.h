@@ -38,7 +38,7 @@ inline std::vector<ImageModel> image_models() {
 }
 
 /// A configuration whose marker lies within the ideal image, at a sensible distance; phi is anywhere but at the poles.
-inline RcmCoordinates visible_configuration(const ImageModel& model, Random& random) {
+inline JointVector visible_configuration(const ImageModel& model, Random& random) {
   while (true) {
     const double depth_m = random.uniform(0.05, 0.16);
     const Eigen::Vector3d proximal = depth_m * model.camera.ray_from_ideal({random.uniform(0, model.camera.width_px),

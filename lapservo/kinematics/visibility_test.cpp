@@ -9,7 +9,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/kinematics/test_models.h"
 
 namespace lapservo::internal {
@@ -70,9 +70,9 @@ TEST(Visibility, EndsWhereTheShaftLeansTooSteeply) {
     const double steepest_rad = random.uniform(0.1, 1), turn_rad = random.uniform(-pi, pi);
     const Eigen::Vector3d middle_m(random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01), 0.12);
     for (const double side : {-1.0, 1.0})
-      for (const double share : {0.99, 1.01}) {
-        const Rigid3 pose = leaning_shaft(model.marker, middle_m, side * share * steepest_rad, turn_rad);
-        EXPECT_EQ(marker_in_view(model.camera, model.marker, pose, {steepest_rad, 10}), share < 1)
+      for (const double fraction : {0.99, 1.01}) {
+        const Rigid3 pose = leaning_shaft(model.marker, middle_m, side * fraction * steepest_rad, turn_rad);
+        EXPECT_EQ(marker_in_view(model.camera, model.marker, pose, {steepest_rad, 10}), fraction < 1)
             << "seed " << seed << ", trial " << trial;
       }
   }
@@ -96,6 +96,29 @@ TEST(Visibility, IsNotMistakenWhereTheLensFoldsBack) {
   const Rigid3 pose = leaning_shaft(model.marker, {0.175, 0, 0.1}, 0, 0);
   EXPECT_TRUE(every_seen_point_in_image(model.camera, model.marker, pose, 0));
   EXPECT_FALSE(marker_in_view(model.camera, model.marker, pose, {any_steepness_rad, 0}));
+}
+
+TEST(Visibility, RandomConfigurationsAreInViewWithinTheDepthAskedFor) {
+  constexpr ViewRange range{0.06, 0.16, {.steepest_rad = 0.9, .border_px = 20}};
+  for (const ImageModel& model : testing::image_models()) {
+    Random random(62);
+    for (int i = 0; i < 20; ++i) {
+      const auto q = random_configuration_in_view(model.camera, model.marker, model.camera_from_rcm, range, random);
+      ASSERT_TRUE(q);
+      const Rigid3 pose = model.camera_from_rcm * rcm_from_unrolled(*q);
+      EXPECT_TRUE(marker_in_view(model.camera, model.marker, pose, range.limits));
+      EXPECT_GE(pose.translation.z(), range.nearest_m);
+      EXPECT_LE(pose.translation.z(), range.farthest_m);
+    }
+  }
+}
+
+TEST(Visibility, NoRandomConfigurationWhereNoneIsInView) {
+  const ImageModel model = testing::image_models()[0];
+  const ViewRange wider_than_the_image{0.06, 0.16, {.steepest_rad = 0.9, .border_px = 400}};
+  Random random(63);
+  EXPECT_FALSE(
+      random_configuration_in_view(model.camera, model.marker, model.camera_from_rcm, wider_than_the_image, random));
 }
 
 }  // namespace

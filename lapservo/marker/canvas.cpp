@@ -82,11 +82,11 @@ double Canvas::text_width_mm(const std::string& text, double height_mm) {
 void Canvas::text(const std::string& text, PointMm at, double height_mm, Anchor anchor, double turn_deg) {
   const double width_mm = text_width_mm(text, height_mm);
   cairo_set_source_rgb(cairo_, 0, 0, 0);
-  const double share = anchor == Anchor::left ? 0 : (anchor == Anchor::middle ? 0.5 : 1);
+  const double fraction = anchor == Anchor::left ? 0 : (anchor == Anchor::middle ? 0.5 : 1);
   cairo_save(cairo_);
   cairo_translate(cairo_, at.x, at.y);
   cairo_rotate(cairo_, rad_from_deg(turn_deg));
-  cairo_move_to(cairo_, -share * width_mm, 0);
+  cairo_move_to(cairo_, -fraction * width_mm, 0);
   cairo_show_text(cairo_, text.c_str());
   cairo_restore(cairo_);
 }

@@ -21,9 +21,9 @@ double rounded(double length_m) {
   return std::round(length_m / rounding_m) * rounding_m;
 }
 
-// The free numbers of the linear family: share of l1 in l1 + l2, and l1 + l2 at the upper and lower edge.
+// The free numbers of the linear family: fraction of l1 in l1 + l2, and l1 + l2 at the upper and lower edge.
 struct Choice {
-  double share, upper_m, lower_m;
+  double fraction, upper_m, lower_m;
 };
 
 Marker marker_of(const DesignSpec& spec, double length_m, const Choice& choice) {
@@ -31,14 +31,14 @@ Marker marker_of(const DesignSpec& spec, double length_m, const Choice& choice) 
   marker.diameter_m = spec.diameter_m;
   marker.hues_deg = spec.hues_deg;
   const auto bands = [&](double sum_m) {
-    return std::array<double, 3>{choice.share * sum_m, (1 - choice.share) * sum_m, length_m - sum_m};
+    return std::array<double, 3>{choice.fraction * sum_m, (1 - choice.fraction) * sum_m, length_m - sum_m};
   };
   marker.bands_upper_m = bands(choice.upper_m);
   marker.bands_lower_m = bands(choice.lower_m);
   return marker;
 }
 
-double smallest_band(const Marker& marker) {
+double min_band(const Marker& marker) {
   return std::min(*std::min_element(marker.bands_upper_m.begin(), marker.bands_upper_m.end()),
                   *std::min_element(marker.bands_lower_m.begin(), marker.bands_lower_m.end()));
 }
@@ -51,19 +51,20 @@ std::string millimetres(double length_m) {
 
 // Best of a grid around a choice. The sums are rounded here, and not at the end, so that the limits hold after it and
 // the ratio l1 : l2, and with it the linear family, survives.
-std::optional<Choice> search(const DesignSpec& spec, double length_m, double smallest_m, const Choice& centre,
-                             double share_reach, double sum_reach_m) {
+std::optional<Choice> search(const DesignSpec& spec, double length_m, double min_m, const Choice& centre,
+                             double fraction_reach, double sum_reach_m) {
   constexpr int steps = 12;
   std::optional<Choice> best;
   double best_sigma = std::numeric_limits<double>::infinity();
   for (int i = -steps; i <= steps; ++i)
     for (int j = -steps; j <= steps; ++j)
       for (int k = -steps; k <= steps; ++k) {
-        const Choice choice{centre.share + share_reach * i / steps, rounded(centre.upper_m + sum_reach_m * j / steps),
+        const Choice choice{centre.fraction + fraction_reach * i / steps,
+                            rounded(centre.upper_m + sum_reach_m * j / steps),
                             rounded(centre.lower_m + sum_reach_m * k / steps)};
-        if (choice.share <= 0 || choice.share >= 1 || choice.lower_m - choice.upper_m < rounding_m / 2) continue;
+        if (choice.fraction <= 0 || choice.fraction >= 1 || choice.lower_m - choice.upper_m < rounding_m / 2) continue;
         const Marker marker = marker_of(spec, length_m, choice);
-        if (smallest_band(marker) < smallest_m - 1e-9) continue;
+        if (min_band(marker) < min_m - 1e-9) continue;
         const double sigma = worst_sigma_centre_line_rad(marker, spec.viewing);
         if (sigma < best_sigma) best_sigma = sigma, best = choice;
       }
@@ -71,22 +72,22 @@ std::optional<Choice> search(const DesignSpec& spec, double length_m, double sma
 }
 
 // The first band grows at the cost of the last. nullopt when there is no room to grow.
-std::optional<Marker> length_marker(const DesignSpec& spec, double length_m, double smallest_m) {
-  const double longest_m = length_m - 2 * smallest_m;
-  if (longest_m - smallest_m < rounding_m / 2) return std::nullopt;
+std::optional<Marker> length_marker(const DesignSpec& spec, double length_m, double min_m) {
+  const double longest_m = length_m - 2 * min_m;
+  if (longest_m - min_m < rounding_m / 2) return std::nullopt;
   Marker marker;
   marker.diameter_m = spec.diameter_m;
   marker.hues_deg = spec.hues_deg;
-  marker.bands_upper_m = {smallest_m, smallest_m, longest_m};
-  marker.bands_lower_m = {longest_m, smallest_m, smallest_m};
+  marker.bands_upper_m = {min_m, min_m, longest_m};
+  marker.bands_lower_m = {longest_m, min_m, min_m};
   return marker;
 }
 
-std::optional<Marker> cross_ratio_marker(const DesignSpec& spec, double length_m, double smallest_m) {
-  const double reach_m = (length_m - 3 * smallest_m) / 2, middle_m = (length_m + smallest_m) / 2;
-  const auto coarse = search(spec, length_m, smallest_m, {0.5, middle_m, middle_m}, 0.5, reach_m);
+std::optional<Marker> cross_ratio_marker(const DesignSpec& spec, double length_m, double min_m) {
+  const double reach_m = (length_m - 3 * min_m) / 2, middle_m = (length_m + min_m) / 2;
+  const auto coarse = search(spec, length_m, min_m, {0.5, middle_m, middle_m}, 0.5, reach_m);
   if (!coarse) return std::nullopt;
-  const auto fine = search(spec, length_m, smallest_m, *coarse, 0.08, reach_m / 8);
+  const auto fine = search(spec, length_m, min_m, *coarse, 0.08, reach_m / 8);
   return marker_of(spec, length_m, fine.value_or(*coarse));
 }
 
@@ -107,12 +108,11 @@ bool in_linear_family(const Marker& marker) {
 
 Marker design_marker(const DesignSpec& spec) {
   const double length_m = spec.length_m.value_or(std::round(3e3 * spec.diameter_m) * 1e-3);
-  const double smallest_m = spec.smallest_band_m.value_or(std::max(0.003, 12 / spec.viewing.px_per_m()));
+  const double min_m = spec.min_band_m.value_or(std::max(0.003, 12 / spec.viewing.px_per_m()));
   const bool by_cross_ratio = spec.code == MarkerCode::cross_ratio;
-  const auto marker =
-      by_cross_ratio ? cross_ratio_marker(spec, length_m, smallest_m) : length_marker(spec, length_m, smallest_m);
+  const auto marker = by_cross_ratio ? cross_ratio_marker(spec, length_m, min_m) : length_marker(spec, length_m, min_m);
   if (!marker)
-    throw InputError("length", "no marker: three bands of at least " + millimetres(smallest_m) +
+    throw InputError("length", "no marker: three bands of at least " + millimetres(min_m) +
                                    " that change over the turn do not fit into " + millimetres(length_m));
   if (const std::string problem = marker_problem(*marker); !problem.empty()) throw InputError("marker", problem);
   const std::string problem = by_cross_ratio ? decoding_problem(*marker) : length_decoding_problem(*marker, 0);

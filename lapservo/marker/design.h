@@ -16,8 +16,8 @@ enum class MarkerCode {
 struct DesignSpec {
   MarkerCode code = MarkerCode::cross_ratio;
   double diameter_m = 0.0084;
-  std::optional<double> length_m;         ///< default: three diameters, to the millimetre
-  std::optional<double> smallest_band_m;  ///< default: 3 mm or 12 px, whichever is more
+  std::optional<double> length_m;    ///< default: three diameters, to the millimetre
+  std::optional<double> min_band_m;  ///< default: 3 mm or 12 px, whichever is more
   std::array<double, 3> hues_deg{90, 180, 270};
   Viewing viewing;
 };
@@ -26,7 +26,7 @@ struct DesignSpec {
 /// line. For MarkerCode::length instead the marker whose first band changes most over the turn, the middle one staying
 /// as short as can be; its cross-ratio turns back, so that only LengthDecoder reads it.
 ///
-/// The family's three free numbers (share of l1 in l1 + l2, and l1 + l2 at either edge) are searched on a grid and
+/// The family's three free numbers (fraction of l1 in l1 + l2, and l1 + l2 at either edge) are searched on a grid and
 /// refined; l1 + l2 comes out in tenths of a millimetre. Throws InputError when no such marker fits.
 Marker design_marker(const DesignSpec& spec);
 

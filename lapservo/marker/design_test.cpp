@@ -22,7 +22,7 @@ using testing::marker_with;
 
 constexpr std::uint64_t seed = 47;
 
-double smallest_band_m(const Marker& marker) {
+double min_band_m(const Marker& marker) {
   double smallest = marker.bands_upper_m[0];
   for (const auto& bands : {marker.bands_upper_m, marker.bands_lower_m})
     smallest = std::min(smallest, *std::min_element(bands.begin(), bands.end()));
@@ -30,14 +30,14 @@ double smallest_band_m(const Marker& marker) {
 }
 
 // A member of the linear family within the limits.
-Marker random_member(double length_m, double least_m, Random& random) {
+Marker random_member(double length_m, double min_m, Random& random) {
   for (;;) {
-    const double share = random.uniform(0.2, 0.8), a = random.uniform(0, length_m), b = random.uniform(0, length_m);
+    const double fraction = random.uniform(0.2, 0.8), a = random.uniform(0, length_m), b = random.uniform(0, length_m);
     const auto bands = [&](double sum_m) {
-      return std::array<double, 3>{share * sum_m, (1 - share) * sum_m, length_m - sum_m};
+      return std::array<double, 3>{fraction * sum_m, (1 - fraction) * sum_m, length_m - sum_m};
     };
     const Marker marker = marker_with(bands(a), bands(b));
-    if (smallest_band_m(marker) >= least_m && std::abs(a - b) > 1e-4) return marker;
+    if (min_band_m(marker) >= min_m && std::abs(a - b) > 1e-4) return marker;
   }
 }
 
@@ -46,8 +46,8 @@ TEST(DesignMarker, KeepsToWhatWasAskedForAndCanBeDecodedByEquation18) {
   for (int i = 0; i < 12; ++i) {
     DesignSpec spec;
     spec.diameter_m = random.uniform(0.004, 0.015);
-    spec.smallest_band_m = random.uniform(0.002, 0.005);
-    spec.length_m = *spec.smallest_band_m * 3 + random.uniform(0.0005, 0.02);
+    spec.min_band_m = random.uniform(0.002, 0.005);
+    spec.length_m = *spec.min_band_m * 3 + random.uniform(0.0005, 0.02);
     spec.hues_deg = {20, 140, 260};
     const Marker marker = design_marker(spec);
     SCOPED_TRACE("seed " + std::to_string(seed) + ", design " + std::to_string(i));
@@ -57,7 +57,7 @@ TEST(DesignMarker, KeepsToWhatWasAskedForAndCanBeDecodedByEquation18) {
     EXPECT_EQ(marker.diameter_m, spec.diameter_m);
     EXPECT_EQ(marker.hues_deg, spec.hues_deg);
     EXPECT_NEAR(marker.length_m(), *spec.length_m, 1e-12);
-    EXPECT_GE(smallest_band_m(marker), *spec.smallest_band_m - 1e-9);
+    EXPECT_GE(min_band_m(marker), *spec.min_band_m - 1e-9);
     const double middle = (cross_ratio_at(marker, 0) + cross_ratio_at(marker, two_pi - 1e-9)) / 2;
     EXPECT_NEAR(cross_ratio_at(marker, pi), middle, 1e-9);
   }
@@ -81,9 +81,9 @@ TEST(DesignMarker, NoOtherMemberOfTheFamilyIsClearlyBetter) {
 TEST(DesignMarker, IsThreeDiametersLongWithBandsThatTheCameraResolves) {
   DesignSpec spec;
   EXPECT_NEAR(design_marker(spec).length_m(), 0.025, 1e-12);
-  EXPECT_GE(smallest_band_m(design_marker(spec)), 0.003 - 1e-9);
+  EXPECT_GE(min_band_m(design_marker(spec)), 0.003 - 1e-9);
   spec.viewing = {600, 0.18, 0.1};  // 12 px are 3.6 mm
-  EXPECT_GE(smallest_band_m(design_marker(spec)), 0.0036 - 1e-9);
+  EXPECT_GE(min_band_m(design_marker(spec)), 0.0036 - 1e-9);
 }
 
 TEST(DesignMarker, RefusesALengthIntoWhichNoBandsFit) {
@@ -110,8 +110,7 @@ TEST(DesignMarker, ForOneLengthGivesTheFirstBandAllThereIs) {
   const Marker marker = design_marker(spec);
   EXPECT_EQ(marker_problem(marker), "");
   EXPECT_EQ(most_telling_band(marker), 0U);
-  EXPECT_NEAR(marker.bands_lower_m[0] - marker.bands_upper_m[0], marker.length_m() - 3 * smallest_band_m(marker),
-              1e-12);
+  EXPECT_NEAR(marker.bands_lower_m[0] - marker.bands_upper_m[0], marker.length_m() - 3 * min_band_m(marker), 1e-12);
   EXPECT_NE(decoding_problem(marker), "");
   EXPECT_LT(predicted_sigma_length_rad(marker, 0, {}), worst_sigma_centre_line_rad(design_marker({}), {}));
   spec.length_m = 0.009;

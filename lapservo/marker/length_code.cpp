@@ -12,7 +12,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr double least_change = 1e-6;  // of the marker's length: less is rounding
+constexpr double min_change = 1e-6;  // of the marker's length: less is rounding
 
 double change_m(const Marker& marker, std::size_t band) {
   return marker.bands_lower_m.at(band) - marker.bands_upper_m.at(band);
@@ -30,7 +30,7 @@ std::array<double, 4> imaged_px(const Marker& marker, double tau_rad, const View
 }  // namespace
 
 std::string length_decoding_problem(const Marker& marker, std::size_t band) {
-  if (std::abs(change_m(marker, band)) > least_change * marker.length_m()) return {};
+  if (std::abs(change_m(marker, band)) > min_change * marker.length_m()) return {};
   return "band " + std::to_string(band) + " is as long at every rotation: one of its boundaries must slope";
 }
 
@@ -58,9 +58,9 @@ double predicted_sigma_length_rad(const Marker& marker, std::size_t band, const 
 }
 
 CodeErrors perspective_errors(const Marker& marker, std::size_t band, double tau_rad, const Viewing& viewing,
-                              const Misjudged& misjudged) {
-  const auto e_px = imaged_px(marker, tau_rad, viewing, misjudged.inclination_rad);
-  const double believed_px_per_m = viewing.px_per_m() / (1 + misjudged.depth_share);
+                              const ViewingError& viewing_error) {
+  const auto e_px = imaged_px(marker, tau_rad, viewing, viewing_error.inclination_rad);
+  const double believed_px_per_m = viewing.px_per_m() / (1 + viewing_error.depth_fraction);
   CodeErrors errors;
   errors.by_length_rad =
       LengthDecoder(marker, band).tau_rad((e_px.at(band + 1) - e_px.at(band)) / believed_px_per_m) - tau_rad;

@@ -34,8 +34,8 @@ std::size_t most_telling_band(const Marker& marker);
 double predicted_sigma_length_rad(const Marker& marker, std::size_t band, const Viewing& viewing);
 
 /// What a picture does not tell when there is but one length.
-struct Misjudged {
-  double depth_share = 0;      ///< believed depth of the proximal end = true depth * (1 + depth_share)
+struct ViewingError {
+  double depth_fraction = 0;   ///< believed depth of the proximal end = true depth * (1 + depth_fraction)
   double inclination_rad = 0;  ///< of the shaft, tip away from the camera, believed to be square to the view
 };
 struct CodeErrors {
@@ -45,6 +45,6 @@ struct CodeErrors {
 /// proximal end at `viewing.distance_m`. The cross-ratio's is zero but for rounding, and NaN for markers that it does
 /// not decode.
 CodeErrors perspective_errors(const Marker& marker, std::size_t band, double tau_rad, const Viewing& viewing,
-                              const Misjudged& misjudged);
+                              const ViewingError& viewing_error);
 
 }  // namespace lapservo::internal

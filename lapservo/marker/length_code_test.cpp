@@ -88,8 +88,8 @@ TEST(PerspectiveErrors, SpoilTheLengthOnly) {
     const Marker marker = testing::random_linear_marker(random);
     const std::size_t band = most_telling_band(marker);
     const double tau_rad = random.uniform(1, 5);
-    const Misjudged misjudged{random.uniform(0.01, 0.05), random.uniform(-0.5, 0.5)};
-    const CodeErrors errors = perspective_errors(marker, band, tau_rad, {}, misjudged);
+    const ViewingError viewing_error{random.uniform(0.01, 0.05), random.uniform(-0.5, 0.5)};
+    const CodeErrors errors = perspective_errors(marker, band, tau_rad, {}, viewing_error);
     EXPECT_NEAR(errors.by_cross_ratio_rad, 0, 1e-9) << "seed " << seed;
     const CodeErrors exact = perspective_errors(marker, band, tau_rad, {}, {});
     EXPECT_NEAR(exact.by_length_rad, 0, 1e-9) << "seed " << seed;
@@ -97,14 +97,14 @@ TEST(PerspectiveErrors, SpoilTheLengthOnly) {
   }
 }
 
-// A depth that is wrong by a share makes the length wrong by the same share.
+// A depth that is wrong by a fraction makes the length wrong by the same fraction.
 TEST(PerspectiveErrors, OfALengthAreThoseOfTheDepth) {
   const Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
-  constexpr double share = 0.01, tau_rad = 3;
+  constexpr double fraction = 0.01, tau_rad = 3;
   for (std::size_t band = 0; band < 3; ++band) {
     const double slope_m = (marker.bands_lower_m.at(band) - marker.bands_upper_m.at(band)) / two_pi;
-    EXPECT_NEAR(perspective_errors(marker, band, tau_rad, {}, {share, 0}).by_length_rad,
-                share * band_m(marker, band, tau_rad) / slope_m, 1e-9)
+    EXPECT_NEAR(perspective_errors(marker, band, tau_rad, {}, {fraction, 0}).by_length_rad,
+                fraction * band_m(marker, band, tau_rad) / slope_m, 1e-9)
         << band;
   }
 }

@@ -11,9 +11,9 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr double smallest_diameter_m = 0.5e-3, largest_diameter_m = 0.1;
-constexpr double largest_band_m = 0.5;
-constexpr double smallest_hue_gap_deg = 40;  // closer hues blend under white balance, blur and smoke
+constexpr double min_diameter_m = 0.5e-3, max_diameter_m = 0.1;
+constexpr double max_band_m = 0.5;
+constexpr double min_hue_gap_deg = 40;  // closer hues blend under white balance, blur and smoke
 
 double hue_gap_deg(double a_deg, double b_deg) {
   return std::abs(std::remainder(a_deg - b_deg, 360.0));
@@ -54,18 +54,18 @@ double cross_ratio_at(const Marker& marker, double tau_rad) {
 
 std::string marker_problem(const Marker& marker) {
   const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
-  if (!within(marker.diameter_m, smallest_diameter_m, largest_diameter_m))
+  if (!within(marker.diameter_m, min_diameter_m, max_diameter_m))
     return problem("diameter_m", marker.diameter_m, "0.0005 to 0.1 (metres)");
   for (std::size_t i = 0; i < 3; ++i) {
     const std::string index = "[" + std::to_string(i) + "]";
     if (!within(marker.hues_deg[i], 0, 360)) return problem("hues_deg" + index, marker.hues_deg[i], "0 to 360");
-    if (!(marker.bands_upper_m[i] > 0 && marker.bands_upper_m[i] <= largest_band_m))
+    if (!(marker.bands_upper_m[i] > 0 && marker.bands_upper_m[i] <= max_band_m))
       return problem("bands_upper_m" + index, marker.bands_upper_m[i], "a length above 0, up to 0.5 (metres)");
-    if (!(marker.bands_lower_m[i] > 0 && marker.bands_lower_m[i] <= largest_band_m))
+    if (!(marker.bands_lower_m[i] > 0 && marker.bands_lower_m[i] <= max_band_m))
       return problem("bands_lower_m" + index, marker.bands_lower_m[i], "a length above 0, up to 0.5 (metres)");
   }
   for (std::size_t i = 0; i < 3; ++i)
-    if (hue_gap_deg(marker.hues_deg[i], marker.hues_deg[(i + 1) % 3]) < smallest_hue_gap_deg)
+    if (hue_gap_deg(marker.hues_deg[i], marker.hues_deg[(i + 1) % 3]) < min_hue_gap_deg)
       return problem("hues_deg[" + std::to_string((i + 1) % 3) + "]", marker.hues_deg[(i + 1) % 3],
                      "hues at least 40 degrees apart");
   const double lower_sum = marker.bands_lower_m[0] + marker.bands_lower_m[1] + marker.bands_lower_m[2];
@@ -79,7 +79,7 @@ std::string marker_problem(const Marker& marker) {
 
 bool same_colour_order(const Marker& a, const Marker& b) {
   for (std::size_t i = 0; i < 3; ++i)
-    if (hue_gap_deg(a.hues_deg[i], b.hues_deg[i]) >= smallest_hue_gap_deg / 2) return false;
+    if (hue_gap_deg(a.hues_deg[i], b.hues_deg[i]) >= min_hue_gap_deg / 2) return false;
   return true;
 }
 

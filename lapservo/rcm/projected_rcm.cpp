@@ -15,7 +15,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t fewest_for_outliers = 6;
+constexpr std::size_t min_for_outliers = 6;
 constexpr double outlier_sigmas = 3.5;
 
 using Lines = std::vector<LineObservation>;
@@ -90,8 +90,8 @@ struct Start {
 };
 
 // Over all pairs, or as many random ones as make it sure to meet two good lines.
-std::optional<Start> least_median_start(const Lines& lines) {
-  constexpr std::size_t most_pairs = 600;
+std::optional<Start> min_median_start(const Lines& lines) {
+  constexpr std::size_t max_pairs = 600;
   std::optional<Start> best;
   std::vector<double> misses(lines.size());
   const auto consider = [&](std::size_t i, std::size_t k) {
@@ -102,14 +102,14 @@ std::optional<Start> least_median_start(const Lines& lines) {
     std::nth_element(misses.begin(), middle, misses.end());
     if (!best || *middle < best->median_sigmas) best = Start{*o, *middle};
   };
-  if (lines.size() * (lines.size() - 1) / 2 <= most_pairs) {
+  if (lines.size() * (lines.size() - 1) / 2 <= max_pairs) {
     for (std::size_t i = 0; i < lines.size(); ++i)
       for (std::size_t k = i + 1; k < lines.size(); ++k) consider(i, k);
     return best;
   }
   constexpr std::uint64_t seed = 1;
   Random random(seed);
-  for (std::size_t pair = 0; pair < most_pairs; ++pair)
+  for (std::size_t pair = 0; pair < max_pairs; ++pair)
     consider(random.bits() % lines.size(), random.bits() % lines.size());
   return best;
 }
@@ -131,13 +131,13 @@ struct RobustFit {
 
 // Refits to what lies within the limit, which follows the scale, until the choice stays the same.
 RobustFit fit_robustly(const Lines& lines, const Start& start, NoiseScale scale) {
-  constexpr double least_scale = 1e-6;  // lines that meet to rounding have no noise to judge by
+  constexpr double min_scale = 1e-6;  // lines that meet to rounding have no noise to be estimated from
   RobustFit robust{{false, start.point_px, Eigen::Matrix2d::Zero(), 0}, std::vector<bool>(lines.size(), true)};
-  if (lines.size() < fewest_for_outliers) {
+  if (lines.size() < min_for_outliers) {
     robust.fit = fit(lines, start.point_px);
     return robust;
   }
-  double scale_now = std::max(first_scale(start, lines.size()), scale == NoiseScale::known ? 1 : least_scale);
+  double scale_now = std::max(first_scale(start, lines.size()), scale == NoiseScale::known ? 1 : min_scale);
   for (int round = 0; round < 20; ++round) {
     const std::vector<bool> before = std::exchange(robust.used, {});
     Lines inside;
@@ -148,7 +148,7 @@ RobustFit fit_robustly(const Lines& lines, const Start& start, NoiseScale scale)
     if (inside.size() < 2 || (round > 0 && robust.used == before)) return robust;
     robust.fit = fit(inside, robust.fit.point_px);
     if (!robust.fit.converged) return robust;
-    scale_now = scale == NoiseScale::known ? 1 : std::max(scale_of(robust.fit.chi2, inside.size()), least_scale);
+    scale_now = scale == NoiseScale::known ? 1 : std::max(scale_of(robust.fit.chi2, inside.size()), min_scale);
   }
   return robust;
 }
@@ -213,7 +213,7 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
   }
   estimate.lines = lines.size();
   if (lines.size() < 2) return estimate;
-  const auto start = least_median_start(lines);
+  const auto start = min_median_start(lines);
   if (!start) {
     estimate.status = RcmStatus::parallel;
     return estimate;
@@ -240,10 +240,10 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
     estimate.covariance_px2 =
         estimate.noise_factor * estimate.noise_factor * as_given +
         options.common_px * options.common_px * common_covariance(inside, best.point_px, as_given);
-  const double share =
+  const double fraction =
       estimate.covariance_px2 ? larger_sigma(*estimate.covariance_px2) / lever_px(inside, best.point_px) : 0;
-  estimate.near_parallel = estimate.direction_spread_rad < near_parallel_rad || share > near_parallel_share;
-  const bool parallel = !(share < 1) || estimate.direction_spread_rad < parallel_rad;
+  estimate.near_parallel = estimate.direction_spread_rad < near_parallel_rad || fraction > near_parallel_fraction;
+  const bool parallel = !(fraction < 1) || estimate.direction_spread_rad < parallel_rad;
   estimate.status = parallel ? RcmStatus::parallel : RcmStatus::ok;
   return estimate;
 }

@@ -57,7 +57,7 @@ struct RcmEstimate {
 /// Lines whose directions spread by less are parallel: e0 and e3 are known to no better than this over their distance.
 inline constexpr double parallel_rad = 1e-3;
 inline constexpr double near_parallel_rad = 0.0524;
-inline constexpr double near_parallel_share = 0.05;
+inline constexpr double near_parallel_fraction = 0.05;
 
 /// The point that all lines pass through, by weighted total least squares: the end points of every line move, by as
 /// little as their covariances allow, until all lines meet. Minimises sum g^2 / (h^T C h) over the point o, where

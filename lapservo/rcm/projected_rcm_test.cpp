@@ -123,7 +123,7 @@ TEST(ProjectedRcm, CovarianceIsHonest) {
   constexpr int trials = 1500;
   for (const double noise_factor : {1.0, 3.0}) {
     const NoiseScale scale = noise_factor == 1 ? NoiseScale::known : NoiseScale::estimated;
-    double spread = 0, chi2_share = 0, factor = 0;
+    double spread = 0, chi2_fraction = 0, factor = 0;
     Eigen::Vector2d bias_sigmas = Eigen::Vector2d::Zero();
     for (int trial = 0; trial < trials; ++trial) {
       const auto estimate =
@@ -132,12 +132,12 @@ TEST(ProjectedRcm, CovarianceIsHonest) {
       spread += mahalanobis2(estimate, truth) / 2 / trials;
       const Eigen::Matrix2d root = estimate.covariance_px2->llt().matrixL();
       bias_sigmas += root.inverse() * (estimate.point_px - truth) / trials;
-      chi2_share += estimate.chi2 / estimate.degrees_of_freedom / trials;
+      chi2_fraction += estimate.chi2 / estimate.degrees_of_freedom / trials;
       factor += estimate.noise_factor / trials;
     }
     EXPECT_NEAR(std::sqrt(spread), scale == NoiseScale::known ? 1 : 1.06, 0.06) << "seed " << seed;  // Student's t
     EXPECT_LT(bias_sigmas.norm(), 0.1) << "seed " << seed;
-    EXPECT_NEAR(std::sqrt(chi2_share), noise_factor, 0.05 * noise_factor) << "seed " << seed;
+    EXPECT_NEAR(std::sqrt(chi2_fraction), noise_factor, 0.05 * noise_factor) << "seed " << seed;
     EXPECT_NEAR(factor, scale == NoiseScale::known ? 1 : noise_factor, 0.05 * noise_factor) << "seed " << seed;
   }
 }

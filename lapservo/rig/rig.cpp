@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr auto file_kind = "rig file";
-constexpr double largest_tolerance_m = 5e-3;
+constexpr double max_tolerance_m = 5e-3;
 
 int parse_image_size(const YamlField& field) {
   constexpr auto expected = "a whole number of pixels, 16 to 16384";
@@ -140,7 +140,7 @@ Marker parse_marker(const YamlField& field) {
   marker.bands_lower_m = field["bands_lower_m"].numbers<3>("three lengths in metres");
   if (const YamlField seam = field["seam_rad"]; seam.present()) marker.seam_rad = seam.number("an angle in radians");
   if (const YamlField tolerance = field["tolerance_m"]; tolerance.present())
-    marker.tolerance_m = tolerance.number_between(0, largest_tolerance_m, "0 to 0.005 (metres)");
+    marker.tolerance_m = tolerance.number_between(0, max_tolerance_m, "0 to 0.005 (metres)");
   if (const std::string problem = marker_problem(marker); !problem.empty()) field.fail_within(problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
     field.fail("not decodable", "bands whose cross-ratio is monotonic over the rotation: " + problem);

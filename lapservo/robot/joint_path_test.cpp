@@ -25,13 +25,13 @@ TEST(JointPath, PathIsSmoothAtTheArmsRate) {
     for (int k = 0; k < 60; ++k) {
       const Eigen::Vector4d velocity = random_vector(random), last = path.end().velocity;
       path.ramp_to(k * period_s, velocity, period_s);
-      const double largest_rate = velocity.cwiseAbs().cwiseMax(last.cwiseAbs()).maxCoeff();
+      const double max_rate = velocity.cwiseAbs().cwiseMax(last.cwiseAbs()).maxCoeff();
       for (double t = k * period_s + tick_s; t < (k + 1) * period_s; t += tick_s) {
         const MotionState now = path.at(t);
-        EXPECT_LE(now.velocity.cwiseAbs().maxCoeff(), largest_rate + 1e-12);
+        EXPECT_LE(now.velocity.cwiseAbs().maxCoeff(), max_rate + 1e-12);
         // The velocity is the position's derivative, and both are continuous.
         const Eigen::Vector4d mean = (now.velocity + before.velocity) / 2;
-        EXPECT_LT((now.position - before.position).cwiseAbs().maxCoeff(), 1.5 * tick_s * (largest_rate + 0.1));
+        EXPECT_LT((now.position - before.position).cwiseAbs().maxCoeff(), 1.5 * tick_s * (max_rate + 0.1));
         if (t > k * period_s + 1.5 * tick_s) {
           EXPECT_LT(((now.position - before.position) / tick_s - mean).norm(), 1e-6);
         }

@@ -8,7 +8,7 @@ using namespace internal;
 namespace {
 
 // What the fit's covariance does not know: the lens, the print, the registration; s_rad, r_px, l_px, d_px.
-const Eigen::Vector4d least_sigma(5e-5, 0.02, 0.02, 0.02);
+const Eigen::Vector4d min_sigma(5e-5, 0.02, 0.02, 0.02);
 
 Eigen::Vector4d both_ends(const Eigen::Vector2d& first, const Eigen::Vector2d& last) {
   Eigen::Vector4d ends;
@@ -23,7 +23,7 @@ FeatureModel feature_model(const Rig& rig) {
   if (!instrument.camera_from_rcm) return {};
   const ImageModel image{rig.camera, instrument.marker, *instrument.camera_from_rcm};
   return [image](const Eigen::Vector4d& q) -> std::optional<FeatureState> {
-    const auto [reason, point] = feature_map(image, RcmCoordinates::from_vector(q));
+    const auto [reason, point] = feature_map(image, JointVector::from_vector(q));
     if (!point) return std::nullopt;
     FeatureState state;
     state.features = point->f;
@@ -49,7 +49,7 @@ ImageMeasurement measurement_of(const Observation& observation, double stamp_s,
   measurement.features << f.s_rad, (edges_px[0] - *rcm_px).norm(), f.l_px, f.d_px;
   measurement.ends_px = both_ends(edges_px[0], edges_px[3]);
   measurement.covariance = features_covariance(edges_px, observation.edges_covariance_px2, rcm_px);
-  measurement.covariance += least_sigma.cwiseAbs2().asDiagonal();
+  measurement.covariance += min_sigma.cwiseAbs2().asDiagonal();
   measurement.found = measurement.covariance.allFinite();
   if (observation.rcm) measurement.q = observation.rcm->q.vector();
   return measurement;

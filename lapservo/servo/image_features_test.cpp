@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/servo/image_window.h"
 #include "lapservo/testing/rigs.h"
 
@@ -17,7 +17,7 @@ const Eigen::Vector4d somewhere(0.05, 1.57, 0.064, 1.2);
 
 Observation seen_at(const Rig& rig, const Eigen::Vector4d& q) {
   const Instrument& instrument = rig.instruments[0];
-  const auto coordinates = RcmCoordinates::from_vector(q);
+  const auto coordinates = JointVector::from_vector(q);
   const auto line = centre_line(rig.camera, instrument.marker,
                                 *instrument.camera_from_rcm * rcm_from_unrolled(coordinates), coordinates.psi_rad)
                         .value();

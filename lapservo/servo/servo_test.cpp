@@ -32,7 +32,7 @@ class PerfectWorld {
       input.image = ImageMeasurement{visible,           time_s_, state_now.features, 1e-4 * Eigen::Matrix4d::Identity(),
                                      state_now.ends_px, q_};
     }
-    if (broken_reading) input.joints.q.phi_rad = std::numeric_limits<double>::quiet_NaN();
+    if (broken_joints) input.joints.q.phi_rad = std::numeric_limits<double>::quiet_NaN();
     time_s_ += period_s;
     const ServoDecision decision = servo_.step(input);
     if (decision.send && !stuck) q_ = decision.control.setpoint.position;
@@ -45,7 +45,7 @@ class PerfectWorld {
   }
 
   OperatingState state = OperatingState::enabled;
-  bool sees = true, visible = true, broken_reading = false, stuck = false;
+  bool sees = true, visible = true, broken_joints = false, stuck = false;
   const Eigen::Vector4d& q() const { return q_; }
   void push(const Eigen::Vector4d& by) { q_ += by; }
 
@@ -103,10 +103,10 @@ TEST(Servo, SendsNothingToAnArmThatIsNotEnabledAndStartsAnewWhereItIs) {
   EXPECT_LT(world.steps(300).control.error.norm(), 0.05);
 }
 
-TEST(Servo, AReadingThatIsNotANumberLeavesEverythingFinite) {
+TEST(Servo, AMeasuredJointThatIsNotANumberLeavesEverythingFinite) {
   PerfectWorld world;
   world.steps(10);
-  world.broken_reading = true;
+  world.broken_joints = true;
   for (int i = 0; i < 30; ++i) {
     const ServoDecision decision = world.step();
     EXPECT_EQ(decision.control.action, ControlAction::hold);
@@ -114,7 +114,7 @@ TEST(Servo, AReadingThatIsNotANumberLeavesEverythingFinite) {
     EXPECT_TRUE(decision.control.setpoint.position.allFinite());
     EXPECT_TRUE(decision.control.velocity.allFinite());
   }
-  world.broken_reading = false;
+  world.broken_joints = false;
   EXPECT_LT(world.steps(300).control.error.norm(), 0.01);
 }
 

@@ -41,11 +41,11 @@ const ArmConfig& ArmConfig::checked() const {
   return *this;
 }
 
-Arm::Arm(const ArmConfig& config, const Eigen::Vector4d& readings)
-    : config_(config.checked()), setpoint_(readings), motor_(readings), played_(readings) {
-  check(readings.allFinite() && (readings.array() >= config.lower.array()).all() &&
-            (readings.array() <= config.upper.array()).all(),
-        "start", readings, "within lower and upper");
+Arm::Arm(const ArmConfig& config, const Eigen::Vector4d& q_measured)
+    : config_(config.checked()), setpoint_(q_measured), motor_(q_measured), q_driven_(q_measured) {
+  check(q_measured.allFinite() && (q_measured.array() >= config.lower.array()).all() &&
+            (q_measured.array() <= config.upper.array()).all(),
+        "start", q_measured, "within lower and upper");
 }
 
 void Arm::servo_jp(const Eigen::Vector4d& setpoint) {
@@ -57,14 +57,14 @@ void Arm::servo_jp(const Eigen::Vector4d& setpoint) {
 
 void Arm::step(double dt_s) {
   for (int i = 0; i < 4; ++i) motor_[i] = approach(motor_[i], setpoint_[i], config_.rate[i], config_.lag_s, dt_s);
-  played_ = played_.cwiseMax(motor_ - config_.backlash / 2).cwiseMin(motor_ + config_.backlash / 2);
+  q_driven_ = q_driven_.cwiseMax(motor_ - config_.backlash / 2).cwiseMin(motor_ + config_.backlash / 2);
 }
 
 Eigen::Vector4d Arm::measured_jp() const {
-  Eigen::Vector4d reading = motor_;
+  Eigen::Vector4d measured = motor_;
   for (int i = 0; i < 4; ++i)
-    if (config_.resolution[i] > 0) reading[i] = std::round(motor_[i] / config_.resolution[i]) * config_.resolution[i];
-  return reading;
+    if (config_.resolution[i] > 0) measured[i] = std::round(motor_[i] / config_.resolution[i]) * config_.resolution[i];
+  return measured;
 }
 
 void Arm::fault() {

@@ -6,13 +6,13 @@ namespace lapservo {
 
 /// What a real arm does to its setpoints. Joints: theta_rad, phi_rad, rho_m, psi_rad.
 struct ArmConfig {
-  Eigen::Vector4d lower{-1.2, 0.5, 0.02, -4.6};  ///< of the readings
+  Eigen::Vector4d lower{-1.2, 0.5, 0.02, -4.6};  ///< of the measured joints
   Eigen::Vector4d upper{1.2, 2.6, 0.22, 4.6};
   Eigen::Vector4d rate{1.5, 1.5, 0.15, 6};             ///< the motors' largest speeds, rad/s and m/s
   double lag_s = 0.02;                                 ///< first order, from setpoint to motor
   Eigen::Vector4d resolution{1e-5, 1e-5, 2e-6, 1e-4};  ///< of the encoders
-  Eigen::Vector4d backlash{0, 0, 1e-4, 0.02};          ///< full play between motor and instrument
-  /// Instrument less readings, when the play is in the middle: 2 degrees and 3 mm.
+  Eigen::Vector4d backlash{0, 0, 1e-4, 0.02};          ///< full backlash between motor and instrument
+  /// Instrument less measured joints, when the backlash is in the middle: 2 degrees and 3 mm.
   Eigen::Vector4d joint_offset{0.0349, -0.0349, 0.003, 0.0349};
   /// Where the true RCM lies in the RCM frame of the rig. Not zero: the rig is registered wrongly too.
   Eigen::Vector3d rcm_offset_m = Eigen::Vector3d::Zero();
@@ -25,8 +25,8 @@ struct ArmConfig {
 /// motion is exact, however finely it is stepped.
 class Arm {
  public:
-  /// At rest with these readings, which must lie within the limits (else InputError).
-  Arm(const ArmConfig& config, const Eigen::Vector4d& readings);
+  /// At rest with these measured joints, which must lie within the limits (else InputError).
+  Arm(const ArmConfig& config, const Eigen::Vector4d& q_measured);
 
   /// Goes there from now on. Beyond the limits it goes to the limit and counts; a value that isn't finite is a fault:
   /// the arm stops and stays until recover().
@@ -35,8 +35,8 @@ class Arm {
 
   /// What the encoders say: the motors' positions, rounded.
   Eigen::Vector4d measured_jp() const;
-  /// Where the instrument is: the motors' positions through play and offsets.
-  Eigen::Vector4d true_jp() const { return played_ + config_.joint_offset; }
+  /// Where the instrument is: the motors' positions through backlash and offsets.
+  Eigen::Vector4d true_jp() const { return q_driven_ + config_.joint_offset; }
 
   long setpoints_beyond_limits() const { return beyond_limits_; }
   bool faulted() const { return faulted_; }
@@ -45,7 +45,7 @@ class Arm {
 
  private:
   ArmConfig config_;
-  Eigen::Vector4d setpoint_, motor_, played_;
+  Eigen::Vector4d setpoint_, motor_, q_driven_;
   long beyond_limits_ = 0;
   bool faulted_ = false;
 };

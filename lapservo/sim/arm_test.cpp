@@ -87,8 +87,8 @@ TEST(Arm, MovesAlikeHoweverFinelyItIsStepped) {
   }
 }
 
-// Driven to and fro, the instrument stands apart by the whole play at the same reading.
-TEST(Arm, PlayIsAsWideAsConfigured) {
+// Driven to and fro, the instrument stands apart by the whole backlash at the same measured joint.
+TEST(Arm, BacklashIsAsWideAsConfigured) {
   ArmConfig config = ideal();
   config.backlash = {0.001, 0.002, 1e-4, 0.02};
   Arm arm(config, start);
@@ -101,7 +101,7 @@ TEST(Arm, PlayIsAsWideAsConfigured) {
   };
   const Eigen::Vector4d from_above = come_from(1), from_below = come_from(-1);
   EXPECT_LT((from_above - from_below - config.backlash).norm(), 1e-12);
-  // Within the play the instrument stays.
+  // Within the backlash the instrument stays.
   arm.servo_jp(start - 0.9 * config.backlash);
   arm.step(1);
   EXPECT_LT((arm.true_jp() - from_below).norm(), 1e-12);
@@ -115,9 +115,9 @@ TEST(Arm, ReadsInWholeStepsOfItsEncodersAndStandsOffByItsOffsets) {
   for (int k = 0; k < 100; ++k) {
     arm.servo_jp(start + Eigen::Vector4d(random.uniform(), random.uniform(), 0.1 * random.uniform(), random.uniform()));
     arm.step(0.013);
-    const Eigen::Vector4d reading = arm.measured_jp(), steps = reading.cwiseQuotient(config.resolution);
+    const Eigen::Vector4d measured = arm.measured_jp(), steps = measured.cwiseQuotient(config.resolution);
     for (int i = 0; i < 4; ++i) EXPECT_NEAR(steps[i], std::round(steps[i]), 1e-6);
-    const Eigen::Vector4d rounding = arm.true_jp() - reading - config.joint_offset;
+    const Eigen::Vector4d rounding = arm.true_jp() - measured - config.joint_offset;
     for (int i = 0; i < 4; ++i) EXPECT_LE(std::abs(rounding[i]), 0.5001 * config.resolution[i]);
   }
 }

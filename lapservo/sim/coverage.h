@@ -6,7 +6,7 @@ namespace lapservo::internal {
 
 /// The part of a pixel where a function is negative.
 struct Coverage {
-  float share = 0;                   ///< of the pixel's area
+  float fraction = 0;                ///< of the pixel's area
   float centre_x = 0, centre_y = 0;  ///< centroid, from the pixel's first corner, in [0, 1]; the middle when empty
 };
 

@@ -29,7 +29,7 @@ const EndoscopeConfig& EndoscopeConfig::checked() const {
   check(exposure_moments >= 2 && exposure_moments <= 100, "exposure_moments", exposure_moments, "2 to 100");
   check(latency_s >= exposure_s / 2 && latency_s <= 10, "latency_s", latency_s, "half the exposure to 10");
   check(jitter_s >= 0 && jitter_s <= 1, "jitter_s", jitter_s, "0 to 1");
-  check(dropped_share >= 0 && dropped_share <= 1, "dropped_share", dropped_share, "0 to 1");
+  check(dropped_fraction >= 0 && dropped_fraction <= 1, "dropped_fraction", dropped_fraction, "0 to 1");
   check(render_threads >= 0 && render_threads <= 64, "render_threads", render_threads, "0 to 64");
   return *this;
 }
@@ -61,7 +61,7 @@ std::vector<double> Endoscope::next_moments_s() const {
 void Endoscope::expose(const Exposure& shafts) {
   // A generator for each frame: what one frame draws doesn't change another.
   Random random(seed_ + 0x632be59bd9b4e019ULL * static_cast<std::uint64_t>(next_ + 1));
-  const bool dropped = random.uniform() < config_.dropped_share;
+  const bool dropped = random.uniform() < config_.dropped_fraction;
   const double jitter_s = random.uniform(-config_.jitter_s, config_.jitter_s);
   const std::uint64_t noise_seed = random.bits();
   EndoscopePicture picture;

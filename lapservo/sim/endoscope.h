@@ -15,13 +15,13 @@ namespace lapservo {
 
 struct EndoscopeConfig {
   double frame_rate_hz = 60;
-  double exposure_s = 0;         ///< shutter open for so long; 0: frozen, without motion blur
-  int exposure_moments = 5;      ///< that motion blur is made of
-  double latency_s = 0.08;       ///< from the middle of the exposure to arrival
-  double jitter_s = 0.001;       ///< arrival is evenly up to this much earlier or later
-  double dropped_share = 0.005;  ///< of the frames that never arrive
-  int render_threads = 2;        ///< frames are rendered while they are on their way; 0: when they are asked for
-  bool pictures = true;          ///< false: frames arrive without a picture, for studies that need only their times
+  double exposure_s = 0;            ///< shutter open for so long; 0: frozen, without motion blur
+  int exposure_moments = 5;         ///< that motion blur is made of
+  double latency_s = 0.08;          ///< from the middle of the exposure to arrival
+  double jitter_s = 0.001;          ///< arrival is evenly up to this much earlier or later
+  double dropped_fraction = 0.005;  ///< of the frames that never arrive
+  int render_threads = 2;           ///< frames are rendered while they are on their way; 0: when they are asked for
+  bool pictures = true;             ///< false: frames arrive without a picture, for studies that need only their times
 
   /// Returns itself if all its numbers make sense; else throws InputError naming the first field that doesn't.
   const EndoscopeConfig& checked() const;

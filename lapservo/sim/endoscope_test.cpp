@@ -13,7 +13,7 @@ namespace {
 EndoscopeConfig without_pictures() {
   EndoscopeConfig config;
   config.pictures = false;
-  config.jitter_s = config.dropped_share = 0;
+  config.jitter_s = config.dropped_fraction = 0;
   return config;
 }
 
@@ -69,7 +69,7 @@ TEST(Endoscope, JitterIsEvenWithinItsBoundsAndKeepsTheOrder) {
 
 TEST(Endoscope, DropsTheShareThatWasAskedForAndAlwaysTheSameOnes) {
   EndoscopeConfig config = without_pictures();
-  config.dropped_share = 0.2;
+  config.dropped_fraction = 0.2;
   const auto once = taken(config, 7, 5000), again = taken(config, 7, 5000), other = taken(config, 8, 5000);
   EXPECT_NEAR(static_cast<double>(once.size()) / 5000, 0.8, 4 * std::sqrt(0.2 * 0.8 / 5000));
   ASSERT_EQ(once.size(), again.size());

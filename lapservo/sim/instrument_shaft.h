@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/scene.h"
 
@@ -23,7 +23,7 @@ inline std::vector<ShaftModel> shafts_of(const Rig& rig) {
 }
 
 /// Where it is at a configuration. Throws std::bad_optional_access when the instrument has no camera_from_rcm.
-inline ShaftPlacement placement_of(const Instrument& instrument, const RcmCoordinates& q) {
+inline ShaftPlacement placement_of(const Instrument& instrument, const JointVector& q) {
   return {instrument.camera_from_rcm.value() * rcm_from_unrolled(q), q.psi_rad};
 }
 

@@ -144,10 +144,10 @@ cv::Mat Renderer::State::render_exposure(const Exposure& exposure, std::uint64_t
     clear(drawn);
   } else {
     cv::Mat exposed = background_light_.clone();
-    const double share = 1.0 / static_cast<double>(exposure.size());
+    const double fraction = 1.0 / static_cast<double>(exposure.size());
     for (const auto& moment : exposure) {
       const std::vector<cv::Rect> now = draw(moment);
-      for (const cv::Rect& part : now) exposed(part) += (scene_.light(part) - background_light_(part)) * share;
+      for (const cv::Rect& part : now) exposed(part) += (scene_.light(part) - background_light_(part)) * fraction;
       clear(now);
       drawn.insert(drawn.end(), now.begin(), now.end());
     }

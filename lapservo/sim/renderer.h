@@ -14,7 +14,7 @@ namespace lapservo {
 struct RenderOptions {
   Lighting lighting;
   Sensor sensor;
-  float smoke = 0;  ///< share of grey veil in front of everything, 0 to 1
+  float smoke = 0;  ///< fraction of grey veil in front of everything, 0 to 1
 };
 
 /// What one exposure sees: the shafts at one or, for motion blur, several moments of it.

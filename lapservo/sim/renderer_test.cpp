@@ -58,7 +58,7 @@ cv::Mat even_background(const Camera& camera, float light) {
   return {camera.height_px, camera.width_px, CV_32FC3, cv::Scalar::all(light)};
 }
 
-double largest_difference(const cv::Mat& a, const cv::Mat& b) {
+double max_difference(const cv::Mat& a, const cv::Mat& b) {
   return cv::norm(a, b, cv::NORM_INF);
 }
 
@@ -98,8 +98,8 @@ TEST(Renderer, AFullTurnChangesNothing) {
     const cv::Mat once = renderer.render({across_the_view(turn_rad, psi_rad)}, 1);
     const cv::Mat again = renderer.render({across_the_view(turn_rad, psi_rad + two_pi)}, 1);
     const cv::Mat other = renderer.render({across_the_view(turn_rad, psi_rad + 0.3)}, 1);
-    EXPECT_LE(largest_difference(once, again), 2);
-    EXPECT_GE(largest_difference(once, other), 50);
+    EXPECT_LE(max_difference(once, again), 2);
+    EXPECT_GE(max_difference(once, other), 50);
   }
 }
 
@@ -142,10 +142,10 @@ TEST(Renderer, IsDeterministicAndForgetsTheFrameBefore) {
   Renderer renderer(camera, {short_shaft()}, tissue), fresh(camera, {short_shaft()}, tissue);
   const cv::Mat first = renderer.render({across_the_view(0.3, 1)}, 7);
   const cv::Mat other = renderer.render({across_the_view(-1.2, 2)}, 8);
-  EXPECT_GT(largest_difference(first, other), 20);
-  EXPECT_EQ(largest_difference(renderer.render({across_the_view(0.3, 1)}, 7), first), 0);
-  EXPECT_EQ(largest_difference(fresh.render({across_the_view(0.3, 1)}, 7), first), 0);
-  EXPECT_GT(largest_difference(renderer.render({across_the_view(0.3, 1)}, 9), first), 0);
+  EXPECT_GT(max_difference(first, other), 20);
+  EXPECT_EQ(max_difference(renderer.render({across_the_view(0.3, 1)}, 7), first), 0);
+  EXPECT_EQ(max_difference(fresh.render({across_the_view(0.3, 1)}, 7), first), 0);
+  EXPECT_GT(max_difference(renderer.render({across_the_view(0.3, 1)}, 9), first), 0);
 }
 
 TEST(Renderer, EveryResponseShowsTheSameLight) {
@@ -157,8 +157,8 @@ TEST(Renderer, EveryResponseShowsTheSameLight) {
     Renderer renderer(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
     lights.push_back(light_of(renderer.render({across_the_view(0.3, 1)}, 7), response));
   }
-  EXPECT_LT(largest_difference(lights[0], lights[1]), 0.008);  // half a level of the coarser at white
-  EXPECT_LT(largest_difference(lights[0], lights[2]), 0.008);
+  EXPECT_LT(max_difference(lights[0], lights[1]), 0.008);  // half a level of the coarser at white
+  EXPECT_LT(max_difference(lights[0], lights[2]), 0.008);
 }
 
 TEST(Renderer, MotionBlurIsTheMeanOfItsMoments) {
@@ -172,8 +172,8 @@ TEST(Renderer, MotionBlurIsTheMeanOfItsMoments) {
   const cv::Mat a = renderer.render(moment(0.2), 1), b = renderer.render(moment(0.5), 1);
   cv::Mat mean;
   cv::addWeighted(a, 0.5, b, 0.5, 0, mean);
-  EXPECT_LE(largest_difference(renderer.render_exposure({moment(0.2), moment(0.5)}, 1), mean), 1);
-  EXPECT_LE(largest_difference(renderer.render_exposure({moment(0.2), moment(0.2)}, 1), a), 1);
+  EXPECT_LE(max_difference(renderer.render_exposure({moment(0.2), moment(0.5)}, 1), mean), 1);
+  EXPECT_LE(max_difference(renderer.render_exposure({moment(0.2), moment(0.2)}, 1), a), 1);
 }
 
 TEST(Renderer, TheNearerShaftHidesTheFarther) {
@@ -184,9 +184,9 @@ TEST(Renderer, TheNearerShaftHidesTheFarther) {
   Renderer alone(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
   const cv::Mat only_near = alone.render({near}, 1);
   const cv::Rect middle(230, 150, 20, 20);
-  EXPECT_LE(largest_difference(a(middle), only_near(middle)), 1);
-  EXPECT_LE(largest_difference(b(middle), only_near(middle)), 1);
-  EXPECT_GT(largest_difference(a, only_near), 50);
+  EXPECT_LE(max_difference(a(middle), only_near(middle)), 1);
+  EXPECT_LE(max_difference(b(middle), only_near(middle)), 1);
+  EXPECT_GT(max_difference(a, only_near), 50);
 }
 
 // What the lamps add goes with their power, matt and gloss; what is ambient stays.

@@ -8,7 +8,7 @@
 
 #include "lapservo/core/csv.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/edge_probe.h"
 #include "lapservo/sim/instrument_shaft.h"
@@ -49,8 +49,8 @@ std::vector<Pair> pairs(const fs::path& folder) {
     options.sensor.gains = Light::Constant(gain);
     const cv::Mat background(camera.height_px, camera.width_px, CV_32FC3, cv::Scalar::all(0.2));
     Renderer renderer(camera, {shaft_of(rig.instruments[0])}, background, options);
-    const RcmCoordinates q{truth.number(row, "theta_rad"), truth.number(row, "phi_rad"), truth.number(row, "rho_m"),
-                           truth.number(row, "psi_rad")};
+    const JointVector q{truth.number(row, "theta_rad"), truth.number(row, "phi_rad"), truth.number(row, "rho_m"),
+                        truth.number(row, "psi_rad")};
     pair.rendered = renderer.render({placement_of(rig.instruments[0], q)}, row);
     pair.gain = gain;
     found.push_back(pair);

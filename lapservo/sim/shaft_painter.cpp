@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t samples_a_pixel = 32;
 // Beyond these azimuths, curvature within a pixel counts: near the silhouettes.
-constexpr float flat_rad = 1.2F, limb_rad = 1.35F;
+constexpr float flat_rad = 1.2F, contour_rad = 1.35F;
 
 // A rank-1 lattice: every sample has a row and a column of its own, so edges along the axes are as fine as any.
 constexpr std::array<std::array<float, 2>, samples_a_pixel> make_lattice() {
@@ -168,7 +168,7 @@ ShaftPainter::Paint ShaftPainter::inside(const Corners& at) {
     return {reflectance(Part::tip, mean(at.along_m)) * lit.matt + Light::Constant(lit.gloss), 1};
   }
   float azimuth_rad = mean(at.azimuth_rad);
-  if (std::abs(azimuth_rad) > limb_rad) {
+  if (std::abs(azimuth_rad) > contour_rad) {
     single_.x[0] = mean(at.x);
     single_.y[0] = mean(at.y);
     tracer_.trace(single_, false);
@@ -189,8 +189,8 @@ bool ShaftPainter::silhouette(const Corners& at, Part inner, Paint& paint) {
   tracer_.trace(single_, false);
   if (single_.part[0] != inner) return false;
   paint = of_side(inner, single_.azimuth_rad[0], single_.along_m[0]);
-  paint.light *= covered.share;
-  paint.cover = covered.share;
+  paint.light *= covered.fraction;
+  paint.cover = covered.fraction;
   return true;
 }
 
@@ -204,11 +204,11 @@ bool ShaftPainter::boundary(const Corners& at, Part proximal, Part distal, Paint
     beyond_m[i] = tracer_.beyond_boundary_m(static_cast<std::size_t>(proximal), at.azimuth_rad[i], at.along_m[i]);
     if ((beyond_m[i] < 0) != (at.part[i] == proximal)) return false;
   }
-  const float share = negative_part(beyond_m).share;
+  const float fraction = negative_part(beyond_m).fraction;
   const float azimuth_rad = mean(at.azimuth_rad), along_m = mean(at.along_m);
-  paint = {
-      share * of_side(proximal, azimuth_rad, along_m).light + (1 - share) * of_side(distal, azimuth_rad, along_m).light,
-      1};
+  paint = {fraction * of_side(proximal, azimuth_rad, along_m).light +
+               (1 - fraction) * of_side(distal, azimuth_rad, along_m).light,
+           1};
   return true;
 }
 

@@ -26,7 +26,7 @@ class PixelRays {
 };
 
 /// Light that gathers in front of a background. `depth_m` and `cover` say for each pixel how near the nearest shaft
-/// drawn so far is and what share of the pixel shafts cover; empty when there is only one.
+/// drawn so far is and what fraction of the pixel shafts cover; empty when there is only one.
 struct SceneLight {
   cv::Mat light, depth_m, cover;
 };
@@ -41,7 +41,7 @@ class ShaftPainter {
   void paint(const PixelRays& rays, const cv::Rect& part, const cv::Mat& behind, SceneLight& scene);
 
  private:
-  /// What a pixel receives from this shaft: light, already weighted with the share of the pixel that it covers.
+  /// What a pixel receives from this shaft: light, already weighted with the fraction of the pixel that it covers.
   struct Paint {
     Light light = Light::Zero();
     float cover = 0;

@@ -32,10 +32,10 @@ Endoscope make_endoscope(const Rig& rig, const SimulatorConfig& config) {
 
 }  // namespace
 
-Simulator::Simulator(const Rig& rig, const SimulatorConfig& config, const RcmCoordinates& readings)
+Simulator::Simulator(const Rig& rig, const SimulatorConfig& config, const JointVector& q_measured)
     : camera_from_rcm_(*first_instrument(rig).camera_from_rcm *
                        Rigid3{Eigen::Quaterniond::Identity(), config.arm.rcm_offset_m}),
-      arm_(config.arm, readings.vector()),
+      arm_(config.arm, q_measured.vector()),
       endoscope_(make_endoscope(rig, config)),
       arm_period_s_(1 / config.arm_rate_hz) {}
 
@@ -64,7 +64,7 @@ void Simulator::sleep_until(double time_s) {
 }
 
 ShaftPlacement Simulator::placement() const {
-  const RcmCoordinates q = true_q();
+  const JointVector q = true_q();
   const bool covered =
       std::any_of(covered_.begin(), covered_.end(), [&](const Interval& when) { return when.contains(time_s_); });
   return {camera_from_rcm_ * rcm_from_unrolled(q), q.psi_rad, covered};
@@ -92,7 +92,7 @@ void Simulator::step(double dt_s) {
 std::vector<SimulatedFrame> Simulator::arrived() {
   std::vector<SimulatedFrame> frames;
   for (EndoscopePicture& picture : endoscope_.arrived(time_s_)) {
-    const RcmCoordinates q = truth_.at(picture.index);
+    const JointVector q = truth_.at(picture.index);
     truth_.erase(truth_.begin(), truth_.upper_bound(picture.index));
     frames.push_back({std::move(picture), q});
   }

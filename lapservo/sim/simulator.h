@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/clock.h"
 #include "lapservo/robot/robot.h"
@@ -34,7 +34,7 @@ struct Interval {
 /// A frame with its truth.
 struct SimulatedFrame {
   EndoscopePicture picture;
-  RcmCoordinates q;  ///< of the instrument in the middle of the exposure, for evaluation
+  JointVector q;  ///< of the instrument in the middle of the exposure, for evaluation
 };
 
 /// A simulated operating room: the first instrument of a rig on an arm, before an endoscope, and the time that they
@@ -44,8 +44,8 @@ struct SimulatedFrame {
 class Simulator : public Robot, public ImageStream, public Clock {
  public:
   /// `rig` is how things really are; what a program believes may differ. Its first instrument needs camera_from_rcm
-  /// (else InputError). The arm starts at rest with these readings.
-  Simulator(const Rig& rig, const SimulatorConfig& config, const RcmCoordinates& readings);
+  /// (else InputError). The arm starts at rest with these measured joints.
+  Simulator(const Rig& rig, const SimulatorConfig& config, const JointVector& q_measured);
 
   JointState state() override;
   void send(const JointPath& path) override;
@@ -70,7 +70,7 @@ class Simulator : public Robot, public ImageStream, public Clock {
   void cover_marker(const Interval& when) { covered_.push_back(when); }
 
   /// The instrument in the camera's truth, now.
-  RcmCoordinates true_q() const { return RcmCoordinates::from_vector(arm_.true_jp()); }
+  JointVector true_q() const { return JointVector::from_vector(arm_.true_jp()); }
   ShaftPlacement placement() const;
 
  private:
@@ -81,8 +81,8 @@ class Simulator : public Robot, public ImageStream, public Clock {
   std::optional<JointPath> path_;
   std::vector<Interval> covered_;
   double time_s_ = 0;
-  Exposure exposing_;                     // the moments of the current frame so far
-  std::map<long, RcmCoordinates> truth_;  // of frames on their way
+  Exposure exposing_;                  // the moments of the current frame so far
+  std::map<long, JointVector> truth_;  // of frames on their way
   long taken_ = 0;
 };
 

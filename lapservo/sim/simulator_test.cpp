@@ -25,8 +25,8 @@ Rig small_rig() {
   return rig;
 }
 
-RcmCoordinates in_view(const Rig& rig) {
-  RcmCoordinates q = configuration_through(*rig.instruments[0].camera_from_rcm, {-0.012, 0.004, 0.1}).value();
+JointVector in_view(const Rig& rig) {
+  JointVector q = configuration_through(*rig.instruments[0].camera_from_rcm, {-0.012, 0.004, 0.1}).value();
   q.psi_rad = 0.6;
   return q;
 }
@@ -44,7 +44,7 @@ struct Seen {
 };
 
 // A slow sweep at 1 kHz.
-Seen sweep(Simulator& simulator, const RcmCoordinates& from, double duration_s) {
+Seen sweep(Simulator& simulator, const JointVector& from, double duration_s) {
   Seen seen;
   const auto ticks = static_cast<int>(std::lround(duration_s * 1000));
   for (int k = 0; k < ticks; ++k) {
@@ -66,7 +66,7 @@ TEST(Simulator, IsTheSameBitForBitWhateverThreadsRender) {
     SimulatorConfig config;
     config.endoscope.render_threads = threads;
     config.endoscope.exposure_s = 0.004;
-    config.endoscope.dropped_share = 0.1;
+    config.endoscope.dropped_fraction = 0.1;
     if (runs.size() == 3) config.seed = 2;
     Simulator simulator(rig, config, in_view(rig));
     runs.push_back(sweep(simulator, in_view(rig), 0.7));
@@ -109,7 +109,7 @@ TEST(Simulator, AFrameShowsTheInstrumentAtItsExposure) {
     SimulatorConfig config = without_offsets();
     config.endoscope.latency_s = latency_s;
     config.endoscope.jitter_s = 0;
-    config.endoscope.dropped_share = 0;
+    config.endoscope.dropped_fraction = 0;
     config.render.sensor.gains = Light::Constant(0.5F);
     Simulator simulator(rig, config, in_view(rig));
     const Seen seen = sweep(simulator, in_view(rig), 0.5);
@@ -132,7 +132,7 @@ TEST(Simulator, AFrameShowsTheInstrumentAtItsExposure) {
   }
 }
 
-TEST(Simulator, ReadingsAreOffByTwoDegreesAndThreeMillimetres) {
+TEST(Simulator, MeasuredJointsAreOffByTwoDegreesAndThreeMillimetres) {
   const Rig rig = small_rig();
   SimulatorConfig config;
   config.endoscope.pictures = false;
@@ -150,7 +150,7 @@ TEST(Simulator, ReadingsAreOffByTwoDegreesAndThreeMillimetres) {
 TEST(Simulator, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
   const Rig rig = small_rig();
   SimulatorConfig config = without_offsets();
-  config.endoscope.jitter_s = config.endoscope.dropped_share = 0;
+  config.endoscope.jitter_s = config.endoscope.dropped_fraction = 0;
   Simulator simulator(rig, config, in_view(rig));
   simulator.cover_marker({0.2, 0.3});
   const auto middle_of_band = [&](const SimulatedFrame& frame) {

@@ -16,7 +16,7 @@ TruthCsv::TruthCsv(const std::filesystem::path& path) : file_(path) {
 }
 
 void TruthCsv::add(const std::string& file, const std::string& condition, const Camera& camera,
-                   const Instrument& instrument, const RcmCoordinates& q) {
+                   const Instrument& instrument, const JointVector& q) {
   const Rigid3& camera_from_rcm = instrument.camera_from_rcm.value();
   const auto line = centre_line(camera, instrument.marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
   const auto rcm_px = projected_rcm_px(camera, camera_from_rcm);

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
@@ -15,7 +15,7 @@ class TruthCsv {
   explicit TruthCsv(const std::filesystem::path& path);
   /// The instrument must have camera_from_rcm, and its marker lie before the camera (else std::invalid_argument).
   void add(const std::string& file, const std::string& condition, const Camera& camera, const Instrument& instrument,
-           const RcmCoordinates& q);
+           const JointVector& q);
   void commit() { file_.commit(); }
 
  private:

@@ -19,8 +19,8 @@ inline Marker marker_with(const std::array<double, 3>& upper_m, const std::array
 /// l1 : l2 constant: both inner boundaries, extended, meet on the proximal end.
 inline Marker random_linear_marker(Random& random) {
   const double ratio = random.uniform(0.3, 3), length_m = random.uniform(0.01, 0.05);
-  const auto bands = [&](double proximal_share) {
-    const double proximal_m = proximal_share * length_m, l1 = proximal_m * ratio / (1 + ratio);
+  const auto bands = [&](double proximal_fraction) {
+    const double proximal_m = proximal_fraction * length_m, l1 = proximal_m * ratio / (1 + ratio);
     return std::array<double, 3>{l1, proximal_m - l1, length_m - proximal_m};
   };
   const double a = random.uniform(0.15, 0.45), b = random.uniform(0.55, 0.85);

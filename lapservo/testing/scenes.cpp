@@ -57,7 +57,7 @@ Rig usual_rig(std::size_t instruments) {
   return rig;
 }
 
-RcmCoordinates random_configuration(const Rig& rig, std::size_t i, Random& random) {
+JointVector random_configuration(const Rig& rig, std::size_t i, Random& random) {
   const Instrument& instrument = rig.instruments[i];
   for (int attempt = 0; attempt < 50000; ++attempt) {
     const double v_px = random.uniform(0, rig.camera.height_px);  // a statement each: arguments have no order
@@ -71,11 +71,11 @@ RcmCoordinates random_configuration(const Rig& rig, std::size_t i, Random& rando
   throw std::logic_error("no configuration of this instrument is wholly in view");
 }
 
-ShaftPose pose_of(const Rig& rig, std::size_t i, const RcmCoordinates& q) {
+ShaftPose pose_of(const Rig& rig, std::size_t i, const JointVector& q) {
   return {*rig.instruments[i].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
 }
 
-cv::Mat render(const Rig& rig, const std::vector<RcmCoordinates>& configurations, std::uint64_t seed,
+cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,
                const RenderOptions& options) {
   static const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
   std::vector<ShaftModel> shafts;
@@ -109,7 +109,7 @@ Scene Sight::scene(std::size_t i) const {
 
 namespace {
 
-RcmCoordinates configuration_of_seed(const Rig& rig, std::uint64_t seed) {
+JointVector configuration_of_seed(const Rig& rig, std::uint64_t seed) {
   Random random(seed);
   return random_configuration(rig, 0, random);
 }

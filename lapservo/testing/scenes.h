@@ -6,7 +6,7 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/vision/fine_fit.h"
@@ -22,12 +22,12 @@ using namespace internal;
 Rig usual_rig(std::size_t instruments = 1);
 
 /// The marker wholly in view (a lens's distortion neglected), at most 0.35 rad from facing the camera.
-RcmCoordinates random_configuration(const Rig& rig, std::size_t instrument, Random& random);
+JointVector random_configuration(const Rig& rig, std::size_t instrument, Random& random);
 
-ShaftPose pose_of(const Rig& rig, std::size_t instrument, const RcmCoordinates& q);
+ShaftPose pose_of(const Rig& rig, std::size_t instrument, const JointVector& q);
 
 /// All instruments of the rig in front of tissue; `configurations` in the rig's order. The seed is that of the noise.
-cv::Mat render(const Rig& rig, const std::vector<RcmCoordinates>& configurations, std::uint64_t seed,
+cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,
                const RenderOptions& options = {});
 
 /// Tissue alone.
@@ -57,7 +57,7 @@ class Sight {
 /// One instrument somewhere before the usual rig's camera.
 struct Shot {
   Rig rig;
-  RcmCoordinates q;
+  JointVector q;
   cv::Mat bgr;
   Sight sight;
 

@@ -78,7 +78,7 @@ ImageTerms terms_of(const Rigid3& camera_from_rcm, const PoseUnknowns& start) {
 
 // Tries the axes and random directions both ways, keeps what is better, and halves the steps when nothing is.
 double climb(const Scene& scene, ImageTerms& terms, Eigen::Vector4d steps, Random& random) {
-  constexpr int halvings = 5, directions = 14, most_moves = 8;
+  constexpr int halvings = 5, directions = 14, max_moves = 8;
   const auto score_at = [&](const Eigen::Vector4d& at) {
     const auto unknowns = terms.unknowns(at);
     return unknowns ? agreement(scene, unknowns->pose()) : -1e9;
@@ -86,7 +86,7 @@ double climb(const Scene& scene, ImageTerms& terms, Eigen::Vector4d steps, Rando
   double best = score_at(terms.values);
   for (int halving = 0; halving < halvings; ++halving, steps /= 2) {
     bool moved = true;
-    for (int move = 0; moved && move < most_moves; ++move) {
+    for (int move = 0; moved && move < max_moves; ++move) {
       moved = false;
       for (int i = 0; i < directions; ++i) {
         Eigen::Vector4d direction = Eigen::Vector4d::Unit(i % 4);

@@ -64,13 +64,13 @@ int allocations_when_tracked(std::size_t instruments) {
   constexpr int warm_up = 3, frames = 8;
   const Rig rig = scenes::usual_rig(instruments);
   const std::vector<Eigen::Vector3d> places_m{{-0.02, 0.01, 0.1}, {0.04, 0, 0.1}, {0.006, -0.03, 0.1}};
-  std::vector<RcmCoordinates> configurations;
+  std::vector<JointVector> configurations;
   for (std::size_t i = 0; i < instruments; ++i)
     configurations.push_back(configuration_through(*rig.instruments[i].camera_from_rcm, places_m[i]).value());
   Tracker tracker(rig);
   int counted = 0;
   for (int frame = 0; frame < frames; ++frame) {
-    for (RcmCoordinates& q : configurations) q.psi_rad += 0.03, q.theta_rad += 0.002;
+    for (JointVector& q : configurations) q.psi_rad += 0.03, q.theta_rad += 0.002;
     const cv::Mat image = scenes::render(rig, configurations, static_cast<std::uint64_t>(frame));
     allocations = 0;
     counting = frame >= warm_up;

@@ -98,7 +98,7 @@ Blob take_blob(Grid& grid, int seed, std::vector<int>& stack) {
 
 }  // namespace
 
-std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int least_samples) {
+std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int min_samples) {
   Grid grid(image, classes, grid_px);
   drop_lonely(grid);
   std::vector<Blob> blobs;
@@ -107,7 +107,7 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes
     if (!grid.at(seed)) continue;
     Blob blob = take_blob(grid, seed, stack);
     blob.grid_px = grid_px;
-    if (static_cast<int>(blob.samples.size()) >= least_samples) blobs.push_back(std::move(blob));
+    if (static_cast<int>(blob.samples.size()) >= min_samples) blobs.push_back(std::move(blob));
   }
   std::sort(blobs.begin(), blobs.end(),
             [](const Blob& a, const Blob& b) { return a.samples.size() > b.samples.size(); });

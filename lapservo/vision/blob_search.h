@@ -18,7 +18,7 @@ struct Blob {
   int grid_px = 0;  ///< distance of neighbouring samples
 };
 
-/// All groups of coloured samples of at least `least_samples`, largest first. Touches one pixel in grid_px^2 only.
-std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int least_samples);
+/// All groups of coloured samples of at least `min_samples`, largest first. Touches one pixel in grid_px^2 only.
+std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int min_samples);
 
 }  // namespace lapservo::internal

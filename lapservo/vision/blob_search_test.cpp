@@ -14,7 +14,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int width_px = 640, height_px = 480, grid_px = 8, least_samples = 8;
+constexpr int width_px = 640, height_px = 480, grid_px = 8, min_samples = 8;
 
 ColorClasses usual_classes() {
   Instrument instrument;
@@ -49,7 +49,7 @@ cv::Mat blank() {
 }
 
 std::vector<Blob> search(const cv::Mat& image) {
-  return find_blobs(ImageView(image), usual_classes(), grid_px, least_samples);
+  return find_blobs(ImageView(image), usual_classes(), grid_px, min_samples);
 }
 
 TEST(BlobSearch, FindsAMarkerWhereverItLiesAndHoweverItIsTurned) {

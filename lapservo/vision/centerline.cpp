@@ -24,7 +24,7 @@ namespace {
 // and compressed frames the latter is 0.5 to 0.9.
 constexpr double boundary_sigma_px = 0.7, across_sigma_px = 0.5;
 constexpr double widest_hue_deg = 30;
-constexpr int least_saturation = 60, least_value = 40, least_area_px = 150;
+constexpr int min_saturation = 60, min_value = 40, min_area_px = 150;
 
 using BandMasks = std::array<cv::Mat, 3>;
 using Edges = std::array<Eigen::Vector2d, 4>;
@@ -32,7 +32,7 @@ using Edges = std::array<Eigen::Vector2d, 4>;
 cv::Mat hue_mask(const cv::Mat& hsv, double hue_deg, double reach_deg) {
   const auto in_range = [&](double low_deg, double high_deg) {
     cv::Mat mask;
-    cv::inRange(hsv, cv::Scalar(low_deg / 2, least_saturation, least_value), cv::Scalar(high_deg / 2, 255, 255), mask);
+    cv::inRange(hsv, cv::Scalar(low_deg / 2, min_saturation, min_value), cv::Scalar(high_deg / 2, 255, 255), mask);
     return mask;
   };
   const double low = hue_deg - reach_deg, high = hue_deg + reach_deg;
@@ -68,7 +68,7 @@ std::vector<Region> regions_of(const BandMasks& masks) {
   const int count = cv::connectedComponentsWithStats(joined, labels, stats, centroids);
   std::vector<int> order;
   for (int i = 1; i < count; ++i)
-    if (stats.at<int>(i, cv::CC_STAT_AREA) >= least_area_px) order.push_back(i);
+    if (stats.at<int>(i, cv::CC_STAT_AREA) >= min_area_px) order.push_back(i);
   std::sort(order.begin(), order.end(),
             [&](int a, int b) { return stats.at<int>(a, cv::CC_STAT_AREA) > stats.at<int>(b, cv::CC_STAT_AREA); });
   std::vector<Region> regions;
@@ -172,8 +172,8 @@ std::optional<Edges> boundaries_on(const MiddleLine& line, const Camera& camera,
 }
 
 // theta, phi and rho from e0 and e3 on the facing generatrix, for a known tau: Gauss-Newton with numeric derivatives.
-std::optional<RcmCoordinates> configuration_from(const Camera& camera, const Instrument& instrument, const Edges& edges,
-                                                 double tau_rad) {
+std::optional<JointVector> configuration_from(const Camera& camera, const Instrument& instrument, const Edges& edges,
+                                              double tau_rad) {
   const Rigid3& camera_from_rcm = *instrument.camera_from_rcm;
   const double depth_m = camera.fx_px * instrument.marker.length_m() / std::max(1.0, (edges[3] - edges[0]).norm());
   auto start = configuration_through(camera_from_rcm, camera.ray_from_ideal(edges[0]) * depth_m);
@@ -207,8 +207,8 @@ std::optional<RcmCoordinates> configuration_from(const Camera& camera, const Ins
   const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled({x[0], x[1], x[2], 0});
   const auto line = centre_line(camera, instrument.marker, unrolled, 0);
   if (!line) return std::nullopt;
-  return RcmCoordinates{wrap_pi(x[0]), x[1], x[2],
-                        wrap_pi(rotation_rad(instrument.marker, line->facing_azimuth_rad, tau_rad))};
+  return JointVector{wrap_pi(x[0]), x[1], x[2],
+                     wrap_pi(rotation_rad(instrument.marker, line->facing_azimuth_rad, tau_rad))};
 }
 
 double tau_from(const CrossRatioDecoder& decoder, const Edges& e) {
@@ -234,9 +234,9 @@ EdgesCovariance covariance_of(const Edges& edges) {
     Eigen::Matrix<double, 8, 1> own = Eigen::Matrix<double, 8, 1>::Zero();
     own.segment<2>(place) = boundary_sigma_px * along;
     add(own);
-    const double share = (edges[k] - edges[0]).norm() / length_px;
-    at_first.segment<2>(place) = (1 - share) * across_sigma_px * across;
-    at_last.segment<2>(place) = share * across_sigma_px * across;
+    const double fraction = (edges[k] - edges[0]).norm() / length_px;
+    at_first.segment<2>(place) = (1 - fraction) * across_sigma_px * across;
+    at_last.segment<2>(place) = fraction * across_sigma_px * across;
   }
   add(at_first), add(at_last);
   return covariance;

@@ -21,7 +21,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr int line_count = 13, station_count = 15, samples_along = 128;
-constexpr int most_reach = 200;  // samples on each side of a section's middle
+constexpr int max_reach = 200;  // samples on each side of a section's middle
 
 // Measured image points that lie on the marker's outline or boundaries, attached to where they belong on its surface.
 struct SidePoint {
@@ -43,7 +43,7 @@ Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azi
 }
 
 // The stretch of a section with the most marker colour in it.
-Stretch<float> most_colorful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
+Stretch<float> max_colorful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
   return heaviest_stretch(0, static_cast<int>(classes.size()), [&](int i) {
     const std::uint8_t color = classes[static_cast<std::size_t>(i)];
     return scene.is_ours(color) ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
@@ -53,7 +53,7 @@ Stretch<float> most_colorful_stretch(std::span<const std::uint8_t> classes, cons
 // Sections across the shaft: where its colours begin and end.
 SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double reach_px) {
   SidePoints points;
-  InplaceVector<std::uint8_t, 2 * most_reach + 1> classes;
+  InplaceVector<std::uint8_t, 2 * max_reach + 1> classes;
   for (int station = 0; station < station_count; ++station) {
     const double along_m = scene.marker.length_m() * (0.04 + 0.92 * station / (station_count - 1));
     const auto silhouette = [&](double side) {
@@ -65,10 +65,10 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     if (!(half_px > 2) || half_px > 4000) continue;
     const Eigen::Vector2d across = (right - left) / (2 * half_px);
     const double step_px = std::max(1.0, half_px / 40);
-    const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), most_reach);
+    const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), max_reach);
     classes.clear();
     for (int i = -reach; i <= reach; ++i) classes.push_back(scene.class_at(middle + i * step_px * across));
-    const Stretch<float> stretch = most_colorful_stretch(classes, scene);
+    const Stretch<float> stretch = max_colorful_stretch(classes, scene);
     const double width_px = (stretch.last - stretch.first + 1) * step_px;
     if (width_px < detection_limits.narrowest_section * 2 * half_px ||
         width_px > detection_limits.widest_section * 2 * half_px)
@@ -76,7 +76,7 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     const auto add = [&](int inner, int outer, double side) {
       if (outer < 0 || outer >= static_cast<int>(classes.size())) return;
       if (classes[static_cast<std::size_t>(outer)] == Scene::outside) return;
-      const double t_px = (inner - reach + 0.5 * side) * step_px + side * detection_limits.limb_inset_px;
+      const double t_px = (inner - reach + 0.5 * side) * step_px + side * detection_limits.contour_inset_px;
       points.push_back({middle + t_px * across, side, along_m});
     };
     add(stretch.first, stretch.first - 1, -1);
@@ -252,8 +252,7 @@ CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOp
         sample_surface(scene, fit.unknowns.pose(), *view, std::max(0.12, options.along_reach * narrowing));
     const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
     fit.boundaries_seen = static_cast<int>(boundaries.size());
-    if (fit.boundaries_seen < detection_limits.fewest_boundaries || sides.size() < detection_limits.fewest_sides)
-      return fit;
+    if (fit.boundaries_seen < detection_limits.min_boundaries || sides.size() < detection_limits.min_sides) return fit;
     if (options.search_rotation && round == 1) {
       const RotationSearch search = search_rotation(scene, surface);
       fit.unknowns = fit.unknowns.with_psi(search.psi_rad);

@@ -16,7 +16,7 @@ double hue_gap_deg(double a_deg, double b_deg) {
 // HSV hue of encoded values, or nullopt for what is too grey or too dark to have one.
 std::optional<double> hue_of(double b, double g, double r) {
   const double highest = std::max({b, g, r}), chroma = highest - std::min({b, g, r});
-  if (chroma < color_limits.least_chroma || chroma < color_limits.least_saturation * highest) return std::nullopt;
+  if (chroma < color_limits.min_chroma || chroma < color_limits.min_saturation * highest) return std::nullopt;
   if (highest == r) return 60 * (g - b) / chroma;
   if (highest == g) return 120 + 60 * (b - r) / chroma;
   return 240 + 60 * (r - g) / chroma;

@@ -21,8 +21,8 @@ namespace lapservo::internal {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr std::size_t most_lanes = 16;
-using Floats = hn::CappedTag<float, most_lanes>;
+constexpr std::size_t max_lanes = 16;
+using Floats = hn::CappedTag<float, max_lanes>;
 using Ints = hn::RebindToSigned<Floats>;
 using V = hn::Vec<Floats>;
 using VI = hn::Vec<Ints>;
@@ -30,7 +30,7 @@ using Mask = hn::Mask<Floats>;
 
 // A value for every lane.
 struct Lanes {
-  alignas(64) std::array<float, most_lanes> value;
+  alignas(64) std::array<float, max_lanes> value;
   V load() const { return hn::Load(Floats(), value.data()); }
   void store(V values) { hn::Store(values, Floats(), value.data()); }
 };
@@ -51,7 +51,7 @@ LineLanes lanes_of(std::span<const EdgeLine> lines, std::size_t lanes) {
     out.u.value[j] = line.u_px, out.v.value[j] = line.v_px;
     out.du.value[j] = line.du, out.dv.value[j] = line.dv;
     out.first.value[j] = static_cast<float>(-line.before), out.last.value[j] = static_cast<float>(line.after);
-    out.blur.value[j] = line.blur_px, out.radius.value[j] = line.limb_radius_px;
+    out.blur.value[j] = line.blur_px, out.radius.value[j] = line.contour_radius_px;
     out.samples = std::max(out.samples, static_cast<std::size_t>(line.before + line.after + 1));
   }
   return out;
@@ -64,10 +64,10 @@ struct SampledLanes {
 
 // The four pixels around a place, in each lane: two words a row hold blue, green and red of both.
 struct Neighbours {
-  alignas(64) std::array<std::array<std::int32_t, most_lanes>, 4> words;
+  alignas(64) std::array<std::array<std::int32_t, max_lanes>, 4> words;
 
   void load(const ImageView& image, VI u, VI v, std::size_t lanes) {
-    alignas(64) std::array<std::int32_t, most_lanes> us, vs;
+    alignas(64) std::array<std::int32_t, max_lanes> us, vs;
     hn::Store(u, Ints(), us.data());
     hn::Store(v, Ints(), vs.data());
     for (std::size_t j = 0; j < lanes; ++j) {
@@ -299,7 +299,7 @@ FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, con
   fit.residual_variance = hn::Div(hn::Max(zero, squares), degrees);
   // Comparisons with what is not finite are false.
   const V huge = hn::Set(d, 1e30F);
-  fit.converged = hn::And(hn::And(fit.converged, hn::Gt(fit.information, hn::Set(d, least_edge_information))),
+  fit.converged = hn::And(hn::And(fit.converged, hn::Gt(fit.information, hn::Set(d, min_edge_information))),
                           hn::And(hn::Ge(degrees, hn::Set(d, 3)),
                                   hn::And(hn::Lt(hn::Abs(fit.offset), huge), hn::Lt(fit.residual_variance, huge))));
   return fit;
@@ -333,7 +333,7 @@ FitLanes iterate(const LineLanes& lines, const std::array<Column, 3>& light, con
     fit.converged = hn::And(fit.converged, hn::Le(hn::Abs(edge_px), reach));
     active = hn::And(hn::And(active, fit.converged), hn::Ge(hn::Abs(step), hn::Set(d, edge_tolerance_px)));
   }
-  const V largest = hn::Set(d, iterations > 1 ? largest_last_step_px : largest_only_step_px);
+  const V largest = hn::Set(d, iterations > 1 ? max_last_step_px : max_only_step_px);
   fit.converged = hn::And(fit.converged, hn::Lt(hn::Abs(fit.offset), largest));
   fit.offset = edge_px;
   return fit;
@@ -358,7 +358,8 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
   for (std::size_t j = 0; j < lines.size(); ++j) {
     const auto of = [j](const Lanes& lane) { return lane.value[j]; };
     if (of(sampled.brightest) >= LightImage::saturated_value) {
-      fits.push_back(Shapes == 1 ? locate_step(image, lines[j], iterations) : locate_limb(image, lines[j], iterations));
+      fits.push_back(Shapes == 1 ? locate_step(image, lines[j], iterations)
+                                 : locate_contour(image, lines[j], iterations));
     } else {
       fits.push_back({of(converged) > 0,
                       of(offset),
@@ -383,7 +384,7 @@ EdgeFits locate_all(const LightImage& image, std::span<const EdgeLine> lines, in
 EdgeFits locate_steps(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
   return locate_all<1>(image, lines, iterations);
 }
-EdgeFits locate_limbs(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
+EdgeFits locate_contours(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
   return locate_all<2>(image, lines, iterations);
 }
 
@@ -395,7 +396,7 @@ HWY_AFTER_NAMESPACE();
 namespace lapservo::internal {
 
 HWY_EXPORT(locate_steps);
-HWY_EXPORT(locate_limbs);
+HWY_EXPORT(locate_contours);
 
 EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line) {
   EdgeProfile profile;
@@ -416,16 +417,16 @@ EdgeFit locate_step(const LightImage& light, const EdgeLine& line, int iteration
   return fit_step(sample_profile(light, line), line.blur_px, iterations);
 }
 
-EdgeFit locate_limb(const LightImage& light, const EdgeLine& line, int iterations) {
-  return fit_limb(sample_profile(light, line), line.blur_px, line.limb_radius_px, iterations);
+EdgeFit locate_contour(const LightImage& light, const EdgeLine& line, int iterations) {
+  return fit_contour(sample_profile(light, line), line.blur_px, line.contour_radius_px, iterations);
 }
 
 EdgeFits locate_steps(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
   return HWY_DYNAMIC_DISPATCH(locate_steps)(light, lines, iterations);
 }
 
-EdgeFits locate_limbs(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
-  return HWY_DYNAMIC_DISPATCH(locate_limbs)(light, lines, iterations);
+EdgeFits locate_contours(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
+  return HWY_DYNAMIC_DISPATCH(locate_contours)(light, lines, iterations);
 }
 
 }  // namespace lapservo::internal

@@ -11,24 +11,24 @@ namespace lapservo::internal {
 /// A line in the raw image across an edge, sampled every pixel. All of it must lie inside the image
 /// (LightImage::contains).
 struct EdgeLine {
-  float u_px = 0, v_px = 0;   ///< where the edge is expected
-  float du = 1, dv = 0;       ///< unit direction; offsets count along it
-  int before = 0, after = 0;  ///< samples on either side, at most EdgeProfile::max_samples - 1 together
-  float blur_px = 1;          ///< of the edge along the line, one sigma
-  float limb_radius_px = 0;   ///< for locate_limbs
+  float u_px = 0, v_px = 0;     ///< where the edge is expected
+  float du = 1, dv = 0;         ///< unit direction; offsets count along it
+  int before = 0, after = 0;    ///< samples on either side, at most EdgeProfile::max_samples - 1 together
+  float blur_px = 1;            ///< of the edge along the line, one sigma
+  float contour_radius_px = 0;  ///< for locate_contours
 };
 
-inline constexpr std::size_t most_edge_lines = 512;
-using EdgeFits = InplaceVector<EdgeFit, most_edge_lines>;
+inline constexpr std::size_t max_edge_lines = 512;
+using EdgeFits = InplaceVector<EdgeFit, max_edge_lines>;
 
-/// The light along a line; fit_step and fit_limb of it.
+/// The light along a line; fit_step and fit_contour of it.
 EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line);
 EdgeFit locate_step(const LightImage& light, const EdgeLine& line, int iterations);
-EdgeFit locate_limb(const LightImage& light, const EdgeLine& line, int iterations);
+EdgeFit locate_contour(const LightImage& light, const EdgeLine& line, int iterations);
 
 /// The same for many lines, several at once in the lanes of the processor's vectors (Highway, chosen when run): one fit
-/// a line, equal to rounding. More than most_edge_lines: std::length_error.
+/// a line, equal to rounding. More than max_edge_lines: std::length_error.
 EdgeFits locate_steps(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
-EdgeFits locate_limbs(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
+EdgeFits locate_contours(const LightImage& light, std::span<const EdgeLine> lines, int iterations);
 
 }  // namespace lapservo::internal

@@ -16,8 +16,9 @@ namespace {
 
 constexpr double edge_px = 60.3, blur_px = 1.2, radius_px = 45;
 
-// Light that rises at edge_px from the left, as a step or as a cylinder's limb, with noise; and bright spots.
-cv::Mat picture(bool limb, std::uint64_t seed, int spots = 0) {
+// Light that rises at edge_px from the left, as a step or as a cylinder's occluding contour, with noise; and bright
+// spots.
+cv::Mat picture(bool contour, std::uint64_t seed, int spots = 0) {
   const Response response;
   Random random(seed);
   cv::Mat image(100, 140, CV_8UC3);
@@ -25,8 +26,8 @@ cv::Mat picture(bool limb, std::uint64_t seed, int spots = 0) {
     for (int u = 0; u < image.cols; ++u)
       for (int c = 0; c < 3; ++c) {
         const double x = u - edge_px, from_axis = 1 - std::clamp(x / radius_px, 0.0, 1.0);
-        const double shade = limb ? (x > 0 ? 0.25 + 0.75 * std::sqrt(1 - from_axis * from_axis) : 0)
-                                  : 0.5 * std::erfc(-x / blur_px / std::sqrt(2.0));
+        const double shade = contour ? (x > 0 ? 0.25 + 0.75 * std::sqrt(1 - from_axis * from_axis) : 0)
+                                     : 0.5 * std::erfc(-x / blur_px / std::sqrt(2.0));
         const double light = 0.05 + (0.4 - 0.1 * c) * shade;
         const double value = 255 * response.value_from_light(light) + 1.5 * random.normal();
         image.at<cv::Vec3b>(v, u)[c] = cv::saturate_cast<std::uint8_t>(value);
@@ -38,7 +39,7 @@ cv::Mat picture(bool limb, std::uint64_t seed, int spots = 0) {
 }
 
 // Of all directions and lengths, across the edge; some up to the image's border.
-std::vector<EdgeLine> random_lines(std::size_t count, bool limb, std::uint64_t seed) {
+std::vector<EdgeLine> random_lines(std::size_t count, bool contour, std::uint64_t seed) {
   Random random(seed);
   std::vector<EdgeLine> lines;
   for (std::size_t i = 0; i < count; ++i) {
@@ -48,9 +49,9 @@ std::vector<EdgeLine> random_lines(std::size_t count, bool limb, std::uint64_t s
     line.v_px = static_cast<float>(random.uniform(16, 83));
     line.du = static_cast<float>(cosine), line.dv = static_cast<float>(std::sin(angle_rad));
     line.before = static_cast<int>(random.uniform(4, 9));
-    line.after = static_cast<int>(random.uniform(limb ? 9 : 4, limb ? 16 : 10));
+    line.after = static_cast<int>(random.uniform(contour ? 9 : 4, contour ? 16 : 10));
     line.blur_px = static_cast<float>(random.uniform(1, 1.5) / cosine);
-    line.limb_radius_px = static_cast<float>(radius_px / cosine);
+    line.contour_radius_px = static_cast<float>(radius_px / cosine);
     lines.push_back(line);
   }
   return lines;
@@ -85,10 +86,10 @@ void on_every_target(const Check& check) {
 class EdgeLines : public ::testing::TestWithParam<bool> {
  protected:
   EdgeFits together(const LightImage& light, std::span<const EdgeLine> lines, int iterations) const {
-    return GetParam() ? locate_limbs(light, lines, iterations) : locate_steps(light, lines, iterations);
+    return GetParam() ? locate_contours(light, lines, iterations) : locate_steps(light, lines, iterations);
   }
   EdgeFit alone(const LightImage& light, const EdgeLine& line, int iterations) const {
-    return GetParam() ? locate_limb(light, line, iterations) : locate_step(light, line, iterations);
+    return GetParam() ? locate_contour(light, line, iterations) : locate_step(light, line, iterations);
   }
 };
 
@@ -139,7 +140,7 @@ TEST_P(EdgeLines, MayReachTheImagesCorner) {
   EdgeLine line;
   line.u_px = 118.98F, line.v_px = 98.98F;
   line.before = 8, line.after = 20;
-  line.blur_px = 1.2F, line.limb_radius_px = 45;
+  line.blur_px = 1.2F, line.contour_radius_px = 45;
   on_every_target([&] { EXPECT_EQ(together(light, {&line, 1}, 2).size(), 1); });
 }
 

@@ -14,7 +14,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int most_lines = EdgeMeasurements::most_lines, stations = EdgeMeasurements::most_stations;
+constexpr int max_lines = EdgeMeasurements::max_lines, stations = EdgeMeasurements::max_stations;
 
 // A direction around the shaft, in the unrolled frame and in the camera's.
 struct Generatrix {
@@ -63,7 +63,7 @@ struct Frame {
     if (beyond <= 0) return 0;
     const double distance_m = to_camera.norm();
     const auto lit = [](double cosine) {
-      return edge_limits.film_ambient_share + (1 - edge_limits.film_ambient_share) * std::max(0.0, cosine);
+      return edge_limits.film_ambient_fraction + (1 - edge_limits.film_ambient_fraction) * std::max(0.0, cosine);
     };
     return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
                     edge_limits.film_most_lit);
@@ -128,7 +128,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
       (frame.marker().radius_m() * (image.d_px_d_point * generatrix.around) + slope_m * axis_px).normalized();
   const Eigen::Vector2d normal(-tangent.y(), tangent.x());
   place.normal_cosine = normal.dot(place.along);
-  if (!(std::abs(place.normal_cosine) > edge_limits.least_normal_cosine)) return std::nullopt;
+  if (!(std::abs(place.normal_cosine) > edge_limits.min_normal_cosine)) return std::nullopt;
 
   double gap_px = 1e9;
   if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
@@ -144,7 +144,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
                                  -film_light * film_sigma_m * pull.dot(generatrix.outwards));
   place.measurement.group = k;
-  place.measurement.turn_share = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / two_pi;
+  place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / two_pi;
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   return place;
 }
@@ -167,12 +167,12 @@ struct Candidate {
 // sigma from the noise that the lines show.
 void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
   std::array<float, 3> typical{};
-  InplaceVector<float, most_lines> values;
+  InplaceVector<float, max_lines> values;
   for (std::size_t c = 0; c < 3; ++c) {
     values.clear();
     for (const Candidate& candidate : candidates)
       if (candidate.colors_agree) values.push_back(candidate.edge->step[c]);
-    if (values.size() < edge_limits.fewest_alike) return;
+    if (values.size() < edge_limits.min_alike) return;
     typical[c] = median(values);
   }
   values.clear();
@@ -185,10 +185,10 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
   const float typical_square = dot(typical, typical);
   for (const auto& [place, edge, agree] : candidates) {
     const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
-    const bool alike = projection > edge_limits.least_step * typical_square &&
+    const bool alike = projection > edge_limits.min_step * typical_square &&
                        projection * projection > edge_limits.least_alike * square * typical_square;
     if (!alike || edge->residual_variance >
-                      edge_limits.most_residual * square + edge_limits.most_residual_variances * typical_variance)
+                      edge_limits.max_residual * square + edge_limits.max_residual_variances * typical_variance)
       continue;
     const double variance = 0.5 * (edge->residual_variance + typical_variance) * edge_limits.interpolation_noise;
     const double cosine = place->normal_cosine;
@@ -203,12 +203,11 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
 
 void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
-  out.lines =
-      std::max(edge_limits.fewest_lines, std::min(static_cast<int>(1.2 * radius_px), most_lines) / effort.thinning);
+  out.lines = std::max(edge_limits.min_lines, std::min(static_cast<int>(1.2 * radius_px), max_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
   const double sine_of_half = std::sin(frame.view.half_visible_rad);
-  InplaceVector<BoundaryPlace, 4 * most_lines> places;
-  InplaceVector<EdgeLine, 4 * most_lines> lines;
+  InplaceVector<BoundaryPlace, 4 * max_lines> places;
+  InplaceVector<EdgeLine, 4 * max_lines> lines;
   for (int i = 0; i < out.lines; ++i) {
     const double sine = edge_limits.line_reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
     const Generatrix generatrix = frame.generatrix(frame.view.facing_azimuth_rad + std::asin(sine));
@@ -227,7 +226,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px
   }
   const EdgeFits edges = locate_steps(frame.light, lines, effort.iterations);
   for (std::size_t k = 0; k < 4; ++k) {
-    InplaceVector<Candidate, most_lines> candidates;
+    InplaceVector<Candidate, max_lines> candidates;
     for (std::size_t i = 0; i < places.size(); ++i)
       if (places[i].measurement.group == k && edges[i].converged)
         candidates.push_back({&places[i], &edges[i], colors_agree(frame, places[i], edges[i].offset_px)});
@@ -248,15 +247,15 @@ bool one_band(const Frame& frame, double azimuth_a_rad, double azimuth_b_rad, do
          first == band(b, along_m + room_m);
 }
 
-// One of the shaft's sides, and a generatrix as deep inside as the limb's model holds.
+// One of the shaft's sides, and a generatrix as deep inside as the occluding contour's model holds.
 struct Side {
   static constexpr double deep_rad = 0.87;  // where d = R (1 - cos 0.87) = 0.35 R
-  Generatrix limb, deep;
+  Generatrix contour, deep;
   std::size_t group;
 
   Side(const Frame& frame, double sign)
-      : limb(frame.generatrix(frame.view.facing_azimuth_rad + sign * frame.view.half_visible_rad)),
-        deep(frame.generatrix(limb.azimuth_rad - sign * deep_rad)),
+      : contour(frame.generatrix(frame.view.facing_azimuth_rad + sign * frame.view.half_visible_rad)),
+        deep(frame.generatrix(contour.azimuth_rad - sign * deep_rad)),
         group(sign < 0 ? 4 : 5) {}
 };
 
@@ -268,7 +267,7 @@ struct SidePlace {
 
 std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort,
                                     double blur_px) {
-  const Eigen::Vector3d point = frame.point(side.limb, along_m);
+  const Eigen::Vector3d point = frame.point(side.contour, along_m);
   if (!(point.z() > 1e-3)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d along = (image.d_px_d_point * frame.axes.col(2)).normalized();
@@ -280,11 +279,11 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
   const int outside = static_cast<int>(std::min(2.5 * blur_px + effort.extra_px, 14.0));
   if (inside < 5) return std::nullopt;
   const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
-  if (!one_band(frame, side.limb.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
+  if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
   const auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
   if (!line) return std::nullopt;
   SidePlace place{{}, *line};
-  place.line.limb_radius_px = static_cast<float>(radius_px);
+  place.line.contour_radius_px = static_cast<float>(radius_px);
   place.measurement.row = row_of(frame.unknowns, point, image.d_px_d_point.transpose() * inwards, 0, 0);
   place.measurement.group = side.group;
   return place;
@@ -304,11 +303,11 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
       lines.push_back(place->line);
     }
   out.sides_in_image = static_cast<int>(places.size());
-  const EdgeFits edges = locate_limbs(frame.light, lines, effort.iterations);
+  const EdgeFits edges = locate_contours(frame.light, lines, effort.iterations);
   InplaceVector<float, 2 * stations> variances;
   for (const EdgeFit& edge : edges)
     if (edge.converged) variances.push_back(edge.residual_variance);
-  if (variances.size() < edge_limits.fewest_side_edges) return;
+  if (variances.size() < edge_limits.min_side_edges) return;
   const double typical_variance = median(variances);
   for (std::size_t i = 0; i < places.size(); ++i) {
     const EdgeFit& edge = edges[i];
@@ -318,7 +317,7 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
     measurement.residual_px = edge.offset_px;
     measurement.sigma_px =
         std::sqrt(variance / edge.information + 4 * edge_limits.single_floor_px * edge_limits.single_floor_px);
-    if (measurement.sigma_px > edge_limits.largest_side_sigma_px) continue;
+    if (measurement.sigma_px > edge_limits.max_side_sigma_px) continue;
     out.all.push_back(measurement);
     out.side_blur.add(edge, variance);
   }
@@ -329,8 +328,8 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
 double BlurEvidence::improved(double blur_px) const {
   if (!(information > 0)) return blur_px;
   return std::clamp(blur_px + gradient / information,
-                    std::max(edge_limits.least_blur_px, edge_limits.least_blur_change * blur_px),
-                    std::min(edge_limits.largest_blur_px, edge_limits.largest_blur_change * blur_px));
+                    std::max(edge_limits.min_blur_px, edge_limits.min_blur_change * blur_px),
+                    std::min(edge_limits.max_blur_px, edge_limits.max_blur_change * blur_px));
 }
 
 EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,

@@ -30,12 +30,12 @@ struct Measurement {
   double residual_px;  ///< along the normal
   double sigma_px;
   std::size_t group;          ///< 0..3: the boundary; 4 and 5: the sides
-  double turn_share = 0;      ///< tau / 2 pi
+  double turn_fraction = 0;   ///< tau / 2 pi
   double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides
 };
 inline constexpr std::size_t measurement_groups = 6;
 
-/// How far beyond the blur a pass looks for edges, how often it refines each before the pose, and which share of the
+/// How far beyond the blur a pass looks for edges, how often it refines each before the pose, and which fraction of the
 /// generatrices and stations it uses: one of so many.
 struct Effort {
   double extra_px;
@@ -56,8 +56,8 @@ struct BlurEvidence {
 
 /// Everything that a frame shows of a marker's boundaries and of its shaft's sides near a pose.
 struct EdgeMeasurements {
-  static constexpr int most_lines = 64, most_stations = 24;
-  InplaceVector<Measurement, 4 * most_lines + 2 * most_stations> all;
+  static constexpr int max_lines = 64, max_stations = 24;
+  InplaceVector<Measurement, 4 * max_lines + 2 * max_stations> all;
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at

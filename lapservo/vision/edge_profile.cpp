@@ -30,8 +30,8 @@ Basis<1> step_basis(const EdgeProfile& profile, float edge_px, float blur_px) {
   return basis;
 }
 
-// sqrt(1 - (1 - d/R)^2) = sqrt(2 d / R) (1 - d / 4R - ...): the limb within a third of the radius.
-Basis<2> limb_basis(const EdgeProfile& profile, float edge_px, float blur_px, float radius_px) {
+// sqrt(1 - (1 - d/R)^2) = sqrt(2 d / R) (1 - d / 4R - ...): the occluding contour within a third of the radius.
+Basis<2> contour_basis(const EdgeProfile& profile, float edge_px, float blur_px, float radius_px) {
   Basis<2> basis;
   const BlurredEdges& edges = BlurredEdges::instance();
   const float scale = std::sqrt(2 / radius_px), root_blur = std::sqrt(blur_px);
@@ -108,7 +108,7 @@ EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
     degrees += used - linear;
     fit.step[c] = amplitude.tail(Shapes).sum();
   }
-  if (degrees < 3 || !(fit.information > least_edge_information)) return fit;
+  if (degrees < 3 || !(fit.information > min_edge_information)) return fit;
   fit.offset_px = position_gradient / fit.information;
   fit.residual_variance = squares / static_cast<float>(degrees);
   fit.converged = std::isfinite(fit.offset_px) && std::isfinite(fit.residual_variance);
@@ -131,7 +131,7 @@ EdgeFit iterate(const EdgeProfile& profile, int iterations, const MakeBasis& bas
     }
     if (std::abs(step_px) < edge_tolerance_px) break;
   }
-  fit.converged = std::abs(fit.offset_px) < (iterations > 1 ? largest_last_step_px : largest_only_step_px);
+  fit.converged = std::abs(fit.offset_px) < (iterations > 1 ? max_last_step_px : max_only_step_px);
   fit.offset_px = edge_px;
   return fit;
 }
@@ -142,8 +142,9 @@ EdgeFit fit_step(const EdgeProfile& profile, float blur_px, int iterations) {
   return iterate(profile, iterations, [&](float edge_px) { return step_basis(profile, edge_px, blur_px); });
 }
 
-EdgeFit fit_limb(const EdgeProfile& profile, float blur_px, float radius_px, int iterations) {
-  return iterate(profile, iterations, [&](float edge_px) { return limb_basis(profile, edge_px, blur_px, radius_px); });
+EdgeFit fit_contour(const EdgeProfile& profile, float blur_px, float radius_px, int iterations) {
+  return iterate(profile, iterations,
+                 [&](float edge_px) { return contour_basis(profile, edge_px, blur_px, radius_px); });
 }
 
 }  // namespace lapservo::internal

@@ -25,17 +25,17 @@ struct EdgeFit {
 };
 
 /// An edge with less information has no contrast.
-inline constexpr float least_edge_information = 1e-9F;
+inline constexpr float min_edge_information = 1e-9F;
 /// Iterations end below the first; the last of several may move the edge by less than the second, an only one by less
 /// than the third.
-inline constexpr float edge_tolerance_px = 0.004F, largest_last_step_px = 0.25F, largest_only_step_px = 1.5F;
+inline constexpr float edge_tolerance_px = 0.004F, max_last_step_px = 0.25F, max_only_step_px = 1.5F;
 
 /// A step between two flat stretches, blurred by `blur_px`. Takes up to `iterations` Gauss-Newton steps.
 EdgeFit fit_step(const EdgeProfile& profile, float blur_px, int iterations);
 
-/// The limb of a diffusely lit cylinder of radius `radius_px` with the light near the camera; positive positions lie
-/// inside: background, then ambient plus diffuse light that rises like sqrt(1 - (1 - x / R)^2), blurred. The apparent
-/// edge of such a limb lies inside the true one; this finds the true one.
-EdgeFit fit_limb(const EdgeProfile& profile, float blur_px, float radius_px, int iterations);
+/// The occluding contour of a diffusely lit cylinder of radius `radius_px` with the light near the camera; positive
+/// positions lie inside: background, then ambient plus diffuse light that rises like sqrt(1 - (1 - x / R)^2), blurred.
+/// The apparent edge of such a occluding contour lies inside the true one; this finds the true one.
+EdgeFit fit_contour(const EdgeProfile& profile, float blur_px, float radius_px, int iterations);
 
 }  // namespace lapservo::internal

@@ -36,7 +36,7 @@ Shape step(double blur_px) {
 }
 
 // Ambient plus diffuse light of a cylinder, blurred by numeric convolution.
-Shape limb(double blur_px, double radius_px) {
+Shape contour(double blur_px, double radius_px) {
   return [=](double x) {
     constexpr int count = 800;
     double sum = 0;
@@ -75,12 +75,12 @@ TEST(EdgeProfile, TheErrorOfAStepIsAsPredicted) {
   EXPECT_NEAR(std::sqrt(variances / profiles), noise, 0.03 * noise);
 }
 
-TEST(EdgeProfile, ALimbIsFoundWhereItsTrueEdgeIs) {
+TEST(EdgeProfile, AContourIsFoundWhereItsTrueEdgeIs) {
   for (const double radius_px : {25.0, 45.0, 70.0})
     for (const double blur_px : {0.9, 1.5})
       for (const double edge_px : {-0.8, 0.0, 0.45}) {
-        EdgeProfile profile = profile_of(limb(blur_px, radius_px), edge_px, 8);
-        const EdgeFit fit = fit_limb(profile, static_cast<float>(blur_px), static_cast<float>(radius_px), 8);
+        EdgeProfile profile = profile_of(contour(blur_px, radius_px), edge_px, 8);
+        const EdgeFit fit = fit_contour(profile, static_cast<float>(blur_px), static_cast<float>(radius_px), 8);
         ASSERT_TRUE(fit.converged) << radius_px << ", " << blur_px;
         EXPECT_NEAR(fit.offset_px, edge_px, 0.03) << radius_px << ", " << blur_px;
         const EdgeFit as_step = fit_step(profile, static_cast<float>(blur_px), 8);
@@ -88,13 +88,13 @@ TEST(EdgeProfile, ALimbIsFoundWhereItsTrueEdgeIs) {
       }
 }
 
-TEST(EdgeProfile, TheErrorOfALimbIsAsPredicted) {
+TEST(EdgeProfile, TheErrorOfAContourIsAsPredicted) {
   constexpr double noise = 0.005, blur_px = 1.2, radius_px = 45;
   constexpr int profiles = 400;
-  const Shape shape = limb(blur_px, radius_px);
+  const Shape shape = contour(blur_px, radius_px);
   double squares = 0;
   for (std::uint64_t seed = 1; seed <= profiles; ++seed) {
-    const EdgeFit fit = fit_limb(profile_of(shape, 0.2, 12, noise, seed), blur_px, radius_px, 6);
+    const EdgeFit fit = fit_contour(profile_of(shape, 0.2, 12, noise, seed), blur_px, radius_px, 6);
     ASSERT_TRUE(fit.converged) << "seed " << seed;
     const double sigmas = (fit.offset_px - 0.2) * std::sqrt(fit.information) / noise;
     squares += sigmas * sigmas;
@@ -156,15 +156,15 @@ TEST(EdgeProfile, ExposureAndDirectionDoNotMatter) {
 TEST(EdgeProfile, BlurEvidencePointsToTheTrueBlur) {
   for (const double true_px : {0.9, 1.1, 1.3, 1.6}) {
     const EdgeProfile profile = profile_of(step(true_px), 0.2, 10);
-    const EdgeProfile of_limb = profile_of(limb(true_px, 45), 0.1, 12);
-    float blur_px = 1.2F, limb_blur_px = 1.2F;
+    const EdgeProfile of_contour = profile_of(contour(true_px, 45), 0.1, 12);
+    float blur_px = 1.2F, contour_blur_px = 1.2F;
     for (int i = 0; i < 6; ++i) {
-      const EdgeFit fit = fit_step(profile, blur_px, 8), limb_fit = fit_limb(of_limb, limb_blur_px, 45, 8);
+      const EdgeFit fit = fit_step(profile, blur_px, 8), contour_fit = fit_contour(of_contour, contour_blur_px, 45, 8);
       blur_px += fit.blur_gradient / fit.blur_information;
-      limb_blur_px += limb_fit.blur_gradient / limb_fit.blur_information;
+      contour_blur_px += contour_fit.blur_gradient / contour_fit.blur_information;
     }
     EXPECT_NEAR(blur_px, true_px, 0.02);
-    EXPECT_NEAR(limb_blur_px, true_px, 0.1);
+    EXPECT_NEAR(contour_blur_px, true_px, 0.1);
   }
 }
 

@@ -13,7 +13,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int most_passes = 3;
+constexpr int max_passes = 3;
 
 double robust_weight(const Measurement& m, double residual_px) {
   return cauchy_weight(residual_px / m.sigma_px, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
@@ -23,10 +23,10 @@ double robust_weight(const Measurement& m, double residual_px) {
 // film's thickness in film_sigma_m; `film_prior` is what that lies below its expected one.
 template <int Size>
 UnknownVector solve(std::span<const Measurement> measurements, double film_prior) {
-  constexpr int most_iterations = 4;
+  constexpr int max_iterations = 4;
   using Row = Eigen::Matrix<double, Size, 1>;
   Row step = Row::Zero();
-  for (int i = 0; i < most_iterations; ++i) {
+  for (int i = 0; i < max_iterations; ++i) {
     NormalEquations equations(Size);
     equations.add(Row::Unit(Size - 1), film_prior, 1);
     for (const Measurement& m : measurements) {
@@ -42,7 +42,7 @@ UnknownVector solve(std::span<const Measurement> measurements, double film_prior
 }
 
 double median_sigma_px(std::span<const Measurement> measurements) {
-  InplaceVector<double, 4 * EdgeMeasurements::most_lines> sigmas_px;
+  InplaceVector<double, 4 * EdgeMeasurements::max_lines> sigmas_px;
   for (const Measurement& m : measurements)
     if (m.group < 4) sigmas_px.push_back(m.sigma_px);
   if (sigmas_px.empty()) return 0;
@@ -55,38 +55,38 @@ double median_sigma_px(std::span<const Measurement> measurements) {
 CommonErrors common_errors(std::span<const Measurement> measurements, const ResidualLines& lines,
                            const EdgeBlur& blur) {
   const FineFitLimits& limits = fine_fit_limits;
-  const double smear_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
+  const double motion_blur_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
   const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - limits.usual_blur_px);
   return {limits.common_boundary_px +
-              limits.common_share_of_blur * std::max(0.0, blur.boundaries_px - limits.usual_blur_px),
-          limits.common_side_px + limits.common_share_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
-              limits.side_share_of_smear * smear_px,
+              limits.common_fraction_of_blur * std::max(0.0, blur.boundaries_px - limits.usual_blur_px),
+          limits.common_side_px + limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
+              limits.side_fraction_of_motion_blur * motion_blur_px,
           std::max(1.0, scatter_sigmas(measurements, lines)),
           std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px};
 }
 
 // What a pass changed.
 struct Change {
-  double points_px = 0;   // how far the farthest measured point moved
-  double blur_share = 0;  // by how much the blur did, of what it was
-  double smear_px = 0;    // by how much a blur beyond a lens's did
+  double points_px = 0;       // how far the farthest measured point moved
+  double blur_fraction = 0;   // by how much the blur did, of what it was
+  double motion_blur_px = 0;  // by how much a blur beyond a lens's did
 
   void add_blur(double before_px, double after_px) {
-    blur_share = std::max(blur_share, std::abs(after_px / before_px - 1));
+    blur_fraction = std::max(blur_fraction, std::abs(after_px / before_px - 1));
     if (std::max(before_px, after_px) > fine_fit_limits.sharp_blur_px)
-      smear_px = std::max(smear_px, std::abs(after_px - before_px));
+      motion_blur_px = std::max(motion_blur_px, std::abs(after_px - before_px));
   }
-  // Motion's smear may be no blur, which then never settles.
+  // Motion blur may be no blur, which then never settles.
   bool settled() const {
-    return std::max(points_px, fine_fit_limits.smear_weight * smear_px) < fine_fit_limits.settled_px;
+    return std::max(points_px, fine_fit_limits.motion_blur_weight * motion_blur_px) < fine_fit_limits.settled_px;
   }
   // Whether edges located with the blur before are good enough for the last pass.
-  bool sharp() const { return blur_share < fine_fit_limits.settled_blur; }
+  bool sharp() const { return blur_fraction < fine_fit_limits.settled_blur; }
 };
 
 }  // namespace
 
-double FineFit::located_share() const {
+double FineFit::located_fraction() const {
   const int located = used[0] + used[1] + used[2] + used[3];
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
 }
@@ -124,7 +124,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   auto change = refine(capture);
   if (change && !(change->settled() && change->sharp())) change = refine(approach);
   if (!change) return fit;
-  for (int i = 0; i < most_passes; ++i) {
+  for (int i = 0; i < max_passes; ++i) {
     change = refine(measure_all);
     if (!change) return fit;
     if (change->settled()) break;
@@ -149,7 +149,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   }
   fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
   const double doubt =
-      1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_share - fit.located_share());
+      1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit.located_fraction());
   fit.covariance = doubt * doubt * print->covariance;
   fit.print_off_probability = print->off_probability;
   fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;

@@ -25,8 +25,8 @@ struct FineFit {
   double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
   double psi_variance_by_print = 0;      ///< and what the print adds beyond that
 
-  /// Of the boundary points that the image could show, the share that was located.
-  double located_share() const;
+  /// Of the boundary points that the image could show, the fraction that was located.
+  double located_fraction() const;
 };
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a

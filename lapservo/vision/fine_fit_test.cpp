@@ -148,7 +148,7 @@ TEST(FineFit, DoesNotConvergeWhereNothingIs) {
   const Sight sight(rig, scenes::render_nothing(rig, 4));
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     Random random(seed);
-    const RcmCoordinates q = scenes::random_configuration(rig, 0, random);
+    const JointVector q = scenes::random_configuration(rig, 0, random);
     const auto start = PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q);
     const FineFit fit = fit_finely(sight.scene(), sight.light(), start, {});
     const int located = fit.used[0] + fit.used[1] + fit.used[2] + fit.used[3];

@@ -56,10 +56,10 @@ std::optional<BlobShape> shape_of(const Scene& scene, const Blob& blob) {
     shape.band_centres[index] += *ideal;
     ++shape.band_samples[index];
   }
-  constexpr int least_of_a_band = 2;
-  if (std::count_if(shape.band_samples.begin(), shape.band_samples.end(), [](int n) { return n >= least_of_a_band; }) <
+  constexpr int min_of_a_band = 2;
+  if (std::count_if(shape.band_samples.begin(), shape.band_samples.end(), [](int n) { return n >= min_of_a_band; }) <
           2 ||
-      shape.band_samples[1] < least_of_a_band)
+      shape.band_samples[1] < min_of_a_band)
     return std::nullopt;
   shape.centre /= static_cast<double>(shape.ideal_px.size());
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
@@ -119,8 +119,8 @@ std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, d
       heaviest_stretch(-reach, reach + 1, [&](int i) { return scene.is_ours(color_at(i)) ? 1 : -0.8; });
   const bool outside = color_at(colored.first - 1) == Scene::outside || color_at(colored.last + 1) == Scene::outside;
   if (colored.sum * step_px < 4 || outside) return std::nullopt;
-  return Section{(colored.first - 0.5) * step_px - detection_limits.limb_inset_px,
-                 (colored.last + 0.5) * step_px + detection_limits.limb_inset_px};
+  return Section{(colored.first - 0.5) * step_px - detection_limits.contour_inset_px,
+                 (colored.last + 0.5) * step_px + detection_limits.contour_inset_px};
 }
 
 std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, Eigen::Vector2d along) {

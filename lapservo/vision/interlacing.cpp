@@ -37,12 +37,12 @@ int count_alternating(const std::uint8_t* a, const std::uint8_t* b, const std::u
   return count;
 }
 
-// Of a share of the box's bytes, chunks spread over all its rows and columns.
+// Of a fraction of the box's bytes, chunks spread over all its rows and columns.
 Alternation sampled_alternation(const ImageView& image, const PixelBox& box) {
-  constexpr int most_pixels = 2500, stagger = 5, bytes = channels * chunk_px;
+  constexpr int max_pixels = 2500, stagger = 5, bytes = channels * chunk_px;
   const int width_px = box.u_end - box.u_begin, height_px = box.v_end - box.v_begin;
   int every = 1;  // a power of two: a multiple of the odd stagger then meets all chunks
-  while (static_cast<std::int64_t>(width_px) * height_px / every > most_pixels) every *= 2;
+  while (static_cast<std::int64_t>(width_px) * height_px / every > max_pixels) every *= 2;
   Alternation sum;
   for (int v = box.v_begin; v + taps <= box.v_end; ++v)
     for (int u = box.u_begin + v * stagger % every * chunk_px; u + chunk_px + taps - 1 <= box.u_end;
@@ -121,7 +121,7 @@ std::optional<PixelBox> box_of(const Camera& camera, const Marker& marker, const
 
 }  // namespace
 
-Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::uint8_t least_gap) {
+Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::uint8_t min_gap) {
   constexpr int needed_px = chunk_px + taps - 1;
   Alternation sum;
   for (int u = box.u_begin; u + needed_px <= box.u_end; u += chunk_px) {
@@ -131,9 +131,8 @@ Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::u
       const std::uint8_t* at = image.pixel(u, v);
       for (std::size_t i = 0; i < row.size(); ++i) row[i] = luma(at + channels * i);
       if (v < box.v_begin + taps - 1) continue;
-      sum.down +=
-          count_alternating<chunk_px>(rows[0].data(), rows[1].data(), rows[2].data(), rows[3].data(), least_gap);
-      sum.across += count_alternating<chunk_px>(row.data(), row.data() + 1, row.data() + 2, row.data() + 3, least_gap);
+      sum.down += count_alternating<chunk_px>(rows[0].data(), rows[1].data(), rows[2].data(), rows[3].data(), min_gap);
+      sum.across += count_alternating<chunk_px>(row.data(), row.data() + 1, row.data() + 2, row.data() + 3, min_gap);
     }
   }
   return sum;
@@ -142,12 +141,12 @@ Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::u
 // What frames without fields stay below: chroma subsampling (4:2:2) of strong noise 0.6 and 0.1, of a sharp picture 0.2
 // and 0.25. Fields 3 px apart across the shaft exceed it, 5 px along it, 10 px about it.
 bool is_combed(const ImageView& image, const PixelBox& box) {
-  constexpr double least_per_px = 0.25, least_ratio = 0.3;
+  constexpr double min_per_px = 0.25, min_ratio = 0.3;
   if (!is_suspicious(image, box)) return false;
   const int perimeter_px = 2 * (box.u_end - box.u_begin + box.v_end - box.v_begin);
-  for (const std::uint8_t least_gap : {low_gap, high_gap}) {
-    const Alternation luma = luma_alternation(image, box, least_gap);
-    if (luma.down - luma.across > std::max(least_per_px * perimeter_px, least_ratio * luma.across)) return true;
+  for (const std::uint8_t min_gap : {low_gap, high_gap}) {
+    const Alternation luma = luma_alternation(image, box, min_gap);
+    if (luma.down - luma.across > std::max(min_per_px * perimeter_px, min_ratio * luma.across)) return true;
   }
   return false;
 }

@@ -26,8 +26,8 @@ struct Alternation {
   int across = 0;  ///< (u, v) to (u + 3, v)
 };
 
-/// In luma, which chroma subsampling spares, where the parities differ by more than `least_gap` levels.
-Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::uint8_t least_gap);
+/// In luma, which chroma subsampling spares, where the parities differ by more than `min_gap` levels.
+Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::uint8_t min_gap);
 
 /// Whether two fields are woven in the box that saw something in two places, some pixels apart. Looks at some thousand
 /// pixels, and at all only where those look suspicious. Allocates nothing.

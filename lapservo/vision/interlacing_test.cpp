@@ -21,7 +21,7 @@ cv::Mat woven(const cv::Mat& even, const cv::Mat& odd) {
 }
 
 // By how much a coordinate of q changes for the marker's surface to move by so many pixels.
-Eigen::Vector4d step_of(const Rig& rig, const RcmCoordinates& q, int coordinate, double px) {
+Eigen::Vector4d step_of(const Rig& rig, const JointVector& q, int coordinate, double px) {
   const double depth_m = scenes::pose_of(rig, 0, q).camera_from_unrolled.translation.z();
   const double shift_m = px * depth_m / rig.camera.fx_px;
   const Eigen::Vector4d per_m(1 / q.rho_m, 1 / q.rho_m, 1, 1 / rig.instruments[0].marker.radius_m());
@@ -29,17 +29,17 @@ Eigen::Vector4d step_of(const Rig& rig, const RcmCoordinates& q, int coordinate,
 }
 
 struct Woven {
-  RcmCoordinates q;  ///< of the even field
+  JointVector q;  ///< of the even field
   cv::Mat frame;
 };
 
 Woven woven_shot(std::uint64_t seed, int coordinate, double px) {
   const scenes::Shot& shot = usual_shot(seed);
-  const auto moved = RcmCoordinates::from_vector(shot.q.vector() + step_of(shot.rig, shot.q, coordinate, px));
+  const auto moved = JointVector::from_vector(shot.q.vector() + step_of(shot.rig, shot.q, coordinate, px));
   return {shot.q, woven(shot.bgr, scenes::render(shot.rig, {moved}, seed + 100))};
 }
 
-double psi_error(const Observation& o, const RcmCoordinates& truth) {
+double psi_error(const Observation& o, const JointVector& truth) {
   return wrap_pi(o.rcm.value().q.psi_rad - truth.psi_rad);
 }
 

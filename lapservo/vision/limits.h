@@ -12,28 +12,28 @@ namespace lapservo::internal {
 
 /// Which pixels have a colour (color_classes.cpp). Hues of the samples' tissue: red to yellow, vessels violet.
 struct ColorLimits {
-  double merge_deg = 20;           ///< hues this close are one colour to the camera
-  double widest_reach_deg = 34;    ///< no hue reaches further, else tissue and vessels have the marker's colours
-  double least_saturation = 0.18;  ///< smoke (--smoke 0.55) leaves a quarter of the print's
-  double least_chroma = 22;        ///< of 255: below it noise makes hues, most of all in the dark
+  double merge_deg = 20;         ///< hues this close are one colour to the camera
+  double widest_reach_deg = 34;  ///< no hue reaches further, else tissue and vessels have the marker's colours
+  double min_saturation = 0.18;  ///< smoke (--smoke 0.55) leaves a quarter of the print's
+  double min_chroma = 22;        ///< of 255: below it noise makes hues, most of all in the dark
 };
 inline constexpr ColorLimits color_limits;
 
 /// Where a marker may be and which pose to start from (surface_tracker.cpp, coarse_fit.cpp).
 struct DetectionLimits {
-  int least_samples = 8;       ///< of a blob, on a grid of 8 px: smaller ones leave too few boundaries for a fit
-  std::size_t most_blobs = 6;  ///< the largest; bounds the time that tissue with the marker's colours costs
+  int min_samples = 8;        ///< of a blob, on a grid of 8 px: smaller ones leave too few boundaries for a fit
+  std::size_t max_blobs = 6;  ///< the largest; bounds the time that tissue with the marker's colours costs
 
   /// One sigma of a coarse fit's points: colour classes change at a pixel, sides are dark and frayed.
   double side_sigma_px = 2.0, boundary_sigma_px = 1.5;
-  double limb_inset_px = 1.0;    ///< the limb is dark: its colour ends inside the true silhouette
-  double line_reach = 0.74;      ///< of the visible half angle: beyond, bands are too foreshortened and dark
-  int fewest_boundaries = 10;    ///< points, of 52 (four on 13 lines)
-  std::size_t fewest_sides = 4;  ///< points, of 30
+  double contour_inset_px = 1.0;  ///< the occluding contour is dark: its colour ends inside the true silhouette
+  double line_reach = 0.74;       ///< of the visible half angle: beyond, bands are too foreshortened and dark
+  int min_boundaries = 10;        ///< points, of 52 (four on 13 lines)
+  std::size_t min_sides = 4;      ///< points, of 30
   /// A section's stretch of colour by the shaft's expected width: less is blood's remainder, more is tissue's.
   double narrowest_section = 0.5, widest_section = 1.4;
 
-  double least_rotation_score = 0.5;  ///< colours that match less those that contradict, at the best rotation
+  double min_rotation_score = 0.5;  ///< colours that match less those that contradict, at the best rotation
   /// Of the best score: a rotation 0.7 rad and more away that scores higher is as good.
   double rival_ratio = 0.93;
   double rival_apart_radii = 1;  ///< two places nearer than this are one
@@ -46,39 +46,39 @@ inline constexpr DetectionLimits detection_limits;
 
 /// When a free fit overrules camera_from_rcm, and what is said of q then (surface_tracker.cpp).
 struct RegistrationLimits {
-  double well_seen_share = 0.7;    ///< of the boundary points: hidden ones leave free fits that are wrong
-  double most_print_share = 0.25;  ///< of psi's variance: a print that is off contradicts any registration
+  double well_seen_fraction = 0.7;   ///< of the boundary points: hidden ones leave free fits that are wrong
+  double max_print_fraction = 0.25;  ///< of psi's variance: a print that is off contradicts any registration
   /// Between the fitted axis and the line from the RCM, where q is still given, with this angle in its sigma.
-  double largest_mismatch_rad = 0.03;
+  double max_mismatch_rad = 0.03;
 };
 inline constexpr RegistrationLimits registration_limits;
 
 /// Which points of edges count, and for how much (edge_measurements.cpp).
 struct EdgeLimits {
-  int fewest_lines = 12;    ///< generatrices of a pass
+  int min_lines = 12;       ///< generatrices of a pass
   double line_reach = 0.9;  ///< of the visible half width: beyond, light and resolution are gone
   /// What the model leaves out (shading across the blur, lens, print) of every single boundary point; twice that of
   /// sides.
   double single_floor_px = 0.04;
-  double interpolation_noise = 1.6;   ///< of the variance: interpolated samples are smoother than pixels are noisy
-  double least_normal_cosine = 0.3;   ///< between the boundary's normal and the line that is sampled
-  double largest_side_sigma_px = 2;   ///< a side less certain says nothing
-  std::size_t fewest_alike = 3;       ///< points whose colours agree, for what a boundary's change of light is
-  std::size_t fewest_side_edges = 4;  ///< for how noisy a side is
+  double interpolation_noise = 1.6;  ///< of the variance: interpolated samples are smoother than pixels are noisy
+  double min_normal_cosine = 0.3;    ///< between the boundary's normal and the line that is sampled
+  double max_side_sigma_px = 2;      ///< a side less certain says nothing
+  std::size_t min_alike = 3;         ///< points whose colours agree, for what a boundary's change of light is
+  std::size_t min_side_edges = 4;    ///< for how noisy a side is
 
-  /// A change of light is the boundary's when it is at least this share of what most have, and its direction in the
+  /// A change of light is the boundary's when it is at least this fraction of what most have, and its direction in the
   /// three channels this alike (cosine squared).
-  float least_step = 0.25F, least_alike = 0.7F;
-  /// And what it leaves at most this share of it (squared), beyond what all leave.
-  float most_residual = 0.05F;
-  int most_residual_variances = 9;  ///< of the typical variance: three sigma
+  float min_step = 0.25F, least_alike = 0.7F;
+  /// And what it leaves at most this fraction of it (squared), beyond what all leave.
+  float max_residual = 0.05F;
+  int max_residual_variances = 9;  ///< of the typical variance: three sigma
 
-  /// Light on the film's edge: the share that is even (the rest is diffuse, from the camera), and by that on the
+  /// Light on the film's edge: the fraction that is even (the rest is diffuse, from the camera), and by that on the
   /// outside at most.
-  double film_ambient_share = 0.18, film_most_lit = 2;
+  double film_ambient_fraction = 0.18, film_most_lit = 2;
   double seam_blurs = 2.5, seam_px = 1.5;  ///< inner boundaries this near to the seam, together, are left out
   /// Of a blur, and by how much a pass may change it: wider is no edge, and far steps overshoot.
-  double least_blur_px = 0.5, largest_blur_px = 8, least_blur_change = 0.6, largest_blur_change = 1.7;
+  double min_blur_px = 0.5, max_blur_px = 8, min_blur_change = 0.6, max_blur_change = 1.7;
 };
 inline constexpr EdgeLimits edge_limits;
 
@@ -90,17 +90,18 @@ struct FineFitLimits {
   /// What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole: it does not
   /// average over lines. With it error over sigma is 0.7 on the rotation samples, 1.3 on rendered ones (usual).
   double common_boundary_px = 0.007, common_side_px = 0.02;
-  /// And as a share of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. A limb that motion
-  /// smears is worst: the part of its blur that the boundaries do not have.
-  double usual_blur_px = 1.2, common_share_of_blur = 0.05, side_share_of_smear = 0.15;
-  /// Where less than the usual share of a marker shows, some of what was taken for its boundaries are the blood's:
+  /// And as a fraction of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. A occluding contour
+  /// that motion blurs is worst: the part of its blur that the boundaries do not have.
+  double usual_blur_px = 1.2, common_fraction_of_blur = 0.05, side_fraction_of_motion_blur = 0.15;
+  /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
   /// sigma grows by so much for all that is missing.
-  double usual_share = 0.7, doubt_of_hidden = 4;
+  double usual_fraction = 0.7, doubt_of_hidden = 4;
   double usual_sigma_px = 0.05;  ///< of an edge; compressed ones (--format jpg) have three times that
 
-  double settled_px = 1.5;       ///< a pass that moves no point farther is the last
-  double settled_blur = 0.1;     ///< change of the blur, a share of it, below which edges need not be located again
-  double smear_weight = 5;       ///< a smear's change by that of a point: motion's may be no blur, and never settles
+  double settled_px = 1.5;    ///< a pass that moves no point farther is the last
+  double settled_blur = 0.1;  ///< change of the blur, a fraction of it, below which edges need not be located again
+  double motion_blur_weight =
+      5;  ///< a motion blur's change by that of a point: motion's may be no blur, and never settles
   double sharp_blur_px = 1.8;    ///< a blur below it may flicker where few sides are left
   double settled_sigmas = 0.01;  ///< a reweighting that moves the unknowns by less is the last
 };
@@ -111,63 +112,65 @@ struct PrintLimits {
   /// How often a print is off, and how far it is then [mm], each half as often as the one before. An exact print's
   /// sigma grows by a tenth; where a frame tells nothing of the print, this adds 20 mrad to psi's. With all sizes
   /// alike, frames that tell nothing lost 17 % of what was found.
-  double off_share = 0.1;
+  double off_fraction = 0.1;
   std::array<double, 8> sigmas_mm{0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64};
-  double least_weight = 1e-6;  ///< less is too unlikely to count
+  double min_weight = 1e-6;  ///< less is too unlikely to count
 };
 inline constexpr PrintLimits print_limits;
 
 /// When a fit is good enough to move a robot by (verification.cpp). How far the limits are from what is found: 340 fits
 /// taken for ok in 340 rendered frames (usual, dark, blood, smoke, defocus, noise and JPEG of docs/accuracy.md, and
 /// --blood 0.4 --seed 71) have, but for one in a hundred each,
-///   matching >= 0.44, wrong <= 0.024, beyond <= 0.47, beside <= 0.15, located share >= 0.44, rms <= 1.29 sigma,
+///   matching >= 0.44, wrong <= 0.024, beyond <= 0.47, beside <= 0.15, located fraction >= 0.44, rms <= 1.29 sigma,
 ///   an end on >= 10 lines, sides at >= 14 places, blur <= 2.4 px, sigma of psi <= 18 mrad;
-/// half of the 71 fits refused there have matching <= 0.54, located share <= 0.50, rms >= 1.6 sigma, sigma >= 33 mrad.
-struct JudgeLimits {
-  double largest_sigma_psi_rad = 0.02;        ///< five sigma: a tenth of a radian, from which on psi counts as wrong
-  double largest_sigma_print_off_rad = 0.01;  ///< where the print is certainly off: how far is known from four numbers
-                                              ///< at best, so ten sigma
-  double certainly_off = 0.999;               ///< probability
+/// half of the 71 fits refused there have matching <= 0.54, located fraction <= 0.50, rms >= 1.6 sigma, sigma >= 33
+/// mrad.
+struct ValidationLimits {
+  double max_sigma_psi_rad = 0.02;        ///< five sigma: a tenth of a radian, from which on psi counts as wrong
+  double max_sigma_print_off_rad = 0.01;  ///< where the print is certainly off: how far is known from four numbers
+                                          ///< at best, so ten sigma
+  double certainly_off = 0.999;           ///< probability
   /// Times what the rig's tolerance_m adds to the variance: who sets it wants to live with it.
   double tolerance_slack = 1.5;
-  double well_seen_share = 0.7;  ///< of the boundary points, to blame the print
+  double well_seen_fraction = 0.7;  ///< of the boundary points, to blame the print
 
   /// A boundary that lies too far from its place is not located at all; where nothing hides the marker, that is the
-  /// print. Missed: below this share of its lines, of which there are enough.
-  double unhidden_matching = 0.85, missed_share = 0.3, unblurred_px = 1.8;
+  /// print. Missed: below this fraction of its lines, of which there are enough.
+  double unhidden_matching = 0.85, missed_fraction = 0.3, unblurred_px = 1.8;
   int enough_lines = 10;
 
-  double least_in_image = 0.25;  ///< of the visible surface
+  double min_in_image = 0.25;  ///< of the visible surface
   double wholly_in_image = 0.98;
   /// Of the samples on the marker, those with their colour; those with another band's; and of the places just beyond
   /// the ends and beside the sides, those with a marker's colour.
-  double least_matching = 0.3, most_wrong = 0.05, most_beyond = 0.5, most_beside = 0.2;
+  double min_matching = 0.3, max_wrong = 0.05, max_beyond = 0.5, max_beside = 0.2;
   /// Where all boundaries show as they should, other colours are noise, of which the dark has plenty under a high gain:
   /// a right fit that is refused gives way to a wrong one with fewer of them.
-  double complete_matching = 0.6, complete_share = 0.9, tolerance_of_complete = 1.6;
-  double blurred_px = 1.5, least_guard = 0.02;  ///< about boundaries colours mix: so far, and this share of the length
+  double complete_matching = 0.6, complete_fraction = 0.9, tolerance_of_complete = 1.6;
+  double blurred_px = 1.5, min_guard = 0.02;  ///< about boundaries colours mix: so far, and this fraction of the length
 
-  /// Lines on which an inner boundary is located, both together, and an end: so many and this share of all lines.
-  int fewest_inner = 6, inner_one_in = 10, fewest_outer = 4;
+  /// Lines on which an inner boundary is located, both together, and an end: so many and this fraction of all lines.
+  int min_inner = 6, inner_one_in = 10, min_outer = 4;
   /// Each end's, where both are needed: without the RCM they alone fix the depth and with it everything else.
-  int fewest_of_end = 6, end_one_in = 12;
-  double mostly_hidden = 0.5, partly_hidden = 0.7;  ///< located shares, below which more is asked
-  double most_spilled = 0.12;  ///< of the ring beyond an end, with that end's colour: the end is elsewhere
+  int min_of_end = 6, end_one_in = 12;
+  double mostly_hidden = 0.5, partly_hidden = 0.7;  ///< located fractions, below which more is asked
+  double max_spilled = 0.12;  ///< of the ring beyond an end, with that end's colour: the end is elsewhere
 
   /// Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
-  /// many, noisy. So the boundaries' rms may grow with the located share, where more than a quarter of the sides show.
-  double least_share = 0.2;
-  double largest_rms_sigmas = 1.3, rms_per_share = 5.5, rms_from_share = 0.7, rms_most_share = 0.2;
+  /// many, noisy. So the boundaries' rms may grow with the located fraction, where more than a quarter of the sides
+  /// show.
+  double min_fraction = 0.2;
+  double max_rms_sigmas = 1.3, rms_per_fraction = 5.5, rms_from_fraction = 0.7, rms_most_fraction = 0.2;
   int sides_one_in = 4;
 
   /// Motion over 15 px in an exposure gave psi off by 0.1 rad and more with sigmas of 5 mrad (6 wrong of 117, moving
-  /// frames with --motion 0.4 --seed 9). Beyond smeared_px sides hold the shaft's place no more, and an end that most
-  /// lines miss is not hidden: what they found is another. Beyond lost_px the smear's form, which nobody knows, decides
-  /// where the edges are taken to be.
-  double smeared_px = 2, lost_px = 4.5;
-  int fewest_sides = 8;
-  int smeared_end_parts = 3, smeared_end_of = 5;  ///< every boundary on three lines of five
+  /// frames with --motion 0.4 --seed 9). Beyond motion_blurred_px sides hold the shaft's place no more, and an end that
+  /// most lines miss is not hidden: what they found is another. Beyond lost_px the motion blur's form, which nobody
+  /// knows, decides where the edges are taken to be.
+  double motion_blurred_px = 2, lost_px = 4.5;
+  int min_sides = 8;
+  int motion_blurred_end_parts = 3, motion_blurred_end_of = 5;  ///< every boundary on three lines of five
 };
-inline constexpr JudgeLimits judge_limits;
+inline constexpr ValidationLimits validation_limits;
 
 }  // namespace lapservo::internal

@@ -2,12 +2,13 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include <Eigen/Core>
 
 #include "lapservo/kinematics/features.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo {
 
@@ -33,14 +34,15 @@ inline std::array<Eigen::Vector2d, 4> zero_points() {
   return {zero, zero, zero, zero};
 }
 
-/// What one frame tells of one instrument. All but `status` is meaningful only when it is Status::ok; then every
-/// number is finite. Sigmas are one standard deviation.
+/// What one frame tells of one instrument. Its numbers are meaningful only when `status` is Status::ok; then every one
+/// is finite. Sigmas are one standard deviation.
 struct Observation {
   Status status = Status::no_marker;
+  std::string instrument;  ///< its name in the rig
 
   /// Present when the instrument's camera_from_rcm is known; covariance in the order theta, phi, rho, psi.
   struct Rcm {
-    RcmCoordinates q;
+    JointVector q;
     Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   };
   std::optional<Rcm> rcm;

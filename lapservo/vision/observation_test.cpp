@@ -106,7 +106,7 @@ TEST(Observation, SigmaTauIsThatOfSampledConfigurations) {
     double squares = 0;
     for (int i = 0; i < samples; ++i) {
       const Eigen::Vector4d deviate(random.normal(), random.normal(), random.normal(), random.normal());
-      const auto q = RcmCoordinates::from_vector(o.rcm->q.vector() + root * deviate);
+      const auto q = JointVector::from_vector(o.rcm->q.vector() + root * deviate);
       const ShaftPose pose = scenes::pose_of(shot.rig, 0, q);
       const auto line =
           centre_line(shot.rig.camera, shot.rig.instruments[0].marker, pose.camera_from_unrolled, pose.psi_rad);
@@ -151,7 +151,7 @@ TEST(Observation, ErrorsOfTheFeaturesAreAsTheirCovarianceSays) {
 TEST(Observation, IsFiniteForEveryStatus) {
   const Rig rig = scenes::usual_rig(3);
   Random random(1);
-  std::vector<RcmCoordinates> q;
+  std::vector<JointVector> q;
   for (std::size_t i = 0; i < 3; ++i) q.push_back(scenes::random_configuration(rig, i, random));
   const cv::Mat usual = scenes::render(rig, q, 1);
   const cv::Size size = usual.size();

@@ -28,22 +28,22 @@ using CrossMatrix = Eigen::Matrix<double, print_errors, Eigen::Dynamic, 0, print
 
 // A measurement of a group whose residuals are fitted by a line: along the shaft in metres, a side's in pixels.
 struct LinePoint {
-  double value, turn_share, sigma;
+  double value, turn_fraction, sigma;
 };
 
 // Robust: from the median on, reweighted. A boundary that lies elsewhere as a whole is no outlier to itself; one with
-// few points is judged with the others, about zero.
+// few points is compared with the others, about zero.
 ResidualLine line_of(std::span<const Measurement> measurements, std::size_t group) {
   constexpr int iterations = 4;
   constexpr std::size_t fewest = 8;
   constexpr double usual_slope = 1 * mm;  // a turn
-  InplaceVector<LinePoint, EdgeMeasurements::most_lines> points;
-  InplaceVector<double, EdgeMeasurements::most_lines> values;
+  InplaceVector<LinePoint, EdgeMeasurements::max_lines> points;
+  InplaceVector<double, EdgeMeasurements::max_lines> values;
   for (const Measurement& m : measurements) {
     if (m.group != group) continue;
     const double unit = group < 4 ? m.along_px_per_m : 1;
     const double value = m.residual_px / unit;
-    points.push_back({value, group < 4 ? m.turn_share : 0, m.sigma_px / std::abs(unit)});
+    points.push_back({value, group < 4 ? m.turn_fraction : 0, m.sigma_px / std::abs(unit)});
     values.push_back(value);
   }
   if (values.size() < fewest) return {};
@@ -53,13 +53,13 @@ ResidualLine line_of(std::span<const Measurement> measurements, std::size_t grou
   for (int i = 0; i < iterations; ++i) {
     double sum = 0, turns = 0, turns_squared = 1 / (usual_slope * usual_slope), at_start = 0, at_turn = 0;
     for (const LinePoint& p : points) {
-      const double sigmas = (p.value - line.at_start - line.slope * p.turn_share) / p.sigma;
+      const double sigmas = (p.value - line.at_start - line.slope * p.turn_fraction) / p.sigma;
       const double weight = cauchy_weight(sigmas, cauchy_scale_sigmas) / (p.sigma * p.sigma);
       sum += weight;
-      turns += weight * p.turn_share;
-      turns_squared += weight * p.turn_share * p.turn_share;
+      turns += weight * p.turn_fraction;
+      turns_squared += weight * p.turn_fraction * p.turn_fraction;
       at_start += weight * p.value;
-      at_turn += weight * p.turn_share * p.value;
+      at_turn += weight * p.turn_fraction * p.value;
     }
     const double determinant = sum * turns_squared - turns * turns;
     line = {(turns_squared * at_start - turns * at_turn) / determinant,
@@ -71,7 +71,7 @@ ResidualLine line_of(std::span<const Measurement> measurements, std::size_t grou
 // d(residual)/d(print's errors at its upper and at its lower edge) [px/mm].
 Eigen::Vector2d print_row(const Measurement& m) {
   const double along = mm * m.along_px_per_m;
-  return {along * (1 - m.turn_share), along * m.turn_share};
+  return {along * (1 - m.turn_fraction), along * m.turn_fraction};
 }
 
 // Which of the print's errors a boundary has at its upper and at its lower edge.
@@ -272,9 +272,9 @@ std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& eviden
     gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
   const double best = *std::max_element(gains.begin(), gains.end());
   std::array<double, print_sigmas_mm.size() + 1> weights{};
-  weights[0] = (1 - print_limits.off_share) * std::exp(gains[0] - best);
-  double share = print_limits.off_share / 2;
-  for (std::size_t i = 1; i < gains.size(); ++i, share /= 2) weights[i] = share * std::exp(gains[i] - best);
+  weights[0] = (1 - print_limits.off_fraction) * std::exp(gains[0] - best);
+  double fraction = print_limits.off_fraction / 2;
+  for (std::size_t i = 1; i < gains.size(); ++i, fraction /= 2) weights[i] = fraction * std::exp(gains[i] - best);
   return weights;
 }
 
@@ -282,7 +282,7 @@ std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& eviden
 
 double ResidualLine::residual_px(const Measurement& m) const {
   const double unit = m.along_px_per_m != 0 ? m.along_px_per_m : 1;
-  return m.residual_px - unit * (at_start + slope * m.turn_share);
+  return m.residual_px - unit * (at_start + slope * m.turn_fraction);
 }
 
 ResidualLines residual_lines(std::span<const Measurement> measurements) {
@@ -314,7 +314,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   Mixture mixture(pose_unknowns + 1);
   mixture.add(*tolerated, weights[0]);
   for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i) {
-    if (weights[i + 1] < print_limits.least_weight) continue;
+    if (weights[i + 1] < print_limits.min_weight) continue;
     const auto off = solved(sums, std::hypot(print_sigmas_mm[i], tolerance_mm));
     if (!off) return std::nullopt;
     mixture.add(*off, weights[i + 1]);

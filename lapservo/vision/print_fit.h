@@ -10,7 +10,7 @@
 namespace lapservo::internal {
 
 /// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
-/// says, and by how much it is to be taken larger still before the print is blamed: smear and compression move
+/// says, and by how much it is to be taken larger still before the print is blamed: motion blur and compression move
 /// boundaries as a print's errors would.
 struct CommonErrors {
   double boundary_px = 0, side_px = 0, noise_scale = 1, doubt_scale = 1;

@@ -5,7 +5,7 @@
 
 namespace lapservo::internal {
 
-PoseUnknowns PoseUnknowns::rcm(const Rigid3& camera_from_rcm, const RcmCoordinates& q) {
+PoseUnknowns PoseUnknowns::rcm(const Rigid3& camera_from_rcm, const JointVector& q) {
   PoseUnknowns unknowns;
   unknowns.camera_from_rcm_ = camera_from_rcm;
   unknowns.q_ = q;
@@ -48,7 +48,7 @@ UnknownVector PoseUnknowns::row(const Eigen::Vector3d& point_in_camera, const Ei
 }
 
 PoseUnknowns PoseUnknowns::changed_by(const UnknownVector& step) const {
-  if (camera_from_rcm_) return rcm(*camera_from_rcm_, RcmCoordinates::from_vector(q_->vector() + step));
+  if (camera_from_rcm_) return rcm(*camera_from_rcm_, JointVector::from_vector(q_->vector() + step));
   const Eigen::Quaterniond tilt =
       Eigen::AngleAxisd(step[0], Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(step[1], Eigen::Vector3d::UnitY());
   ShaftPose moved = pose_;
@@ -60,7 +60,7 @@ PoseUnknowns PoseUnknowns::changed_by(const UnknownVector& step) const {
 
 PoseUnknowns PoseUnknowns::with_psi(double psi_rad) const {
   if (!camera_from_rcm_) return free({pose_.camera_from_unrolled, psi_rad});
-  RcmCoordinates q = *q_;
+  JointVector q = *q_;
   q.psi_rad = psi_rad;
   return rcm(*camera_from_rcm_, q);
 }

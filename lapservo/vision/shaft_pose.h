@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/geometry/rigid3.h"
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo::internal {
 
@@ -26,13 +26,13 @@ using UnknownMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, m
 /// (rotations about the unrolled x and y, translations along x, y and z) and psi.
 class PoseUnknowns {
  public:
-  static PoseUnknowns rcm(const Rigid3& camera_from_rcm, const RcmCoordinates& q);
+  static PoseUnknowns rcm(const Rigid3& camera_from_rcm, const JointVector& q);
   static PoseUnknowns free(const ShaftPose& pose);
 
   int size() const { return camera_from_rcm_ ? 4 : 6; }
   const ShaftPose& pose() const { return pose_; }
   /// Present in the first form.
-  const std::optional<RcmCoordinates>& q() const { return q_; }
+  const std::optional<JointVector>& q() const { return q_; }
 
   /// Rows d(n . p)/d(unknowns but psi) for a point p (camera frame) that moves with the shaft; psi's entry is 0.
   UnknownVector row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction) const;
@@ -50,7 +50,7 @@ class PoseUnknowns {
   void derive();
 
   std::optional<Rigid3> camera_from_rcm_;
-  std::optional<RcmCoordinates> q_;
+  std::optional<JointVector> q_;
   ShaftPose pose_;
   Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
   std::array<Twist, 5> twists_{};

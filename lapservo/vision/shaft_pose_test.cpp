@@ -74,7 +74,7 @@ TEST(PoseUnknowns, NoChangeIsNoChangeAndPsiTurnsTheMarkerAlone) {
 TEST(PoseUnknowns, ThroughTheRcmTheyAreQ) {
   Random random(31);
   const Rigid3 camera_from_rcm = random_pose(random);
-  const RcmCoordinates q{0.4, 1.3, 0.12, -2};
+  const JointVector q{0.4, 1.3, 0.12, -2};
   const PoseUnknowns unknowns = PoseUnknowns::rcm(camera_from_rcm, q);
   const Eigen::Vector4d step(0.01, -0.02, 0.003, 0.4);
   const PoseUnknowns moved = unknowns.changed_by(step);

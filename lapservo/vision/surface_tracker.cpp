@@ -22,8 +22,8 @@ constexpr int grid_px = 8;
 
 bool contradicts_registration(const FineFit& free) {
   const Eigen::Index psi = free.unknowns.size() - 1;
-  return free.located_share() > registration_limits.well_seen_share &&
-         free.psi_variance_by_print <= registration_limits.most_print_share * free.covariance(psi, psi);
+  return free.located_fraction() > registration_limits.well_seen_fraction &&
+         free.psi_variance_by_print <= registration_limits.max_print_fraction * free.covariance(psi, psi);
 }
 
 // How sure the fit is of what the centre line shows.
@@ -73,7 +73,7 @@ std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scen
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
   const double mismatch_rad = std::atan2((fitted.rotation * z).cross(through_rcm.rotation * z).norm(),
                                          (fitted.rotation * z).dot(through_rcm.rotation * z));
-  if (!view || !(mismatch_rad < registration_limits.largest_mismatch_rad)) return std::nullopt;
+  if (!view || !(mismatch_rad < registration_limits.max_mismatch_rad)) return std::nullopt;
   q->psi_rad = rotation_rad(scene.marker, view->facing_azimuth_rad, tau_rad);
   const double angle_variance =
       mismatch_rad * mismatch_rad + fit.covariance(fit.unknowns.size() - 1, fit.unknowns.size() - 1);
@@ -152,28 +152,28 @@ SurfaceTracker::Found SurfaceTracker::refusal(Status status, const PoseUnknowns&
 SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImage& light, const Memory& memory) const {
   const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
   const FineFit near = fit_finely(scene, light, expected, memory.blur);
-  if (judge(scene, near) == Status::ok) return {Status::ok, near, {}};
+  if (validate(scene, near) == Status::ok) return {Status::ok, near, {}};
   const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
   if (!coarse.found) return {};
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
-  const Status status = judge(scene, fit);
+  const Status status = validate(scene, fit);
   return status == Status::ok ? Found{status, fit, {}} : refusal(status, fit.unknowns);
 }
 
 SurfaceTracker::Found SurfaceTracker::try_start(const Scene& scene, const LightImage& light,
                                                 const PoseUnknowns& start) const {
   const CoarseFit coarse = fit_coarsely(scene, start, {});
-  if (!coarse.found || coarse.rotation_score < detection_limits.least_rotation_score) return {};
+  if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score) return {};
   if (coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
     return refusal(Status::ambiguous, coarse.unknowns);
   const FineFit first = fit_finely(scene, light, coarse.unknowns, {});
-  const Status judged = judge(scene, first);
-  if (judged == Status::ok) return {judged, first, {}};
-  if (judged == Status::marker_mismatch) return refusal(judged, first.unknowns);
+  const Status validated = validate(scene, first);
+  if (validated == Status::ok) return {validated, first, {}};
+  if (validated == Status::marker_mismatch) return refusal(validated, first.unknowns);
   const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, detection_limits.near_by);
   if (!nearer.found) return {};
   const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
-  const Status status = judge(scene, fit);
+  const Status status = validate(scene, fit);
   return status == Status::ok ? Found{status, fit, {}} : refusal(status, fit.unknowns);
 }
 
@@ -226,7 +226,7 @@ SurfaceTracker::Found SurfaceTracker::detect_occluded(const Scene& scene, const 
     for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm))
       for (const PoseUnknowns& candidate : search_agreement(scene, start, camera_from_rcm)) {
         const FineFit fit = fit_finely(scene, light, candidate, {});
-        if (judge(scene, fit) != Status::ok) continue;
+        if (validate(scene, fit) != Status::ok) continue;
         if (!best.fit || fit.inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = {Status::ok, fit, {}};
       }
   return best;
@@ -245,8 +245,8 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     if (!found.fit) {
       memory_[i].reset();
       if (!blobs) {
-        blobs = find_blobs(image, classes_, grid_px, detection_limits.least_samples);
-        if (blobs->size() > detection_limits.most_blobs) blobs->resize(detection_limits.most_blobs);
+        blobs = find_blobs(image, classes_, grid_px, detection_limits.min_samples);
+        if (blobs->size() > detection_limits.max_blobs) blobs->resize(detection_limits.max_blobs);
       }
       found = detect(scene, light, *blobs, camera_from_rcm);
       if (found.fit && !camera_from_rcm && has_rival(scene, light, *blobs, *found.fit))

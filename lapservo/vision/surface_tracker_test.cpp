@@ -18,7 +18,7 @@ namespace {
 using scenes::Shot;
 using scenes::usual_shot;
 
-Eigen::Vector4d q_error(const RcmCoordinates& seen, const RcmCoordinates& expected) {
+Eigen::Vector4d q_error(const JointVector& seen, const JointVector& expected) {
   Eigen::Vector4d error = seen.vector() - expected.vector();
   error[0] = wrap_pi(error[0]), error[3] = wrap_pi(error[3]);
   return error;
@@ -29,7 +29,7 @@ double normalised_square(const Eigen::Vector4d& error, const Eigen::Matrix4d& co
   return error.dot(covariance.ldlt().solve(error)) / 4;
 }
 
-void expect_right(const Observation& o, const RcmCoordinates& truth) {
+void expect_right(const Observation& o, const JointVector& truth) {
   ASSERT_EQ(o.status, Status::ok) << to_string(o.status);
   ASSERT_TRUE(o.rcm);
   EXPECT_LT(normalised_square(q_error(o.rcm->q, truth), o.rcm->covariance), 4);
@@ -37,9 +37,9 @@ void expect_right(const Observation& o, const RcmCoordinates& truth) {
 }
 
 // Instruments that cross would hide one another: their middles 320 px apart in the image.
-std::vector<RcmCoordinates> apart(const Rig& rig, Random& random) {
+std::vector<JointVector> apart(const Rig& rig, Random& random) {
   for (;;) {
-    std::vector<RcmCoordinates> all;
+    std::vector<JointVector> all;
     std::vector<Eigen::Vector2d> centres;
     for (std::size_t i = 0; i < rig.instruments.size(); ++i) {
       all.push_back(scenes::random_configuration(rig, i, random));
@@ -53,12 +53,12 @@ std::vector<RcmCoordinates> apart(const Rig& rig, Random& random) {
   }
 }
 
-std::vector<RcmCoordinates> slow_motion(const Rig& rig, std::uint64_t seed, int frames) {
+std::vector<JointVector> slow_motion(const Rig& rig, std::uint64_t seed, int frames) {
   Random random(seed);
-  const RcmCoordinates start = scenes::random_configuration(rig, 0, random);
-  std::vector<RcmCoordinates> motion;
+  const JointVector start = scenes::random_configuration(rig, 0, random);
+  std::vector<JointVector> motion;
   for (int i = 0; i < frames; ++i) {
-    RcmCoordinates q = start;
+    JointVector q = start;
     q.theta_rad += 0.004 * i, q.phi_rad -= 0.003 * i, q.rho_m += 0.3e-3 * i, q.psi_rad += 0.03 * i;
     motion.push_back(q);
   }
@@ -157,7 +157,7 @@ TEST(SurfaceTracker, InstrumentsKeepTheirNamesInAnyOrderOfTheRig) {
   }
 }
 
-// The camera was moved after registration, or this is another theatre's rig: what is said of q says how far to trust
+// The camera was moved after registration, or this is another room's rig: what is said of q says how far to trust
 // it, or is not said; what needs no registration stays right.
 TEST(SurfaceTracker, AWrongRegistrationIsNoWrongRotation) {
   const Rig rig = scenes::usual_rig();

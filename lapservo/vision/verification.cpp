@@ -13,7 +13,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr const JudgeLimits& limits = judge_limits;
+constexpr const ValidationLimits& limits = validation_limits;
 
 // Of the marker; at least a pixel.
 double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
@@ -29,20 +29,20 @@ double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azim
 bool misses_a_boundary(const FineFit& fit, const ColorAgreement& agreement) {
   bool missing = false;
   for (std::size_t k = 0; k < 4; ++k)
-    missing |= fit.in_image[k] >= limits.enough_lines && fit.used[k] < limits.missed_share * fit.in_image[k];
+    missing |= fit.in_image[k] >= limits.enough_lines && fit.used[k] < limits.missed_fraction * fit.in_image[k];
   return missing && agreement.matching > limits.unhidden_matching && fit.blur.boundaries_px < limits.unblurred_px;
 }
 
 // Sigma of psi, and whom to blame when it is too large: the print or the picture.
-Status judge_sigma(const FineFit& fit, const ColorAgreement& agreement) {
+Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
   const auto squared = [](double x) { return x * x; };
   const bool off = fit.print_off_probability > limits.certainly_off;
-  const double limit = squared(off ? limits.largest_sigma_print_off_rad : limits.largest_sigma_psi_rad);
+  const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
   const Eigen::Index psi = fit.unknowns.size() - 1;
   const double variance = fit.covariance(psi, psi);
   if (fit.psi_variance_by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
   if (variance < limit + limits.tolerance_slack * fit.psi_variance_by_tolerance) return Status::ok;
-  const bool well_seen = fit.located_share() > limits.well_seen_share;
+  const bool well_seen = fit.located_fraction() > limits.well_seen_fraction;
   return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
 }
 
@@ -57,7 +57,7 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
   const double length_m = scene.marker.length_m(), ring_m = 0.1 * length_m;
   const double guard_m =
       length_m *
-      std::max(limits.least_guard, limits.blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
+      std::max(limits.min_guard, limits.blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
   int total = 0, inside = 0, matching = 0, wrong = 0, outer = 0, beyond = 0, flank = 0, beside = 0;
   std::array<int, 2> ring{}, spilled{};
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
@@ -96,54 +96,56 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
       if (color != Scene::outside) ++flank, beside += scene.is_ours(color);
     }
   }
-  const auto share = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
-  return {share(matching, inside), share(wrong, inside),
-          share(inside, total),    share(beyond, outer),
-          share(beside, flank),    std::max(share(spilled[0], ring[0]), share(spilled[1], ring[1]))};
+  const auto fraction = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
+  return {fraction(matching, inside), fraction(wrong, inside),
+          fraction(inside, total),    fraction(beyond, outer),
+          fraction(beside, flank),    std::max(fraction(spilled[0], ring[0]), fraction(spilled[1], ring[1]))};
 }
 
-Status judge(const Scene& scene, const FineFit& fit) {
+Status validate(const Scene& scene, const FineFit& fit) {
   if (!fit.converged) return Status::poor_fit;
   const ColorAgreement agreement = color_agreement(scene, fit.unknowns.pose());
-  if (agreement.in_image < limits.least_in_image) return Status::cut;
+  if (agreement.in_image < limits.min_in_image) return Status::cut;
 
   // Colours where they should not be.
-  const double share = fit.located_share();
-  const bool complete = agreement.matching > limits.complete_matching && share > limits.complete_share;
+  const double fraction = fit.located_fraction();
+  const bool complete = agreement.matching > limits.complete_matching && fraction > limits.complete_fraction;
   const double tolerance = complete ? limits.tolerance_of_complete : 1;
-  if (agreement.wrong > tolerance * limits.most_wrong || agreement.beyond > tolerance * limits.most_beyond ||
-      agreement.beside > tolerance * limits.most_beside)
+  if (agreement.wrong > tolerance * limits.max_wrong || agreement.beyond > tolerance * limits.max_beyond ||
+      agreement.beside > tolerance * limits.max_beside)
     return Status::poor_fit;
 
   // Too little of the marker.
-  if (agreement.matching < limits.least_matching) return Status::occluded;
+  if (agreement.matching < limits.min_matching) return Status::occluded;
   const int inner_used = fit.used[1] + fit.used[2], outer_used = fit.used[0] + fit.used[3];
-  if (inner_used < std::max(limits.fewest_inner, fit.lines / limits.inner_one_in) || outer_used < limits.fewest_outer)
+  if (inner_used < std::max(limits.min_inner, fit.lines / limits.inner_one_in) || outer_used < limits.min_outer)
     return Status::occluded;
   // With the RCM both ends confirm what is left of a hidden marker; without it they are needed always.
   const bool in_image = agreement.in_image > limits.wholly_in_image;
-  const bool needs_both_ends = !fit.unknowns.q() || (share < limits.mostly_hidden && in_image);
+  const bool needs_both_ends = !fit.unknowns.q() || (fraction < limits.mostly_hidden && in_image);
   if (needs_both_ends &&
-      std::min(fit.used[0], fit.used[3]) < std::max(limits.fewest_of_end, fit.lines / limits.end_one_in))
+      std::min(fit.used[0], fit.used[3]) < std::max(limits.min_of_end, fit.lines / limits.end_one_in))
     return agreement.in_image < limits.wholly_in_image ? Status::cut : Status::occluded;
 
   // Boundaries and sides that agree badly.
-  if (share < limits.partly_hidden && agreement.spilled > limits.most_spilled) return Status::poor_fit;
+  if (fraction < limits.partly_hidden && agreement.spilled > limits.max_spilled) return Status::poor_fit;
   const bool few_sides = limits.sides_one_in * fit.sides_used < fit.sides_in_image;
-  const double more_rms_sigmas =
-      few_sides ? 0 : limits.rms_per_share * std::clamp(share - limits.rms_from_share, 0.0, limits.rms_most_share);
-  if (share < limits.least_share || fit.inlier_rms_sigmas > limits.largest_rms_sigmas + more_rms_sigmas)
+  const double more_rms_sigmas = few_sides ? 0
+                                           : limits.rms_per_fraction * std::clamp(fraction - limits.rms_from_fraction,
+                                                                                  0.0, limits.rms_most_fraction);
+  if (fraction < limits.min_fraction || fit.inlier_rms_sigmas > limits.max_rms_sigmas + more_rms_sigmas)
     return Status::poor_fit;
 
-  // Motion's smear.
-  const double smear_px = std::max(fit.blur.boundaries_px, fit.blur.sides_px);
-  if (smear_px > limits.lost_px) return Status::uncertain;
-  const bool smeared = smear_px > limits.smeared_px;
-  const int least_used = *std::min_element(fit.used.begin(), fit.used.end());
-  if (smeared && limits.smeared_end_of * least_used < limits.smeared_end_parts * fit.lines) return Status::uncertain;
+  // Motion blur.
+  const double motion_blur_px = std::max(fit.blur.boundaries_px, fit.blur.sides_px);
+  if (motion_blur_px > limits.lost_px) return Status::uncertain;
+  const bool blurred = motion_blur_px > limits.motion_blurred_px;
+  const int min_used = *std::min_element(fit.used.begin(), fit.used.end());
+  if (blurred && limits.motion_blurred_end_of * min_used < limits.motion_blurred_end_parts * fit.lines)
+    return Status::uncertain;
   // Few boundaries need the sides beside them.
-  if ((smeared || share < limits.mostly_hidden) && fit.sides_used < limits.fewest_sides) return Status::uncertain;
-  return judge_sigma(fit, agreement);
+  if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
+  return validate_sigma(fit, agreement);
 }
 
 }  // namespace lapservo::internal

@@ -9,16 +9,16 @@ namespace lapservo::internal {
 
 /// How well the frame's colours agree with the marker at a pose, over a grid of its visible surface.
 struct ColorAgreement {
-  double matching = 0;  ///< share of the samples inside the image that have the predicted colour
-  double wrong = 0;     ///< share that has another of the marker's colours
-  double in_image = 0;  ///< share of the visible surface that lies inside the image
-  double beyond = 0;    ///< share of the shaft just beyond both ends that has a marker's colour
-  double beside = 0;    ///< share of the places just outside both sides that has a marker's colour
-  double spilled = 0;   ///< share of the ring just beyond an end that has that end's colour, of both the larger
+  double matching = 0;  ///< fraction of the samples inside the image that have the predicted colour
+  double wrong = 0;     ///< fraction that has another of the marker's colours
+  double in_image = 0;  ///< fraction of the visible surface that lies inside the image
+  double beyond = 0;    ///< fraction of the shaft just beyond both ends that has a marker's colour
+  double beside = 0;    ///< fraction of the places just outside both sides that has a marker's colour
+  double spilled = 0;   ///< fraction of the ring just beyond an end that has that end's colour, of both the larger
 };
 ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose);
 
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
-Status judge(const Scene& scene, const FineFit& fit);
+Status validate(const Scene& scene, const FineFit& fit);
 
 }  // namespace lapservo::internal

@@ -28,7 +28,7 @@ TEST(Verification, ARightPoseIsOk) {
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
-    EXPECT_EQ(judge(shot.sight.scene(), fit_from_truth(shot)), Status::ok);
+    EXPECT_EQ(validate(shot.sight.scene(), fit_from_truth(shot)), Status::ok);
     const ColorAgreement agreement = color_agreement(shot.sight.scene(), scenes::pose_of(shot.rig, 0, shot.q));
     EXPECT_GT(agreement.matching, 0.85);
     EXPECT_LT(agreement.wrong, 0.02);
@@ -39,7 +39,7 @@ TEST(Verification, ARightPoseIsOk) {
 
 // Started wrong, a fit may find back; what is called ok is right.
 TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
-  int judged_not_ok = 0;
+  int refused = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
@@ -48,8 +48,8 @@ TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
           change(0, 0, 2e-3, 0), change(0, 0, -2e-3, 0), change(0, 0, 6e-3, 0), change(0.03, 0, 0, 0),
           change(0.15, 0, 0, 0), change(0, 0.03, 0, 0), change(0, -0.15, 0, 0)}) {
       const FineFit fit = fit_from(shot, shot.truth(true).changed_by(wrong));
-      if (judge(shot.sight.scene(), fit) != Status::ok) {
-        ++judged_not_ok;
+      if (validate(shot.sight.scene(), fit) != Status::ok) {
+        ++refused;
         continue;
       }
       const UnknownVector error = fit.unknowns.q()->vector() - shot.q.vector();
@@ -57,7 +57,7 @@ TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
       EXPECT_LT(std::abs(error[2]), 0.2e-3) << wrong.transpose();
     }
   }
-  EXPECT_GT(judged_not_ok, 8 * 6);
+  EXPECT_GT(refused, 8 * 6);
 }
 
 // Even when all else about the fit looks well.
@@ -72,7 +72,7 @@ TEST(Verification, APoseThatTheColoursContradictIsNotOk) {
                                        change(0.3, 0, 0, 0), change(-0.3, 0, 0, 0)}) {
       FineFit fit = right;
       fit.unknowns = right.unknowns.changed_by(wrong);
-      EXPECT_NE(judge(scene, fit), Status::ok) << wrong.transpose();
+      EXPECT_NE(validate(scene, fit), Status::ok) << wrong.transpose();
       EXPECT_LT(color_agreement(scene, fit.unknowns.pose()).matching, matching - 0.1) << wrong.transpose();
     }
   }
@@ -82,22 +82,22 @@ TEST(Verification, AFitWithoutSupportIsNotOk) {
   const Shot& shot = usual_shot(1);
   const FineFit right = fit_from_truth(shot);
   const Scene scene = shot.sight.scene();
-  ASSERT_EQ(judge(scene, right), Status::ok);
+  ASSERT_EQ(validate(scene, right), Status::ok);
   FineFit fit = right;
   fit.converged = false;
-  EXPECT_EQ(judge(scene, fit), Status::poor_fit);
+  EXPECT_EQ(validate(scene, fit), Status::poor_fit);
   fit = right;
   fit.used[1] = fit.used[2] = 0;
-  EXPECT_EQ(judge(scene, fit), Status::occluded);
+  EXPECT_EQ(validate(scene, fit), Status::occluded);
   fit = right;
   fit.used[0] = fit.used[3] = 0;
-  EXPECT_EQ(judge(scene, fit), Status::occluded);
+  EXPECT_EQ(validate(scene, fit), Status::occluded);
   fit = right;
   fit.covariance(3, 3) = 0.01;
-  EXPECT_EQ(judge(scene, fit), Status::uncertain);
+  EXPECT_EQ(validate(scene, fit), Status::uncertain);
   fit = right;
   fit.inlier_rms_sigmas = 4;
-  EXPECT_EQ(judge(scene, fit), Status::poor_fit);
+  EXPECT_EQ(validate(scene, fit), Status::poor_fit);
 }
 
 TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
@@ -106,14 +106,14 @@ TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
   ShaftPose aside = fit.unknowns.pose();
   aside.camera_from_unrolled.translation.x() += 0.2;
   fit.unknowns = PoseUnknowns::free(aside);
-  EXPECT_EQ(judge(shot.sight.scene(), fit), Status::cut);
+  EXPECT_EQ(validate(shot.sight.scene(), fit), Status::cut);
   EXPECT_EQ(color_agreement(shot.sight.scene(), aside).in_image, 0);
 }
 
 TEST(Verification, TissueIsNotOk) {
   const Shot& shot = usual_shot(1);
   const Sight empty(shot.rig, scenes::render_nothing(shot.rig, 2));
-  EXPECT_NE(judge(empty.scene(), fit_from_truth(shot)), Status::ok);
+  EXPECT_NE(validate(empty.scene(), fit_from_truth(shot)), Status::ok);
   EXPECT_LT(color_agreement(empty.scene(), scenes::pose_of(shot.rig, 0, shot.q)).matching, 0.05);
 }
 

@@ -9,17 +9,15 @@
 
 namespace lapservo {
 
-using RcmCoordinates = JointVector;
-
 /// Shaft axis in the RCM frame, from the RCM towards the tip.
-Eigen::Vector3d shaft_axis_in_rcm(const RcmCoordinates& q);
+Eigen::Vector3d shaft_axis_in_rcm(const JointVector& q);
 
 /// The unrolled frame Rz(theta) Ry(phi), moved along the axis to the marker's proximal end: azimuths about the shaft
 /// are measured in it, and points of the marker have z from 0 to its length.
-Rigid3 rcm_from_unrolled(const RcmCoordinates& q);
+Rigid3 rcm_from_unrolled(const JointVector& q);
 
 /// The configuration (psi = 0) of a shaft through the RCM whose marker begins at a point; nullopt at the RCM itself.
-std::optional<RcmCoordinates> configuration_through(const Rigid3& camera_from_rcm,
-                                                    const Eigen::Vector3d& proximal_end_in_camera);
+std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
+                                                 const Eigen::Vector3d& proximal_end_in_camera);
 
 }  // namespace lapservo

@@ -5,11 +5,11 @@ namespace lapservo::internal {
 /// Backlash of one joint: the motor takes the instrument along only when it presses against one side of a gap. The
 /// state does not depend on the gap's width (the turning point and the side pressed since), so that the width may
 /// change while it is being learnt.
-class Play {
+class Backlash {
  public:
   /// The instrument in the middle of the gap, or with the motor pressed against a side: 1 after rising, -1 after
   /// falling.
-  explicit Play(double motor = 0, int side = 0) : turned_at_(motor), side_(side) {}
+  explicit Backlash(double motor = 0, int side = 0) : turned_at_(motor), side_(side) {}
 
   void follow(double motor, double width) {
     const double left = motor - turned_at_;

@@ -30,7 +30,7 @@ struct TestRig : ImageModel {
 };
 
 inline std::optional<FeatureState> exact_map(const ImageModel& rig, const Eigen::Vector4d& q) {
-  const auto point = feature_map(rig, RcmCoordinates::from_vector(q)).point;
+  const auto point = feature_map(rig, JointVector::from_vector(q)).point;
   if (!point) return std::nullopt;
   FeatureState state{point->f, point->jacobian, {}, point->ends_jacobian};
   state.ends_px << point->ideal_px[0], point->ideal_px[3];
@@ -45,13 +45,13 @@ inline FeatureModel model_of(const TestRig& rig) {
 struct Flaws {
   double latency_s = 0.08;
   bool delay_known = true;
-  Eigen::Vector4d offset = Eigen::Vector4d::Zero();    ///< true joints minus readings
-  Eigen::Vector4d backlash = Eigen::Vector4d::Zero();  ///< full play, joint by joint
+  Eigen::Vector4d offset = Eigen::Vector4d::Zero();    ///< true joints minus measured joints
+  Eigen::Vector4d backlash = Eigen::Vector4d::Zero();  ///< full backlash, joint by joint
   double lag_s = 0;                                    ///< of the arm, first order
-  Eigen::Vector4d resolution{1e-5, 1e-5, 2e-6, 1e-4};  ///< of the readings
+  Eigen::Vector4d resolution{1e-5, 1e-5, 2e-6, 1e-4};  ///< of the measured joints
   Eigen::Vector4d noise{4e-4, 0.15, 0.15, 0.15};       ///< of the image
   long frame_every = 1;                                ///< control periods a frame
-  double dropped = 0;                                  ///< share of frames that never come
+  double dropped = 0;                                  ///< fraction of frames that never come
   double jitter_s = 0;                                 ///< of the steps' times, at most
   std::function<bool(double time_s)> hidden = [](double) { return false; };
   std::function<ImageMeasurement(const ImageMeasurement&)> spoil = [](const ImageMeasurement& m) { return m; };
@@ -65,16 +65,16 @@ struct Moment {
   ControlStep step;
 };
 
-/// An arm with lag, offsets and play before a camera with latency; 60 periods and frames a second.
-class Theatre {
+/// An arm with lag, offsets and backlash before a camera with latency; 60 periods and frames a second.
+class TestSimulator {
  public:
-  Theatre(const TestRig& rig, const Flaws& flaws, const Eigen::Vector4d& q_readings, std::uint64_t seed)
-      : rig_(rig), flaws_(flaws), random_(seed), motor_(q_readings), played_(q_readings) {}
+  TestSimulator(const TestRig& rig, const Flaws& flaws, const Eigen::Vector4d& q_measured, std::uint64_t seed)
+      : rig_(rig), flaws_(flaws), random_(seed), motor_(q_measured), q_driven_(q_measured) {}
 
-  Eigen::Vector4d readings() const {
+  Eigen::Vector4d q_measured() const {
     return (motor_.cwiseQuotient(flaws_.resolution)).array().round().matrix().cwiseProduct(flaws_.resolution);
   }
-  Eigen::Vector4d q_true() const { return played_ + flaws_.offset; }
+  Eigen::Vector4d q_true() const { return q_driven_ + flaws_.offset; }
 
   std::vector<Moment> run(VisualController& controller, const Trajectory& trajectory, double duration_s) {
     std::vector<Moment> moments;
@@ -89,7 +89,7 @@ class Theatre {
       const DesiredFeatures desired = trajectory.at(time_s);
       moment.error = feature_error(moment.truth.features, desired.features);
       if (k % flaws_.frame_every == 0 && random_.uniform() >= flaws_.dropped) expose(time_s, moment.truth);
-      moment.step = controller.step(time_s, readings(), arrived(time_s), desired);
+      moment.step = controller.step(time_s, q_measured(), arrived(time_s), desired);
       move(controller, std::max(time_s, moved_s_), start_s_ + static_cast<double>(k + 1) * period_s);
       moments.push_back(moment);
     }
@@ -120,9 +120,9 @@ class Theatre {
     constexpr int parts = 8;
     for (int i = 1; i <= parts; ++i) {
       const Eigen::Vector4d setpoint = controller.path().at(from_s + (to_s - from_s) * i / parts).position;
-      const double share = flaws_.lag_s > 0 ? -std::expm1(-(to_s - from_s) / parts / flaws_.lag_s) : 1.0;
-      motor_ += share * (setpoint - motor_);
-      played_ = played_.cwiseMax(motor_ - flaws_.backlash / 2).cwiseMin(motor_ + flaws_.backlash / 2);
+      const double fraction = flaws_.lag_s > 0 ? -std::expm1(-(to_s - from_s) / parts / flaws_.lag_s) : 1.0;
+      motor_ += fraction * (setpoint - motor_);
+      q_driven_ = q_driven_.cwiseMax(motor_ - flaws_.backlash / 2).cwiseMin(motor_ + flaws_.backlash / 2);
     }
     moved_s_ = to_s;
   }
@@ -130,7 +130,7 @@ class Theatre {
   TestRig rig_;
   Flaws flaws_;
   Random random_;
-  Eigen::Vector4d motor_, played_;
+  Eigen::Vector4d motor_, q_driven_;
   std::deque<ImageMeasurement> on_the_way_;
   double start_s_ = 0, moved_s_ = 0;
 };
@@ -142,7 +142,7 @@ inline ControllerConfig test_config(const Flaws& flaws) {
   return config;
 }
 
-/// Readings within the joint limits at which the true instrument shows well inside the window.
+/// Measured joints within the joint limits at which the true instrument shows well inside the window.
 inline Eigen::Vector4d random_start(const TestRig& rig, const ControllerConfig& config, const Flaws& flaws,
                                     Random& random, double margin_px = 30) {
   const ImageWindow& w = config.window.value();
@@ -158,7 +158,7 @@ inline Eigen::Vector4d random_start(const TestRig& rig, const ControllerConfig& 
     const bool inside = std::min(e[0], e[2]) > w.u_min_px + margin_px &&
                         std::max(e[0], e[2]) < w.u_max_px - margin_px &&
                         std::min(e[1], e[3]) > w.v_min_px + margin_px && std::max(e[1], e[3]) < w.v_max_px - margin_px;
-    const double tau = feature_map(rig, RcmCoordinates::from_vector(q + flaws.offset)).point->tau_rad;
+    const double tau = feature_map(rig, JointVector::from_vector(q + flaws.offset)).point->tau_rad;
     if (!inside || tau < 0.5 || tau > two_pi - 0.5) continue;
     const auto goal = newton_inverse(model_of(rig), paper_sinusoids().offset, q + flaws.offset, config.scales);
     if (goal->converged && std::abs(goal->q[3]) < 2.5) return q;

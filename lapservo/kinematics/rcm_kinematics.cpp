@@ -1,27 +1,27 @@
-#include "lapservo/kinematics/rcm_coordinates.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 
 #include <algorithm>
 #include <cmath>
 
 namespace lapservo {
 
-Eigen::Vector3d shaft_axis_in_rcm(const RcmCoordinates& q) {
+Eigen::Vector3d shaft_axis_in_rcm(const JointVector& q) {
   return {std::sin(q.phi_rad) * std::cos(q.theta_rad), std::sin(q.phi_rad) * std::sin(q.theta_rad),
           std::cos(q.phi_rad)};
 }
 
-Rigid3 rcm_from_unrolled(const RcmCoordinates& q) {
+Rigid3 rcm_from_unrolled(const JointVector& q) {
   const Eigen::Quaterniond rotation =
       Eigen::AngleAxisd(q.theta_rad, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(q.phi_rad, Eigen::Vector3d::UnitY());
   return {rotation, q.rho_m * shaft_axis_in_rcm(q)};
 }
 
-std::optional<RcmCoordinates> configuration_through(const Rigid3& camera_from_rcm,
-                                                    const Eigen::Vector3d& proximal_end_in_camera) {
+std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
+                                                 const Eigen::Vector3d& proximal_end_in_camera) {
   const Eigen::Vector3d arm = camera_from_rcm.inverse() * proximal_end_in_camera;
   const double rho_m = arm.norm();
   if (!(rho_m > 1e-3)) return std::nullopt;
-  return RcmCoordinates{std::atan2(arm.y(), arm.x()), std::acos(std::clamp(arm.z() / rho_m, -1.0, 1.0)), rho_m, 0};
+  return JointVector{std::atan2(arm.y(), arm.x()), std::acos(std::clamp(arm.z() / rho_m, -1.0, 1.0)), rho_m, 0};
 }
 
 }  // namespace lapservo
