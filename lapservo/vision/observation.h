@@ -47,6 +47,17 @@ struct Observation {
   };
   std::optional<Rcm> rcm;
 
+  /// Method::surface only. With camera_from_rcm or without. Origin at the marker's proximal end on the axis, z along
+  /// the axis to the tip, x towards tau = 0.
+  struct MarkerPose {
+    Rigid3 camera_from_marker;
+    double sigma_xy_m = 0;      ///< of the origin across the camera's axis: root mean square of x's and y's
+    double sigma_z_m = 0;       ///< of its depth
+    double sigma_axis_rad = 0;  ///< of the angle between the axis and the true one: root of both components' squares
+    double sigma_roll_rad = 0;  ///< about the axis
+  };
+  std::optional<MarkerPose> marker;
+
   double tau_rad = 0;  ///< azimuth of the marker on the centre line, [0, 2 pi)
   double sigma_tau_rad = 0;
   std::array<Eigen::Vector2d, 4> edges_ideal_px = zero_points();  ///< e0..e3 on the centre line

@@ -13,6 +13,7 @@
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/limits.h"
+#include "lapservo/vision/marker_pose.h"
 #include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
@@ -101,6 +102,7 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
       features_of(line->ideal_px, camera_from_rcm ? projected_rcm_px(scene.camera, *camera_from_rcm) : std::nullopt);
   observation.camera_from_unrolled = pose.camera_from_unrolled;
   observation.psi_rad = pose.psi_rad;
+  observation.marker = marker_pose_of(scene.marker, fit.unknowns, fit.covariance);
   if (fit.unknowns.q()) {
     observation.rcm = Observation::Rcm{*fit.unknowns.q(), fit.covariance};
   } else if (camera_from_rcm) {
