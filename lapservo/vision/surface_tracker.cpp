@@ -122,6 +122,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single)
       single_(single),
       classes_(rig.instruments),
       light_(rig.camera.response.table()),
+      channels_(rig.camera),
       memory_(rig.instruments.size()),
       observations_(rig.instruments.size()) {}
 
@@ -236,7 +237,7 @@ SurfaceTracker::Found SurfaceTracker::detect_occluded(const Scene& scene, const 
 
 const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) {
   const ImageView image(image_bgr);
-  const LightImage light(image, light_);
+  const LightImage light(image, light_, channels_);
   if (single_) reset();
   std::optional<std::vector<Blob>> blobs;
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
