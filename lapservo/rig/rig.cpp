@@ -133,8 +133,24 @@ Camera parse_camera(const YamlField& field, const fs::path& folder) {
   return parse_camera_fields(YamlField::read(path, file_kind));
 }
 
+MarkerSigmas parse_sigmas(const YamlField& marker) {
+  constexpr auto expected = "standard deviations: numbers from 0 up, as many as they belong to";
+  const auto one = [&](const char* key) -> std::optional<double> {
+    const YamlField field = marker[key];
+    return field.present() ? std::optional(field.number(expected)) : std::nullopt;
+  };
+  const auto three = [&](const char* key) -> std::optional<std::array<double, 3>> {
+    const YamlField field = marker[key];
+    return field.present() ? std::optional(field.numbers<3>(expected)) : std::nullopt;
+  };
+  return {one("sigma_diameter_m"), three("sigma_hues_deg"), three("sigma_bands_upper_m"), three("sigma_bands_lower_m"),
+          one("sigma_seam_rad"),   one("sigma_wrap_m"),     one("sigma_skew_m"),          one("sigma_gap_rad")};
+}
+
 Marker parse_marker(const YamlField& field) {
-  expect_keys(field, {{}, {"diameter_m", "hues_deg", "bands_upper_m", "bands_lower_m", "seam_rad", "tolerance_m"}});
+  expect_keys(field, {{},
+                      {"diameter_m", "hues_deg", "bands_upper_m", "bands_lower_m", "seam_rad", "wrap_m", "skew_m",
+                       "gap_rad", "tolerance_m"}});
   Marker marker;
   marker.diameter_m = field["diameter_m"].number("0.0005 to 0.1 (metres)");
   if (const YamlField hues = field["hues_deg"]; hues.present())
@@ -144,6 +160,10 @@ Marker parse_marker(const YamlField& field) {
   if (const YamlField seam = field["seam_rad"]; seam.present()) marker.seam_rad = seam.number("an angle in radians");
   if (const YamlField tolerance = field["tolerance_m"]; tolerance.present())
     marker.tolerance_m = tolerance.number_between(0, max_tolerance_m, "0 to 0.005 (metres)");
+  if (const YamlField wrap = field["wrap_m"]; wrap.present()) marker.wrap_m = wrap.number("a length in metres");
+  if (const YamlField skew = field["skew_m"]; skew.present()) marker.skew_m = skew.number("a length in metres");
+  if (const YamlField gap = field["gap_rad"]; gap.present()) marker.gap_rad = gap.number("an angle in radians");
+  marker.sigmas = parse_sigmas(field);
   if (const std::string problem = marker_problem(marker); !problem.empty()) field.fail_within(problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
     field.fail("not decodable", "bands whose cross-ratio is monotonic over the rotation: " + problem);

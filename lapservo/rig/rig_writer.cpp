@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -83,11 +84,24 @@ std::string marker_yaml(const Marker& marker, int indent) {
   const auto add = [&](std::string_view key, const std::string& value) {
     text += fmt::format("{:{}}{}: {}\n", "", indent, key, value);
   };
-  add("diameter_m", fmt::format("{}", marker.diameter_m));
-  add("hues_deg", list_of(marker.hues_deg));
-  add("bands_upper_m", list_of(marker.bands_upper_m));
-  add("bands_lower_m", list_of(marker.bands_lower_m));
-  add("seam_rad", fmt::format("{}", marker.seam_rad));
+  const auto add_number = [&](std::string_view key, double value, const std::optional<double>& sigma) {
+    add(key, fmt::format("{}", value));
+    if (sigma) add(fmt::format("sigma_{}", key), fmt::format("{}", *sigma));
+  };
+  const auto add_list = [&](std::string_view key, const std::array<double, 3>& values,
+                            const std::optional<std::array<double, 3>>& sigmas) {
+    add(key, list_of(values));
+    if (sigmas) add(fmt::format("sigma_{}", key), list_of(*sigmas));
+  };
+  const MarkerSigmas& sigmas = marker.sigmas;
+  add_number("diameter_m", marker.diameter_m, sigmas.diameter_m);
+  add_list("hues_deg", marker.hues_deg, sigmas.hues_deg);
+  add_list("bands_upper_m", marker.bands_upper_m, sigmas.bands_upper_m);
+  add_list("bands_lower_m", marker.bands_lower_m, sigmas.bands_lower_m);
+  add_number("seam_rad", marker.seam_rad, sigmas.seam_rad);
+  if (marker.wrap_m != 0 || sigmas.wrap_m) add_number("wrap_m", marker.wrap_m, sigmas.wrap_m);
+  if (marker.skew_m != 0 || sigmas.skew_m) add_number("skew_m", marker.skew_m, sigmas.skew_m);
+  if (marker.gap_rad != 0 || sigmas.gap_rad) add_number("gap_rad", marker.gap_rad, sigmas.gap_rad);
   if (marker.tolerance_m > 0) add("tolerance_m", fmt::format("{}", marker.tolerance_m));
   return text;
 }

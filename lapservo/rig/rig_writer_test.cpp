@@ -43,6 +43,14 @@ void expect_same_bits(const Rig& a, const Rig& b) {
     EXPECT_EQ(left.marker.bands_lower_m, right.marker.bands_lower_m);
     EXPECT_EQ(left.marker.seam_rad, right.marker.seam_rad);
     EXPECT_EQ(left.marker.tolerance_m, right.marker.tolerance_m);
+    for (const auto member : {&Marker::wrap_m, &Marker::skew_m, &Marker::gap_rad})
+      EXPECT_EQ(left.marker.*member, right.marker.*member);
+    const MarkerSigmas &of_left = left.marker.sigmas, &of_right = right.marker.sigmas;
+    for (const auto member : {&MarkerSigmas::diameter_m, &MarkerSigmas::seam_rad, &MarkerSigmas::wrap_m,
+                              &MarkerSigmas::skew_m, &MarkerSigmas::gap_rad})
+      EXPECT_EQ(of_left.*member, of_right.*member);
+    for (const auto member : {&MarkerSigmas::hues_deg, &MarkerSigmas::bands_upper_m, &MarkerSigmas::bands_lower_m})
+      EXPECT_EQ(of_left.*member, of_right.*member);
     EXPECT_EQ(left.image_delay_s, right.image_delay_s);
     ASSERT_EQ(left.joints.has_value(), right.joints.has_value());
     if (left.joints) {
@@ -87,6 +95,15 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
     instrument.marker.seam_rad = random.uniform(-3, 3);
     instrument.marker.hues_deg[0] += random.uniform(-1, 1);
     if (i % 4 == 1) instrument.marker.tolerance_m = random.uniform(0, 1e-3);
+    if (i % 4 == 2) {
+      instrument.marker.wrap_m = random.uniform(-2e-3, 2e-3), instrument.marker.gap_rad = random.uniform(0, 0.3);
+      instrument.marker.skew_m = random.uniform(-1e-3, 1e-3);
+      instrument.marker.bands_lower_m[2] += instrument.marker.skew_m;
+      MarkerSigmas& sigmas = instrument.marker.sigmas;
+      sigmas.bands_upper_m = sigmas.bands_lower_m = sigmas.hues_deg = {random.uniform(), 1.0 / 3, 1e-17};
+      sigmas.diameter_m = sigmas.seam_rad = sigmas.wrap_m = sigmas.skew_m = sigmas.gap_rad = random.uniform(0, 1e-3);
+    }
+    if (i % 4 == 3) instrument.marker.sigmas.wrap_m = 1e-5;
     if (i % 2 == 0)
       instrument.camera_from_rcm =
           Rigid3{Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized(),
