@@ -11,6 +11,7 @@
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/estimator.h"
 #include "lapservo/control/feature_model.h"
+#include "lapservo/control/frozen_image.h"
 #include "lapservo/control/hold_reason.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
@@ -54,6 +55,7 @@ class VisualController {
 
   HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired);
   HoldReason update(const ImageMeasurement& image);
+  bool is_new(const ImageMeasurement& image);
   void watch_image_age();
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   Law probing_law(const Eigen::Vector4d& velocity) const;
@@ -67,10 +69,12 @@ class VisualController {
   std::unique_ptr<Estimator> estimator_;
   JointHistory history_;
   ArmLag arm_lag_;
+  FrozenImage frozen_image_;
   JointPath path_;
   bool started_ = false;
   double now_s_ = 0;
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
+  std::optional<double> image_s_;                       ///< stamp of the latest image
   double usable_s_ = 0;                                 ///< when the last usable one arrived
 };
 
