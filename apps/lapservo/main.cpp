@@ -54,6 +54,7 @@ int parse_and_run(int argc, char** argv) {
       "Exit codes: 0 done, 1 found nothing or did not converge, 2 bad input.");
   lapservo::app::Run run;
   lapservo::app::add_track(app, run);
+  lapservo::app::add_calibrate(app, run);
   lapservo::app::add_experiment(app, run);
   lapservo::app::add_render(app, run);
   lapservo::app::add_servo(app, run);

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -45,7 +46,7 @@ void add_viewing(CLI::App* command, ViewingOptions& options) {
 
 struct DesignOptions {
   double diameter_mm = 8.4;
-  std::optional<double> length_mm, min_band_mm;
+  std::optional<double> length_mm, min_band_mm, print_error_mm;
   std::vector<double> hues_deg{90, 180, 270}, upper_mm, lower_mm;
   std::string code = "cross-ratio", out;
   bool by_length() const { return code == "length"; }
@@ -78,14 +79,22 @@ std::string yaml_of(Marker marker) {
   return "marker:\n" + marker_yaml(marker, 2);
 }
 
-void print_sigmas(const Marker& marker, const Viewing& viewing) {
-  std::printf("\n  tau [deg]   cross-ratio   sigma [mrad]: centre line   whole surface\n");
+constexpr double usual_print_error_m = 0.1e-3;
+
+void print_sigmas(const Marker& marker, const Viewing& viewing, double print_error_m) {
+  std::printf("\n  tau [deg]   cross-ratio   sigma [mrad]: centre line   whole surface   print off by %.2f mm\n",
+              1e3 * print_error_m);
   for (int i = 0; i <= 8; ++i) {
     const double tau_rad = two_pi * std::min(i / 8.0, 0.99999);
-    std::printf("  %9.0f   %11.4f   %25.1f   %13.2f\n", deg_from_rad(two_pi * i / 8), cross_ratio_at(marker, tau_rad),
-                1e3 * predicted_sigma_centre_line_rad(marker, tau_rad, viewing),
-                1e3 * predicted_sigma_surface_rad(marker, tau_rad, viewing));
+    std::printf("  %9.0f   %11.4f   %25.1f   %13.2f   %20.0f\n", deg_from_rad(two_pi * i / 8),
+                cross_ratio_at(marker, tau_rad), 1e3 * predicted_sigma_centre_line_rad(marker, tau_rad, viewing),
+                1e3 * predicted_sigma_surface_rad(marker, tau_rad, viewing),
+                1e3 * predicted_print_error_rad(marker, tau_rad, print_error_m));
   }
+  std::printf(
+      "\nThe print's error (one standard deviation of each boundary) does not average out: `lapservo calibrate "
+      "marker`\n"
+      "measures the print as it is.\n");
 }
 
 // Eq. (16) beside eq. (18): what noise leaves of each, and what a depth or an inclination that is not known does.
@@ -135,6 +144,7 @@ int run_design(const DesignOptions& options) {
                     {},
                     {options.hues_deg[0], options.hues_deg[1], options.hues_deg[2]},
                     viewing};
+    spec.print_error_m = 1e-3 * options.print_error_mm.value_or(0);
     if (options.length_mm) spec.length_m = 1e-3 * *options.length_mm;
     if (options.min_band_mm) spec.min_band_m = 1e-3 * *options.min_band_mm;
     marker = design_marker(spec);
@@ -150,7 +160,7 @@ int run_design(const DesignOptions& options) {
   if (options.by_length())
     print_length_code(marker, viewing);
   else
-    print_sigmas(marker, viewing);
+    print_sigmas(marker, viewing, options.print_error_mm ? 1e-3 * *options.print_error_mm : usual_print_error_m);
   if (decoding_problem(marker).empty())
     std::printf("\nThe cross-ratio is monotonic over the turn%s.\n", in_linear_family(marker)
                                                                          ? ", and linear: eq. (18) is exact"
@@ -218,6 +228,15 @@ int run_show(const RigOptions& options) {
   std::printf("%s: %.2f mm outer diameter, %.2f mm long\n", instrument.name.c_str(), 1e3 * instrument.marker.diameter_m,
               1e3 * instrument.marker.length_m());
   show_in_terminal(instrument.marker);
+  double worst_rad = 0;
+  for (int i = 0; i < 16; ++i)
+    worst_rad =
+        std::max(worst_rad, predicted_print_error_rad(instrument.marker, two_pi * (i + 0.5) / 16, usual_print_error_m));
+  std::printf(
+      "worst sigma of tau on the centre line: %.1f mrad by noise (%.2f px a boundary), %.0f mrad by a print that "
+      "is off by %.1f mm\n",
+      1e3 * worst_sigma_centre_line_rad(instrument.marker, options.viewing.viewing()), options.viewing.sigma_px,
+      1e3 * worst_rad, 1e3 * usual_print_error_m);
   if (options.out.empty()) return 0;
   write_marker_picture(options.out, instrument.name, instrument.marker, options.viewing.viewing());
   std::printf("picture: %s\n", options.out.c_str());
@@ -234,6 +253,12 @@ void add_design(CLI::App* parent, Run& run_later) {
       ->check(number_between(1.0, 500.0));
   command->add_option("--smallest-band-mm", options->min_band_mm, "No band is shorter; default 3 mm or 12 px")
       ->check(number_between(0.1, 200.0));
+  command
+      ->add_option(
+          "--print-error-mm", options->print_error_mm,
+          "Standard deviation of where each boundary is printed and cut: minimise what it does to the rotation, "
+          "together with the noise; else noise alone, and what 0.1 mm does is said")
+      ->check(number_between(0.001, 10.0));
   command->add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
       ->check(finite_number())
       ->delimiter(',')

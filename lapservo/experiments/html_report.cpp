@@ -161,7 +161,8 @@ std::string paragraphs(const std::vector<std::string>& text) {
 
 std::string html_from(const ReportSection& section) {
   std::string html = fmt::format("<section id=\"{}\">\n<h2>{}</h2>\n", escaped(section.id), escaped(section.title));
-  html += warning(section.unfinished) + paragraphs(section.text) + comparison_table(rows_of(section.comparisons));
+  html += warning(section.unfinished) + paragraphs(section.text);
+  if (!section.comparisons.empty()) html += comparison_table(rows_of(section.comparisons));
   if (!section.figures.empty()) {
     html += "<h3>Figures</h3>\n<div class=\"figures\">\n";
     for (const Figure& figure : section.figures) html += html_from(figure);
@@ -173,7 +174,7 @@ std::string html_from(const ReportSection& section) {
     for (const std::string& note : section.notes) html += "<li>" + escaped(note) + "</li>\n";
     html += "</ul>\n";
   }
-  html += "<h3>To make it again</h3>\n<pre>" + escaped(section.command) + "</pre>\n";
+  if (!section.command.empty()) html += "<h3>To make it again</h3>\n<pre>" + escaped(section.command) + "</pre>\n";
   std::string files;
   for (const std::string& file : section.files) files += (files.empty() ? "" : ", ") + file;
   if (!files.empty()) html += "<p>The data behind it, beside this file: " + escaped(files) + "</p>\n";
@@ -195,9 +196,12 @@ std::vector<std::string> papers_pictures(const ReportSection& section) {
   return names;
 }
 
-// Every figure of the paper's, section by section.
+// Every figure of the paper's, section by section; nothing where none is compared.
 std::string summary(const Report& report) {
   std::string rows, links;
+  if (std::all_of(report.sections.begin(), report.sections.end(),
+                  [](const ReportSection& section) { return section.comparisons.empty(); }))
+    return {};
   for (const ReportSection& section : report.sections) {
     rows += fmt::format("<tr class=\"part\"><td colspan=\"4\"><a href=\"#{}\">{}</a></td></tr>\n", escaped(section.id),
                         escaped(section.title));

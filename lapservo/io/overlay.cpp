@@ -129,6 +129,7 @@ class DrawnMarker {
         curve.clear();
       }
       last_tau = tau;
+      if (!is_printed(marker_, tau)) continue;
       curve.push_back(at(across, boundaries_m(marker_, tau)[k]));
     }
     stroke(pen, curve, style, boundary_color);

@@ -12,24 +12,28 @@
 namespace lapservo::internal {
 namespace {
 
-// With t = tau / 2 pi: l_i = upper_i + t slope_i, and r - 1 = l1 l3 / (l2 L).
+// With t the fraction of the print: l_i = upper_i + t slope_i, L = total + t total_slope, and r - 1 = l1 l3 / (l2 L).
+// What moves all boundaries alike, as a wrap that is not square does, leaves it as it is.
 struct Lengths {
   std::array<double, 3> upper, slope;
-  double total;
+  double total, total_slope;
 };
 
 Lengths lengths(const Marker& marker) {
-  Lengths l{marker.bands_upper_m, {}, marker.length_m()};
+  Lengths l{marker.bands_upper_m, {}, marker.length_m(), marker.skew_m};
   for (std::size_t i = 0; i < 3; ++i) l.slope[i] = marker.bands_lower_m[i] - marker.bands_upper_m[i];
   return l;
 }
 
-// Numerator of dr/dt, a quadratic c0 + c1 t + c2 t^2: (l1 l3)' l2 - l1 l3 l2'. The cubic terms cancel.
+// Numerator of dr/dt over the length at the upper edge, a quadratic c0 + c1 t + c2 t^2: (n' d - n d') / total with
+// n = l1 l3 and d = l2 L. The cubic terms cancel.
 std::array<double, 3> derivative_numerator(const Lengths& l) {
   const auto [a1, a2, a3] = l.upper;
   const auto [b1, b2, b3] = l.slope;
-  const double p0 = a1 * a3, p1 = a1 * b3 + b1 * a3, p2 = b1 * b3;
-  return {p1 * a2 - p0 * b2, 2 * p2 * a2, p2 * b2};
+  const double n0 = a1 * a3, n1 = a1 * b3 + b1 * a3, n2 = b1 * b3;
+  const double growth = l.total_slope / l.total;
+  const double d0 = a2, d1 = b2 + growth * a2, d2 = growth * b2;
+  return {n1 * d0 - n0 * d1, 2 * (n2 * d0 - n0 * d2), n2 * d1 - n1 * d2};
 }
 
 double lowest_of_quadratic_on_unit_interval(const std::array<double, 3>& c, double sign) {
@@ -63,7 +67,7 @@ std::string decoding_problem(const Marker& marker) {
   char text[160];
   std::snprintf(text, sizeof text,
                 "the cross-ratio turns back near tau = %.2f rad, so that two rotations look the same",
-                two_pi * turns_at);
+                marker.covered_rad() * turns_at);
   return text;
 }
 
@@ -81,20 +85,21 @@ CrossRatioDecoder::CrossRatioDecoder(const Marker& marker) : marker_(marker) {
 double CrossRatioDecoder::tau_rad(double cross_ratio) const {
   if (!std::isfinite(cross_ratio)) return std::numeric_limits<double>::quiet_NaN();
   const bool towards_upper = (cross_ratio <= lowest_) == (at_upper_ <= at_lower_);
-  if (cross_ratio <= lowest_ || cross_ratio >= highest_) return towards_upper ? 0 : two_pi;
-  // l1 l3 - (r - 1) L l2 = 0 is q0 + q1 t + q2 t^2. Monotonicity leaves one root in [0, 1].
+  const double covered_rad = marker_.covered_rad();
+  if (cross_ratio <= lowest_ || cross_ratio >= highest_) return towards_upper ? 0 : covered_rad;
+  // l1 l3 - (r - 1) l2 L = 0 is q0 + q1 t + q2 t^2. Monotonicity leaves one root in [0, 1].
   const Lengths l = lengths(marker_);
-  const double scaled = (cross_ratio - 1) * l.total;
+  const double scaled = (cross_ratio - 1) * l.total, growth = (cross_ratio - 1) * l.total_slope;
   const double q0 = l.upper[0] * l.upper[2] - scaled * l.upper[1];
-  const double q1 = l.upper[0] * l.slope[2] + l.slope[0] * l.upper[2] - scaled * l.slope[1];
-  const double q2 = l.slope[0] * l.slope[2];
+  const double q1 = l.upper[0] * l.slope[2] + l.slope[0] * l.upper[2] - scaled * l.slope[1] - growth * l.upper[1];
+  const double q2 = l.slope[0] * l.slope[2] - growth * l.slope[1];
   const double root = std::sqrt(std::max(0.0, q1 * q1 - 4 * q0 * q2));
   const double stable = -0.5 * (q1 + std::copysign(root, q1));
   const double t_a = q2 != 0 ? stable / q2 : std::numeric_limits<double>::infinity();
   const double t_b = stable != 0 ? q0 / stable : 0;
   const auto distance = [](double t) { return std::max({0.0, -t, t - 1}); };
   const double t = distance(t_b) <= distance(t_a) ? t_b : t_a;
-  return two_pi * std::clamp(t, 0.0, 1.0);
+  return covered_rad * std::clamp(t, 0.0, 1.0);
 }
 
 }  // namespace lapservo::internal

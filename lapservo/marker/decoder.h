@@ -13,7 +13,8 @@ class CrossRatioDecoder {
   /// Throws std::invalid_argument with decoding_problem's text when the cross-ratio is not monotonic in tau.
   explicit CrossRatioDecoder(const Marker& marker);
 
-  /// tau in [0, 2 pi]; a cross-ratio beyond the marker's range gives the nearer end, a non-finite one gives NaN.
+  /// tau in [0, covered_rad()]; a cross-ratio beyond the marker's range gives the nearer end, a non-finite one gives
+  /// NaN.
   double tau_rad(double cross_ratio) const;
 
   double lowest_cross_ratio() const { return lowest_; }

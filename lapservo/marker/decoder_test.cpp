@@ -53,6 +53,93 @@ TEST(Marker, BandsAreLinearBetweenTheEdgesOfThePrint) {
   }
 }
 
+// Wrapped askew, cut askew, with a gap.
+Marker askew(Marker marker, Random& random) {
+  marker.wrap_m = random.uniform(-2e-3, 2e-3), marker.gap_rad = random.uniform(0, 0.5);
+  marker.skew_m = random.uniform(-1e-3, 1e-3), marker.bands_lower_m[2] += marker.skew_m;
+  return marker;
+}
+
+TEST(Marker, AskewBoundariesAreStraightFromEdgeToEdgeOfThePrint) {
+  Random random(seed);
+  for (int i = 0; i < 200; ++i) {
+    const Marker marker = askew(random_linear_marker(random), random);
+    ASSERT_EQ(marker_problem(marker), "");
+    const double end_rad = std::nextafter(marker.covered_rad(), 0.0);
+    const auto upper = boundaries_m(marker, 0), lower = boundaries_m(marker, end_rad);
+    EXPECT_EQ(upper[0], 0);
+    EXPECT_NEAR(lower[0], marker.wrap_m, 1e-12);
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(upper.at(k + 1) - upper.at(k), marker.bands_upper_m.at(k), 1e-12);
+      EXPECT_NEAR(lower.at(k + 1) - lower.at(k), marker.bands_lower_m.at(k), 1e-12);
+    }
+    const auto slopes = boundary_slopes_m(marker);
+    const double tau_rad = random.uniform(0, end_rad);
+    const auto between = boundaries_m(marker, tau_rad);
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(between.at(k), upper.at(k) + slopes.at(k) * tau_rad, 1e-12);
+      EXPECT_EQ(jumps_at_seam(marker, k), marker.gap_rad > 0 || std::abs(lower.at(k) - upper.at(k)) > 1e-9);
+    }
+  }
+}
+
+TEST(Marker, TheGapIsBare) {
+  Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  EXPECT_TRUE(is_printed(marker, two_pi - 1e-9));
+  EXPECT_NEAR(distance_to_seam_rad(marker, two_pi - 0.1), 0.1, 1e-12);
+  EXPECT_FALSE(jumps_at_seam(marker, 0));
+  EXPECT_TRUE(jumps_at_seam(marker, 1));
+  marker.gap_rad = 0.2;
+  for (const double tau_rad : {-0.1, two_pi - 0.19, 4 * two_pi - 0.01}) {
+    EXPECT_FALSE(is_printed(marker, tau_rad));
+    EXPECT_EQ(distance_to_seam_rad(marker, tau_rad), 0);
+  }
+  EXPECT_TRUE(is_printed(marker, -0.21));
+  EXPECT_NEAR(distance_to_seam_rad(marker, -0.3), 0.1, 1e-12);
+  EXPECT_NEAR(distance_to_seam_rad(marker, 0.3), 0.3, 1e-12);
+  EXPECT_TRUE(jumps_at_seam(marker, 3));
+}
+
+TEST(CrossRatioDecoder, InvertsAskewPrints) {
+  Random random(seed);
+  int decodable = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Marker marker = askew(random_marker(random), random);
+    if (!marker_problem(marker).empty() || !decoding_problem(marker).empty()) continue;
+    ++decodable;
+    const CrossRatioDecoder decoder(marker);
+    for (const double fraction : {0.001, 0.3, 0.6, 0.999}) {
+      const double tau_rad = fraction * marker.covered_rad();
+      EXPECT_NEAR(decoder.tau_rad(cross_ratio_at(marker, tau_rad)), tau_rad, 1e-6);
+    }
+    EXPECT_LE(decoder.tau_rad(100), marker.covered_rad());
+    EXPECT_LE(decoder.tau_rad(-100), marker.covered_rad());
+  }
+  EXPECT_GT(decodable, 300);
+}
+
+// What moves every boundary alike is nothing to the cross-ratio.
+TEST(CrossRatioDecoder, DoesNotSeeTheWrap) {
+  Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  const CrossRatioDecoder square(marker);
+  marker.wrap_m = 1.4e-3;
+  const CrossRatioDecoder wrapped(marker);
+  for (int i = 0; i < 50; ++i) {
+    const double ratio = 1 + 0.02 * i;
+    EXPECT_NEAR(square.tau_rad(ratio), wrapped.tau_rad(ratio), 1e-9);
+  }
+}
+
+TEST(Marker, RefusesPrintsThatAreNone) {
+  Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  marker.gap_rad = -0.1;
+  EXPECT_NE(marker_problem(marker).find("gap_rad"), std::string::npos);
+  marker.gap_rad = 0, marker.wrap_m = std::nan("");
+  EXPECT_NE(marker_problem(marker).find("wrap_m"), std::string::npos);
+  marker.wrap_m = 0, marker.skew_m = 1e-3;
+  EXPECT_NE(marker_problem(marker).find("skew_m"), std::string::npos);
+}
+
 TEST(Marker, CrossRatioIsTheSameInEveryPerspectiveImage) {
   Random random(seed);
   int checked = 0;

@@ -65,7 +65,7 @@ std::optional<Choice> search(const DesignSpec& spec, double length_m, double min
         if (choice.fraction <= 0 || choice.fraction >= 1 || choice.lower_m - choice.upper_m < rounding_m / 2) continue;
         const Marker marker = marker_of(spec, length_m, choice);
         if (min_band(marker) < min_m - 1e-9) continue;
-        const double sigma = worst_sigma_centre_line_rad(marker, spec.viewing);
+        const double sigma = worst_sigma_centre_line_rad(marker, spec.viewing, spec.print_error_m);
         if (sigma < best_sigma) best_sigma = sigma, best = choice;
       }
   return best;
@@ -93,11 +93,16 @@ std::optional<Marker> cross_ratio_marker(const DesignSpec& spec, double length_m
 
 }  // namespace
 
-double worst_sigma_centre_line_rad(const Marker& marker, const Viewing& viewing) {
+double worst_sigma_centre_line_rad(const Marker& marker, const Viewing& viewing, double print_error_m) {
   constexpr int steps = 16;
   double worst = 0;
-  for (int i = 0; i < steps; ++i)
-    worst = std::max(worst, predicted_sigma_centre_line_rad(marker, two_pi * i / (steps - 0.999), viewing));
+  for (int i = 0; i < steps; ++i) {
+    const double tau_rad = two_pi * i / (steps - 0.999);
+    const double noise_rad = predicted_sigma_centre_line_rad(marker, tau_rad, viewing);
+    worst = std::max(worst, print_error_m > 0
+                                ? std::hypot(noise_rad, predicted_print_error_rad(marker, tau_rad, print_error_m))
+                                : noise_rad);
+  }
   return worst;
 }
 

@@ -138,5 +138,16 @@ TEST(InLinearFamily, MeansThatTheCrossRatioRunsStraight) {
   }
 }
 
+TEST(DesignMarker, MinimisesThePrintsErrorsWithTheNoise) {
+  DesignSpec spec;
+  const Marker by_noise = design_marker(spec);
+  spec.print_error_m = 0.1e-3;
+  const Marker by_both = design_marker(spec);
+  const auto worst = [&](const Marker& marker) { return worst_sigma_centre_line_rad(marker, spec.viewing, 0.1e-3); };
+  EXPECT_LE(worst(by_both), worst(by_noise) * (1 + 1e-9));
+  EXPECT_GT(worst(by_noise), worst_sigma_centre_line_rad(by_noise, spec.viewing));
+  EXPECT_TRUE(in_linear_family(by_both));
+}
+
 }  // namespace
 }  // namespace lapservo::internal

@@ -35,14 +35,16 @@ std::string length_decoding_problem(const Marker& marker, std::size_t band) {
 }
 
 LengthDecoder::LengthDecoder(const Marker& marker, std::size_t band)
-    : upper_m_(marker.bands_upper_m.at(band)), lower_m_(marker.bands_lower_m.at(band)) {
+    : upper_m_(marker.bands_upper_m.at(band)),
+      lower_m_(marker.bands_lower_m.at(band)),
+      covered_rad_(marker.covered_rad()) {
   if (const std::string problem = length_decoding_problem(marker, band); !problem.empty())
     throw std::invalid_argument(problem);
 }
 
 double LengthDecoder::tau_rad(double length_m) const {
   if (!std::isfinite(length_m)) return std::numeric_limits<double>::quiet_NaN();
-  return two_pi * std::clamp((length_m - upper_m_) / (lower_m_ - upper_m_), 0.0, 1.0);
+  return covered_rad_ * std::clamp((length_m - upper_m_) / (lower_m_ - upper_m_), 0.0, 1.0);
 }
 
 std::size_t most_telling_band(const Marker& marker) {
@@ -54,7 +56,7 @@ std::size_t most_telling_band(const Marker& marker) {
 
 double predicted_sigma_length_rad(const Marker& marker, std::size_t band, const Viewing& viewing) {
   const double sigma_m = std::sqrt(2.0) * viewing.sigma_edge_px / viewing.px_per_m();
-  return two_pi * sigma_m / std::abs(change_m(marker, band));
+  return marker.covered_rad() * sigma_m / std::abs(change_m(marker, band));
 }
 
 CodeErrors perspective_errors(const Marker& marker, std::size_t band, double tau_rad, const Viewing& viewing,

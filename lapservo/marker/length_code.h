@@ -16,11 +16,11 @@ class LengthDecoder {
   /// Band 0, 1 or 2. Throws std::invalid_argument with length_decoding_problem's text when its length tells nothing.
   LengthDecoder(const Marker& marker, std::size_t band);
 
-  /// tau in [0, 2 pi]; a length beyond the band's range gives the nearer end, a non-finite one gives NaN.
+  /// tau in [0, covered_rad()]; a length beyond the band's range gives the nearer end, a non-finite one gives NaN.
   double tau_rad(double length_m) const;
 
  private:
-  double upper_m_, lower_m_;
+  double upper_m_, lower_m_, covered_rad_;
 };
 
 /// Empty when the band's length changes over tau; else why it can't be decoded.

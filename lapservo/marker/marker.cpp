@@ -12,7 +12,7 @@ using namespace internal;
 namespace {
 
 constexpr double min_diameter_m = 0.5e-3, max_diameter_m = 0.1;
-constexpr double max_band_m = 0.5;
+constexpr double max_band_m = 0.5, max_askew_m = 0.02, max_gap_rad = 1.5;
 constexpr double min_hue_gap_deg = 40;  // closer hues blend under white balance, blur and smoke
 
 double hue_gap_deg(double a_deg, double b_deg) {
@@ -29,18 +29,19 @@ std::string problem(const std::string& field, const Value& value, const std::str
 }  // namespace
 
 std::array<double, 4> boundaries_m(const Marker& marker, double tau_rad) {
-  const double t = wrap_two_pi(tau_rad) / two_pi;
+  const double t = wrap_two_pi(tau_rad) / marker.covered_rad(), wrapped_m = t * marker.wrap_m;
   const auto& upper = marker.bands_upper_m;
   const auto& lower = marker.bands_lower_m;
   const double l1 = upper[0] + t * (lower[0] - upper[0]);
   const double l2 = upper[1] + t * (lower[1] - upper[1]);
-  return {0, l1, l1 + l2, marker.length_m()};
+  return {wrapped_m, wrapped_m + l1, wrapped_m + (l1 + l2), wrapped_m + (marker.length_m() + t * marker.skew_m)};
 }
 
 std::array<double, 4> boundary_slopes_m(const Marker& marker) {
-  const double d1 = (marker.bands_lower_m[0] - marker.bands_upper_m[0]) / two_pi;
-  const double d2 = (marker.bands_lower_m[1] - marker.bands_upper_m[1]) / two_pi;
-  return {0, d1, d1 + d2, 0};
+  const double covered_rad = marker.covered_rad(), wrap = marker.wrap_m / covered_rad;
+  const double d1 = (marker.bands_lower_m[0] - marker.bands_upper_m[0]) / covered_rad;
+  const double d2 = (marker.bands_lower_m[1] - marker.bands_upper_m[1]) / covered_rad;
+  return {wrap, wrap + d1, wrap + (d1 + d2), wrap + marker.skew_m / covered_rad};
 }
 
 double cross_ratio(double l1, double l2, double l3) {
@@ -50,6 +51,22 @@ double cross_ratio(double l1, double l2, double l3) {
 double cross_ratio_at(const Marker& marker, double tau_rad) {
   const auto e = boundaries_m(marker, tau_rad);
   return cross_ratio(e[1] - e[0], e[2] - e[1], e[3] - e[2]);
+}
+
+bool jumps_at_seam(const Marker& marker, std::size_t boundary) {
+  if (boundary == 1 || boundary == 2 || marker.gap_rad > 0) return true;
+  return boundary == 0 ? marker.wrap_m != 0 : marker.wrap_m + marker.skew_m != 0;
+}
+
+double distance_to_seam_rad(const Marker& marker, double tau_rad) {
+  const double to_upper_rad = std::abs(wrap_pi(tau_rad));
+  if (marker.gap_rad == 0) return to_upper_rad;
+  const double tau = wrap_two_pi(tau_rad);
+  return tau >= marker.covered_rad() ? 0 : std::min(to_upper_rad, marker.covered_rad() - tau);
+}
+
+bool is_printed(const Marker& marker, double tau_rad) {
+  return marker.gap_rad == 0 || wrap_two_pi(tau_rad) < marker.covered_rad();
 }
 
 std::string marker_problem(const Marker& marker) {
@@ -69,10 +86,17 @@ std::string marker_problem(const Marker& marker) {
       return problem("hues_deg[" + std::to_string((i + 1) % 3) + "]", marker.hues_deg[(i + 1) % 3],
                      "hues at least 40 degrees apart");
   const double lower_sum = marker.bands_lower_m[0] + marker.bands_lower_m[1] + marker.bands_lower_m[2];
-  if (!(std::abs(lower_sum - marker.length_m()) <= 1e-6))
+  if (!within(marker.wrap_m, -max_askew_m, max_askew_m))
+    return problem("wrap_m", marker.wrap_m, "-0.02 to 0.02 (metres)");
+  if (!within(marker.skew_m, -max_askew_m, max_askew_m))
+    return problem("skew_m", marker.skew_m, "-0.02 to 0.02 (metres)");
+  if (!within(marker.gap_rad, 0, max_gap_rad)) return problem("gap_rad", marker.gap_rad, "0 to 1.5 (radians)");
+  if (!(std::abs(lower_sum - marker.length_m() - marker.skew_m) <= 1e-6))
     return problem("bands_lower_m", "a sum of " + std::to_string(lower_sum),
-                   "the same sum as bands_upper_m (" + std::to_string(marker.length_m()) +
-                       "): both ends of the marker are circles");
+                   marker.skew_m == 0 ? "the same sum as bands_upper_m (" + std::to_string(marker.length_m()) +
+                                            "): both ends of the marker are circles"
+                                      : "that of bands_upper_m and skew_m (" +
+                                            std::to_string(marker.length_m() + marker.skew_m) + ")");
   if (!(std::abs(marker.seam_rad) <= 100)) return problem("seam_rad", marker.seam_rad, "an angle in radians");
   return {};
 }

@@ -27,6 +27,26 @@ double cross_ratio_slope(const Marker& marker, double tau_rad) {
   return slope * cross_ratio_at(marker, tau_rad);
 }
 
+std::array<double, 4> tau_by_boundaries(const Marker& marker, double tau_rad) {
+  auto by_boundaries = log_gradient(boundaries_m(marker, tau_rad));
+  // A boundary farther distal raises the cross-ratio as a larger tau would.
+  const double per_rad = cross_ratio_slope(marker, tau_rad) / cross_ratio_at(marker, tau_rad);
+  for (double& value : by_boundaries) value /= per_rad;
+  return by_boundaries;
+}
+
+double predicted_print_error_rad(const Marker& marker, double tau_rad, double print_error_m) {
+  const double fraction = wrap_two_pi(tau_rad) / marker.covered_rad();
+  const auto by_boundaries = tau_by_boundaries(marker, tau_rad);
+  double square = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const bool inner = k == 1 || k == 2;
+    const double weight = inner ? (1 - fraction) * (1 - fraction) + fraction * fraction : 1;
+    square += weight * by_boundaries[k] * by_boundaries[k];
+  }
+  return print_error_m * std::sqrt(square);
+}
+
 double predicted_sigma_centre_line_rad(const Marker& marker, double tau_rad, const Viewing& viewing) {
   double square = 0;
   for (const double partial : log_gradient(boundaries_m(marker, tau_rad))) square += partial * partial;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "lapservo/marker/marker.h"
 
 namespace lapservo::internal {
@@ -14,6 +16,14 @@ struct Viewing {
 
 /// d(cross-ratio)/d(tau), per radian.
 double cross_ratio_slope(const Marker& marker, double tau_rad);
+
+/// d(tau)/d(place of e0..e3), radians per metre: by how much tau is mistaken on the centre line when a boundary lies
+/// farther distal than the rig says, to first order.
+std::array<double, 4> tau_by_boundaries(const Marker& marker, double tau_rad);
+
+/// Standard deviation of tau on the centre line when the print is off: both ends, and each inner boundary at either
+/// edge of the print, by independent errors of this standard deviation.
+double predicted_print_error_rad(const Marker& marker, double tau_rad, double print_error_m);
 
 /// Standard deviation of tau from the centre line alone: four boundaries, their cross-ratio, eq. (18), to first order.
 double predicted_sigma_centre_line_rad(const Marker& marker, double tau_rad, const Viewing& viewing);

@@ -135,5 +135,42 @@ TEST(PredictedSigma, OfTheSurfaceIsManyTimesBetterThanTheCentreLine) {
               predicted_sigma_centre_line_rad(linear, tau_rad, {}));
 }
 
+// A boundary that is moved by little moves what the decoder reads by as much as the sensitivity says.
+TEST(TauByBoundaries, IsWhatTheDecoderMistakes) {
+  Marker marker = testing::marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  marker.wrap_m = 1e-3, marker.gap_rad = 0.1;
+  const CrossRatioDecoder decoder(marker);
+  constexpr double step_m = 1e-7;
+  for (const double tau_rad : {0.5, 3.0, 5.5}) {
+    const auto by_boundaries = tau_by_boundaries(marker, tau_rad);
+    for (std::size_t k = 0; k < 4; ++k) {
+      auto e = boundaries_m(marker, tau_rad);
+      e.at(k) += step_m;
+      const double read_rad = decoder.tau_rad(cross_ratio(e[1] - e[0], e[2] - e[1], e[3] - e[2]));
+      EXPECT_NEAR((read_rad - tau_rad) / step_m, by_boundaries.at(k), 1e-3 * std::abs(by_boundaries.at(k)) + 1e-3);
+    }
+  }
+}
+
+TEST(PredictedPrintError, IsTheSpreadOverRandomPrints) {
+  const Marker marker = testing::marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
+  const CrossRatioDecoder decoder(marker);
+  constexpr double error_m = 2e-6, fraction = 0.4;
+  const double tau_rad = fraction * two_pi;
+  Random random(5);
+  double square = 0;
+  constexpr int prints = 4000;
+  for (int i = 0; i < prints; ++i) {
+    auto e = boundaries_m(marker, tau_rad);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const bool inner = k == 1 || k == 2;
+      e.at(k) += error_m * (inner ? (1 - fraction) * random.normal() + fraction * random.normal() : random.normal());
+    }
+    const double off_rad = decoder.tau_rad(cross_ratio(e[1] - e[0], e[2] - e[1], e[3] - e[2])) - tau_rad;
+    square += off_rad * off_rad / prints;
+  }
+  EXPECT_NEAR(std::sqrt(square) / predicted_print_error_rad(marker, tau_rad, error_m), 1, 0.05);
+}
+
 }  // namespace
 }  // namespace lapservo::internal

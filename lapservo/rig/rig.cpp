@@ -77,13 +77,16 @@ void check_unused(const YamlField& field) {
       offset.number_between(0, 0, "0: a camera_matrix of the pixels as they are");
 }
 
-// Not corrected, so it may not stand in a rig as if it were.
-void refuse_chromatic_aberration(const YamlField& field) {
-  if (!field.present()) return;
+ChromaticAberration parse_chromatic_aberration(const YamlField& field) {
+  ChromaticAberration aberration;
+  if (!field.present()) return aberration;
   expect_keys(field, {{}, {"blue", "red"}});
-  for (const char* channel : {"blue", "red"})
-    if (const YamlField magnification = field[channel]; magnification.present())
-      magnification.number_between(1, 1, "1: no other magnification is corrected");
+  const auto read = [&](const char* channel, double& magnification) {
+    if (const YamlField given = field[channel]; given.present())
+      magnification = given.number_between(0.98, 1.02, "0.98 to 1.02, times green's image");
+  };
+  read("blue", aberration.blue), read("red", aberration.red);
+  return aberration;
 }
 
 bool parse_switch(const YamlField& field) {
@@ -117,7 +120,7 @@ Camera parse_camera_fields(const YamlField& field) {
     check_invertible(camera, coefficients["data"]);
   }
   camera.response = parse_response(field["response"]);
-  refuse_chromatic_aberration(field["lateral_chromatic_aberration"]);
+  camera.chromatic_aberration = parse_chromatic_aberration(field["lateral_chromatic_aberration"]);
   if (const YamlField deinterlace = field["deinterlace"]; deinterlace.present())
     camera.deinterlace = parse_switch(deinterlace);
   check_unused(field);
@@ -130,8 +133,24 @@ Camera parse_camera(const YamlField& field, const fs::path& folder) {
   return parse_camera_fields(YamlField::read(path, file_kind));
 }
 
+MarkerSigmas parse_sigmas(const YamlField& marker) {
+  constexpr auto expected = "standard deviations: numbers from 0 up, as many as they belong to";
+  const auto one = [&](const char* key) -> std::optional<double> {
+    const YamlField field = marker[key];
+    return field.present() ? std::optional(field.number(expected)) : std::nullopt;
+  };
+  const auto three = [&](const char* key) -> std::optional<std::array<double, 3>> {
+    const YamlField field = marker[key];
+    return field.present() ? std::optional(field.numbers<3>(expected)) : std::nullopt;
+  };
+  return {one("sigma_diameter_m"), three("sigma_hues_deg"), three("sigma_bands_upper_m"), three("sigma_bands_lower_m"),
+          one("sigma_seam_rad"),   one("sigma_wrap_m"),     one("sigma_skew_m"),          one("sigma_gap_rad")};
+}
+
 Marker parse_marker(const YamlField& field) {
-  expect_keys(field, {{}, {"diameter_m", "hues_deg", "bands_upper_m", "bands_lower_m", "seam_rad", "tolerance_m"}});
+  expect_keys(field, {{},
+                      {"diameter_m", "hues_deg", "bands_upper_m", "bands_lower_m", "seam_rad", "wrap_m", "skew_m",
+                       "gap_rad", "tolerance_m"}});
   Marker marker;
   marker.diameter_m = field["diameter_m"].number("0.0005 to 0.1 (metres)");
   if (const YamlField hues = field["hues_deg"]; hues.present())
@@ -141,6 +160,10 @@ Marker parse_marker(const YamlField& field) {
   if (const YamlField seam = field["seam_rad"]; seam.present()) marker.seam_rad = seam.number("an angle in radians");
   if (const YamlField tolerance = field["tolerance_m"]; tolerance.present())
     marker.tolerance_m = tolerance.number_between(0, max_tolerance_m, "0 to 0.005 (metres)");
+  if (const YamlField wrap = field["wrap_m"]; wrap.present()) marker.wrap_m = wrap.number("a length in metres");
+  if (const YamlField skew = field["skew_m"]; skew.present()) marker.skew_m = skew.number("a length in metres");
+  if (const YamlField gap = field["gap_rad"]; gap.present()) marker.gap_rad = gap.number("an angle in radians");
+  marker.sigmas = parse_sigmas(field);
   if (const std::string problem = marker_problem(marker); !problem.empty()) field.fail_within(problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
     field.fail("not decodable", "bands whose cross-ratio is monotonic over the rotation: " + problem);

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -47,14 +48,19 @@ std::string joints_yaml(const Joints& joints) {
                      list_of(joints.sign), list_of(joints.offset));
 }
 
+std::string chromatic_aberration_yaml(const ChromaticAberration& aberration) {
+  if (aberration == ChromaticAberration{}) return "";
+  return fmt::format("  lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", aberration.blue, aberration.red);
+}
+
 std::string camera_yaml(const Camera& camera) {
   const std::array matrix{camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0};
   return fmt::format(
       "camera:\n  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n"
       "  camera_matrix: {{rows: 3, cols: 3, data: {}}}\n"
-      "  distortion_coefficients: {{rows: 1, cols: 5, data: {}}}\n  response: {}\n{}",
+      "  distortion_coefficients: {{rows: 1, cols: 5, data: {}}}\n  response: {}\n{}{}",
       camera.width_px, camera.height_px, list_of(matrix), list_of(camera.distortion), response_yaml(camera.response),
-      camera.deinterlace ? "  deinterlace: true\n" : "");
+      chromatic_aberration_yaml(camera.chromatic_aberration), camera.deinterlace ? "  deinterlace: true\n" : "");
 }
 
 std::string instrument_yaml(const Instrument& instrument) {
@@ -78,11 +84,24 @@ std::string marker_yaml(const Marker& marker, int indent) {
   const auto add = [&](std::string_view key, const std::string& value) {
     text += fmt::format("{:{}}{}: {}\n", "", indent, key, value);
   };
-  add("diameter_m", fmt::format("{}", marker.diameter_m));
-  add("hues_deg", list_of(marker.hues_deg));
-  add("bands_upper_m", list_of(marker.bands_upper_m));
-  add("bands_lower_m", list_of(marker.bands_lower_m));
-  add("seam_rad", fmt::format("{}", marker.seam_rad));
+  const auto add_number = [&](std::string_view key, double value, const std::optional<double>& sigma) {
+    add(key, fmt::format("{}", value));
+    if (sigma) add(fmt::format("sigma_{}", key), fmt::format("{}", *sigma));
+  };
+  const auto add_list = [&](std::string_view key, const std::array<double, 3>& values,
+                            const std::optional<std::array<double, 3>>& sigmas) {
+    add(key, list_of(values));
+    if (sigmas) add(fmt::format("sigma_{}", key), list_of(*sigmas));
+  };
+  const MarkerSigmas& sigmas = marker.sigmas;
+  add_number("diameter_m", marker.diameter_m, sigmas.diameter_m);
+  add_list("hues_deg", marker.hues_deg, sigmas.hues_deg);
+  add_list("bands_upper_m", marker.bands_upper_m, sigmas.bands_upper_m);
+  add_list("bands_lower_m", marker.bands_lower_m, sigmas.bands_lower_m);
+  add_number("seam_rad", marker.seam_rad, sigmas.seam_rad);
+  if (marker.wrap_m != 0 || sigmas.wrap_m) add_number("wrap_m", marker.wrap_m, sigmas.wrap_m);
+  if (marker.skew_m != 0 || sigmas.skew_m) add_number("skew_m", marker.skew_m, sigmas.skew_m);
+  if (marker.gap_rad != 0 || sigmas.gap_rad) add_number("gap_rad", marker.gap_rad, sigmas.gap_rad);
   if (marker.tolerance_m > 0) add("tolerance_m", fmt::format("{}", marker.tolerance_m));
   return text;
 }

@@ -28,6 +28,7 @@ void expect_same_bits(const Rig& a, const Rig& b) {
     EXPECT_EQ(a.camera.*member, b.camera.*member);
   EXPECT_EQ(a.camera.distortion, b.camera.distortion);
   EXPECT_EQ(a.camera.deinterlace, b.camera.deinterlace);
+  EXPECT_EQ(a.camera.chromatic_aberration, b.camera.chromatic_aberration);
   EXPECT_EQ(a.camera.response.kind, b.camera.response.kind);
   EXPECT_EQ(a.camera.response.gamma, b.camera.response.gamma);
   EXPECT_EQ(a.camera.response.table_light, b.camera.response.table_light);
@@ -42,6 +43,14 @@ void expect_same_bits(const Rig& a, const Rig& b) {
     EXPECT_EQ(left.marker.bands_lower_m, right.marker.bands_lower_m);
     EXPECT_EQ(left.marker.seam_rad, right.marker.seam_rad);
     EXPECT_EQ(left.marker.tolerance_m, right.marker.tolerance_m);
+    for (const auto member : {&Marker::wrap_m, &Marker::skew_m, &Marker::gap_rad})
+      EXPECT_EQ(left.marker.*member, right.marker.*member);
+    const MarkerSigmas &of_left = left.marker.sigmas, &of_right = right.marker.sigmas;
+    for (const auto member : {&MarkerSigmas::diameter_m, &MarkerSigmas::seam_rad, &MarkerSigmas::wrap_m,
+                              &MarkerSigmas::skew_m, &MarkerSigmas::gap_rad})
+      EXPECT_EQ(of_left.*member, of_right.*member);
+    for (const auto member : {&MarkerSigmas::hues_deg, &MarkerSigmas::bands_upper_m, &MarkerSigmas::bands_lower_m})
+      EXPECT_EQ(of_left.*member, of_right.*member);
     EXPECT_EQ(left.image_delay_s, right.image_delay_s);
     ASSERT_EQ(left.joints.has_value(), right.joints.has_value());
     if (left.joints) {
@@ -67,6 +76,7 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
                                     "camera_matrix: {data: [1100, 0, 639.5, 0, 1090, 359.5, 0, 0, 1]}}\n") +
                             markers,
                         "rig.yaml");
+    if (i % 2 == 0) rig.camera.chromatic_aberration = {random.uniform(0.99, 1.01), random.uniform(0.99, 1.01)};
     rig.camera.fx_px = random.uniform(500, 2000), rig.camera.cy_px = random.uniform(300, 400);
     rig.camera.distortion = {random.uniform(-0.05, 0.05), 1e-17, 0, -0.0, random.uniform(-1e-9, 1e-9)};
     if (i % 3 == 0) rig.camera.response = {Response::Kind::power, random.uniform(0.3, 4)};
@@ -85,6 +95,15 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
     instrument.marker.seam_rad = random.uniform(-3, 3);
     instrument.marker.hues_deg[0] += random.uniform(-1, 1);
     if (i % 4 == 1) instrument.marker.tolerance_m = random.uniform(0, 1e-3);
+    if (i % 4 == 2) {
+      instrument.marker.wrap_m = random.uniform(-2e-3, 2e-3), instrument.marker.gap_rad = random.uniform(0, 0.3);
+      instrument.marker.skew_m = random.uniform(-1e-3, 1e-3);
+      instrument.marker.bands_lower_m[2] += instrument.marker.skew_m;
+      MarkerSigmas& sigmas = instrument.marker.sigmas;
+      sigmas.bands_upper_m = sigmas.bands_lower_m = sigmas.hues_deg = {random.uniform(), 1.0 / 3, 1e-17};
+      sigmas.diameter_m = sigmas.seam_rad = sigmas.wrap_m = sigmas.skew_m = sigmas.gap_rad = random.uniform(0, 1e-3);
+    }
+    if (i % 4 == 3) instrument.marker.sigmas.wrap_m = 1e-5;
     if (i % 2 == 0)
       instrument.camera_from_rcm =
           Rigid3{Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized(),

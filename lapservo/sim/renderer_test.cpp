@@ -89,6 +89,68 @@ TEST(Renderer, BoundariesLieWhereKinematicsSays) {
   }
 }
 
+ShaftModel askew_shaft(double wrap_m, double gap_rad) {
+  ShaftModel shaft = short_shaft();
+  shaft.marker.wrap_m = wrap_m, shaft.marker.gap_rad = gap_rad;
+  return shaft;
+}
+
+TEST(Renderer, AskewBoundariesLieWhereTheMarkerSays) {
+  Random random(15);
+  const Camera camera = small_camera();
+  const ShaftModel shaft = askew_shaft(1.4e-3, 0.24);
+  Renderer renderer(camera, {shaft}, even_background(camera, 0.1F), quiet());
+  int checked = 0;
+  for (int trial = 0; trial < 30; ++trial) {
+    const ShaftPlacement placement = across_the_view(random.uniform(-pi, pi), random.uniform(-pi, pi));
+    const auto line = centre_line(camera, shaft.marker, placement.camera_from_unrolled, placement.psi_rad).value();
+    if (distance_to_seam_rad(shaft.marker, line.tau_rad) < 0.2) continue;
+    const cv::Mat light = light_of(renderer.render({placement}, 1), camera.response);
+    const Eigen::Vector2d direction = (line.ideal_px[3] - line.ideal_px[0]).normalized();
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto off_px = crossing_px(light, line.ideal_px[k], direction);
+      ASSERT_TRUE(off_px) << "trial " << trial << " boundary " << k;
+      EXPECT_NEAR(*off_px, 0, k == 0 || k == 3 ? 0.15 : 0.06) << "trial " << trial << " boundary " << k;
+    }
+    ++checked;
+  }
+  EXPECT_GT(checked, 15);
+}
+
+TEST(Renderer, TheShaftShowsInTheGap) {
+  const Camera camera = small_camera();
+  for (const double gap_rad : {0.3, 0.03}) {
+    const ShaftModel shaft = askew_shaft(0, gap_rad);
+    Renderer renderer(camera, {shaft}, even_background(camera, 0.1F), quiet()),
+        without(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
+    ShaftPlacement placement = across_the_view(0.3, 0);
+    const auto facing = centre_line(camera, shaft.marker, placement.camera_from_unrolled, 0).value();
+    placement.psi_rad = facing.tau_rad + gap_rad / 2;  // the gap's middle faces the camera
+    const auto line = centre_line(camera, shaft.marker, placement.camera_from_unrolled, placement.psi_rad).value();
+    ASSERT_FALSE(is_printed(shaft.marker, line.tau_rad));
+    const cv::Mat gap = light_of(renderer.render({placement}, 1), camera.response);
+    const cv::Mat none = light_of(without.render({placement}, 1), camera.response);
+    const Eigen::Vector2d middle = 0.9 * line.ideal_px[3] + 0.1 * line.ideal_px[0];
+    const float ratio = light_at(gap, middle).norm() / light_at(none, middle).norm();
+    if (gap_rad > 0.1)
+      EXPECT_LT(ratio, 0.2F);
+    else  // narrower than a pixel: darker by its fraction
+      EXPECT_LT(ratio, 0.99F);
+  }
+}
+
+// Both ways of tracing rays agree where both can.
+TEST(Renderer, APrintAskewByNothingIsASquareOne) {
+  const Camera camera = small_camera();
+  Renderer square(camera, {short_shaft()}, even_background(camera, 0.1F), quiet());
+  Renderer askew(camera, {askew_shaft(1e-12, 0)}, even_background(camera, 0.1F), quiet());
+  Random random(16);
+  for (int trial = 0; trial < 10; ++trial) {
+    const ShaftPlacement placement = across_the_view(random.uniform(-pi, pi), random.uniform(-pi, pi));
+    EXPECT_LE(max_difference(square.render({placement}, 1), askew.render({placement}, 1)), 12) << "trial " << trial;
+  }
+}
+
 TEST(Renderer, AFullTurnChangesNothing) {
   const Camera camera = small_camera();
   Renderer renderer(camera, {short_shaft()}, make_tissue(camera.width_px, camera.height_px, 3));

@@ -135,9 +135,18 @@ void ShaftPainter::paint(const PixelRays& rays, const cv::Rect& part, const cv::
   }
 }
 
+// Of corners on the sides: whether the print's seam, and a gap that may be narrower than the pixel, lies between them.
+bool ShaftPainter::spans_seam(const Corners& at) const {
+  const auto tau = [&](std::size_t i) { return tracer_.tau_rad(at.azimuth_rad[i]); };
+  for (std::size_t i = 1; i < 4; ++i)
+    if (std::abs(tau(i) - tau(0)) > 1) return true;
+  return false;
+}
+
 ShaftPainter::Paint ShaftPainter::paint_pixel(const Corners& at) {
   const Part low = *std::min_element(at.part.begin(), at.part.end());
   const Part high = *std::max_element(at.part.begin(), at.part.end());
+  if (tracer_.has_gap() && is_band(high) && spans_seam(at)) return sampled(at);
   if (low == high && (on_side(low) || low == Part::tip)) return inside(at);
   const bool two_parts = std::all_of(at.part.begin(), at.part.end(), [&](Part p) { return p == low || p == high; });
   Paint paint;

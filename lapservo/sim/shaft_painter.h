@@ -54,6 +54,7 @@ class ShaftPainter {
 
   static Corners corners(const RayRow& above, const RayRow& below, std::size_t i);
   Paint paint_pixel(const Corners& corners);
+  bool spans_seam(const Corners& corners) const;
   Paint inside(const Corners& corners);
   bool silhouette(const Corners& corners, Part inner, Paint& paint);
   bool boundary(const Corners& corners, Part proximal, Part distal, Paint& paint);

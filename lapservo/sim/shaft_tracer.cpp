@@ -51,10 +51,63 @@ ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placemen
   e2_m_ = static_cast<float>(at_seam[2]);
   e1_slope_m_ = static_cast<float>(slopes[1]);
   e2_slope_m_ = static_cast<float>(slopes[2]);
+  e0_slope_m_ = static_cast<float>(slopes[0]);
+  e3_slope_m_ = static_cast<float>(slopes[3]);
+  covered_rad_ = static_cast<float>(marker.covered_rad());
+  square_ = marker.gap_rad == 0 && slopes[0] == 0 && slopes[3] == 0;
   visible_ = camera_.x() > 1.01F * outer_m_;
 }
 
 void ShaftTracer::trace(RayRow& rays, bool with_tip) const {
+  square_ ? trace_square(rays) : trace_askew(rays);
+  if (with_tip) trace_tip(rays);
+  if (!blotches_.empty()) stain(rays);
+}
+
+// A ray goes onto the film, or past it onto the shaft; where the film covers that place it went in through an edge.
+void ShaftTracer::trace_askew(RayRow& rays) const {
+  const float cx = camera_.x(), cz = camera_.z();
+  struct Hit {
+    bool met = false;
+    float depth_m = 0, along_m = 0, azimuth_rad = 0;
+    int band = 0;  // of the film over it; 0 where there is none
+  };
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const Eigen::Vector3f d = rotation_ * Eigen::Vector3f(rays.x[i], rays.y[i], 1);
+    const float a = d.x() * d.x() + d.y() * d.y(), cross2 = cx * cx * d.y() * d.y(), closest = -cx * d.x();
+    // `side`: -1 where the ray comes in, 1 where it leaves.
+    const auto hit = [&](float radius_m, float side) {
+      Hit at;
+      const float root2 = radius_m * radius_m * a - cross2;
+      at.depth_m = (closest + side * std::sqrt(std::max(root2, 0.0F))) / a;
+      at.met = root2 > 0 && at.depth_m > nearest_m;
+      at.along_m = cz + at.depth_m * d.z();
+      at.azimuth_rad = std::atan2(at.depth_m * d.y(), cx + at.depth_m * d.x());
+      const float tau = tau_rad(at.azimuth_rad);
+      const bool covered =
+          tau < covered_rad_ && at.along_m >= e0_slope_m_ * tau && at.along_m <= length_m_ + e3_slope_m_ * tau;
+      if (covered) at.band = 1 + (at.along_m > e1_m_ + e1_slope_m_ * tau) + (at.along_m > e2_m_ + e2_slope_m_ * tau);
+      return at;
+    };
+    const Hit outer = hit(outer_m_, -1);
+    Hit seen = outer;
+    Part part = outer.met && outer.band > 0 ? static_cast<Part>(outer.band) : Part::nothing;
+    if (part == Part::nothing && outer.met) {
+      const Hit inner = hit(inner_m_, -1), leaving = inner.met ? inner : hit(outer_m_, 1);
+      seen = inner.met ? inner : outer;
+      if (leaving.band > 0)
+        part = Part::film_edge;
+      else if (inner.met && inner.along_m > shaft_start_m_ && inner.along_m < shaft_end_m_)
+        part = Part::shaft;
+    }
+    rays.azimuth_rad[i] = seen.azimuth_rad;
+    rays.along_m[i] = seen.along_m;
+    rays.depth_m[i] = seen.depth_m;
+    rays.part[i] = part;
+  }
+}
+
+void ShaftTracer::trace_square(RayRow& rays) const {
   const Eigen::Matrix3f& m = rotation_;
   const float cx = camera_.x(), cz = camera_.z();
   const float outer2 = outer_m_ * outer_m_, inner2 = inner_m_ * inner_m_;
@@ -110,8 +163,6 @@ void ShaftTracer::trace(RayRow& rays, bool with_tip) const {
     depths[i] = depth;
     parts[i] = static_cast<Part>(part);
   }
-  if (with_tip) trace_tip(rays);
-  if (!blotches_.empty()) stain(rays);
 }
 
 void ShaftTracer::trace_tip(RayRow& rays) const {

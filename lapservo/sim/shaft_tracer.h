@@ -47,6 +47,7 @@ class ShaftTracer {
   /// Distance along the axis beyond boundary e1 (index 1) or e2 (2) at an azimuth from the facing generatrix.
   float beyond_boundary_m(std::size_t index, float azimuth_rad, float along_m) const;
   float tau_rad(float azimuth_rad) const;
+  bool has_gap() const { return covered_rad_ < 6.2831853F; }
 
   // The facing frame: z along the axis, origin at the marker's proximal end, the camera in the x-z plane, x > 0.
   Eigen::Vector3f in_facing_frame(const Eigen::Vector3d& point_in_camera) const;
@@ -59,6 +60,8 @@ class ShaftTracer {
   float length_m() const { return length_m_; }
 
  private:
+  void trace_square(RayRow& rays) const;
+  void trace_askew(RayRow& rays) const;
   void trace_tip(RayRow& rays) const;
   void stain(RayRow& rays) const;
 
@@ -71,6 +74,9 @@ class ShaftTracer {
   float tau_facing_;               // tau on the facing generatrix, in [0, 2 pi)
   float e1_m_, e2_m_;              // at tau = 0
   float e1_slope_m_, e2_slope_m_;  // per radian
+  float e0_slope_m_, e3_slope_m_;
+  float covered_rad_;
+  bool square_;  // both ends are circles, and the print reaches round
   std::vector<Blotch> blotches_;
 };
 

@@ -30,13 +30,15 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
   };
   for (int i = 0; i < lines; ++i) {
     const double azimuth_rad = view->facing_azimuth_rad + 0.85 * view->half_visible_rad * (2.0 * i / (lines - 1) - 1);
-    const auto ends_m = boundaries_m(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
+    const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
+    const bool printed = is_printed(scene.marker, tau_rad);
+    const auto ends_m = boundaries_m(scene.marker, tau_rad);
     for (int k = -margin; k < places + margin; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
       const std::uint8_t color = color_at(radius_m, azimuth_rad, along_m);
       if (color == Scene::outside) continue;
       const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin();
-      if (band < 1 || band > 3) {
+      if (!printed || band < 1 || band > 3) {
         count_empty(color);
       } else if (color == scene.bands[static_cast<std::size_t>(band - 1)]) {
         score += 1;

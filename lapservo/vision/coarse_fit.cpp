@@ -145,6 +145,18 @@ void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const 
   equations.add(row, residual_px, cauchy_weight(residual_px / sigma_px, cauchy_scale_sigmas) / (sigma_px * sigma_px));
 }
 
+// Where a boundary lies on a generatrix, and how that changes with tau. Of a rotation that is not known yet, ends in
+// the middle of where they lie over the turn.
+struct Place {
+  double along_m, slope_m;
+};
+Place place_of(const Marker& marker, std::size_t boundary, double azimuth_rad, double psi_rad, bool with_rotation) {
+  if (with_rotation)
+    return {boundaries_m(marker, marker_azimuth_rad(marker, azimuth_rad, psi_rad))[boundary],
+            boundary_slopes_m(marker)[boundary]};
+  return {boundaries_m(marker, marker.covered_rad() / 2)[boundary], 0};
+}
+
 // One Gauss-Newton step on measured points. Inner boundaries count only once the rotation is known.
 std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unknowns, std::span<const SidePoint> sides,
                                     std::span<const BoundaryPoint> boundaries, bool with_rotation) {
@@ -161,13 +173,10 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
     add_curve_distance(scene, unknowns, point_on(pose, scene.marker, azimuth_rad, side.along_m), axes.col(2), 0,
                        side.raw_px, detection_limits.side_sigma_px, equations);
   }
-  const auto slopes_m = boundary_slopes_m(scene.marker);
   for (const BoundaryPoint& b : boundaries) {
     const bool inner = b.boundary == 1 || b.boundary == 2;
     if (inner && !with_rotation) continue;
-    const double along_m =
-        boundaries_m(scene.marker, marker_azimuth_rad(scene.marker, b.azimuth_rad, pose.psi_rad))[b.boundary];
-    const double slope_m = slopes_m[b.boundary];
+    const auto [along_m, slope_m] = place_of(scene.marker, b.boundary, b.azimuth_rad, pose.psi_rad, with_rotation);
     const Eigen::Vector3d tangent = scene.marker.radius_m() * azimuth_direction(b.azimuth_rad) + slope_m * axes.col(2);
     add_curve_distance(scene, unknowns, point_on(pose, scene.marker, b.azimuth_rad, along_m), tangent, -slope_m,
                        b.raw_px, detection_limits.boundary_sigma_px, equations);
@@ -196,8 +205,9 @@ class RotationScore {
   double at(double psi_rad) const {
     int score = 0;
     for (std::size_t i = 0; i < line_count; ++i) {
-      const auto ends_m =
-          boundaries_m(scene_.marker, marker_azimuth_rad(scene_.marker, surface_.lines[i].azimuth_rad, psi_rad));
+      const double tau_rad = marker_azimuth_rad(scene_.marker, surface_.lines[i].azimuth_rad, psi_rad);
+      if (!is_printed(scene_.marker, tau_rad)) continue;
+      const auto ends_m = boundaries_m(scene_.marker, tau_rad);
       std::array<const std::array<int, 3>*, 4> sums;
       for (std::size_t k = 0; k < 4; ++k) sums[k] = &sums_[i][index(ends_m[k])];
       for (std::size_t band = 0; band < 3; ++band) score += (*sums[band + 1])[band] - (*sums[band])[band];

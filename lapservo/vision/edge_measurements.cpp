@@ -54,11 +54,12 @@ struct Frame {
     return unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * line.outwards +
            along_m * axes.col(2);
   }
-  // How brightly the film's edge at boundary k shows, relative to the outside beside it; 0 when it is not seen.
-  double film_light(std::size_t k, const Generatrix& line) const {
+  // How brightly the film's edge at boundary k, `along_m` from the frame's origin, shows, relative to the outside
+  // beside it; 0 when it is not seen.
+  double film_light(std::size_t k, const Generatrix& line, double along_m) const {
     if (k == 1 || k == 2) return 0;
     Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
-    if (k == 3) to_camera.z() -= marker().length_m();
+    to_camera.z() -= along_m;
     const double beyond = k == 0 ? -to_camera.z() : to_camera.z();
     if (beyond <= 0) return 0;
     const double distance_m = to_camera.norm();
@@ -115,7 +116,7 @@ bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_p
 std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
                                             const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
                                             double blur_px) {
-  const double film_light = frame.film_light(k, generatrix);
+  const double film_light = frame.film_light(k, generatrix, along_m[k]);
   const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - film_light * frame.film_m * generatrix.outwards;
   if (!(point.z() > 1e-3)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
@@ -144,7 +145,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
                                  -film_light * film_sigma_m * pull.dot(generatrix.outwards));
   place.measurement.group = k;
-  place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / two_pi;
+  place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   return place;
 }
@@ -205,6 +206,8 @@ void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
   out.lines = std::max(edge_limits.min_lines, std::min(static_cast<int>(1.2 * radius_px), max_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
+  std::array<bool, 4> jumps{};
+  for (std::size_t k = 0; k < 4; ++k) jumps[k] = jumps_at_seam(frame.marker(), k);
   const double sine_of_half = std::sin(frame.view.half_visible_rad);
   InplaceVector<BoundaryPlace, 4 * max_lines> places;
   InplaceVector<EdgeLine, 4 * max_lines> lines;
@@ -213,10 +216,9 @@ void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px
     const Generatrix generatrix = frame.generatrix(frame.view.facing_azimuth_rad + std::asin(sine));
     const double tau_rad = frame.tau(generatrix.azimuth_rad);
     const auto along_m = boundaries_m(frame.marker(), tau_rad);
-    const double seam_px = std::abs(wrap_pi(tau_rad)) * radius_px * std::sqrt(1 - sine * sine);
+    const double seam_px = distance_to_seam_rad(frame.marker(), tau_rad) * radius_px * std::sqrt(1 - sine * sine);
     for (std::size_t k = 0; k < 4; ++k) {
-      const bool inner = k == 1 || k == 2;
-      if (inner && seam_px < edge_limits.seam_blurs * blur_px + edge_limits.seam_px) continue;
+      if (jumps[k] && seam_px < edge_limits.seam_blurs * blur_px + edge_limits.seam_px) continue;
       const auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur_px);
       if (!place) continue;
       ++out.in_image[k];
@@ -238,6 +240,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px
 bool one_band(const Frame& frame, double azimuth_a_rad, double azimuth_b_rad, double along_m, double room_m) {
   const double tau_a = wrap_two_pi(frame.tau(azimuth_a_rad)), tau_b = wrap_two_pi(frame.tau(azimuth_b_rad));
   if (std::abs(tau_a - tau_b) > pi) return false;  // the seam lies between
+  if (!is_printed(frame.marker(), tau_a) || !is_printed(frame.marker(), tau_b)) return false;
   const auto a = boundaries_m(frame.marker(), tau_a), b = boundaries_m(frame.marker(), tau_b);
   const auto band = [](const std::array<double, 4>& e, double x) {
     return std::upper_bound(e.begin(), e.end(), x) - e.begin();

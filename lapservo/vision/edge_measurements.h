@@ -30,7 +30,7 @@ struct Measurement {
   double residual_px;  ///< along the normal
   double sigma_px;
   std::size_t group;          ///< 0..3: the boundary; 4 and 5: the sides
-  double turn_fraction = 0;   ///< tau / 2 pi
+  double turn_fraction = 0;   ///< tau by what the print covers
   double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides
 };
 inline constexpr std::size_t measurement_groups = 6;

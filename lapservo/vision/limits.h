@@ -76,7 +76,7 @@ struct EdgeLimits {
   /// Light on the film's edge: the fraction that is even (the rest is diffuse, from the camera), and by that on the
   /// outside at most.
   double film_ambient_fraction = 0.18, film_most_lit = 2;
-  double seam_blurs = 2.5, seam_px = 1.5;  ///< inner boundaries this near to the seam, together, are left out
+  double seam_blurs = 2.5, seam_px = 1.5;  ///< boundaries that jump at the seam, this near to it, are left out
   /// Of a blur, and by how much a pass may change it: wider is no edge, and far steps overshoot.
   double min_blur_px = 0.5, max_blur_px = 8, min_blur_change = 0.6, max_blur_change = 1.7;
 };

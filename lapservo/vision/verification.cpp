@@ -63,7 +63,10 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   for (int i = 0; i < azimuths; ++i) {
     const double azimuth_rad = view->facing_azimuth_rad + 0.8 * view->half_visible_rad * (2.0 * i / (azimuths - 1) - 1);
-    const auto ends_m = boundaries_m(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
+    const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
+    if (scene.marker.gap_rad > 0 && distance_to_seam_rad(scene.marker, tau_rad) * scene.marker.radius_m() < guard_m)
+      continue;
+    const auto ends_m = boundaries_m(scene.marker, tau_rad);
     const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, 0);
     for (int k = -margin; k < places + margin; ++k) {
       const double along_m = length_m * (k + 0.5) / places;

@@ -1,0 +1,125 @@
+#include "apps/lapservo/calibration_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/experiments/html_report.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+const std::array<std::string, 4> names{"e0 (proximal end)", "e1", "e2", "e3 (distal end)"};
+
+// Means over so many parts of the turn: thousands of points, a page that opens.
+Series binned(const std::vector<PrintResidual>& residuals, std::size_t boundary) {
+  constexpr std::size_t parts = 120;
+  std::array<double, parts> sums{}, counts{};
+  for (const PrintResidual& r : residuals) {
+    if (r.boundary != boundary) continue;
+    const auto part = static_cast<std::size_t>(std::clamp(r.tau_rad / two_pi * parts, 0.0, parts - 1.0));
+    sums[part] += r.residual_m, counts[part] += 1;
+  }
+  Series series{.name = names[boundary],
+                .x = {},
+                .y = {},
+                .sigma = {},
+                .draw = Draw::points,
+                .color = static_cast<int>(boundary)};
+  for (std::size_t part = 0; part < parts; ++part) {
+    if (counts[part] < 3) continue;
+    series.x.push_back(360 * (static_cast<double>(part) + 0.5) / parts);
+    series.y.push_back(1e3 * sums[part] / counts[part]);
+  }
+  return series;
+}
+
+Plot residual_plot(const std::string& title, const std::vector<PrintResidual>& residuals) {
+  Plot plot;
+  plot.title = title;
+  plot.x = {.label = "tau", .unit = "deg", .low = 0, .high = 360};
+  plot.y = {.label = "along the shaft", .unit = "mm", .low = {}, .high = {}};
+  for (std::size_t k = 0; k < 4; ++k) plot.series.push_back(binned(residuals, k));
+  plot.references = {{"the print", 0}};
+  return plot;
+}
+
+void add_print(Plot& plot, const Marker& marker, const std::string& name, Draw draw) {
+  constexpr int steps = 24;
+  for (std::size_t k = 0; k < 4; ++k) {
+    Series series{.name = fmt::format("{}, {}", names[k], name),
+                  .x = {},
+                  .y = {},
+                  .sigma = {},
+                  .draw = draw,
+                  .color = static_cast<int>(k)};
+    for (int i = 0; i <= steps; ++i) {
+      const double tau_rad = std::nextafter(marker.covered_rad(), 0.0) * i / steps;
+      series.x.push_back(deg_from_rad(tau_rad));
+      series.y.push_back(1e3 * boundaries_m(marker, tau_rad)[k]);
+    }
+    plot.series.push_back(std::move(series));
+  }
+}
+
+Plot print_plot(const Marker& before, const Marker& after) {
+  Plot plot;
+  plot.title = "Boundaries over the print";
+  plot.x = {.label = "tau", .unit = "deg", .low = 0, .high = 360};
+  plot.y = {.label = "from the proximal end", .unit = "mm", .low = {}, .high = {}};
+  add_print(plot, before, "rig", Draw::dashed);
+  add_print(plot, after, "calibrated", Draw::line);
+  return plot;
+}
+
+Table table_of(const Marker& before, const Marker& after) {
+  Table table{"One standard deviation each", {"", "before", "after", "sigma"}, {}};
+  const auto add = [&](const std::string& name, double unit, double was, double is, double sigma) {
+    table.rows.push_back({name, fmt::format("{:.4f}", unit * was), fmt::format("{:.4f}", unit * is),
+                          fmt::format("{:.4f}", unit * sigma)});
+  };
+  const MarkerSigmas& sigmas = after.sigmas;
+  for (std::size_t i = 0; i < 3; ++i)
+    add(fmt::format("bands_upper_m[{}] [mm]", i), 1e3, before.bands_upper_m[i], after.bands_upper_m[i],
+        (*sigmas.bands_upper_m)[i]);
+  for (std::size_t i = 0; i < 3; ++i)
+    add(fmt::format("bands_lower_m[{}] [mm]", i), 1e3, before.bands_lower_m[i], after.bands_lower_m[i],
+        (*sigmas.bands_lower_m)[i]);
+  add("wrap_m [mm]", 1e3, before.wrap_m, after.wrap_m, sigmas.wrap_m.value());
+  add("skew_m [mm]", 1e3, before.skew_m, after.skew_m, sigmas.skew_m.value());
+  add("gap_rad [mrad]", 1e3, before.gap_rad, after.gap_rad, sigmas.gap_rad.value());
+  if (sigmas.seam_rad) add("seam_rad [mrad]", 1e3, before.seam_rad, after.seam_rad, *sigmas.seam_rad);
+  return table;
+}
+
+}  // namespace
+
+void write_calibration_report(const std::filesystem::path& path, const Instrument& instrument,
+                              const MarkerCalibration& calibration) {
+  ReportSection section;
+  section.id = "marker";
+  section.title = "The marker of " + instrument.name;
+  section.text = {
+      fmt::format("{} frames from all sides, {} of them with the seam. Boundaries miss the rig's print by "
+                  "{:.3f} px rms and the calibrated one by {:.3f} px, each with the poses that fit it best.",
+                  calibration.frames, calibration.seam_views, calibration.before_px, calibration.after_px)};
+  section.figures = {{residual_plot("Before: the rig's print", calibration.before),
+                      "Where boundaries were found, beyond where the rig's print has them; means over 3 degrees."},
+                     {residual_plot("After: the calibrated print", calibration.after),
+                      "The same for the calibrated print. What is left and runs straight is none of its errors."},
+                     {print_plot(instrument.marker, calibration.marker), "Both prints, unrolled."}};
+  section.tables = {table_of(instrument.marker, calibration.marker)};
+  section.notes = {"Lengths count in diameters: the rig's diameter_m is taken for right."};
+  Report report;
+  report.title = "lapservo calibrate marker";
+  report.sections = {section};
+  write_report(path, report);
+}
+
+}  // namespace lapservo::app

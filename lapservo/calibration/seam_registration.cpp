@@ -1,0 +1,110 @@
+#include "lapservo/calibration/seam_registration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr std::size_t min_frames = 8;
+
+// The joint psi at a time; nullopt outside the recording, and across its pauses.
+std::optional<double> psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
+  constexpr double longest_pause_s = 0.5;
+  const auto next = std::lower_bound(recording.time_s.begin(), recording.time_s.end(), time_s);
+  if (next == recording.time_s.end() || (next == recording.time_s.begin() && *next > time_s)) return std::nullopt;
+  const auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(1, next - recording.time_s.begin()));
+  const double from_s = recording.time_s[i - 1], to_s = recording.time_s[i];
+  if (to_s - from_s > longest_pause_s) return std::nullopt;
+  const double fraction = (time_s - from_s) / (to_s - from_s);
+  const double joint = (1 - fraction) * recording.joints[i - 1][3] + fraction * recording.joints[i][3];
+  return joints.sign[3] * joint + joints.offset[3];
+}
+
+// psi in the RCM's azimuths of a shaft in a free pose: its axis as theta and phi have it, its turn about that.
+double psi_of(const ShaftPose& pose, const Rigid3& camera_from_rcm) {
+  const Eigen::Matrix3d axes =
+      (camera_from_rcm.rotation.conjugate() * pose.camera_from_unrolled.rotation).toRotationMatrix();
+  const Eigen::Vector3d axis = axes.col(2);
+  const double theta_rad = std::atan2(axis.y(), axis.x()), phi_rad = std::atan2(axis.head<2>().norm(), axis.z());
+  const Eigen::Matrix3d unrolled = rcm_from_unrolled({theta_rad, phi_rad, 0, 0}).rotation.toRotationMatrix();
+  const Eigen::Vector3d x = unrolled.transpose() * axes.col(0);
+  return pose.psi_rad + std::atan2(x.y(), x.x());
+}
+
+}  // namespace
+
+JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints) {
+  const CsvTable table = CsvTable::read(path);
+  JointRecording recording;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const double time_s = table.number(row, "time_s");
+    if (!recording.time_s.empty() && !(time_s > recording.time_s.back()))
+      throw InputError(path.string(), "row " + std::to_string(row + 1) + ": time_s", table.text(row, "time_s"),
+                       "later than the row before: the clock jumps");
+    recording.time_s.push_back(time_s);
+    auto& at = recording.joints.emplace_back();
+    for (std::size_t i = 0; i < at.size(); ++i) at[i] = table.number(row, joints.names[i]);
+  }
+  if (recording.time_s.size() < 2) throw InputError(path.string(), "has fewer than two rows");
+  return recording;
+}
+
+SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibration& calibration,
+                               const JointRecording& recording) {
+  SeamRegistration result;
+  const Marker& marker = calibration.marker;
+  std::vector<double> differences;
+  double first_s = 1e300, last_s = -1e300;
+  for (const KeyFrame& frame : calibration.key_frames) {
+    const double time_s = frame.time_s - instrument.image_delay_s.value_or(0);
+    first_s = std::min(first_s, time_s), last_s = std::max(last_s, time_s);
+    if (const auto psi_rad = psi_at(recording, instrument.joints.value(), time_s))
+      differences.push_back(psi_of(frame.sighting.unknowns.pose(), instrument.camera_from_rcm.value()) - *psi_rad);
+  }
+  result.frames = differences.size();
+  if (differences.size() < min_frames) {
+    char text[240];
+    std::snprintf(
+        text, sizeof text,
+        "%zu frames lie within the recording of the joints, at least %zu are needed: the frames run from %.2f "
+        "to %.2f s, the recording from %.2f to %.2f s",
+        differences.size(), min_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
+    result.refusal = text;
+    return result;
+  }
+  // About the direction of most, then the median, then the mean of what is near it.
+  double sine = 0, cosine = 0;
+  for (const double d : differences) sine += std::sin(d), cosine += std::cos(d);
+  const double about = std::atan2(sine, cosine);
+  for (double& d : differences) d = wrap_pi(d - about);
+  std::sort(differences.begin(), differences.end());
+  const double median = differences[differences.size() / 2];
+  std::vector<double> sizes;
+  for (const double d : differences) sizes.push_back(std::abs(d - median));
+  std::sort(sizes.begin(), sizes.end());
+  const double scale = std::max(1e-4, 1.4826 * sizes[sizes.size() / 2]);
+  double sum = 0, squares = 0, count = 0;
+  for (const double d : differences)
+    if (std::abs(d - median) < 3 * scale) sum += d, squares += d * d, ++count;
+  const double mean = sum / count, variance = std::max(0.0, squares / count - mean * mean);
+  constexpr double widest_rad = 0.2;
+  if (scale > widest_rad) {
+    result.refusal =
+        "the joints do not turn as the marker does: check joints.sign, the recording's clock and image_delay_s";
+    return result;
+  }
+  // A pose was found with marker.seam_rad: what psi is too large by, the seam lies farther.
+  result.seam_rad = wrap_pi(marker.seam_rad + about + mean);
+  result.sigma_rad = std::sqrt(variance / std::max(1.0, count - 1));
+  return result;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,80 @@
+#include "lapservo/rig/rig_updater.h"
+
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/rig/rig.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr auto camera =
+    "image_width: 640\nimage_height: 480\nsigma_camera_matrix: {data: [1, 0, 1, 0, 1, 1, 0, 0, 0]}\n"
+    "camera_matrix: {rows: 3, cols: 3, data: [500, 0, 320, 0, 501, 240, 0, 0, 1]}\n";
+constexpr auto rig_text = R"(camera: cameras/cam.yaml
+instruments:
+  - name: "12"
+    marker:
+      diameter_m: 0.0084
+      bands_upper_m: [0.0035, 0.0035, 0.017]
+      bands_lower_m: [0.0095, 0.0095, 0.005]
+      seam_rad: 0.1
+      gap_rad: 0.2
+      tolerance_m: 0.0001
+  - name: other
+    marker:
+      diameter_m: 0.0080
+      hues_deg: [180, 90, 270]
+      bands_upper_m: [0.0035, 0.0035, 0.017]
+      bands_lower_m: [0.0095, 0.0095, 0.005]
+    camera_from_rcm:
+      translation_m: [-0.0778, 0.0672, 0.0592]
+      quaternion_xyzw: [0.8920, -0.3695, 0.0997, 0.2408]
+      sigma_translation_m: [0.0001, 0.0001, 0.0002]
+    image_delay_s: 0.1
+    sigma_image_delay_s: 0.002
+)";
+
+struct Files {
+  testing::TemporaryFolder folder;
+  Files() {
+    std::filesystem::create_directories(folder / "cameras");
+    std::filesystem::create_directories(folder / "elsewhere");
+    testing::write_file(folder / "cameras/cam.yaml", camera);
+    testing::write_file(folder / "rig.yaml", rig_text);
+  }
+};
+
+TEST(UpdatedRig, ChangesOneMarkerAndNothingElse) {
+  const Files files;
+  Rig rig = load_rig(files.folder / "rig.yaml");
+  Marker marker = rig.instruments[0].marker;
+  marker.bands_upper_m = {0.0036, 0.0034, 0.017}, marker.wrap_m = 1.0 / 3e3, marker.gap_rad = 0, marker.tolerance_m = 0;
+  marker.sigmas.wrap_m = 1e-6, marker.sigmas.bands_upper_m = {1e-6, 2e-6, 3e-6};
+  for (const char* place : {"new.yaml", "elsewhere/new.yaml", "rig.yaml"}) {
+    const auto path = files.folder / place;
+    const std::string text = updated_rig_yaml(files.folder / "rig.yaml", path, 0, marker);
+    EXPECT_NE(text.find("sigma_translation_m: [0.0001, 0.0001, 0.0002]"), std::string::npos);
+    EXPECT_NE(text.find("sigma_image_delay_s: 0.002"), std::string::npos);
+    testing::write_file(path, text);
+    const Rig updated = load_rig(path);
+    EXPECT_EQ(updated.instruments[0].name, "12");
+    const Marker& now = updated.instruments[0].marker;
+    EXPECT_EQ(now.bands_upper_m, marker.bands_upper_m);
+    EXPECT_EQ(now.bands_lower_m, marker.bands_lower_m);
+    EXPECT_EQ(now.wrap_m, marker.wrap_m);
+    EXPECT_EQ(now.gap_rad, 0);
+    EXPECT_EQ(now.tolerance_m, 0);
+    EXPECT_EQ(now.sigmas.wrap_m, marker.sigmas.wrap_m);
+    EXPECT_EQ(now.sigmas.bands_upper_m, marker.sigmas.bands_upper_m);
+    EXPECT_EQ(updated.instruments[1].marker.diameter_m, rig.instruments[1].marker.diameter_m);
+    EXPECT_EQ(updated.instruments[1].image_delay_s, rig.instruments[1].image_delay_s);
+    EXPECT_EQ(updated.camera.fy_px, 501);
+  }
+}
+
+}  // namespace
+}  // namespace lapservo::internal

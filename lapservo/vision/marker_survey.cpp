@@ -1,0 +1,145 @@
+#include "lapservo/vision/marker_survey.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/coarse_fit.h"
+#include "lapservo/vision/initial_pose.h"
+#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/limits.h"
+#include "lapservo/vision/verification.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int grid_px = 8;
+// A print that is off by half a millimetre leaves nine tenths of the surface with the colour that the rig's would have.
+constexpr double min_matching = 0.6, max_wrong = 0.15, max_beside = 0.2;
+
+std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unknowns, const EdgeBlur& blur,
+                                    bool settled) {
+  const ShaftPose& pose = unknowns.pose();
+  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
+  if (!view) return std::nullopt;
+  const ColorAgreement agreement = color_agreement(scene, pose);
+  if (agreement.in_image < 0.9 || agreement.matching < min_matching || agreement.wrong > max_wrong ||
+      agreement.beside > max_beside)
+    return std::nullopt;
+  return Sighting{unknowns, blur, film_mean_m,
+                  wrap_two_pi(marker_azimuth_rad(scene.marker, view->facing_azimuth_rad, pose.psi_rad)), settled};
+}
+
+// The fine fit where it settles, else the coarse one.
+std::optional<Sighting> refined(const Scene& scene, const LightImage& light, const CoarseFit& coarse,
+                                const EdgeBlur& blur) {
+  const FineFit fine = fit_finely(scene, light, coarse.unknowns, blur);
+  if (fine.converged)
+    if (auto sighting = sighting_of(scene, fine.unknowns, fine.blur, true)) return sighting;
+  return sighting_of(scene, coarse.unknowns, blur, false);
+}
+
+}  // namespace
+
+MarkerSurvey::MarkerSurvey(const Rig& rig, std::size_t instrument)
+    : rig_(rig), instrument_(instrument), classes_(rig.instruments), light_(rig.camera.response.table()) {}
+
+std::optional<Sighting> MarkerSurvey::follow(const Scene& scene, const LightImage& light) const {
+  const CoarseFit coarse = fit_coarsely(scene, last_->unknowns, detection_limits.from_memory);
+  if (!coarse.found) return std::nullopt;
+  auto sighting = refined(scene, light, coarse, last_->blur);
+  return sighting && sighting->settled ? sighting : std::nullopt;
+}
+
+std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImage& light) const {
+  auto blobs = find_blobs(scene.image, classes_, grid_px, detection_limits.min_samples);
+  if (blobs.size() > detection_limits.max_blobs) blobs.resize(detection_limits.max_blobs);
+  std::optional<Sighting> best;
+  double best_score = 0;
+  const auto try_start = [&](const PoseUnknowns& start) {
+    const CoarseFit coarse = fit_coarsely(scene, PoseUnknowns::free(start.pose()), {});
+    if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score ||
+        coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
+      return;
+    const auto sighting = refined(scene, light, coarse, {});
+    if (!sighting) return;
+    const double score = color_agreement(scene, sighting->unknowns.pose()).matching + sighting->settled;
+    if (score > best_score) best_score = score, best = sighting;
+  };
+  for (const Blob& blob : blobs) {
+    if (const auto& camera_from_rcm = rig_.instruments[instrument_].camera_from_rcm)
+      for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm)) try_start(start);
+    if (!best || !best->settled)
+      for (const PoseUnknowns& start : initial_poses(scene, blob, std::nullopt)) try_start(start);
+    if (best && best->settled) break;
+  }
+  return best;
+}
+
+std::optional<Sighting> MarkerSurvey::find(const cv::Mat& bgr) {
+  const ImageView image(bgr);
+  const LightImage light(image, light_);
+  const Scene scene{
+      image,
+      rig_.camera,
+      classes_,
+      rig_.instruments[instrument_].marker,
+      {classes_.of_band(instrument_, 0), classes_.of_band(instrument_, 1), classes_.of_band(instrument_, 2)}};
+  auto sighting = last_ ? follow(scene, light) : std::nullopt;
+  if (!sighting) sighting = detect(scene, light);
+  last_ = sighting;
+  return sighting;
+}
+
+std::optional<MarkerView> cropped_view(const cv::Mat& bgr, const Camera& camera, const Marker& marker,
+                                       const Rigid3& camera_from_unrolled) {
+  constexpr double room_m = 3e-3;
+  const double reach_m = marker.radius_m() + room_m;
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(1e9), high = -low;
+  for (const double along_m : {-room_m, marker.length_m() + room_m})
+    for (const double x : {-reach_m, reach_m})
+      for (const double y : {-reach_m, reach_m}) {
+        const Eigen::Vector3d corner = camera_from_unrolled * Eigen::Vector3d(x, y, along_m);
+        if (!(corner.z() > 1e-3)) return std::nullopt;
+        const Eigen::Vector2d px = camera.raw_from_point(corner);
+        low = low.cwiseMin(px), high = high.cwiseMax(px);
+      }
+  const auto cut = [](double px, int end) { return static_cast<int>(std::clamp(px, 0.0, static_cast<double>(end))); };
+  const cv::Point from(cut(std::floor(low.x()), camera.width_px), cut(std::floor(low.y()), camera.height_px));
+  const cv::Point to(cut(std::ceil(high.x()) + 1, camera.width_px), cut(std::ceil(high.y()) + 1, camera.height_px));
+  if (to.x - from.x < grid_px || to.y - from.y < grid_px) return std::nullopt;
+  MarkerView view{bgr(cv::Rect(from, to)).clone(), camera};
+  view.camera.width_px = to.x - from.x, view.camera.height_px = to.y - from.y;
+  view.camera.cx_px -= from.x, view.camera.cy_px -= from.y;
+  return view;
+}
+
+ViewMeasurer::ViewMeasurer(const Rig& rig, std::size_t instrument)
+    : classes_(rig.instruments),
+      bands_{classes_.of_band(instrument, 0), classes_.of_band(instrument, 1), classes_.of_band(instrument, 2)},
+      light_(rig.camera.response.table()) {}
+
+ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& marker, const Sighting& sighting,
+                                       const Reach& reach) const {
+  constexpr int iterations = 6;
+  const ImageView image(view.bgr);
+  const LightImage light(image, light_);
+  const Scene scene{image, view.camera, classes_, marker, bands_};
+  return {
+      measure_edges(scene, light, sighting.unknowns, sighting.film_m, {reach.extra_px, iterations, 1}, sighting.blur),
+      measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px, reach.seam_m, reach.free_gap),
+      std::max(sighting.blur.boundaries_px, sighting.blur.sides_px), sighting.film_m};
+}
+
+std::optional<Sighting> ViewMeasurer::settled(const MarkerView& view, const Marker& marker,
+                                              const Sighting& sighting) const {
+  const ImageView image(view.bgr);
+  const LightImage light(image, light_);
+  const Scene scene{image, view.camera, classes_, marker, bands_};
+  const FineFit fine = fit_finely(scene, light, sighting.unknowns, sighting.blur);
+  return fine.converged ? sighting_of(scene, fine.unknowns, fine.blur, true) : std::nullopt;
+}
+
+}  // namespace lapservo::internal

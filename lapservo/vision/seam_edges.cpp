@@ -1,0 +1,431 @@
+#include "lapservo/vision/seam_edges.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double farthest_rad = 0.85;  // of the seam from the facing generatrix
+constexpr double visible_rad = 1.2;    // samples beyond are too foreshortened
+constexpr double turned_rad = 0.1;     // an edge's face that is seen by less than this is too thin to matter
+constexpr int stations = 40;
+constexpr std::size_t min_stations = 3;
+constexpr double floor_px = 0.04;  // what the model leaves out
+constexpr double max_sigma_px = 1;
+constexpr double min_explained = 0.8;  // of the light's variance that the edges leave unexplained without them
+
+double normal_cdf(double x) {
+  return 0.5 * std::erfc(-x / std::sqrt(2.0));
+}
+
+// Light across the seam, a mean of stations with the same bands on either side.
+struct Profile {
+  int left_band = 0, right_band = 0;
+  double stations = 0, along_m = 0;          // how many, and their mean place
+  std::vector<std::array<double, 3>> light;  // sums, per sample
+  std::vector<double> luma;                  // the same, see Luma
+  std::vector<int> count;
+};
+
+struct Section {
+  std::vector<double> x_m;  // around the shaft from where the upper edge is expected
+  std::vector<double> px_per_m;
+  std::vector<Profile> profiles;
+  std::array<double, 3> shaft{0.02, 0.02, 0.02};  // light of the bare shaft
+};
+
+// Brightness as videos keep it in full resolution, as light of a grey of the same value. Colours, of which most videos
+// keep a quarter, are blurred and may be shifted by half a pixel.
+class Luma {
+ public:
+  explicit Luma(const std::array<float, 256>& light_of_value) : light_(light_of_value) {}
+
+  double of_values(double b, double g, double r) const { return light_at(0.0722 * b + 0.7152 * g + 0.2126 * r); }
+  double of_light(const std::array<double, 3>& bgr) const {
+    return of_values(value_of(bgr[0]), value_of(bgr[1]), value_of(bgr[2]));
+  }
+  // Bilinear.
+  double at(const ImageView& image, const Eigen::Vector2d& px) const {
+    const int u = static_cast<int>(px.x()), v = static_cast<int>(px.y());
+    const double fu = px.x() - u, fv = px.y() - v;
+    const auto of = [&](int du, int dv) {
+      const std::uint8_t* bgr = image.pixel(u + du, v + dv);
+      return of_values(bgr[0], bgr[1], bgr[2]);
+    };
+    return (1 - fv) * ((1 - fu) * of(0, 0) + fu * of(1, 0)) + fv * ((1 - fu) * of(0, 1) + fu * of(1, 1));
+  }
+
+ private:
+  double light_at(double value) const {
+    const auto i = static_cast<std::size_t>(std::clamp(value, 0.0, 254.0));
+    const double fraction = std::clamp(value - static_cast<double>(i), 0.0, 1.0);
+    return (1 - fraction) * static_cast<double>(light_[i]) + fraction * static_cast<double>(light_[i + 1]);
+  }
+  double value_of(double light) const {
+    const auto next = std::upper_bound(light_.begin() + 1, light_.end() - 1, static_cast<float>(light));
+    const auto i = static_cast<std::size_t>(next - light_.begin());
+    const auto low = static_cast<double>(light_[i - 1]), high = static_cast<double>(light_[i]);
+    return static_cast<double>(i) - 1 + std::clamp((light - low) / (high - low), 0.0, 1.0);
+  }
+
+  const std::array<float, 256>& light_;
+};
+
+struct SeamView {
+  const Scene& scene;
+  const LightImage& light;
+  const PoseUnknowns& unknowns;
+  Eigen::Matrix3d axes;
+  double upper_rad = 0;  // azimuth of the upper edge, unrolled frame
+
+  const Marker& marker() const { return scene.marker; }
+  Eigen::Vector3d outwards(double azimuth_rad) const {
+    return std::cos(azimuth_rad) * axes.col(0) + std::sin(azimuth_rad) * axes.col(1);
+  }
+  Eigen::Vector3d around(double azimuth_rad) const {
+    return std::cos(azimuth_rad) * axes.col(1) - std::sin(azimuth_rad) * axes.col(0);
+  }
+  Eigen::Vector3d point(double azimuth_rad, double along_m) const {
+    return unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * outwards(azimuth_rad) +
+           along_m * axes.col(2);
+  }
+  double azimuth(double x_m) const { return upper_rad + x_m / marker().radius_m(); }
+};
+
+// The band at a place, with some room to its boundaries, else 0.
+int band_at(const Marker& marker, double tau_rad, double along_m, double room_m) {
+  const auto e = boundaries_m(marker, tau_rad);
+  for (int band = 1; band <= 3; ++band)
+    if (along_m > e[static_cast<std::size_t>(band - 1)] + room_m &&
+        along_m < e[static_cast<std::size_t>(band)] - room_m)
+      return band;
+  return 0;
+}
+
+// The band that a station shows from tau_a to tau_b; 0 when it is not one alone.
+int one_band(const Marker& marker, double tau_a_rad, double tau_b_rad, double along_m, double room_m) {
+  const int a = band_at(marker, tau_a_rad, along_m, room_m), b = band_at(marker, tau_b_rad, along_m, room_m);
+  return a == b ? a : 0;
+}
+
+std::optional<Section> sample(const SeamView& view, double facing_rad, double blur_px, double reach_m) {
+  const Marker& marker = view.marker();
+  const double radius_m = marker.radius_m(), gap_m = marker.gap_rad * radius_m;
+  const double middle_m = marker.length_m() / 2;
+  const auto scale_at = [&](double x_m) {
+    const double azimuth_rad = view.azimuth(x_m);
+    const auto image = view.scene.camera.raw_with_jacobian(view.point(azimuth_rad, middle_m));
+    return (image.d_px_d_point * view.around(azimuth_rad)).norm();
+  };
+  const double here = scale_at(0);
+  if (!(here > 1)) return std::nullopt;
+  const double flank_m = (3 * blur_px + 4) / here, left_m = -gap_m - reach_m - flank_m, right_m = reach_m + flank_m;
+  Section section;
+  for (double x_m = left_m; x_m <= right_m && section.x_m.size() < 400;) {
+    const double px_per_m = scale_at(x_m);
+    if (!(px_per_m > 0.1 * here)) return std::nullopt;
+    if (std::abs(wrap_pi(view.azimuth(x_m) - facing_rad)) < visible_rad) {
+      section.x_m.push_back(x_m);
+      section.px_per_m.push_back(px_per_m);
+    }
+    x_m += 1 / px_per_m;
+  }
+  if (section.x_m.size() < 8) return std::nullopt;
+  const Luma luma(view.light.light_of_value());
+  const double room_m = 2.5 * blur_px / here + 0.2 * reach_m;
+  for (int station = 0; station < stations; ++station) {
+    const double along_m = marker.length_m() * (station + 0.5) / stations;
+    const int right = one_band(marker, 0, right_m / radius_m, along_m, room_m);
+    const double end_rad = std::nextafter(marker.covered_rad(), 0.0);
+    const int left = one_band(marker, end_rad, end_rad - (-left_m - gap_m) / radius_m, along_m, room_m);
+    if (left == 0 || right == 0) continue;
+    auto found = std::find_if(section.profiles.begin(), section.profiles.end(),
+                              [&](const Profile& p) { return p.left_band == left && p.right_band == right; });
+    if (found == section.profiles.end()) {
+      section.profiles.push_back({left, right, 0, 0, {}, {}, {}});
+      found = section.profiles.end() - 1;
+      found->light.resize(section.x_m.size());
+      found->luma.resize(section.x_m.size());
+      found->count.resize(section.x_m.size());
+    }
+    found->stations += 1, found->along_m += along_m;
+    for (std::size_t i = 0; i < section.x_m.size(); ++i) {
+      const Eigen::Vector2d px = view.scene.camera.raw_from_point(view.point(view.azimuth(section.x_m[i]), along_m));
+      if (!view.light.contains(px)) continue;
+      const auto at = view.light.at(static_cast<float>(px.x()), static_cast<float>(px.y()));
+      if (at.saturated[0] || at.saturated[1] || at.saturated[2]) continue;
+      for (std::size_t c = 0; c < 3; ++c) found->light[i][c] += static_cast<double>(at.light[c]);
+      found->luma[i] += luma.at(view.light.image(), px);
+      ++found->count[i];
+    }
+  }
+  std::erase_if(section.profiles, [](const Profile& p) { return p.stations < min_stations; });
+  if (section.profiles.empty()) return std::nullopt;
+  for (Profile& profile : section.profiles) profile.along_m /= profile.stations;
+  return section;
+}
+
+// The bare shaft beside the marker's ends, on the seam's azimuth.
+std::array<double, 3> shaft_light(const SeamView& view, double blur_px) {
+  const Marker& marker = view.marker();
+  std::array<std::vector<float>, 3> values;
+  for (int i = 0; i < 12; ++i) {
+    const double beyond_m = 1.5e-3 + 0.15e-3 * i + 2e-5 * blur_px;
+    for (const double along_m : {-beyond_m, marker.length_m() + beyond_m}) {
+      const Eigen::Vector2d px = view.scene.camera.raw_from_point(view.point(view.upper_rad, along_m));
+      if (!view.light.contains(px)) continue;
+      const auto at = view.light.at(static_cast<float>(px.x()), static_cast<float>(px.y()));
+      for (std::size_t c = 0; c < 3; ++c) values[c].push_back(at.light[c]);
+    }
+  }
+  std::array<double, 3> median{0.02, 0.02, 0.02};
+  for (std::size_t c = 0; c < 3; ++c) {
+    if (values[c].size() < 4) continue;
+    const auto middle = values[c].begin() + static_cast<std::ptrdiff_t>(values[c].size() / 2);
+    std::nth_element(values[c].begin(), middle, values[c].end());
+    median[c] = static_cast<double>(*middle);
+  }
+  return median;
+}
+
+// What each place of a section is made of: the left band, the right one and the bare shaft, shaded over the turn.
+constexpr int colors = 5;
+using Basis = Eigen::Matrix<double, Eigen::Dynamic, colors>;
+using Colors = std::array<Eigen::Matrix<double, colors, 1>, 3>;  // a profile's light, b g r
+
+// Of edges at `upper_m` and `gap_m` before it.
+Basis basis_of(const Section& section, double upper_m, double gap_m, double blur_px, double radius_m) {
+  const auto scale_at = [&](double x_m) {
+    const auto next = std::lower_bound(section.x_m.begin(), section.x_m.end(), x_m);
+    const auto i =
+        std::min<std::ptrdiff_t>(next - section.x_m.begin(), static_cast<std::ptrdiff_t>(section.x_m.size()) - 1);
+    return section.px_per_m[static_cast<std::size_t>(i)];
+  };
+  const double lower_m = upper_m - gap_m, per_upper = scale_at(upper_m) / blur_px,
+               per_lower = scale_at(lower_m) / blur_px;
+  Basis basis(static_cast<Eigen::Index>(section.x_m.size()), colors);
+  for (Eigen::Index i = 0; i < basis.rows(); ++i) {
+    const double x = section.x_m[static_cast<std::size_t>(i)], turn = x / radius_m;
+    const double left = normal_cdf((lower_m - x) * per_lower), right = normal_cdf((x - upper_m) * per_upper);
+    basis.row(i) << left, left * turn, right, right * turn, 1 - left - right;
+  }
+  return basis;
+}
+
+// Which samples most stations have.
+Eigen::VectorXd used_samples(const Profile& profile) {
+  Eigen::VectorXd used(static_cast<Eigen::Index>(profile.count.size()));
+  for (Eigen::Index i = 0; i < used.size(); ++i)
+    used[i] = 2 * profile.count[static_cast<std::size_t>(i)] > profile.stations ? 1 : 0;
+  return used;
+}
+
+// The light of bands and shaft that fits a profile best.
+Colors colors_of(const Section& section, const Profile& profile, const Basis& basis) {
+  const Eigen::VectorXd used = used_samples(profile);
+  const Eigen::Matrix<double, colors, Eigen::Dynamic> weighted = basis.transpose() * used.asDiagonal();
+  Colors best;
+  for (std::size_t c = 0; c < 3; ++c) {
+    Eigen::VectorXd light = Eigen::VectorXd::Zero(basis.rows());
+    for (Eigen::Index i = 0; i < light.size(); ++i)
+      if (const auto k = static_cast<std::size_t>(i); used[i] > 0) light[i] = profile.light[k][c] / profile.count[k];
+    // In units of a hundredth of white: shading over a radian is of the light's size, the shaft's light is known to a
+    // third.
+    constexpr double unit = 0.01;
+    const double shaft = section.shaft[c], shaft_sigma = 0.3 * shaft + 0.005;
+    Eigen::Matrix<double, colors, colors> information = weighted * basis;
+    Eigen::Matrix<double, colors, 1> gradient = weighted * light;
+    information(1, 1) += unit * unit, information(3, 3) += unit * unit;
+    information(0, 0) += 1e-9, information(2, 2) += 1e-9;
+    information(4, 4) += unit * unit / (shaft_sigma * shaft_sigma);
+    gradient[4] += shaft * unit * unit / (shaft_sigma * shaft_sigma);
+    best[c] = information.ldlt().solve(gradient);
+  }
+  return best;
+}
+
+// Residuals of all profiles with the colours that fit best. Weighted by the root of the stations, so that noise is
+// alike.
+Eigen::VectorXd color_residuals(const Section& section, const Basis& basis) {
+  const Eigen::Index samples = basis.rows();
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(samples * 3 * static_cast<Eigen::Index>(section.profiles.size()));
+  Eigen::Index at = 0;
+  for (const Profile& profile : section.profiles) {
+    const Colors best = colors_of(section, profile, basis);
+    for (std::size_t c = 0; c < 3; ++c, at += samples) {
+      const Eigen::VectorXd expected = basis * best[c];
+      for (Eigen::Index i = 0; i < samples; ++i)
+        if (const auto k = static_cast<std::size_t>(i); 2 * profile.count[k] > profile.stations)
+          out[at + i] = std::sqrt(profile.stations) * (profile.light[k][c] / profile.count[k] - expected[i]);
+    }
+  }
+  return out;
+}
+
+// The same of the luma, for colours that are known; its own brightness and offset are free.
+Eigen::VectorXd luma_residuals(const Section& section, const Basis& basis, const std::vector<Colors>& known,
+                               const Luma& luma) {
+  const Eigen::Index samples = basis.rows();
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(samples * static_cast<Eigen::Index>(section.profiles.size()));
+  Eigen::Index at = 0;
+  for (std::size_t p = 0; p < section.profiles.size(); ++p, at += samples) {
+    const Profile& profile = section.profiles[p];
+    const Eigen::VectorXd used = used_samples(profile);
+    Eigen::Matrix<double, Eigen::Dynamic, 2> expected(samples, 2);
+    Eigen::VectorXd measured = Eigen::VectorXd::Zero(samples);
+    for (Eigen::Index i = 0; i < samples; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      if (used[i] > 0) measured[i] = profile.luma[k] / profile.count[k];
+      const auto row = basis.row(i);
+      expected.row(i) << luma.of_light({row.dot(known[p][0]), row.dot(known[p][1]), row.dot(known[p][2])}), 1;
+    }
+    const Eigen::Matrix<double, 2, Eigen::Dynamic> weighted = expected.transpose() * used.asDiagonal();
+    Eigen::Matrix2d information = weighted * expected;
+    information.diagonal() += Eigen::Vector2d::Constant(1e-9);
+    const Eigen::Vector2d brightness = information.ldlt().solve(weighted * measured);
+    out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(measured - expected * brightness);
+  }
+  return out;
+}
+
+struct SeamFit {
+  double upper_m = 0, gap_m = 0;
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+};
+
+// Gauss-Newton with differences. `residuals` takes the upper edge's place and the gap. False when it fails.
+template <typename Residuals>
+bool refine(const Residuals& residuals, bool free_gap, double pixel_m, double max_step_m, SeamFit& fit, double& cost) {
+  const double delta_m = 0.02 * pixel_m;
+  Eigen::VectorXd residual = residuals(fit.upper_m, fit.gap_m);
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  for (int iteration = 0; iteration < 8; ++iteration) {
+    Eigen::Matrix<double, Eigen::Dynamic, 2> slopes(residual.size(), 2);
+    slopes.col(0) = (residuals(fit.upper_m + delta_m, fit.gap_m) - residual) / delta_m;
+    slopes.col(1).setZero();
+    if (free_gap) slopes.col(1) = (residuals(fit.upper_m, fit.gap_m + delta_m) - residual) / delta_m;
+    information = slopes.transpose() * slopes;
+    information.diagonal() += Eigen::Vector2d(1e-12, free_gap ? 1e-12 : 1e9) * information.trace();
+    Eigen::Vector2d step = -information.ldlt().solve(slopes.transpose() * residual);
+    if (!step.allFinite()) return false;
+    step = step.cwiseMax(-max_step_m).cwiseMin(max_step_m);
+    Eigen::VectorXd next = residuals(fit.upper_m + step[0], fit.gap_m + step[1]);
+    if (next.squaredNorm() > residual.squaredNorm()) break;
+    fit.upper_m += step[0], fit.gap_m += step[1], residual = std::move(next);
+    if (step.norm() < 0.002 * pixel_m) break;
+  }
+  cost = residual.squaredNorm();
+  // Colours are fitted, too, and neighbours share pixels.
+  const double freedom = std::max<double>(1, 0.6 * static_cast<double>(residual.size()));
+  fit.covariance = cost / freedom * information.inverse();
+  return fit.covariance.allFinite();
+}
+
+// The best of a grid, refined by all channels, and then by the luma alone.
+std::optional<SeamFit> fit(const Section& section, const Luma& luma, double expected_gap_m, double reach_m,
+                           double gap_reach_m, double blur_px, double radius_m, double px_per_m) {
+  const auto basis = [&](double upper_m, double gap_m) { return basis_of(section, upper_m, gap_m, blur_px, radius_m); };
+  const auto by_colors = [&](double upper_m, double gap_m) { return color_residuals(section, basis(upper_m, gap_m)); };
+  const double pixel_m = 1 / px_per_m, step_m = std::max(0.8 * blur_px, 1.0) * pixel_m;
+  SeamFit best{0, expected_gap_m, {}};
+  double best_cost = 1e300, worst_cost = 0;
+  const bool free_gap = gap_reach_m > 0;
+  const double first_gap_m = std::max(0.0, expected_gap_m - gap_reach_m), last_gap_m = expected_gap_m + gap_reach_m;
+  for (double upper_m = -reach_m; upper_m <= reach_m; upper_m += step_m)
+    for (double gap_m = first_gap_m; gap_m <= last_gap_m; gap_m += step_m) {
+      const double cost = by_colors(upper_m, gap_m).squaredNorm();
+      worst_cost = std::max(worst_cost, cost);
+      if (cost < best_cost) best_cost = cost, best.upper_m = upper_m, best.gap_m = gap_m;
+    }
+  if (!refine(by_colors, free_gap, pixel_m, 2 * step_m, best, best_cost)) return std::nullopt;
+  if (std::abs(best.upper_m) > 1.2 * reach_m || best_cost > min_explained * worst_cost) return std::nullopt;
+  std::vector<Colors> known;
+  for (const Profile& profile : section.profiles)
+    known.push_back(colors_of(section, profile, basis(best.upper_m, best.gap_m)));
+  const auto by_luma = [&](double upper_m, double gap_m) {
+    return luma_residuals(section, basis(upper_m, gap_m), known, luma);
+  };
+  SeamFit finer = best;
+  double cost = 0;
+  if (!refine(by_luma, free_gap, pixel_m, step_m, finer, cost)) return std::nullopt;
+  const double moved_m = std::hypot(finer.upper_m - best.upper_m, finer.gap_m - best.gap_m);
+  if (moved_m > 2 * pixel_m) return std::nullopt;  // bands of one brightness
+  return finer;
+}
+
+// An edge of the print that was found `beyond_m` around the shaft from where it is expected.
+SeamEdge edge_at(const SeamView& view, double azimuth_rad, double along_m, double beyond_m, double variance_m2,
+                 bool moves_with_gap) {
+  const Eigen::Vector3d point = view.point(azimuth_rad, along_m), around = view.around(azimuth_rad);
+  const auto image = view.scene.camera.raw_with_jacobian(point);
+  const Eigen::Vector2d across = image.d_px_d_point * around;
+  const double px_per_m = across.norm(), radius_m = view.marker().radius_m();
+  const Eigen::Vector3d pull = image.d_px_d_point.transpose() * (across / px_per_m);
+  SeamEdge edge;
+  edge.row = view.unknowns.row(point, pull);
+  edge.row[view.unknowns.size() - 1] = radius_m * pull.dot(around);
+  edge.residual_px = px_per_m * beyond_m;
+  edge.sigma_px = std::sqrt(px_per_m * px_per_m * variance_m2 + floor_px * floor_px);
+  edge.by_gap_px = moves_with_gap ? -radius_m * pull.dot(around) : 0;
+  return edge;
+}
+
+}  // namespace
+
+std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns,
+                                      double blur_px, double reach_m, bool free_gap) {
+  const Marker& marker = scene.marker;
+  const ShaftPose& pose = unknowns.pose();
+  const auto cylinder = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
+  if (!cylinder) return std::nullopt;
+  SeamView view{scene, light, unknowns, pose.camera_from_unrolled.rotation.toRotationMatrix(),
+                pose.psi_rad + marker.seam_rad};
+
+  const double gap_m = marker.gap_rad * marker.radius_m();
+  const double turned_upper_rad = wrap_pi(view.upper_rad - cylinder->facing_azimuth_rad);
+  if (std::abs(turned_upper_rad - marker.gap_rad / 2) > farthest_rad) return std::nullopt;
+  auto section = sample(view, cylinder->facing_azimuth_rad, blur_px, reach_m);
+  if (!section) return std::nullopt;
+  section->shaft = shaft_light(view, blur_px);
+  double along_m = 0, weight = 0;
+  for (const Profile& profile : section->profiles)
+    along_m += profile.stations * profile.along_m, weight += profile.stations;
+  along_m /= weight;
+  const auto middle = scene.camera.raw_with_jacobian(view.point(view.upper_rad, along_m));
+  const double px_per_m = (middle.d_px_d_point * view.around(view.upper_rad)).norm();
+  const auto found = fit(*section, Luma(light.light_of_value()), gap_m, reach_m, free_gap ? reach_m : 0, blur_px,
+                         marker.radius_m(), px_per_m);
+  if (!found) return std::nullopt;
+
+  const double radius_m = marker.radius_m();
+  SeamEdges edges;
+  edges.gap_rad = found->gap_m / radius_m;
+  edges.sigma_gap_rad = std::hypot(std::sqrt(found->covariance(1, 1)), floor_px / px_per_m) / radius_m;
+  const double found_upper_rad = turned_upper_rad + found->upper_m / radius_m;
+  if (!free_gap || found_upper_rad < turned_rad) {
+    edges.upper = edge_at(view, view.upper_rad, along_m, found->upper_m, found->covariance(0, 0), false);
+    if (edges.upper->sigma_px > max_sigma_px) edges.upper.reset();
+  }
+  if (free_gap && found_upper_rad - edges.gap_rad > -turned_rad) {
+    const double variance_m2 = found->covariance(0, 0) + found->covariance(1, 1) - 2 * found->covariance(0, 1);
+    edges.lower = edge_at(view, view.upper_rad - marker.gap_rad, along_m, found->upper_m - found->gap_m + gap_m,
+                          variance_m2, true);
+    if (edges.lower->sigma_px > max_sigma_px) edges.lower.reset();
+  }
+  return edges;
+}
+
+}  // namespace lapservo::internal
