@@ -16,6 +16,7 @@
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/trajectory.h"
+#include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
 
 namespace lapservo::internal {
@@ -55,7 +56,6 @@ class VisualController {
 
   HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired);
   HoldReason update(const ImageMeasurement& image);
-  bool is_new(const ImageMeasurement& image);
   void watch_image_age();
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   Law probing_law(const Eigen::Vector4d& velocity) const;
@@ -70,6 +70,7 @@ class VisualController {
   JointHistory history_;
   ArmLag arm_lag_;
   FrozenImage frozen_image_;
+  WildJoints wild_joints_;
   JointPath path_;
   bool started_ = false;
   double now_s_ = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -75,7 +76,8 @@ class SimRobot {
   Eigen::Vector4d last_wanted_;
   ServoStatistics statistics_;
   OperatingState state_ = OperatingState::enabled;
-  bool homed_ = true, state_changed_ = true;
+  bool homed_ = true;
+  std::atomic<bool> state_changed_ = true;
   double now_s_ = 0;
 
   Transport::Publisher<JointMessage> measured_js_, setpoint_js_;
