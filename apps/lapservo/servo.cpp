@@ -150,7 +150,7 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_flag("--enable-motion", options->enable_motion,
                     "Move a real arm; without it nothing is sent, and what would be is said");
   command->add_option("--joint-limits", options->joint_limits,
-                      "YAML of the arm's joints, for example configs/psm-classic.yaml");
+                      "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
   command
       ->add_option("--trajectory", options->trajectory,
                    "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")

@@ -11,7 +11,7 @@ namespace {
 
 TEST(ArmLimits, TheReadyFilesAreRead) {
   for (const char* name : {"psm-classic.yaml", "psm-si.yaml"}) {
-    const JointLimits limits = load_arm_limits(testing::source_folder() / "configs" / name);
+    const JointLimits limits = load_arm_limits(testing::source_folder() / "configs/joint_limits" / name);
     EXPECT_TRUE((limits.lower.array() < limits.upper.array()).all()) << name;
     EXPECT_NEAR(limits.lower[2], 0.01, 1e-12) << name;
   }
