@@ -170,25 +170,12 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
 std::vector<std::vector<JointVector>> random_configurations(const Rig& rig, int count, std::uint64_t seed,
                                                             double steepest_rad) {
   Random random(seed);
-  constexpr double border_px = 40;
-  const auto acceptable = [&](const Instrument& instrument, const JointVector& q) {
-    return marker_in_view(rig.camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q),
-                          {steepest_rad, border_px});
-  };
+  const ViewRange range{0.075, 0.12, {steepest_rad, 40}};
   std::vector<std::vector<JointVector>> configurations;
   for (int frame = 0; frame < count; ++frame) {
     std::vector<JointVector> of_frame;
-    for (const Instrument& instrument : rig.instruments) {
-      std::optional<JointVector> q;
-      for (int attempt = 0; attempt < 50000 && !q; ++attempt) {
-        const Eigen::Vector2d pixel(random.uniform(0, rig.camera.width_px), random.uniform(0, rig.camera.height_px));
-        q = configuration_through(*instrument.camera_from_rcm,
-                                  rig.camera.ray_from_ideal(pixel) * random.uniform(0.075, 0.12));
-        if (q) q->psi_rad = random.uniform(-pi, pi);
-        if (q && !acceptable(instrument, *q)) q.reset();
-      }
-      of_frame.push_back(q.value());
-    }
+    for (const Instrument& i : rig.instruments)
+      of_frame.push_back(random_configuration_in_view(rig.camera, i.marker, *i.camera_from_rcm, range, random).value());
     configurations.push_back(of_frame);
   }
   return configurations;

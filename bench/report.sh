@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# report.sh BENCH.json: writes the medians of a run of lapservo_bench into docs/performance.md (between its marks) and
-# draws docs/performance.svg. Needs jq and gnuplot. CPU times of one run, so that ratios mean something.
+# report.sh BENCH.json FIGURE_PROGRAM: writes the medians of a run of lapservo_bench into docs/performance.md (between
+# its marks) and draws docs/performance.svg with bench/figure.cpp. Needs jq. CPU times of one run, so that ratios mean
+# something.
 set -euo pipefail
-json=$1
+json=$1 figure_of=$2
 page=$(dirname "$0")/../docs/performance.md figure=$(dirname "$0")/../docs/performance.svg
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
-# name, width, height, instruments, milliseconds, share found: one line a benchmark.
+# name, width, height, instruments, milliseconds, fraction found: one line a benchmark.
 jq -r '
   def ms: .cpu_time * {"ns": 1e-6, "us": 1e-3, "ms": 1, "s": 1e3}[.time_unit];
   def argument(key): (.run_name | capture("/" + key + ":(?<v>[0-9]+)") // {v: "-"}).v;
@@ -83,33 +84,5 @@ awk -v table="$scratch/table" -v when="$scratch/when" '
   !skipping' "$page" > "$scratch/page"
 cp "$scratch/page" "$page"
 
-series() { awk -F'\t' -v name="$1" -v n="$2" '$1 == name && $4 == n {print $2 * $3 / 1e6, $5}' "$scratch/medians" | sort -g; }
-plot=()
-while IFS='|' read -r name instruments title style; do
-  series "$name" "$instruments" > "$scratch/${name//\//_}"
-  [ -s "$scratch/${name//\//_}" ] && plot+=("'$scratch/${name//\//_}' using 1:2 with linespoints $style title '$title'")
-done <<'SERIES'
-apriltag/decimate_1|-|AprilTag, decimate 1|lc rgb '#c44e52' pt 5 dt 2
-apriltag/decimate_2|-|AprilTag, decimate 2|lc rgb '#c44e52' pt 5
-textbook|-|HSV, ranges, opening, components|lc rgb '#dd8452' pt 9
-aruco|-|aruco|lc rgb '#937860' pt 11
-hsv_of_frame|-|BGR to HSV|lc rgb '#8c8c8c' pt 13
-copy_frame|-|memcpy of the frame|lc rgb '#000000' pt 1
-cold|1|lapservo, cold|lc rgb '#4c72b0' pt 7 lw 2
-tracked|1|lapservo, tracked|lc rgb '#55a868' pt 7 lw 2
-search_without_marker|-|lapservo, no marker in view|lc rgb '#64b5cd' pt 6
-SERIES
-joined=$(printf ', %s' "${plot[@]}")
-gnuplot <<GNUPLOT
-set terminal svg size 760,560 dynamic background rgb 'white' font 'sans-serif,13'
-set output '$scratch/figure.svg'
-set logscale xy
-set xlabel 'Image (scaled by its pixels)'
-set ylabel 'CPU time a frame, ms'
-set xrange [0.27:9.5]
-set xtics ('640x480' 0.3072, '1280x720' 0.9216, '1920x1080' 2.0736, '3840x2160' 8.2944)
-set grid ytics lc rgb '#dddddd'
-set key below center maxrows 3 Left reverse
-plot ${joined:2}
-GNUPLOT
+"$figure_of" "$scratch/medians" > "$scratch/figure.svg"
 cp "$scratch/figure.svg" "$figure"

@@ -99,7 +99,7 @@ void track(TrackedRig& tracked, const cv::Mat& image) {
   require(observations.size() == rig.instruments.size(), "one observation an instrument");
   for (const Observation& observation : observations) {
     fuzz::require_sound(observation);
-    const std::string row = observation_csv_row(0, 0, "0.png", "PSM1", observation);
+    const std::string row = observation_csv_row(0, 0, "0.png", observation);
     require(std::count(row.begin(), row.end(), ',') == 27, "a row has 28 fields");
   }
   require(draw_overlay(image, rig, observations).size() == image.size(), "an overlay has its picture's size");

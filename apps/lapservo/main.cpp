@@ -58,6 +58,7 @@ int parse_and_run(int argc, char** argv) {
   lapservo::app::add_experiment(app, run);
   lapservo::app::add_render(app, run);
   lapservo::app::add_servo(app, run);
+  lapservo::app::add_sim_robot(app, run);
   lapservo::app::add_marker(app, run);
   lapservo::app::add_estimate_rcm(app, run);
   try {

@@ -45,15 +45,10 @@ struct Options {
 
 JointVector random_configuration(const Camera& camera, const Instrument& instrument, const std::string& rig,
                                  Random& random) {
-  const ViewLimits limits{.steepest_rad = std::atan(1.2), .border_px = 0.02 * camera.width_px};
-  for (int attempt = 0; attempt < 20000; ++attempt) {
-    const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
-    const Eigen::Vector3d point = camera.ray_from_ideal(pixel) * random.uniform(0.06, 0.14);
-    auto q = configuration_through(*instrument.camera_from_rcm, point);
-    if (!q || q->rho_m < 0.02 || std::sin(q->phi_rad) < 0.1) continue;
-    q->psi_rad = random.uniform(-pi, pi);
-    if (marker_in_view(camera, instrument.marker, placement_of(instrument, *q).camera_from_unrolled, limits)) return *q;
-  }
+  const ViewRange range{0.06, 0.14, {.steepest_rad = std::atan(1.2), .border_px = 0.02 * camera.width_px}};
+  if (const auto q =
+          random_configuration_in_view(camera, instrument.marker, *instrument.camera_from_rcm, range, random))
+    return *q;
   throw InputError(
       rig, "instrument " + instrument.name + " is never wholly in view between 60 and 140 mm: check camera_from_rcm");
 }

@@ -1,38 +1,26 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
 
-#include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
-#include "apps/lapservo/live_view.h"
 #include "apps/lapservo/numbers.h"
-#include "apps/lapservo/output_folder.h"
 #include "apps/lapservo/progress.h"
+#include "apps/lapservo/servo_arm.h"
+#include "apps/lapservo/servo_options.h"
+#include "apps/lapservo/servo_output.h"
 #include "apps/lapservo/subcommands.h"
-#include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/random_start.h"
-#include "lapservo/control/tracking_law.h"
 #include "lapservo/control/trajectory_check.h"
-#include "lapservo/core/atomic_file.h"
-#include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
-#include "lapservo/experiments/setup.h"
-#include "lapservo/io/overlay.h"
-#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rig/single_instrument.h"
 #include "lapservo/servo/controller_file.h"
-#include "lapservo/servo/convergence.h"
 #include "lapservo/servo/image_features.h"
-#include "lapservo/servo/image_window.h"
 #include "lapservo/servo/replay.h"
 #include "lapservo/servo/run.h"
 #include "lapservo/servo/servo_log.h"
@@ -43,91 +31,7 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-constexpr double window_margin_px = 20, via_dwell_s = 1;
-const Eigen::Vector4d via_rate(0.05, 60, 40, 40);  // s_rad, r, l, d px a second
-
-struct Options {
-  std::string rig, robot, trajectory = "paper", method = "default", tracker, controller, delay = "estimate", out,
-                          replay;
-  std::vector<double> set_point, via, start, rcm_px, hide;
-  double duration_s = 20, latency_ms = 80, fps = 60;
-  std::uint64_t seed = 1;
-  bool view = false, force = false;
-};
-
-Eigen::Vector4d four(const std::vector<double>& values) {
-  return Eigen::Vector4d(values.data());
-}
-
-ControllerConfig controller_of(const Options& options, const Rig& rig) {
-  ControllerConfig config;
-  const auto mode = control_mode_from_string(options.method);
-  if (!mode) throw InputError("--method", "is " + options.method + ", expected default, paper or uncalibrated");
-  if (*mode == ControlMode::paper) config = paper_controller(1 / options.fps);
-  config.mode = *mode;
-  config.period_s = 1 / options.fps;
-  config.window = image_window(rig.camera, window_margin_px);
-  if (options.delay != "estimate") {
-    const auto delay_ms = parse_finite(options.delay);
-    if (!delay_ms) throw InputError("--delay-ms", "is " + options.delay + ", expected milliseconds or `estimate`");
-    config.observer.delay_s = *delay_ms / 1000;
-  }
-  if (!options.controller.empty()) config = load_controller(options.controller, config);
-  return checked(config);
-}
-
-// The paper's law comes with the paper's eyes.
-Method tracker_of(const Options& options, ControlMode mode) {
-  const bool own = options.tracker.empty() && mode == ControlMode::paper;
-  return own || options.tracker == "centerline" ? Method::centerline : Method::surface;
-}
-
-std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
-  if (numbers.size() % 4 != 0)
-    throw InputError("--via",
-                     fmt::format("holds {} numbers, expected four (s_rad,r_px,l_px,d_px) a point", numbers.size()));
-  std::vector<Eigen::Vector4d> points;
-  for (std::size_t i = 0; i < numbers.size(); i += 4) points.emplace_back(numbers.data() + i);
-  return points;
-}
-
-// What the trajectory is called in complaints.
-std::string trajectory_name(const Options& options) {
-  if (!options.set_point.empty()) return "--set-point";
-  return options.via.empty() ? options.trajectory : "--via";
-}
-
-Trajectory trajectory_of(const Options& options) {
-  if (!options.set_point.empty()) return set_point(four(options.set_point));
-  if (!options.via.empty()) return via_points(points_of(options.via), via_rate, via_dwell_s);
-  if (options.trajectory == "paper") return sinusoids(paper_sinusoids());
-  return trajectory_from_csv(options.trajectory);
-}
-
-// The uncalibrated mode gets to know no more of the RCM than its image.
-void forget_registration(RunConfig& run, const Options& options) {
-  Instrument& instrument = run.rig.instruments.front();
-  if (!options.rcm_px.empty()) {
-    run.rcm_px = Eigen::Vector2d(options.rcm_px[0], options.rcm_px[1]);
-  } else if (instrument.camera_from_rcm) {
-    run.rcm_px = projected_rcm_px(run.rig.camera, *instrument.camera_from_rcm);
-  }
-  if (!run.rcm_px)
-    throw InputError("--rcm-px", "is missing and " + options.rig +
-                                     " has no camera_from_rcm, expected the RCM's image: see lapservo estimate-rcm");
-  instrument.camera_from_rcm.reset();
-}
-
-// Before it is made to forget anything.
-RunConfig run_config_of(const Options& options) {
-  RunConfig run;
-  run.rig = single_instrument(load_rig(options.rig), options.rig);
-  run.controller = controller_of(options, run.rig);
-  run.tracker.method = tracker_of(options, run.controller.mode);
-  return run;
-}
-
-JointVector joints_at_start(const Options& options, const Trajectory& trajectory, const RunConfig& run,
+JointVector joints_at_start(const ServoOptions& options, const Trajectory& trajectory, const RunConfig& run,
                             const FeatureModel& true_model, const Eigen::Vector4d& joint_offset) {
   const std::string source = trajectory_name(options);
   if (options.start.empty()) {
@@ -137,78 +41,6 @@ JointVector joints_at_start(const Options& options, const Trajectory& trajectory
   const JointVector start = JointVector::from_vector(four(options.start));
   refuse_infeasible(trajectory, options.duration_s, true_model, run.controller, start, source);
   return start;
-}
-
-class RunFolder {
- public:
-  // With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
-  RunFolder(const Options& options, const Rig& rig, const ControllerConfig& controller)
-      : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(options)),
-        log_(folder_ / "log.csv") {
-    write_file(folder_ / "controller.yaml", controller_yaml(controller));
-  }
-  ServoLog& log() { return log_; }
-  void commit() {
-    log_.commit();
-    folder_.commit();
-  }
-
- private:
-  static std::uintmax_t needed_bytes(const Options& options) {
-    constexpr std::uintmax_t bytes_a_tick = 2000;
-    return bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20);
-  }
-  static InputFiles inputs_of(const Options& options, const Rig& rig) {
-    InputFiles inputs;
-    inputs.add_rig(options.rig, rig);
-    inputs.add(options.controller);
-    inputs.add(options.trajectory);
-    return inputs;
-  }
-
-  OutputFolder folder_;
-  ServoLog log_;
-};
-
-// What the run came to, for the last lines.
-class Summary {
- public:
-  void add(const ControlTick& tick, const InstrumentTruth& truth) {
-    const ControlStep& control = tick.decision.control;
-    ++ticks_;
-    if (control.action == ControlAction::hold) ++held_[std::string(to_string(control.reason))];
-    const Eigen::Vector4d error =
-        truth.features ? feature_error(*truth.features, tick.input.desired.features) : control.error;
-    convergence_.add(tick.input.time_s, error);
-  }
-  bool converged() const { return convergence_.reached_s().has_value(); }
-  std::string text() const {
-    std::string text = "not within 1 px and 5 mrad for a second";
-    if (const auto reached_s = convergence_.reached_s()) {
-      const Eigen::Vector4d rms = convergence_.rms_since();
-      text = fmt::format(
-          "within 1 px and 5 mrad from {:.2f} s on; rms since: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px",
-          *reached_s, 1000 * rms[0], rms[1], rms[2], rms[3]);
-    }
-    for (const auto& [reason, count] : held_)
-      text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
-    return text;
-  }
-
- private:
-  long ticks_ = 0;
-  std::map<std::string, long> held_;
-  Convergence convergence_;
-};
-
-bool show(LiveView& view, const ControlTick& tick, const Rig& rig) {
-  if (!tick.seen) return true;
-  const ControlStep& control = tick.decision.control;
-  cv::Mat picture = draw_overlay(tick.seen->image.bgr, rig, tick.seen->observations);
-  const std::string label = fmt::format("{:.2f} s  {} {}", tick.input.time_s, to_string(control.action),
-                                        control.reason == HoldReason::none ? "" : to_string(control.reason));
-  cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
-  return view.show(picture);
 }
 
 // What the user gets of a run: the log, the picture, the progress, the last lines.
@@ -246,7 +78,7 @@ class Watcher : public RunObserver {
   int done_ = 0;
 };
 
-int simulate(const Options& options) {
+int simulate(const ServoOptions& options) {
   std::optional<LiveView> view;
   if (options.view) view.emplace("servo", "use --out to write a log instead");
   RunConfig config = run_config_of(options);
@@ -279,7 +111,7 @@ int simulate(const Options& options) {
   return summary.converged() ? 0 : 1;
 }
 
-int replay_log(const Options& options) {
+int replay_log(const ServoOptions& options) {
   const fs::path log = options.replay, folder = log.parent_path();
   const Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
@@ -294,23 +126,31 @@ int replay_log(const Options& options) {
   return 1;
 }
 
-int run(const Options& options) {
+int run(const ServoOptions& options) {
   if (!options.replay.empty()) return replay_log(options);
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
-  if (options.robot != "sim")
-    throw InputError("--robot",
-                     options.robot.empty() ? "is missing, expected sim" : "is " + options.robot + ", expected sim");
-  return simulate(options);
+  if (options.robot == "sim") return simulate(options);
+  if (options.robot.find(':') != std::string::npos) return steer_arm(options);
+  constexpr auto expected = ", expected sim or ros2:NAMESPACE";
+  throw InputError("--robot", (options.robot.empty() ? "is missing" : "is " + options.robot) + expected);
 }
 
 }  // namespace
 
 void add_servo(CLI::App& app, Run& run_later) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ServoOptions>();
   CLI::App* command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
   command->add_option("--rig", options->rig, "Camera, marker and camera_from_rcm");
-  command->add_option("--robot", options->robot, "sim: the built-in simulator");
+  command->add_option("--robot", options->robot,
+                      "sim: the built-in simulator; ros2:PSM1: the arm of that CRTK namespace, see docs/robots.md");
+  command->add_option(
+      "--camera", options->camera,
+      "Images of a real arm: ros2:/topic, an Image or, where it ends in /compressed, a CompressedImage");
+  command->add_flag("--enable-motion", options->enable_motion,
+                    "Move a real arm; without it nothing is sent, and what would be is said");
+  command->add_option("--joint-limits", options->joint_limits,
+                      "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
   command
       ->add_option("--trajectory", options->trajectory,
                    "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")

@@ -17,6 +17,7 @@ void add_experiment(CLI::App& app, Run& run);
 void add_marker(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);
 void add_servo(CLI::App& app, Run& run);
+void add_sim_robot(CLI::App& app, Run& run);
 void add_track(CLI::App& app, Run& run);
 
 }  // namespace lapservo::app

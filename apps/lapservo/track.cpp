@@ -110,10 +110,10 @@ struct Tally {
   int frames = 0;
   std::map<std::string, int> found;
 
-  void add(const Rig& rig, const std::vector<Observation>& observations) {
+  void add(const std::vector<Observation>& observations) {
     ++frames;
-    for (std::size_t i = 0; i < observations.size(); ++i)
-      found[rig.instruments[i].name] += observations[i].status == Status::ok;
+    for (const Observation& observation : observations)
+      found[observation.instrument] += observation.status == Status::ok;
   }
   std::string text() const {
     std::string line;
@@ -128,15 +128,6 @@ struct Tally {
 [[noreturn]] void rethrow_with_frame(const InputError& error, const Options& options, const Frame& frame) {
   if (error.source() == "image") throw error.with_source(frame.file.empty() ? options.input : frame.file.string());
   throw error;
-}
-
-// In a flawed frame nothing is measured, and the next is searched anew.
-std::vector<Observation> observed(Tracker& tracker, const Rig& rig, const Frame& frame) {
-  if (!frame.flaw) return tracker.track(frame.bgr);
-  tracker.reset();
-  std::vector<Observation> nothing(rig.instruments.size());
-  for (Observation& observation : nothing) observation.status = *frame.flaw;
-  return nothing;
 }
 
 int run(const Options& options) {
@@ -158,11 +149,10 @@ int run(const Options& options) {
       if (!frame) break;
       Tracker& tracker = rigs.tracker_for(*frame);
       try {
-        const auto observations = observed(tracker, rigs.rig(), *frame);
-        tally.add(rigs.rig(), observations);
-        for (std::size_t i = 0; i < observations.size(); ++i)
-          csv.add(frame->index, frame->time_s, frame->file.filename().string(), rigs.rig().instruments[i].name,
-                  observations[i]);
+        const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
+        tally.add(observations);
+        for (const Observation& observation : observations)
+          csv.add(frame->index, frame->time_s, frame->file.filename().string(), observation);
         if (overlay || view) {
           const cv::Mat picture = draw_overlay(frame->bgr, rigs.rig(), observations);
           if (overlay) overlay->add(*frame, picture);

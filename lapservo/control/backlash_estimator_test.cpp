@@ -34,7 +34,7 @@ struct World {
       const Eigen::Vector4d q = q_measured(t), then = q_measured(t - delay_error_s);
       Eigen::Vector4d seen(0.035, -0.035, 0.003, 0.035);
       for (int i = 0; i < 4; ++i) {
-        Backlash& backlash = backlashes[static_cast<std::size_t>(i)];
+        Backlash& state = backlashes[static_cast<std::size_t>(i)];
         state.follow(then[i], backlash[i]);
         seen[i] += state.instrument(backlash[i]) + noise[i] * random.normal();
       }

@@ -34,6 +34,8 @@ VisualController::VisualController(const ControllerConfig& config, FeatureModel 
       exact_gains_(exact_gains(config)),
       estimator_(make_estimator(config, std::move(model))),
       arm_lag_(config.scales),
+      frozen_image_(config.scales),
+      wild_joints_(config.limits.rate),
       path_(config.limits.acceleration) {}
 
 void VisualController::reset(double time_s, const Eigen::Vector4d& q_joint) {
@@ -78,6 +80,12 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
     return HoldReason::non_finite;
   }
   if (!started_) reset(time_s, q_joint);
+  const WildJoints::Verdict verdict = wild_joints_.validate(time_s, q_joint);
+  if (verdict == WildJoints::Verdict::wild) {
+    now_s_ = time_s;
+    return HoldReason::wild_joints;
+  }
+  if (verdict == WildJoints::Verdict::jumped) history_.clear();
   const MotionState setpoint = path_.at(time_s);
   arm_lag_.add(setpoint, q_joint, time_s - now_s_);
   history_.push(time_s, q_joint);
@@ -91,6 +99,10 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   if (!all_finite(image)) return HoldReason::non_finite;
   if (!image.found) return HoldReason::marker_lost;
   if (now_s_ - image.time_s > config_.max_image_age_s) return HoldReason::stale_image;
+  // The same stamp again, or an older one, tells nothing: the age of what was told before goes on growing.
+  if (image_s_ && image.time_s <= *image_s_) return image_reason_;
+  image_s_ = image.time_s;
+  if (frozen_image_.add(image, history_)) return HoldReason::frozen_image;
   const HoldReason reason = estimator_->update(image, history_);
   if (reason == HoldReason::none) usable_s_ = now_s_;
   return reason;

@@ -11,10 +11,12 @@
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/estimator.h"
 #include "lapservo/control/feature_model.h"
+#include "lapservo/control/frozen_image.h"
 #include "lapservo/control/hold_reason.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
 #include "lapservo/control/trajectory.h"
+#include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
 
 namespace lapservo::internal {
@@ -67,10 +69,13 @@ class VisualController {
   std::unique_ptr<Estimator> estimator_;
   JointHistory history_;
   ArmLag arm_lag_;
+  FrozenImage frozen_image_;
+  WildJoints wild_joints_;
   JointPath path_;
   bool started_ = false;
   double now_s_ = 0;
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
+  std::optional<double> image_s_;                       ///< stamp of the latest image
   double usable_s_ = 0;                                 ///< when the last usable one arrived
 };
 

@@ -1,5 +1,6 @@
 #include "lapservo/control/visual_controller.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -423,6 +424,30 @@ TEST(VisualController, TracksUncalibrated) {
   expect_all_limits_kept(done, config);
 }
 
+// Measured joints that are wild for one tick cost that tick and nothing else.
+TEST(VisualController, OneWildReadingSpoilsNothing) {
+  for (const Eigen::Vector4d& wild : {Eigen::Vector4d(0.09, 0, 0, 0), Eigen::Vector4d(0.5, -1, 0.05, 2)}) {
+    Flaws flaws = usual_flaws();
+    flaws.latency_s = 0.08;
+    flaws.delay_known = false;
+    flaws.misread = [&](double time_s) {
+      return std::abs(time_s - 6) < 0.5 / 60 ? wild : Eigen::Vector4d(Eigen::Vector4d::Zero());
+    };
+    const ControllerConfig config = testing::test_config(flaws);
+    const auto done = run(config, model_of(TestRig()), flaws, sinusoids(paper_sinusoids()), 8, 1);
+    EXPECT_NEAR(done.delay_s, 0.08, 0.005);
+    int held = 0;
+    for (const Moment& m : done.moments) {
+      if (m.time_s < 5) continue;
+      held += m.step.reason == HoldReason::wild_joints;
+      EXPECT_LT(std::abs(m.error[0]), 2e-3) << m.time_s;
+      EXPECT_LT(m.error.tail<3>().cwiseAbs().maxCoeff(), 2) << m.time_s;
+    }
+    EXPECT_EQ(held, 1);
+    expect_all_limits_kept(done, config);
+  }
+}
+
 class Holding : public ::testing::TestWithParam<ControlMode> {
  protected:
   ControllerConfig config_for(const Flaws& flaws) const {
@@ -505,7 +530,7 @@ TEST_P(Holding, NamesEveryReason) {
   EXPECT_EQ(step({}), HoldReason::stale_image);
   EXPECT_EQ(good(), HoldReason::none);
   if (GetParam() == ControlMode::fused) {
-    ImageMeasurement outlier = image_at(t);
+    ImageMeasurement outlier = image_at(t + config.period_s);
     outlier.features[2] += 80;
     EXPECT_EQ(step(outlier), HoldReason::outlier);
     EXPECT_EQ(good(), HoldReason::none);
@@ -522,9 +547,36 @@ TEST_P(Holding, NamesEveryReason) {
   DesiredFeatures wild = desired;
   wild.rate[1] = std::numeric_limits<double>::infinity();
   EXPECT_EQ(reason_for(t += config.period_s, q, wild), HoldReason::non_finite);
-  EXPECT_EQ(reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.5, 0, 0), desired), HoldReason::not_following);
+  EXPECT_EQ(reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.5, 0, 0), desired), HoldReason::wild_joints);
+  // Pushed away and back again, no faster than is plausible.
+  for (int k = 1; k < 6; ++k) reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.02 * k, 0, 0), desired);
+  EXPECT_EQ(reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.12, 0, 0), desired), HoldReason::not_following);
+  for (int k = 5; k >= 0; --k) reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.02 * k, 0, 0), desired);
   controller.reset(t, q);
   EXPECT_EQ(good(), HoldReason::none);
+}
+
+TEST_P(Holding, AnImageOfAnOldStampIsNotFresh) {
+  const Flaws flaws;
+  const ControllerConfig config = config_for(flaws);
+  const TestRig rig;
+  const Eigen::Vector4d q(0.05, 1.57, 0.064, 1);
+  const FeatureState state = exact_map(rig, q).value();
+  const DesiredFeatures desired{state.features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
+  VisualController controller(config, testing::model_of(rig));
+  ImageMeasurement image;
+  image.found = true;
+  image.features = state.features;
+  image.ends_px = state.ends_px;
+  image.covariance = Eigen::Vector4d(1e-7, 0.02, 0.02, 0.02).asDiagonal();
+  HoldReason reason = HoldReason::none, fresh = reason;
+  for (int k = 1; k <= 60; ++k) {
+    image.time_s = std::min(k, 40) * config.period_s;
+    reason = controller.step(k * config.period_s, q, image, desired).reason;
+    if (k <= 40) fresh = reason;
+  }
+  EXPECT_EQ(fresh, HoldReason::none);
+  EXPECT_EQ(reason, HoldReason::stale_image);
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, Holding, ::testing::Values(ControlMode::fused, ControlMode::paper),

@@ -60,12 +60,10 @@ bool holds_several_documents(const std::string& yaml) {
   return parser.HandleNextDocument(events) && parser.HandleNextDocument(events);
 }
 
-// yaml-cpp's words begin with its name.
 std::string syntax_problem(const YAML::Exception& error) {
-  std::string text = error.what();
-  constexpr std::string_view prefix = "yaml-cpp: ";
-  if (text.starts_with(prefix)) text.erase(0, prefix.size());
-  return text;
+  if (error.mark.is_null()) return error.msg;
+  return "line " + std::to_string(error.mark.line + 1) + ", column " + std::to_string(error.mark.column + 1) + ": " +
+         error.msg;
 }
 
 }  // namespace

@@ -12,19 +12,15 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double nearest_m = 0.06, farthest_m = 0.13;
-constexpr int max_attempts = 20000, candidates = 12;
+constexpr int candidates = 12;
+constexpr ViewLimits well_in_view{.steepest_rad = 0.35, .border_px = 30};
 
 JointVector random_position(const Rig& rig, Random& random) {
   const Instrument& instrument = rig.instruments[0];
-  const Camera& camera = rig.camera;
-  for (int attempt = 0; attempt < max_attempts; ++attempt) {
-    const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
-    auto q = configuration_through(*instrument.camera_from_rcm,
-                                   camera.ray_from_ideal(pixel) * random.uniform(nearest_m, farthest_m));
-    if (!q || q->rho_m < 0.02 || std::sin(q->phi_rad) < 0.1) continue;
-    q->psi_rad = random.uniform(-pi, pi);
-    if (marker_well_in_view(camera, instrument, *q)) return *q;
-  }
+  const ViewRange range{nearest_m, farthest_m, well_in_view};
+  if (const auto q =
+          random_configuration_in_view(rig.camera, instrument.marker, *instrument.camera_from_rcm, range, random))
+    return *q;
   throw InputError("rig", "instrument " + instrument.name +
                               " is hardly ever wholly in view between 60 and 130 mm: check camera_from_rcm");
 }
@@ -32,8 +28,7 @@ JointVector random_position(const Rig& rig, Random& random) {
 }  // namespace
 
 bool marker_well_in_view(const Camera& camera, const Instrument& instrument, const JointVector& q) {
-  return marker_in_view(camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q),
-                        {.steepest_rad = 0.35, .border_px = 30});
+  return marker_in_view(camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), well_in_view);
 }
 
 Eigen::Vector2d marker_middle_px(const Camera& camera, const Instrument& instrument, const JointVector& q) {

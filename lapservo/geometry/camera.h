@@ -15,6 +15,12 @@ struct ProjectionWithJacobian {
   Eigen::Matrix<double, 2, 3> d_px_d_point;
 };
 
+/// Lateral chromatic aberration: how much larger than green's a channel's raw image is, about the principal point.
+struct ChromaticAberration {
+  double blue = 1, red = 1;
+  bool operator==(const ChromaticAberration&) const = default;
+};
+
 /// Pinhole camera with plumb_bob distortion (k1 k2 p1 p2 k3), as in a ROS camera_info. Pixel centres lie at integer
 /// coordinates. Raw pixels are those of the image; ideal pixels are undistorted with the same camera matrix.
 struct Camera {
@@ -24,6 +30,7 @@ struct Camera {
   std::array<double, 5> distortion{};  ///< k1 k2 p1 p2 k3
   Response response;
   bool deinterlace = false;  ///< its frames are two fields, of two moments
+  ChromaticAberration chromatic_aberration = {};
 
   bool distorted() const {
     int some = 0;  // asked for every sample: no branches

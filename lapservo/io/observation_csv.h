@@ -12,16 +12,14 @@ namespace lapservo::internal {
 extern const char* const observation_csv_header;
 
 /// One row of it, without the line's end. Unknown values are empty fields.
-std::string observation_csv_row(int frame, double time_s, const std::string& file, const std::string& instrument,
-                                const Observation& observation);
+std::string observation_csv_row(int frame, double time_s, const std::string& file, const Observation& observation);
 
 /// A CSV of observations that appears under its name when committed; until then see RowFile.
 class ObservationCsv {
  public:
   /// Throws InputError at once when `path` can't be written.
   explicit ObservationCsv(const std::filesystem::path& path);
-  void add(int frame, double time_s, const std::string& file, const std::string& instrument,
-           const Observation& observation);
+  void add(int frame, double time_s, const std::string& file, const Observation& observation);
   /// Throws InputError when it could not be written to its end.
   void commit() { file_.commit(); }
 

@@ -25,10 +25,16 @@ constexpr std::uint64_t seed = 59;
 
 Observation random_observation(Random& random) {
   Observation o;
+  o.instrument = "PSM1";
   o.status = Status::ok;
   o.rcm = Observation::Rcm{};
   o.rcm->q = {random.uniform(-pi, pi), random.uniform(0, pi), random.uniform(0.05, 0.2), random.uniform(-pi, pi)};
   for (Eigen::Index i = 0; i < 4; ++i) o.rcm->covariance(i, i) = std::pow(10.0, random.uniform(-12, -4));
+  o.marker = Observation::MarkerPose{};
+  o.marker->camera_from_marker = {Eigen::Quaterniond(0.5, 0.1, -0.7, 0.5).normalized(),
+                                  {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(0.05, 0.2)}};
+  o.marker->sigma_xy_m = 1e-5, o.marker->sigma_z_m = 2e-4, o.marker->sigma_axis_rad = 3e-4;
+  o.marker->sigma_roll_rad = 4e-4;
   o.tau_rad = random.uniform(0, two_pi);
   o.sigma_tau_rad = std::pow(10.0, random.uniform(-6, -2));
   for (std::size_t k = 0; k < 4; ++k) {
@@ -47,7 +53,7 @@ CsvTable table_of(const std::vector<std::string>& rows) {
 }
 
 CsvTable table_of(const Observation& observation) {
-  return table_of({observation_csv_row(3, 0.1, "0003.png", "PSM1", observation)});
+  return table_of({observation_csv_row(3, 0.1, "0003.png", observation)});
 }
 
 // docs/conventions.md, "Observations", word by word.
@@ -57,7 +63,9 @@ TEST(ObservationCsv, HasTheColumnsOfTheConventions) {
             "theta_rad,phi_rad,rho_m,psi_rad,tau_rad,"
             "sigma_theta_rad,sigma_phi_rad,sigma_rho_m,sigma_psi_rad,sigma_tau_rad,"
             "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
-            "s_rad,r_px,l_px,d_px,cross_ratio");
+            "s_rad,r_px,l_px,d_px,cross_ratio,"
+            "marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
+            "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad");
 }
 
 TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
@@ -91,6 +99,15 @@ TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
     EXPECT_NEAR(value("l_px"), o.features.l_px, 1e-4);
     EXPECT_NEAR(value("d_px"), o.features.d_px, 1e-4);
     EXPECT_NEAR(value("cross_ratio"), o.features.cross_ratio, 1e-7);
+    const Rigid3& pose = o.marker->camera_from_marker;
+    EXPECT_NEAR(value("marker_y_m"), pose.translation.y(), 1e-8);
+    EXPECT_NEAR(value("marker_z_m"), pose.translation.z(), 1e-8);
+    EXPECT_NEAR(value("marker_qx"), pose.rotation.x(), 1e-8);
+    EXPECT_NEAR(value("marker_qw"), pose.rotation.w(), 1e-8);
+    EXPECT_NEAR(value("sigma_marker_xy_m"), 1e-5, 1e-8);
+    EXPECT_NEAR(value("sigma_marker_z_m"), 2e-4, 1e-7);
+    EXPECT_NEAR(value("sigma_axis_rad"), 3e-4, 1e-7);
+    EXPECT_NEAR(value("sigma_roll_rad"), 4e-4, 1e-7);
   }
 }
 
@@ -118,6 +135,13 @@ TEST(ObservationCsv, WithoutARegistrationTheRcmsColumnsAreEmpty) {
                                       "sigma_rho_m", "sigma_psi_rad", "r_px"}));
 }
 
+TEST(ObservationCsv, WithoutAPoseTheMarkersColumnsAreEmpty) {
+  Random random(seed);
+  Observation o = random_observation(random);
+  o.marker.reset();
+  EXPECT_EQ(empty_columns(table_of(o)).size(), 11U);
+}
+
 TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
   Random random(seed);
   for (const auto& [status, word] :
@@ -130,7 +154,7 @@ TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
     const CsvTable table = table_of(o);
     EXPECT_EQ(table.text(0, "status"), word);
     EXPECT_EQ(table.text(0, "instrument"), "PSM1");
-    EXPECT_EQ(empty_columns(table).size(), 23U) << word;
+    EXPECT_EQ(empty_columns(table).size(), 34U) << word;
   }
 }
 
@@ -146,9 +170,11 @@ TEST(ObservationCsv, WhatIsNotFiniteIsUnknown) {
 }
 
 TEST(ObservationCsv, NamesMayHoldCommasAndQuotes) {
-  const CsvTable table = table_of({observation_csv_row(0, 0, "left, \"new\".png", "PSM 1", {})});
+  Observation observation;
+  observation.instrument = "PSM \"1\", left";
+  const CsvTable table = table_of({observation_csv_row(0, 0, "left, \"new\".png", observation)});
   EXPECT_EQ(table.text(0, "file"), "left, \"new\".png");
-  EXPECT_EQ(table.text(0, "instrument"), "PSM 1");
+  EXPECT_EQ(table.text(0, "instrument"), observation.instrument);
 }
 
 TEST(ObservationCsv, AppearsWholeWhenCommittedAndElseNotAtAll) {
@@ -156,13 +182,15 @@ TEST(ObservationCsv, AppearsWholeWhenCommittedAndElseNotAtAll) {
   Random random(seed);
   {
     ObservationCsv csv(folder / "dropped.csv");
-    csv.add(0, 0, "", "PSM1", random_observation(random));
+    csv.add(0, 0, "", random_observation(random));
   }
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
   ObservationCsv csv(folder / "obs.csv");
-  csv.add(0, 0, "", "PSM1", random_observation(random));
-  csv.add(0, 0, "", "PSM2", {});
-  csv.add(1, 1.0 / 30, "", "PSM1", random_observation(random));
+  csv.add(0, 0, "", random_observation(random));
+  Observation other;
+  other.instrument = "PSM2";
+  csv.add(0, 0, "", other);
+  csv.add(1, 1.0 / 30, "", random_observation(random));
   EXPECT_FALSE(std::filesystem::exists(folder / "obs.csv"));
   csv.commit();
   const CsvTable table = CsvTable::read(folder / "obs.csv");

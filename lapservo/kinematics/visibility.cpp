@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 
 namespace lapservo::internal {
@@ -22,6 +23,22 @@ bool marker_in_view(const Camera& camera, const Marker& marker, const Rigid3& ca
       if (!camera.contains(camera.ideal_from_point(point), -0.5 * camera.width_px)) return false;
     }
   return true;
+}
+
+std::optional<JointVector> random_configuration_in_view(const Camera& camera, const Marker& marker,
+                                                        const Rigid3& camera_from_rcm, const ViewRange& range,
+                                                        Random& random) {
+  constexpr int max_attempts = 50000;
+  constexpr double min_rho_m = 0.02, min_sine_phi = 0.1;  // away from the trocar, and from the singularity
+  for (int attempt = 0; attempt < max_attempts; ++attempt) {
+    const Eigen::Vector2d pixel(random.uniform(0, camera.width_px), random.uniform(0, camera.height_px));
+    auto q = configuration_through(camera_from_rcm,
+                                   camera.ray_from_ideal(pixel) * random.uniform(range.nearest_m, range.farthest_m));
+    if (!q || q->rho_m < min_rho_m || std::sin(q->phi_rad) < min_sine_phi) continue;
+    q->psi_rad = random.uniform(-pi, pi);
+    if (marker_in_view(camera, marker, camera_from_rcm * rcm_from_unrolled(*q), range.limits)) return q;
+  }
+  return std::nullopt;
 }
 
 }  // namespace lapservo::internal

@@ -98,5 +98,28 @@ TEST(Visibility, IsNotMistakenWhereTheLensFoldsBack) {
   EXPECT_FALSE(marker_in_view(model.camera, model.marker, pose, {any_steepness_rad, 0}));
 }
 
+TEST(Visibility, RandomConfigurationsAreInViewWithinTheDepthAskedFor) {
+  constexpr ViewRange range{0.06, 0.16, {any_steepness_rad, 20}};
+  for (const ImageModel& model : testing::image_models()) {
+    Random random(62);
+    for (int i = 0; i < 20; ++i) {
+      const auto q = random_configuration_in_view(model.camera, model.marker, model.camera_from_rcm, range, random);
+      ASSERT_TRUE(q);
+      const Rigid3 pose = model.camera_from_rcm * rcm_from_unrolled(*q);
+      EXPECT_TRUE(marker_in_view(model.camera, model.marker, pose, range.limits));
+      EXPECT_GE(pose.translation.z(), range.nearest_m);
+      EXPECT_LE(pose.translation.z(), range.farthest_m);
+    }
+  }
+}
+
+TEST(Visibility, NoRandomConfigurationWhereNoneIsInView) {
+  const ImageModel model = testing::image_models()[0];
+  const ViewRange wider_than_the_image{0.06, 0.16, {.steepest_rad = 0.9, .border_px = 400}};
+  Random random(63);
+  EXPECT_FALSE(
+      random_configuration_in_view(model.camera, model.marker, model.camera_from_rcm, wider_than_the_image, random));
+}
+
 }  // namespace
 }  // namespace lapservo::internal

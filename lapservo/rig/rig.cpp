@@ -77,13 +77,16 @@ void check_unused(const YamlField& field) {
       offset.number_between(0, 0, "0: a camera_matrix of the pixels as they are");
 }
 
-// Not corrected, so it may not stand in a rig as if it were.
-void refuse_chromatic_aberration(const YamlField& field) {
-  if (!field.present()) return;
+ChromaticAberration parse_chromatic_aberration(const YamlField& field) {
+  ChromaticAberration aberration;
+  if (!field.present()) return aberration;
   expect_keys(field, {{}, {"blue", "red"}});
-  for (const char* channel : {"blue", "red"})
-    if (const YamlField magnification = field[channel]; magnification.present())
-      magnification.number_between(1, 1, "1: no other magnification is corrected");
+  const auto read = [&](const char* channel, double& magnification) {
+    if (const YamlField given = field[channel]; given.present())
+      magnification = given.number_between(0.98, 1.02, "0.98 to 1.02, times green's image");
+  };
+  read("blue", aberration.blue), read("red", aberration.red);
+  return aberration;
 }
 
 bool parse_switch(const YamlField& field) {
@@ -117,7 +120,7 @@ Camera parse_camera_fields(const YamlField& field) {
     check_invertible(camera, coefficients["data"]);
   }
   camera.response = parse_response(field["response"]);
-  refuse_chromatic_aberration(field["lateral_chromatic_aberration"]);
+  camera.chromatic_aberration = parse_chromatic_aberration(field["lateral_chromatic_aberration"]);
   if (const YamlField deinterlace = field["deinterlace"]; deinterlace.present())
     camera.deinterlace = parse_switch(deinterlace);
   check_unused(field);

@@ -48,14 +48,19 @@ std::string joints_yaml(const Joints& joints) {
                      list_of(joints.sign), list_of(joints.offset));
 }
 
+std::string chromatic_aberration_yaml(const ChromaticAberration& aberration) {
+  if (aberration == ChromaticAberration{}) return "";
+  return fmt::format("  lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", aberration.blue, aberration.red);
+}
+
 std::string camera_yaml(const Camera& camera) {
   const std::array matrix{camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0};
   return fmt::format(
       "camera:\n  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n"
       "  camera_matrix: {{rows: 3, cols: 3, data: {}}}\n"
-      "  distortion_coefficients: {{rows: 1, cols: 5, data: {}}}\n  response: {}\n{}",
+      "  distortion_coefficients: {{rows: 1, cols: 5, data: {}}}\n  response: {}\n{}{}",
       camera.width_px, camera.height_px, list_of(matrix), list_of(camera.distortion), response_yaml(camera.response),
-      camera.deinterlace ? "  deinterlace: true\n" : "");
+      chromatic_aberration_yaml(camera.chromatic_aberration), camera.deinterlace ? "  deinterlace: true\n" : "");
 }
 
 std::string instrument_yaml(const Instrument& instrument) {

@@ -28,6 +28,7 @@ void expect_same_bits(const Rig& a, const Rig& b) {
     EXPECT_EQ(a.camera.*member, b.camera.*member);
   EXPECT_EQ(a.camera.distortion, b.camera.distortion);
   EXPECT_EQ(a.camera.deinterlace, b.camera.deinterlace);
+  EXPECT_EQ(a.camera.chromatic_aberration, b.camera.chromatic_aberration);
   EXPECT_EQ(a.camera.response.kind, b.camera.response.kind);
   EXPECT_EQ(a.camera.response.gamma, b.camera.response.gamma);
   EXPECT_EQ(a.camera.response.table_light, b.camera.response.table_light);
@@ -75,6 +76,7 @@ TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
                                     "camera_matrix: {data: [1100, 0, 639.5, 0, 1090, 359.5, 0, 0, 1]}}\n") +
                             markers,
                         "rig.yaml");
+    if (i % 2 == 0) rig.camera.chromatic_aberration = {random.uniform(0.99, 1.01), random.uniform(0.99, 1.01)};
     rig.camera.fx_px = random.uniform(500, 2000), rig.camera.cy_px = random.uniform(300, 400);
     rig.camera.distortion = {random.uniform(-0.05, 0.05), 1e-17, 0, -0.0, random.uniform(-1e-9, 1e-9)};
     if (i % 3 == 0) rig.camera.response = {Response::Kind::power, random.uniform(0.3, 4)};

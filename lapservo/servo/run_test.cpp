@@ -40,6 +40,8 @@ struct Case {
   std::optional<Interval> hidden, faulted;
   ControlMode mode = ControlMode::fused;
   TrackingThread thread = TrackingThread::callers;
+  std::optional<Interval> frozen{};  ///< the picture from its beginning arrives again and again
+  bool new_stamps = true;            ///< then, as if it were new
 };
 
 struct Record {
@@ -131,6 +133,25 @@ class InStep : public Robot, public ImageStream, public Clock {
   bool vision_is_idle_ = false;
 };
 
+// A camera that shows one picture for a while.
+class FreezingImages : public ImageStream {
+ public:
+  FreezingImages(Simulator& simulator, const Interval& when, bool new_stamps)
+      : simulator_(simulator), when_(when), new_stamps_(new_stamps) {}
+  std::optional<StampedImage> newest() override {
+    auto image = simulator_.newest();
+    if (!image) return image;
+    if (!kept_ || !when_.contains(image->time_s)) kept_ = image;
+    return StampedImage{new_stamps_ ? image->time_s : kept_->time_s, kept_->bgr};
+  }
+
+ private:
+  Simulator& simulator_;
+  Interval when_;
+  bool new_stamps_;
+  std::optional<StampedImage> kept_;
+};
+
 PastRun run_case(const Case& c) {
   const Rig rig = testing::small_test_rig();
   const RunConfig config = config_of(rig, c);
@@ -144,7 +165,10 @@ PastRun run_case(const Case& c) {
                                    simulated.arm.joint_offset, random, "trajectory"));
   if (c.hidden) simulator.cover_marker(*c.hidden);
   Watcher watcher(c, rig, simulator);
-  if (c.thread == TrackingThread::own) {
+  if (c.frozen) {
+    FreezingImages images(simulator, *c.frozen, c.new_stamps);
+    run(simulator, images, simulator, config, trajectory, c.duration_s, watcher);
+  } else if (c.thread == TrackingThread::own) {
     InStep in_step(simulator);
     run(in_step, in_step, in_step, config, trajectory, c.duration_s, watcher);
   } else {
@@ -219,6 +243,28 @@ TEST(Run, HoldsWhileTheMarkerIsHiddenAndGoesOnWithoutAJump) {
   }
   expect_within_limits(done, controller);
   EXPECT_LT(done.error(done.records.size() - 1).tail<3>().cwiseAbs().maxCoeff(), 1);
+}
+
+// Held within 100 ms of the first picture that repeats, and no farther away then than braking takes it; then on again.
+TEST(Run, HoldsWhenThePictureFreezesWhateverItsStamps) {
+  for (const bool new_stamps : {true, false}) {
+    SCOPED_TRACE(new_stamps ? "new stamps" : "the same stamp");
+    Case c;
+    c.frozen = Interval{4, 6};
+    c.new_stamps = new_stamps;
+    const PastRun done = run_case(c);
+    const ControllerConfig controller = config_of(testing::small_test_rig(), c).controller;
+    for (const Record& record : done.records) {
+      const double since_s = record.input.time_s - 4, before_s = record.input.time_s - 6;
+      if (since_s < 0.1 + 2 * controller.period_s || before_s > -2 * controller.period_s) continue;
+      EXPECT_EQ(record.decision.control.action, ControlAction::hold) << record.input.time_s;
+      EXPECT_EQ(record.decision.control.reason, new_stamps ? HoldReason::frozen_image : HoldReason::stale_image)
+          << record.input.time_s;
+    }
+    expect_within_limits(done, controller);
+    EXPECT_EQ(done.records.back().decision.control.action, ControlAction::track);
+    EXPECT_LT(done.error(done.records.size() - 1).tail<3>().cwiseAbs().maxCoeff(), 1);
+  }
 }
 
 TEST(Run, SurvivesAnArmFault) {

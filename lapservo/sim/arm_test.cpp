@@ -87,7 +87,7 @@ TEST(Arm, MovesAlikeHoweverFinelyItIsStepped) {
   }
 }
 
-// Driven to and fro, the instrument stands apart by the whole backlash at the same reading.
+// Driven to and fro, the instrument stands apart by the whole backlash at the same measured joint.
 TEST(Arm, BacklashIsAsWideAsConfigured) {
   ArmConfig config = ideal();
   config.backlash = {0.001, 0.002, 1e-4, 0.02};

@@ -1,6 +1,7 @@
 #include "lapservo/sim/endoscope.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <string>
 
@@ -16,6 +17,10 @@ namespace {
 
 // Moments that are equal but for rounding.
 constexpr double same_s = 1e-9;
+
+bool is_being_rendered(const std::future<cv::Mat>& picture) {
+  return picture.valid() && picture.wait_for(std::chrono::seconds(0)) == std::future_status::timeout;
+}
 
 void check(bool right, const char* field, double value, const char* expected) {
   if (!right) throw InputError("endoscope", field, fmt::format("{}", value), expected);
@@ -82,6 +87,7 @@ std::vector<EndoscopePicture> Endoscope::arrived(double time_s) {
   std::vector<EndoscopePicture> pictures;
   while (!on_the_way_.empty() && on_the_way_.front().picture.stamp_s <= time_s + same_s) {
     OnTheWay& first = on_the_way_.front();
+    if (config_.real_time && is_being_rendered(first.rendered)) break;
     if (first.rendered.valid()) first.picture.bgr = first.rendered.get();
     pictures.push_back(std::move(first.picture));
     on_the_way_.pop_front();

@@ -21,6 +21,7 @@ struct EndoscopeConfig {
   double jitter_s = 0.001;          ///< arrival is evenly up to this much earlier or later
   double dropped_fraction = 0.005;  ///< of the frames that never arrive
   int render_threads = 2;           ///< frames are rendered while they are on their way; 0: when they are asked for
+  bool real_time = false;           ///< a picture that is not rendered in time arrives late, and nobody waits for it
   bool pictures = true;             ///< false: frames arrive without a picture, for studies that need only their times
 
   /// Returns itself if all its numbers make sense; else throws InputError naming the first field that doesn't.

@@ -98,6 +98,7 @@ struct Neighbours {
 };
 
 // LightImage::at() in every lane and at every sample; nothing beyond a line's end.
+template <bool Chromatic>
 SampledLanes sample(const LightImage& light, const LineLanes& lines, const Column& present) {
   const Floats d;
   const std::size_t lanes = hn::Lanes(d);
@@ -106,11 +107,23 @@ SampledLanes sample(const LightImage& light, const LineLanes& lines, const Colum
   VI brightest = hn::Zero(Ints());
   V t = lines.first.load();
   for (std::size_t i = 0; i < lines.samples; ++i) {
-    const V u = hn::MulAdd(t, lines.du.load(), lines.u.load()), v = hn::MulAdd(t, lines.dv.load(), lines.v.load());
-    const VI left = hn::ConvertTo(Ints(), u), top = hn::ConvertTo(Ints(), v);
-    const V fu = hn::Sub(u, hn::ConvertTo(d, left)), fv = hn::Sub(v, hn::ConvertTo(d, top));
-    around.load(light.image(), left, top, lanes);
+    const V green_u = hn::MulAdd(t, lines.du.load(), lines.u.load());
+    const V green_v = hn::MulAdd(t, lines.dv.load(), lines.v.load());
+    V fu, fv;
+    const auto look_at = [&](V u, V v) HWY_ATTR {
+      const VI left = hn::ConvertTo(Ints(), u), top = hn::ConvertTo(Ints(), v);
+      fu = hn::Sub(u, hn::ConvertTo(d, left)), fv = hn::Sub(v, hn::ConvertTo(d, top));
+      around.load(light.image(), left, top, lanes);
+    };
+    if constexpr (!Chromatic) look_at(green_u, green_v);
     for (std::size_t c = 0; c < 3; ++c) {
+      if constexpr (Chromatic) {
+        const ChannelGeometry& channels = light.channels();
+        const V magnification = hn::Set(d, channels.magnification[c]);
+        const V centre_u = hn::Set(d, channels.centre_u), centre_v = hn::Set(d, channels.centre_v);
+        look_at(hn::MulAdd(magnification, hn::Sub(green_u, centre_u), centre_u),
+                hn::MulAdd(magnification, hn::Sub(green_v, centre_v), centre_v));
+      }
       const auto at = [&](std::size_t right, std::size_t lower) HWY_ATTR {
         const VI value = around.value(c, right, lower);
         brightest = hn::Max(brightest, value);
@@ -347,7 +360,8 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
   V t = lanes.first.load();
   for (std::size_t i = 0; i < lanes.samples; ++i, t = hn::Add(t, hn::Set(d, 1)))
     present[i].store(hn::IfThenElseZero(hn::Le(t, lanes.last.load()), hn::Set(d, 1)));
-  const SampledLanes sampled = sample(image, lanes, present);
+  const SampledLanes sampled =
+      image.channels().differs() ? sample<true>(image, lanes, present) : sample<false>(image, lanes, present);
   const FitLanes fit = iterate<Shapes>(lanes, sampled.light, present, iterations);
   Lanes offset, information, variance, blur_gradient, blur_information, converged;
   std::array<Lanes, 3> step;

@@ -101,7 +101,10 @@ TEST_P(EdgeLines, TogetherAreAsOneByOneOnEveryProcessor) {
       SCOPED_TRACE("seed " + std::to_string(seed) + ", spots " + std::to_string(spots));
       const cv::Mat image = picture(GetParam(), seed, spots);
       const ImageView view(image);
-      const LightImage light(view, table);
+      Camera camera;
+      camera.width_px = image.cols, camera.height_px = image.rows, camera.cx_px = 70, camera.cy_px = 45;
+      if (seed % 2 == 0) camera.chromatic_aberration = {0.99, 1.008};
+      const LightImage light(view, table, ChannelGeometry(camera));
       for (const std::size_t count : {1U, 7U, 16U, 61U})
         for (const int iterations : {1, 3}) {
           const auto lines = random_lines(count, GetParam(), seed + 100 * count);

@@ -52,7 +52,8 @@ double median_sigma_px(std::span<const Measurement> measurements) {
 }
 
 // What each boundary and side as a whole may be off, and the noise as it is.
-CommonErrors common_errors(std::span<const Measurement> measurements, const EdgeBlur& blur) {
+CommonErrors common_errors(std::span<const Measurement> measurements, const ResidualLines& lines,
+                           const EdgeBlur& blur) {
   const FineFitLimits& limits = fine_fit_limits;
   const double motion_blur_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
   const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - limits.usual_blur_px);
@@ -60,7 +61,7 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Edge
               limits.common_fraction_of_blur * std::max(0.0, blur.boundaries_px - limits.usual_blur_px),
           limits.common_side_px + limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
               limits.side_fraction_of_motion_blur * motion_blur_px,
-          std::max(1.0, scatter_sigmas(measurements)),
+          std::max(1.0, scatter_sigmas(measurements, lines)),
           std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px};
 }
 
@@ -133,8 +134,9 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.in_image = pass.in_image;
   fit.sides_in_image = pass.sides_in_image;
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
-  const auto print =
-      fit_print(pass.all, unknowns, film_prior, scene.marker.tolerance_m, common_errors(pass.all, fit.blur));
+  const ResidualLines lines = residual_lines(pass.all);
+  const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker.tolerance_m,
+                               common_errors(pass.all, lines, fit.blur));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;

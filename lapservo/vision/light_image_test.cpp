@@ -1,6 +1,7 @@
 #include "lapservo/vision/light_image.h"
 
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -38,6 +39,31 @@ TEST(LightImage, InterpolatesLightBetweenPixelCentres) {
       EXPECT_NEAR(sample.light[static_cast<std::size_t>(c)], expected, 1e-5) << "seed 2, at " << u << ", " << v;
     }
   }
+}
+
+TEST(LightImage, ReadsEachChannelWhereItsImageLies) {
+  const cv::Mat image = random_image(5, 60, 50, 255);
+  const ImageView view(image);
+  const auto table = Response{}.table();
+  Camera camera;
+  camera.width_px = 60, camera.height_px = 50, camera.cx_px = 31, camera.cy_px = 22;
+  camera.chromatic_aberration = {0.985, 1.01};
+  const LightImage plain(view, table), light(view, table, ChannelGeometry(camera));
+  Random random(6);
+  int tried = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Vector2d green(random.uniform(0, 59), random.uniform(0, 49)), centre(camera.cx_px, camera.cy_px);
+    if (!light.contains(green)) continue;
+    ++tried;
+    const auto sample = light.at(static_cast<float>(green.x()), static_cast<float>(green.y()));
+    for (const auto& [c, magnification] : {std::pair(0U, 0.985), std::pair(1U, 1.0), std::pair(2U, 1.01)}) {
+      const Eigen::Vector2d place = centre + magnification * (green - centre);
+      ASSERT_TRUE(plain.contains(place));
+      EXPECT_NEAR(sample.light[c], plain.at(static_cast<float>(place.x()), static_cast<float>(place.y())).light[c],
+                  1e-4);
+    }
+  }
+  EXPECT_GT(tried, 1500);
 }
 
 TEST(LightImage, IsSaturatedWhereverASaturatedPixelHasAShare) {

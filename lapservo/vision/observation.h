@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include <Eigen/Core>
@@ -33,10 +34,11 @@ inline std::array<Eigen::Vector2d, 4> zero_points() {
   return {zero, zero, zero, zero};
 }
 
-/// What one frame tells of one instrument. All but `status` is meaningful only when it is Status::ok; then every
-/// number is finite. Sigmas are one standard deviation.
+/// What one frame tells of one instrument. Its numbers are meaningful only when `status` is Status::ok; then every one
+/// is finite. Sigmas are one standard deviation.
 struct Observation {
   Status status = Status::no_marker;
+  std::string instrument;  ///< its name in the rig
 
   /// Present when the instrument's camera_from_rcm is known; covariance in the order theta, phi, rho, psi.
   struct Rcm {
@@ -44,6 +46,17 @@ struct Observation {
     Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
   };
   std::optional<Rcm> rcm;
+
+  /// Method::surface only. With camera_from_rcm or without. Origin at the marker's proximal end on the axis, z along
+  /// the axis to the tip, x towards tau = 0.
+  struct MarkerPose {
+    Rigid3 camera_from_marker;
+    double sigma_xy_m = 0;      ///< of the origin across the camera's axis: root mean square of x's and y's
+    double sigma_z_m = 0;       ///< of its depth
+    double sigma_axis_rad = 0;  ///< of the angle between the axis and the true one: root of both components' squares
+    double sigma_roll_rad = 0;  ///< about the axis
+  };
+  std::optional<MarkerPose> marker;
 
   double tau_rad = 0;  ///< azimuth of the marker on the centre line, [0, 2 pi)
   double sigma_tau_rad = 0;

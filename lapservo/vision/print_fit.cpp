@@ -26,74 +26,61 @@ using PrintVector = Eigen::Matrix<double, print_errors, 1>;
 using PrintMatrix = Eigen::Matrix<double, print_errors, print_errors>;
 using CrossMatrix = Eigen::Matrix<double, print_errors, Eigen::Dynamic, 0, print_errors, max_unknowns>;
 
-// A group's residuals as a straight line over the print, of boundaries as metres along the shaft, of sides a constant
-// in pixels.
-struct Line {
-  double at_start = 0, slope = 0;
-
-  double residual_px(const Measurement& m) const {
-    const double unit = m.along_px_per_m != 0 ? m.along_px_per_m : 1;
-    return m.residual_px - unit * (at_start + slope * m.turn_fraction);
-  }
+// A measurement of a group whose residuals are fitted by a line: along the shaft in metres, a side's in pixels.
+struct LinePoint {
+  double value, turn_fraction, sigma;
 };
-using Lines = std::array<Line, measurement_groups>;
 
 // Robust: from the median on, reweighted. A boundary that lies elsewhere as a whole is no outlier to itself; one with
 // few points is compared with the others, about zero.
-Line line_of(std::span<const Measurement> measurements, std::size_t group) {
+ResidualLine line_of(std::span<const Measurement> measurements, std::size_t group) {
   constexpr int iterations = 4;
   constexpr std::size_t fewest = 8;
   constexpr double usual_slope = 1 * mm;  // a turn
+  InplaceVector<LinePoint, EdgeMeasurements::max_lines> points;
   InplaceVector<double, EdgeMeasurements::max_lines> values;
-  for (const Measurement& m : measurements)
-    if (m.group == group) values.push_back(m.residual_px / (group < 4 ? m.along_px_per_m : 1));
+  for (const Measurement& m : measurements) {
+    if (m.group != group) continue;
+    const double unit = group < 4 ? m.along_px_per_m : 1;
+    const double value = m.residual_px / unit;
+    points.push_back({value, group < 4 ? m.turn_fraction : 0, m.sigma_px / std::abs(unit)});
+    values.push_back(value);
+  }
   if (values.size() < fewest) return {};
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
-  Line line{*middle, 0};
+  ResidualLine line{*middle, 0};
   for (int i = 0; i < iterations; ++i) {
-    Eigen::Matrix2d information = Eigen::Vector2d(0, 1 / (usual_slope * usual_slope)).asDiagonal();
-    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
-    for (const Measurement& m : measurements) {
-      if (m.group != group) continue;
-      const double unit = group < 4 ? m.along_px_per_m : 1;
-      const double weight = cauchy_weight(line.residual_px(m) / m.sigma_px, cauchy_scale_sigmas) * unit * unit /
-                            (m.sigma_px * m.sigma_px);
-      const Eigen::Vector2d row(1, group < 4 ? m.turn_fraction : 0);
-      information += weight * row * row.transpose();
-      gradient += weight * m.residual_px / unit * row;
+    double sum = 0, turns = 0, turns_squared = 1 / (usual_slope * usual_slope), at_start = 0, at_turn = 0;
+    for (const LinePoint& p : points) {
+      const double sigmas = (p.value - line.at_start - line.slope * p.turn_fraction) / p.sigma;
+      const double weight = cauchy_weight(sigmas, cauchy_scale_sigmas) / (p.sigma * p.sigma);
+      sum += weight;
+      turns += weight * p.turn_fraction;
+      turns_squared += weight * p.turn_fraction * p.turn_fraction;
+      at_start += weight * p.value;
+      at_turn += weight * p.turn_fraction * p.value;
     }
-    const Eigen::Vector2d solved = information.inverse() * gradient;
-    line = {solved[0], solved[1]};
+    const double determinant = sum * turns_squared - turns * turns;
+    line = {(turns_squared * at_start - turns * at_turn) / determinant,
+            (sum * at_turn - turns * at_start) / determinant};
   }
   return line;
 }
 
-Lines lines_of(std::span<const Measurement> measurements) {
-  Lines lines;
-  for (std::size_t group = 0; group < measurement_groups; ++group) lines[group] = line_of(measurements, group);
-  return lines;
+// d(residual)/d(print's errors at its upper and at its lower edge) [px/mm].
+Eigen::Vector2d print_row(const Measurement& m) {
+  const double along = mm * m.along_px_per_m;
+  return {along * (1 - m.turn_fraction), along * m.turn_fraction};
 }
 
-double scatter_sigmas(std::span<const Measurement> measurements, const Lines& lines) {
-  double squares = 0;
-  int inliers = 0;
-  for (const Measurement& m : measurements) {
-    const double sigmas = std::abs(lines[m.group].residual_px(m)) / m.sigma_px;
-    if (m.group < 4 && sigmas <= inlier_sigmas) squares += sigmas * sigmas, ++inliers;
-  }
-  return inliers ? std::sqrt(squares / inliers) : 0;
-}
+// Which of the print's errors a boundary has at its upper and at its lower edge.
+constexpr std::array<std::array<int, 2>, 4> errors_of_boundary{{{0, 0}, {1, 2}, {3, 4}, {5, 5}}};
 
-// d(residual)/d(print's errors) [px/mm]: of an inner boundary two.
-PrintVector print_row(const Measurement& m) {
-  PrintVector row = PrintVector::Zero();
-  const double along = mm * m.along_px_per_m, fraction = m.turn_fraction;
-  if (m.group == 0) row[0] = along;
-  if (m.group == 1) row[1] = along * (1 - fraction), row[2] = along * fraction;
-  if (m.group == 2) row[3] = along * (1 - fraction), row[4] = along * fraction;
-  if (m.group == 3) row[5] = along;
-  return row;
+double print_shift_px(const Measurement& m, const PrintVector& print_mm) {
+  if (m.group >= errors_of_boundary.size()) return 0;
+  const auto& errors = errors_of_boundary[m.group];
+  return print_row(m).dot(Eigen::Vector2d(print_mm[errors[0]], print_mm[errors[1]]));
 }
 
 // Normal equations of the pose and film (x) and of the print's errors (n).
@@ -133,26 +120,68 @@ struct Sums {
   std::array<Pull, measurement_groups> pulls;
 };
 
-Sums sums_of(std::span<const Measurement> measurements, const Lines& lines, int pose_unknowns, double film_prior,
-             const CommonErrors& errors) {
+// Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two
+// edges, the residual, and 1. Of fixed size, which is several times faster.
+class Products {
+ public:
+  void add(const Measurement& m, double weight) {
+    Row row = Row::Zero();
+    for (Eigen::Index i = 0; i < m.row.size(); ++i) row[i] = m.row[i];
+    row.segment<2>(at_print) = print_row(m);
+    row[at_residual] = m.residual_px;
+    row[at_one] = 1;
+    const Row weighted = weight * row;
+    sums_.noalias() += weighted * row.transpose();
+  }
+  auto xx(int unknowns) const { return sums_.topLeftCorner(unknowns, unknowns); }
+  auto nx(int edge, int unknowns) const { return sums_.row(at_print + edge).head(unknowns); }
+  double nn(int edge, int other) const { return sums_(at_print + edge, at_print + other); }
+  auto x(Eigen::Index by, int unknowns) const { return sums_.col(by).head(unknowns); }
+  double n(Eigen::Index by, int edge) const { return sums_(at_print + edge, by); }
+  double weight() const { return sums_(at_one, at_one); }
+  double residual() const { return sums_(at_residual, at_one); }
+  static constexpr Eigen::Index at_print = max_unknowns, at_residual = at_print + 2, at_one = at_print + 3;
+
+ private:
+  static constexpr Eigen::Index size = at_one + 2;  // even: a whole number of registers
+  using Row = Eigen::Matrix<double, size, 1>;
+  Eigen::Matrix<double, size, size> sums_ = Eigen::Matrix<double, size, size>::Zero();
+};
+
+// Adds a group's products to the sums of all, and tells its pull.
+Pull gathered(const Products& products, std::size_t group, int unknowns, Equations& all) {
+  Pull pull;
+  pull.x = products.x(Products::at_one, unknowns);
+  pull.weight = products.weight();
+  pull.residual = products.residual();
+  all.xx += products.xx(unknowns);
+  all.x += products.x(Products::at_residual, unknowns);
+  if (group >= errors_of_boundary.size()) return pull;
+  const auto& errors = errors_of_boundary[group];
+  for (const int edge : {0, 1}) {
+    const int error = errors[static_cast<std::size_t>(edge)];
+    all.nx.row(error) += products.nx(edge, unknowns);
+    for (const int other : {0, 1}) all.nn(error, errors[static_cast<std::size_t>(other)]) += products.nn(edge, other);
+    all.n[error] += products.n(Products::at_residual, edge);
+    pull.n[error] += products.n(Products::at_one, edge);
+  }
+  return pull;
+}
+
+Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
+             double film_prior, const CommonErrors& errors) {
   const int unknowns = pose_unknowns + 1;
   const double certainty = 1 / (errors.noise_scale * errors.noise_scale);
-  Sums sums{Equations(unknowns), {}};
-  for (std::size_t group = 0; group < measurement_groups; ++group) {
-    sums.pulls[group].x = UnknownVector::Zero(unknowns);
-    sums.pulls[group].error_px = errors.noise_scale * (group < 4 ? errors.boundary_px : errors.side_px);
-  }
-  sums.equations.add(UnknownVector::Unit(unknowns, pose_unknowns), PrintVector::Zero(), certainty, film_prior);
+  std::array<Products, measurement_groups> products;
   for (const Measurement& m : measurements) {
     const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
-    const double weight = certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
-    const PrintVector row = print_row(m);
-    sums.equations.add(m.row, row, weight, m.residual_px);
-    Pull& pull = sums.pulls[m.group];
-    pull.x += weight * m.row;
-    pull.n += weight * row;
-    pull.weight += weight;
-    pull.residual += weight * m.residual_px;
+    products[m.group].add(m, certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px));
+  }
+  Sums sums{Equations(unknowns), {}};
+  sums.equations.add(UnknownVector::Unit(unknowns, pose_unknowns), PrintVector::Zero(), certainty, film_prior);
+  for (std::size_t group = 0; group < measurement_groups; ++group) {
+    sums.pulls[group] = gathered(products[group], group, unknowns, sums.equations);
+    sums.pulls[group].error_px = errors.noise_scale * (group < 4 ? errors.boundary_px : errors.side_px);
   }
   return sums;
 }
@@ -251,13 +280,30 @@ std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& eviden
 
 }  // namespace
 
-double scatter_sigmas(std::span<const Measurement> measurements) {
-  return scatter_sigmas(measurements, lines_of(measurements));
+double ResidualLine::residual_px(const Measurement& m) const {
+  const double unit = m.along_px_per_m != 0 ? m.along_px_per_m : 1;
+  return m.residual_px - unit * (at_start + slope * m.turn_fraction);
 }
 
-std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_unknowns, double film_prior,
-                                  double tolerance_m, const CommonErrors& errors) {
-  const Sums sums = sums_of(measurements, lines_of(measurements), pose_unknowns, film_prior, errors);
+ResidualLines residual_lines(std::span<const Measurement> measurements) {
+  ResidualLines lines;
+  for (std::size_t group = 0; group < measurement_groups; ++group) lines[group] = line_of(measurements, group);
+  return lines;
+}
+
+double scatter_sigmas(std::span<const Measurement> measurements, const ResidualLines& lines) {
+  double squares = 0;
+  int inliers = 0;
+  for (const Measurement& m : measurements) {
+    const double sigmas = std::abs(lines[m.group].residual_px(m)) / m.sigma_px;
+    if (m.group < 4 && sigmas <= inlier_sigmas) squares += sigmas * sigmas, ++inliers;
+  }
+  return inliers ? std::sqrt(squares / inliers) : 0;
+}
+
+std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
+                                  double film_prior, double tolerance_m, const CommonErrors& errors) {
+  const Sums sums = sums_of(measurements, lines, pose_unknowns, film_prior, errors);
   const double tolerance_mm = tolerance_m / mm;
   const auto exact = solved(sums, 0);
   auto tolerated = tolerance_m > 0 ? solved(sums, tolerance_mm) : exact;
@@ -274,7 +320,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_
     mixture.add(*off, weights[i + 1]);
   }
   const Solution mean = mixture.mean();
-  for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_row(m).dot(mean.print_mm);
+  for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
   const int psi = pose_unknowns - 1;
   PrintFit fit;
   fit.step = mean.step;

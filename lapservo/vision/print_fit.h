@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <span>
 
@@ -15,6 +16,18 @@ struct CommonErrors {
   double boundary_px = 0, side_px = 0, noise_scale = 1, doubt_scale = 1;
 };
 
+/// A group's residuals as a straight line over the print: of boundaries in metres along the shaft, of sides a constant
+/// in pixels. Zero where a group has too few points for one of its own.
+struct ResidualLine {
+  double at_start = 0, slope = 0;  ///< at tau = 0; a turn
+
+  /// What the line leaves of a residual.
+  double residual_px(const Measurement& m) const;
+};
+using ResidualLines = std::array<ResidualLine, measurement_groups>;
+
+ResidualLines residual_lines(std::span<const Measurement> measurements);
+
 /// A pose, given that the print may lie elsewhere than the rig says: each boundary at either edge of the print (tau = 0
 /// and tau -> 2 pi, linear between; the ends are circles). These six errors are normal, independent and alike.
 struct PrintFit {
@@ -28,12 +41,11 @@ struct PrintFit {
 /// Tells the print's errors from the settled measurements' residuals. How large they usually are is not known, so the
 /// pose is a mean over the rig's print and prints that are off by 5 um to 0.6 mm, each weighted by how likely it
 /// makes the residuals. On return the residuals are those that the step and the print's likeliest errors leave.
-/// `film_prior` as the fit has it. Nullopt when a direction is not seen at all.
-std::optional<PrintFit> fit_print(std::span<Measurement> measurements, int pose_unknowns, double film_prior,
-                                  double tolerance_m, const CommonErrors& errors);
+/// `lines` are those of these residuals, `film_prior` as the fit has it. Nullopt when a direction is not seen at all.
+std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
+                                  double film_prior, double tolerance_m, const CommonErrors& errors);
 
-/// Root mean square of the boundaries' residuals in sigmas, each about its own straight line over the print; outliers
-/// do not count.
-double scatter_sigmas(std::span<const Measurement> measurements);
+/// Root mean square of the boundaries' residuals in sigmas, each about its own line; outliers do not count.
+double scatter_sigmas(std::span<const Measurement> measurements, const ResidualLines& lines);
 
 }  // namespace lapservo::internal

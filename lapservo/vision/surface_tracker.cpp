@@ -13,6 +13,7 @@
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/limits.h"
+#include "lapservo/vision/marker_pose.h"
 #include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
@@ -101,6 +102,7 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
       features_of(line->ideal_px, camera_from_rcm ? projected_rcm_px(scene.camera, *camera_from_rcm) : std::nullopt);
   observation.camera_from_unrolled = pose.camera_from_unrolled;
   observation.psi_rad = pose.psi_rad;
+  observation.marker = marker_pose_of(scene.marker, fit.unknowns, fit.covariance);
   if (fit.unknowns.q()) {
     observation.rcm = Observation::Rcm{*fit.unknowns.q(), fit.covariance};
   } else if (camera_from_rcm) {
@@ -120,6 +122,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single)
       single_(single),
       classes_(rig.instruments),
       light_(rig.camera.response.table()),
+      channels_(rig.camera),
       memory_(rig.instruments.size()),
       observations_(rig.instruments.size()) {}
 
@@ -234,7 +237,7 @@ SurfaceTracker::Found SurfaceTracker::detect_occluded(const Scene& scene, const 
 
 const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) {
   const ImageView image(image_bgr);
-  const LightImage light(image, light_);
+  const LightImage light(image, light_, channels_);
   if (single_) reset();
   std::optional<std::vector<Blob>> blobs;
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {

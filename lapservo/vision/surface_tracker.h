@@ -53,6 +53,7 @@ class SurfaceTracker {
   bool single_;
   ColorClasses classes_;
   std::array<float, 256> light_;
+  ChannelGeometry channels_;
   std::vector<std::optional<Memory>> memory_;
   std::vector<Observation> observations_;
 };

@@ -1,10 +1,15 @@
 #include "lapservo/vision/surface_tracker.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
@@ -260,6 +265,34 @@ TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
     EXPECT_EQ(to_string(Tracker(one).track(scenes::render(both, configurations, seed))[0].status), "ambiguous");
     EXPECT_EQ(to_string(Tracker(one).track(usual_shot(seed).bgr)[0].status), "ok");
   }
+}
+
+// A channel's picture is that of a camera with another focal length.
+TEST(SurfaceTracker, LateralChromaticAberrationOfTheRigIsUndone) {
+  constexpr ChromaticAberration aberration{0.9985, 1.0015};
+  std::vector<double> known_rad, unknown_rad;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    const auto& shot = usual_shot(seed);
+    std::array<cv::Mat, 3> channels;
+    for (const auto& [c, magnification] :
+         {std::pair(0U, aberration.blue), std::pair(1U, 1.0), std::pair(2U, aberration.red)}) {
+      Rig rig = scenes::usual_rig();
+      rig.camera.fx_px *= magnification, rig.camera.fy_px *= magnification;
+      cv::extractChannel(scenes::render(rig, {shot.q}, seed, {}), channels[c], static_cast<int>(c));
+    }
+    cv::Mat seen;
+    cv::merge(channels.data(), channels.size(), seen);
+    Rig rig = shot.rig;
+    const auto error_rad = [&] {
+      const Observation o = Tracker(rig).track(seen)[0];
+      return o.status == Status::ok ? std::abs(wrap_pi(o.rcm.value().q.psi_rad - shot.q.psi_rad)) : HUGE_VAL;
+    };
+    unknown_rad.push_back(error_rad());
+    rig.camera.chromatic_aberration = aberration;
+    known_rad.push_back(error_rad());
+  }
+  for (const double error : known_rad) EXPECT_LT(error, 0.003);
+  EXPECT_GT(*std::max_element(unknown_rad.begin(), unknown_rad.end()), 0.003) << "the test's own power";
 }
 
 }  // namespace

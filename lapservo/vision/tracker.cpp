@@ -66,6 +66,9 @@ struct Tracker::State {
     else
       observations = centerline.observe(image_bgr);
   }
+  void name_observations() {
+    for (std::size_t i = 0; i < observations.size(); ++i) observations[i].instrument = rig.instruments[i].name;
+  }
   // What lies between two moments is no observation of either, and nothing to start the next frame from.
   void refuse_combed(const cv::Mat& image_bgr) {
     const ImageView image(image_bgr);
@@ -98,11 +101,21 @@ const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr) & {
     state_->observe(image_bgr);
     state_->refuse_combed(image_bgr);
   }
+  state_->name_observations();
   return state_->observations;
 }
 
 std::vector<Observation> Tracker::track(const cv::Mat& image_bgr) && {
   return track(image_bgr);  // the overload above: *this is an lvalue here
+}
+
+const std::vector<Observation>& Tracker::refuse(Status why) & {
+  reset();
+  Observation refused;
+  refused.status = why;
+  state_->observations.assign(state_->rig.instruments.size(), refused);
+  state_->name_observations();
+  return state_->observations;
 }
 
 void Tracker::reset() {

@@ -40,6 +40,10 @@ class Tracker {
   /// Of a tracker that is gone after the expression, as in `Tracker(rig).track(image)`: by value.
   std::vector<Observation> track(const cv::Mat& image_bgr) &&;
 
+  /// Of a frame whose pixels are not the camera's, as a damaged one's: one observation per instrument, of this status.
+  /// Forgets the frame before.
+  const std::vector<Observation>& refuse(Status why) &;
+
   /// Forgets the frame before: the next one is searched anew.
   void reset();
 

@@ -1,6 +1,7 @@
 #include "lapservo/vision/tracker.h"
 
 #include <cmath>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -30,6 +31,16 @@ TEST(Tracker, LendsTheSameObservationsFrameByFrame) {
   Tracker tracker(shot.rig);
   const Observation* const first = tracker.track(shot.bgr).data();
   EXPECT_EQ(tracker.track(shot.bgr).data(), first);
+}
+
+TEST(Tracker, NamesTheInstrumentWhateverBecomesOfIt) {
+  const auto& shot = usual_shot(1);
+  Tracker tracker(shot.rig);
+  const std::string& name = shot.rig.instruments[0].name;
+  EXPECT_EQ(tracker.track(shot.bgr)[0].instrument, name);
+  EXPECT_EQ(tracker.track(cv::Mat::zeros(shot.bgr.size(), CV_8UC3))[0].instrument, name);
+  EXPECT_EQ(tracker.refuse(Status::damaged)[0].instrument, name);
+  EXPECT_EQ(tracker.refuse(Status::damaged)[0].status, Status::damaged);
 }
 
 }  // namespace

@@ -1,0 +1,415 @@
+// The closed loop through ROS 2's wire: `lapservo servo` as a process of its own steers an arm in another process or in
+// this one, over loopback. What is asserted goes by the stamps that messages carry and by counts, not by how fast this
+// computer is; waits end early.
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdlib>
+#include <fcntl.h>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <sys/wait.h>
+#include <thread>
+#include <unistd.h>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "lapservo/control/paper_trajectory.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/rig/rig_writer.h"
+#include "lapservo/sim_robot/sim_robot.h"
+#include "lapservo/testing/rigs.h"
+#include "lapservo/testing/temporary_folder.h"
+#include "transports/ros2/ros2_transport.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double patience_s = 60, allowed_s = 0.1;  // for anything to happen; from a fault to the last set-point
+const JointLimits limits;                           // the controller's, which the command line was not told otherwise
+const double rest_s = (limits.rate.cwiseQuotient(limits.acceleration)).maxCoeff();
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+void sleep(double duration_s) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(duration_s));
+}
+
+bool wait_for(const std::function<bool()>& condition) {
+  for (const double end_s = now_s() + patience_s; now_s() < end_s && !condition();) sleep(0.01);
+  return condition();
+}
+
+// The tool with these arguments, its output in a file; killed with the object.
+class Process {
+ public:
+  Process(const std::vector<std::string>& arguments, const std::string& output) {
+    std::vector<char*> argv{const_cast<char*>(LAPSERVO_TOOL)};
+    for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
+    argv.push_back(nullptr);
+    id_ = ::fork();
+    if (id_ != 0) return;
+    const int file = ::open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    ::dup2(file, 1);
+    ::dup2(file, 2);
+    ::execv(LAPSERVO_TOOL, argv.data());
+    ::_exit(127);
+  }
+  ~Process() {
+    if (running()) signal(SIGKILL), wait();
+  }
+  Process(const Process&) = delete;
+  Process& operator=(const Process&) = delete;
+
+  void signal(int number) const { ::kill(id_, number); }
+  bool running() { return !exit_code_ && ::waitpid(id_, &status_, WNOHANG) == 0; }
+  /// Its exit code; -1 after a signal.
+  int wait() {
+    if (!exit_code_) {
+      ::waitpid(id_, &status_, 0);
+      exit_code_ = WIFEXITED(status_) ? WEXITSTATUS(status_) : -1;
+    }
+    return *exit_code_;
+  }
+
+ private:
+  pid_t id_ = 0;
+  int status_ = 0;
+  std::optional<int> exit_code_;
+};
+
+// What everybody on the arm's topics can hear of servo_jp.
+class Spy {
+ public:
+  explicit Spy(Transport& transport)
+      : subscription_(transport.subscribe_joints("/PSM1/servo_jp", [this](JointMessage&& message) {
+          const std::lock_guard lock(mutex_);
+          heard_.push_back(
+              {message.stamp_s, q_from_joints(default_joints(), Eigen::Vector4d(message.positions.data()))});
+        })) {}
+
+  struct SetPoint {
+    double stamp_s = 0;
+    Eigen::Vector4d q = Eigen::Vector4d::Zero();
+  };
+  std::vector<SetPoint> heard() {
+    const std::lock_guard lock(mutex_);
+    return heard_;
+  }
+  std::size_t count() { return heard().size(); }
+  double last_s() {
+    const auto all = heard();
+    return all.empty() ? 0 : all.back().stamp_s;
+  }
+  // Whether they change: not at rest.
+  bool moves_after(double stamp_s) {
+    Eigen::Vector4d first = Eigen::Vector4d::Constant(NAN);
+    for (const SetPoint& set_point : heard()) {
+      if (set_point.stamp_s <= stamp_s) continue;
+      if (first.hasNaN()) first = set_point.q;
+      if ((set_point.q - first).cwiseAbs().maxCoeff() > 1e-9) return true;
+    }
+    return false;
+  }
+  // Of messages of one sender: no step is farther than the rate limit over the time between the two, or over a tick.
+  void expect_no_jump() {
+    constexpr double tick_s = 1.0 / 500;
+    const auto all = heard();
+    for (std::size_t i = 1; i < all.size(); ++i) {
+      const double passed_s = std::max(all[i].stamp_s - all[i - 1].stamp_s, tick_s) + 1e-3;
+      const Eigen::Array4d step = (all[i].q - all[i - 1].q).cwiseAbs();
+      EXPECT_TRUE((step <= limits.rate.array() * passed_s).all()) << i << ": " << step.transpose();
+    }
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<SetPoint> heard_;
+  Transport::Subscription subscription_;
+};
+
+// Section V-D as the half-size camera sees it, and that camera's rig.
+class Ros2Loop : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    ::setenv("ROS_LOCALHOST_ONLY", "1", 1);
+    if (!std::getenv("ROS_DOMAIN_ID")) ::setenv("ROS_DOMAIN_ID", "88", 1);
+  }
+  void SetUp() override {
+    rig_ = testing::small_test_rig();
+    testing::write_file(folder_ / "rig.yaml", rig_yaml(rig_));
+    Sinusoids f = paper_sinusoids();
+    f.offset.tail<3>() /= 2;
+    f.amplitude.tail<3>() /= 2;
+    const Trajectory trajectory = sinusoids(f);
+    std::string csv = "time_s,s_rad,r_px,l_px,d_px\n";
+    for (int k = 0; k < 9000; ++k) {
+      const Eigen::Vector4d d = trajectory.at(k * 0.02).features;
+      csv += fmt::format("{},{},{},{},{}\n", k * 0.02, d[0], d[1], d[2], d[3]);
+    }
+    testing::write_file(folder_ / "v-d.csv", csv);
+  }
+  std::string file(const std::string& name) const { return (folder_ / name).string(); }
+  std::string said(const std::string& name) const { return testing::read_file(folder_ / name); }
+
+  std::unique_ptr<Process> servo(double duration_s, const std::string& output = "servo.txt", bool motion = true) const {
+    std::vector<std::string> arguments{"servo",
+                                       "--rig",
+                                       file("rig.yaml"),
+                                       "--trajectory",
+                                       file("v-d.csv"),
+                                       "--robot",
+                                       "ros2:PSM1",
+                                       "--camera",
+                                       "ros2:/endoscope/image_raw",
+                                       "--fps",
+                                       "30",
+                                       "--duration",
+                                       fmt::format("{}", duration_s)};
+    if (motion) arguments.push_back("--enable-motion");
+    return std::make_unique<Process>(arguments, file(output));
+  }
+  std::unique_ptr<Process> arm() const {
+    return std::make_unique<Process>(
+        std::vector<std::string>{"sim-robot", "--rig", file("rig.yaml"), "--start", "0.05,1.57,0.064,1.2"},
+        file("arm.txt"));
+  }
+  // From what servo says in its last lines.
+  double converged_s(const std::string& output) const {
+    const std::string text = said(output), before = "within 1 px and 5 mrad from ";
+    const std::size_t at = text.find(before);
+    return at == std::string::npos ? 1e9 : std::atof(text.c_str() + at + before.size());
+  }
+
+  Rig rig_;
+  testing::TemporaryFolder folder_;
+};
+
+// An arm in this process, that can be made to misbehave.
+class Arm {
+ public:
+  explicit Arm(const Rig& rig)
+      : transport_("arm"),
+        simulator_(rig, simulated(), {0.05, 1.57, 0.064, 1.2}),
+        robot_(transport_, rig, simulator_, config()) {
+    thread_ = std::thread([this] {
+      const double begin_s = now_s();
+      double paused_s = 0;
+      while (!ended_) {
+        sleep(0.001);
+        if (silent) {
+          paused_s = now_s() - begin_s - simulator_.now_s();
+        } else {
+          robot_.advance(now_s() - begin_s - paused_s);
+        }
+      }
+    });
+  }
+  ~Arm() {
+    ended_ = true;
+    thread_.join();
+  }
+  Arm(const Arm&) = delete;
+  Arm& operator=(const Arm&) = delete;
+
+  SimRobot& robot() { return robot_; }
+  Transport& transport() { return transport_; }
+
+  std::atomic<bool> silent = false, nan = false, frozen = false;
+
+ private:
+  static SimulatorConfig simulated() {
+    SimulatorConfig config;
+    config.endoscope.frame_rate_hz = 30;
+    config.endoscope.real_time = true;
+    return config;
+  }
+  SimRobotConfig config() {
+    SimRobotConfig config;
+    config.alter_measured = [this](JointMessage& message) {
+      if (nan) message.positions[1] = NAN;
+    };
+    config.alter_image = [this](ImageMessage& message) {
+      if (frozen) message.stamp_s = last_stamp_s_;
+      last_stamp_s_ = message.stamp_s;
+    };
+    return config;
+  }
+
+  Ros2Transport transport_;
+  Simulator simulator_;
+  double last_stamp_s_ = 0;
+  SimRobot robot_;
+  std::atomic<bool> ended_ = false;
+  std::thread thread_;
+};
+
+TEST_F(Ros2Loop, TwoProcessesConverge) {
+  const auto room = arm();
+  const auto loop = servo(8);
+  EXPECT_EQ(loop->wait(), 0) << said("servo.txt") << said("arm.txt");
+  EXPECT_LE(converged_s("servo.txt"), 5) << said("servo.txt");
+}
+
+TEST_F(Ros2Loop, ObservesOnlyWithoutEnableMotion) {
+  Arm room(rig_);
+  Ros2Transport ears("ears");
+  Spy spy(ears);
+  const auto loop = servo(3, "servo.txt", false);
+  loop->wait();
+  EXPECT_EQ(spy.count(), 0u);
+  EXPECT_NE(said("servo.txt").find("would send outer_yaw "), std::string::npos) << said("servo.txt");
+}
+
+struct Fault {
+  const char* name;
+  std::function<void(Arm&)> begin, end;
+  const char* said;
+  bool silent;  // no set-point is sent any more; else they come to rest
+};
+
+TEST_F(Ros2Loop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
+  const std::vector<Fault> faults{
+      {"NaN", [](Arm& a) { a.nan = true; }, [](Arm& a) { a.nan = false; }, "non_finite_joints", true},
+      {"PAUSED", [](Arm& a) { a.robot().set_state(OperatingState::paused); },
+       [](Arm& a) { a.robot().set_state(OperatingState::enabled); }, "the arm is PAUSED", true},
+      {"FAULT", [](Arm& a) { a.robot().set_state(OperatingState::fault); },
+       [](Arm& a) { a.robot().set_state(OperatingState::enabled); }, "the arm is FAULT", true},
+      {"silence", [](Arm& a) { a.silent = true; }, [](Arm& a) { a.silent = false; }, "old_joint_states", true},
+      {"repeated stamps", [](Arm& a) { a.frozen = true; }, [](Arm& a) { a.frozen = false; }, "stale_image", false},
+  };
+  Arm room(rig_);
+  Ros2Transport ears("ears");
+  Spy spy(ears);
+  const auto loop = servo(600);
+  for (const Fault& fault : faults) {
+    SCOPED_TRACE(fault.name);
+    const std::size_t before = spy.count();
+    ASSERT_TRUE(wait_for([&] { return spy.count() > before + 500; })) << said("servo.txt");
+    const double fault_s = now_s();
+    fault.begin(room);
+    ASSERT_TRUE(wait_for([&] { return said("servo.txt").find(fault.said) != std::string::npos; })) << said("servo.txt");
+    sleep(1);
+    if (fault.silent) {
+      EXPECT_LE(spy.last_s(), fault_s + allowed_s);
+    } else {
+      // The loop's period and the age of what it sees come on top of the limit, and braking.
+      EXPECT_FALSE(spy.moves_after(fault_s + allowed_s + 2.0 / 30 + rest_s));
+    }
+    const std::size_t held = spy.count();
+    fault.end(room);
+    ASSERT_TRUE(wait_for([&] { return spy.count() > held + 100; })) << said("servo.txt");
+  }
+  spy.expect_no_jump();
+  EXPECT_EQ(room.robot().statistics().malformed, 0);
+  EXPECT_EQ(room.robot().statistics().wrist_moved, 0);
+  loop->signal(SIGINT);
+  loop->wait();
+}
+
+TEST_F(Ros2Loop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
+  Arm room(rig_);
+  Ros2Transport ears("ears"), foreign("foreign");
+  const auto say = foreign.joint_publisher("/PSM1/servo_jp");
+  const auto loop = servo(600);
+  Spy spy(ears);
+  ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+  const double first_s = now_s();
+  const Eigen::Vector4d elsewhere(0.1, 0, 0.1, 0.5);
+  EXPECT_TRUE(wait_for([&] {
+    say({now_s(), {}, {elsewhere[0], elsewhere[1], elsewhere[2], elsewhere[3], 0.1, -0.2}});
+    return !loop->running();
+  }));
+  EXPECT_EQ(loop->wait(), 1) << said("servo.txt");
+  EXPECT_NE(said("servo.txt").find("foreign_command"), std::string::npos) << said("servo.txt");
+  double last_s = 0;
+  for (const Spy::SetPoint& set_point : spy.heard())
+    if (!set_point.q.isApprox(q_from_joints(default_joints(), elsewhere), 1e-9)) last_s = set_point.stamp_s;
+  EXPECT_GT(last_s, 0);
+  EXPECT_LE(last_s, first_s + allowed_s);
+}
+
+TEST_F(Ros2Loop, StopsAndStartsAndTakesASetPointByTopic) {
+  Arm room(rig_);
+  Ros2Transport ears("ears");
+  Spy spy(ears);
+  const auto command = ears.string_publisher("/lapservo/PSM1/command");
+  const auto wish = ears.joint_publisher("/lapservo/PSM1/set_point");
+  const auto loop = servo(600);
+  ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+  command({now_s(), "stop"});
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("hold: held") != std::string::npos; })) << said("servo.txt");
+  sleep(rest_s + 0.2);
+  const double rested_s = now_s();
+  sleep(0.5);
+  EXPECT_FALSE(spy.moves_after(rested_s));
+  command({now_s(), "start"});
+  ASSERT_TRUE(wait_for([&] { return spy.moves_after(rested_s); })) << said("servo.txt");
+  const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
+  const Eigen::Vector4d there = paper_sinusoids().offset;
+  wish({now_s(), names, {there[0], 1e6, 200, 100}});
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("refused: set_point") != std::string::npos; }))
+      << said("servo.txt");
+  wish({now_s(), names, {there[0], there[1] / 2, there[2] / 2, there[3] / 2}});
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("a set-point came") != std::string::npos; }))
+      << said("servo.txt");
+  sleep(4);
+  loop->signal(SIGINT);
+  loop->wait();
+  const auto heard = spy.heard();
+  EXPECT_LT((heard.back().q - heard[heard.size() - 300].q).cwiseAbs().maxCoeff(), 2e-3);  // it rests there
+  spy.expect_no_jump();
+}
+
+TEST_F(Ros2Loop, SurvivesWhenEitherSideIsKilledOrStopped) {
+  Ros2Transport ears("ears");
+  Spy spy(ears);
+  auto room = arm();
+  auto loop = servo(600);
+  ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+  double fault_s = now_s();
+  room->signal(SIGSTOP);  // as a network that pauses
+  sleep(1);
+  EXPECT_LE(spy.last_s(), fault_s + allowed_s);
+  room->signal(SIGCONT);
+  std::size_t count = spy.count();
+  ASSERT_TRUE(wait_for([&] { return spy.count() > count + 300; })) << said("servo.txt");
+  fault_s = now_s();
+  room->signal(SIGKILL);
+  room->wait();
+  sleep(0.5);
+  EXPECT_LE(spy.last_s(), fault_s + allowed_s);
+  room = arm();
+  count = spy.count();
+  ASSERT_TRUE(wait_for([&] { return spy.count() > count + 300; })) << said("servo.txt");
+  loop->signal(SIGKILL);
+  loop->wait();
+  const auto again = servo(8, "again.txt");
+  EXPECT_EQ(again->wait(), 0) << said("again.txt");
+}
+
+TEST_F(Ros2Loop, InterruptedItBringsTheArmToRestAndSaysWhatItCameTo) {
+  Arm room(rig_);
+  Ros2Transport ears("ears");
+  Spy spy(ears);
+  const auto loop = servo(600);
+  ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+  loop->signal(SIGINT);
+  loop->wait();
+  const auto heard = spy.heard();
+  EXPECT_LT((heard.back().q - heard[heard.size() - 5].q).cwiseAbs().maxCoeff(), 1e-9);
+  spy.expect_no_jump();
+  EXPECT_NE(said("servo.txt").find("set-points: "), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,222 @@
+#include "apps/lapservo/servo_arm.h"
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/servo_output.h"
+#include "apps/lapservo/transports.h"
+#include "lapservo/control/trajectory_check.h"
+#include "lapservo/core/error.h"
+#include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/image_receiver.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/loop_topics/loop_topics.h"
+#include "lapservo/robot/steady_clock.h"
+#include "lapservo/servo/image_features.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+constexpr double wait_s = 15;  // for the arm and the camera to be heard
+
+void say(double time_s, const std::string& what) {
+  std::printf("%.2f s  %s\n", time_s, what.c_str());
+  std::fflush(stdout);
+}
+
+std::string list_of(const Joints& joints, const Eigen::Vector4d& q) {
+  const Eigen::Vector4d positions = joints_from_q(joints, q);
+  std::string text;
+  for (int i = 0; i < 4; ++i) text += fmt::format("{}{} {:.4f}", i ? ", " : "", joints.names[i], positions[i]);
+  return text;
+}
+
+Transport::Subscription subscribe(Transport& transport, const std::string& topic, ImageReceiver& images,
+                                  const Clock& clock) {
+  constexpr std::string_view ending = "/compressed";
+  if (topic.size() > ending.size() && topic.compare(topic.size() - ending.size(), ending.size(), ending) == 0)
+    return transport.subscribe_compressed_images(
+        topic, [&](CompressedImageMessage&& message) { images.receive(std::move(message), clock.now_s()); });
+  return transport.subscribe_images(topic,
+                                    [&](ImageMessage&& message) { images.receive(std::move(message), clock.now_s()); });
+}
+
+// The trajectory, until somebody wants a set-point instead. All in the loop's thread.
+class Goal {
+ public:
+  explicit Goal(Trajectory trajectory) : trajectory_(std::make_shared<Trajectory>(std::move(trajectory))) {}
+  Trajectory trajectory() const {
+    return {0, [current = trajectory_](double time_s) { return current->at(time_s); }};
+  }
+  void replace(Trajectory trajectory) { *trajectory_ = std::move(trajectory); }
+
+ private:
+  std::shared_ptr<Trajectory> trajectory_;
+};
+
+// What changes is said once, in one line; what somebody else does to the arm ends the run.
+class ArmWatcher : public RunObserver {
+ public:
+  ArmWatcher(const ServoOptions& options, const RunConfig& run, CrtkRobot& robot, const ImageReceiver& images,
+             LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view)
+      : options_(options),
+        run_(run),
+        robot_(robot),
+        images_(images),
+        topics_(topics),
+        goal_(goal),
+        folder_(folder),
+        view_(view) {}
+
+  bool on_tick(const ControlTick& tick) override {
+    if (!start_s_) start_s_ = tick.input.time_s;
+    const double time_s = tick.input.time_s - *start_s_;
+    summary_.add(tick, std::nullopt);
+    if (folder_) folder_->log().add(tick.input, tick.decision, std::nullopt);
+    const Blocked blocked = robot_.blocked();
+    say_state(time_s, tick.decision.control, blocked);
+    say_images(time_s);
+    topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
+    grant(topics_.wishes(), tick, time_s);
+    if (!options_.enable_motion) say_what_would_be_sent(time_s);
+    if (blocked == Blocked::foreign_command) return false;
+    return !interrupted() && (!view_ || show(*view_, tick, run_.rig));
+  }
+  const Summary& summary() const { return summary_; }
+
+ private:
+  void say_state(double time_s, const ControlStep& control, Blocked blocked) {
+    std::string state(to_string(control.action));
+    if (blocked == Blocked::not_enabled) {
+      state = "hold: the arm is " + robot_.operating_state();
+    } else if (blocked == Blocked::foreign_command) {
+      state = "end: somebody else sends set-points to the arm (foreign_command)";
+    } else if (blocked != Blocked::none) {
+      state = "hold: " + std::string(to_string(blocked));
+    } else if (control.reason != HoldReason::none) {
+      state += ": " + std::string(to_string(control.reason));
+    }
+    if (state == state_) return;
+    state_ = state;
+    say(time_s, state);
+  }
+  void grant(const LoopWishes& wishes, const ControlTick& tick, double time_s) {
+    if (wishes.hold) robot_.hold(*wishes.hold);
+    if (!wishes.set_point) return;
+    const Trajectory wanted = set_point(*wishes.set_point);
+    try {
+      if (run_.rig.instruments.front().camera_from_rcm)
+        refuse_infeasible(wanted, 1, feature_model(run_.rig), run_.controller, tick.input.joints.q, "set_point");
+      goal_.replace(wanted);
+      say(time_s, "a set-point came");
+    } catch (const InputError& error) {
+      say(time_s, std::string("refused: ") + error.what());
+    }
+  }
+  void say_images(double time_s) {
+    const std::string counts = images_.counts().text();
+    if (counts == said_counts_ || time_s < next_counts_s_) return;
+    said_counts_ = counts;
+    next_counts_s_ = time_s + 1;
+    say(time_s, "images: " + counts + (images_.complaint().empty() ? "" : " (last: " + images_.complaint() + ")"));
+  }
+  void say_what_would_be_sent(double time_s) {
+    const auto set_point = robot_.set_point();
+    if (!set_point || time_s < next_set_point_s_) return;
+    next_set_point_s_ = time_s + 1;
+    say(time_s, "would send " + list_of(*run_.rig.instruments.front().joints, *set_point) + " (--enable-motion does)");
+  }
+
+  const ServoOptions& options_;
+  const RunConfig& run_;
+  CrtkRobot& robot_;
+  const ImageReceiver& images_;
+  LoopTopics& topics_;
+  Goal& goal_;
+  RunFolder* folder_;
+  LiveView* view_;
+  Summary summary_;
+  std::optional<double> start_s_;
+  double next_counts_s_ = 0, next_set_point_s_ = 0;
+  std::string state_, said_counts_;
+};
+
+// Where the arm is, once it says so.
+std::optional<JointVector> wait_for(CrtkRobot& robot) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
+  while (!interrupted() && std::chrono::steady_clock::now() < end) {
+    if (robot.counts().joint_states > 0 && robot.blocked() != Blocked::no_joint_states) return robot.state().q;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return std::nullopt;
+}
+
+InterlockConfig interlock_of(const ServoOptions& options, const RunConfig& config) {
+  InterlockConfig interlock;
+  interlock.joints = joints_of(options, config.rig);
+  interlock.limits = config.controller.limits;
+  interlock.motion_enabled = options.enable_motion;
+  return interlock;
+}
+
+void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
+  std::printf("%ld joint states; set-points: %ld sent, %ld withheld; dropped: %ld malformed, %ld repeated, %ld late, ",
+              arm.joint_states, arm.set_points, arm.withheld, arm.malformed, arm.repeated, arm.late);
+  std::printf("%ld after a jump of the clock, %ld without a stamp\n", arm.jumped, arm.unstamped);
+  std::printf("%ld images%s%s\n", images.taken, images.text().empty() ? "" : "; ", images.text().c_str());
+}
+
+}  // namespace
+
+int steer_arm(const ServoOptions& options) {
+  const Address arm = address_of(options.robot, "--robot"), camera = address_of(options.camera, "--camera");
+  if (camera.transport != arm.transport)
+    throw InputError("--camera", "is " + options.camera + ", expected " + arm.transport + ":/topic as for --robot");
+  RunConfig config = run_config_of(options);
+  const Rig rig = config.rig;
+  const InterlockConfig interlock = interlock_of(options, config);
+  if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
+  config.tracking_thread = TrackingThread::own;
+  const Trajectory trajectory = trajectory_of(options);
+  std::optional<LiveView> view;
+  if (options.view) view.emplace("servo", "use --out to write a log instead");
+
+  const auto transport = make_transport(arm.transport, "lapservo", "--robot");
+  SteadyClock clock;
+  ImageReceiver images(rig.camera.width_px, rig.camera.height_px);
+  const auto subscription = subscribe(*transport, camera.name, images, clock);
+  CrtkRobot robot(*transport, arm.name, interlock, clock);
+  watch_for_interrupts();
+  const auto start = wait_for(robot);
+  if (!start) {
+    std::fprintf(stderr, "lapservo: %s: no measured_js with the rig's joints within %.0f s\n", options.robot.c_str(),
+                 wait_s);
+    return 1;
+  }
+  if (config.rig.instruments.front().camera_from_rcm)
+    refuse_infeasible(trajectory, options.duration_s, feature_model(config.rig), config.controller, *start,
+                      trajectory_name(options));
+  std::optional<RunFolder> folder;
+  if (!options.out.empty()) folder.emplace(options, rig, config.controller);
+
+  LoopTopics topics(*transport, rig, "endoscope");
+  Goal goal(trajectory);
+  ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr,
+                     view ? &*view : nullptr);
+  lapservo::run(robot, images, clock, config, goal.trajectory(), options.duration_s, watcher);
+  say_counts(robot.counts(), images.counts());
+  std::printf("%s\n", watcher.summary().text().c_str());
+  if (folder) folder->commit();
+  const bool ended_early = robot.blocked() == Blocked::foreign_command;
+  return watcher.summary().converged() && !ended_early ? 0 : 1;
+}
+
+}  // namespace lapservo::app

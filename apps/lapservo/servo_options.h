@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/trajectory.h"
+#include "lapservo/servo/run.h"
+
+namespace lapservo::app {
+
+/// What `lapservo servo` was asked for.
+struct ServoOptions {
+  std::string rig, robot, camera, joint_limits, trajectory = "paper", method = "default", tracker, controller,
+                                                delay = "estimate", out, replay;
+  std::vector<double> set_point, via, start, rcm_px, hide;
+  double duration_s = 20, latency_ms = 80, fps = 60;
+  std::uint64_t seed = 1;
+  bool view = false, force = false, enable_motion = false;
+};
+
+Eigen::Vector4d four(const std::vector<double>& values);
+
+/// Before it is made to forget anything.
+RunConfig run_config_of(const ServoOptions& options);
+/// The uncalibrated mode gets to know no more of the RCM than its image.
+void forget_registration(RunConfig& run, const ServoOptions& options);
+/// The rig's `joints` entry. Throws InputError when there is none.
+const Joints& joints_of(const ServoOptions& options, const Rig& rig);
+
+Trajectory trajectory_of(const ServoOptions& options);
+/// What the trajectory is called in complaints.
+std::string trajectory_name(const ServoOptions& options);
+
+}  // namespace lapservo::app

@@ -1,0 +1,82 @@
+#include "apps/lapservo/servo_output.h"
+
+#include <cstdint>
+#include <limits>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/control/tracking_law.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/io/overlay.h"
+#include "lapservo/servo/controller_file.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+std::uintmax_t needed_bytes(const ServoOptions& options) {
+  constexpr std::uintmax_t bytes_a_tick = 2000;
+  return bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20);
+}
+
+InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
+  InputFiles inputs;
+  inputs.add_rig(options.rig, rig);
+  inputs.add(options.controller);
+  inputs.add(options.trajectory);
+  inputs.add(options.joint_limits);
+  return inputs;
+}
+
+}  // namespace
+
+RunFolder::RunFolder(const ServoOptions& options, const Rig& rig, const ControllerConfig& controller)
+    : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(options)),
+      log_(folder_ / "log.csv") {
+  write_file(folder_ / "controller.yaml", controller_yaml(controller));
+}
+
+void RunFolder::commit() {
+  log_.commit();
+  folder_.commit();
+}
+
+void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {
+  const ControlStep& control = tick.decision.control;
+  ++ticks_;
+  if (control.action == ControlAction::hold) ++held_[std::string(to_string(control.reason))];
+  Eigen::Vector4d error = control.error;
+  if (truth && truth->features) {
+    error = feature_error(*truth->features, tick.input.desired.features);
+  } else if (!truth && !control.estimate) {
+    if (converged()) return;
+    error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
+  }
+  if (!start_s_) start_s_ = tick.input.time_s;
+  convergence_.add(tick.input.time_s - *start_s_, error);
+}
+
+std::string Summary::text() const {
+  std::string text = "not within 1 px and 5 mrad for a second";
+  if (const auto reached_s = convergence_.reached_s()) {
+    const Eigen::Vector4d rms = convergence_.rms_since();
+    text = fmt::format(
+        "within 1 px and 5 mrad from {:.2f} s on; rms since: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px",
+        *reached_s, 1000 * rms[0], rms[1], rms[2], rms[3]);
+  }
+  for (const auto& [reason, count] : held_) text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
+  return text;
+}
+
+bool show(LiveView& view, const ControlTick& tick, const Rig& rig) {
+  if (!tick.seen) return true;
+  const ControlStep& control = tick.decision.control;
+  cv::Mat picture = draw_overlay(tick.seen->image.bgr, rig, tick.seen->observations);
+  const std::string label = fmt::format("{:.2f} s  {} {}", tick.input.time_s, to_string(control.action),
+                                        control.reason == HoldReason::none ? "" : to_string(control.reason));
+  cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
+  return view.show(picture);
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "apps/lapservo/live_view.h"
+#include "apps/lapservo/output_folder.h"
+#include "apps/lapservo/servo_options.h"
+#include "lapservo/servo/convergence.h"
+#include "lapservo/servo/servo_log.h"
+
+namespace lapservo::app {
+
+/// A run's log.csv, rig.yaml and controller.yaml.
+class RunFolder {
+ public:
+  /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
+  RunFolder(const ServoOptions& options, const Rig& rig, const ControllerConfig& controller);
+  ServoLog& log() { return log_; }
+  void commit();
+
+ private:
+  OutputFolder folder_;
+  ServoLog log_;
+};
+
+/// What the run came to, for the last lines.
+class Summary {
+ public:
+  /// By the truth, where it is known, else by the estimate.
+  void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
+  bool converged() const { return convergence_.reached_s().has_value(); }
+  std::string text() const;
+
+ private:
+  std::optional<double> start_s_;
+  long ticks_ = 0;
+  std::map<std::string, long> held_;
+  Convergence convergence_;
+};
+
+/// The image of a tick, if it has one, with what was seen and decided. False when the window was closed.
+bool show(LiveView& view, const ControlTick& tick, const Rig& rig);
+
+}  // namespace lapservo::app

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "lapservo/crtk/transport.h"
+
+namespace lapservo::app {
+
+/// "ros2" and "PSM1" of "ros2:PSM1".
+struct Address {
+  std::string transport, name;
+};
+/// Throws InputError, naming `option`, for what has no such form.
+Address address_of(const std::string& text, const std::string& option);
+
+/// Throws InputError for one that is unknown or that this build lacks.
+std::unique_ptr<internal::Transport> make_transport(const std::string& transport, const std::string& node_name,
+                                                    const std::string& option);
+
+}  // namespace lapservo::app

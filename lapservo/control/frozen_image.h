@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "lapservo/control/controller_config.h"
+#include "lapservo/control/image_measurement.h"
+#include "lapservo/control/joint_history.h"
+
+namespace lapservo::internal {
+
+/// Tells a picture that is shown again under a new stamp from one of an instrument that stands still: its features are
+/// the same to a small part of what noise makes of them, while the measured joints moved between the exposures, however
+/// long the delay is. So a camera without noise before an arm at rest, or one that just starts, is not taken for
+/// frozen, nor a joint that crosses its backlash.
+class FrozenImage {
+ public:
+  explicit FrozenImage(const Scales& scales) : scales_(scales) {}
+
+  /// A found image and the measured joints so far. True: it is the picture before.
+  bool add(const ImageMeasurement& image, const JointHistory& history);
+
+ private:
+  bool same_features(const Eigen::Vector4d& features) const;
+
+  Scales scales_;
+  std::optional<ImageMeasurement> first_;  // of those that are the same
+};
+
+}  // namespace lapservo::internal

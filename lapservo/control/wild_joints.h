@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace lapservo::internal {
+
+/// Tells measured joints that no arm can have come to since the last ones: a bit that fell over, an encoder that was
+/// set. What only flashes up is passed over; where the joints stay for three measured joints, they are.
+class WildJoints {
+ public:
+  /// `rate`: the joints' largest wanted speeds; three times as fast is believed.
+  explicit WildJoints(const Eigen::Vector4d& rate) : rate_(rate) {}
+
+  enum class Verdict {
+    plausible,
+    wild,
+    jumped,  ///< they have stayed where they seemed wild: what was measured before belongs to another place
+  };
+  /// Times that increase, finite joints.
+  Verdict validate(double time_s, const Eigen::Vector4d& q);
+
+ private:
+  struct Reading {
+    double time_s = 0;
+    Eigen::Vector4d q = Eigen::Vector4d::Zero();
+  };
+  bool reachable(const Reading& from, const Reading& to) const;
+
+  Eigen::Vector4d rate_;
+  Reading believed_, latest_;
+  bool started_ = false;
+  int staying_ = 0;  // measured joints in a row that agree with each other and not with what is believed
+};
+
+}  // namespace lapservo::internal

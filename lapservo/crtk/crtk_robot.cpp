@@ -1,0 +1,102 @@
+#include "lapservo/crtk/crtk_robot.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace lapservo::internal {
+
+std::string topic_of(const std::string& arm, const std::string& name) {
+  return (arm.rfind('/', 0) == 0 ? "" : "/") + arm + "/" + name;
+}
+
+CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const InterlockConfig& config, const Clock& clock)
+    : clock_(clock), period_s_(config.period_s), arm_(arm), transport_(transport), interlock_(config) {
+  // Who only observes is no publisher either: others may watch for those.
+  if (config.motion_enabled) servo_jp_ = transport.joint_publisher(topic_of(arm, "servo_jp"));
+  const auto joints = [&](const char* topic, void (Interlock::*tell)(const JointMessage&, double)) {
+    subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, topic), [this, tell](JointMessage&& message) {
+      const double arrival_s = clock_.now_s();
+      const std::lock_guard lock(mutex_);
+      (interlock_.*tell)(message, arrival_s);
+    }));
+  };
+  joints("measured_js", &Interlock::on_measured);
+  joints("setpoint_js", &Interlock::on_setpoint);
+  subscriptions_.push_back(
+      transport.subscribe_operating_state(topic_of(arm, "operating_state"), [this](OperatingStateMessage&& message) {
+        const std::lock_guard lock(mutex_);
+        interlock_.on_operating_state(message);
+      }));
+  subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, "servo_jp"), [this](JointMessage&&) {
+    const std::lock_guard lock(mutex_);
+    interlock_.on_foreign_command();
+  }));
+  thread_ = std::thread([this] { command(); });
+}
+
+CrtkRobot::~CrtkRobot() {
+  ended_ = true;
+  thread_.join();
+  subscriptions_.clear();
+}
+
+JointState CrtkRobot::state() {
+  const std::lock_guard lock(mutex_);
+  return interlock_.state(clock_.now_s());
+}
+
+void CrtkRobot::send(const JointPath& path) {
+  const std::lock_guard lock(mutex_);
+  interlock_.follow(path);
+}
+
+void CrtkRobot::hold(bool on) {
+  const std::lock_guard lock(mutex_);
+  interlock_.hold(on);
+}
+
+Blocked CrtkRobot::blocked() const {
+  const std::lock_guard lock(mutex_);
+  return interlock_.blocked(clock_.now_s());
+}
+
+InterlockCounts CrtkRobot::counts() const {
+  const std::lock_guard lock(mutex_);
+  return interlock_.counts();
+}
+
+std::string CrtkRobot::operating_state() const {
+  const std::lock_guard lock(mutex_);
+  return interlock_.operating_state();
+}
+
+std::optional<Eigen::Vector4d> CrtkRobot::set_point() const {
+  const std::lock_guard lock(mutex_);
+  return interlock_.set_point();
+}
+
+void CrtkRobot::command() {
+  const auto period =
+      std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s_));
+  auto next = std::chrono::steady_clock::now();
+  while (!ended_) {
+    JointMessage message;
+    {
+      const std::lock_guard lock(mutex_);
+      if (auto positions = interlock_.tick(clock_.now_s())) {
+        message.names = interlock_.names();
+        message.positions = std::move(*positions);
+      }
+    }
+    if (!message.positions.empty()) {
+      message.stamp_s = transport_.stamp_now_s();
+      servo_jp_(message);
+    }
+    // What was missed is not made up for: set-points in a burst would pass the rate limit.
+    next = std::max(next + period, std::chrono::steady_clock::now());
+    std::this_thread::sleep_until(next);
+  }
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <atomic>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "lapservo/crtk/interlock.h"
+#include "lapservo/crtk/transport.h"
+#include "lapservo/robot/clock.h"
+#include "lapservo/robot/robot.h"
+
+namespace lapservo::internal {
+
+/// A CRTK arm behind a transport: measured_js, setpoint_js and operating_state come in, servo_jp goes out in a thread
+/// of its own, as the interlock allows. Destroyed, it sends nothing any more: the arm stays at its last set-point.
+class CrtkRobot : public Robot {
+ public:
+  /// `arm`: the arm's namespace, for example PSM1 or /dvrk/PSM1. The transport and the clock must outlive it.
+  CrtkRobot(Transport& transport, const std::string& arm, const InterlockConfig& config, const Clock& clock);
+  ~CrtkRobot() override;
+  CrtkRobot(const CrtkRobot&) = delete;
+  CrtkRobot& operator=(const CrtkRobot&) = delete;
+
+  JointState state() override;
+  void send(const JointPath& path) override;
+
+  /// See Interlock::hold().
+  void hold(bool on);
+
+  Blocked blocked() const;
+  InterlockCounts counts() const;
+  std::string operating_state() const;
+  std::optional<Eigen::Vector4d> set_point() const;
+
+ private:
+  void command();
+
+  const Clock& clock_;
+  double period_s_;
+  std::string arm_;
+  Transport& transport_;
+  mutable std::mutex mutex_;
+  Interlock interlock_;
+  Transport::Publisher<JointMessage> servo_jp_;
+  std::vector<Transport::Subscription> subscriptions_;
+  std::atomic<bool> ended_ = false;
+  std::thread thread_;  // last: it uses the others
+};
+
+/// "/PSM1/measured_js" of "PSM1" or "/PSM1" and "measured_js".
+std::string topic_of(const std::string& arm, const std::string& name);
+
+}  // namespace lapservo::internal

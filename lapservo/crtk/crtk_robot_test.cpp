@@ -1,0 +1,93 @@
+#include "lapservo/crtk/crtk_robot.h"
+
+#include <chrono>
+#include <thread>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/crtk/test_transport.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Time stands still but for what the test adds.
+class StandingClock : public Clock {
+ public:
+  double now_s() const override { return now; }
+  void sleep_until(double) override {}
+  std::atomic<double> now = 10;
+};
+
+InterlockConfig config_of(bool motion_enabled) {
+  InterlockConfig config;
+  config.joints = {{"yaw", "pitch", "insertion", "roll"}, {1, 1, 1, 1}, {}};
+  config.motion_enabled = motion_enabled;
+  return config;
+}
+
+void say_all(TestTransport& transport, double stamp_s) {
+  const JointMessage message{stamp_s, {"yaw", "pitch", "insertion", "roll", "wrist"}, {0.1, 1.5, 0.1, 0.2, 0.7}};
+  transport.say("/PSM1/measured_js", message);
+  transport.say("/PSM1/setpoint_js", message);
+  transport.say("/PSM1/operating_state", OperatingStateMessage{stamp_s, "ENABLED", true, false});
+}
+
+void send_a_path(TestTransport& transport, StandingClock& clock, CrtkRobot& robot) {
+  say_all(transport, 1000);
+  EXPECT_NE(robot.state().operating_state, OperatingState::enabled);  // once, so that the loop starts anew
+  const JointState state = robot.state();
+  EXPECT_EQ(state.operating_state, OperatingState::enabled);
+  EXPECT_EQ(state.q.psi_rad, 0.2);
+  JointPath path(JointLimits().acceleration);
+  path.reset(10, state.q.vector());
+  robot.send(path);
+  clock.now = 10.01;
+  say_all(transport, 1000.01);
+}
+
+constexpr std::chrono::seconds patience(60);
+
+template <typename Condition>
+bool wait_for(const Condition& condition) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  while (!condition() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  return condition();
+}
+
+TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
+  TestTransport transport;
+  StandingClock clock;
+  CrtkRobot robot(transport, "PSM1", config_of(true), clock);
+  send_a_path(transport, clock, robot);
+  ASSERT_TRUE(wait_for([&] { return transport.joints("/PSM1/servo_jp").size() > 5; }));
+  const JointMessage sent = transport.joints("/PSM1/servo_jp").front();
+  EXPECT_EQ(sent.names, (std::vector<std::string>{"yaw", "pitch", "insertion", "roll", "wrist"}));
+  EXPECT_EQ(sent.positions, (std::vector<double>{0.1, 1.5, 0.1, 0.2, 0.7}));
+  clock.now = 10.2;  // nothing came since
+  ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
+  EXPECT_EQ(robot.blocked(), Blocked::old_joint_states);
+}
+
+TEST(CrtkRobot, ANoticedCommandOfSomebodyElseStopsIt) {
+  TestTransport transport;
+  StandingClock clock;
+  CrtkRobot robot(transport, "/PSM1", config_of(true), clock);
+  send_a_path(transport, clock, robot);
+  transport.say("/PSM1/servo_jp", JointMessage{});
+  ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
+  EXPECT_EQ(robot.blocked(), Blocked::foreign_command);
+}
+
+TEST(CrtkRobot, ObservingItSendsNothing) {
+  TestTransport transport;
+  StandingClock clock;
+  CrtkRobot robot(transport, "PSM1", config_of(false), clock);
+  send_a_path(transport, clock, robot);
+  ASSERT_TRUE(wait_for([&] { return robot.counts().withheld > 5; }));
+  EXPECT_TRUE(transport.joints("/PSM1/servo_jp").empty());
+}
+
+}  // namespace
+}  // namespace lapservo::internal

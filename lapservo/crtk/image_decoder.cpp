@@ -1,0 +1,103 @@
+#include "lapservo/crtk/image_decoder.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/core/error.h"
+#include "lapservo/io/image_file.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr std::uint32_t max_px = 16384;
+constexpr std::size_t max_compressed = std::size_t{64} << 20;
+
+// How pixels lie, and what makes BGR of them; keep: they are BGR.
+constexpr int keep = -1;
+struct Encoding {
+  std::string_view name;
+  int channels, bytes;  // of a channel
+  int conversion;
+};
+// OpenCV names Bayer patterns by the second row's second and third pixel.
+constexpr std::array encodings{
+    Encoding{"bgr8", 3, 1, keep},
+    Encoding{"8UC3", 3, 1, keep},
+    Encoding{"rgb8", 3, 1, cv::COLOR_RGB2BGR},
+    Encoding{"bgra8", 4, 1, cv::COLOR_BGRA2BGR},
+    Encoding{"rgba8", 4, 1, cv::COLOR_RGBA2BGR},
+    Encoding{"bgr16", 3, 2, keep},
+    Encoding{"rgb16", 3, 2, cv::COLOR_RGB2BGR},
+    Encoding{"yuv422", 2, 1, cv::COLOR_YUV2BGR_UYVY},
+    Encoding{"uyvy", 2, 1, cv::COLOR_YUV2BGR_UYVY},
+    Encoding{"yuv422_yuy2", 2, 1, cv::COLOR_YUV2BGR_YUY2},
+    Encoding{"yuyv", 2, 1, cv::COLOR_YUV2BGR_YUY2},
+    Encoding{"bayer_rggb8", 1, 1, cv::COLOR_BayerBG2BGR},
+    Encoding{"bayer_bggr8", 1, 1, cv::COLOR_BayerRG2BGR},
+    Encoding{"bayer_gbrg8", 1, 1, cv::COLOR_BayerGR2BGR},
+    Encoding{"bayer_grbg8", 1, 1, cv::COLOR_BayerGB2BGR},
+    Encoding{"bayer_rggb16", 1, 2, cv::COLOR_BayerBG2BGR},
+    Encoding{"bayer_bggr16", 1, 2, cv::COLOR_BayerRG2BGR},
+    Encoding{"bayer_gbrg16", 1, 2, cv::COLOR_BayerGR2BGR},
+    Encoding{"bayer_grbg16", 1, 2, cv::COLOR_BayerGB2BGR},
+};
+
+// The first letters of a word that a stranger sent, without what a terminal would act on.
+std::string shown(std::string text) {
+  text.resize(std::min<std::size_t>(text.size(), 32));
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return text;
+}
+
+BadImage bad_encoding(const std::string& encoding) {
+  if (encoding == "mono8" || encoding == "mono16")
+    return {encoding + " has no colours, by which the marker is found: publish bgr8, rgb8, yuv422 or bayer_*"};
+  return {"encoding " + shown(encoding) + ", expected bgr8, rgb8, bgra8, rgba8, bgr16, rgb16, yuv422 or bayer_*"};
+}
+
+// The upper byte of each 16-bit value.
+cv::Mat upper_bytes(const cv::Mat& bytes, bool big_endian) {
+  cv::Mat upper;
+  cv::extractChannel(bytes.reshape(2), upper, big_endian ? 0 : 1);
+  return upper;
+}
+
+}  // namespace
+
+DecodedImage decode(const ImageMessage& message) {
+  const auto found = std::find_if(encodings.begin(), encodings.end(),
+                                  [&](const Encoding& known) { return known.name == message.encoding; });
+  if (found == encodings.end()) return bad_encoding(message.encoding);
+  const auto [width, height, step] = std::array{message.width, message.height, message.step};
+  if (width == 0 || height == 0 || width > max_px || height > max_px || (found->channels == 2 && width % 2 != 0))
+    return BadImage{fmt::format("size {}x{}", width, height)};
+  const std::size_t row = std::size_t{width} * found->channels * found->bytes;
+  if (step < row || message.data.size() < std::size_t{step} * (height - 1) + row)
+    return BadImage{
+        fmt::format("{} bytes with a step of {} for {}x{} {}", message.data.size(), step, width, height, found->name)};
+  const cv::Mat bytes(static_cast<int>(height), static_cast<int>(row), CV_8UC1,
+                      const_cast<std::uint8_t*>(message.data.data()), step);
+  cv::Mat pixels = found->bytes == 2 ? upper_bytes(bytes, message.is_bigendian) : bytes;
+  pixels = pixels.reshape(found->channels);
+  cv::Mat bgr;
+  if (found->conversion == keep) return pixels.clone();
+  cv::cvtColor(pixels, bgr, found->conversion);
+  return bgr;
+}
+
+DecodedImage decode(const CompressedImageMessage& message) {
+  if (message.data.size() > max_compressed) return BadImage{fmt::format("{} compressed bytes", message.data.size())};
+  try {
+    return decode_image(message.data, "compressed image");
+  } catch (const InputError& error) {
+    return BadImage{shown(message.format) + ", " + error.what()};
+  }
+}
+
+}  // namespace lapservo::internal

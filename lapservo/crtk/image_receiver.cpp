@@ -1,0 +1,108 @@
+#include "lapservo/crtk/image_receiver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lapservo/crtk/image_decoder.h"
+
+namespace lapservo::internal {
+
+std::string ImageCounts::text() const {
+  std::string text;
+  const auto add = [&](const char* what, long count) {
+    if (count > 0) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", what, count);
+  };
+  add("skipped", skipped);
+  add("missing", missing);
+  add("repeated", repeated);
+  add("late", late);
+  add("after a jump of the clock", jumped);
+  add("without a stamp", unstamped);
+  add("of another size", resized);
+  add("unreadable", unreadable);
+  return text;
+}
+
+void ImageReceiver::receive(ImageMessage&& message, double arrival_s) {
+  accept(message.stamp_s, arrival_s, std::move(message));
+}
+
+void ImageReceiver::receive(CompressedImageMessage&& message, double arrival_s) {
+  accept(message.stamp_s, arrival_s, std::move(message));
+}
+
+void ImageReceiver::accept(double stamp_s, double arrival_s, Message&& message) {
+  const std::lock_guard lock(mutex_);
+  const StampClock::Reading measured = clock_.read(stamp_s, arrival_s);
+  switch (measured.verdict) {
+    case StampVerdict::fresh:
+      break;
+    case StampVerdict::repeated:
+      return refuse(&ImageCounts::repeated, "the same stamp again");
+    case StampVerdict::late:
+      return refuse(&ImageCounts::late, "late");
+    case StampVerdict::jumped:
+      last_stamp_s_.reset();
+      return refuse(&ImageCounts::jumped, "the camera's clock jumped");
+    case StampVerdict::unusable:
+      return refuse(&ImageCounts::unstamped, "no stamp");
+  }
+  count_gap(stamp_s);
+  if (waiting_) ++counts_.skipped;
+  waiting_ = Waiting{measured.time_s, std::move(message)};
+}
+
+// The usual distance follows the shortest ones seen.
+void ImageReceiver::count_gap(double stamp_s) {
+  constexpr double follow = 0.01;
+  if (last_stamp_s_) {
+    const double gap_s = stamp_s - *last_stamp_s_;
+    if (distance_s_ && gap_s > 1.5 * *distance_s_ && gap_s < 60)
+      counts_.missing += std::lround(gap_s / *distance_s_) - 1;
+    distance_s_ = distance_s_ ? std::min(gap_s, *distance_s_ + follow * (gap_s - *distance_s_)) : gap_s;
+  }
+  last_stamp_s_ = stamp_s;
+}
+
+void ImageReceiver::refuse(long ImageCounts::*count, const std::string& why) {
+  ++(counts_.*count);
+  complaint_ = why;
+}
+
+std::optional<StampedImage> ImageReceiver::newest() {
+  std::optional<Waiting> waiting;
+  {
+    const std::lock_guard lock(mutex_);
+    waiting = std::exchange(waiting_, std::nullopt);
+  }
+  if (!waiting) return std::nullopt;
+  DecodedImage decoded = std::visit([](const auto& message) { return decode(message); }, waiting->message);
+  const std::lock_guard lock(mutex_);
+  if (const auto* bad = std::get_if<BadImage>(&decoded)) {
+    refuse(&ImageCounts::unreadable, bad->why);
+    return std::nullopt;
+  }
+  cv::Mat& bgr = std::get<cv::Mat>(decoded);
+  if (bgr.size() != size_) {
+    refuse(&ImageCounts::resized,
+           fmt::format("size {}x{}, expected {}x{} as in the rig", bgr.cols, bgr.rows, size_.width, size_.height));
+    return std::nullopt;
+  }
+  ++counts_.taken;
+  return StampedImage{waiting->time_s, std::move(bgr)};
+}
+
+ImageCounts ImageReceiver::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+std::string ImageReceiver::complaint() const {
+  const std::lock_guard lock(mutex_);
+  return complaint_;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "lapservo/crtk/messages.h"
+#include "lapservo/crtk/stamp_clock.h"
+#include "lapservo/stream/image_stream.h"
+
+namespace lapservo::internal {
+
+/// What became of a camera's images.
+struct ImageCounts {
+  long taken = 0;    ///< by newest()
+  long skipped = 0;  ///< a newer one came before they were asked for
+  long missing = 0;  ///< gaps of more than one and a half times the usual distance of stamps, in frames
+  long repeated = 0, late = 0, jumped = 0, unstamped = 0;
+  long resized = 0;     ///< of another size than the rig's camera
+  long unreadable = 0;  ///< wrong encoding, wrong number of bytes, damaged
+  /// "skipped 2, late 1"; empty when all were taken.
+  std::string text() const;
+};
+
+/// A camera's image messages as an ImageStream: the newest, once, decoded by whoever asks for it. Only images with a
+/// stamp that is newer than the last count, so a camera that repeats itself soon gives stale images; time_s is as of
+/// the fastest image (StampClock). What can't be used is dropped, counted, and its reason kept.
+class ImageReceiver : public ImageStream {
+ public:
+  /// Of the rig's camera.
+  ImageReceiver(int width_px, int height_px) : size_(width_px, height_px) {}
+
+  // By the transport's threads, with the time of arrival on the loop's clock.
+  void receive(ImageMessage&& message, double arrival_s);
+  void receive(CompressedImageMessage&& message, double arrival_s);
+
+  std::optional<StampedImage> newest() override;
+
+  ImageCounts counts() const;
+  /// Why images were dropped last, in words; empty while none were.
+  std::string complaint() const;
+
+ private:
+  using Message = std::variant<ImageMessage, CompressedImageMessage>;
+  struct Waiting {
+    double time_s = 0;
+    Message message;
+  };
+
+  void accept(double stamp_s, double arrival_s, Message&& message);
+  void count_gap(double stamp_s);
+  void refuse(long ImageCounts::*count, const std::string& why);
+
+  cv::Size size_;
+  mutable std::mutex mutex_;
+  StampClock clock_{0.5};
+  ImageCounts counts_;
+  std::string complaint_;
+  std::optional<Waiting> waiting_;
+  std::optional<double> last_stamp_s_, distance_s_;
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,90 @@
+#include "lapservo/crtk/image_receiver.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double epoch_s = 1.7e9, period_s = 1.0 / 30;
+
+ImageMessage image(double stamp_s, std::uint32_t width = 4, std::uint32_t height = 2) {
+  ImageMessage message;
+  message.stamp_s = stamp_s;
+  message.width = width, message.height = height, message.step = 3 * width;
+  message.encoding = "bgr8";
+  message.data.assign(std::size_t{message.step} * height, 9);
+  return message;
+}
+
+TEST(ImageReceiver, GivesTheNewestOnceAndCountsTheRest) {
+  ImageReceiver receiver(4, 2);
+  EXPECT_FALSE(receiver.newest());
+  receiver.receive(image(epoch_s), 5);
+  const auto first = receiver.newest();
+  ASSERT_TRUE(first);
+  EXPECT_NEAR(first->time_s, 5, 1e-6);
+  EXPECT_FALSE(receiver.newest());
+  for (int k = 1; k < 4; ++k) receiver.receive(image(epoch_s + k * period_s), 5 + k * period_s);
+  EXPECT_NEAR(receiver.newest()->time_s, 5 + 3 * period_s, 1e-6);
+  EXPECT_EQ(receiver.counts().taken, 2);
+  EXPECT_EQ(receiver.counts().skipped, 2);
+  EXPECT_EQ(receiver.counts().text(), "skipped 2");
+}
+
+TEST(ImageReceiver, RepeatedStampsAreNotFresh) {
+  ImageReceiver receiver(4, 2);
+  receiver.receive(image(epoch_s), 5);
+  EXPECT_TRUE(receiver.newest());
+  for (int k = 1; k < 100; ++k) {
+    receiver.receive(image(epoch_s), 5 + k * period_s);
+    EXPECT_FALSE(receiver.newest());
+  }
+  EXPECT_EQ(receiver.counts().repeated, 99);
+  EXPECT_EQ(receiver.complaint(), "the same stamp again");
+}
+
+TEST(ImageReceiver, DropsAndCountsWhatCanNotBeUsed) {
+  ImageReceiver receiver(4, 2);
+  double now_s = 5;
+  const auto offer = [&](ImageMessage message) {
+    now_s += period_s;
+    receiver.receive(std::move(message), now_s);
+    return receiver.newest().has_value();
+  };
+  EXPECT_TRUE(offer(image(epoch_s + now_s)));
+  EXPECT_FALSE(offer(image(epoch_s + now_s, 6, 2)));
+  EXPECT_EQ(receiver.complaint(), "size 6x2, expected 4x2 as in the rig");
+  ImageMessage grey = image(epoch_s + now_s);
+  grey.encoding = "mono8";
+  EXPECT_FALSE(offer(grey));
+  EXPECT_NE(receiver.complaint().find("mono8"), std::string::npos);
+  EXPECT_FALSE(offer(image(std::nan(""))));
+  EXPECT_FALSE(offer(image(0)));
+  EXPECT_FALSE(offer(image(epoch_s + now_s + 3600)));
+  EXPECT_TRUE(offer(image(epoch_s + now_s + 3600)));
+  EXPECT_FALSE(offer(image(epoch_s + now_s + 3600 - 2)));
+  CompressedImageMessage compressed;
+  compressed.stamp_s = epoch_s + now_s + 3600;
+  receiver.receive(std::move(compressed), now_s + period_s);
+  EXPECT_FALSE(receiver.newest());
+  const ImageCounts counts = receiver.counts();
+  EXPECT_EQ(counts.taken, 2);
+  EXPECT_EQ(counts.resized, 1);
+  EXPECT_EQ(counts.unreadable, 1);
+  EXPECT_EQ(counts.unstamped, 2);
+  EXPECT_EQ(counts.jumped, 3);
+}
+
+TEST(ImageReceiver, CountsLateAndMissingFrames) {
+  ImageReceiver receiver(4, 2);
+  for (int k = 0; k < 30; ++k)
+    if (k % 10 != 5 && k != 16) receiver.receive(image(epoch_s + k * period_s), 5 + k * period_s);
+  EXPECT_EQ(receiver.counts().missing, 4);
+  receiver.receive(image(epoch_s + 31 * period_s), 5 + 32 * period_s + 0.6);
+  EXPECT_EQ(receiver.counts().late, 1);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,307 @@
+#include "lapservo/crtk/interlock.h"
+
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/crtk/joint_map.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double epoch_s = 1.7e9, tick_s = 0.002, joints_period_s = 0.004;
+const double max_s = InterlockConfig().max_age_s;
+
+Joints psm() {
+  return {{"yaw", "pitch", "insertion", "roll"}, {1, -1, 1, 1}, {0, 1.5707963, -0.0156, 0}};
+}
+
+InterlockConfig config_of(bool motion_enabled = true) {
+  InterlockConfig config;
+  config.joints = psm();
+  config.motion_enabled = motion_enabled;
+  return config;
+}
+
+// An arm that obeys at once, whose set-point lies beside its joints (gravity), on a clock that only this test moves.
+class Bench {
+ public:
+  explicit Bench(const InterlockConfig& config = config_of()) : interlock(config), config_(config) { enable(); }
+
+  void enable(const std::string& state = "ENABLED", bool homed = true, bool busy = false) {
+    interlock.on_operating_state({epoch_s + now_s, state, homed, busy});
+  }
+  JointMessage message(const Eigen::Vector4d& of_q) const {
+    const Eigen::Vector4d joints = joints_from_q(psm(), of_q);
+    return {epoch_s + now_s,
+            {"yaw", "pitch", "wrist", "insertion", "roll"},
+            {joints[0], joints[1], wrist, joints[2], joints[3]}};
+  }
+  // Time passes; the arm speaks and the interlock ticks. `alter` may change what the arm says, or drop it (false).
+  void pass(double duration_s) {
+    for (const double end_s = now_s + duration_s; now_s < end_s - 1e-9; now_s += tick_s) {
+      if (now_s >= next_joints_s_) {
+        next_joints_s_ = now_s + joints_period_s;
+        if (talking) {
+          interlock.on_setpoint(message(setpoint), now_s);
+          JointMessage measured = message(setpoint + sag);
+          if (alter) alter(measured);
+          interlock.on_measured(measured, now_s);
+        }
+      }
+      const auto sent = interlock.tick(now_s);
+      if (!sent) continue;
+      EXPECT_EQ(sent->size(), 5u);
+      EXPECT_EQ(sent->at(2), wrist);
+      const Eigen::Vector4d q = q_from_joints(psm(), {sent->at(0), sent->at(1), sent->at(3), sent->at(4)});
+      const Eigen::Array4d step = (q - setpoint).array().abs();
+      EXPECT_TRUE((step <= config_.limits.rate.array() * tick_s + 1e-12).all()) << step.transpose();
+      setpoint = q;
+      last_sent_s = now_s;
+      ++sent_count;
+    }
+  }
+  // As the loop does once a period: starts anew where the arm is when it is told that it is not enabled.
+  void control(double duration_s, const Eigen::Vector4d& velocity) {
+    constexpr double period_s = 1.0 / 60;
+    for (const double end_s = now_s + duration_s; now_s < end_s - 1e-9;) {
+      const JointState state = interlock.state(now_s);
+      if (state.operating_state != OperatingState::enabled) {
+        path.reset(now_s, state.q.vector());
+      } else {
+        path.ramp_to(now_s, velocity, period_s);
+        interlock.follow(path);
+      }
+      pass(period_s);
+    }
+  }
+
+  Interlock interlock;
+  JointPath path{JointLimits().acceleration};
+  Eigen::Vector4d setpoint{0.1, 1.5, 0.08, 0.5}, sag{0.004, -0.003, 0.001, 0.02};
+  double now_s = 10, wrist = 0.3, last_sent_s = 0;
+  int sent_count = 0;
+  bool talking = true;
+  std::function<void(JointMessage&)> alter;
+
+ private:
+  InterlockConfig config_;
+  double next_joints_s_ = 0;
+};
+
+const Eigen::Vector4d slow(0.1, -0.1, 0.01, 0.3), fast(9, 9, 9, 9);
+
+TEST(Interlock, FollowsFromTheArmsOwnSetPointOn) {
+  Bench bench;
+  bench.control(0.05, Eigen::Vector4d::Zero());
+  const Eigen::Vector4d start = bench.setpoint;
+  EXPECT_TRUE(start.isApprox(Bench().setpoint, 1e-12));  // not moved to where the arm sags
+  bench.control(1, slow);
+  EXPECT_GT(bench.sent_count, 450);
+  EXPECT_TRUE((bench.setpoint - start).isApprox(slow, 0.1));
+  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+}
+
+TEST(Interlock, NoStepExceedsTheRateLimitWhateverThePathDoes) {
+  Bench bench;  // pass() checks every step
+  bench.control(0.1, slow);
+  bench.control(0.5, fast);
+  EXPECT_GT(bench.sent_count, 200);
+  JointPath jump(JointLimits().acceleration);
+  jump.reset(bench.now_s, bench.setpoint + Eigen::Vector4d::Ones());
+  bench.interlock.follow(jump);
+  bench.pass(0.2);
+}
+
+TEST(Interlock, StaysWithinTheLimitsAndComesBackFromBeyond) {
+  InterlockConfig config = config_of();
+  config.limits.upper = Eigen::Vector4d(0.15, 2.5, 0.2, 4);
+  Bench bench(config);
+  bench.control(2, {0.2, 0, 0, 0});
+  EXPECT_NEAR(bench.setpoint[0], 0.15, 1e-9);
+  Bench beyond(config);
+  beyond.setpoint[0] = 0.3;
+  beyond.control(0.5, {0.2, 0, 0, 0});
+  EXPECT_NEAR(beyond.setpoint[0], 0.3, 1e-9);
+  beyond.control(1, {-0.2, 0, 0, 0});  // half of it brings the path back
+  EXPECT_LT(beyond.setpoint[0], 0.25);
+}
+
+struct Fault {
+  const char* name;
+  Blocked blocked;
+  double within_s;
+  std::function<void(Bench&)> begin, end;
+};
+
+// Each: no set-point leaves later than `within_s` after it, and motion goes on afterwards without a jump.
+TEST(Interlock, HoldsAtEveryFaultAndGoesOnAfterwards) {
+  const auto alter = [](std::function<void(JointMessage&)> how) { return [how](Bench& bench) { bench.alter = how; }; };
+  const auto well = [](Bench& bench) { bench.alter = nullptr, bench.talking = true, bench.enable(); };
+  const double stamp_s = epoch_s + 10.3;
+  const std::vector<Fault> faults{
+      {"silence", Blocked::old_joint_states, max_s, [](Bench& b) { b.talking = false; }, well},
+      {"NaN", Blocked::non_finite_joints, joints_period_s,
+       alter([](JointMessage& m) { m.positions[0] = std::nan(""); }), well},
+      {"infinite wrist", Blocked::non_finite_joints, joints_period_s,
+       alter([](JointMessage& m) { m.positions[2] = INFINITY; }), well},
+      {"stamps stand still", Blocked::old_joint_states, max_s, alter([&](JointMessage& m) { m.stamp_s = stamp_s; }),
+       well},
+      {"no stamps", Blocked::old_joint_states, max_s, alter([](JointMessage& m) { m.stamp_s = 0; }), well},
+      {"stamps are none", Blocked::old_joint_states, max_s, alter([](JointMessage& m) { m.stamp_s = std::nan(""); }),
+       well},
+      {"a position is missing", Blocked::old_joint_states, max_s,
+       alter([](JointMessage& m) { m.positions.pop_back(); }), well},
+      {"a name is missing", Blocked::old_joint_states, max_s, alter([](JointMessage& m) { m.names[0] = "elbow"; }),
+       well},
+      {"too many joints", Blocked::old_joint_states, max_s,
+       alter([](JointMessage& m) { m.names.resize(100000, "x"), m.positions.resize(100000); }), well},
+      {"late", Blocked::old_joint_states, max_s + 2 * joints_period_s, alter([](JointMessage& m) { m.stamp_s -= 0.2; }),
+       well},
+      {"PAUSED", Blocked::not_enabled, 0, [](Bench& b) { b.enable("PAUSED"); }, well},
+      {"FAULT", Blocked::not_enabled, 0, [](Bench& b) { b.enable("FAULT"); }, well},
+      {"a word", Blocked::not_enabled, 0, [](Bench& b) { b.enable("enabled?"); }, well},
+      {"not homed", Blocked::not_homed, 0, [](Bench& b) { b.enable("ENABLED", false); }, well},
+      {"busy", Blocked::busy, 0, [](Bench& b) { b.enable("ENABLED", true, true); }, well},
+  };
+  for (const Fault& fault : faults) {
+    SCOPED_TRACE(fault.name);
+    Bench bench;
+    bench.control(0.3, slow);
+    EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+    const double fault_s = bench.now_s;
+    fault.begin(bench);
+    bench.control(1, slow);
+    EXPECT_EQ(bench.interlock.blocked(bench.now_s), fault.blocked) << to_string(bench.interlock.blocked(bench.now_s));
+    EXPECT_LE(bench.last_sent_s, fault_s + fault.within_s + 2 * tick_s);
+    EXPECT_NE(bench.interlock.state(bench.now_s).operating_state, OperatingState::enabled);
+    const int sent = bench.sent_count;
+    fault.end(bench);
+    bench.setpoint += Eigen::Vector4d(0.02, 0, 0, 0.1);  // moved meanwhile: the steps from there on count
+    bench.control(0.5, slow);
+    EXPECT_GT(bench.sent_count, sent + 150);
+  }
+}
+
+// A fault so short that the loop never saw it: its path is not taken up as if nothing had happened.
+TEST(Interlock, AShortFaultMakesTheLoopStartAnew) {
+  Bench bench;
+  bench.control(0.3, slow);
+  bench.enable("PAUSED");
+  bench.pass(tick_s);
+  bench.enable();
+  const int sent = bench.sent_count;
+  bench.interlock.follow(bench.path);
+  bench.pass(0.01);
+  EXPECT_EQ(bench.sent_count, sent);
+  EXPECT_NE(bench.interlock.state(bench.now_s).operating_state, OperatingState::enabled);
+  EXPECT_EQ(bench.interlock.state(bench.now_s).operating_state, OperatingState::enabled);
+}
+
+TEST(Interlock, SomebodyElsesSetPointEndsIt) {
+  for (const bool of_wrist : {false, true}) {
+    Bench bench;
+    bench.control(0.3, slow);
+    JointMessage foreign = bench.message(bench.setpoint);
+    foreign.stamp_s += 1e-4;
+    foreign.positions[of_wrist ? 2 : 0] += 0.02;
+    bench.interlock.on_setpoint(foreign, bench.now_s);
+    const int sent = bench.sent_count;
+    bench.control(1, slow);
+    EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::foreign_command);
+    EXPECT_EQ(bench.sent_count, sent);
+  }
+  Bench bench;
+  bench.control(0.3, slow);
+  bench.interlock.on_foreign_command();
+  const int sent = bench.sent_count;
+  bench.control(1, slow);
+  EXPECT_EQ(bench.sent_count, sent);
+}
+
+TEST(Interlock, TheArmsOwnSetPointMayComeBackLate) {
+  Bench bench;
+  bench.control(0.3, slow);
+  const JointMessage old = bench.message(bench.setpoint);
+  bench.control(0.15, slow);
+  JointMessage late = old;
+  late.stamp_s = epoch_s + bench.now_s - 1e-4;
+  bench.interlock.on_setpoint(late, bench.now_s);
+  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+}
+
+TEST(Interlock, DoesNotStartWhereTheArmIsFarFromItsSetPoint) {
+  Bench bench;
+  bench.sag[1] = 0.06;
+  bench.control(0.5, slow);
+  EXPECT_EQ(bench.sent_count, 0);
+  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::far_from_setpoint);
+}
+
+TEST(Interlock, ObservesOnlyUntilMotionIsEnabled) {
+  Bench bench(config_of(false));
+  bench.control(1, slow);
+  EXPECT_EQ(bench.sent_count, 0);
+  EXPECT_EQ(bench.interlock.counts().set_points, 0);
+  EXPECT_GT(bench.interlock.counts().withheld, 450);
+  ASSERT_TRUE(bench.interlock.set_point());
+  EXPECT_TRUE((*bench.interlock.set_point() - bench.setpoint).isApprox(slow, 0.1));
+  bench.interlock.on_foreign_command();  // others may move what is only observed
+  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+}
+
+TEST(Interlock, NothingIsSentOnceStopped) {
+  Bench bench;
+  bench.control(0.3, slow);
+  bench.interlock.stop();
+  const int sent = bench.sent_count;
+  bench.control(0.3, slow);
+  EXPECT_EQ(bench.sent_count, sent);
+}
+
+// The loop is gone: what it sent last brakes to rest.
+TEST(Interlock, BrakesWhenTheLoopIsGone) {
+  Bench bench;
+  bench.control(0.5, slow);
+  bench.pass(0.5);
+  const Eigen::Vector4d rest = bench.setpoint;
+  bench.pass(0.5);
+  EXPECT_TRUE(bench.setpoint.isApprox(rest, 1e-12));
+}
+
+TEST(Interlock, HeldItBrakesToRestAndGoesOnWhenReleased) {
+  Bench bench;
+  bench.control(0.5, slow);
+  bench.interlock.hold(true);
+  const int sent = bench.sent_count;
+  bench.control(0.5, slow);
+  EXPECT_GT(bench.sent_count, sent + 200);  // at rest, but held where it is
+  const Eigen::Vector4d rest = bench.setpoint;
+  bench.control(0.5, slow);
+  EXPECT_TRUE(bench.setpoint.isApprox(rest, 1e-12));
+  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::held);
+  bench.interlock.hold(false);
+  bench.control(0.5, slow);
+  EXPECT_GT((bench.setpoint - rest).norm(), 0.01);
+}
+
+TEST(Interlock, CountsWhatItDrops) {
+  Bench bench;
+  bench.pass(0.1);
+  JointMessage message = bench.message(bench.setpoint);
+  message.stamp_s += 1;
+  bench.interlock.on_measured(message, bench.now_s);
+  message.names.clear();
+  bench.interlock.on_measured(message, bench.now_s);
+  message = bench.message(bench.setpoint);
+  message.stamp_s = 0;
+  bench.interlock.on_measured(message, bench.now_s);
+  EXPECT_EQ(bench.interlock.counts().jumped, 1);
+  EXPECT_EQ(bench.interlock.counts().malformed, 1);
+  EXPECT_EQ(bench.interlock.counts().unstamped, 1);
+  EXPECT_GE(bench.interlock.counts().joint_states, 24);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

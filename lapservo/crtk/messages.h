@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace lapservo::internal {
+
+// What a CRTK site says, whatever carries it. Times are the sender's stamps in seconds; NaN where a stamp is none.
+
+/// sensor_msgs/JointState: measured_js, setpoint_js, servo_jp. Velocities and efforts are not used.
+struct JointMessage {
+  double stamp_s = 0;
+  std::vector<std::string> names;
+  std::vector<double> positions;  ///< rad, m
+};
+
+/// crtk_msgs/OperatingState.
+struct OperatingStateMessage {
+  double stamp_s = 0;
+  std::string state;
+  bool is_homed = false, is_busy = false;
+};
+
+/// crtk_msgs/StringStamped: state_command.
+struct StringMessage {
+  double stamp_s = 0;
+  std::string text;
+};
+
+/// sensor_msgs/Image.
+struct ImageMessage {
+  double stamp_s = 0;
+  std::uint32_t width = 0, height = 0, step = 0;  ///< step: bytes a row
+  std::string encoding;
+  bool is_bigendian = false;
+  std::vector<std::uint8_t> data;
+};
+
+/// sensor_msgs/CompressedImage.
+struct CompressedImageMessage {
+  double stamp_s = 0;
+  std::string format;
+  std::vector<std::uint8_t> data;
+};
+
+/// sensor_msgs/CameraInfo of a camera with plumb_bob distortion, not rectified.
+struct CameraInfoMessage {
+  double stamp_s = 0;
+  std::uint32_t width = 0, height = 0;
+  std::vector<double> d;      ///< k1 k2 p1 p2 k3
+  std::array<double, 9> k{};  ///< row by row
+};
+
+/// geometry_msgs/PoseWithCovarianceStamped: position, then the rotation's vector, in the frame's axes.
+struct PoseMessage {
+  double stamp_s = 0;
+  std::string frame;
+  std::array<double, 3> position_m{};
+  std::array<double, 4> quaternion_xyzw{0, 0, 0, 1};
+  std::array<double, 36> covariance{};  ///< row by row
+};
+
+/// diagnostic_msgs/DiagnosticArray of one status.
+struct DiagnosticMessage {
+  enum class Level : std::uint8_t { ok, warning, error };
+  double stamp_s = 0;
+  Level level = Level::ok;
+  std::string name, message;
+  std::vector<std::pair<std::string, std::string>> values;
+};
+
+/// lapservo_msgs/Observation; see its .msg.
+struct ObservationMessage {
+  double stamp_s = 0;
+  std::string frame, instrument, status, action, reason;
+  std::array<double, 4> q{}, features{}, error{};
+  std::array<double, 16> q_covariance{}, feature_covariance{};
+  std::array<double, 8> edges_px{};
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+namespace lapservo::internal {
+
+/// What the stamp of a message tells of it.
+enum class StampVerdict {
+  fresh,
+  repeated,  ///< not newer than the one before: the same message again, or out of order
+  late,      ///< it was on its way for much longer than others
+  jumped,    ///< the sender's clock was set; the next message counts again
+  unusable,  ///< no stamp: zero or not finite
+};
+/// The enumerator's name.
+std::string_view to_string(StampVerdict verdict);
+
+/// Puts a sender's stamps on the loop's clock without asking that both computers agree on the time: the smallest
+/// difference between arrival and stamp is taken for that of the clocks. So a time is as if the message had travelled
+/// as fast as the fastest one. The difference may drift by 1 ms a second.
+class StampClock {
+ public:
+  /// `late_s`: so much longer on its way than the fastest is late.
+  explicit StampClock(double late_s) : late_s_(late_s) {}
+
+  struct Reading {
+    StampVerdict verdict = StampVerdict::unusable;
+    double time_s = 0;  ///< fresh: the stamp on the loop's clock, at most the arrival, never backwards
+  };
+  /// `arrival_s`: on the loop's clock.
+  Reading read(double stamp_s, double arrival_s);
+
+ private:
+  void start_anew(double stamp_s, double arrival_s);
+
+  double late_s_;
+  std::optional<double> last_stamp_s_;
+  double last_arrival_s_ = 0, offset_s_ = 0, last_time_s_ = 0;
+};
+
+}  // namespace lapservo::internal

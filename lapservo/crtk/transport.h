@@ -1,0 +1,48 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "lapservo/crtk/messages.h"
+
+namespace lapservo::internal {
+
+/// Carries messages by topic (ROS 2's wire, ROS 1, a test's memory). Handlers are called in the transport's threads,
+/// one at a time for each topic, until the subscription that was returned is destroyed. Topics are names as in ROS, for
+/// example /PSM1/measured_js.
+class Transport {
+ public:
+  virtual ~Transport() = default;
+
+  template <typename Message>
+  using Publisher = std::function<void(const Message&)>;
+  template <typename Message>
+  using Handler = std::function<void(Message&&)>;
+  /// Destroyed, no handler runs any more.
+  using Subscription = std::shared_ptr<void>;
+
+  /// Publishers may be called from every thread; a copy that lives keeps the topic alive.
+  virtual Publisher<JointMessage> joint_publisher(const std::string& topic) = 0;
+  virtual Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) = 0;
+  virtual Publisher<StringMessage> string_publisher(const std::string& topic) = 0;
+  virtual Publisher<ImageMessage> image_publisher(const std::string& topic) = 0;
+  virtual Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) = 0;
+  virtual Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) = 0;
+  virtual Publisher<PoseMessage> pose_publisher(const std::string& topic) = 0;
+  virtual Publisher<DiagnosticMessage> diagnostic_publisher(const std::string& topic) = 0;
+  virtual Publisher<ObservationMessage> observation_publisher(const std::string& topic) = 0;
+
+  /// Messages that this transport's own publishers sent are left out.
+  virtual Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) = 0;
+  virtual Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> handler) = 0;
+  virtual Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) = 0;
+  virtual Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) = 0;
+  virtual Subscription subscribe_compressed_images(const std::string& topic,
+                                                   Handler<CompressedImageMessage> handler) = 0;
+
+  /// The time that stamps of messages to be sent carry: seconds since 1970.
+  virtual double stamp_now_s() const = 0;
+};
+
+}  // namespace lapservo::internal

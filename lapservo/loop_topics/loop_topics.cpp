@@ -1,0 +1,217 @@
+#include "lapservo/loop_topics/loop_topics.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "lapservo/io/overlay.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double between_states_s = 1, between_drawings_s = 0.1;
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+std::vector<std::string> feature_names() {
+  return {FeatureVector::names.begin(), FeatureVector::names.end()};
+}
+
+template <std::size_t N, typename Matrix>
+std::array<double, N> rows_of(const Matrix& matrix) {
+  std::array<double, N> values{};
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j)
+      values[static_cast<std::size_t>(i * matrix.cols() + j)] = matrix(i, j);
+  return values;
+}
+
+std::string topic(const Rig& rig, const std::string& name) {
+  return "/lapservo/" + rig.instruments.front().name + "/" + name;
+}
+
+Rigid3 camera_from_marker(const Instrument& instrument, const JointVector& q) {
+  const double azimuth = q.psi_rad + instrument.marker.seam_rad;
+  return *instrument.camera_from_rcm * rcm_from_unrolled(q) *
+         Rigid3{Eigen::Quaterniond(Eigen::AngleAxisd(azimuth, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero()};
+}
+
+}  // namespace
+
+PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& seen) {
+  const Rigid3 pose = camera_from_marker(instrument, seen.q);
+  Eigen::Matrix<double, 6, 4> jacobian;
+  constexpr double step = 1e-6;
+  for (int i = 0; i < 4; ++i) {
+    const Rigid3 moved =
+        camera_from_marker(instrument, JointVector::from_vector(seen.q.vector() + step * Eigen::Vector4d::Unit(i)));
+    const Eigen::AngleAxisd turn(moved.rotation * pose.rotation.conjugate());
+    jacobian.col(i) << (moved.translation - pose.translation) / step, turn.axis() * (turn.angle() / step);
+  }
+  PoseMessage message;
+  message.position_m = {pose.translation.x(), pose.translation.y(), pose.translation.z()};
+  message.quaternion_xyzw = {pose.rotation.x(), pose.rotation.y(), pose.rotation.z(), pose.rotation.w()};
+  const Eigen::Matrix<double, 6, 6> covariance = jacobian * seen.covariance * jacobian.transpose();
+  message.covariance = rows_of<36>(covariance);
+  return message;
+}
+
+LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame)
+    : transport_(transport),
+      rig_(rig),
+      frame_(camera_frame),
+      observation_(transport.observation_publisher(topic(rig, "observation"))),
+      pose_(transport.pose_publisher(topic(rig, "pose"))),
+      desired_(transport.joint_publisher(topic(rig, "desired"))),
+      error_(transport.joint_publisher(topic(rig, "error"))),
+      diagnostics_(transport.diagnostic_publisher("/diagnostics")),
+      overlay_(transport.compressed_image_publisher(topic(rig, "overlay/compressed"))) {
+  subscriptions_.push_back(
+      transport.subscribe_strings(topic(rig, "command"), [this](StringMessage&& command) { hear(command); }));
+  subscriptions_.push_back(
+      transport.subscribe_joints(topic(rig, "set_point"), [this](JointMessage&& set_point) { hear(set_point); }));
+  thread_ = std::thread([this] { draw(); });
+}
+
+LoopTopics::~LoopTopics() {
+  subscriptions_.clear();
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void LoopTopics::publish(const ControlTick& tick, const std::string& state) {
+  const double stamp_s = transport_.stamp_now_s();
+  publish_numbers(tick, stamp_s);
+  publish_state(tick, state, stamp_s);
+  if (!tick.seen) return;
+  // The image's time, on the clock of those who listen.
+  const double seen_s = stamp_s - (tick.input.time_s - tick.seen->image.time_s);
+  publish_observation(tick, seen_s);
+  if (stamp_s < next_drawing_s_) return;
+  next_drawing_s_ = stamp_s + between_drawings_s;
+  const std::lock_guard lock(mutex_);
+  to_draw_ = Drawing{seen_s, tick.seen->image.bgr, tick.seen->observations};
+  changed_.notify_all();
+}
+
+void LoopTopics::publish_numbers(const ControlTick& tick, double stamp_s) {
+  const auto say = [&](const auto& publisher, const Eigen::Vector4d& f) {
+    publisher(JointMessage{stamp_s, feature_names(), {f.data(), f.data() + 4}});
+  };
+  if (tick.input.desired.features.allFinite()) say(desired_, tick.input.desired.features);
+  if (tick.decision.control.estimate) say(error_, tick.decision.control.error);
+}
+
+void LoopTopics::publish_observation(const ControlTick& tick, double stamp_s) {
+  const Observation& seen = tick.seen->observations.front();
+  const ImageMeasurement& measured = tick.seen->measurement;
+  const Instrument& instrument = rig_.instruments.front();
+  ObservationMessage message;
+  message.stamp_s = stamp_s;
+  message.frame = frame_;
+  message.instrument = instrument.name;
+  message.status = to_string(seen.status);
+  message.action = to_string(tick.decision.control.action);
+  message.reason = to_string(tick.decision.control.reason);
+  for (auto* values : {&message.q, &message.features, &message.error}) values->fill(unknown);
+  for (auto* values : {&message.q_covariance, &message.feature_covariance}) values->fill(unknown);
+  message.edges_px.fill(unknown);
+  if (tick.decision.control.estimate) message.error = rows_of<4>(tick.decision.control.error);
+  if (measured.found) {
+    message.features = rows_of<4>(measured.features);
+    message.feature_covariance = rows_of<16>(measured.covariance);
+  }
+  if (seen.status == Status::ok)
+    for (std::size_t i = 0; i < 4; ++i)
+      message.edges_px[2 * i] = seen.edges_raw_px[i].x(), message.edges_px[2 * i + 1] = seen.edges_raw_px[i].y();
+  if (seen.status == Status::ok && seen.rcm) {
+    message.q = rows_of<4>(seen.rcm->q.vector());
+    message.q_covariance = rows_of<16>(seen.rcm->covariance);
+    PoseMessage pose = pose_message(instrument, *seen.rcm);
+    pose.stamp_s = stamp_s;
+    pose.frame = frame_;
+    pose_(pose);
+  }
+  observation_(message);
+}
+
+void LoopTopics::publish_state(const ControlTick& tick, const std::string& state, double stamp_s) {
+  if (state == last_state_ && stamp_s < next_state_s_) return;
+  last_state_ = state;
+  next_state_s_ = stamp_s + between_states_s;
+  DiagnosticMessage message;
+  message.stamp_s = stamp_s;
+  message.level = state.empty() ? DiagnosticMessage::Level::ok : DiagnosticMessage::Level::warning;
+  message.name = "lapservo: " + rig_.instruments.front().name;
+  const ControlStep& control = tick.decision.control;
+  message.message = state.empty() ? std::string(to_string(control.action)) : state;
+  message.values = {{"action", std::string(to_string(control.action))},
+                    {"reason", std::string(to_string(control.reason))},
+                    {"limited", control.limited ? "true" : "false"},
+                    {"delay_s", fmt::format("{:.4f}", control.delay_s)}};
+  for (int i = 0; i < 4; ++i)
+    message.values.emplace_back("error_" + feature_names()[static_cast<std::size_t>(i)],
+                                fmt::format("{:.6g}", control.error[i]));
+  diagnostics_(message);
+}
+
+void LoopTopics::hear(const StringMessage& command) {
+  const std::lock_guard lock(mutex_);
+  if (command.text == "start") {
+    wishes_.hold = false;
+  } else if (command.text == "stop") {
+    wishes_.hold = true;
+  } else {
+    ++malformed_;
+  }
+}
+
+void LoopTopics::hear(const JointMessage& set_point) {
+  const bool whole = set_point.names == feature_names() && set_point.positions.size() == 4 &&
+                     std::all_of(set_point.positions.begin(), set_point.positions.end(),
+                                 [](double value) { return std::isfinite(value); });
+  const std::lock_guard lock(mutex_);
+  if (whole) {
+    wishes_.set_point = Eigen::Vector4d(set_point.positions.data());
+  } else {
+    ++malformed_;
+  }
+}
+
+LoopWishes LoopTopics::wishes() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(wishes_, {});
+}
+
+long LoopTopics::malformed() const {
+  const std::lock_guard lock(mutex_);
+  return malformed_;
+}
+
+void LoopTopics::draw() {
+  while (true) {
+    std::optional<Drawing> drawing;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return ended_ || to_draw_; });
+      if (ended_) return;
+      drawing = std::exchange(to_draw_, std::nullopt);
+    }
+    CompressedImageMessage message;
+    message.stamp_s = drawing->stamp_s;
+    message.format = "bgr8; jpeg compressed bgr8";
+    cv::imencode(".jpg", draw_overlay(drawing->bgr, rig_, drawing->observations), message.data,
+                 {cv::IMWRITE_JPEG_QUALITY, 80});
+    overlay_(message);
+  }
+}
+
+}  // namespace lapservo::internal

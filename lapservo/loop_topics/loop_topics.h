@@ -1,0 +1,82 @@
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/crtk/transport.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/servo/run.h"
+
+namespace lapservo::internal {
+
+/// What others want of the loop.
+struct LoopWishes {
+  std::optional<bool> hold;                  ///< true: stop; false: start
+  std::optional<Eigen::Vector4d> set_point;  ///< s_rad, r_px, l_px, d_px
+};
+
+/// The loop's topics for those who watch and command it, of the rig's first instrument NAME:
+/// /lapservo/NAME/observation (lapservo_msgs/Observation) and /lapservo/NAME/pose (camera_from_marker, where
+/// camera_from_rcm is known) of every image; /lapservo/NAME/desired and /lapservo/NAME/error (JointState: s_rad, r_px,
+/// l_px, d_px) every tick; /diagnostics (DiagnosticArray) once a second and when something changes;
+/// /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second. It hears
+/// /lapservo/NAME/command (StringStamped: start, stop) and /lapservo/NAME/set_point (JointState: s_rad, r_px, l_px,
+/// d_px).
+class LoopTopics {
+ public:
+  LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame);
+  ~LoopTopics();
+  LoopTopics(const LoopTopics&) = delete;
+  LoopTopics& operator=(const LoopTopics&) = delete;
+
+  /// `state`: the loop's, in words; empty where it tracks.
+  void publish(const ControlTick& tick, const std::string& state);
+  /// What came since the last call. Messages that don't make sense are dropped and counted.
+  LoopWishes wishes();
+  long malformed() const;
+
+ private:
+  void publish_numbers(const ControlTick& tick, double stamp_s);
+  void publish_observation(const ControlTick& tick, double stamp_s);
+  void publish_state(const ControlTick& tick, const std::string& state, double stamp_s);
+  void hear(const StringMessage& command);
+  void hear(const JointMessage& set_point);
+  void draw();
+
+  struct Drawing {
+    double stamp_s = 0;
+    cv::Mat bgr;
+    std::vector<Observation> observations;
+  };
+
+  Transport& transport_;
+  Rig rig_;
+  std::string frame_, last_state_;
+  double next_state_s_ = 0;
+  Transport::Publisher<ObservationMessage> observation_;
+  Transport::Publisher<PoseMessage> pose_;
+  Transport::Publisher<JointMessage> desired_, error_;
+  Transport::Publisher<DiagnosticMessage> diagnostics_;
+  Transport::Publisher<CompressedImageMessage> overlay_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  LoopWishes wishes_;
+  long malformed_ = 0;
+  std::optional<Drawing> to_draw_;
+  double next_drawing_s_ = 0;
+  bool ended_ = false;
+  std::vector<Transport::Subscription> subscriptions_;
+  std::thread thread_;  // last: it uses the others
+};
+
+/// camera_from_marker of a configuration with its covariance from that of theta, phi, rho, psi.
+PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& seen);
+
+}  // namespace lapservo::internal

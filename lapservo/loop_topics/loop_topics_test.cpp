@@ -1,0 +1,135 @@
+#include "lapservo/loop_topics/loop_topics.h"
+
+#include <chrono>
+#include <cmath>
+#include <thread>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+#include "lapservo/crtk/test_transport.h"
+#include "lapservo/testing/rigs.h"
+
+namespace lapservo::internal {
+namespace {
+
+const JointVector there{0.05, 1.57, 0.064, 1.2};
+
+ControlTick tick_of(const Rig& rig) {
+  ControlTick tick;
+  tick.input.time_s = 10.02;
+  tick.input.desired.features = {0.9, 400, 180, 100};
+  tick.decision.control.action = ControlAction::track;
+  tick.decision.control.error = {0.001, 1, 2, 3};
+  tick.decision.control.estimate.emplace();
+  tick.seen.emplace();
+  tick.seen->image = {10, cv::Mat(rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar::all(40))};
+  Observation seen;
+  seen.status = Status::ok;
+  seen.rcm = Observation::Rcm{there, Eigen::Vector4d(1e-6, 2e-6, 1e-8, 4e-6).asDiagonal()};
+  tick.seen->observations = {seen};
+  tick.seen->measurement.found = true;
+  tick.seen->measurement.features = {0.901, 401, 182, 103};
+  return tick;
+}
+
+TEST(LoopTopics, TellsWhatWasSeenAndDecided) {
+  const Rig rig = testing::small_test_rig();
+  TestTransport transport;
+  {
+    LoopTopics topics(transport, rig, "endoscope");
+    topics.publish(tick_of(rig), "");
+    for (int i = 0; i < 6000 && transport.compressed_images("/lapservo/PSM1/overlay/compressed").empty(); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  const auto observations = transport.observations("/lapservo/PSM1/observation");
+  ASSERT_EQ(observations.size(), 1u);
+  const ObservationMessage& seen = observations.front();
+  EXPECT_NEAR(seen.stamp_s, transport.stamp_s - 0.02, 1e-9);  // when the image was, not when it was told
+  EXPECT_EQ(seen.status, "ok");
+  EXPECT_EQ(seen.action, "track");
+  EXPECT_EQ(seen.frame, "endoscope");
+  EXPECT_EQ(seen.q[3], 1.2);
+  EXPECT_EQ(seen.features[2], 182);
+  EXPECT_EQ(seen.q_covariance[15], 4e-6);
+  EXPECT_EQ(seen.error[1], 1);
+  EXPECT_EQ(transport.poses("/lapservo/PSM1/pose").size(), 1u);
+  EXPECT_EQ(transport.joints("/lapservo/PSM1/error").at(0).positions[3], 3);
+  EXPECT_EQ(transport.joints("/lapservo/PSM1/desired").at(0).names[1], "r_px");
+  EXPECT_EQ(transport.diagnostics("/diagnostics").at(0).message, "track");
+  EXPECT_EQ(transport.compressed_images("/lapservo/PSM1/overlay/compressed").size(), 1u);
+}
+
+TEST(LoopTopics, WhatIsNotKnownIsNotANumber) {
+  const Rig rig = testing::small_test_rig();
+  TestTransport transport;
+  LoopTopics topics(transport, rig, "endoscope");
+  ControlTick tick = tick_of(rig);
+  tick.seen->observations[0] = {};
+  tick.seen->measurement = {};
+  tick.decision.control.estimate.reset();
+  tick.decision.control.action = ControlAction::hold;
+  topics.publish(tick, "hold: marker_lost");
+  const ObservationMessage seen = transport.observations("/lapservo/PSM1/observation").at(0);
+  EXPECT_EQ(seen.status, "no_marker");
+  for (const double number : {seen.q[0], seen.features[0], seen.error[0], seen.edges_px[7], seen.q_covariance[5]})
+    EXPECT_TRUE(std::isnan(number));
+  EXPECT_TRUE(transport.poses("/lapservo/PSM1/pose").empty());
+  EXPECT_EQ(transport.diagnostics("/diagnostics").at(0).message, "hold: marker_lost");
+  EXPECT_EQ(transport.diagnostics("/diagnostics").at(0).level, DiagnosticMessage::Level::warning);
+}
+
+// The pose's covariance is that of poses whose joints are drawn from theirs.
+TEST(LoopTopics, ThePosesCovarianceIsThatOfItsSamples) {
+  const Instrument instrument = testing::small_test_rig().instruments.front();
+  const Observation::Rcm seen{there, Eigen::Vector4d(1e-6, 2e-6, 1e-8, 4e-6).asDiagonal()};
+  const PoseMessage mean = pose_message(instrument, seen);
+  const auto rotation = [](const PoseMessage& pose) {
+    return Eigen::Quaterniond(Eigen::Vector4d(pose.quaternion_xyzw.data()));
+  };
+  Random random(1);
+  constexpr int count = 4000;
+  Eigen::Matrix<double, 6, 6> sum = Eigen::Matrix<double, 6, 6>::Zero();
+  for (int k = 0; k < count; ++k) {
+    Eigen::Vector4d q = seen.q.vector();
+    for (int i = 0; i < 4; ++i) q[i] += std::sqrt(seen.covariance(i, i)) * random.normal();
+    const PoseMessage pose = pose_message(instrument, {JointVector::from_vector(q), seen.covariance});
+    const Eigen::AngleAxisd turn(rotation(pose) * rotation(mean).conjugate());
+    Eigen::Matrix<double, 6, 1> error;
+    for (int i = 0; i < 3; ++i)
+      error[i] = pose.position_m[static_cast<std::size_t>(i)] - mean.position_m[static_cast<std::size_t>(i)];
+    error.tail<3>() = turn.angle() * turn.axis();
+    sum += error * error.transpose() / count;
+  }
+  const Eigen::Matrix<double, 6, 6> told = Eigen::Map<const Eigen::Matrix<double, 6, 6>>(mean.covariance.data());
+  for (const int part : {0, 3}) {
+    const Eigen::Matrix3d expected = sum.block(part, part, 3, 3), got = told.block(part, part, 3, 3);
+    EXPECT_LT((expected - got).norm(), 0.1 * got.norm()) << part;
+  }
+}
+
+TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
+  const Rig rig = testing::small_test_rig();
+  TestTransport transport;
+  LoopTopics topics(transport, rig, "endoscope");
+  EXPECT_FALSE(topics.wishes().hold);
+  transport.say("/lapservo/PSM1/command", StringMessage{0, "stop"});
+  EXPECT_EQ(topics.wishes().hold, true);
+  transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
+  EXPECT_EQ(topics.wishes().hold, false);
+  EXPECT_FALSE(topics.wishes().hold);
+  transport.say("/lapservo/PSM1/command", StringMessage{0, "explode"});
+  const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
+  transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, 400, 180, 100}});
+  transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, NAN, 180, 100}});
+  transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, 400, 180}});
+  transport.say("/lapservo/PSM1/set_point", JointMessage{0, {}, {0.9, 400, 180, 100}});
+  const LoopWishes wishes = topics.wishes();
+  ASSERT_TRUE(wishes.set_point);
+  EXPECT_EQ(*wishes.set_point, Eigen::Vector4d(0.9, 400, 180, 100));
+  EXPECT_EQ(topics.malformed(), 4);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

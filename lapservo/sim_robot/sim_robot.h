@@ -1,0 +1,90 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/crtk/transport.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/robot/operating_state.h"
+#include "lapservo/sim/simulator.h"
+
+namespace lapservo::internal {
+
+/// A dVRK PSM's joints as a rig names them; what the shipped rigs have.
+Joints default_joints();
+
+struct SimRobotConfig {
+  std::string arm = "PSM1";           ///< namespace of the CRTK topics
+  std::string camera = "/endoscope";  ///< namespace of image_raw and camera_info
+  double joint_rate_hz = 250;         ///< of measured_js and setpoint_js
+  double state_period_s = 0.5;        ///< of operating_state, which is also said when it changes
+  /// For tests of who steers it: changes what it says.
+  std::function<void(JointMessage&)> alter_measured{};
+  std::function<void(ImageMessage&)> alter_image{};
+};
+
+/// What came over servo_jp while the arm was enabled.
+struct ServoStatistics {
+  long count = 0;
+  Eigen::Vector4d max_step = Eigen::Vector4d::Zero();  ///< of q, from the set-point before: rad, m
+  double last_s = 0;                                   ///< when the last one came, on the simulator's time
+  long wrist_moved = 0, malformed = 0;
+};
+
+/// The simulator behind the topics of a CRTK PSM and its camera: measured_js, setpoint_js, operating_state out,
+/// servo_jp and state_command (enable, disable, pause, resume, home, unhome) in; image_raw, camera_info out. It has two
+/// wrist joints more than the rig names. Starts ENABLED and homed.
+class SimRobot {
+ public:
+  /// The rig's first instrument; its `joints`, or default_joints(). What is passed must outlive it.
+  SimRobot(Transport& transport, const Rig& rig, Simulator& simulator, const SimRobotConfig& config);
+
+  /// Lets the simulator's time pass and says what is due.
+  void advance(double time_s);
+
+  void set_state(OperatingState state);
+  OperatingState operating_state() const;
+  ServoStatistics statistics() const;
+
+ private:
+  void obey(const JointMessage& message);
+  void obey(const StringMessage& command);
+  void apply(Eigen::Vector4d& target);
+  void say_joints();
+  void say_state();
+  void say_images();
+  JointMessage message_of(const Eigen::Vector4d& q) const;
+
+  Transport& transport_;
+  Rig rig_;
+  Simulator& simulator_;
+  SimRobotConfig config_;
+  Joints joints_;
+  std::vector<std::string> names_;
+  std::vector<double> wrist_;
+  Eigen::Vector4d setpoint_;
+  double next_joints_s_ = 0, next_state_s_ = 0, stamp_at_0_s_ = 0;
+
+  mutable std::mutex mutex_;  // of what the transport's threads touch
+  std::optional<Eigen::Vector4d> wanted_;
+  Eigen::Vector4d last_wanted_;
+  ServoStatistics statistics_;
+  OperatingState state_ = OperatingState::enabled;
+  bool homed_ = true;
+  std::atomic<bool> state_changed_ = true;
+  double now_s_ = 0;
+
+  Transport::Publisher<JointMessage> measured_js_, setpoint_js_;
+  Transport::Publisher<OperatingStateMessage> operating_state_;
+  Transport::Publisher<ImageMessage> image_;
+  Transport::Publisher<CameraInfoMessage> camera_info_;
+  std::vector<Transport::Subscription> subscriptions_;  // last: they use the others
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,100 @@
+#include "lapservo/sim_robot/sim_robot.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/crtk/image_receiver.h"
+#include "lapservo/crtk/interlock.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/crtk/test_transport.h"
+#include "lapservo/testing/rigs.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Both sides of the topics in memory, on one time that passes as the test says.
+class Room {
+ public:
+  Room() : rig(testing::small_test_rig()), simulator(rig, simulated(), {0.05, 1.57, 0.064, 1.2}) {
+    InterlockConfig config;
+    config.joints = default_joints();
+    config.motion_enabled = true;
+    interlock.emplace(config);
+    robot.emplace(transport, rig, simulator, SimRobotConfig{});
+    subscriptions.push_back(transport.subscribe_joints(
+        "/PSM1/measured_js", [this](JointMessage&& message) { interlock->on_measured(message, now_s); }));
+    subscriptions.push_back(transport.subscribe_joints(
+        "/PSM1/setpoint_js", [this](JointMessage&& message) { interlock->on_setpoint(message, now_s); }));
+    subscriptions.push_back(transport.subscribe_operating_state(
+        "/PSM1/operating_state", [this](OperatingStateMessage&& message) { interlock->on_operating_state(message); }));
+    subscriptions.push_back(transport.subscribe_images(
+        "/endoscope/image_raw", [this](ImageMessage&& message) { images.receive(std::move(message), now_s); }));
+  }
+  static SimulatorConfig simulated() {
+    SimulatorConfig config;
+    config.endoscope.frame_rate_hz = 30;
+    return config;
+  }
+  // The topics' two ends and the loop's, once each millisecond.
+  void pass(double duration_s, const Eigen::Vector4d& velocity) {
+    for (const double end_s = now_s + duration_s; now_s < end_s; now_s += 0.001) {
+      transport.stamp_s = 1.7e9 + now_s;
+      robot->advance(now_s);
+      transport.deliver();
+      const JointState state = interlock->state(now_s);
+      if (state.operating_state != OperatingState::enabled) {
+        path.reset(now_s, state.q.vector());
+      } else {
+        path.ramp_to(now_s, velocity, 0.01);
+        interlock->follow(path);
+      }
+      if (const auto sent = interlock->tick(now_s))
+        transport.say("/PSM1/servo_jp", JointMessage{transport.stamp_s, interlock->names(), *sent});
+      taken += images.newest().has_value();
+    }
+  }
+
+  Rig rig;
+  Simulator simulator;
+  TestTransport transport;
+  std::optional<Interlock> interlock;
+  std::optional<SimRobot> robot;
+  ImageReceiver images{640, 360};
+  JointPath path{JointLimits().acceleration};
+  std::vector<Transport::Subscription> subscriptions;
+  double now_s = 0;
+  int taken = 0;
+};
+
+TEST(SimRobot, IsMovedThroughItsTopicsAndShowsItself) {
+  Room room;
+  const Eigen::Vector4d start = room.simulator.measured_jp(), velocity(0.05, -0.05, 0.005, 0.1);
+  room.pass(1.1, velocity);
+  EXPECT_TRUE((room.simulator.measured_jp() - start).isApprox(velocity, 0.15));
+  EXPECT_NEAR(room.taken, 30, 3);
+  EXPECT_EQ(room.images.counts().text(), "");
+  const ServoStatistics statistics = room.robot->statistics();
+  EXPECT_GT(statistics.count, 900);
+  EXPECT_EQ(statistics.wrist_moved, 0);
+  EXPECT_EQ(statistics.malformed, 0);
+  EXPECT_TRUE((statistics.max_step.array() <= JointLimits().rate.array() * 0.002 + 1e-9).all());
+}
+
+TEST(SimRobot, ObeysStateCommandsAndNothingWhilePaused) {
+  Room room;
+  room.pass(0.2, {0.05, 0, 0, 0});
+  room.transport.say("/PSM1/state_command", StringMessage{0, "pause"});
+  room.pass(0.01, {0.05, 0, 0, 0});
+  const long count = room.robot->statistics().count;
+  const Eigen::Vector4d paused = room.simulator.measured_jp();
+  room.pass(0.5, {0.05, 0, 0, 0});
+  EXPECT_EQ(room.robot->statistics().count, count);
+  EXPECT_LT((room.simulator.measured_jp() - paused).norm(), 2e-3);
+  room.transport.say("/PSM1/state_command", StringMessage{0, "resume"});
+  room.pass(0.5, {0.05, 0, 0, 0});
+  EXPECT_GT(room.robot->statistics().count, count + 300);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,201 @@
+#include "transports/ros2/dds_node.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <stdexcept>
+
+#include "ros2_messages.h"
+#include "transports/ros2/ros2_names.h"
+
+namespace lapservo::internal {
+namespace {
+
+dds_entity_t checked(dds_entity_t entity, const char* what) {
+  if (entity < 0) throw std::runtime_error(std::string("DDS: ") + what + ": " + dds_strretcode(-entity));
+  return entity;
+}
+
+struct DeleteQos {
+  void operator()(dds_qos_t* qos) const { dds_delete_qos(qos); }
+};
+using Qos = std::unique_ptr<dds_qos_t, DeleteQos>;
+
+Qos qos_of(Delivery delivery) {
+  Qos qos(dds_create_qos());
+  const bool reliable = delivery != Delivery::best_effort;
+  dds_qset_reliability(qos.get(), reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_MSECS(100));
+  dds_qset_durability(qos.get(),
+                      delivery == Delivery::latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
+  const int depth = delivery == Delivery::latched ? 1 : delivery == Delivery::reliable ? 10 : 5;
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  const dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
+  dds_qset_data_representation(qos.get(), 1, &xcdr1);
+  return qos;
+}
+
+// Whole pictures in few packets and a receive buffer for some of them (as far as net.core.rmem_max goes), unless
+// CYCLONEDDS_URI says otherwise; what it says comes last and counts. Loopback often has no multicast: those on it are
+// asked one by one.
+std::string configuration() {
+  std::string general = "<MaxMessageSize>65500B</MaxMessageSize>", discovery;
+  const char* const localhost = std::getenv("ROS_LOCALHOST_ONLY");
+  if (localhost && std::string(localhost) == "1") {
+    general += "<Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces>";
+    discovery =
+        "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
+        "<Peers><Peer address=\"127.0.0.1\"/></Peers>";
+  }
+  const std::string text =
+      "<CycloneDDS><Domain id=\"any\"><General>" + general + "</General><Discovery>" + discovery +
+      "</Discovery><Internal><SocketReceiveBufferSize min=\"default\" max=\"16MB\"/></Internal></Domain></CycloneDDS>";
+  const char* const own = std::getenv("CYCLONEDDS_URI");
+  return own && *own ? text + "," + own : text;
+}
+
+// Errors only: it warns of every loopback without multicast.
+void log_sink(void*, const dds_log_data_t* data) {
+  if (data->priority & (DDS_LC_ERROR | DDS_LC_FATAL))
+    std::fprintf(stderr, "DDS: %.*s\n", static_cast<int>(data->size), data->message);
+}
+
+// One a process and number, configured before its first participant.
+class Domains {
+ public:
+  ~Domains() {
+    for (const auto& [id, domain] : domains_) dds_delete(domain);
+  }
+  void need(std::uint32_t id) {
+    const std::lock_guard lock(mutex_);
+    if (domains_.empty()) dds_set_log_sink(log_sink, nullptr);
+    if (!domains_.count(id))
+      domains_[id] = checked(dds_create_domain(id, configuration().c_str()), "domain (see CYCLONEDDS_URI)");
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<std::uint32_t, dds_entity_t> domains_;
+};
+
+dds_entity_t create_participant(std::uint32_t domain) {
+  static Domains domains;
+  domains.need(domain);
+  const Qos qos(dds_create_qos());
+  const std::string enclave = "enclave=/;";  // without it ROS 2 takes the participant for none of its own
+  dds_qset_userdata(qos.get(), enclave.data(), enclave.size());
+  return checked(dds_create_participant(domain, qos.get(), nullptr), "participant");
+}
+
+// Up to Humble a Gid had 24 bytes.
+bool has_wide_gids() {
+  const char* const distro = std::getenv("ROS_DISTRO");
+  const std::string name = distro ? distro : "";
+  return name == "humble" || name == "galactic" || name == "foxy";
+}
+
+// ParticipantEntitiesInfo, in either width.
+template <typename Info, typename Node, typename Gid>
+class Announcement {
+ public:
+  Announcement(const std::string& name, dds_entity_t participant, const std::vector<dds_entity_t>& readers,
+               const std::vector<dds_entity_t>& writers)
+      : readers_(gids(readers)), writers_(gids(writers)) {
+    node_.node_namespace_[0] = '/';
+    name.copy(node_.node_name_, sizeof node_.node_name_ - 1);
+    node_.reader_gid_seq_._length = node_.reader_gid_seq_._maximum = static_cast<std::uint32_t>(readers_.size());
+    node_.reader_gid_seq_._buffer = readers_.data();
+    node_.writer_gid_seq_._length = node_.writer_gid_seq_._maximum = static_cast<std::uint32_t>(writers_.size());
+    node_.writer_gid_seq_._buffer = writers_.data();
+    info_.gid_ = gid(participant);
+    info_.node_entities_info_seq_._length = info_.node_entities_info_seq_._maximum = 1;
+    info_.node_entities_info_seq_._buffer = &node_;
+  }
+  Announcement(const Announcement&) = delete;
+  Announcement& operator=(const Announcement&) = delete;
+  void write(dds_entity_t writer) const { dds_write(writer, &info_); }
+
+ private:
+  static Gid gid(dds_entity_t entity) {
+    Gid gid{};
+    dds_guid_t guid{};
+    dds_get_guid(entity, &guid);
+    std::memcpy(gid.data_, guid.v, sizeof guid.v);
+    return gid;
+  }
+  static std::vector<Gid> gids(const std::vector<dds_entity_t>& entities) {
+    std::vector<Gid> all;
+    for (const dds_entity_t entity : entities) all.push_back(gid(entity));
+    return all;
+  }
+
+  std::vector<Gid> readers_, writers_;
+  Node node_{};
+  Info info_{};
+};
+using Announced = Announcement<rmw_dds_common_msg_dds__ParticipantEntitiesInfo_,
+                               rmw_dds_common_msg_dds__NodeEntitiesInfo_, rmw_dds_common_msg_dds__Gid_>;
+using WideAnnounced =
+    Announcement<rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_,
+                 rmw_dds_common_humble_msg_dds__NodeEntitiesInfo_, rmw_dds_common_humble_msg_dds__Gid_>;
+
+}  // namespace
+
+DdsNode::DdsNode(const std::string& node_name, std::uint32_t domain)
+    : name_(node_name), participant_(create_participant(domain)), wide_gids_(has_wide_gids()) {
+  dds_topic_descriptor_t type = wide_gids_ ? rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc
+                                           : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
+  type.m_typename = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
+  const dds_entity_t topic = create_topic("ros_discovery_info", type);
+  discovery_ = checked(dds_create_writer(participant_, topic, qos_of(Delivery::latched).get(), nullptr), "writer");
+  announce();
+}
+
+DdsNode::~DdsNode() {
+  dds_delete(participant_);
+}
+
+dds_entity_t DdsNode::create_topic(const std::string& dds_name, const dds_topic_descriptor_t& type) {
+  return checked(dds_create_topic(participant_, &type, dds_name.c_str(), nullptr, nullptr), "topic");
+}
+
+dds_entity_t DdsNode::create_writer(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery) {
+  const dds_entity_t on = create_topic(dds_topic_name(topic), type);
+  const dds_entity_t writer = checked(dds_create_writer(participant_, on, qos_of(delivery).get(), nullptr), "writer");
+  dds_delete(on);  // the writer keeps it
+  const std::lock_guard lock(mutex_);
+  writers_.push_back(writer);
+  announce();
+  return writer;
+}
+
+dds_entity_t DdsNode::create_reader(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery) {
+  const Qos qos = qos_of(delivery);
+  dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
+  const dds_entity_t on = create_topic(dds_topic_name(topic), type);
+  const dds_entity_t reader = checked(dds_create_reader(participant_, on, qos.get(), nullptr), "reader");
+  dds_delete(on);
+  const std::lock_guard lock(mutex_);
+  readers_.push_back(reader);
+  announce();
+  return reader;
+}
+
+void DdsNode::remove(dds_entity_t entity) {
+  const std::lock_guard lock(mutex_);
+  for (auto* list : {&readers_, &writers_}) list->erase(std::remove(list->begin(), list->end(), entity), list->end());
+  announce();
+  dds_delete(entity);
+}
+
+void DdsNode::announce() {
+  if (wide_gids_) {
+    WideAnnounced(name_, participant_, readers_, writers_).write(discovery_);
+  } else {
+    Announced(name_, participant_, readers_, writers_).write(discovery_);
+  }
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <dds/dds.h>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace lapservo::internal {
+
+/// How a topic's messages are kept and passed on: ROS 2's profiles.
+enum class Delivery {
+  reliable,     ///< the default: reliable, volatile, the last 10
+  best_effort,  ///< sensor data: best effort, volatile, the last 5
+  latched,      ///< reliable, transient local, the last 1
+};
+
+/// A DDS participant that ROS 2's tools list as a node: each reader and writer is announced on ros_discovery_info.
+/// Errors of the middleware are std::runtime_error.
+class DdsNode {
+ public:
+  DdsNode(const std::string& node_name, std::uint32_t domain);
+  ~DdsNode();
+  DdsNode(const DdsNode&) = delete;
+  DdsNode& operator=(const DdsNode&) = delete;
+
+  /// `topic` as in ROS.
+  dds_entity_t create_writer(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery);
+  /// Without what this node's own writers send.
+  dds_entity_t create_reader(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery);
+  /// Of a reader or writer.
+  void remove(dds_entity_t entity);
+
+  dds_entity_t participant() const { return participant_; }
+
+ private:
+  dds_entity_t create_topic(const std::string& dds_name, const dds_topic_descriptor_t& type);
+  void announce();
+
+  std::string name_;
+  dds_entity_t participant_ = 0, discovery_ = 0;
+  bool wide_gids_ = false;
+  std::mutex mutex_;
+  std::vector<dds_entity_t> readers_, writers_;
+};
+
+}  // namespace lapservo::internal

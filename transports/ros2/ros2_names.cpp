@@ -1,0 +1,48 @@
+#include "transports/ros2/ros2_names.h"
+
+#include <charconv>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::internal {
+namespace {
+
+bool is_letter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+}
+bool is_digit(char c) {
+  return c >= '0' && c <= '9';
+}
+
+// Words of letters, digits and underscores between single slashes, none beginning with a digit.
+bool is_topic(const std::string& name) {
+  if (name.size() < 2 || name.size() > 200 || name.back() == '/') return false;
+  char before = 0;
+  for (const char c : name) {
+    if (!is_letter(c) && !is_digit(c) && c != '/') return false;
+    if (before == '/' && !is_letter(c)) return false;
+    before = c;
+  }
+  return true;
+}
+
+}  // namespace
+
+std::string dds_topic_name(const std::string& topic) {
+  const std::string name = !topic.empty() && topic.front() == '/' ? topic : "/" + topic;
+  if (!is_topic(name))
+    throw InputError("topic", "is " + topic + ", expected names of letters, digits and _ between slashes");
+  return "rt" + name;
+}
+
+std::uint32_t domain_id(const std::string& text) {
+  constexpr std::uint32_t max_id = 232;
+  if (text.empty()) return 0;
+  std::uint32_t id = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+  if (error != std::errc() || end != text.data() + text.size() || id > max_id)
+    throw InputError("ROS_DOMAIN_ID", "is " + text + ", expected 0 to 232");
+  return id;
+}
+
+}  // namespace lapservo::internal

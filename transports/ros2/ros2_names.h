@@ -1,0 +1,15 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace lapservo::internal {
+
+/// The DDS topic of a ROS 2 topic: "rt/PSM1/measured_js" of "/PSM1/measured_js" or, in the root namespace,
+/// "PSM1/measured_js". Throws InputError for what is no name of a topic.
+std::string dds_topic_name(const std::string& topic);
+
+/// The domain that a text, as in ROS_DOMAIN_ID, names: 0 to 232, 0 for an empty one. Throws InputError.
+std::uint32_t domain_id(const std::string& text);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,26 @@
+#include "transports/ros2/ros2_names.h"
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/input_error.h"
+
+namespace lapservo::internal {
+namespace {
+
+TEST(Ros2Names, TopicsAreMangledAsRos2Does) {
+  EXPECT_EQ(dds_topic_name("/PSM1/measured_js"), "rt/PSM1/measured_js");
+  EXPECT_EQ(dds_topic_name("camera/image_raw"), "rt/camera/image_raw");
+  for (const char* wrong : {"", "/", "//a", "/a//b", "/a/", "/1a", "/a b", "/a\nb", "/a-b", "rt/<x>"})
+    EXPECT_NE(testing::input_error([&] { dds_topic_name(wrong); }), "") << wrong;
+}
+
+TEST(Ros2Names, Domains) {
+  EXPECT_EQ(domain_id(""), 0u);
+  EXPECT_EQ(domain_id("42"), 42u);
+  EXPECT_EQ(domain_id("232"), 232u);
+  for (const char* wrong : {"233", "-1", "1x", " 1", "99999999999"})
+    EXPECT_NE(testing::input_error([&] { domain_id(wrong); }), "") << wrong;
+}
+
+}  // namespace
+}  // namespace lapservo::internal

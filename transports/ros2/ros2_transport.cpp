@@ -1,0 +1,185 @@
+#include "transports/ros2/ros2_transport.h"
+
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "transports/ros2/dds_node.h"
+#include "transports/ros2/ros2_names.h"
+#include "transports/ros2/wire.h"
+
+namespace lapservo::internal {
+namespace {
+
+std::uint32_t domain_of_environment() {
+  const char* const id = std::getenv("ROS_DOMAIN_ID");
+  return domain_id(id ? id : "");
+}
+
+// What one writer wrote reaches readers of different QoS each on its own way: the first counts.
+class Sieve {
+ public:
+  bool is_new(const dds_sample_info_t& info) {
+    const auto [last, first] = last_.try_emplace(info.publication_handle, info.source_timestamp);
+    if (first) return true;
+    if (info.source_timestamp <= last->second) return false;
+    last->second = info.source_timestamp;
+    return true;
+  }
+
+ private:
+  std::map<dds_instance_handle_t, dds_time_t> last_;
+};
+
+// Readers of a topic with the thread that takes from them.
+class Reading {
+ public:
+  using Taken = std::function<void(const void*)>;
+  Reading(std::shared_ptr<DdsNode> node, const std::string& topic, const dds_topic_descriptor_t& type,
+          const std::vector<Delivery>& deliveries, Taken taken)
+      : node_(std::move(node)), taken_(std::move(taken)), waitset_(dds_create_waitset(node_->participant())) {
+    dds_waitset_attach(waitset_, waitset_, 0);
+    for (const Delivery delivery : deliveries) {
+      readers_.push_back(node_->create_reader(topic, type, delivery));
+      const dds_entity_t condition = dds_create_readcondition(readers_.back(), DDS_ANY_STATE);
+      dds_waitset_attach(waitset_, condition, 0);
+    }
+    thread_ = std::thread([this] { work(); });
+  }
+  ~Reading() {
+    dds_waitset_set_trigger(waitset_, true);
+    thread_.join();
+    dds_delete(waitset_);
+    for (const dds_entity_t reader : readers_) node_->remove(reader);
+  }
+  Reading(const Reading&) = delete;
+  Reading& operator=(const Reading&) = delete;
+
+ private:
+  void work() {
+    while (true) {
+      dds_waitset_wait(waitset_, nullptr, 0, DDS_INFINITY);
+      if (dds_triggered(waitset_) > 0) return;
+      for (const dds_entity_t reader : readers_) take(reader);
+    }
+  }
+  void take(dds_entity_t reader) {
+    constexpr int at_once = 16;
+    std::array<void*, at_once> samples{};
+    std::array<dds_sample_info_t, at_once> infos;
+    const int count = dds_take(reader, samples.data(), infos.data(), at_once, at_once);
+    if (count <= 0) return;
+    for (int i = 0; i < count; ++i)
+      if (infos[i].valid_data && sieve_.is_new(infos[i])) taken_(samples[i]);
+    dds_return_loan(reader, samples.data(), count);
+  }
+
+  std::shared_ptr<DdsNode> node_;
+  Taken taken_;
+  dds_entity_t waitset_;
+  std::vector<dds_entity_t> readers_;
+  Sieve sieve_;
+  std::thread thread_;
+};
+
+}  // namespace
+
+class Ros2Transport::Implementation {
+ public:
+  explicit Implementation(const std::string& node_name)
+      : node_(std::make_shared<DdsNode>(node_name, domain_of_environment())) {}
+
+  template <typename Message>
+  Publisher<Message> publisher(const std::string& topic, Delivery delivery) {
+    const dds_entity_t writer = node_->create_writer(topic, Wire<Message>::descriptor(), delivery);
+    const std::shared_ptr<void> end(nullptr, [node = node_, writer](void*) { node->remove(writer); });
+    return [writer, end](const Message& message) { Wire<Message>::write(writer, message); };
+  }
+
+  template <typename Message>
+  Subscription subscribe(const std::string& topic, const std::vector<Delivery>& deliveries,
+                         const Handler<Message>& handler) {
+    return std::make_shared<Reading>(
+        node_, topic, Wire<Message>::descriptor(), deliveries, [handler](const void* wire) {
+          handler(Wire<Message>::read(*static_cast<const typename Wire<Message>::Type*>(wire)));
+        });
+  }
+
+ private:
+  std::shared_ptr<DdsNode> node_;
+};
+
+Ros2Transport::Ros2Transport(const std::string& node_name)
+    : implementation_(std::make_shared<Implementation>(node_name)) {}
+
+Ros2Transport::~Ros2Transport() = default;
+
+double Ros2Transport::stamp_now_s() const {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+Transport::Publisher<JointMessage> Ros2Transport::joint_publisher(const std::string& topic) {
+  return implementation_->publisher<JointMessage>(topic, Delivery::reliable);
+}
+
+Transport::Publisher<OperatingStateMessage> Ros2Transport::operating_state_publisher(const std::string& topic) {
+  return implementation_->publisher<OperatingStateMessage>(topic, Delivery::latched);
+}
+
+Transport::Publisher<StringMessage> Ros2Transport::string_publisher(const std::string& topic) {
+  return implementation_->publisher<StringMessage>(topic, Delivery::reliable);
+}
+
+Transport::Publisher<ImageMessage> Ros2Transport::image_publisher(const std::string& topic) {
+  return implementation_->publisher<ImageMessage>(topic, Delivery::best_effort);
+}
+
+Transport::Publisher<CompressedImageMessage> Ros2Transport::compressed_image_publisher(const std::string& topic) {
+  return implementation_->publisher<CompressedImageMessage>(topic, Delivery::best_effort);
+}
+
+Transport::Publisher<CameraInfoMessage> Ros2Transport::camera_info_publisher(const std::string& topic) {
+  return implementation_->publisher<CameraInfoMessage>(topic, Delivery::reliable);
+}
+
+Transport::Publisher<PoseMessage> Ros2Transport::pose_publisher(const std::string& topic) {
+  return implementation_->publisher<PoseMessage>(topic, Delivery::reliable);
+}
+
+Transport::Publisher<DiagnosticMessage> Ros2Transport::diagnostic_publisher(const std::string& topic) {
+  return implementation_->publisher<DiagnosticMessage>(topic, Delivery::reliable);
+}
+
+Transport::Publisher<ObservationMessage> Ros2Transport::observation_publisher(const std::string& topic) {
+  return implementation_->publisher<ObservationMessage>(topic, Delivery::reliable);
+}
+
+Transport::Subscription Ros2Transport::subscribe_joints(const std::string& topic, Handler<JointMessage> handler) {
+  return implementation_->subscribe<JointMessage>(topic, {Delivery::best_effort}, handler);
+}
+
+Transport::Subscription Ros2Transport::subscribe_operating_state(const std::string& topic,
+                                                                 Handler<OperatingStateMessage> handler) {
+  return implementation_->subscribe<OperatingStateMessage>(
+      topic, {Delivery::latched, Delivery::reliable, Delivery::best_effort}, handler);
+}
+
+Transport::Subscription Ros2Transport::subscribe_strings(const std::string& topic, Handler<StringMessage> handler) {
+  return implementation_->subscribe<StringMessage>(topic, {Delivery::reliable, Delivery::best_effort}, handler);
+}
+
+Transport::Subscription Ros2Transport::subscribe_images(const std::string& topic, Handler<ImageMessage> handler) {
+  return implementation_->subscribe<ImageMessage>(topic, {Delivery::best_effort}, handler);
+}
+
+Transport::Subscription Ros2Transport::subscribe_compressed_images(const std::string& topic,
+                                                                   Handler<CompressedImageMessage> handler) {
+  return implementation_->subscribe<CompressedImageMessage>(topic, {Delivery::best_effort}, handler);
+}
+
+}  // namespace lapservo::internal

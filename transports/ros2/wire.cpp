@@ -1,0 +1,185 @@
+#include "transports/ros2/wire.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace lapservo::internal {
+namespace {
+
+// What is written points into the message: dds_write() copies, and takes nothing away.
+char* pointer(const std::string& text) {
+  return const_cast<char*>(text.c_str());
+}
+template <typename Sequence, typename T>
+void point(Sequence& sequence, const std::vector<T>& values) {
+  sequence._length = sequence._maximum = static_cast<std::uint32_t>(values.size());
+  sequence._buffer = const_cast<T*>(values.data());
+  sequence._release = false;
+}
+
+builtin_interfaces_msg_dds__Time_ time_of(double stamp_s) {
+  builtin_interfaces_msg_dds__Time_ time{};
+  const double whole = std::floor(stamp_s);
+  time.sec_ = static_cast<std::int32_t>(whole);
+  time.nanosec_ = static_cast<std::uint32_t>(std::min(std::round((stamp_s - whole) * 1e9), 999999999.0));
+  return time;
+}
+
+template <typename Type>
+Type with_header(double stamp_s) {
+  static char no_frame[1] = "";
+  Type wire{};
+  wire.header_.stamp_ = time_of(stamp_s);
+  wire.header_.frame_id_ = no_frame;
+  return wire;
+}
+
+double stamp_of(const std_msgs_msg_dds__Header_& header) {
+  if (header.stamp_.nanosec_ >= 1000000000u) return std::numeric_limits<double>::quiet_NaN();
+  return header.stamp_.sec_ + 1e-9 * header.stamp_.nanosec_;
+}
+
+std::string text_of(const char* text) {
+  return text ? text : "";
+}
+
+template <typename Sequence>
+auto vector_of(const Sequence& sequence) {
+  using T = std::decay_t<decltype(*sequence._buffer)>;
+  return std::vector<T>(sequence._buffer, sequence._buffer + sequence._length);
+}
+
+}  // namespace
+
+void Wire<JointMessage>::write(dds_entity_t writer, const JointMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  std::vector<char*> names;
+  for (const std::string& name : message.names) names.push_back(pointer(name));
+  point(wire.name_, names);
+  point(wire.position_, message.positions);
+  dds_write(writer, &wire);
+}
+
+JointMessage Wire<JointMessage>::read(const Type& wire) {
+  JointMessage message{stamp_of(wire.header_), {}, vector_of(wire.position_)};
+  for (std::uint32_t i = 0; i < wire.name_._length; ++i) message.names.push_back(text_of(wire.name_._buffer[i]));
+  return message;
+}
+
+void Wire<OperatingStateMessage>::write(dds_entity_t writer, const OperatingStateMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.state_ = pointer(message.state);
+  wire.is_homed_ = message.is_homed;
+  wire.is_busy_ = message.is_busy;
+  dds_write(writer, &wire);
+}
+
+OperatingStateMessage Wire<OperatingStateMessage>::read(const Type& wire) {
+  return {stamp_of(wire.header_), text_of(wire.state_), wire.is_homed_, wire.is_busy_};
+}
+
+void Wire<StringMessage>::write(dds_entity_t writer, const StringMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.string_ = pointer(message.text);
+  dds_write(writer, &wire);
+}
+
+StringMessage Wire<StringMessage>::read(const Type& wire) {
+  return {stamp_of(wire.header_), text_of(wire.string_)};
+}
+
+void Wire<ImageMessage>::write(dds_entity_t writer, const ImageMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.height_ = message.height;
+  wire.width_ = message.width;
+  wire.encoding_ = pointer(message.encoding);
+  wire.is_bigendian_ = message.is_bigendian;
+  wire.step_ = message.step;
+  point(wire.data_, message.data);
+  dds_write(writer, &wire);
+}
+
+ImageMessage Wire<ImageMessage>::read(const Type& wire) {
+  ImageMessage message;
+  message.stamp_s = stamp_of(wire.header_);
+  message.width = wire.width_;
+  message.height = wire.height_;
+  message.step = wire.step_;
+  message.encoding = text_of(wire.encoding_);
+  message.is_bigendian = wire.is_bigendian_ != 0;
+  message.data = vector_of(wire.data_);
+  return message;
+}
+
+void Wire<CompressedImageMessage>::write(dds_entity_t writer, const CompressedImageMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.format_ = pointer(message.format);
+  point(wire.data_, message.data);
+  dds_write(writer, &wire);
+}
+
+CompressedImageMessage Wire<CompressedImageMessage>::read(const Type& wire) {
+  return {stamp_of(wire.header_), text_of(wire.format_), vector_of(wire.data_)};
+}
+
+void Wire<CameraInfoMessage>::write(dds_entity_t writer, const CameraInfoMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  static char model[] = "plumb_bob";
+  wire.height_ = message.height;
+  wire.width_ = message.width;
+  wire.distortion_model_ = model;
+  point(wire.d_, message.d);
+  std::copy(message.k.begin(), message.k.end(), wire.k_);
+  for (const int i : {0, 4, 8}) wire.r_[i] = 1;
+  for (int i = 0; i < 9; ++i) wire.p_[i + i / 3] = message.k[i];
+  dds_write(writer, &wire);
+}
+
+void Wire<PoseMessage>::write(dds_entity_t writer, const PoseMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.header_.frame_id_ = pointer(message.frame);
+  const auto& [x, y, z] = message.position_m;
+  wire.pose_.pose_.position_ = {x, y, z};
+  const auto& q = message.quaternion_xyzw;
+  wire.pose_.pose_.orientation_ = {q[0], q[1], q[2], q[3]};
+  std::copy(message.covariance.begin(), message.covariance.end(), wire.pose_.covariance_);
+  dds_write(writer, &wire);
+}
+
+void Wire<DiagnosticMessage>::write(dds_entity_t writer, const DiagnosticMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  std::vector<diagnostic_msgs_msg_dds__KeyValue_> values;
+  for (const auto& [key, value] : message.values) values.push_back({pointer(key), pointer(value)});
+  static char no_hardware[1] = "";
+  diagnostic_msgs_msg_dds__DiagnosticStatus_ status{};
+  status.level_ = static_cast<std::uint8_t>(message.level);
+  status.name_ = pointer(message.name);
+  status.message_ = pointer(message.message);
+  status.hardware_id_ = no_hardware;
+  point(status.values_, values);
+  wire.status_._length = wire.status_._maximum = 1;
+  wire.status_._buffer = &status;
+  dds_write(writer, &wire);
+}
+
+void Wire<ObservationMessage>::write(dds_entity_t writer, const ObservationMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  wire.header_.frame_id_ = pointer(message.frame);
+  wire.instrument_ = pointer(message.instrument);
+  wire.status_ = pointer(message.status);
+  wire.action_ = pointer(message.action);
+  wire.reason_ = pointer(message.reason);
+  const auto fill = [](const auto& values, double* to) { std::copy(values.begin(), values.end(), to); };
+  fill(message.q, wire.q_);
+  fill(message.q_covariance, wire.q_covariance_);
+  fill(message.features, wire.features_);
+  fill(message.feature_covariance, wire.feature_covariance_);
+  fill(message.edges_px, wire.edges_px_);
+  fill(message.error, wire.error_);
+  dds_write(writer, &wire);
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <dds/dds.h>
+
+#include "lapservo/crtk/messages.h"
+#include "ros2_messages.h"
+
+namespace lapservo::internal {
+
+/// A message as ROS 2's type on the wire: its descriptor, how it is written, and what is read of it. Reading copies.
+template <typename Message>
+struct Wire;
+
+template <>
+struct Wire<JointMessage> {
+  using Type = sensor_msgs_msg_dds__JointState_;
+  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__JointState__desc; }
+  static void write(dds_entity_t writer, const JointMessage& message);
+  static JointMessage read(const Type& wire);
+};
+
+template <>
+struct Wire<OperatingStateMessage> {
+  using Type = crtk_msgs_msg_dds__OperatingState_;
+  static const dds_topic_descriptor_t& descriptor() { return crtk_msgs_msg_dds__OperatingState__desc; }
+  static void write(dds_entity_t writer, const OperatingStateMessage& message);
+  static OperatingStateMessage read(const Type& wire);
+};
+
+template <>
+struct Wire<StringMessage> {
+  using Type = crtk_msgs_msg_dds__StringStamped_;
+  static const dds_topic_descriptor_t& descriptor() { return crtk_msgs_msg_dds__StringStamped__desc; }
+  static void write(dds_entity_t writer, const StringMessage& message);
+  static StringMessage read(const Type& wire);
+};
+
+template <>
+struct Wire<ImageMessage> {
+  using Type = sensor_msgs_msg_dds__Image_;
+  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__Image__desc; }
+  static void write(dds_entity_t writer, const ImageMessage& message);
+  static ImageMessage read(const Type& wire);
+};
+
+template <>
+struct Wire<CompressedImageMessage> {
+  using Type = sensor_msgs_msg_dds__CompressedImage_;
+  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__CompressedImage__desc; }
+  static void write(dds_entity_t writer, const CompressedImageMessage& message);
+  static CompressedImageMessage read(const Type& wire);
+};
+
+template <>
+struct Wire<CameraInfoMessage> {
+  using Type = sensor_msgs_msg_dds__CameraInfo_;
+  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__CameraInfo__desc; }
+  static void write(dds_entity_t writer, const CameraInfoMessage& message);
+};
+
+template <>
+struct Wire<PoseMessage> {
+  using Type = geometry_msgs_msg_dds__PoseWithCovarianceStamped_;
+  static const dds_topic_descriptor_t& descriptor() { return geometry_msgs_msg_dds__PoseWithCovarianceStamped__desc; }
+  static void write(dds_entity_t writer, const PoseMessage& message);
+};
+
+template <>
+struct Wire<DiagnosticMessage> {
+  using Type = diagnostic_msgs_msg_dds__DiagnosticArray_;
+  static const dds_topic_descriptor_t& descriptor() { return diagnostic_msgs_msg_dds__DiagnosticArray__desc; }
+  static void write(dds_entity_t writer, const DiagnosticMessage& message);
+};
+
+template <>
+struct Wire<ObservationMessage> {
+  using Type = lapservo_msgs_msg_dds__Observation_;
+  static const dds_topic_descriptor_t& descriptor() { return lapservo_msgs_msg_dds__Observation__desc; }
+  static void write(dds_entity_t writer, const ObservationMessage& message);
+};
+
+}  // namespace lapservo::internal
