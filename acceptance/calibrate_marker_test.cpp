@@ -1,7 +1,6 @@
 // Prints as hands make them (bands off by 0.3 mm, 3 degrees of wrap, 1 mm of gap), rendered over a slow turn,
 // calibrated, and tracked in other places with the calibrated rig. LAPSERVO_PRINTS, LAPSERVO_PRINT_SEED and
-// LAPSERVO_TURN_FRAMES set how many (2), which, and of how many frames (90; the figures of docs/calibration.md are of
-// 20 prints and 180 frames).
+// LAPSERVO_TURN_FRAMES set how many (2), which, and of how many frames (90).
 
 #include <cmath>
 #include <cstdio>

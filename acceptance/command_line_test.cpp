@@ -379,5 +379,74 @@ TEST_F(CommandLine, HelpShowsExamples) {
   EXPECT_EQ(run("fly"), 2);
 }
 
+// A turn of a print that is not the rig's: the marker is wrapped askew, and joints say where its seam lies.
+TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
+  constexpr int frames = 48;
+  const std::string plain = read(rig_);
+  const auto with = [&](const std::string& bands, const std::string& more) {
+    std::string text = plain;
+    const auto replace = [&](const std::string& from, const std::string& to) {
+      const auto at = text.find(from);
+      ASSERT_NE(at, std::string::npos) << from;
+      text.replace(at, from.size(), to);
+    };
+    if (!bands.empty()) replace("bands_upper_m: [0.0035, 0.0035, 0.017]", "bands_upper_m: " + bands);
+    replace("seam_rad: 0.0", "seam_rad: 0.0" + more);
+    return text +
+           "    joints: {names: [yaw, pitch, insertion, roll], sign: [1, 1, 1, 1], offset: [0, 0, 0, 0]}\n"
+           "    image_delay_s: 0.1\n    sigma_image_delay_s: 0.01\n";
+  };
+  const std::string real = in("real.yaml", with("[0.0037, 0.0032, 0.0171]", "\n      wrap_m: 0.0013"));
+  const std::string designed = in("designed.yaml", with("", ""));
+  std::string poses = "theta_rad,phi_rad,rho_m,psi_rad\n", joints = "time_s,roll,yaw,pitch,insertion\n";
+  for (int i = 0; i < frames; ++i) {
+    const double psi_rad = -3 + 6.6 * i / frames;
+    const auto number = [](double value) { return std::to_string(value); };
+    poses += number(-0.0778 + 0.01 * std::sin(0.3 * i)) + ",1.7681,0.1405," + number(psi_rad) + "\n";
+    // The arm's psi starts elsewhere: the seam lies 0.3 rad farther than the rig says. Its clock is late by 0.1 s.
+    joints += number(i / 30.0 - 0.1) + "," + number(psi_rad - 0.3) + ",0,0,0\n";
+  }
+  ASSERT_EQ(run("render --rig " + real + " --out " + in("turn") + " --poses " + in("poses.csv", poses)), 0) << errors();
+  fs::remove(in("turn") + "/rig.yaml");
+
+  const std::string calibrate = "calibrate marker " + in("turn") + " --rig " + designed + " --out " + out("rig.yaml");
+  ASSERT_EQ(run(calibrate + " --joints " + in("joints.csv", joints) + " --report " + out("report.html")), 0)
+      << errors();
+  EXPECT_NE(output().find("seam_rad"), std::string::npos);
+  EXPECT_NE(read(out("report.html")).find("<svg"), std::string::npos);
+  const std::string written = read(out("rig.yaml"));
+  for (const char* key : {"sigma_bands_upper_m", "sigma_wrap_m", "sigma_seam_rad", "sigma_image_delay_s: 0.01"})
+    EXPECT_NE(written.find(key), std::string::npos) << key;
+  const auto value_of = [&](const std::string& key) {
+    return std::stod(written.substr(written.find("\n      " + key + ": ") + key.size() + 9));
+  };
+  EXPECT_NEAR(value_of("wrap_m"), 0.0013, 2e-5);
+  EXPECT_NEAR(value_of("seam_rad"), 0.3, 5e-3);
+  ASSERT_EQ(run("track " + in("turn") + " --rig " + out("rig.yaml") + " --out " + out("obs.csv")), 0) << errors();
+  const CsvTable observed = CsvTable::read(out("obs.csv"));
+  for (std::size_t row = 0; row < observed.rows(); ++row) EXPECT_EQ(observed.text(row, "status"), "ok") << row;
+
+  // What can't tell leaves what was there.
+  const std::string before = written;
+  fs::create_directories(in("few"));
+  for (const char* name : {"0000.png", "0010.png", "0020.png"})
+    fs::copy_file(in("turn") + "/" + name, in("few") + "/" + name);
+  EXPECT_EQ(run("calibrate marker " + in("few") + " --rig " + designed + " --out " + out("rig.yaml")), 1);
+  EXPECT_NE(errors().find("film a slow full turn"), std::string::npos) << errors();
+  EXPECT_EQ(read(out("rig.yaml")), before);
+}
+
+TEST_F(CommandLine, CalibrateMarkerRefusesBadInput) {
+  cv::imwrite(in("small.png"), cv::Mat(90, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
+  const std::string rig = " --rig " + rig_ + " --out " + out("rig.yaml");
+  expect_refused("calibrate marker " + in("small.png") + rig, {"small.png", "160 x 90", "1280 x 720"});
+  expect_refused("calibrate marker " + in("none.png") + rig, {"none.png"});
+  expect_refused("calibrate marker " + in("small.png") + rig + " --instrument B", {"--instrument", "B"});
+  expect_refused("calibrate marker " + in("small.png") + rig + " --joints " + in("joints.csv", "time_s\n1\n"),
+                 {"joints", "PSM1", "lacks"});
+  expect_refused("calibrate marker " + in("small.png") + " --rig " + rig_ + " --out " + in("small.png"), {"small.png"});
+  expect_refused("calibrate marker " + in("small.png") + rig + " --report " + out("rig.yaml"), {"--out and --report"});
+}
+
 }  // namespace
 }  // namespace lapservo

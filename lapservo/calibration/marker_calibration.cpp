@@ -20,10 +20,12 @@ constexpr int sectors = 60;
 constexpr std::size_t max_per_sector = 2;
 constexpr double max_time_s = 1e9;
 
-constexpr std::size_t min_frames = 12, min_seam_views = 3;
-constexpr double widest_unseen_rad = 0.8;  // between neighbouring facing azimuths; a view measures +-0.9 rad
-constexpr double max_blur_px = 4;
-constexpr int max_rounds = 16;
+constexpr std::size_t min_edges = 40, min_frames = 12, min_seam_views = 3;
+constexpr double widest_unseen_rad = 0.9;  // between neighbouring facing azimuths; a view measures +-0.9 rad
+// Of the diameter's image. Of 0.01 sides are found to 0.05 px, of 0.024 (--blur-px 2.2) 0.8 px inside, and all lengths
+// with them.
+constexpr double max_blur_diameters = 0.02;
+constexpr int max_rounds = 16, gap_round = 7;
 constexpr double settled_m = 1e-6;
 // A gap narrower than this, or than three sigma, is none.
 constexpr double min_gap_m = 0.04e-3, min_gap_sigmas = 3;
@@ -62,13 +64,16 @@ class Fit {
   // Measures and adjusts once. Nullopt when it can't be solved.
   std::optional<Adjustment> round(const Round& how, bool free_print, bool with_covariance = false) {
     measured_.clear();
-    for (const KeyFrame& frame : frames_) {
+    std::erase_if(frames_, [&](const KeyFrame& frame) {
       const Eigen::Vector3d place = frame.sighting.unknowns.pose().camera_from_unrolled.translation;
       const double px_per_m = frame.view.camera.fx_px / std::max(place.z(), 1e-3);
       const double extra_px = std::clamp(how.reach_m * px_per_m, 2.0, 15.0);
-      measured_.push_back(
-          measurer_.measure(frame.view, marker_, frame.sighting, {extra_px, how.seam_reach_m, free_gap_}));
-    }
+      auto measured = measurer_.measure(frame.view, marker_, frame.sighting, {extra_px, how.seam_reach_m, free_gap_});
+      if (measured.edges.all.size() < min_edges) return true;  // too few for a pose
+      measured_.push_back(std::move(measured));
+      return false;
+    });
+    if (frames_.empty()) return std::nullopt;
     auto adjustment =
         adjust(measured_, marker_, {how.loss_scale_sigmas, free_print, free_gap_ && free_print, with_covariance});
     if (!adjustment) return std::nullopt;
@@ -112,7 +117,6 @@ class Fit {
     std::vector<double> sigmas;
     for (std::size_t i = 0; i < adjustment.residuals_px[frame].size(); ++i)
       sigmas.push_back(std::abs(adjustment.residuals_px[frame][i]) / measured_[frame].edges.all[i].sigma_px);
-    if (sigmas.size() < 20) return 1e9;
     const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
     std::nth_element(sigmas.begin(), middle, sigmas.end());
     return *middle;
@@ -165,16 +169,32 @@ std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker
         deg_from_rad(unseen_rad));
     return text;
   }
-  const auto blurred = std::count_if(frames.begin(), frames.end(), [](const KeyFrame& frame) {
-    return std::max(frame.sighting.blur.boundaries_px, frame.sighting.blur.sides_px) > max_blur_px;
+  const auto blurred = std::count_if(frames.begin(), frames.end(), [&](const KeyFrame& frame) {
+    const double depth_m = frame.sighting.unknowns.pose().camera_from_unrolled.translation.z();
+    return frame.sighting.blur.boundaries_px >
+           max_blur_diameters * marker.diameter_m * frame.view.camera.fx_px / depth_m;
   });
   if (2 * static_cast<std::size_t>(blurred) > frames.size()) {
-    std::snprintf(text, sizeof text,
-                  "%zd of %zu frames are blurred by more than %.0f px: turn more slowly, focus, or give more light",
-                  static_cast<std::ptrdiff_t>(blurred), frames.size(), max_blur_px);
+    std::snprintf(
+        text, sizeof text,
+        "%zd of %zu frames are too blurred (by more than %.0f %% of the shaft's width): focus, turn more slowly, "
+        "or come nearer",
+        static_cast<std::ptrdiff_t>(blurred), frames.size(), 100 * max_blur_diameters);
     return text;
   }
   return {};
+}
+
+// Whether the last round moved every number by little: by a micrometre, or by a fraction of its sigma, within which
+// noisy edges come and go.
+bool is_settled(const Adjustment& adjustment, double radius_m) {
+  constexpr double of_sigma = 0.3;
+  for (int i = 0; i < print_numbers; ++i) {
+    const double unit_m = i == print_numbers - 1 ? radius_m : 1;
+    const double sigma_m = unit_m * std::sqrt((*adjustment.covariance)(i, i));
+    if (std::abs(unit_m * adjustment.print[i]) > std::max(settled_m, of_sigma * sigma_m)) return false;
+  }
+  return true;
 }
 
 struct ResidualSummary {
@@ -259,24 +279,24 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   calibration.before_px = residuals_before.rms_px, calibration.before = residuals_before.residuals;
 
   std::optional<Adjustment> last;
-  bool settled = false;
+  bool settled = false, gap_judged = false;
+  std::optional<double> no_gap_sigma_rad;
   for (int i = 0; i < max_rounds && !settled; ++i) {
     if (progress) progress(i, max_rounds);
     const auto stage = std::min(static_cast<std::size_t>(i), rounds.size() - 1);
-    last = fit.round(rounds[stage], true);
+    last = fit.round(rounds[stage], true, stage + 1 == rounds.size());
     if (!last) return refused(unsolvable);
     if (i >= 2) fit.drop_misfits(*last);
     if (fit.frames().size() < min_frames) return refused(unsolvable);
-    settled = stage + 1 == rounds.size() && last->print.head<print_numbers - 1>().cwiseAbs().maxCoeff() < settled_m &&
-              std::abs(last->print[print_numbers - 1]) * nominal.radius_m() < settled_m;
-    if (settled && fit.free_gap()) {
-      // A gap that can't be told from none is none: then the print's ends meet in one edge.
-      const auto final = fit.round(rounds.back(), true, true);
-      if (!final) return refused(unsolvable);
-      const double gap_m = fit.marker().gap_rad * nominal.radius_m();
-      const double sigma_m = std::sqrt((*final->covariance)(print_numbers - 1, print_numbers - 1)) * nominal.radius_m();
-      if (gap_m < std::max(min_gap_m, min_gap_sigmas * sigma_m)) fit.believe_no_gap(), settled = false;
-    }
+    settled = last->covariance && is_settled(*last, nominal.radius_m());
+    if (gap_judged || !(settled || i == gap_round)) continue;
+    // A gap that can't be told from none is none: then the print's ends meet in one edge.
+    gap_judged = true;
+    const double gap_m = fit.marker().gap_rad * nominal.radius_m();
+    const double sigma_m = std::sqrt((*last->covariance)(print_numbers - 1, print_numbers - 1)) * nominal.radius_m();
+    if (gap_m >= std::max(min_gap_m, min_gap_sigmas * sigma_m)) continue;
+    no_gap_sigma_rad = sigma_m / nominal.radius_m();
+    fit.believe_no_gap(), settled = false;
   }
   last = fit.round(rounds.back(), true, true);
   if (!last) return refused(unsolvable);
@@ -290,6 +310,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   calibration.after_px = residuals_after.rms_px, calibration.after = residuals_after.residuals;
   calibration.marker = fit.marker();
   calibration.marker.sigmas = sigmas_of(*last->covariance, nominal.sigmas);
+  if (no_gap_sigma_rad) calibration.marker.sigmas.gap_rad = no_gap_sigma_rad;
   calibration.marker.tolerance_m = tolerance_of(PrintShape::of(fit.marker()), *last->covariance, fit.marker());
   if (const std::string problem = marker_problem(calibration.marker); !problem.empty())
     return refused("what was found is no marker: " + problem);

@@ -112,6 +112,7 @@ TEST_F(CalibrateMarker, RefusesWhatCanNotTell) {
   };
   EXPECT_NE(refusal({.frames = 40, .fraction = 0.6}).find("from all sides"), std::string::npos);
   EXPECT_NE(refusal({.frames = 6}).find("at least"), std::string::npos);
+  EXPECT_NE(refusal({.frames = 30, .blur_px = 1.8}).find("blurred"), std::string::npos);
   EXPECT_NE(refusal({.frames = 30, .blur_px = 6}), "");
   EXPECT_NE(calibrate_marker(rig, 0, {}).refusal, "");
 }

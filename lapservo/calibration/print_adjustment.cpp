@@ -5,6 +5,7 @@
 #include <ceres/ceres.h>
 #include <cmath>
 #include <cstddef>
+#include <glog/logging.h>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -19,7 +20,7 @@ constexpr double mm = 1e-3;
 constexpr int frame_numbers = 7, film = 6;
 // After the print's numbers (lengths in mm): what all films are off by, in film_sigma_m, and all sides, the seam's
 // edges and each boundary, in all frames alike [px].
-constexpr int shared_film = print_numbers, sides = shared_film + 1, seam = sides + 1, boundaries = seam + 1;
+constexpr int shared_film = print_numbers, sides = shared_film + 1, seam = sides + 1, boundaries = seam + 2;
 constexpr int shared_numbers = boundaries + 4;
 constexpr int gap = print_numbers - 1;
 constexpr std::size_t upper_group = measurement_groups, groups = measurement_groups + 2;
@@ -27,9 +28,9 @@ constexpr std::size_t upper_group = measurement_groups, groups = measurement_gro
 // Before the fit, one sigma: how far a print may be off; and what the model leaves out of every frame alike, which is
 // taken for zero: to tell it from so many frames would be to believe the model to a thousandth of a pixel.
 constexpr double print_prior_mm = 2, gap_prior_rad = 0.5;
-// From the film on. Measured on rendered frames: sides up to 0.04 px, an end whose face is seen up to 0.1 px, inner
+// From the film on. Measured on rendered frames: sides up to 0.08 px, an end whose face is seen up to 0.1 px, inner
 // boundaries 0.01 px.
-constexpr std::array shared_sigmas{1.0, 0.03, 0.03, 0.05, 0.01, 0.01, 0.05};
+constexpr std::array shared_sigmas{1.0, 0.05, 0.03, 0.03, 0.05, 0.01, 0.01, 0.05};
 constexpr double zero = 1e-3;            // of these
 constexpr double common_seam_px = 0.03;  // of one frame
 
@@ -108,10 +109,10 @@ SharedRow shared_row(const Measurement& m, const PrintShape& shape, double cover
   return row;
 }
 
-SharedRow shared_row(const SeamEdge& edge) {
+SharedRow shared_row(const SeamEdge& edge, bool lower) {
   SharedRow row{};
   row[gap] = edge.by_gap_px;
-  row[seam] = 1;
+  row[lower ? seam + 1 : seam] = 1;
   return row;
 }
 
@@ -145,7 +146,7 @@ void add_frame(ceres::Problem& problem, const ViewMeasurements& frame, const Pri
   }
   const auto add_seam = [&](const std::optional<SeamEdge>& edge, std::size_t group) {
     if (!edge) return;
-    auto* cost = new LinearCost(edge->row, shared_row(*edge), edge->residual_px, edge->sigma_px);
+    auto* cost = new LinearCost(edge->row, shared_row(*edge, group != upper_group), edge->residual_px, edge->sigma_px);
     blocks.seam.push_back(cost);
     add(cost, group), used[group] = true;
   };
@@ -166,18 +167,35 @@ void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& sha
     add(i, zero * shared_sigmas[static_cast<std::size_t>(i - shared_film)]);
 }
 
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 // Of residuals over sigma, by the median of their size.
 double robust_scale(std::vector<double> sigmas) {
   if (sigmas.empty()) return 1;
   for (double& value : sigmas) value = std::abs(value);
-  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-  std::nth_element(sigmas.begin(), middle, sigmas.end());
-  return *middle / 0.6745;
+  return median(std::move(sigmas)) / 0.6745;
+}
+
+// As the tracker has it (fine_fit.cpp): compression and motion blur move edges, in all frames alike.
+double doubt_scale(const std::vector<ViewMeasurements>& frames) {
+  std::vector<double> sigmas_px, blurs_px;
+  for (const ViewMeasurements& frame : frames) {
+    blurs_px.push_back(frame.blur_px);
+    for (const Measurement& m : frame.edges.all)
+      if (m.group < 4) sigmas_px.push_back(m.sigma_px);
+  }
+  if (sigmas_px.empty()) return 1;
+  return std::max(1.0, median(std::move(sigmas_px)) / fine_fit_limits.usual_sigma_px) +
+         std::max(0.0, median(std::move(blurs_px)) - fine_fit_limits.usual_blur_px);
 }
 
 // The print's; what was taken for zero in all frames counts as it was before the fit.
 std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, const std::array<double, shared_numbers>& shared,
-                                             bool free_gap, double noise_scale) {
+                                             bool free_gap, double noise_scale, double doubt_scale) {
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
   ceres::Covariance covariance(options);
@@ -186,7 +204,9 @@ std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, const std:
   Eigen::Matrix<double, shared_numbers, shared_numbers, Eigen::RowMajor> all;
   if (!covariance.GetCovarianceBlock(shared.data(), shared.data(), all.data())) return std::nullopt;
   constexpr int common = shared_numbers - shared_film;
-  const auto prior = Eigen::Map<const Eigen::Matrix<double, common, 1>>(shared_sigmas.data());
+  Eigen::Matrix<double, common, 1> prior =
+      doubt_scale * Eigen::Map<const Eigen::Matrix<double, common, 1>>(shared_sigmas.data());
+  prior[0] = shared_sigmas[0];  // the film is as thick in any picture
   const PrintCovariance joint = all.topLeftCorner<print_numbers, print_numbers>();
   const Eigen::Matrix<double, print_numbers, common> cross = all.block<print_numbers, common>(0, shared_film);
   const Eigen::Matrix<double, common, common> of_common = all.bottomRightCorner<common, common>();
@@ -219,6 +239,7 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
     fixed.push_back(gap);
   if (!fixed.empty()) problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, fixed));
 
+  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres complains of, its results say
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   solver.max_num_iterations = 30;
@@ -242,7 +263,7 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   }
   result.noise_scale = robust_scale(std::move(sigmas));
   if (options.with_covariance) {
-    result.covariance = covariance_of(problem, shared, options.free_gap, result.noise_scale);
+    result.covariance = covariance_of(problem, shared, options.free_gap, result.noise_scale, doubt_scale(frames));
     if (!result.covariance) return std::nullopt;
   }
   return result;

@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -36,7 +34,6 @@ struct Profile {
   int left_band = 0, right_band = 0;
   double stations = 0, along_m = 0;          // how many, and their mean place
   std::vector<std::array<double, 3>> light;  // sums, per sample
-  std::vector<double> luma;                  // the same, see Luma
   std::vector<int> count;
 };
 
@@ -45,43 +42,6 @@ struct Section {
   std::vector<double> px_per_m;
   std::vector<Profile> profiles;
   std::array<double, 3> shaft{0.02, 0.02, 0.02};  // light of the bare shaft
-};
-
-// Brightness as videos keep it in full resolution, as light of a grey of the same value. Colours, of which most videos
-// keep a quarter, are blurred and may be shifted by half a pixel.
-class Luma {
- public:
-  explicit Luma(const std::array<float, 256>& light_of_value) : light_(light_of_value) {}
-
-  double of_values(double b, double g, double r) const { return light_at(0.0722 * b + 0.7152 * g + 0.2126 * r); }
-  double of_light(const std::array<double, 3>& bgr) const {
-    return of_values(value_of(bgr[0]), value_of(bgr[1]), value_of(bgr[2]));
-  }
-  // Bilinear.
-  double at(const ImageView& image, const Eigen::Vector2d& px) const {
-    const int u = static_cast<int>(px.x()), v = static_cast<int>(px.y());
-    const double fu = px.x() - u, fv = px.y() - v;
-    const auto of = [&](int du, int dv) {
-      const std::uint8_t* bgr = image.pixel(u + du, v + dv);
-      return of_values(bgr[0], bgr[1], bgr[2]);
-    };
-    return (1 - fv) * ((1 - fu) * of(0, 0) + fu * of(1, 0)) + fv * ((1 - fu) * of(0, 1) + fu * of(1, 1));
-  }
-
- private:
-  double light_at(double value) const {
-    const auto i = static_cast<std::size_t>(std::clamp(value, 0.0, 254.0));
-    const double fraction = std::clamp(value - static_cast<double>(i), 0.0, 1.0);
-    return (1 - fraction) * static_cast<double>(light_[i]) + fraction * static_cast<double>(light_[i + 1]);
-  }
-  double value_of(double light) const {
-    const auto next = std::upper_bound(light_.begin() + 1, light_.end() - 1, static_cast<float>(light));
-    const auto i = static_cast<std::size_t>(next - light_.begin());
-    const auto low = static_cast<double>(light_[i - 1]), high = static_cast<double>(light_[i]);
-    return static_cast<double>(i) - 1 + std::clamp((light - low) / (high - low), 0.0, 1.0);
-  }
-
-  const std::array<float, 256>& light_;
 };
 
 struct SeamView {
@@ -144,7 +104,6 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
     x_m += 1 / px_per_m;
   }
   if (section.x_m.size() < 8) return std::nullopt;
-  const Luma luma(view.light.light_of_value());
   const double room_m = 2.5 * blur_px / here + 0.2 * reach_m;
   for (int station = 0; station < stations; ++station) {
     const double along_m = marker.length_m() * (station + 0.5) / stations;
@@ -155,10 +114,9 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
     auto found = std::find_if(section.profiles.begin(), section.profiles.end(),
                               [&](const Profile& p) { return p.left_band == left && p.right_band == right; });
     if (found == section.profiles.end()) {
-      section.profiles.push_back({left, right, 0, 0, {}, {}, {}});
+      section.profiles.push_back({left, right, 0, 0, {}, {}});
       found = section.profiles.end() - 1;
       found->light.resize(section.x_m.size());
-      found->luma.resize(section.x_m.size());
       found->count.resize(section.x_m.size());
     }
     found->stations += 1, found->along_m += along_m;
@@ -168,7 +126,6 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
       const auto at = view.light.at(static_cast<float>(px.x()), static_cast<float>(px.y()));
       if (at.saturated[0] || at.saturated[1] || at.saturated[2]) continue;
       for (std::size_t c = 0; c < 3; ++c) found->light[i][c] += static_cast<double>(at.light[c]);
-      found->luma[i] += luma.at(view.light.image(), px);
       ++found->count[i];
     }
   }
@@ -201,13 +158,10 @@ std::array<double, 3> shaft_light(const SeamView& view, double blur_px) {
   return median;
 }
 
-// What each place of a section is made of: the left band, the right one and the bare shaft, shaded over the turn.
-constexpr int colors = 5;
-using Basis = Eigen::Matrix<double, Eigen::Dynamic, colors>;
-using Colors = std::array<Eigen::Matrix<double, colors, 1>, 3>;  // a profile's light, b g r
-
-// Of edges at `upper_m` and `gap_m` before it.
-Basis basis_of(const Section& section, double upper_m, double gap_m, double blur_px, double radius_m) {
+// Residuals of all profiles when the upper edge lies at `upper_m` and the other one `gap_m` before it; colours, shading
+// and the shaft's light are those that fit best. Weighted by the root of the stations, so that noise is alike.
+Eigen::VectorXd residuals(const Section& section, double upper_m, double gap_m, double blur_px, double radius_m) {
+  constexpr int colors = 5;
   const auto scale_at = [&](double x_m) {
     const auto next = std::lower_bound(section.x_m.begin(), section.x_m.end(), x_m);
     const auto i =
@@ -216,87 +170,41 @@ Basis basis_of(const Section& section, double upper_m, double gap_m, double blur
   };
   const double lower_m = upper_m - gap_m, per_upper = scale_at(upper_m) / blur_px,
                per_lower = scale_at(lower_m) / blur_px;
-  Basis basis(static_cast<Eigen::Index>(section.x_m.size()), colors);
-  for (Eigen::Index i = 0; i < basis.rows(); ++i) {
+  const auto samples = static_cast<Eigen::Index>(section.x_m.size());
+  Eigen::Matrix<double, Eigen::Dynamic, colors> basis(samples, colors);
+  for (Eigen::Index i = 0; i < samples; ++i) {
     const double x = section.x_m[static_cast<std::size_t>(i)], turn = x / radius_m;
     const double left = normal_cdf((lower_m - x) * per_lower), right = normal_cdf((x - upper_m) * per_upper);
     basis.row(i) << left, left * turn, right, right * turn, 1 - left - right;
   }
-  return basis;
-}
-
-// Which samples most stations have.
-Eigen::VectorXd used_samples(const Profile& profile) {
-  Eigen::VectorXd used(static_cast<Eigen::Index>(profile.count.size()));
-  for (Eigen::Index i = 0; i < used.size(); ++i)
-    used[i] = 2 * profile.count[static_cast<std::size_t>(i)] > profile.stations ? 1 : 0;
-  return used;
-}
-
-// The light of bands and shaft that fits a profile best.
-Colors colors_of(const Section& section, const Profile& profile, const Basis& basis) {
-  const Eigen::VectorXd used = used_samples(profile);
-  const Eigen::Matrix<double, colors, Eigen::Dynamic> weighted = basis.transpose() * used.asDiagonal();
-  Colors best;
-  for (std::size_t c = 0; c < 3; ++c) {
-    Eigen::VectorXd light = Eigen::VectorXd::Zero(basis.rows());
-    for (Eigen::Index i = 0; i < light.size(); ++i)
-      if (const auto k = static_cast<std::size_t>(i); used[i] > 0) light[i] = profile.light[k][c] / profile.count[k];
-    // In units of a hundredth of white: shading over a radian is of the light's size, the shaft's light is known to a
-    // third.
-    constexpr double unit = 0.01;
-    const double shaft = section.shaft[c], shaft_sigma = 0.3 * shaft + 0.005;
-    Eigen::Matrix<double, colors, colors> information = weighted * basis;
-    Eigen::Matrix<double, colors, 1> gradient = weighted * light;
-    information(1, 1) += unit * unit, information(3, 3) += unit * unit;
-    information(0, 0) += 1e-9, information(2, 2) += 1e-9;
-    information(4, 4) += unit * unit / (shaft_sigma * shaft_sigma);
-    gradient[4] += shaft * unit * unit / (shaft_sigma * shaft_sigma);
-    best[c] = information.ldlt().solve(gradient);
-  }
-  return best;
-}
-
-// Residuals of all profiles with the colours that fit best. Weighted by the root of the stations, so that noise is
-// alike.
-Eigen::VectorXd color_residuals(const Section& section, const Basis& basis) {
-  const Eigen::Index samples = basis.rows();
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(samples * 3 * static_cast<Eigen::Index>(section.profiles.size()));
+  Eigen::VectorXd out(samples * 3 * static_cast<Eigen::Index>(section.profiles.size()));
+  out.setZero();
   Eigen::Index at = 0;
   for (const Profile& profile : section.profiles) {
-    const Colors best = colors_of(section, profile, basis);
+    const double weight = std::sqrt(profile.stations);
+    Eigen::VectorXd used(samples);
+    for (Eigen::Index i = 0; i < samples; ++i)
+      used[i] = 2 * profile.count[static_cast<std::size_t>(i)] > profile.stations ? 1 : 0;
+    const Eigen::Matrix<double, colors, Eigen::Dynamic> weighted = basis.transpose() * used.asDiagonal();
     for (std::size_t c = 0; c < 3; ++c, at += samples) {
-      const Eigen::VectorXd expected = basis * best[c];
-      for (Eigen::Index i = 0; i < samples; ++i)
-        if (const auto k = static_cast<std::size_t>(i); 2 * profile.count[k] > profile.stations)
-          out[at + i] = std::sqrt(profile.stations) * (profile.light[k][c] / profile.count[k] - expected[i]);
+      Eigen::VectorXd light(samples);
+      for (Eigen::Index i = 0; i < samples; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        light[i] = used[i] > 0 ? profile.light[k][c] / profile.count[k] : 0;
+      }
+      // In units of a hundredth of white: shading over a radian is of the light's size, the shaft's light is known to
+      // a third.
+      constexpr double unit = 0.01;
+      const double shaft = section.shaft[c], shaft_sigma = 0.3 * shaft + 0.005;
+      Eigen::Matrix<double, colors, colors> information = weighted * basis;
+      Eigen::Matrix<double, colors, 1> gradient = weighted * light;
+      information(1, 1) += unit * unit, information(3, 3) += unit * unit;
+      information(0, 0) += 1e-9, information(2, 2) += 1e-9;
+      information(4, 4) += unit * unit / (shaft_sigma * shaft_sigma);
+      gradient[4] += shaft * unit * unit / (shaft_sigma * shaft_sigma);
+      const Eigen::Matrix<double, colors, 1> color = information.ldlt().solve(gradient);
+      out.segment(at, samples) = weight * used.cwiseProduct(light - basis * color);
     }
-  }
-  return out;
-}
-
-// The same of the luma, for colours that are known; its own brightness and offset are free.
-Eigen::VectorXd luma_residuals(const Section& section, const Basis& basis, const std::vector<Colors>& known,
-                               const Luma& luma) {
-  const Eigen::Index samples = basis.rows();
-  Eigen::VectorXd out = Eigen::VectorXd::Zero(samples * static_cast<Eigen::Index>(section.profiles.size()));
-  Eigen::Index at = 0;
-  for (std::size_t p = 0; p < section.profiles.size(); ++p, at += samples) {
-    const Profile& profile = section.profiles[p];
-    const Eigen::VectorXd used = used_samples(profile);
-    Eigen::Matrix<double, Eigen::Dynamic, 2> expected(samples, 2);
-    Eigen::VectorXd measured = Eigen::VectorXd::Zero(samples);
-    for (Eigen::Index i = 0; i < samples; ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      if (used[i] > 0) measured[i] = profile.luma[k] / profile.count[k];
-      const auto row = basis.row(i);
-      expected.row(i) << luma.of_light({row.dot(known[p][0]), row.dot(known[p][1]), row.dot(known[p][2])}), 1;
-    }
-    const Eigen::Matrix<double, 2, Eigen::Dynamic> weighted = expected.transpose() * used.asDiagonal();
-    Eigen::Matrix2d information = weighted * expected;
-    information.diagonal() += Eigen::Vector2d::Constant(1e-9);
-    const Eigen::Vector2d brightness = information.ldlt().solve(weighted * measured);
-    out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(measured - expected * brightness);
   }
   return out;
 }
@@ -306,39 +214,10 @@ struct SeamFit {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
 };
 
-// Gauss-Newton with differences. `residuals` takes the upper edge's place and the gap. False when it fails.
-template <typename Residuals>
-bool refine(const Residuals& residuals, bool free_gap, double pixel_m, double max_step_m, SeamFit& fit, double& cost) {
-  const double delta_m = 0.02 * pixel_m;
-  Eigen::VectorXd residual = residuals(fit.upper_m, fit.gap_m);
-  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-  for (int iteration = 0; iteration < 8; ++iteration) {
-    Eigen::Matrix<double, Eigen::Dynamic, 2> slopes(residual.size(), 2);
-    slopes.col(0) = (residuals(fit.upper_m + delta_m, fit.gap_m) - residual) / delta_m;
-    slopes.col(1).setZero();
-    if (free_gap) slopes.col(1) = (residuals(fit.upper_m, fit.gap_m + delta_m) - residual) / delta_m;
-    information = slopes.transpose() * slopes;
-    information.diagonal() += Eigen::Vector2d(1e-12, free_gap ? 1e-12 : 1e9) * information.trace();
-    Eigen::Vector2d step = -information.ldlt().solve(slopes.transpose() * residual);
-    if (!step.allFinite()) return false;
-    step = step.cwiseMax(-max_step_m).cwiseMin(max_step_m);
-    Eigen::VectorXd next = residuals(fit.upper_m + step[0], fit.gap_m + step[1]);
-    if (next.squaredNorm() > residual.squaredNorm()) break;
-    fit.upper_m += step[0], fit.gap_m += step[1], residual = std::move(next);
-    if (step.norm() < 0.002 * pixel_m) break;
-  }
-  cost = residual.squaredNorm();
-  // Colours are fitted, too, and neighbours share pixels.
-  const double freedom = std::max<double>(1, 0.6 * static_cast<double>(residual.size()));
-  fit.covariance = cost / freedom * information.inverse();
-  return fit.covariance.allFinite();
-}
-
-// The best of a grid, refined by all channels, and then by the luma alone.
-std::optional<SeamFit> fit(const Section& section, const Luma& luma, double expected_gap_m, double reach_m,
-                           double gap_reach_m, double blur_px, double radius_m, double px_per_m) {
-  const auto basis = [&](double upper_m, double gap_m) { return basis_of(section, upper_m, gap_m, blur_px, radius_m); };
-  const auto by_colors = [&](double upper_m, double gap_m) { return color_residuals(section, basis(upper_m, gap_m)); };
+// From the best of a grid, Gauss-Newton with differences: two unknowns, residuals with the colours projected out.
+std::optional<SeamFit> fit(const Section& section, double expected_gap_m, double reach_m, double gap_reach_m,
+                           double blur_px, double radius_m, double px_per_m) {
+  const auto at = [&](double upper_m, double gap_m) { return residuals(section, upper_m, gap_m, blur_px, radius_m); };
   const double pixel_m = 1 / px_per_m, step_m = std::max(0.8 * blur_px, 1.0) * pixel_m;
   SeamFit best{0, expected_gap_m, {}};
   double best_cost = 1e300, worst_cost = 0;
@@ -346,24 +225,34 @@ std::optional<SeamFit> fit(const Section& section, const Luma& luma, double expe
   const double first_gap_m = std::max(0.0, expected_gap_m - gap_reach_m), last_gap_m = expected_gap_m + gap_reach_m;
   for (double upper_m = -reach_m; upper_m <= reach_m; upper_m += step_m)
     for (double gap_m = first_gap_m; gap_m <= last_gap_m; gap_m += step_m) {
-      const double cost = by_colors(upper_m, gap_m).squaredNorm();
+      const double cost = at(upper_m, gap_m).squaredNorm();
       worst_cost = std::max(worst_cost, cost);
       if (cost < best_cost) best_cost = cost, best.upper_m = upper_m, best.gap_m = gap_m;
     }
-  if (!refine(by_colors, free_gap, pixel_m, 2 * step_m, best, best_cost)) return std::nullopt;
-  if (std::abs(best.upper_m) > 1.2 * reach_m || best_cost > min_explained * worst_cost) return std::nullopt;
-  std::vector<Colors> known;
-  for (const Profile& profile : section.profiles)
-    known.push_back(colors_of(section, profile, basis(best.upper_m, best.gap_m)));
-  const auto by_luma = [&](double upper_m, double gap_m) {
-    return luma_residuals(section, basis(upper_m, gap_m), known, luma);
-  };
-  SeamFit finer = best;
-  double cost = 0;
-  if (!refine(by_luma, free_gap, pixel_m, step_m, finer, cost)) return std::nullopt;
-  const double moved_m = std::hypot(finer.upper_m - best.upper_m, finer.gap_m - best.gap_m);
-  if (moved_m > 2 * pixel_m) return std::nullopt;  // bands of one brightness
-  return finer;
+  const double delta_m = 0.02 * pixel_m;
+  Eigen::VectorXd residual = at(best.upper_m, best.gap_m);
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  for (int iteration = 0; iteration < 8; ++iteration) {
+    Eigen::Matrix<double, Eigen::Dynamic, 2> slopes(residual.size(), 2);
+    slopes.col(0) = (at(best.upper_m + delta_m, best.gap_m) - residual) / delta_m;
+    slopes.col(1).setZero();
+    if (free_gap) slopes.col(1) = (at(best.upper_m, best.gap_m + delta_m) - residual) / delta_m;
+    information = slopes.transpose() * slopes;
+    information.diagonal() += Eigen::Vector2d(1e-12, free_gap ? 1e-12 : 1e9) * information.trace();
+    Eigen::Vector2d step = -information.ldlt().solve(slopes.transpose() * residual);
+    if (!step.allFinite()) return std::nullopt;
+    step = step.cwiseMax(-2 * step_m).cwiseMin(2 * step_m);
+    Eigen::VectorXd next = at(best.upper_m + step[0], best.gap_m + step[1]);
+    if (next.squaredNorm() > residual.squaredNorm()) break;
+    best.upper_m += step[0], best.gap_m += step[1], residual = std::move(next);
+    if (step.norm() < 0.002 * pixel_m) break;
+  }
+  if (std::abs(best.upper_m) > 1.2 * reach_m) return std::nullopt;
+  if (residual.squaredNorm() > min_explained * worst_cost) return std::nullopt;
+  const double freedom =
+      std::max<double>(1, 0.6 * static_cast<double>(residual.size()));  // colours, and neighbours share pixels
+  best.covariance = residual.squaredNorm() / freedom * information.inverse();
+  return best.covariance.allFinite() ? std::optional(best) : std::nullopt;
 }
 
 // An edge of the print that was found `beyond_m` around the shaft from where it is expected.
@@ -406,8 +295,7 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
   along_m /= weight;
   const auto middle = scene.camera.raw_with_jacobian(view.point(view.upper_rad, along_m));
   const double px_per_m = (middle.d_px_d_point * view.around(view.upper_rad)).norm();
-  const auto found = fit(*section, Luma(light.light_of_value()), gap_m, reach_m, free_gap ? reach_m : 0, blur_px,
-                         marker.radius_m(), px_per_m);
+  const auto found = fit(*section, gap_m, reach_m, free_gap ? reach_m : 0, blur_px, marker.radius_m(), px_per_m);
   if (!found) return std::nullopt;
 
   const double radius_m = marker.radius_m();
