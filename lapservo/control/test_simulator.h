@@ -55,6 +55,9 @@ struct Flaws {
   double jitter_s = 0;                                 ///< of the steps' times, at most
   std::function<bool(double time_s)> hidden = [](double) { return false; };
   std::function<ImageMeasurement(const ImageMeasurement&)> spoil = [](const ImageMeasurement& m) { return m; };
+  std::function<Eigen::Vector4d(double time_s)> misread = [](double) {  // what the measured joints are off by
+    return Eigen::Vector4d(Eigen::Vector4d::Zero());
+  };
 };
 
 struct Moment {
@@ -89,7 +92,7 @@ class TestSimulator {
       const DesiredFeatures desired = trajectory.at(time_s);
       moment.error = feature_error(moment.truth.features, desired.features);
       if (k % flaws_.frame_every == 0 && random_.uniform() >= flaws_.dropped) expose(time_s, moment.truth);
-      moment.step = controller.step(time_s, q_measured(), arrived(time_s), desired);
+      moment.step = controller.step(time_s, q_measured() + flaws_.misread(time_s), arrived(time_s), desired);
       move(controller, std::max(time_s, moved_s_), start_s_ + static_cast<double>(k + 1) * period_s);
       moments.push_back(moment);
     }
