@@ -1,10 +1,9 @@
 // Prints as hands make them (bands off by 0.3 mm, 3 degrees of wrap, 1 mm of gap), rendered over a slow turn,
 // calibrated, and tracked in other places with the calibrated rig. LAPSERVO_PRINTS, LAPSERVO_PRINT_SEED and
-// LAPSERVO_TURN_FRAMES set how many (2), which, and of how many frames (90).
+// LAPSERVO_TURN_FRAMES set how many (1), which, and of how many frames (90).
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <map>
 #include <string>
 
@@ -21,11 +20,6 @@ namespace {
 
 constexpr double mm = 1e-3;
 constexpr double steepest_rad = 0.35;
-
-int from_environment(const char* name, int otherwise) {
-  const char* text = std::getenv(name);
-  return text ? std::atoi(text) : otherwise;
-}
 
 struct Errors {
   std::string name;
@@ -144,14 +138,6 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
         1e3 * rms(before.errors_rad), 1e3 * rms(after.errors_rad), 1e3 * mean(after.errors_rad),
         rms(after.errors_sigmas), text_of(after.statuses).c_str(), 1e3 * calibration.marker.gap_rad * print.radius_m(),
         1e3 * print.gap_rad * print.radius_m(), rms(sigmas));
-    if (std::getenv("LAPSERVO_VERBOSE")) {
-      const PrintShape a = PrintShape::of(calibration.marker), b = PrintShape::of(print);
-      for (std::size_t k = 0; k < 4; ++k)
-        std::printf("   e%zu upper %+.1f um, lower %+.1f um\n", k, 1e6 * (a.upper_m[k] - b.upper_m[k]),
-                    1e6 * (a.lower_m[k] - b.lower_m[k]));
-      for (const double value : sigmas) std::printf(" %.2f", value);
-      std::printf("  tolerance %.2f um\n", 1e6 * calibration.marker.tolerance_m);
-    }
     const auto append = [](std::vector<double>& all, const std::vector<double>& more) {
       all.insert(all.end(), more.begin(), more.end());
     };

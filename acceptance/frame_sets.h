@@ -40,6 +40,9 @@ struct Score {
   double found_fraction() const { return expected ? static_cast<double>(found) / expected : 1; }
 };
 
+/// A whole number from an environment variable, by which a test is made longer.
+int from_environment(const char* name, int otherwise);
+
 double mean(const std::vector<double>& values);
 double rms(const std::vector<double>& values);
 double standard_deviation(const std::vector<double>& values);

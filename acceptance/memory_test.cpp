@@ -1,5 +1,4 @@
 // Tracking for hours needs no more memory than tracking for minutes: cold, followed, lost and refused frames by turns.
-#include <cstdlib>
 #include <fstream>
 #include <string>
 #include <unistd.h>
@@ -22,11 +21,6 @@ double resident_mb() {
 }
 
 // LAPSERVO_MEMORY_FRAMES=20000 for the long one.
-int frames_to_track() {
-  const char* const given = std::getenv("LAPSERVO_MEMORY_FRAMES");
-  return given ? std::atoi(given) : 1200;
-}
-
 TEST(Memory, IsFlatOverManyFrames) {
   RenderedSet set;
   set.rig = example_rig();
@@ -37,7 +31,7 @@ TEST(Memory, IsFlatOverManyFrames) {
   frames.push_back(frames[0].clone());
   cv::GaussianBlur(frames.back(), frames.back(), {}, 12);
   Tracker tracker(set.rig);
-  const int count = frames_to_track();
+  const int count = from_environment("LAPSERVO_MEMORY_FRAMES", 1200);
   int found = 0;
   double settled_mb = 0;
   for (int i = 0; i < count; ++i) {

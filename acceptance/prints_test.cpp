@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <map>
 #include <string>
 
@@ -20,11 +19,6 @@ namespace {
 
 constexpr double mm = 1e-3;
 constexpr double steepest_rad = 0.35;
-
-int from_environment(const char* name, int otherwise) {
-  const char* text = std::getenv(name);
-  return text ? std::atoi(text) : otherwise;
-}
 
 struct Print {
   Marker marker;
