@@ -87,7 +87,7 @@ TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   const auto image_subscription = to.subscribe_images("/image", images.handler());
   const auto say_image = from.image_publisher("/image");
   ImageMessage picture{stamp_s, 640, 360, 1920, "bgr8", true, {}};
-  for (int i = 0; i < 1920 * 360; ++i) picture.data.push_back(static_cast<std::uint8_t>(i * i));
+  for (unsigned i = 0; i < 1920 * 360; ++i) picture.data.push_back(static_cast<std::uint8_t>(i * i));
   const ImageMessage image = images.get([&] { say_image(picture); });
   EXPECT_EQ(image.width, 640u);
   EXPECT_EQ(image.height, 360u);
