@@ -148,7 +148,8 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
   std::printf("all: psi rms %.1f mrad before, %.2f after, error / sigma %.2f;%s; written numbers' error / sigma %.2f\n",
               1e3 * rms(before_rad), 1e3 * rms(after_rad), rms(after_sigmas), text_of(after_statuses).c_str(),
               rms(written_sigmas));
-  if (GetParam().bands_m > 0) {
+  // Of some prints nothing is ok before: then there is nothing to compare with.
+  if (GetParam().bands_m > 0 && !before_rad.empty()) {
     EXPECT_LE(rms(after_rad), 0.1 * rms(before_rad));
   }
   EXPECT_LE(rms(after_rad), 1.5e-3);
