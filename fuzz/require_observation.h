@@ -22,6 +22,13 @@ inline void require_sound(const Observation& o) {
   require(o.camera_from_unrolled.translation.allFinite() && o.camera_from_unrolled.rotation.coeffs().allFinite() &&
               std::isfinite(o.psi_rad),
           "the pose is finite");
+  if (o.marker) {
+    const Observation::MarkerPose& m = *o.marker;
+    require(m.camera_from_marker.translation.allFinite() && m.camera_from_marker.rotation.coeffs().allFinite(),
+            "the marker's pose is finite");
+    for (const double sigma : {m.sigma_xy_m, m.sigma_z_m, m.sigma_axis_rad, m.sigma_roll_rad})
+      require(std::isfinite(sigma) && sigma > 0, "sigmas of the marker's pose are finite and above 0");
+  }
   if (!o.rcm) return;
   require(o.rcm->q.vector().allFinite(), "q is finite");
   require(o.rcm->covariance.allFinite() && o.rcm->covariance.diagonal().minCoeff() > 0,
