@@ -7,6 +7,7 @@
 
 #include "lapservo/calibration/print_adjustment.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/marker/decoder.h"
@@ -98,10 +99,7 @@ class Fit {
   void drop_misfits(const Adjustment& adjustment) {
     std::vector<double> scatters;
     for (std::size_t i = 0; i < frames_.size(); ++i) scatters.push_back(scatter(adjustment, i));
-    std::vector<double> sorted = scatters;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
-    const double limit = 3 * *middle + 0.5;
+    const double limit = 3 * median(std::vector(scatters)) + 0.5;
     std::size_t i = 0;
     std::erase_if(frames_, [&](const KeyFrame&) { return !(scatters[i++] < limit); });
   }
@@ -117,9 +115,7 @@ class Fit {
     std::vector<double> sigmas;
     for (std::size_t i = 0; i < adjustment.residuals_px[frame].size(); ++i)
       sigmas.push_back(std::abs(adjustment.residuals_px[frame][i]) / measured_[frame].edges.all[i].sigma_px);
-    const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-    std::nth_element(sigmas.begin(), middle, sigmas.end());
-    return *middle;
+    return median(sigmas);
   }
 
   ViewMeasurer measurer_;

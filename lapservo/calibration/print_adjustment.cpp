@@ -10,6 +10,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "lapservo/core/median.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -167,17 +168,11 @@ void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& sha
     add(i, zero * shared_sigmas[static_cast<std::size_t>(i - shared_film)]);
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Of residuals over sigma, by the median of their size.
 double robust_scale(std::vector<double> sigmas) {
   if (sigmas.empty()) return 1;
   for (double& value : sigmas) value = std::abs(value);
-  return median(std::move(sigmas)) / 0.6745;
+  return median(sigmas) / 0.6745;
 }
 
 // As the tracker has it (fine_fit.cpp): compression and motion blur move edges, in all frames alike.
@@ -189,8 +184,8 @@ double doubt_scale(const std::vector<ViewMeasurements>& frames) {
       if (m.group < 4) sigmas_px.push_back(m.sigma_px);
   }
   if (sigmas_px.empty()) return 1;
-  return std::max(1.0, median(std::move(sigmas_px)) / fine_fit_limits.usual_sigma_px) +
-         std::max(0.0, median(std::move(blurs_px)) - fine_fit_limits.usual_blur_px);
+  return std::max(1.0, median(sigmas_px) / fine_fit_limits.usual_sigma_px) +
+         std::max(0.0, median(blurs_px) - fine_fit_limits.usual_blur_px);
 }
 
 // The print's; what was taken for zero in all frames counts as it was before the fit.

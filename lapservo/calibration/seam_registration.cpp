@@ -8,6 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/median.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo::internal {
@@ -85,15 +86,13 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
   for (const double d : differences) sine += std::sin(d), cosine += std::cos(d);
   const double about = std::atan2(sine, cosine);
   for (double& d : differences) d = wrap_pi(d - about);
-  std::sort(differences.begin(), differences.end());
-  const double median = differences[differences.size() / 2];
+  const double middle = median(differences);
   std::vector<double> sizes;
-  for (const double d : differences) sizes.push_back(std::abs(d - median));
-  std::sort(sizes.begin(), sizes.end());
-  const double scale = std::max(1e-4, 1.4826 * sizes[sizes.size() / 2]);
+  for (const double d : differences) sizes.push_back(std::abs(d - middle));
+  const double scale = std::max(1e-4, 1.4826 * median(sizes));
   double sum = 0, squares = 0, count = 0;
   for (const double d : differences)
-    if (std::abs(d - median) < 3 * scale) sum += d, squares += d * d, ++count;
+    if (std::abs(d - middle) < 3 * scale) sum += d, squares += d * d, ++count;
   const double mean = sum / count, variance = std::max(0.0, squares / count - mean * mean);
   constexpr double widest_rad = 0.2;
   if (scale > widest_rad) {

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/edge_lines.h"
@@ -148,13 +149,6 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   return place;
-}
-
-// Reorders the values.
-float median(std::span<float> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 // A boundary point that was located.

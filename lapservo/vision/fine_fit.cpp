@@ -7,6 +7,7 @@
 #include <span>
 
 #include "lapservo/core/inplace_vector.h"
+#include "lapservo/core/median.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
 
@@ -45,10 +46,7 @@ double median_sigma_px(std::span<const Measurement> measurements) {
   InplaceVector<double, 4 * EdgeMeasurements::max_lines> sigmas_px;
   for (const Measurement& m : measurements)
     if (m.group < 4) sigmas_px.push_back(m.sigma_px);
-  if (sigmas_px.empty()) return 0;
-  const auto middle = sigmas_px.begin() + static_cast<std::ptrdiff_t>(sigmas_px.size() / 2);
-  std::nth_element(sigmas_px.begin(), middle, sigmas_px.end());
-  return *middle;
+  return sigmas_px.empty() ? 0 : median(sigmas_px);
 }
 
 // What each boundary and side as a whole may be off, and the noise as it is.

@@ -7,6 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "lapservo/core/median.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/heaviest_stretch.h"
@@ -101,8 +102,7 @@ SideLine fit_side(const std::vector<Eigen::Vector2d>& points, double outwards) {
     line.slope = spread > 1e-9 ? (w * wxy - wx * wy) / spread : 0;
     line.offset = (wy - line.slope * wx) / w;
     for (const Eigen::Vector2d& p : points) misses.push_back(std::abs(p.y() - line.at(p.x())));
-    std::nth_element(misses.begin(), misses.begin() + static_cast<std::ptrdiff_t>(misses.size() / 2), misses.end());
-    scale = std::max(1.0, 2 * misses[misses.size() / 2]);
+    scale = std::max(1.0, 2 * median(misses));
   }
   return line;
 }
@@ -180,12 +180,10 @@ Ends find_ends(const Scene& scene, const Outline& outline) {
     if (split.seen[0]) first.push_back(start + split.position[0] * step);
     if (split.seen[3]) last.push_back(start + split.position[3] * step);
   }
-  const auto median = [](std::vector<double>& values) -> std::optional<double> {
-    if (values.size() < 2) return std::nullopt;
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return values[values.size() / 2];
+  const auto of_two_or_more = [](std::vector<double>& values) -> std::optional<double> {
+    return values.size() < 2 ? std::nullopt : std::optional(median(values));
   };
-  return {median(first), median(last)};
+  return {of_two_or_more(first), of_two_or_more(last)};
 }
 
 // Point of the axis behind a place on the centre line, from the width of the shaft there.

@@ -11,6 +11,7 @@
 #include <Eigen/LU>
 
 #include "lapservo/core/inplace_vector.h"
+#include "lapservo/core/median.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
 
@@ -47,9 +48,7 @@ ResidualLine line_of(std::span<const Measurement> measurements, std::size_t grou
     values.push_back(value);
   }
   if (values.size() < fewest) return {};
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  ResidualLine line{*middle, 0};
+  ResidualLine line{median(values), 0};
   for (int i = 0; i < iterations; ++i) {
     double sum = 0, turns = 0, turns_squared = 1 / (usual_slope * usual_slope), at_start = 0, at_turn = 0;
     for (const LinePoint& p : points) {

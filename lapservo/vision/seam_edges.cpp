@@ -10,6 +10,7 @@
 #include <Eigen/LU>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 
@@ -148,14 +149,12 @@ std::array<double, 3> shaft_light(const SeamView& view, double blur_px) {
       for (std::size_t c = 0; c < 3; ++c) values[c].push_back(at.light[c]);
     }
   }
-  std::array<double, 3> median{0.02, 0.02, 0.02};
+  std::array<double, 3> light{0.02, 0.02, 0.02};
   for (std::size_t c = 0; c < 3; ++c) {
     if (values[c].size() < 4) continue;
-    const auto middle = values[c].begin() + static_cast<std::ptrdiff_t>(values[c].size() / 2);
-    std::nth_element(values[c].begin(), middle, values[c].end());
-    median[c] = static_cast<double>(*middle);
+    light[c] = static_cast<double>(median(values[c]));
   }
-  return median;
+  return light;
 }
 
 // Residuals of all profiles when the upper edge lies at `upper_m` and the other one `gap_m` before it; colours, shading
