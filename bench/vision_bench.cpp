@@ -68,11 +68,7 @@ void fit(benchmark::State& state) {
   const auto table = rig.camera.response.table();
   const LightImage light(image, table);
   const ColorClasses classes(rig.instruments);
-  const Scene scene{image,
-                    rig.camera,
-                    classes,
-                    instrument.marker,
-                    {classes.of_band(0, 0), classes.of_band(0, 1), classes.of_band(0, 2)}};
+  const Scene scene{image, rig.camera, classes, instrument.marker, classes.of_bands(0)};
   JointVector q = configurations(rig, 0)[0];
   q.theta_rad += 1e-3, q.phi_rad -= 1e-3, q.rho_m += 2e-4, q.psi_rad += 0.01;
   const PoseUnknowns start = PoseUnknowns::rcm(*instrument.camera_from_rcm, q);

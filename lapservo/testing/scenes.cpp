@@ -87,6 +87,20 @@ cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, s
   return Renderer(rig.camera, shafts, tissue, options).render(placements, seed);
 }
 
+cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t seed,
+                         const ChromaticAberration& aberration) {
+  std::array<cv::Mat, 3> channels;
+  for (const auto& [c, magnification] :
+       {std::pair(0U, aberration.blue), std::pair(1U, 1.0), std::pair(2U, aberration.red)}) {
+    Rig magnified = rig;
+    magnified.camera.fx_px *= magnification, magnified.camera.fy_px *= magnification;
+    cv::extractChannel(render(magnified, {q}, seed, {}), channels[c], static_cast<int>(c));
+  }
+  cv::Mat picture;
+  cv::merge(channels.data(), channels.size(), picture);
+  return picture;
+}
+
 cv::Mat render_nothing(const Rig& rig, std::uint64_t seed) {
   return Renderer(rig.camera, {}, make_tissue(rig.camera.width_px, rig.camera.height_px, seed)).render({}, seed);
 }
@@ -100,11 +114,7 @@ Sight::Sight(const Rig& rig, const cv::Mat& bgr)
       light_(view_, table_) {}
 
 Scene Sight::scene(std::size_t i) const {
-  return {view_,
-          rig_.camera,
-          classes_,
-          rig_.instruments[i].marker,
-          {classes_.of_band(i, 0), classes_.of_band(i, 1), classes_.of_band(i, 2)}};
+  return {view_, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i)};
 }
 
 namespace {

@@ -66,6 +66,11 @@ struct Shot {
   CentreLine line() const;  ///< the true one
 };
 
+/// A picture of the first instrument by a lens with lateral chromatic aberration: a channel's is that of a camera with
+/// another focal length.
+cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t seed,
+                         const ChromaticAberration& aberration);
+
 /// The shot of a seed, rendered once for all who ask.
 const Shot& usual_shot(std::uint64_t seed);
 

@@ -6,6 +6,8 @@
 #include <span>
 #include <utility>
 
+#include "lapservo/vision/limits.h"
+
 namespace lapservo::internal {
 
 namespace {
@@ -111,6 +113,13 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes
   }
   std::sort(blobs.begin(), blobs.end(),
             [](const Blob& a, const Blob& b) { return a.samples.size() > b.samples.size(); });
+  return blobs;
+}
+
+std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& classes) {
+  constexpr int grid_px = 8;
+  auto blobs = find_blobs(image, classes, grid_px, detection_limits.min_samples);
+  if (blobs.size() > detection_limits.max_blobs) blobs.resize(detection_limits.max_blobs);
   return blobs;
 }
 

@@ -21,4 +21,7 @@ struct Blob {
 /// All groups of coloured samples of at least `min_samples`, largest first. Touches one pixel in grid_px^2 only.
 std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int min_samples);
 
+/// As many of them as detection looks at, on its grid.
+std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& classes);
+
 }  // namespace lapservo::internal

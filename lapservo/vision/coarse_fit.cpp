@@ -43,7 +43,7 @@ Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azi
 }
 
 // The stretch of a section with the most marker colour in it.
-Stretch<float> max_colorful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
+Stretch<float> most_colorful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
   return heaviest_stretch(0, static_cast<int>(classes.size()), [&](int i) {
     const std::uint8_t color = classes[static_cast<std::size_t>(i)];
     return scene.is_ours(color) ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
@@ -68,7 +68,7 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), max_reach);
     classes.clear();
     for (int i = -reach; i <= reach; ++i) classes.push_back(scene.class_at(middle + i * step_px * across));
-    const Stretch<float> stretch = max_colorful_stretch(classes, scene);
+    const Stretch<float> stretch = most_colorful_stretch(classes, scene);
     const double width_px = (stretch.last - stretch.first + 1) * step_px;
     if (width_px < detection_limits.narrowest_section * 2 * half_px ||
         width_px > detection_limits.widest_section * 2 * half_px)

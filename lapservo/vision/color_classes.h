@@ -25,6 +25,8 @@ class ColorClasses {
   }
   /// Class of one band of one instrument.
   std::uint8_t of_band(std::size_t instrument, std::size_t band) const { return bands_[instrument][band]; }
+  /// Those of an instrument's three bands.
+  const std::array<std::uint8_t, 3>& of_bands(std::size_t instrument) const { return bands_[instrument]; }
   int count() const { return static_cast<int>(hues_deg_.size()); }
 
  private:

@@ -5,9 +5,9 @@
 
 #include "lapservo/vision/coarse_fit.h"
 
-/// The thresholds by which vision decides, one struct a step: unit, reason and what they were measured on. Shares run
-/// from 0 to 1. How finely something is sampled, and how often, stands where it is done. docs/accuracy.md has the sets
-/// that are named here (`bench/accuracy.sh`), docs/design.md what was tried instead.
+/// The thresholds by which vision decides, one struct a step: unit, reason and what they were measured on. Fractions
+/// run from 0 to 1. How finely something is sampled, and how often, stands where it is done. docs/accuracy.md has the
+/// sets that are named here (`bench/accuracy.sh`), docs/design.md what was tried instead.
 namespace lapservo::internal {
 
 /// Which pixels have a colour (color_classes.cpp). Hues of the samples' tissue: red to yellow, vessels violet.

@@ -15,7 +15,6 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int grid_px = 8;
 // A print that is off by half a millimetre leaves nine tenths of the surface with the colour that the rig's would have.
 constexpr double min_matching = 0.6, max_wrong = 0.15, max_beside = 0.2;
 
@@ -54,8 +53,7 @@ std::optional<Sighting> MarkerSurvey::follow(const Scene& scene, const LightImag
 }
 
 std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImage& light) const {
-  auto blobs = find_blobs(scene.image, classes_, grid_px, detection_limits.min_samples);
-  if (blobs.size() > detection_limits.max_blobs) blobs.resize(detection_limits.max_blobs);
+  const auto blobs = largest_blobs(scene.image, classes_);
   std::optional<Sighting> best;
   double best_score = 0;
   const auto try_start = [&](const PoseUnknowns& start) {
@@ -80,13 +78,8 @@ std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImag
 
 std::optional<Sighting> MarkerSurvey::find(const cv::Mat& bgr) {
   const ImageView image(bgr);
-  const LightImage light(image, light_);
-  const Scene scene{
-      image,
-      rig_.camera,
-      classes_,
-      rig_.instruments[instrument_].marker,
-      {classes_.of_band(instrument_, 0), classes_.of_band(instrument_, 1), classes_.of_band(instrument_, 2)}};
+  const LightImage light(image, light_, ChannelGeometry(rig_.camera));
+  const Scene scene{image, rig_.camera, classes_, rig_.instruments[instrument_].marker, classes_.of_bands(instrument_)};
   auto sighting = last_ ? follow(scene, light) : std::nullopt;
   if (!sighting) sighting = detect(scene, light);
   last_ = sighting;
@@ -109,7 +102,8 @@ std::optional<MarkerView> cropped_view(const cv::Mat& bgr, const Camera& camera,
   const auto cut = [](double px, int end) { return static_cast<int>(std::clamp(px, 0.0, static_cast<double>(end))); };
   const cv::Point from(cut(std::floor(low.x()), camera.width_px), cut(std::floor(low.y()), camera.height_px));
   const cv::Point to(cut(std::ceil(high.x()) + 1, camera.width_px), cut(std::ceil(high.y()) + 1, camera.height_px));
-  if (to.x - from.x < grid_px || to.y - from.y < grid_px) return std::nullopt;
+  constexpr int min_px = 8;
+  if (to.x - from.x < min_px || to.y - from.y < min_px) return std::nullopt;
   MarkerView view{bgr(cv::Rect(from, to)).clone(), camera};
   view.camera.width_px = to.x - from.x, view.camera.height_px = to.y - from.y;
   view.camera.cx_px -= from.x, view.camera.cy_px -= from.y;
@@ -117,15 +111,13 @@ std::optional<MarkerView> cropped_view(const cv::Mat& bgr, const Camera& camera,
 }
 
 ViewMeasurer::ViewMeasurer(const Rig& rig, std::size_t instrument)
-    : classes_(rig.instruments),
-      bands_{classes_.of_band(instrument, 0), classes_.of_band(instrument, 1), classes_.of_band(instrument, 2)},
-      light_(rig.camera.response.table()) {}
+    : classes_(rig.instruments), bands_(classes_.of_bands(instrument)), light_(rig.camera.response.table()) {}
 
 ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& marker, const Sighting& sighting,
                                        const Reach& reach) const {
   constexpr int iterations = 6;
   const ImageView image(view.bgr);
-  const LightImage light(image, light_);
+  const LightImage light(image, light_, ChannelGeometry(view.camera));
   const Scene scene{image, view.camera, classes_, marker, bands_};
   return {
       measure_edges(scene, light, sighting.unknowns, sighting.film_m, {reach.extra_px, iterations, 1}, sighting.blur),
@@ -136,7 +128,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
 std::optional<Sighting> ViewMeasurer::settled(const MarkerView& view, const Marker& marker,
                                               const Sighting& sighting) const {
   const ImageView image(view.bgr);
-  const LightImage light(image, light_);
+  const LightImage light(image, light_, ChannelGeometry(view.camera));
   const Scene scene{image, view.camera, classes_, marker, bands_};
   const FineFit fine = fit_finely(scene, light, sighting.unknowns, sighting.blur);
   return fine.converged ? sighting_of(scene, fine.unknowns, fine.blur, true) : std::nullopt;

@@ -19,8 +19,6 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int grid_px = 8;
-
 bool contradicts_registration(const FineFit& free) {
   const Eigen::Index psi = free.unknowns.size() - 1;
   return free.located_fraction() > registration_limits.well_seen_fraction &&
@@ -131,11 +129,7 @@ void SurfaceTracker::reset() {
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
-  return {image,
-          rig_.camera,
-          classes_,
-          rig_.instruments[i].marker,
-          {classes_.of_band(i, 0), classes_.of_band(i, 1), classes_.of_band(i, 2)}};
+  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i)};
 }
 
 void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
@@ -247,10 +241,7 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     if (memory_[i]) found = follow(scene, light, *memory_[i]);
     if (!found.fit) {
       memory_[i].reset();
-      if (!blobs) {
-        blobs = find_blobs(image, classes_, grid_px, detection_limits.min_samples);
-        if (blobs->size() > detection_limits.max_blobs) blobs->resize(detection_limits.max_blobs);
-      }
+      if (!blobs) blobs = largest_blobs(image, classes_);
       found = detect(scene, light, *blobs, camera_from_rcm);
       if (found.fit && !camera_from_rcm && has_rival(scene, light, *blobs, *found.fit))
         found = {Status::ambiguous, std::nullopt, std::nullopt};

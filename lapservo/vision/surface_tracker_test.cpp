@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -267,21 +266,12 @@ TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
   }
 }
 
-// A channel's picture is that of a camera with another focal length.
 TEST(SurfaceTracker, LateralChromaticAberrationOfTheRigIsUndone) {
   constexpr ChromaticAberration aberration{0.9985, 1.0015};
   std::vector<double> known_rad, unknown_rad;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const auto& shot = usual_shot(seed);
-    std::array<cv::Mat, 3> channels;
-    for (const auto& [c, magnification] :
-         {std::pair(0U, aberration.blue), std::pair(1U, 1.0), std::pair(2U, aberration.red)}) {
-      Rig rig = scenes::usual_rig();
-      rig.camera.fx_px *= magnification, rig.camera.fy_px *= magnification;
-      cv::extractChannel(scenes::render(rig, {shot.q}, seed, {}), channels[c], static_cast<int>(c));
-    }
-    cv::Mat seen;
-    cv::merge(channels.data(), channels.size(), seen);
+    const cv::Mat seen = scenes::render_aberrated(shot.rig, shot.q, seed, aberration);
     Rig rig = shot.rig;
     const auto error_rad = [&] {
       const Observation o = Tracker(rig).track(seen)[0];
