@@ -16,6 +16,11 @@ Rigid3 rcm_from_unrolled(const JointVector& q) {
   return {rotation, q.rho_m * shaft_axis_in_rcm(q)};
 }
 
+Rigid3 camera_from_marker(const Marker& marker, const Rigid3& camera_from_unrolled, double psi_rad) {
+  const Eigen::AngleAxisd roll(psi_rad + marker.seam_rad, Eigen::Vector3d::UnitZ());
+  return {(camera_from_unrolled.rotation * roll).normalized(), camera_from_unrolled.translation};
+}
+
 std::optional<JointVector> configuration_through(const Rigid3& camera_from_rcm,
                                                  const Eigen::Vector3d& proximal_end_in_camera) {
   const Eigen::Vector3d arm = camera_from_rcm.inverse() * proximal_end_in_camera;

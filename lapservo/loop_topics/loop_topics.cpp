@@ -34,21 +34,19 @@ std::string topic(const Rig& rig, const std::string& name) {
   return "/lapservo/" + rig.instruments.front().name + "/" + name;
 }
 
-Rigid3 camera_from_marker(const Instrument& instrument, const JointVector& q) {
-  const double azimuth = q.psi_rad + instrument.marker.seam_rad;
-  return *instrument.camera_from_rcm * rcm_from_unrolled(q) *
-         Rigid3{Eigen::Quaterniond(Eigen::AngleAxisd(azimuth, Eigen::Vector3d::UnitZ())), Eigen::Vector3d::Zero()};
+Rigid3 camera_from_marker_at(const Instrument& instrument, const JointVector& q) {
+  return camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
 }
 
 }  // namespace
 
 PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& seen) {
-  const Rigid3 pose = camera_from_marker(instrument, seen.q);
+  const Rigid3 pose = camera_from_marker_at(instrument, seen.q);
   Eigen::Matrix<double, 6, 4> jacobian;
   constexpr double step = 1e-6;
   for (int i = 0; i < 4; ++i) {
     const Rigid3 moved =
-        camera_from_marker(instrument, JointVector::from_vector(seen.q.vector() + step * Eigen::Vector4d::Unit(i)));
+        camera_from_marker_at(instrument, JointVector::from_vector(seen.q.vector() + step * Eigen::Vector4d::Unit(i)));
     const Eigen::AngleAxisd turn(moved.rotation * pose.rotation.conjugate());
     jacobian.col(i) << (moved.translation - pose.translation) / step, turn.axis() * (turn.angle() / step);
   }
@@ -157,9 +155,9 @@ void LoopTopics::publish_state(const ControlTick& tick, const std::string& state
                     {"reason", std::string(to_string(control.reason))},
                     {"limited", control.limited ? "true" : "false"},
                     {"delay_s", fmt::format("{:.4f}", control.delay_s)}};
-  for (int i = 0; i < 4; ++i)
-    message.values.emplace_back("error_" + feature_names()[static_cast<std::size_t>(i)],
-                                fmt::format("{:.6g}", control.error[i]));
+  for (std::size_t i = 0; i < FeatureVector::size; ++i)
+    message.values.emplace_back(fmt::format("error_{}", FeatureVector::names[i]),
+                                fmt::format("{:.6g}", control.error[static_cast<Eigen::Index>(i)]));
   diagnostics_(message);
 }
 

@@ -7,10 +7,8 @@ namespace lapservo::internal {
 Observation::MarkerPose marker_pose_of(const Marker& marker, const PoseUnknowns& unknowns,
                                        const UnknownMatrix& covariance) {
   const ShaftPose& pose = unknowns.pose();
-  const Eigen::AngleAxisd roll(pose.psi_rad + marker.seam_rad, Eigen::Vector3d::UnitZ());
   Observation::MarkerPose result;
-  result.camera_from_marker = {(pose.camera_from_unrolled.rotation * roll).normalized(),
-                               pose.camera_from_unrolled.translation};
+  result.camera_from_marker = camera_from_marker(marker, pose.camera_from_unrolled, pose.psi_rad);
   Eigen::Quaterniond& rotation = result.camera_from_marker.rotation;
   if (rotation.w() < 0) rotation.coeffs() *= -1;  // one of the two that mean the same
   const Eigen::Vector3d& origin = result.camera_from_marker.translation;
