@@ -23,6 +23,7 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
+#include "lapservo/rig/instrument_index.h"
 #include "lapservo/rig/rig_updater.h"
 #include "lapservo/vision/interlacing.h"
 
@@ -43,11 +44,9 @@ std::size_t index_of(const Rig& rig, const MarkerOptions& options) {
       throw InputError(options.rig, "has several instruments: name one with --instrument");
     return 0;
   }
-  const auto found = std::find_if(rig.instruments.begin(), rig.instruments.end(),
-                                  [&](const Instrument& instrument) { return instrument.name == options.instrument; });
-  if (found == rig.instruments.end())
-    throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
-  return static_cast<std::size_t>(found - rig.instruments.begin());
+  const auto index = instrument_index(rig, options.instrument);
+  if (!index) throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
+  return *index;
 }
 
 // What the joints are compared with must be there before the work.
@@ -102,24 +101,11 @@ int refuse(const MarkerOptions& options, const std::string& why) {
   return 1;
 }
 
-void print_row(const char* name, double unit, double before, double after, double sigma) {
-  std::printf("  %-22s   %10.4f   %10.4f   %8.4f   %+8.4f\n", name, unit * before, unit * after, unit * sigma,
-              unit * (after - before));
-}
-
-void print_table(const Marker& before, const Marker& after, bool with_seam) {
+void print_table(const std::vector<CalibratedNumber>& numbers) {
   std::printf("\n                               before        after      sigma     change\n");
-  const MarkerSigmas& sigmas = after.sigmas;
-  for (std::size_t i = 0; i < 3; ++i)
-    print_row(fmt::format("bands_upper_m[{}] [mm]", i).c_str(), 1e3, before.bands_upper_m[i], after.bands_upper_m[i],
-              (*sigmas.bands_upper_m)[i]);
-  for (std::size_t i = 0; i < 3; ++i)
-    print_row(fmt::format("bands_lower_m[{}] [mm]", i).c_str(), 1e3, before.bands_lower_m[i], after.bands_lower_m[i],
-              (*sigmas.bands_lower_m)[i]);
-  print_row("wrap_m [mm]", 1e3, before.wrap_m, after.wrap_m, sigmas.wrap_m.value());
-  print_row("skew_m [mm]", 1e3, before.skew_m, after.skew_m, sigmas.skew_m.value());
-  print_row("gap_rad [mrad]", 1e3, before.gap_rad, after.gap_rad, sigmas.gap_rad.value());
-  if (with_seam) print_row("seam_rad [mrad]", 1e3, before.seam_rad, after.seam_rad, sigmas.seam_rad.value());
+  for (const CalibratedNumber& n : numbers)
+    std::printf("  %-22s   %10.4f   %10.4f   %8.4f   %+8.4f\n", n.name.c_str(), n.before, n.after, n.sigma,
+                n.after - n.before);
 }
 
 int run_marker(const MarkerOptions& options) {
@@ -165,7 +151,7 @@ int run_marker(const MarkerOptions& options) {
   }
   std::printf("%s: found in %d of %d frames; %zu from all sides are used, %zu of them show the seam\n",
               instrument.name.c_str(), frames.found, frames.looked_at, calibration.frames, calibration.seam_views);
-  print_table(instrument.marker, calibration.marker, recording.has_value());
+  print_table(calibrated_numbers(instrument.marker, calibration.marker, recording.has_value()));
   std::printf("\nboundaries miss the print by %.3f px rms before, %.3f px after\n", calibration.before_px,
               calibration.after_px);
   std::printf(

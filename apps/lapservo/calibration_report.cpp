@@ -78,27 +78,34 @@ Plot print_plot(const Marker& before, const Marker& after) {
   return plot;
 }
 
-Table table_of(const Marker& before, const Marker& after) {
+Table table_of(const std::vector<CalibratedNumber>& numbers) {
   Table table{"One standard deviation each", {"", "before", "after", "sigma"}, {}};
-  const auto add = [&](const std::string& name, double unit, double was, double is, double sigma) {
-    table.rows.push_back({name, fmt::format("{:.4f}", unit * was), fmt::format("{:.4f}", unit * is),
-                          fmt::format("{:.4f}", unit * sigma)});
-  };
-  const MarkerSigmas& sigmas = after.sigmas;
-  for (std::size_t i = 0; i < 3; ++i)
-    add(fmt::format("bands_upper_m[{}] [mm]", i), 1e3, before.bands_upper_m[i], after.bands_upper_m[i],
-        (*sigmas.bands_upper_m)[i]);
-  for (std::size_t i = 0; i < 3; ++i)
-    add(fmt::format("bands_lower_m[{}] [mm]", i), 1e3, before.bands_lower_m[i], after.bands_lower_m[i],
-        (*sigmas.bands_lower_m)[i]);
-  add("wrap_m [mm]", 1e3, before.wrap_m, after.wrap_m, sigmas.wrap_m.value());
-  add("skew_m [mm]", 1e3, before.skew_m, after.skew_m, sigmas.skew_m.value());
-  add("gap_rad [mrad]", 1e3, before.gap_rad, after.gap_rad, sigmas.gap_rad.value());
-  if (sigmas.seam_rad) add("seam_rad [mrad]", 1e3, before.seam_rad, after.seam_rad, *sigmas.seam_rad);
+  for (const CalibratedNumber& n : numbers)
+    table.rows.push_back(
+        {n.name, fmt::format("{:.4f}", n.before), fmt::format("{:.4f}", n.after), fmt::format("{:.4f}", n.sigma)});
   return table;
 }
 
 }  // namespace
+
+std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Marker& after, bool with_seam) {
+  std::vector<CalibratedNumber> numbers;
+  const auto add = [&](const std::string& name, double was, double is, double sigma) {
+    numbers.push_back({name, 1e3 * was, 1e3 * is, 1e3 * sigma});
+  };
+  const MarkerSigmas& sigmas = after.sigmas;
+  for (std::size_t i = 0; i < 3; ++i)
+    add(fmt::format("bands_upper_m[{}] [mm]", i), before.bands_upper_m[i], after.bands_upper_m[i],
+        (*sigmas.bands_upper_m)[i]);
+  for (std::size_t i = 0; i < 3; ++i)
+    add(fmt::format("bands_lower_m[{}] [mm]", i), before.bands_lower_m[i], after.bands_lower_m[i],
+        (*sigmas.bands_lower_m)[i]);
+  add("wrap_m [mm]", before.wrap_m, after.wrap_m, sigmas.wrap_m.value());
+  add("skew_m [mm]", before.skew_m, after.skew_m, sigmas.skew_m.value());
+  add("gap_rad [mrad]", before.gap_rad, after.gap_rad, sigmas.gap_rad.value());
+  if (with_seam) add("seam_rad [mrad]", before.seam_rad, after.seam_rad, sigmas.seam_rad.value());
+  return numbers;
+}
 
 void write_calibration_report(const std::filesystem::path& path, const Instrument& instrument,
                               const MarkerCalibration& calibration) {
@@ -114,7 +121,8 @@ void write_calibration_report(const std::filesystem::path& path, const Instrumen
                      {residual_plot("After: the calibrated print", calibration.after),
                       "The same for the calibrated print. What is left and runs straight is none of its errors."},
                      {print_plot(instrument.marker, calibration.marker), "Both prints, unrolled."}};
-  section.tables = {table_of(instrument.marker, calibration.marker)};
+  section.tables = {table_of(
+      calibrated_numbers(instrument.marker, calibration.marker, calibration.marker.sigmas.seam_rad.has_value()))};
   section.notes = {"Lengths count in diameters: the rig's diameter_m is taken for right."};
   Report report;
   report.title = "lapservo calibrate marker";

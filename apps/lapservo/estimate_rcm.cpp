@@ -25,6 +25,7 @@
 #include "lapservo/rcm/distinct_lines.h"
 #include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/projected_rcm.h"
+#include "lapservo/rig/instrument_index.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
@@ -53,9 +54,8 @@ using LinesByInstrument = std::map<std::string, std::vector<LineObservation>>;
 
 const Instrument* find_instrument(const std::optional<Rig>& rig, const std::string& name) {
   if (!rig) return nullptr;
-  const auto found = std::find_if(rig->instruments.begin(), rig->instruments.end(),
-                                  [&](const Instrument& instrument) { return instrument.name == name; });
-  return found == rig->instruments.end() ? nullptr : &*found;
+  const auto index = instrument_index(*rig, name);
+  return index ? &rig->instruments[*index] : nullptr;
 }
 
 Eigen::Vector2d read_ideal_point(const CsvTable& table, std::size_t row, const char* edge, const Options& options,

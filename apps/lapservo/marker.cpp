@@ -20,6 +20,7 @@
 #include "lapservo/marker/design.h"
 #include "lapservo/marker/drawing.h"
 #include "lapservo/marker/length_code.h"
+#include "lapservo/rig/instrument_index.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/rig/rig_writer.h"
 
@@ -188,8 +189,7 @@ Instrument chosen(const RigOptions& options) {
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.out);
   if (options.instrument.empty()) return rig.instruments.front();
-  for (const Instrument& instrument : rig.instruments)
-    if (instrument.name == options.instrument) return instrument;
+  if (const auto index = instrument_index(rig, options.instrument)) return rig.instruments[*index];
   throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
 }
 

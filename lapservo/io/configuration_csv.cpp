@@ -1,19 +1,18 @@
 #include "lapservo/io/configuration_csv.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <string>
 
 #include "lapservo/core/error.h"
+#include "lapservo/rig/instrument_index.h"
 
 namespace lapservo::internal {
 namespace {
 
 std::size_t index_of(const std::string& name, const Rig& rig, const std::string& source) {
-  const auto found = std::find_if(rig.instruments.begin(), rig.instruments.end(),
-                                  [&](const Instrument& instrument) { return instrument.name == name; });
-  if (found == rig.instruments.end()) throw InputError(source, "instrument", name, "an instrument of the rig");
-  return static_cast<std::size_t>(found - rig.instruments.begin());
+  const auto index = instrument_index(rig, name);
+  if (!index) throw InputError(source, "instrument", name, "an instrument of the rig");
+  return *index;
 }
 
 }  // namespace
