@@ -5,7 +5,7 @@
 namespace lapservo::internal {
 
 /// Tells measured joints that no arm can have come to since the last ones: a bit that fell over, an encoder that was
-/// set. What only flashes up is passed over; where the joints stay for three measured joints, they are.
+/// set. What only flashes up is passed over; where the joints stay three times in a row, they are.
 class WildJoints {
  public:
   /// `rate`: the joints' largest wanted speeds; three times as fast is believed.

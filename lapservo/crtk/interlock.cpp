@@ -43,11 +43,12 @@ std::string_view to_string(Blocked blocked) {
 Interlock::Interlock(const InterlockConfig& config)
     : config_(config), measured_clock_(config.max_age_s), setpoint_clock_(config.max_age_s) {}
 
-bool Interlock::well_formed(const JointMessage& message) {
+// Of the four joints; nullopt, and counted, when the message is none to go by.
+std::optional<Interlock::Places> Interlock::places_in(const JointMessage& message) {
   const bool sized = message.names.size() <= max_joints && message.names.size() == message.positions.size();
-  if (sized && find_joints(config_.joints, message.names)) return true;
-  ++counts_.malformed;
-  return false;
+  const auto places = sized ? find_joints(config_.joints, message.names) : std::nullopt;
+  if (!places) ++counts_.malformed;
+  return places;
 }
 
 std::optional<double> Interlock::stamped(StampClock& clock, const JointMessage& message, double arrival_s) {
@@ -71,31 +72,32 @@ std::optional<double> Interlock::stamped(StampClock& clock, const JointMessage& 
   return std::nullopt;
 }
 
-Eigen::Vector4d Interlock::q_of(const JointMessage& message) const {
-  const auto places = *find_joints(config_.joints, message.names);
+Eigen::Vector4d Interlock::q_of(const JointMessage& message, const Places& places) const {
   Eigen::Vector4d positions;
   for (int i = 0; i < 4; ++i) positions[i] = message.positions[places[i]];
   return q_from_joints(config_.joints, positions);
 }
 
 void Interlock::on_measured(const JointMessage& message, double arrival_s) {
-  if (!well_formed(message)) return;
+  const auto places = places_in(message);
+  if (!places) return;
   const auto time_s = stamped(measured_clock_, message, arrival_s);
   if (!time_s) return;
   ++counts_.joint_states;
   finite_ = all_finite(message.positions);
-  if (finite_) measured_ = Reading{*time_s, arrival_s, message.positions, q_of(message)};
+  if (finite_) measured_ = Reading{*time_s, arrival_s, message.positions, q_of(message, *places)};
   watch(arrival_s);
 }
 
 void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
-  if (!well_formed(message) || !all_finite(message.positions)) return;
+  const auto places = places_in(message);
+  if (!places || !all_finite(message.positions)) return;
   const auto time_s = stamped(setpoint_clock_, message, arrival_s);
   if (!time_s) return;
-  setpoint_ = Reading{*time_s, arrival_s, message.positions, q_of(message)};
+  setpoint_ = Reading{*time_s, arrival_s, message.positions, q_of(message, *places)};
   if (!moving_) {
     names_ = message.names;
-    places_ = *find_joints(config_.joints, names_);
+    places_ = *places;
   } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_, arrival_s))) {
     on_foreign_command();
   }

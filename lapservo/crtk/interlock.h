@@ -104,9 +104,10 @@ class Interlock {
     Eigen::Vector4d q = Eigen::Vector4d::Zero();
   };
 
-  bool well_formed(const JointMessage& message);
+  using Places = std::array<std::size_t, 4>;
+  std::optional<Places> places_in(const JointMessage& message);
   std::optional<double> stamped(StampClock& clock, const JointMessage& message, double arrival_s);
-  Eigen::Vector4d q_of(const JointMessage& message) const;
+  Eigen::Vector4d q_of(const JointMessage& message, const Places& places) const;
   void watch(double now_s);
   void forget_path();
   void start(double now_s);
@@ -122,7 +123,7 @@ class Interlock {
   OperatingStateMessage operating_state_;
   bool operating_state_known_ = false, held_ = false, foreign_ = false, stopped_ = false;
   std::vector<std::string> names_;
-  std::array<std::size_t, 4> places_{};
+  Places places_{};
 
   std::optional<JointPath> path_;
   bool must_start_anew_ = true, told_ = false;  // the loop was told that the arm is not enabled

@@ -28,9 +28,10 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
   if (YAML::Node camera = root["camera"]; camera.IsScalar())
     root["camera"] = camera_path_from(camera.Scalar(), path, destination);
   YAML::Node entry = root["instruments"][instrument]["marker"];
-  for (const auto& number : YAML::Load(marker_yaml(marker, 0))) entry[number.first.Scalar()] = number.second;
+  const YAML::Node numbers = YAML::Load(marker_yaml(marker, 0));
+  for (const auto& number : numbers) entry[number.first.Scalar()] = number.second;
   for (const char* key : {"wrap_m", "skew_m", "gap_rad", "tolerance_m"})
-    if (!YAML::Load(marker_yaml(marker, 0))[key]) entry.remove(key);
+    if (!numbers[key]) entry.remove(key);
   YAML::Emitter out;
   out << root;
   return std::string(out.c_str()) + "\n";
