@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/control/backlash.h"
+#include "lapservo/robot/backlash.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/control/backlash.h"
+#include "lapservo/robot/backlash.h"
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {

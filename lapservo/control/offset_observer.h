@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/control/backlash.h"
+#include "lapservo/robot/backlash.h"
 #include "lapservo/control/backlash_estimator.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/delay_estimator.h"

@@ -1,4 +1,4 @@
-#include "lapservo/control/backlash.h"
+#include "lapservo/robot/backlash.h"
 
 #include <algorithm>
 #include <cmath>
