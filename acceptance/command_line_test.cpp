@@ -379,6 +379,73 @@ TEST_F(CommandLine, HelpShowsExamples) {
   EXPECT_EQ(run("fly"), 2);
 }
 
+// A swinging arm whose joints are read by another clock, from the other side of its gears: from a rig that knows
+// their names only.
+TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
+  std::string plain = read(rig_);
+  const std::string known = plain.substr(plain.find("    camera_from_rcm:"));
+  plain.resize(plain.size() - known.size());
+  const std::string joints_entry =
+      "    joints: {names: [yaw, pitch, insertion, roll], sign: [1, 1, 1, 1], offset: [0, 0, 0, 0]}\n";
+  const std::string unregistered = in("unregistered.yaml", plain + joints_entry);
+  constexpr double fps = 8, clock_s = 0.4;
+  constexpr int frames = 72;
+  std::string poses = "theta_rad,phi_rad,rho_m,psi_rad\n", joints = "time_s,yaw,pitch,insertion,roll\n";
+  const auto q_at = [](double t) {
+    return std::array{-0.0778 + 0.25 * std::sin(0.9 * t), 1.75 + 0.18 * std::sin(1.3 * t + 1),
+                      0.140 + 0.010 * std::sin(0.7 * t), 1.2 * std::sin(0.8 * t + 2)};
+  };
+  const auto row = [](const std::array<double, 4>& numbers) {
+    std::string text;
+    for (const double number : numbers) text += (text.empty() ? "" : ",") + std::to_string(number);
+    return text + "\n";
+  };
+  for (int i = 0; i < frames; ++i) poses += row(q_at(i / fps));
+  for (int i = -20; i < 50 * frames / fps + 20; ++i) {
+    const auto q = q_at(i / 50.0);
+    joints += std::to_string(i / 50.0 - clock_s) + "," + row({q[0], 1.5 - q[1], q[2] + 0.02, 0.7 - q[3]});
+  }
+  ASSERT_EQ(run("render --rig " + rig_ + " --out " + in("swing") + " --poses " + in("poses.csv", poses)), 0)
+      << errors();
+  const std::string calibrate =
+      "calibrate registration " + in("swing") + " --fps 8 --rig " + unregistered + " --out " + out("rig.yaml");
+  ASSERT_EQ(run(calibrate + " --joints " + in("joints.csv", joints) + " --report " + out("report.html")), 0)
+      << errors();
+  EXPECT_NE(read(out("report.html")).find("<svg"), std::string::npos);
+  const std::string written = read(out("rig.yaml"));
+  EXPECT_NE(written.find("sign: [1, -1, 1, -1]"), std::string::npos) << written;
+  const auto numbers_of = [&](const std::string& key) {
+    std::string text = written.substr(written.find("\n      " + key + ": [") + key.size() + 10);
+    std::vector<double> numbers;
+    for (std::size_t at = 0; at < text.find(']'); at = text.find(',', at) + 1)
+      numbers.push_back(std::stod(text.substr(at)));
+    return numbers;
+  };
+  const auto offset = numbers_of("offset"), translation = numbers_of("translation_m");
+  EXPECT_NEAR(offset[1], 1.5, 1.7e-3);
+  EXPECT_NEAR(offset[2], -0.02, 3e-4);
+  EXPECT_NEAR(offset[3], 0.7, 3e-3);
+  EXPECT_NEAR(translation[0], -0.077782, 3e-4);
+  EXPECT_NEAR(translation[2], 0.059220, 3e-4);
+  const std::string delay = "\n    image_delay_s: ";
+  EXPECT_NEAR(std::stod(written.substr(written.find(delay) + delay.size())), clock_s, 5e-3);
+
+  // Without joints: from what was tracked without a registration; with one, the axes would pass through it anyway.
+  ASSERT_EQ(run("track " + in("swing") + " --rig " + unregistered + " --out " + out("free.csv")), 0) << errors();
+  ASSERT_EQ(run("calibrate registration " + out("free.csv") + " --rig " + unregistered + " --out " + out("rcm.yaml")),
+            0)
+      << errors();
+  EXPECT_NE(output().find("is a convention"), std::string::npos);
+  ASSERT_EQ(run("track " + in("swing") + " --rig " + out("rig.yaml") + " --out " + out("bound.csv")), 0) << errors();
+  EXPECT_EQ(
+      run("calibrate registration " + out("bound.csv") + " --rig " + out("rig.yaml") + " --out " + out("no.yaml")), 1);
+  EXPECT_NE(errors().find("camera_from_rcm"), std::string::npos);
+  EXPECT_FALSE(fs::exists(out("no.yaml")));
+
+  EXPECT_EQ(run(calibrate + " --joints " + in("other.csv", "time_s,a,b,c,d\n0,1,2,3,4\n1,1,2,3,4\n")), 2);
+  EXPECT_NE(errors().find("yaw"), std::string::npos);
+}
+
 // A turn of a print that is not the rig's: the marker is wrapped askew, and joints say where its seam lies.
 TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
   constexpr int frames = 48;

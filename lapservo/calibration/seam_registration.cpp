@@ -1,13 +1,12 @@
 #include "lapservo/calibration/seam_registration.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
+#include <optional>
+#include <vector>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/csv.h"
-#include "lapservo/core/error.h"
 #include "lapservo/core/median.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 
@@ -16,17 +15,9 @@ namespace {
 
 constexpr std::size_t min_frames = 8;
 
-// The joint psi at a time; nullopt outside the recording, and across its pauses.
 std::optional<double> psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
-  constexpr double longest_pause_s = 0.5;
-  const auto next = std::lower_bound(recording.time_s.begin(), recording.time_s.end(), time_s);
-  if (next == recording.time_s.end() || (next == recording.time_s.begin() && *next > time_s)) return std::nullopt;
-  const auto i = static_cast<std::size_t>(std::max<std::ptrdiff_t>(1, next - recording.time_s.begin()));
-  const double from_s = recording.time_s[i - 1], to_s = recording.time_s[i];
-  if (to_s - from_s > longest_pause_s) return std::nullopt;
-  const double fraction = (time_s - from_s) / (to_s - from_s);
-  const double joint = (1 - fraction) * recording.joints[i - 1][3] + fraction * recording.joints[i][3];
-  return joints.sign[3] * joint + joints.offset[3];
+  const auto at = recording.at(time_s);
+  return at ? std::optional(joints.sign[3] * (*at)[3] + joints.offset[3]) : std::nullopt;
 }
 
 // psi in the RCM's azimuths of a shaft in a free pose: its axis as theta and phi have it, its turn about that.
@@ -41,22 +32,6 @@ double psi_of(const ShaftPose& pose, const Rigid3& camera_from_rcm) {
 }
 
 }  // namespace
-
-JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints) {
-  const CsvTable table = CsvTable::read(path);
-  JointRecording recording;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const double time_s = table.number(row, "time_s");
-    if (!recording.time_s.empty() && !(time_s > recording.time_s.back()))
-      throw InputError(path.string(), "row " + std::to_string(row + 1) + ": time_s", table.text(row, "time_s"),
-                       "later than the row before: the clock jumps");
-    recording.time_s.push_back(time_s);
-    auto& at = recording.joints.emplace_back();
-    for (std::size_t i = 0; i < at.size(); ++i) at[i] = table.number(row, joints.names[i]);
-  }
-  if (recording.time_s.size() < 2) throw InputError(path.string(), "has fewer than two rows");
-  return recording;
-}
 
 SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibration& calibration,
                                const JointRecording& recording) {

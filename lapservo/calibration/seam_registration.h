@@ -1,23 +1,12 @@
 #pragma once
 
-#include <filesystem>
-#include <optional>
+#include <cstddef>
 #include <string>
-#include <vector>
 
+#include "lapservo/calibration/joint_recording.h"
 #include "lapservo/calibration/marker_calibration.h"
 
 namespace lapservo::internal {
-
-/// An arm's joints over time.
-struct JointRecording {
-  std::vector<double> time_s;
-  std::vector<std::array<double, 4>> joints;  ///< as Joints::names has them; rad, rad, m, rad
-};
-
-/// A CSV of `time_s` and a column a joint (docs/conventions.md). Throws InputError for columns that are missing,
-/// numbers that are none, fewer than two rows and times that do not rise.
-JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints);
 
 /// Where the seam lies on the instrument.
 struct SeamRegistration {

@@ -19,6 +19,7 @@ class CsvTable {
   static CsvTable parse(std::string_view text, std::string source);
 
   std::size_t rows() const { return rows_.size(); }
+  const std::vector<std::string>& columns() const { return header_; }
   bool has(std::string_view column) const;
   /// Throws InputError when there is no such column.
   const std::string& text(std::size_t row, std::string_view column) const;

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 
-#include "lapservo/marker/marker.h"
+#include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
 
@@ -13,5 +15,21 @@ namespace lapservo::internal {
 /// there. The rig must have been read without complaint (load_rig).
 std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
                              std::size_t instrument, const Marker& marker);
+
+/// Where an instrument stands before its camera, with one standard deviation each; without a value, what the file says
+/// of it stays.
+struct MeasuredRegistration {
+  Rigid3 camera_from_rcm;
+  std::array<double, 3> sigma_translation_m{};
+  std::optional<std::array<double, 4>> sigma_quaternion_xyzw;  ///< nullopt: the rotation was not measured
+  std::optional<Joints> joints;
+  std::array<double, 4> sigma_offset{};  ///< of joints
+  std::optional<double> image_delay_s;
+  double sigma_image_delay_s = 0;
+};
+
+/// The same, with another registration.
+std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
+                             std::size_t instrument, const MeasuredRegistration& registration);
 
 }  // namespace lapservo::internal

@@ -76,5 +76,37 @@ TEST(UpdatedRig, ChangesOneMarkerAndNothingElse) {
   }
 }
 
+TEST(UpdatedRig, ChangesOneRegistrationAndNothingElse) {
+  const Files files;
+  MeasuredRegistration measured;
+  measured.camera_from_rcm = {Eigen::Quaterniond(0.3, 0.4, -0.5, 0.7).normalized(), {0.1, -1.0 / 3, 0.25}};
+  measured.sigma_translation_m = {1e-5, 2e-5, 3e-5};
+  const auto path = files.folder / "new.yaml";
+  const auto updated = [&](std::size_t instrument) {
+    const std::string text = updated_rig_yaml(files.folder / "rig.yaml", path, instrument, measured);
+    testing::write_file(path, text);
+    return std::pair{load_rig(path), text};
+  };
+  const auto [rcm_only, text] = updated(1);
+  const Instrument& other = rcm_only.instruments[1];
+  EXPECT_EQ(other.camera_from_rcm->translation, measured.camera_from_rcm.translation);
+  EXPECT_EQ(other.camera_from_rcm->rotation.coeffs(), measured.camera_from_rcm.rotation.coeffs());
+  EXPECT_EQ(other.image_delay_s, 0.1) << "not measured: stays";
+  EXPECT_EQ(text.find("sigma_translation_m: [0.0001"), std::string::npos) << "the old one's";
+  EXPECT_NE(text.find("sigma_translation_m: [1e-05, 2e-05, 3e-05]"), std::string::npos);
+
+  measured.sigma_quaternion_xyzw = {1e-4, 1e-4, 1e-4, 1e-4};
+  measured.joints = Joints{{"yaw", "pitch", "insertion", "roll"}, {1, -1, 1, 1}, {0, 1.0 / 7, 0.02, -3}};
+  measured.image_delay_s = 1.0 / 9, measured.sigma_image_delay_s = 0.001;
+  const auto [whole, whole_text] = updated(0);
+  EXPECT_EQ(whole.instruments[0].joints->offset, measured.joints->offset);
+  EXPECT_EQ(whole.instruments[0].joints->sign, measured.joints->sign);
+  EXPECT_EQ(whole.instruments[0].joints->names, measured.joints->names);
+  EXPECT_EQ(whole.instruments[0].image_delay_s, measured.image_delay_s);
+  EXPECT_EQ(whole.instruments[0].marker.gap_rad, 0.2);
+  for (const char* key : {"sigma_quaternion_xyzw", "sigma_offset", "sigma_image_delay_s: 0.001"})
+    EXPECT_NE(whole_text.find(key), std::string::npos) << key;
+}
+
 }  // namespace
 }  // namespace lapservo::internal

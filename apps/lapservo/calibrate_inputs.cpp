@@ -1,0 +1,86 @@
+#include "apps/lapservo/calibrate_inputs.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/input_files.h"
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/numbers.h"
+#include "apps/lapservo/progress.h"
+#include "lapservo/core/error.h"
+#include "lapservo/rig/instrument_index.h"
+#include "lapservo/vision/interlacing.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace fs = std::filesystem;
+
+void add_calibrate_options(CLI::App* command, CalibrateOptions& options) {
+  command->add_option("--rig", options.rig, "The rig as it is known so far")->required();
+  command->add_option("--out", options.out, "The rig to write or replace, with what was measured; may be --rig's")
+      ->required();
+  command->add_option("--instrument", options.instrument, "Its name, where the rig has several");
+  command->add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
+  command->add_option("--fps", options.fps, "Frames per second of a folder of pictures")
+      ->capture_default_str()
+      ->check(number_between(0.001, 1000.0));
+}
+
+std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options) {
+  if (options.instrument.empty()) {
+    if (rig.instruments.size() > 1)
+      throw InputError(options.rig, "has several instruments: name one with --instrument");
+    return 0;
+  }
+  const auto index = instrument_index(rig, options.instrument);
+  if (!index) throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
+  return *index;
+}
+
+void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig) {
+  InputFiles inputs;
+  inputs.add(options.input), inputs.add(options.joints);
+  std::error_code error;
+  if (fs::is_directory(options.input, error)) inputs.add_pictures_in(options.input);
+  for (const std::string& out : {options.out, options.report}) inputs.refuse_as_output(out);
+  if (!options.report.empty() &&
+      fs::weakly_canonical(options.out, error) == fs::weakly_canonical(options.report, error))
+    throw InputError(options.out, "is the place for --out and --report, expected two places");
+  inputs.add_rig(options.rig, rig);
+  inputs.refuse_as_output(options.report);
+}
+
+FramesRead read_frames(const CalibrateOptions& options, const Rig& rig, FrameSource& source, int every,
+                       const std::function<std::string(const cv::Mat&, double)>& look) {
+  const bool deinterlace = options.deinterlace || rig.camera.deinterlace;
+  EvenField field(rig.camera.response);
+  FramesRead frames;
+  Progress progress(source.frame_count());
+  int read = 0;
+  while (!(frames.stopped = interrupted())) {
+    const auto frame = source.next();
+    if (!frame) break;
+    if (frame->bgr.cols != rig.camera.width_px || frame->bgr.rows != rig.camera.height_px)
+      throw InputError(frame->file.empty() ? options.input : frame->file.string(), "size",
+                       fmt::format("{} x {}", frame->bgr.cols, frame->bgr.rows),
+                       fmt::format("{} x {}, as the rig's camera has it", rig.camera.width_px, rig.camera.height_px));
+    if (read++ % every != 0) continue;
+    if (frame->flaw) {
+      ++frames.flawed;
+      continue;
+    }
+    ++frames.looked_at;
+    progress.show(read, look(deinterlace ? field.of(frame->bgr) : frame->bgr, frame->time_s));
+  }
+  return frames;
+}
+
+int refuse_calibration(const CalibrateOptions& options, const std::string& why) {
+  std::fprintf(stderr, "lapservo: %s: %s; the rig is as it was\n", options.input.c_str(), why.c_str());
+  return 1;
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "apps/lapservo/subcommands.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::app {
+
+/// What the subcommands that measure one instrument of a rig from frames are told.
+struct CalibrateOptions {
+  std::string input, rig, out, instrument, joints, report;
+  double fps = 30;
+  bool deinterlace = false;
+};
+
+/// All but the input, the joints and the report, which each subcommand describes itself.
+void add_calibrate_options(CLI::App* command, CalibrateOptions& options);
+
+/// Place in the rig of the instrument that is meant. Throws InputError where that is open or unknown.
+std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options);
+
+/// Throws InputError when a result would go over an input or over the other result.
+void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
+
+/// What became of a recording's frames.
+struct FramesRead {
+  int looked_at = 0, flawed = 0;
+  bool stopped = false;  ///< by the user
+};
+
+/// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` returns what is told
+/// beside the progress. Throws InputError at a frame that is not of the rig's size.
+FramesRead read_frames(const CalibrateOptions& options, const Rig& rig, FrameSource& source, int every,
+                       const std::function<std::string(const cv::Mat&, double)>& look);
+
+/// Says on stderr why nothing was written; returns the exit code.
+int refuse_calibration(const CalibrateOptions& options, const std::string& why);
+
+}  // namespace lapservo::app

@@ -1,0 +1,206 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/registration_report.h"
+#include "apps/lapservo/subcommands.h"
+#include "lapservo/calibration/pose_table.h"
+#include "lapservo/calibration/registration.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "lapservo/rig/rig_updater.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+// The rig's, else the recording's own four columns in the order theta, phi, rho, psi.
+Joints joints_of(const CalibrateOptions& options, const Instrument& instrument) {
+  if (instrument.joints) return *instrument.joints;
+  Joints joints;
+  std::vector<std::string> names;
+  const CsvTable table = CsvTable::read(options.joints);
+  for (const std::string& column : table.columns())
+    if (column != "time_s") names.push_back(column);
+  if (names.size() != joints.names.size())
+    throw InputError(options.joints, "columns", fmt::format("{}", fmt::join(names, ", ")),
+                     "time_s and four joints (theta's, phi's, rho's, psi's), since " + instrument.name +
+                         " has no joints entry in " + options.rig + " that would name them");
+  std::copy(names.begin(), names.end(), joints.names.begin());
+  return joints;
+}
+
+struct Poses {
+  std::vector<TimedPose> all;
+  std::string none;  ///< why there are none
+  bool stopped = false;
+};
+
+bool is_table(const std::string& input) {
+  return std::filesystem::path(input).extension() == ".csv";
+}
+
+Poses poses_in_table(const CalibrateOptions& options, const Instrument& instrument) {
+  PoseTable table = read_poses(options.input, instrument.name);
+  Poses poses{std::move(table.poses), "", false};
+  if (table.with_rcm > 0 && poses.all.empty())
+    poses.none = fmt::format(
+        "its {} rows were measured with a camera_from_rcm, through which their axes pass whether it is right or not: "
+        "give the pictures, or track them with a rig without it",
+        table.with_rcm);
+  else if (table.rows == 0)
+    poses.none = fmt::format("has no row of {}", instrument.name);
+  return poses;
+}
+
+// Without what is to be measured: poses by the image alone.
+Poses poses_in_frames(const CalibrateOptions& options, Rig rig, std::size_t index) {
+  constexpr int enough = 3600;
+  const auto source = open_frame_source(options.input, options.fps);
+  for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
+  Tracker tracker(rig);
+  Poses poses;
+  const FramesRead read = read_frames(options, rig, *source, std::max(1, source->frame_count().value_or(0) / enough),
+                                      [&](const cv::Mat& bgr, double time_s) {
+                                        const Observation& seen = tracker.track(bgr)[index];
+                                        if (seen.status == Status::ok && seen.marker)
+                                          poses.all.push_back({time_s, *seen.marker});
+                                        return fmt::format(", {} in {}", rig.instruments[index].name, poses.all.size());
+                                      });
+  poses.stopped = read.stopped;
+  if (const std::string complaint = source->complaint(); !complaint.empty())
+    std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", options.input.c_str(), complaint.c_str());
+  if (poses.all.empty())
+    poses.none = fmt::format("{} is in none of {} frames{}", rig.instruments[index].name, read.looked_at,
+                             read.flawed ? fmt::format(" ({} are damaged)", read.flawed) : "");
+  return poses;
+}
+
+MeasuredRegistration measured(const Registration& registration) {
+  MeasuredRegistration result;
+  result.camera_from_rcm = registration.camera_from_rcm;
+  for (std::size_t i = 0; i < 3; ++i)
+    result.sigma_translation_m[i] = registration.sigma_translation_m[static_cast<Eigen::Index>(i)];
+  if (registration.sigma_quaternion) {
+    result.sigma_quaternion_xyzw.emplace();
+    for (std::size_t i = 0; i < 4; ++i)
+      (*result.sigma_quaternion_xyzw)[i] = (*registration.sigma_quaternion)[static_cast<Eigen::Index>(i)];
+  }
+  if (registration.arm) {
+    result.joints = registration.arm->joints;
+    result.sigma_offset = registration.arm->sigma_offset;
+    result.image_delay_s = registration.arm->image_delay_s;
+    result.sigma_image_delay_s = registration.arm->sigma_image_delay_s;
+  }
+  return result;
+}
+
+void print_numbers(const Instrument& before, const Registration& registration) {
+  std::printf("\n                               before        after      sigma\n");
+  for (const CalibratedNumber& n : registered_numbers(before, registration))
+    std::printf("  %-22s   %10s   %10.4f   %8.4f\n", n.name.c_str(),
+                std::isfinite(n.before) ? fmt::format("{:.4f}", n.before).c_str() : "-", n.after, n.sigma);
+  if (!registration.arm) return;
+  const auto& [joints, sigma, delay_s, sigma_delay_s, backlash] = *registration.arm;
+  std::printf("  joints.sign: %+.0f %+.0f %+.0f %+.0f\n", joints.sign[0], joints.sign[1], joints.sign[2],
+              joints.sign[3]);
+  std::printf("  backlash behind the readings (not written): theta %.1f, phi %.1f mrad, rho %.2f mm, psi %.1f mrad\n",
+              1e3 * backlash[0], 1e3 * backlash[1], 1e3 * backlash[2], 1e3 * backlash[3]);
+}
+
+double rms(const Registration& registration, double RegistrationResidual::*what) {
+  double squares = 0;
+  for (const RegistrationResidual& r : registration.residuals) squares += r.*what * (r.*what);
+  return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, registration.residuals.size())));
+}
+
+void print_residuals(const Registration& registration) {
+  const double position_mm = 1e3 * rms(registration, &RegistrationResidual::position_m);
+  if (!registration.arm) {
+    std::printf("\naxes miss the RCM by %.2f mm rms in %zu frames\n", position_mm, registration.residuals.size());
+    return;
+  }
+  std::printf(
+      "\nmarkers are %.2f mm, %.2f mrad (axis), %.2f mrad (about it) rms from where the joints have them, in "
+      "%zu frames\n",
+      position_mm, 1e3 * rms(registration, &RegistrationResidual::axis_rad),
+      1e3 * rms(registration, &RegistrationResidual::roll_rad), registration.residuals.size());
+}
+
+int run_registration(const CalibrateOptions& options) {
+  const Rig rig = load_rig(options.rig);
+  const std::size_t index = instrument_meant(rig, options);
+  Instrument instrument = rig.instruments[index];
+  refuse_outputs_over_inputs(options, rig);
+  std::optional<JointRecording> recording;
+  if (!options.joints.empty()) {
+    instrument.joints = joints_of(options, instrument);
+    recording = read_joint_recording(options.joints, *instrument.joints);
+  }
+  AtomicFile out(options.out);
+  watch_for_interrupts();
+
+  const Poses poses =
+      is_table(options.input) ? poses_in_table(options, instrument) : poses_in_frames(options, rig, index);
+  if (poses.stopped) return refuse_calibration(options, "stopped");
+  if (!poses.none.empty()) return refuse_calibration(options, poses.none);
+  const Registration registration =
+      recording ? register_arm(instrument, poses.all, *recording, options.joints) : register_rcm(instrument, poses.all);
+  if (!registration.refusal.empty()) return refuse_calibration(options, registration.refusal);
+  print_numbers(instrument, registration);
+  print_residuals(registration);
+  for (const std::string& what : registration.unknown) std::printf("%s\n", what.c_str());
+  if (!options.report.empty()) {
+    write_registration_report(options.report, instrument, registration);
+    std::printf("report: %s\n", options.report.c_str());
+  }
+  out.stream() << updated_rig_yaml(options.rig, options.out, index, measured(registration));
+  out.commit();
+  std::printf("rig: %s\n", options.out.c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_calibrate_registration(CLI::App* parent, Run& run_later) {
+  auto options = std::make_shared<CalibrateOptions>();
+  CLI::App* command = parent->add_subcommand(
+      "registration",
+      "Measure where the arm stands before the camera, its joints' signs and offsets, and the video's delay.");
+  command
+      ->add_option("input", options->input,
+                   "The marker in motion: a folder, a video, a camera, a stream, or a CSV of observations that were "
+                   "tracked without camera_from_rcm")
+      ->required();
+  add_calibrate_options(command, *options);
+  command->add_option("--joints", options->joints,
+                      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints). "
+                      "Without it only the RCM's position can be told");
+  command->add_option("--report", options->report, "HTML page with what is left at each frame");
+  command->footer(
+      "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "
+      "it\n"
+      "smoothly for 10 to 60 s, the marker in view. Clocks of joints and video may differ by up to 3 s. theta's "
+      "offset\n"
+      "stays the rig's: camera_from_rcm turns with it.\n"
+      "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml "
+      "--report "
+      "registration.html");
+  command->callback([options, &run_later] { run_later = [options] { return run_registration(*options); }; });
+}
+
+}  // namespace lapservo::app

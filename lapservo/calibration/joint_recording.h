@@ -1,0 +1,28 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// An arm's joints over time.
+struct JointRecording {
+  std::vector<double> time_s;                 ///< rises
+  std::vector<std::array<double, 4>> joints;  ///< as Joints::names has them; rad, rad, m, rad
+
+  /// Between two rows, linearly; nullopt before the first and after the last one, and across pauses of half a second.
+  std::optional<std::array<double, 4>> at(double time_s) const;
+};
+
+/// A CSV of `time_s` and a column a joint (docs/conventions.md). Throws InputError for columns that are missing,
+/// numbers that are none, fewer than two rows and times that do not rise.
+JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints);
+
+/// The same motion in steps of at most `step_s`, smooth through the rows (Catmull and Rom's cubic); pauses stay.
+JointRecording refined(const JointRecording& recording, double step_s);
+
+}  // namespace lapservo::internal

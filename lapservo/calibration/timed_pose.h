@@ -1,0 +1,26 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "lapservo/vision/observation.h"
+
+namespace lapservo::internal {
+
+/// A marker's pose by one frame alone, without an RCM; `time_s` is the frame's stamp.
+struct TimedPose {
+  double time_s = 0;
+  Observation::MarkerPose marker;
+
+  Eigen::Vector3d origin() const { return marker.camera_from_marker.translation; }  ///< in the camera frame
+  Eigen::Vector3d axis() const { return marker.camera_from_marker.rotation * Eigen::Vector3d::UnitZ(); }
+};
+
+/// How many of them there are in a second: over about as many, what is wrong with them stays alike.
+inline std::size_t poses_per_second(const std::vector<TimedPose>& poses) {
+  const double span_s = poses.empty() ? 0 : poses.back().time_s - poses.front().time_s;
+  return span_s > 0 ? static_cast<std::size_t>(std::clamp(static_cast<double>(poses.size()) / span_s, 1.0, 120.0)) : 1;
+}
+
+}  // namespace lapservo::internal
