@@ -4,8 +4,6 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include "lapservo/rig/rig_writer.h"
-
 namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
@@ -20,6 +18,12 @@ std::string camera_path_from(const std::string& camera, const fs::path& rig, con
   return relative.empty() ? file.lexically_normal().string() : relative.string();
 }
 
+std::string text_of(const YAML::Node& root) {
+  YAML::Emitter out;
+  out << root;
+  return std::string(out.c_str()) + "\n";
+}
+
 }  // namespace
 
 std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, std::size_t instrument,
@@ -31,9 +35,13 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
   for (const auto& number : YAML::Load(marker_yaml(marker, 0))) entry[number.first.Scalar()] = number.second;
   for (const char* key : {"wrap_m", "skew_m", "gap_rad", "tolerance_m"})
     if (!YAML::Load(marker_yaml(marker, 0))[key]) entry.remove(key);
-  YAML::Emitter out;
-  out << root;
-  return std::string(out.c_str()) + "\n";
+  return text_of(root);
+}
+
+std::string updated_rig_yaml(const fs::path& path, const Camera& camera, const CameraSigmas& sigmas) {
+  YAML::Node root = YAML::LoadFile(path.string());
+  root["camera"] = YAML::Load(measured_camera_yaml(camera, sigmas));
+  return text_of(root);
 }
 
 }  // namespace lapservo::internal
