@@ -42,20 +42,21 @@ std::vector<BoardCorner> find_chessboard(const Board& board, const cv::Mat& grey
   std::vector<cv::Point2f> points;
   constexpr int large_px = 800;
   const cv::Size size(board.columns, board.rows);
-  const auto found_in = [&](const cv::Mat& picture) {
-    return cv::findChessboardCornersSB(picture, size, points, cv::CALIB_CB_NORMALIZE_IMAGE);
+  const auto found_in = [&](const cv::Mat& picture, int flags) {
+    return cv::findChessboardCornersSB(picture, size, points, flags);
   };
   bool found = false;
   cv::Mat other;
   if (grey.cols > large_px) {
     cv::resize(grey, other, {}, 0.5, 0.5, cv::INTER_AREA);
-    found = found_in(other);
+    found = found_in(other, 0);
     for (cv::Point2f& p : points) p = 2 * p + cv::Point2f(0.5F, 0.5F);
   }
-  if (!found && (thorough || grey.cols <= large_px)) found = found_in(grey);
+  if (!found && (thorough || grey.cols <= large_px)) found = found_in(grey, 0);
+  if (!found && thorough) found = found_in(grey, cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE);
   if (!found && thorough) {
     cv::GaussianBlur(grey, other, {}, 1.5);
-    found = found_in(other);
+    found = found_in(other, 0);
   }
   if (!found) return {};
   std::vector<BoardCorner> corners;

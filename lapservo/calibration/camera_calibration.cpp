@@ -122,8 +122,7 @@ Measured measured(const Board& board, const std::vector<BoardView>& views, const
 }
 
 // As many as tell all that there is to tell.
-std::vector<EdgeProfile> some_of(std::vector<EdgeProfile> profiles) {
-  constexpr std::size_t most = 600;
+std::vector<EdgeProfile> some_of(std::vector<EdgeProfile> profiles, std::size_t most) {
   if (profiles.size() <= most) return profiles;
   std::vector<EdgeProfile> some;
   for (std::size_t i = 0; i < most; ++i) some.push_back(std::move(profiles[i * profiles.size() / most]));
@@ -172,6 +171,19 @@ void add_residuals(const CameraAdjustment& adjustment, const Measured& edges, Ca
     calibration.view_rms_px.push_back(rms_of(of_view));
   }
   calibration.rms_px = rms_of(all);
+}
+
+// Empty where the views tell enough.
+std::string too_alike(const CameraAdjustment& adjustment) {
+  const Camera& camera = adjustment.camera;
+  const CameraSigmas& sigmas = adjustment.sigmas;
+  if (sigmas.fx_px < max_focal_sigma * camera.fx_px && sigmas.cx_px < max_centre_sigma_px &&
+      sigmas.cy_px < max_centre_sigma_px)
+    return {};
+  return fmt::format(
+      "the views are too alike: one sigma of the focal length is {:.1f} px of {:.0f}, of the principal "
+      "point {:.1f} and {:.1f} px",
+      sigmas.fx_px, camera.fx_px, sigmas.cx_px, sigmas.cy_px);
 }
 
 struct Tilts {
@@ -288,15 +300,17 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
     if (!adjustment) return refuse("the views are too alike to tell the camera");
     fit = fit_of(*adjustment);
   }
+  if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
   // Means are of light as the last round had it.
   constexpr int response_rounds = 2;
   for (int round = 0; round < response_rounds; ++round) {
     told("response");
-    const auto response =
-        fit_response(some_of(measured(board, views, *fit, false, true).profiles), fit->camera.response);
+    const bool last = round + 1 == response_rounds;
+    const auto response = fit_response(some_of(measured(board, views, *fit, false, true).profiles, last ? 600 : 300),
+                                       fit->camera.response, last);
     if (!response) break;
     calibration.response = response;
-    fit->camera.response = round + 1 < response_rounds ? response->table : response->response;
+    fit->camera.response = response->response;
   }
   told("edges in all colours");
   const Measured edges = measured(board, views, *fit, true, false);
@@ -307,13 +321,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   calibration.bright_wider_px = adjustment->bright_wider_px[green];
   calibration.poses = adjustment->camera_from_board;
   add_residuals(*adjustment, edges, calibration);
-  const CameraSigmas& sigmas = calibration.sigmas;
-  if (sigmas.fx_px > max_focal_sigma * calibration.camera.fx_px || sigmas.cx_px > max_centre_sigma_px ||
-      sigmas.cy_px > max_centre_sigma_px)
-    return refuse(
-        fmt::format("the views are too alike: one sigma of the focal length is {:.1f} px of {:.0f}, of the "
-                    "principal point {:.1f} and {:.1f} px",
-                    sigmas.fx_px, calibration.camera.fx_px, sigmas.cx_px, sigmas.cy_px));
+  if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
   return calibration;
 }
 

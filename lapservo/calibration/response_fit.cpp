@@ -8,6 +8,7 @@
 #include <glog/logging.h>
 #include <limits>
 #include <numeric>
+#include <type_traits>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -75,8 +76,23 @@ T encoded(const T* curve, const T& light) {
   return s + d[3];
 }
 
+// Value at a light, by a response that is known.
+template <typename T>
+T encoded_by(const Response& response, const T& light) {
+  if constexpr (std::is_same_v<T, double>) {
+    return light <= 0 ? 0 : response.value_from_light(light);
+  } else {
+    if (light.a <= 0) return T(0);
+    constexpr double step = 1e-4;
+    const double value = response.value_from_light(light.a);
+    const double slope = (response.value_from_light(light.a * (1 + step)) - value) / (light.a * step);
+    return T(value) + slope * (light - light.a);
+  }
+}
+
 struct ProfileCost {
   const EdgeProfile* profile;
+  const Response* const* known;  // what it points to: null where the curve is free
 
   // The values of a profile as the numbers have them.
   template <typename T>
@@ -93,7 +109,8 @@ struct ProfileCost {
       T part = rise(z);
       if (const int from = std::abs(i); from > 0 && from <= shape_numbers)
         part += static_cast<double>(i > 0 ? 1 : -1) * shape[from - 1];
-      plain.push_back(encoded(shared, dark + (bright - dark) * part));
+      const T light = dark + (bright - dark) * part;
+      plain.push_back(*known ? encoded_by(**known, light) : encoded(shared, light));
     }
     const T mask_px = exp(shared[strength + 1]);
     std::vector<T> mask;
@@ -354,7 +371,8 @@ std::optional<EdgeProfile> profile_of(const EdgePixels& edge, int towards_bright
   return profile;
 }
 
-std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles, const Response& start) {
+std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles, const Response& start,
+                                        bool try_named) {
   constexpr std::size_t least_profiles = 50;
   if (profiles.size() < least_profiles) return std::nullopt;
   Shared shared = start_of(start);
@@ -367,13 +385,14 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
   shared[strength] = 0.1, shared[strength + 1] = std::log(usual_mask_px);
   std::array<Shape, shape_angles_rad.size()> shapes{};
   std::vector<std::array<double, edge_numbers>> edges;
+  const Response* known = nullptr;
   ceres::Problem problem;
   ResponseFit fit;
   const auto misfit = [&] {
     double squares = 0, weight = 0;
     for (std::size_t i = 0; i < profiles.size(); ++i) {
-      const auto values =
-          ProfileCost{&profiles[i]}.values(shared.data(), shapes[shape_of(profiles[i])].data(), edges[i].data());
+      const auto values = ProfileCost{&profiles[i], &known}.values(shared.data(), shapes[shape_of(profiles[i])].data(),
+                                                                   edges[i].data());
       for (std::size_t k = 0; k < values.size(); ++k)
         if (std::isfinite(profiles[i].value[k]))
           squares += std::pow((values[k] - profiles[i].value[k]) / profiles[i].sigma[k], 2), weight += 1;
@@ -385,7 +404,7 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
   for (std::size_t i = 0; i < profiles.size(); ++i) {
     auto* cost =
         new ceres::AutoDiffCostFunction<ProfileCost, ceres::DYNAMIC, shared_numbers, shape_numbers, edge_numbers>(
-            new ProfileCost{&profiles[i]}, static_cast<int>(profiles[i].value.size()) + 3);
+            new ProfileCost{&profiles[i], &known}, static_cast<int>(profiles[i].value.size()) + 3);
     problem.AddResidualBlock(cost, nullptr, shared.data(), shapes[shape_of(profiles[i])].data(), edges[i].data());
   }
   problem.AddResidualBlock(
@@ -434,14 +453,15 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
   std::vector<int> curve_only(curve_numbers);
   std::iota(curve_only.begin(), curve_only.end(), 0);
   problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, curve_only));
-  solver.max_num_iterations = 8;
+  solver.max_num_iterations = 10;
   fit.response = fit.table;
-  for (const auto& [name, response] : named_responses()) {
+  if (!try_named) return fit;
+  const std::vector<Named> named = named_responses();
+  for (const auto& [name, response] : named) {
     const double distance = difference(fit.table, response, fit.low, fit.high);
     if (distance > max_named_distance) continue;
     shared = fitted;
-    const Shared named = start_of(response);
-    std::copy_n(named.begin(), curve_numbers, shared.begin());
+    known = &response;
     ceres::Solve(solver, &problem, &summary);
     if (!summary.IsSolutionUsable() || summary.final_cost >= best_cost) continue;
     best_cost = summary.final_cost, fit.nearest = name, fit.named_distance = distance;

@@ -16,15 +16,17 @@ namespace {
 
 using namespace internal;
 
-// Where each pixel's ray meets the board, in squares from its upper left corner, as two channels.
+constexpr int step_px = 4;  // between places that are computed; a lens bends little in between
+
+// Where rays meet the board, in squares from its upper left corner, as two channels: of every fourth pixel.
 cv::Mat places_on_board(const BoardScene& scene, const Camera& camera, const Rigid3& camera_from_board,
                         double magnification) {
   const Rigid3 board_from_camera = camera_from_board.inverse();
   const Eigen::Vector2d centre(camera.cx_px, camera.cy_px);
-  cv::Mat places(camera.height_px, camera.width_px, CV_64FC2);
+  cv::Mat places(camera.height_px / step_px + 2, camera.width_px / step_px + 2, CV_64FC2);
   for (int v = 0; v < places.rows; ++v)
     for (int u = 0; u < places.cols; ++u) {
-      const Eigen::Vector2d green = centre + (Eigen::Vector2d(u, v) - centre) / magnification;
+      const Eigen::Vector2d raw(step_px * u, step_px * v), green = centre + (raw - centre) / magnification;
       const auto ideal = camera.ideal_from_raw(green);
       cv::Vec2d& place = places.at<cv::Vec2d>(v, u);
       place = {-100, -100};
@@ -54,12 +56,25 @@ double brightness(const BoardScene& scene, const cv::Vec2d& place, const cv::Vec
   return 1 - inside * 0.5 * (1 + product);
 }
 
-cv::Vec2d gradients_at(const cv::Mat& places, int u, int v) {
-  const int u0 = std::max(0, u - 1), u1 = std::min(places.cols - 1, u + 1);
-  const int v0 = std::max(0, v - 1), v1 = std::min(places.rows - 1, v + 1);
-  const cv::Vec2d by_u = (places.at<cv::Vec2d>(v, u1) - places.at<cv::Vec2d>(v, u0)) / (u1 - u0);
-  const cv::Vec2d by_v = (places.at<cv::Vec2d>(v1, u) - places.at<cv::Vec2d>(v0, u)) / (v1 - v0);
-  return {std::max(1e-6, std::hypot(by_u[0], by_v[0])), std::max(1e-6, std::hypot(by_u[1], by_v[1]))};
+// Light of the pattern in each pixel, 0 to 1.
+cv::Mat pattern(const BoardScene& scene, const Camera& camera, const cv::Mat& places) {
+  cv::Mat light(camera.height_px, camera.width_px, CV_64F);
+  for (int v = 0; v < light.rows; ++v)
+    for (int u = 0; u < light.cols; ++u) {
+      const int i = u / step_px, k = v / step_px;
+      const double right = static_cast<double>(u % step_px) / step_px,
+                   down = static_cast<double>(v % step_px) / step_px;
+      const auto at = [&](int row, int column) { return places.at<cv::Vec2d>(row, column); };
+      const cv::Vec2d top = (1 - right) * at(k, i) + right * at(k, i + 1);
+      const cv::Vec2d bottom = (1 - right) * at(k + 1, i) + right * at(k + 1, i + 1);
+      const cv::Vec2d by_v = (bottom - top) / step_px;
+      const cv::Vec2d by_u =
+          ((1 - down) * (at(k, i + 1) - at(k, i)) + down * (at(k + 1, i + 1) - at(k + 1, i))) / step_px;
+      const cv::Vec2d gradients(std::max(1e-6, std::hypot(by_u[0], by_v[0])),
+                                std::max(1e-6, std::hypot(by_u[1], by_v[1])));
+      light.at<double>(v, u) = brightness(scene, (1 - down) * top + down * bottom, gradients);
+    }
+  return light;
 }
 
 cv::Mat sharpened(const BoardScene& scene, const cv::Mat& values) {
@@ -77,16 +92,17 @@ cv::Mat render(const BoardScene& scene, const Camera& camera, const Rigid3& came
                lamp_v = random.uniform(0.3, 0.7) * camera.height_px;
   cv::Mat values(camera.height_px, camera.width_px, CV_64FC3);
   const std::array<double, 3> magnifications{camera.chromatic_aberration.blue, 1, camera.chromatic_aberration.red};
-  cv::Mat places;
+  cv::Mat parts;
   for (int c = 0; c < 3; ++c) {
     const double magnification = magnifications[static_cast<std::size_t>(c)];
     if (c == 0 || magnification != magnifications[static_cast<std::size_t>(c - 1)])
-      places = places_on_board(scene, camera, camera_from_board, magnification);
+      parts = pattern(scene, camera, places_on_board(scene, camera, camera_from_board, magnification));
     for (int v = 0; v < values.rows; ++v)
       for (int u = 0; u < values.cols; ++u) {
-        const double part = brightness(scene, places.at<cv::Vec2d>(v, u), gradients_at(places, u, v));
-        const double lamp = 1 / (1 + 2 * std::pow(std::hypot(u - lamp_u, v - lamp_v) / camera.width_px, 2));
-        const double light = scene.exposure * lamp * (scene.dark + (scene.bright - scene.dark) * part);
+        const double from_lamp_px2 = (u - lamp_u) * (u - lamp_u) + (v - lamp_v) * (v - lamp_v);
+        const double lamp = 1 / (1 + 2 * from_lamp_px2 / (camera.width_px * camera.width_px));
+        const double reflected = scene.dark + (scene.bright - scene.dark) * parts.at<double>(v, u);
+        const double light = scene.exposure * lamp * reflected;
         const double noise = scene.noise * std::sqrt(0.25 + 0.75 * light) * random.normal();
         values.at<cv::Vec3d>(v, u)[c] = camera.response.value_from_light(std::clamp(light + noise, 0.0, 1.0));
       }
