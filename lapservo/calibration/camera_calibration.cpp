@@ -263,6 +263,12 @@ std::string advice(const std::vector<BoardView>& views, const cv::Size& size) {
       if (coverage.views[first] + coverage.views[first + 1] == 0)
         empty.push_back(fmt::format("{} {}", vertical[static_cast<std::size_t>(row)], side));
     }
+  for (const auto& [side, column] : {std::pair{"left side", 0}, {"right side", Coverage::columns - 1}}) {
+    int seen = 0;
+    for (int row = 0; row < Coverage::rows; ++row)
+      seen += coverage.views[static_cast<std::size_t>(row * Coverage::columns + column)];
+    if (seen == 0) empty.push_back(side);
+  }
   if (!empty.empty()) wanted.push_back(fmt::format("fill the {}", fmt::join(empty, ", the ")));
   const Tilts tilts = tilts_of(views, size);
   if (tilts.up_down_rad < least_tilt_rad)

@@ -8,6 +8,7 @@
 #include <glog/logging.h>
 #include <limits>
 #include <numeric>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -90,9 +91,15 @@ T encoded_by(const Response& response, const T& light) {
   }
 }
 
+// What a fit takes for given.
+struct Given {
+  const Response* response = nullptr;  // null where the curve is free
+  bool sharpened = false;
+};
+
 struct ProfileCost {
   const EdgeProfile* profile;
-  const Response* const* known;  // what it points to: null where the curve is free
+  const Given* given;
 
   // The values of a profile as the numbers have them.
   template <typename T>
@@ -100,7 +107,7 @@ struct ProfileCost {
     using std::erfc;
     using std::exp;
     const int half = static_cast<int>(profile->value.size() / 2);
-    const int reach = static_cast<int>(max_sharpening_reach_px / profile_step_px);
+    const int reach = given->sharpened ? static_cast<int>(max_sharpening_reach_px / profile_step_px) : 0;
     const T bright = exp(edge[0]), dark = exp(edge[0] + shared[ratio] + edge[1]), blur_px = exp(edge[2]);
     const auto rise = [&](const T& z) { return T(0.5) * erfc(-z / std::sqrt(2.0)); };
     std::vector<T> plain;
@@ -110,8 +117,9 @@ struct ProfileCost {
       if (const int from = std::abs(i); from > 0 && from <= shape_numbers)
         part += static_cast<double>(i > 0 ? 1 : -1) * shape[from - 1];
       const T light = dark + (bright - dark) * part;
-      plain.push_back(*known ? encoded_by(**known, light) : encoded(shared, light));
+      plain.push_back(given->response ? encoded_by(*given->response, light) : encoded(shared, light));
     }
+    if (!given->sharpened) return plain;
     const T mask_px = exp(shared[strength + 1]);
     std::vector<T> mask;
     T sum(0);
@@ -320,6 +328,8 @@ struct Bin {
 };
 // A named response is tried where values differ by less, and taken where the cost is no more times that of the fit.
 constexpr double max_named_distance = 0.04, named_cost = 1.03;
+// Sharpening is looked for where profiles miss by more sigmas without.
+constexpr double max_plain_misfit = 1.1;
 constexpr double least_strength = 0.15;           // of sharpening: less is a detail of the blur
 constexpr double least_variance = 0.002 * 0.002;  // rounding to 8 bits, and more
 
@@ -385,13 +395,13 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
   shared[strength] = 0.1, shared[strength + 1] = std::log(usual_mask_px);
   std::array<Shape, shape_angles_rad.size()> shapes{};
   std::vector<std::array<double, edge_numbers>> edges;
-  const Response* known = nullptr;
+  Given given;
   ceres::Problem problem;
   ResponseFit fit;
   const auto misfit = [&] {
     double squares = 0, weight = 0;
     for (std::size_t i = 0; i < profiles.size(); ++i) {
-      const auto values = ProfileCost{&profiles[i], &known}.values(shared.data(), shapes[shape_of(profiles[i])].data(),
+      const auto values = ProfileCost{&profiles[i], &given}.values(shared.data(), shapes[shape_of(profiles[i])].data(),
                                                                    edges[i].data());
       for (std::size_t k = 0; k < values.size(); ++k)
         if (std::isfinite(profiles[i].value[k]))
@@ -404,7 +414,7 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
   for (std::size_t i = 0; i < profiles.size(); ++i) {
     auto* cost =
         new ceres::AutoDiffCostFunction<ProfileCost, ceres::DYNAMIC, shared_numbers, shape_numbers, edge_numbers>(
-            new ProfileCost{&profiles[i], &known}, static_cast<int>(profiles[i].value.size()) + 3);
+            new ProfileCost{&profiles[i], &given}, static_cast<int>(profiles[i].value.size()) + 3);
     problem.AddResidualBlock(cost, nullptr, shared.data(), shapes[shape_of(profiles[i])].data(), edges[i].data());
   }
   problem.AddResidualBlock(
@@ -426,15 +436,22 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
   solver.num_threads = 2;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  if (summary.IsSolutionUsable() && shared[strength] < least_strength) {  // none
-    shared[strength] = 0;
-    problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, {strength, strength + 1}));
+  const auto solve = [&](bool sharpened) {
+    given.sharpened = sharpened;
+    problem.SetManifold(shared.data(),
+                        sharpened ? nullptr : new ceres::SubsetManifold(shared_numbers, {strength, strength + 1}));
     ceres::Solve(solver, &problem, &summary);
+    return summary.IsSolutionUsable();
+  };
+  const auto from_start = std::tuple(shared, shapes, edges);
+  if (!solve(false)) return std::nullopt;
+  if (misfit() > max_plain_misfit) {  // from where it was: without sharpening it went astray
+    std::tie(shared, shapes, edges) = from_start;
+    if (!solve(true)) return std::nullopt;
+    if (shared[strength] < least_strength && !solve(false)) return std::nullopt;
   }
-  if (!summary.IsSolutionUsable()) return std::nullopt;
   fit.misfit[1] = misfit();
-  fit.sharpening = shared[strength], fit.sharpening_px = std::exp(shared[strength + 1]);
+  fit.sharpening = given.sharpened ? shared[strength] : 0, fit.sharpening_px = std::exp(shared[strength + 1]);
 
   std::vector<double> darks, brights;
   for (const EdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
@@ -450,9 +467,10 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
   const Shared fitted = shared;
   const double fitted_cost = summary.final_cost;
   double best_cost = std::numeric_limits<double>::max();
-  std::vector<int> curve_only(curve_numbers);
-  std::iota(curve_only.begin(), curve_only.end(), 0);
-  problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, curve_only));
+  std::vector<int> fixed(curve_numbers);
+  std::iota(fixed.begin(), fixed.end(), 0);
+  if (!given.sharpened) fixed.insert(fixed.end(), {strength, strength + 1});
+  problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, fixed));
   solver.max_num_iterations = 10;
   fit.response = fit.table;
   if (!try_named) return fit;
@@ -461,7 +479,7 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
     const double distance = difference(fit.table, response, fit.low, fit.high);
     if (distance > max_named_distance) continue;
     shared = fitted;
-    known = &response;
+    given.response = &response;
     ceres::Solve(solver, &problem, &summary);
     if (!summary.IsSolutionUsable() || summary.final_cost >= best_cost) continue;
     best_cost = summary.final_cost, fit.nearest = name, fit.named_distance = distance;
