@@ -333,6 +333,132 @@ constexpr double max_plain_misfit = 1.1;
 constexpr double least_strength = 0.15;           // of sharpening: less is a detail of the blur
 constexpr double least_variance = 0.002 * 0.002;  // rounding to 8 bits, and more
 
+// Profiles, what explains them, and the problem that holds both together.
+class ProfileFit {
+ public:
+  ProfileFit(const std::vector<EdgeProfile>& profiles, const Response& start)
+      : profiles_(profiles), shared_(start_of(start)) {
+    const Response from = table_of(shared_);
+    std::vector<double> ratios;
+    for (const EdgeProfile& p : profiles_) {
+      const double bright = from.light_from_value(std::min(1.0, p.bright));
+      ratios.push_back(std::log(std::max(1e-4, from.light_from_value(std::max(0.0, p.dark))) / bright));
+      edges_.push_back({std::log(bright), 0, std::log(p.blur_px), 0});
+    }
+    shared_[ratio] = median(ratios);
+    shared_[strength] = 0.1, shared_[strength + 1] = std::log(usual_mask_px);
+    add_costs();
+    solver_.linear_solver_type = ceres::SPARSE_SCHUR;
+    solver_.max_num_iterations = 40;
+    solver_.function_tolerance = 1e-6;
+    solver_.num_threads = 2;
+    solver_.logging_type = ceres::SILENT;
+  }
+
+  /// Of values over their sigmas.
+  double misfit() const {
+    double squares = 0;
+    int count = 0;
+    for (std::size_t i = 0; i < profiles_.size(); ++i) {
+      const EdgeProfile& profile = profiles_[i];
+      const auto values =
+          ProfileCost{&profile, &given_}.values(shared_.data(), shapes_[shape_of(profile)].data(), edges_[i].data());
+      for (std::size_t k = 0; k < values.size(); ++k)
+        if (std::isfinite(profile.value[k]))
+          squares += std::pow((values[k] - profile.value[k]) / profile.sigma[k], 2), ++count;
+    }
+    return std::sqrt(squares / count);
+  }
+
+  /// Curve, and sharpening where profiles can't be understood without. False when it does not settle.
+  bool solve() {
+    const auto start = std::tuple(shared_, shapes_, edges_);
+    if (!solve_for(false)) return false;
+    if (misfit() <= max_plain_misfit) return true;
+    std::tie(shared_, shapes_, edges_) = start;  // without sharpening it went astray
+    return solve_for(true) && (shared_[strength] >= least_strength || solve_for(false));
+  }
+
+  /// The cost with a known response; what was fitted stays.
+  std::optional<double> cost_with(const Response& response) {
+    const auto fitted = std::tuple(shared_, shapes_, edges_);
+    std::vector<int> fixed(curve_numbers);
+    std::iota(fixed.begin(), fixed.end(), 0);
+    if (!given_.sharpened) fixed.insert(fixed.end(), {strength, strength + 1});
+    given_.response = &response;
+    solver_.max_num_iterations = 10;
+    const bool usable = run(fixed);
+    const double cost = summary_.final_cost;
+    std::tie(shared_, shapes_, edges_) = fitted;
+    given_.response = nullptr;
+    return usable ? std::optional(cost) : std::nullopt;
+  }
+
+  double cost() const { return summary_.final_cost; }
+  const Shared& shared() const { return shared_; }
+  bool sharpened() const { return given_.sharpened; }
+  ceres::Problem& problem() { return problem_; }
+
+ private:
+  void add_costs() {
+    for (std::size_t i = 0; i < profiles_.size(); ++i) {
+      auto* cost =
+          new ceres::AutoDiffCostFunction<ProfileCost, ceres::DYNAMIC, shared_numbers, shape_numbers, edge_numbers>(
+              new ProfileCost{&profiles_[i], &given_}, static_cast<int>(profiles_[i].value.size()) + 3);
+      problem_.AddResidualBlock(cost, nullptr, shared_.data(), shapes_[shape_of(profiles_[i])].data(),
+                                edges_[i].data());
+    }
+    problem_.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<CurvePrior, CurvePrior::size, shared_numbers>(new CurvePrior), nullptr,
+        shared_.data());
+    for (Shape& shape : shapes_)
+      problem_.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<ShapePrior, shape_numbers, shape_numbers>(new ShapePrior), nullptr,
+          shape.data());
+    problem_.SetParameterLowerBound(shared_.data(), strength, 0);
+    problem_.SetParameterLowerBound(shared_.data(), strength + 1, std::log(1.0));
+    problem_.SetParameterUpperBound(shared_.data(), strength + 1, std::log(3.0));
+  }
+  bool solve_for(bool sharpened) {
+    given_.sharpened = sharpened;
+    return run(sharpened ? std::vector<int>{} : std::vector<int>{strength, strength + 1});
+  }
+  bool run(const std::vector<int>& fixed) {
+    problem_.SetManifold(shared_.data(), fixed.empty() ? nullptr : new ceres::SubsetManifold(shared_numbers, fixed));
+    ceres::Solve(solver_, &problem_, &summary_);
+    return summary_.IsSolutionUsable();
+  }
+
+  const std::vector<EdgeProfile>& profiles_;
+  Shared shared_;
+  std::array<Shape, shape_angles_rad.size()> shapes_{};
+  std::vector<std::array<double, edge_numbers>> edges_;
+  Given given_;
+  ceres::Problem problem_;
+  ceres::Solver::Options solver_;
+  ceres::Solver::Summary summary_;
+};
+
+// The value below which so many of all lie.
+double quantile(std::vector<double> values, double fraction) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1))];
+}
+
+// A named response that explains the profiles nearly as well is what the camera has.
+void name_response(ProfileFit& profiles, ResponseFit& fit) {
+  const double fitted_cost = profiles.cost();
+  double best_cost = std::numeric_limits<double>::max();
+  for (const auto& [name, response] : named_responses()) {
+    const double distance = difference(fit.table, response, fit.low, fit.high);
+    if (distance > max_named_distance) continue;
+    const auto cost = profiles.cost_with(response);
+    if (!cost || *cost >= best_cost) continue;
+    best_cost = *cost, fit.nearest = name, fit.named_distance = distance;
+    if (best_cost < named_cost * fitted_cost) fit.response = response;
+  }
+}
+
 }  // namespace
 
 std::optional<EdgeProfile> profile_of(const EdgePixels& edge, int towards_bright, int channel, double blur_px,
@@ -385,106 +511,21 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
                                         bool try_named) {
   constexpr std::size_t least_profiles = 50;
   if (profiles.size() < least_profiles) return std::nullopt;
-  Shared shared = start_of(start);
-  const Response from = table_of(shared);
-  std::vector<double> ratios;
-  for (const EdgeProfile& p : profiles)
-    ratios.push_back(std::log(std::max(1e-4, from.light_from_value(std::max(0.0, p.dark))) /
-                              from.light_from_value(std::min(1.0, p.bright))));
-  shared[ratio] = median(ratios);
-  shared[strength] = 0.1, shared[strength + 1] = std::log(usual_mask_px);
-  std::array<Shape, shape_angles_rad.size()> shapes{};
-  std::vector<std::array<double, edge_numbers>> edges;
-  Given given;
-  ceres::Problem problem;
+  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres complains of, its results say
   ResponseFit fit;
-  const auto misfit = [&] {
-    double squares = 0, weight = 0;
-    for (std::size_t i = 0; i < profiles.size(); ++i) {
-      const auto values = ProfileCost{&profiles[i], &given}.values(shared.data(), shapes[shape_of(profiles[i])].data(),
-                                                                   edges[i].data());
-      for (std::size_t k = 0; k < values.size(); ++k)
-        if (std::isfinite(profiles[i].value[k]))
-          squares += std::pow((values[k] - profiles[i].value[k]) / profiles[i].sigma[k], 2), weight += 1;
-    }
-    return std::sqrt(squares / weight);
-  };
-  for (const EdgeProfile& p : profiles)
-    edges.push_back({std::log(from.light_from_value(std::min(1.0, p.bright))), 0, std::log(p.blur_px), 0});
-  for (std::size_t i = 0; i < profiles.size(); ++i) {
-    auto* cost =
-        new ceres::AutoDiffCostFunction<ProfileCost, ceres::DYNAMIC, shared_numbers, shape_numbers, edge_numbers>(
-            new ProfileCost{&profiles[i], &given}, static_cast<int>(profiles[i].value.size()) + 3);
-    problem.AddResidualBlock(cost, nullptr, shared.data(), shapes[shape_of(profiles[i])].data(), edges[i].data());
-  }
-  problem.AddResidualBlock(
-      new ceres::AutoDiffCostFunction<CurvePrior, CurvePrior::size, shared_numbers>(new CurvePrior), nullptr,
-      shared.data());
-  for (Shape& shape : shapes)
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ShapePrior, shape_numbers, shape_numbers>(new ShapePrior),
-                             nullptr, shape.data());
-  problem.SetParameterLowerBound(shared.data(), strength, 0);
-  problem.SetParameterLowerBound(shared.data(), strength + 1, std::log(1.0));
-  problem.SetParameterUpperBound(shared.data(), strength + 1, std::log(3.0));
-  fit.misfit[0] = misfit();
-
-  FLAGS_minloglevel = google::GLOG_FATAL;
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::SPARSE_SCHUR;
-  solver.max_num_iterations = 40;
-  solver.function_tolerance = 1e-6;
-  solver.num_threads = 2;
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  const auto solve = [&](bool sharpened) {
-    given.sharpened = sharpened;
-    problem.SetManifold(shared.data(),
-                        sharpened ? nullptr : new ceres::SubsetManifold(shared_numbers, {strength, strength + 1}));
-    ceres::Solve(solver, &problem, &summary);
-    return summary.IsSolutionUsable();
-  };
-  const auto from_start = std::tuple(shared, shapes, edges);
-  if (!solve(false)) return std::nullopt;
-  if (misfit() > max_plain_misfit) {  // from where it was: without sharpening it went astray
-    std::tie(shared, shapes, edges) = from_start;
-    if (!solve(true)) return std::nullopt;
-    if (shared[strength] < least_strength && !solve(false)) return std::nullopt;
-  }
-  fit.misfit[1] = misfit();
-  fit.sharpening = given.sharpened ? shared[strength] : 0, fit.sharpening_px = std::exp(shared[strength + 1]);
-
+  ProfileFit fitted(profiles, start);
+  fit.misfit[0] = fitted.misfit();
+  if (!fitted.solve()) return std::nullopt;
+  fit.misfit[1] = fitted.misfit();
+  fit.sharpening = fitted.sharpened() ? fitted.shared()[strength] : 0;
+  fit.sharpening_px = std::exp(fitted.shared()[strength + 1]);
   std::vector<double> darks, brights;
   for (const EdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
-  const auto part = [](std::vector<double>& v, double fraction) {
-    std::sort(v.begin(), v.end());
-    return v[static_cast<std::size_t>(fraction * static_cast<double>(v.size() - 1))];
-  };
-  fit.low = part(darks, 0.02), fit.high = part(brights, 0.98);
-  fit.table = table_of(shared);
-  const double scale = std::max(1.0, fit.misfit[1]);
-  fit.sigma = curve_sigma_of(problem, shared, scale, fit.low, fit.high);
-  // A named one that explains the profiles nearly as well is what the camera has.
-  const Shared fitted = shared;
-  const double fitted_cost = summary.final_cost;
-  double best_cost = std::numeric_limits<double>::max();
-  std::vector<int> fixed(curve_numbers);
-  std::iota(fixed.begin(), fixed.end(), 0);
-  if (!given.sharpened) fixed.insert(fixed.end(), {strength, strength + 1});
-  problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, fixed));
-  solver.max_num_iterations = 10;
-  fit.response = fit.table;
-  if (!try_named) return fit;
-  const std::vector<Named> named = named_responses();
-  for (const auto& [name, response] : named) {
-    const double distance = difference(fit.table, response, fit.low, fit.high);
-    if (distance > max_named_distance) continue;
-    shared = fitted;
-    given.response = &response;
-    ceres::Solve(solver, &problem, &summary);
-    if (!summary.IsSolutionUsable() || summary.final_cost >= best_cost) continue;
-    best_cost = summary.final_cost, fit.nearest = name, fit.named_distance = distance;
-    if (best_cost < named_cost * fitted_cost) fit.response = response;
-  }
+  fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);
+  fit.table = fit.response = table_of(fitted.shared());
+  fit.sigma = curve_sigma_of(fitted.problem(), fitted.shared(), std::max(1.0, fit.misfit[1]), fit.low, fit.high);
+  if (!std::isfinite(fit.sigma)) return std::nullopt;
+  if (try_named) name_response(fitted, fit);
   return fit;
 }
 
