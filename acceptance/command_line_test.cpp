@@ -20,6 +20,7 @@
 #include <opencv2/videoio.hpp>
 
 #include "lapservo/core/csv.h"
+#include "lapservo/testing/boards.h"
 #include "lapservo/testing/sample_frames.h"
 
 namespace lapservo {
@@ -501,6 +502,70 @@ TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
   EXPECT_EQ(run("calibrate marker " + in("few") + " --rig " + designed + " --out " + out("rig.yaml")), 1);
   EXPECT_NE(errors().find("film a slow full turn"), std::string::npos) << errors();
   EXPECT_EQ(read(out("rig.yaml")), before);
+}
+
+TEST_F(CommandLine, CalibratesACamera) {
+  Camera camera;
+  camera.width_px = 640, camera.height_px = 480;
+  camera.fx_px = camera.fy_px = 612.5, camera.cx_px = 326.2, camera.cy_px = 233.1;
+  camera.response = {Response::Kind::rec709};
+  fs::create_directories(in("boards"));
+  int number = 0;
+  for (const Rigid3& pose : boards::different_poses({}, camera, 5, 3))
+    cv::imwrite(in("boards/" + std::to_string(number++) + ".png"), boards::render({}, camera, pose, 7));
+  cv::imwrite(in("boards/9.png"), cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));
+  const std::string rig = in("rig.yaml", R"(camera:
+  image_width: 640
+  image_height: 480
+  camera_matrix: {rows: 3, cols: 3, data: [600, 0, 320, 0, 600, 240, 0, 0, 1]}
+instruments:
+  - name: PSM1
+    marker:
+      diameter_m: 0.0084
+      bands_upper_m: [0.0035, 0.0035, 0.017]
+      bands_lower_m: [0.0095, 0.0095, 0.005]
+)");
+  const std::string board = " --board 9x6 --square-mm 5", before = read(rig);
+  // Too few, and none: the rig is as it was.
+  EXPECT_EQ(run("calibrate camera " + in("boards/0.png") + board + " --rig " + rig), 1);
+  EXPECT_NE(errors().find("3 more views"), std::string::npos) << errors();
+  EXPECT_EQ(run("calibrate camera " + in("boards/9.png") + board + " --rig " + rig), 1);
+  EXPECT_NE(errors().find("in none of 1 pictures"), std::string::npos) << errors();
+  EXPECT_EQ(read(rig), before);
+
+  ASSERT_EQ(run("calibrate camera " + in("boards") + board + " --rig " + rig + " --camera-info " + out("camera.yaml") +
+                " --report " + out("report.html")),
+            0)
+      << errors();
+  EXPECT_NE(output().find("response: rec709"), std::string::npos) << output();
+  EXPECT_NE(output().find("there is no board: " + in("boards/9.png")), std::string::npos) << output();
+  EXPECT_NE(read(out("report.html")).find("<svg"), std::string::npos);
+  for (const std::string& text : {read(rig), read(out("camera.yaml"))})
+    for (const char* key : {"sigma_camera_matrix", "sigma_distortion_coefficients", "response: rec709",
+                            "sigma_lateral_chromatic_aberration"})
+      EXPECT_NE(text.find(key), std::string::npos) << key;
+  // Both can be read: a rig may name the camera's file.
+  std::string other = before;
+  other.replace(0, other.find("instruments"), "camera: " + out("camera.yaml") + "\n");
+  const std::string empty = in("boards/9.png");
+  for (const std::string& calibrated : {rig, in("other.yaml", other)})
+    EXPECT_EQ(run("track " + empty + " --rig " + calibrated + " --out " + out("obs.csv")), 1) << errors();
+}
+
+TEST_F(CommandLine, CalibrateCameraRefusesBadInput) {
+  cv::imwrite(in("large.png"), cv::Mat(90, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
+  cv::imwrite(in("small.png"), cv::Mat(80, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
+  const std::string to = " --out " + out("camera.yaml"), board = " --board 9x6 --square-mm 5";
+  const std::string calibrate = "calibrate camera " + in("large.png");
+  expect_refused(calibrate + " --square-mm 5 --board 9by6" + to, {"--board", "9by6", "inner corners"});
+  expect_refused(calibrate + " --square-mm 0 --board 9x6" + to, {"--square-mm"});
+  expect_refused(calibrate + board, {"--rig, --out or --camera-info"});
+  expect_refused(calibrate + " " + in("small.png") + board + to, {"small.png", "160 x 80", "160 x 90", "large.png"});
+  expect_refused(calibrate + board + " --rig " + rig_, {"large.png", "160 x 90", "the rig's camera"});
+  expect_refused(calibrate + board + to + " --aruco DICT_9", {"--aruco", "DICT_9", "DICT_4X4_50"});
+  expect_refused(calibrate + board + to + " --marker-mm 3", {"--marker-mm", "--aruco"});
+  expect_refused(calibrate + board + to + " --report " + out("camera.yaml"), {"camera.yaml", "two results"});
+  expect_refused(calibrate + board + " --out " + in("large.png"), {"large.png", "input itself"});
 }
 
 TEST_F(CommandLine, CalibrateMarkerRefusesBadInput) {

@@ -72,9 +72,35 @@ sample_set() {
   done
 }
 
+# What cameras do to a picture: response and aberration measured on boards of the same camera, where there are any; the
+# lens is the frames' own.
+pipeline_set() {
+  local frames=$1 condition rig file stem pairs
+  for condition in $(awk -F, 'NR > 1 && !seen[$3]++ { print $3 }' "$frames/pipeline/truth.csv"); do
+    rig=$frames/pipeline/rig.yaml pairs=()
+    if [ -d "$frames/boards/$condition" ]; then
+      "$lapservo" calibrate camera "$frames/boards/$condition" --board 9x6 --square-mm 5 --camera-info "$scratch/camera.yaml" >/dev/null
+      grep -E '^(response|lateral_chromatic_aberration):' "$scratch/camera.yaml" | sed 's/^/  /' >"$scratch/measured"
+      sed -e "/^  response/r $scratch/measured" -e '/^  response/d' "$rig" >"$scratch/rig.yaml"
+      rig=$scratch/rig.yaml
+    elif [ "$condition" = interlaced ]; then
+      sed 's/^  response/  deinterlace: true\n&/' "$rig" >"$scratch/rig.yaml"
+      rig=$scratch/rig.yaml
+    fi
+    for file in $(awk -F, -v condition="$condition" '$3 == condition { print $1 }' "$frames/pipeline/truth.csv"); do
+      stem=${file%.*}
+      track "$frames/pipeline/$file" "$rig" "$scratch/$stem.csv" --single
+      awk -F, -v file="$file" 'NR == 1 || $1 == file' "$frames/pipeline/truth.csv" >"$scratch/$stem.truth.csv"
+      pairs+=("$scratch/$stem.truth.csv" "$scratch/$stem.csv")
+    done
+    awk -f bench/evaluate.awk -v name="pipeline: $condition, surface" "${pairs[@]}"
+  done
+}
+
 header
 if [ $# -eq 0 ]; then
   render_all
 else
   for set in rotation illumination tilt two distorted video stress; do sample_set "$1/$set" "$set"; done
+  pipeline_set "$1"
 fi

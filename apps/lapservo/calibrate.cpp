@@ -142,7 +142,10 @@ void add_calibrate_marker(CLI::App* parent, Run& run_later) {
 void add_calibrate(CLI::App& app, Run& run_later) {
   CLI::App* calibrate = app.add_subcommand("calibrate", "Measure what a rig says, and write it down.");
   calibrate->require_subcommand(1);
-  calibrate->footer("Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml");
+  calibrate->footer(
+      "Examples:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml\n  lapservo calibrate "
+      "marker turn.mp4 --rig designed.yaml --out rig.yaml");
+  add_calibrate_camera(calibrate, run_later);
   add_calibrate_marker(calibrate, run_later);
   add_calibrate_registration(calibrate, run_later);
 }

@@ -5,8 +5,6 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
-#include "lapservo/rig/rig_writer.h"
-
 namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
@@ -21,6 +19,12 @@ std::string camera_path_from(const std::string& camera, const fs::path& rig, con
   return relative.empty() ? file.lexically_normal().string() : relative.string();
 }
 
+std::string text_of(const YAML::Node& root) {
+  YAML::Emitter out;
+  out << root;
+  return std::string(out.c_str()) + "\n";
+}
+
 // The file with one instrument's entry edited.
 template <typename Edit>
 std::string with_instrument(const fs::path& path, const fs::path& destination, std::size_t instrument, Edit edit) {
@@ -28,17 +32,15 @@ std::string with_instrument(const fs::path& path, const fs::path& destination, s
   if (YAML::Node camera = root["camera"]; camera.IsScalar())
     root["camera"] = camera_path_from(camera.Scalar(), path, destination);
   edit(root["instruments"][instrument]);
-  YAML::Emitter out;
-  out << root;
-  return std::string(out.c_str()) + "\n";
+  return text_of(root);
 }
 
 // As short as reads back to the same bits.
-std::string text_of(double value) {
+std::string exact(double value) {
   return fmt::format("{}", value);
 }
 // Of a standard deviation.
-std::string sigma_text_of(double value) {
+std::string rounded(double value) {
   return fmt::format("{:.3g}", value);
 }
 
@@ -67,26 +69,32 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
                              const MeasuredRegistration& measured) {
   return with_instrument(path, destination, instrument, [&](YAML::Node entry) {
     YAML::Node transform;
-    transform["translation_m"] = list_of(measured.camera_from_rcm.translation, text_of);
-    transform["sigma_translation_m"] = list_of(measured.sigma_translation_m, sigma_text_of);
-    transform["quaternion_xyzw"] = list_of(measured.camera_from_rcm.rotation.coeffs(), text_of);
+    transform["translation_m"] = list_of(measured.camera_from_rcm.translation, exact);
+    transform["sigma_translation_m"] = list_of(measured.sigma_translation_m, rounded);
+    transform["quaternion_xyzw"] = list_of(measured.camera_from_rcm.rotation.coeffs(), exact);
     if (measured.sigma_quaternion_xyzw)
-      transform["sigma_quaternion_xyzw"] = list_of(*measured.sigma_quaternion_xyzw, sigma_text_of);
+      transform["sigma_quaternion_xyzw"] = list_of(*measured.sigma_quaternion_xyzw, rounded);
     entry["camera_from_rcm"] = transform;
     if (measured.joints) {
       YAML::Node joints;
       joints["names"].SetStyle(YAML::EmitterStyle::Flow);
       for (const std::string& name : measured.joints->names) joints["names"].push_back(name);
-      joints["sign"] = list_of(measured.joints->sign, text_of);
-      joints["offset"] = list_of(measured.joints->offset, text_of);
-      joints["sigma_offset"] = list_of(measured.sigma_offset, sigma_text_of);
+      joints["sign"] = list_of(measured.joints->sign, exact);
+      joints["offset"] = list_of(measured.joints->offset, exact);
+      joints["sigma_offset"] = list_of(measured.sigma_offset, rounded);
       entry["joints"] = joints;
     }
     if (measured.image_delay_s) {
-      entry["image_delay_s"] = text_of(*measured.image_delay_s);
-      entry["sigma_image_delay_s"] = sigma_text_of(measured.sigma_image_delay_s);
+      entry["image_delay_s"] = exact(*measured.image_delay_s);
+      entry["sigma_image_delay_s"] = rounded(measured.sigma_image_delay_s);
     }
   });
+}
+
+std::string updated_rig_yaml(const fs::path& path, const Camera& camera, const CameraSigmas& sigmas) {
+  YAML::Node root = YAML::LoadFile(path.string());
+  root["camera"] = YAML::Load(measured_camera_yaml(camera, sigmas));
+  return text_of(root);
 }
 
 }  // namespace lapservo::internal

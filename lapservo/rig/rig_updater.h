@@ -7,6 +7,7 @@
 #include <string>
 
 #include "lapservo/rig/rig.h"
+#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::internal {
 
@@ -31,5 +32,8 @@ struct MeasuredRegistration {
 /// The same, with another registration.
 std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
                              std::size_t instrument, const MeasuredRegistration& registration);
+
+/// The same with another camera, which stands in the rig itself whatever file the old one came from.
+std::string updated_rig_yaml(const std::filesystem::path& path, const Camera& camera, const CameraSigmas& sigmas);
 
 }  // namespace lapservo::internal

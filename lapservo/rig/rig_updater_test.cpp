@@ -108,5 +108,26 @@ TEST(UpdatedRig, ChangesOneRegistrationAndNothingElse) {
     EXPECT_NE(whole_text.find(key), std::string::npos) << key;
 }
 
+TEST(UpdatedRig, HoldsAnotherCamera) {
+  const Files files;
+  const auto path = files.folder / "rig.yaml";
+  Camera measured = load_rig(path).camera;
+  measured.fx_px = 501.25, measured.chromatic_aberration = {1.0004, 0.9997};
+  measured.response = {Response::Kind::table, 1, {0, 0.2, 1}, {0, 0.5, 1}};
+  CameraSigmas sigmas;
+  sigmas.fx_px = 0.125, sigmas.red = 1e-5, sigmas.response = 0.003;
+  const std::string text = updated_rig_yaml(path, measured, sigmas);
+  EXPECT_NE(text.find("sigma_response: 0.003"), std::string::npos) << text;
+  EXPECT_NE(text.find("sigma_camera_matrix: {rows: 3, cols: 3, data: [0.125,"), std::string::npos) << text;
+  EXPECT_NE(text.find("sigma_translation_m: [0.0001, 0.0001, 0.0002]"), std::string::npos) << text;
+  testing::write_file(path, text);
+  const Rig updated = load_rig(path);
+  EXPECT_TRUE(updated.camera_file.empty());
+  EXPECT_EQ(updated.camera.fx_px, measured.fx_px);
+  EXPECT_EQ(updated.camera.chromatic_aberration, measured.chromatic_aberration);
+  EXPECT_EQ(updated.camera.response.table_value, measured.response.table_value);
+  EXPECT_EQ(updated.instruments[0].marker.tolerance_m, 0.0001);
+}
+
 }  // namespace
 }  // namespace lapservo::internal

@@ -79,6 +79,25 @@ std::string instrument_yaml(const Instrument& instrument) {
 
 }  // namespace
 
+std::string measured_camera_yaml(const Camera& camera, const CameraSigmas& sigmas) {
+  const std::array matrix{camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0};
+  const std::array sigma{sigmas.fx_px, 0.0, sigmas.cx_px, 0.0, sigmas.fy_px, sigmas.cy_px, 0.0, 0.0, 0.0};
+  const auto matrix_of = [](int rows, int columns, const auto& data) {
+    return fmt::format("{{rows: {}, cols: {}, data: {}}}\n", rows, columns, list_of(data));
+  };
+  std::string text = fmt::format("image_width: {}\nimage_height: {}\ndistortion_model: plumb_bob\n", camera.width_px,
+                                 camera.height_px);
+  text += "camera_matrix: " + matrix_of(3, 3, matrix) + "sigma_camera_matrix: " + matrix_of(3, 3, sigma);
+  text += "distortion_coefficients: " + matrix_of(1, 5, camera.distortion) +
+          "sigma_distortion_coefficients: " + matrix_of(1, 5, sigmas.distortion);
+  text += fmt::format("response: {}\nsigma_response: {}\n", response_yaml(camera.response), sigmas.response);
+  const ChromaticAberration& aberration = camera.chromatic_aberration;
+  text += fmt::format("lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", aberration.blue, aberration.red);
+  text += fmt::format("sigma_lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", sigmas.blue, sigmas.red);
+  if (camera.deinterlace) text += "deinterlace: true\n";
+  return text;
+}
+
 std::string marker_yaml(const Marker& marker, int indent) {
   std::string text;
   const auto add = [&](std::string_view key, const std::string& value) {

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "lapservo/calibration/board.h"
+#include "lapservo/calibration/camera_adjustment.h"
+#include "lapservo/calibration/response_fit.h"
+#include "lapservo/geometry/camera.h"
+
+namespace lapservo::internal {
+
+/// A picture in which the board was found.
+struct BoardView {
+  std::string name;
+  cv::Mat bgr;
+  std::vector<BoardCorner> corners;
+};
+
+/// Chooses, out of the frames of a video, those that show the board differently.
+class BoardViews {
+ public:
+  BoardViews(Board board, std::size_t most) : board_(std::move(board)), most_(most) {}
+
+  /// Keeps the picture when its board lies elsewhere than in all that were kept, or, with `always`, wherever it lies.
+  /// Returns whether a board was found.
+  bool add(const std::string& name, const cv::Mat& bgr, bool always);
+  const std::vector<BoardView>& views() const { return views_; }
+  bool full() const { return views_.size() >= most_; }
+  int found() const { return found_; }
+  std::vector<BoardView> take() { return std::move(views_); }
+
+ private:
+  Board board_;
+  std::size_t most_;
+  std::vector<BoardView> views_;
+  int found_ = 0;
+};
+
+/// Where a fraction of the picture's parts (`columns` x `rows`, row by row) has corners in so many views.
+struct Coverage {
+  static constexpr int columns = 4, rows = 3;
+  std::array<int, static_cast<std::size_t>(columns* rows)> views{};
+};
+Coverage coverage_of(const std::vector<BoardView>& views, const cv::Size& size);
+/// What the next pictures should show: "fill the lower left", "tilt the board". Empty when nothing is missing.
+std::string advice(const std::vector<BoardView>& views, const cv::Size& size);
+
+/// An edge's residual in a view, green.
+struct CameraResidual {
+  std::size_t view;
+  Eigen::Vector2d raw_px, beyond_px;
+};
+
+struct CameraCalibration {
+  /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
+  std::string refusal;
+  Camera camera;
+  CameraSigmas sigmas;
+  std::optional<ResponseFit> response;  ///< nullopt where the pictures don't tell: the camera's is as it was
+  std::vector<double> view_rms_px;      ///< of edges about the fit, by view, green
+  double rms_px = 0;
+  std::vector<Rigid3> poses;   ///< camera_from_board, by view
+  double bright_wider_px = 0;  ///< with the calibrated response, green: 0 for a board whose squares are equally wide
+  std::vector<CameraResidual> residuals;
+};
+
+/// Matrix, distortion, lateral chromatic aberration and response of the camera that took the views, all of one size.
+/// `start` gives the response to begin with. `progress` is told what is done.
+CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
+                                   const std::function<void(const std::string&)>& progress = {});
+
+}  // namespace lapservo::internal
