@@ -147,7 +147,8 @@ void add_servo(CLI::App& app, Run& run_later) {
       "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/robots.md");
   command->add_option(
       "--camera", options->camera,
-      "Images of a real arm: ros2:/topic, an Image or, where it ends in /compressed, a CompressedImage");
+      "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
+      "/dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
   command->add_flag("--enable-motion", options->enable_motion,
                     "Move a real arm; without it nothing is sent, and what would be is said");
   command->add_option("--joint-limits", options->joint_limits,
