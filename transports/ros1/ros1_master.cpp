@@ -60,11 +60,16 @@ bool is_master(const MasterAddress& address) {
 
 }  // namespace
 
-void require_ros1_master(const MasterAddress& address) {
+MasterAnswer ask_ros1_master(const MasterAddress& address) {
   const auto answer = std::make_shared<std::promise<bool>>();
   auto result = answer->get_future();
   std::thread([answer, address] { answer->set_value(is_master(address)); }).detach();  // it may outlive the question
-  if (result.wait_for(patience) != std::future_status::ready || !result.get())
+  if (result.wait_for(patience) != std::future_status::ready) return MasterAnswer::late;
+  return result.get() ? MasterAnswer::yes : MasterAnswer::no;
+}
+
+void require_ros1_master(const MasterAddress& address) {
+  if (ask_ros1_master(address) != MasterAnswer::yes)
     throw InputError("ROS_MASTER_URI",
                      "is " + to_string(address) +
                          ", where no ROS 1 master answers: start roscore (or rosmaster --core), or set "

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -44,7 +45,7 @@ class Ros1Subscription {
       : node_(std::move(node)), topic_(topic), handler_(std::move(handler)) {
     ros::SubscribeOptions options;
     options.initByFullCallbackType<const Event&>(topic, queue_size, [this](const Event& event) { take(event); });
-    options.callback_queue = &queue_;
+    options.callback_queue = queue_.get();
     options.transport_hints = ros::TransportHints().tcpNoDelay();
     subscriber_ = ros::NodeHandle().subscribe(options);
     if (!subscriber_) throw std::runtime_error("ROS: can't subscribe to " + topic);
@@ -52,9 +53,10 @@ class Ros1Subscription {
   }
   ~Ros1Subscription() {
     ended_ = true;
-    queue_.disable();
+    queue_->disable();
     thread_.join();
-    subscriber_.shutdown();
+    using Both = std::pair<std::shared_ptr<ros::CallbackQueue>, ros::Subscriber>;
+    node_->end([this] { subscriber_.shutdown(); }, std::make_shared<Both>(queue_, subscriber_));
   }
   Ros1Subscription(const Ros1Subscription&) = delete;
   Ros1Subscription& operator=(const Ros1Subscription&) = delete;
@@ -63,9 +65,9 @@ class Ros1Subscription {
   using Event = ros::MessageEvent<Ros1Received<Message>>;  // not const: its own copy, where it is not the only one
 
   void work() {
-    const ros::WallDuration moment(1);
-    while (!ended_) {
-      queue_.callAvailable(moment);
+    constexpr double longest_s = 30;
+    for (double moment_s = 1; !ended_; moment_s = std::min(2 * moment_s, longest_s)) {
+      queue_->callAvailable(ros::WallDuration(moment_s));
       if (!ended_ && !connected_) look_for_other_types();
     }
   }
@@ -83,7 +85,7 @@ class Ros1Subscription {
   // A publisher of another type refuses, of which roscpp says nothing.
   void look_for_other_types() {
     const std::string type = ros::message_traits::datatype<Ros1Type<Message>>();
-    const auto other = other_type_on(subscriber_.getTopic(), type);
+    const auto other = node_->answers() ? other_type_on(subscriber_.getTopic(), type) : std::nullopt;
     connected_ = subscriber_.getNumPublishers() > 0;
     if (!other || connected_ || ++refused_ < 2) return;  // a connection takes its time
     connected_ = true;
@@ -93,7 +95,7 @@ class Ros1Subscription {
   std::shared_ptr<Ros1Node> node_;
   std::string topic_;
   std::function<void(Message&&)> handler_;
-  ros::CallbackQueue queue_;
+  std::shared_ptr<ros::CallbackQueue> queue_ = std::make_shared<ros::CallbackQueue>();
   ros::Subscriber subscriber_;
   std::atomic<bool> ended_ = false;
   bool connected_ = false;  // or told of why not

@@ -26,8 +26,13 @@ Transport::Publisher<Message> publisher(const std::shared_ptr<void>& node, const
                                         std::uint32_t queue_size, bool latched = false) {
   const ros::Publisher to = ros::NodeHandle().advertise<Ros1Type<Message>>(full_name(topic), queue_size, latched);
   if (!to) throw std::runtime_error("ROS: can't publish " + topic);
-  return [node, to, latched](const Message& message) {
-    if (latched || to.getNumSubscribers() > 0) to.publish(ros1_message(message));
+  const auto end = [node = std::static_pointer_cast<Ros1Node>(node)](ros::Publisher* publisher) {
+    const std::shared_ptr<ros::Publisher> kept(publisher);
+    node->end([&] { kept->shutdown(); }, kept);
+  };
+  const std::shared_ptr<ros::Publisher> shared(new ros::Publisher(to), end);
+  return [shared, latched](const Message& message) {
+    if (latched || shared->getNumSubscribers() > 0) shared->publish(ros1_message(message));
   };
 }
 

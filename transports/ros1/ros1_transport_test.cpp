@@ -139,10 +139,10 @@ TEST_F(Ros1Wire, StrangersMessagesAreDroppedAndTold) {
   TestInbox<StringMessage> echo;
   const auto echo_subscription = transport_->subscribe_strings("/out/text", echo.handler());
   const auto ask = transport_->string_publisher("/in/text");
-  for (std::size_t said = 0; said < 3; ++said) {
+  for (int i = 0; i < 4; ++i) {
     echo.clear();
     echo.get([&] { ask({stamp_s, "pretend"}); });
-    std::this_thread::sleep_for(std::chrono::seconds(1));  // the master is asked once a second
+    std::this_thread::sleep_for(std::chrono::seconds(1));  // the master is asked after 1 s and 3 s
   }
   const std::string said = ::testing::internal::GetCapturedStderr();
   EXPECT_TRUE(odd.empty());
@@ -170,6 +170,25 @@ TEST_F(Ros1Wire, OutlivesMasterAndPeer) {
   master_.kill();
   joints.clear();
   hear();
+}
+
+// Last: what could not be unregistered stays for the rest of this process.
+TEST_F(Ros1Wire, EndsThoughItsMasterHangs) {
+  TestInbox<JointMessage> joints;
+  auto subscription = transport_->subscribe_joints("/out/joints", joints.handler());
+  auto say = transport_->joint_publisher("/in/joints");
+  joints.get([&] { say({stamp_s, {}, {1}}); });
+  auto lonely = transport_->subscribe_joints("/nobody", joints.handler());
+  master_.stop();
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));  // it asks the master for such a topic
+  const auto begin = std::chrono::steady_clock::now();
+  lonely = subscription = nullptr;
+  say = nullptr;
+  transport_ = nullptr;
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+  const std::size_t heard = joints.count();
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(joints.count(), heard);
 }
 
 }  // namespace

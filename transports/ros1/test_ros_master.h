@@ -44,6 +44,7 @@ class TestChild {
     ::waitpid(id_, nullptr, 0);
     id_ = 0;
   }
+  void stop() const { ::kill(id_, SIGSTOP); }
 
  private:
   pid_t id_ = 0;
@@ -81,6 +82,8 @@ class TestRosMaster {
     }
   }
   void kill() { child_.kill(); }
+  /// It listens on, and answers no more.
+  void stop() { child_.stop(); }
 
  private:
   // The same each time: roscpp keeps the master that it knew first.
