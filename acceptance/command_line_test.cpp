@@ -103,6 +103,42 @@ TEST_F(CommandLine, VideosAndTheBaseline) {
   ASSERT_EQ(run("track " + out("film") + "/video.mp4 --method centerline --out " + out("c.csv")), 0) << errors();
 }
 
+#ifdef LAPSERVO_GST
+// Live, they are measured as from files; each frame that is not taken is counted.
+TEST_F(CommandLine, GStreamersPipelinesAreTracked) {
+  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("frames") + " --count 3 --seed 5"), 0) << errors();
+  std::string raw;
+  for (const char* name : {"/0000.png", "/0001.png", "/0002.png"}) {
+    const cv::Mat picture = cv::imread(out("frames") + name);
+    raw.append(reinterpret_cast<const char*>(picture.data), picture.total() * picture.elemSize());
+  }
+  const std::string pipeline = "'gst:filesrc location=" + in("frames.raw", raw) +
+                               " ! rawvideoparse format=bgr width=1280 height=720 framerate=1/1'";
+  ASSERT_EQ(run("track " + out("frames") + " --rig " + rig_ + " --single --out " + out("files.csv")), 0) << errors();
+  ASSERT_EQ(run("track " + pipeline + " --rig " + rig_ + " --single --out " + out("live.csv")), 0) << errors();
+  const CsvTable files = CsvTable::read(out("files.csv")), live = CsvTable::read(out("live.csv"));
+  ASSERT_EQ(live.rows(), 3U) << output();
+  for (std::size_t row = 0; row < 3; ++row) {
+    EXPECT_NEAR(live.number(row, "time_s"), static_cast<double>(row), 1e-4);
+    EXPECT_EQ(live.text(row, "psi_rad"), files.text(row, "psi_rad"));
+  }
+  EXPECT_EQ(run("track " + pipeline + " --rig " + rig_ + " --frames 1 --out " + out("live.csv")), 0) << errors();
+  EXPECT_EQ(CsvTable::read(out("live.csv")).rows(), 1U);
+  fs::remove_all(folder_ / "out");
+  fs::create_directories(folder_ / "out");
+  expect_refused(track("gst:nosuchelement"), {"gst:nosuchelement", "nosuchelement", "expected a pipeline"});
+  expect_refused("track gst:videotestsrc --out " + out("obs.csv"), {"--rig", "is missing"});
+}
+#endif
+
+TEST_F(CommandLine, CamerasThatAreNone) {
+  const std::string servo = "servo --rig " + lapservo::testing::source_folder().string() +
+                            "/configs/paper.yaml --robot ros2:PSM1 --out " + out("run") + " --camera ";
+  expect_refused(servo + "/dev/video-none", {"/dev/video-none", "can't be opened", "expected a camera"});
+  expect_refused(servo + "video.mp4", {"--camera", "is video.mp4", "/dev/videoN"});
+  expect_refused(servo + "''", {"--camera", "is missing", "ros2:/topic"});
+}
+
 TEST_F(CommandLine, NothingFoundIsOne) {
   cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
   EXPECT_EQ(run("track " + in("grey.png") + " --rig " + rig_ + " --out " + out("obs.csv")), 1);

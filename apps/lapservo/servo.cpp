@@ -132,7 +132,7 @@ int run(const ServoOptions& options) {
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
   if (options.robot == "sim") return simulate(options);
   if (options.robot.find(':') != std::string::npos) return steer_arm(options);
-  constexpr auto expected = ", expected sim or ros2:NAMESPACE";
+  constexpr auto expected = ", expected sim, ros2:NAMESPACE or ros1:NAMESPACE";
   throw InputError("--robot", (options.robot.empty() ? "is missing" : "is " + options.robot) + expected);
 }
 
@@ -142,11 +142,13 @@ void add_servo(CLI::App& app, Run& run_later) {
   auto options = std::make_shared<ServoOptions>();
   CLI::App* command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
   command->add_option("--rig", options->rig, "Camera, marker and camera_from_rcm");
-  command->add_option("--robot", options->robot,
-                      "sim: the built-in simulator; ros2:PSM1: the arm of that CRTK namespace, see docs/robots.md");
+  command->add_option(
+      "--robot", options->robot,
+      "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/robots.md");
   command->add_option(
       "--camera", options->camera,
-      "Images of a real arm: ros2:/topic, an Image or, where it ends in /compressed, a CompressedImage");
+      "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
+      "/dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
   command->add_flag("--enable-motion", options->enable_motion,
                     "Move a real arm; without it nothing is sent, and what would be is said");
   command->add_option("--joint-limits", options->joint_limits,

@@ -10,12 +10,12 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/live_images.h"
 #include "apps/lapservo/servo_output.h"
 #include "apps/lapservo/transports.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/crtk_robot.h"
-#include "lapservo/crtk/image_receiver.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/loop_topics/loop_topics.h"
 #include "lapservo/robot/steady_clock.h"
@@ -39,16 +39,6 @@ std::string list_of(const Joints& joints, const Eigen::Vector4d& q) {
   return text;
 }
 
-Transport::Subscription subscribe(Transport& transport, const std::string& topic, ImageReceiver& images,
-                                  const Clock& clock) {
-  constexpr std::string_view ending = "/compressed";
-  if (topic.size() > ending.size() && topic.compare(topic.size() - ending.size(), ending.size(), ending) == 0)
-    return transport.subscribe_compressed_images(
-        topic, [&](CompressedImageMessage&& message) { images.receive(std::move(message), clock.now_s()); });
-  return transport.subscribe_images(topic,
-                                    [&](ImageMessage&& message) { images.receive(std::move(message), clock.now_s()); });
-}
-
 // The trajectory, until somebody wants a set-point instead. All in the loop's thread.
 class Goal {
  public:
@@ -65,7 +55,7 @@ class Goal {
 // What changes is said once, in one line; what somebody else does to the arm ends the run.
 class ArmWatcher : public RunObserver {
  public:
-  ArmWatcher(const ServoOptions& options, const RunConfig& run, CrtkRobot& robot, const ImageReceiver& images,
+  ArmWatcher(const ServoOptions& options, const RunConfig& run, CrtkRobot& robot, const LiveImages& images,
              LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view)
       : options_(options),
         run_(run),
@@ -122,6 +112,10 @@ class ArmWatcher : public RunObserver {
     }
   }
   void say_images(double time_s) {
+    if (const auto ended = images_.ended(); ended && !said_ended_) {
+      said_ended_ = true;
+      say(time_s, options_.camera + ": " + (ended->empty() ? "its images have ended" : *ended));
+    }
     const std::string counts = images_.counts().text();
     if (counts == said_counts_ || time_s < next_counts_s_) return;
     said_counts_ = counts;
@@ -138,7 +132,7 @@ class ArmWatcher : public RunObserver {
   const ServoOptions& options_;
   const RunConfig& run_;
   CrtkRobot& robot_;
-  const ImageReceiver& images_;
+  const LiveImages& images_;
   LoopTopics& topics_;
   Goal& goal_;
   RunFolder* folder_;
@@ -147,6 +141,7 @@ class ArmWatcher : public RunObserver {
   std::optional<double> start_s_;
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string state_, said_counts_;
+  bool said_ended_ = false;
 };
 
 // Where the arm is, once it says so.
@@ -177,9 +172,7 @@ void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
 }  // namespace
 
 int steer_arm(const ServoOptions& options) {
-  const Address arm = address_of(options.robot, "--robot"), camera = address_of(options.camera, "--camera");
-  if (camera.transport != arm.transport)
-    throw InputError("--camera", "is " + options.camera + ", expected " + arm.transport + ":/topic as for --robot");
+  const Address arm = address_of(options.robot, "--robot");
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
   const InterlockConfig interlock = interlock_of(options, config);
@@ -189,11 +182,11 @@ int steer_arm(const ServoOptions& options) {
   std::optional<LiveView> view;
   if (options.view) view.emplace("servo", "use --out to write a log instead");
 
-  const auto transport = make_transport(arm.transport, "lapservo", "--robot");
+  Transports transports("lapservo");
   SteadyClock clock;
-  ImageReceiver images(rig.camera.width_px, rig.camera.height_px);
-  const auto subscription = subscribe(*transport, camera.name, images, clock);
-  CrtkRobot robot(*transport, arm.name, interlock, clock);
+  LiveImages images(options.camera, "--camera", rig.camera, clock, transports);
+  Transport& transport = transports.get(arm.transport, "--robot");
+  CrtkRobot robot(transport, arm.name, interlock, clock);
   watch_for_interrupts();
   const auto start = wait_for(robot);
   if (!start) {
@@ -207,7 +200,7 @@ int steer_arm(const ServoOptions& options) {
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, rig, config.controller);
 
-  LoopTopics topics(*transport, rig, "endoscope");
+  LoopTopics topics(transport, rig, "endoscope");
   Goal goal(trajectory);
   ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr,
                      view ? &*view : nullptr);

@@ -54,8 +54,8 @@ int run(const Options& options) {
   Simulator simulator(rig, simulated, start_of(options, rig, simulated.arm));
   const auto transport = make_transport(options.transport, "lapservo_sim_robot", "--transport");
   SimRobotConfig config;
-  config.arm = options.arm;
-  config.camera = options.camera;
+  config.arm = resolved_name({options.transport, options.arm}, "--arm");
+  config.camera = resolved_name({options.transport, options.camera}, "--camera");
   SimRobot robot(*transport, rig, simulator, config);
   watch_for_interrupts();
   std::printf("arm %s, camera %s/image_raw; lapservo servo --rig %s --robot %s:%s --camera %s:%s/image_raw ",
@@ -82,7 +82,7 @@ void add_sim_robot(CLI::App& app, Run& run_later) {
   CLI::App* command =
       app.add_subcommand("sim-robot", "Be an arm and its camera, simulated, for another process to steer.");
   command->add_option("--rig", options->rig, "What stands before the camera");
-  command->add_option("--transport", options->transport, "ros2")->capture_default_str();
+  command->add_option("--transport", options->transport, "ros2 or ros1")->capture_default_str();
   command->add_option("--arm", options->arm, "Namespace of its CRTK topics")->capture_default_str();
   command->add_option("--camera", options->camera, "Namespace of image_raw and camera_info")->capture_default_str();
   command->add_option("--start", options->start, "Measured joints to start from, theta,phi,rho,psi; else random")

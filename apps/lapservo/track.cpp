@@ -13,6 +13,7 @@
 
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/live_frames.h"
 #include "apps/lapservo/live_view.h"
 #include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
@@ -34,6 +35,7 @@ struct Options {
   std::string method = "surface";
   bool single = false, deinterlace = false, view = false;
   double fps = 30;
+  int frames = 0;
 };
 
 // What is known to be read before the first frame; rigs beside the frames come with them.
@@ -130,10 +132,24 @@ struct Tally {
   throw error;
 }
 
+// Devices are OpenCV's here: what their size is need not be known before.
+bool is_live(const std::string& input) {
+  return names_live_images(input) && !input.starts_with("/dev/");
+}
+
+std::unique_ptr<LiveFrames> open_live(const Options& options) {
+  if (!is_live(options.input)) return nullptr;
+  if (options.rig.empty())
+    throw InputError("--rig", "is missing, expected a rig's YAML: live images have none beside them");
+  return std::make_unique<LiveFrames>(options.input, load_rig(options.rig).camera);
+}
+
 int run(const Options& options) {
   refuse_outputs(options, inputs_of(options));
   RigByFrame rigs(options);
-  const auto source = open_frame_source(options.input, options.fps);
+  const auto live = open_live(options);
+  const auto file = live ? nullptr : open_frame_source(options.input, options.fps);
+  FrameSource* const source = live ? live.get() : file.get();
   std::optional<LiveView> view;
   if (options.view) view.emplace("track", "use --overlay to write pictures instead");
   ObservationCsv csv(options.out);
@@ -144,9 +160,12 @@ int run(const Options& options) {
   bool stopped = false;
   {
     Progress progress(source->frame_count());
-    while (!(stopped = interrupted())) {
+    while (!(stopped = interrupted()) && (options.frames == 0 || tally.frames < options.frames)) {
       const auto frame = source->next();
-      if (!frame) break;
+      if (!frame) {
+        stopped = interrupted();
+        break;
+      }
       Tracker& tracker = rigs.tracker_for(*frame);
       try {
         const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
@@ -172,6 +191,7 @@ int run(const Options& options) {
   std::printf("%s%d frames%s\nobservations: %s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str(),
               options.out.c_str());
   if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
+  if (live && !live->dropped().empty()) std::printf("no frames: %s\n", live->dropped().c_str());
   if (const std::string complaint = source->complaint(); !stopped && !complaint.empty()) {
     std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options.input.c_str(),
                  complaint.c_str());
@@ -190,8 +210,10 @@ void add_track(CLI::App& app, Run& run_later) {
   auto options = std::make_shared<Options>();
   CLI::App* command = app.add_subcommand("track", "Measure the instruments in pictures, a video or a camera's frames.");
   command
-      ->add_option("input", options->input,
-                   "Picture, folder of pictures, video file, camera (0, /dev/video0) or stream (rtsp://...)")
+      ->add_option(
+          "input", options->input,
+          "Picture, folder of pictures, video file, camera (0, /dev/video0), stream (rtsp://...), topic "
+          "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
       ->required();
   command->add_option("--rig", options->rig,
                       "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
@@ -216,6 +238,9 @@ void add_track(CLI::App& app, Run& run_later) {
   command->add_option("--fps", options->fps, "Frames per second of a folder's pictures")
       ->capture_default_str()
       ->check(number_between(0.001, 100000.0));
+  command->add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1000000000));
   command->footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
   command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
 }

@@ -52,7 +52,8 @@ void ImageReceiver::accept(double stamp_s, double arrival_s, Message&& message) 
   }
   count_gap(stamp_s);
   if (waiting_) ++counts_.skipped;
-  waiting_ = Waiting{measured.time_s, std::move(message)};
+  const double time_s = stamps_by_ == StampsBy::loop ? std::min(stamp_s, arrival_s) : measured.time_s;
+  waiting_ = Waiting{time_s, std::move(message)};
 }
 
 // The usual distance follows the shortest ones seen.

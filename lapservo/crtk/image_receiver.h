@@ -23,13 +23,18 @@ struct ImageCounts {
   std::string text() const;
 };
 
+/// Whose clock stamps are of: one that agrees with nobody's, or the loop's own.
+enum class StampsBy { sender, loop };
+
 /// A camera's image messages as an ImageStream: the newest, once, decoded by whoever asks for it. Only images with a
 /// stamp that is newer than the last count, so a camera that repeats itself soon gives stale images; time_s is as of
-/// the fastest image (StampClock). What can't be used is dropped, counted, and its reason kept.
+/// the fastest image (StampClock), or the stamp where it is by the loop's clock. What can't be used is dropped,
+/// counted, and its reason kept.
 class ImageReceiver : public ImageStream {
  public:
   /// Of the rig's camera.
-  ImageReceiver(int width_px, int height_px) : size_(width_px, height_px) {}
+  ImageReceiver(int width_px, int height_px, StampsBy stamps_by = StampsBy::sender)
+      : size_(width_px, height_px), stamps_by_(stamps_by) {}
 
   // By the transport's threads, with the time of arrival on the loop's clock.
   void receive(ImageMessage&& message, double arrival_s);
@@ -53,6 +58,7 @@ class ImageReceiver : public ImageStream {
   void refuse(long ImageCounts::*count, const std::string& why);
 
   cv::Size size_;
+  StampsBy stamps_by_;
   mutable std::mutex mutex_;
   StampClock clock_{0.5};
   ImageCounts counts_;

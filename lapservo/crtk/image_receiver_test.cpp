@@ -33,6 +33,16 @@ TEST(ImageReceiver, GivesTheNewestOnceAndCountsTheRest) {
   EXPECT_EQ(receiver.counts().text(), "skipped 2");
 }
 
+TEST(ImageReceiver, StampsByTheLoopsClockStay) {
+  ImageReceiver receiver(4, 2, StampsBy::loop);
+  receiver.receive(image(5), 5.01);
+  EXPECT_DOUBLE_EQ(receiver.newest()->time_s, 5);
+  receiver.receive(image(5.03), 5.08);
+  EXPECT_DOUBLE_EQ(receiver.newest()->time_s, 5.03);
+  receiver.receive(image(5.12), 5.11);  // not after it came
+  EXPECT_DOUBLE_EQ(receiver.newest()->time_s, 5.11);
+}
+
 TEST(ImageReceiver, RepeatedStampsAreNotFresh) {
   ImageReceiver receiver(4, 2);
   receiver.receive(image(epoch_s), 5);

@@ -3,16 +3,15 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <cstdlib>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "lapservo/crtk/test_inbox.h"
 #include "transports/ros2/dds_node.h"
 #include "transports/ros2/ros2_names.h"
 #include "transports/ros2/wire.h"
@@ -22,46 +21,11 @@ namespace {
 
 constexpr std::chrono::seconds patience(60);
 
-// What arrived, for whoever waits for it.
-template <typename Message>
-class Inbox {
- public:
-  Transport::Handler<Message> handler() {
-    return [this](Message&& message) {
-      const std::lock_guard lock(mutex_);
-      messages_.push_back(std::move(message));
-      changed_.notify_all();
-    };
-  }
-  bool empty() {
-    const std::lock_guard lock(mutex_);
-    return messages_.empty();
-  }
-  // Says it again until it arrives: discovery takes its time.
-  Message get(const std::function<void()>& say) {
-    std::unique_lock lock(mutex_);
-    const auto end = std::chrono::steady_clock::now() + patience;
-    while (messages_.empty() && std::chrono::steady_clock::now() < end) {
-      lock.unlock();
-      say();
-      lock.lock();
-      changed_.wait_for(lock, std::chrono::milliseconds(20), [this] { return !messages_.empty(); });
-    }
-    EXPECT_FALSE(messages_.empty());
-    return messages_.empty() ? Message{} : messages_.front();
-  }
-
- private:
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::vector<Message> messages_;
-};
-
 constexpr double stamp_s = 1700000000.123456;
 
 TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   Ros2Transport from("from"), to("to");
-  Inbox<JointMessage> joints;
+  TestInbox<JointMessage> joints;
   const auto joint_subscription = to.subscribe_joints("/PSM1/measured_js", joints.handler());
   const auto say_joints = from.joint_publisher("/PSM1/measured_js");
   const JointMessage js = joints.get([&] { say_joints({stamp_s, {"yaw", "pitch"}, {0.25, -1.5}}); });
@@ -69,7 +33,7 @@ TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   EXPECT_EQ(js.names, (std::vector<std::string>{"yaw", "pitch"}));
   EXPECT_EQ(js.positions, (std::vector<double>{0.25, -1.5}));
 
-  Inbox<OperatingStateMessage> states;
+  TestInbox<OperatingStateMessage> states;
   const auto say_state = from.operating_state_publisher("PSM1/operating_state");
   say_state({stamp_s, "ENABLED", true, false});  // before anybody listens: it is latched
   const auto state_subscription = to.subscribe_operating_state("/PSM1/operating_state", states.handler());
@@ -78,12 +42,12 @@ TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   EXPECT_TRUE(state.is_homed);
   EXPECT_FALSE(state.is_busy);
 
-  Inbox<StringMessage> strings;
+  TestInbox<StringMessage> strings;
   const auto string_subscription = to.subscribe_strings("/PSM1/state_command", strings.handler());
   const auto say_string = from.string_publisher("/PSM1/state_command");
   EXPECT_EQ(strings.get([&] { say_string({stamp_s, "enable"}); }).text, "enable");
 
-  Inbox<ImageMessage> images;
+  TestInbox<ImageMessage> images;
   const auto image_subscription = to.subscribe_images("/image", images.handler());
   const auto say_image = from.image_publisher("/image");
   ImageMessage picture{stamp_s, 640, 360, 1920, "bgr8", true, {}};
@@ -96,7 +60,7 @@ TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   EXPECT_TRUE(image.is_bigendian);
   EXPECT_EQ(image.data, picture.data);
 
-  Inbox<CompressedImageMessage> compressed;
+  TestInbox<CompressedImageMessage> compressed;
   const auto compressed_subscription = to.subscribe_compressed_images("/image/compressed", compressed.handler());
   const auto say_compressed = from.compressed_image_publisher("/image/compressed");
   const CompressedImageMessage jpeg = compressed.get([&] { say_compressed({stamp_s, "jpeg", {1, 2, 3}}); });
@@ -106,7 +70,7 @@ TEST(Ros2Transport, CarriesEveryKindOfMessage) {
 
 TEST(Ros2Transport, DoesNotHearItself) {
   Ros2Transport one("one"), other("other");
-  Inbox<JointMessage> own, others;
+  TestInbox<JointMessage> own, others;
   const auto own_subscription = one.subscribe_joints("/PSM1/servo_jp", own.handler());
   const auto others_subscription = other.subscribe_joints("/PSM1/servo_jp", others.handler());
   const auto say = one.joint_publisher("/PSM1/servo_jp");
@@ -120,7 +84,7 @@ TEST(Ros2Transport, EveryPublisherOfOperatingStatesMatches) {
     Ros2Transport to("to");
     const char* const domain = std::getenv("ROS_DOMAIN_ID");
     DdsNode from("from", domain_id(domain ? domain : ""));
-    Inbox<OperatingStateMessage> states;
+    TestInbox<OperatingStateMessage> states;
     const auto subscription = to.subscribe_operating_state("/PSM1/operating_state", states.handler());
     const dds_entity_t writer =
         from.create_writer("/PSM1/operating_state", Wire<OperatingStateMessage>::descriptor(), delivery);

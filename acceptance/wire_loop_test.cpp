@@ -1,17 +1,21 @@
-// The closed loop through ROS 2's wire: `lapservo servo` as a process of its own steers an arm in another process or in
-// this one, over loopback. What is asserted goes by the stamps that messages carry and by counts, not by how fast this
-// computer is; waits end early.
+// The closed loop through ROS 2's wire and ROS 1's: `lapservo servo` as a process of its own steers an arm in another
+// process or in this one, over loopback. What is asserted goes by the stamps that messages carry and by counts, not by
+// how fast this computer is; waits end early.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <fcntl.h>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <stdexcept>
 #include <string>
 #include <sys/wait.h>
 #include <thread>
@@ -27,7 +31,13 @@
 #include "lapservo/sim_robot/sim_robot.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
+#ifdef LAPSERVO_ROS1
+#include "transports/ros1/ros1_transport.h"
+#include "transports/ros1/test_ros_master.h"
+#endif
+#ifdef LAPSERVO_ROS2
 #include "transports/ros2/ros2_transport.h"
+#endif
 
 namespace lapservo::internal {
 namespace {
@@ -35,6 +45,28 @@ namespace {
 constexpr double patience_s = 60, allowed_s = 0.1;  // for anything to happen; from a fault to the last set-point
 const JointLimits limits;                           // the controller's, which the command line was not told otherwise
 const double rest_s = (limits.rate.cwiseQuotient(limits.acceleration)).maxCoeff();
+
+// Those that this build has.
+std::vector<std::string> transports() {
+  return {
+#ifdef LAPSERVO_ROS2
+      "ros2",
+#endif
+#ifdef LAPSERVO_ROS1
+      "ros1",
+#endif
+  };
+}
+
+std::unique_ptr<Transport> make_transport(const std::string& name, const std::string& node_name) {
+#ifdef LAPSERVO_ROS1
+  if (name == "ros1") return std::make_unique<Ros1Transport>(node_name);
+#endif
+#ifdef LAPSERVO_ROS2
+  if (name == "ros2") return std::make_unique<Ros2Transport>(node_name);
+#endif
+  throw std::invalid_argument(name);
+}
 
 double now_s() {
   return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
@@ -138,13 +170,14 @@ class Spy {
 };
 
 // Section V-D as the half-size camera sees it, and that camera's rig.
-class Ros2Loop : public ::testing::Test {
+class WireLoop : public ::testing::TestWithParam<std::string> {
  protected:
-  static void SetUpTestSuite() {
+  void SetUp() override {
     ::setenv("ROS_LOCALHOST_ONLY", "1", 1);
     if (!std::getenv("ROS_DOMAIN_ID")) ::setenv("ROS_DOMAIN_ID", "88", 1);
-  }
-  void SetUp() override {
+#ifdef LAPSERVO_ROS1
+    if (GetParam() == "ros1") master_ = std::make_unique<TestRosMaster>();
+#endif
     rig_ = testing::small_test_rig();
     testing::write_file(folder_ / "rig.yaml", rig_yaml(rig_));
     Sinusoids f = paper_sinusoids();
@@ -158,8 +191,12 @@ class Ros2Loop : public ::testing::Test {
     }
     testing::write_file(folder_ / "v-d.csv", csv);
   }
-  std::string file(const std::string& name) const { return (folder_ / name).string(); }
-  std::string said(const std::string& name) const { return testing::read_file(folder_ / name); }
+  std::string file(const std::string& name) const {
+    return (folder_ / name).string();
+  }
+  std::string said(const std::string& name) const {
+    return testing::read_file(folder_ / name);
+  }
 
   std::unique_ptr<Process> servo(double duration_s, const std::string& output = "servo.txt", bool motion = true) const {
     std::vector<std::string> arguments{"servo",
@@ -168,9 +205,9 @@ class Ros2Loop : public ::testing::Test {
                                        "--trajectory",
                                        file("v-d.csv"),
                                        "--robot",
-                                       "ros2:PSM1",
+                                       GetParam() + ":PSM1",
                                        "--camera",
-                                       "ros2:/endoscope/image_raw",
+                                       GetParam() + ":/endoscope/image_raw",
                                        "--fps",
                                        "30",
                                        "--duration",
@@ -179,28 +216,45 @@ class Ros2Loop : public ::testing::Test {
     return std::make_unique<Process>(arguments, file(output));
   }
   std::unique_ptr<Process> arm() const {
-    return std::make_unique<Process>(
-        std::vector<std::string>{"sim-robot", "--rig", file("rig.yaml"), "--start", "0.05,1.57,0.064,1.2"},
-        file("arm.txt"));
+    return std::make_unique<Process>(std::vector<std::string>{"sim-robot", "--rig", file("rig.yaml"), "--start",
+                                                              "0.05,1.57,0.064,1.2", "--transport", GetParam()},
+                                     file("arm.txt"));
   }
   // From what servo says in its last lines.
-  double converged_s(const std::string& output) const {
-    const std::string text = said(output), before = "within 1 px and 5 mrad from ";
+  void expect_steady(const std::string& output) const {
+    const std::string text = said(output), before = "\nwithin 1 px and 5 mrad from ";
     const std::size_t at = text.find(before);
-    return at == std::string::npos ? 1e9 : std::atof(text.c_str() + at + before.size());
+    ASSERT_NE(at, std::string::npos) << text;
+    double reached_s = 0, s_mrad = 0, r = 0, l = 0, d = 0;
+    ASSERT_EQ(std::sscanf(text.c_str() + at + before.size(), "%lf s on; rms since: s %lf mrad, r %lf, l %lf, d %lf px",
+                          &reached_s, &s_mrad, &r, &l, &d),
+              5)
+        << text;
+    EXPECT_LE(reached_s, 5) << text;
+    EXPECT_LE(s_mrad, 0.5) << text;
+    EXPECT_LE(std::max({r, l, d}), 0.3) << text;
   }
 
   Rig rig_;
   testing::TemporaryFolder folder_;
+#ifdef LAPSERVO_ROS1
+  std::unique_ptr<TestRosMaster> master_;
+#endif
 };
+// What goes through the same code whatever the wire is seen on the first one only: it is in real time.
+class FirstWireLoop : public WireLoop {};
+INSTANTIATE_TEST_SUITE_P(Over, WireLoop, ::testing::ValuesIn(transports()),
+                         [](const auto& wire) { return wire.param; });
+INSTANTIATE_TEST_SUITE_P(Over, FirstWireLoop, ::testing::Values(transports().front()),
+                         [](const auto& wire) { return wire.param; });
 
 // An arm in this process, that can be made to misbehave.
 class Arm {
  public:
-  explicit Arm(const Rig& rig)
-      : transport_("arm"),
+  Arm(const std::string& transport, const Rig& rig)
+      : transport_(make_transport(transport, "arm")),
         simulator_(rig, simulated(), {0.05, 1.57, 0.064, 1.2}),
-        robot_(transport_, rig, simulator_, config()) {
+        robot_(*transport_, rig, simulator_, config()) {
     thread_ = std::thread([this] {
       const double begin_s = now_s();
       double paused_s = 0;
@@ -222,7 +276,6 @@ class Arm {
   Arm& operator=(const Arm&) = delete;
 
   SimRobot& robot() { return robot_; }
-  Transport& transport() { return transport_; }
 
   std::atomic<bool> silent = false, nan = false, frozen = false;
 
@@ -245,7 +298,7 @@ class Arm {
     return config;
   }
 
-  Ros2Transport transport_;
+  std::unique_ptr<Transport> transport_;
   Simulator simulator_;
   double last_stamp_s_ = 0;
   SimRobot robot_;
@@ -253,17 +306,32 @@ class Arm {
   std::thread thread_;
 };
 
-TEST_F(Ros2Loop, TwoProcessesConverge) {
+TEST_P(WireLoop, TwoProcessesConverge) {
   const auto room = arm();
   const auto loop = servo(8);
   EXPECT_EQ(loop->wait(), 0) << said("servo.txt") << said("arm.txt");
-  EXPECT_LE(converged_s("servo.txt"), 5) << said("servo.txt");
+  expect_steady("servo.txt");
 }
 
-TEST_F(Ros2Loop, ObservesOnlyWithoutEnableMotion) {
-  Arm room(rig_);
-  Ros2Transport ears("ears");
-  Spy spy(ears);
+#ifdef LAPSERVO_ROS1
+TEST_P(FirstWireLoop, AMasterThatIsNotThereIsSaidWithinTwoSeconds) {
+  const TestPort closed;
+  ::setenv("ROS_MASTER_URI", fmt::format("http://127.0.0.1:{}", closed.number()).c_str(), 1);
+  const double begin_s = now_s();
+  Process arm({"sim-robot", "--rig", file("rig.yaml"), "--start", "0.05,1.57,0.064,1.2", "--transport", "ros1"},
+              file("arm.txt"));
+  EXPECT_EQ(arm.wait(), 2);
+  EXPECT_LT(now_s() - begin_s, 2);
+  const std::string text = said("arm.txt");
+  EXPECT_EQ(text.find("lapservo: ROS_MASTER_URI: is http://127.0.0.1:"), 0u) << text;
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+}
+#endif
+
+TEST_P(FirstWireLoop, ObservesOnlyWithoutEnableMotion) {
+  Arm room(GetParam(), rig_);
+  const auto ears = make_transport(GetParam(), "ears");
+  Spy spy(*ears);
   const auto loop = servo(3, "servo.txt", false);
   loop->wait();
   EXPECT_EQ(spy.count(), 0u);
@@ -277,7 +345,7 @@ struct Fault {
   bool silent;  // no set-point is sent any more; else they come to rest
 };
 
-TEST_F(Ros2Loop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
+TEST_P(FirstWireLoop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
   const std::vector<Fault> faults{
       {"NaN", [](Arm& a) { a.nan = true; }, [](Arm& a) { a.nan = false; }, "non_finite_joints", true},
       {"PAUSED", [](Arm& a) { a.robot().set_state(OperatingState::paused); },
@@ -287,9 +355,9 @@ TEST_F(Ros2Loop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
       {"silence", [](Arm& a) { a.silent = true; }, [](Arm& a) { a.silent = false; }, "old_joint_states", true},
       {"repeated stamps", [](Arm& a) { a.frozen = true; }, [](Arm& a) { a.frozen = false; }, "stale_image", false},
   };
-  Arm room(rig_);
-  Ros2Transport ears("ears");
-  Spy spy(ears);
+  Arm room(GetParam(), rig_);
+  const auto ears = make_transport(GetParam(), "ears");
+  Spy spy(*ears);
   const auto loop = servo(600);
   for (const Fault& fault : faults) {
     SCOPED_TRACE(fault.name);
@@ -316,12 +384,12 @@ TEST_F(Ros2Loop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
   loop->wait();
 }
 
-TEST_F(Ros2Loop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
-  Arm room(rig_);
-  Ros2Transport ears("ears"), foreign("foreign");
-  const auto say = foreign.joint_publisher("/PSM1/servo_jp");
+TEST_P(WireLoop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
+  Arm room(GetParam(), rig_);
+  const auto ears = make_transport(GetParam(), "ears"), foreign = make_transport(GetParam(), "foreign");
+  const auto say = foreign->joint_publisher("/PSM1/servo_jp");
   const auto loop = servo(600);
-  Spy spy(ears);
+  Spy spy(*ears);
   ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
   const double first_s = now_s();
   const Eigen::Vector4d elsewhere(0.1, 0, 0.1, 0.5);
@@ -338,12 +406,12 @@ TEST_F(Ros2Loop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
   EXPECT_LE(last_s, first_s + allowed_s);
 }
 
-TEST_F(Ros2Loop, StopsAndStartsAndTakesASetPointByTopic) {
-  Arm room(rig_);
-  Ros2Transport ears("ears");
-  Spy spy(ears);
-  const auto command = ears.string_publisher("/lapservo/PSM1/command");
-  const auto wish = ears.joint_publisher("/lapservo/PSM1/set_point");
+TEST_P(FirstWireLoop, StopsAndStartsAndTakesASetPointByTopic) {
+  Arm room(GetParam(), rig_);
+  const auto ears = make_transport(GetParam(), "ears");
+  Spy spy(*ears);
+  const auto command = ears->string_publisher("/lapservo/PSM1/command");
+  const auto wish = ears->joint_publisher("/lapservo/PSM1/set_point");
   const auto loop = servo(600);
   ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
   command({now_s(), "stop"});
@@ -370,9 +438,9 @@ TEST_F(Ros2Loop, StopsAndStartsAndTakesASetPointByTopic) {
   spy.expect_no_jump();
 }
 
-TEST_F(Ros2Loop, SurvivesWhenEitherSideIsKilledOrStopped) {
-  Ros2Transport ears("ears");
-  Spy spy(ears);
+TEST_P(WireLoop, SurvivesWhenEitherSideIsKilledOrStopped) {
+  const auto ears = make_transport(GetParam(), "ears");
+  Spy spy(*ears);
   auto room = arm();
   auto loop = servo(600);
   ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
@@ -397,10 +465,10 @@ TEST_F(Ros2Loop, SurvivesWhenEitherSideIsKilledOrStopped) {
   EXPECT_EQ(again->wait(), 0) << said("again.txt");
 }
 
-TEST_F(Ros2Loop, InterruptedItBringsTheArmToRestAndSaysWhatItCameTo) {
-  Arm room(rig_);
-  Ros2Transport ears("ears");
-  Spy spy(ears);
+TEST_P(FirstWireLoop, InterruptedItBringsTheArmToRestAndSaysWhatItCameTo) {
+  Arm room(GetParam(), rig_);
+  const auto ears = make_transport(GetParam(), "ears");
+  Spy spy(*ears);
   const auto loop = servo(600);
   ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
   loop->signal(SIGINT);

@@ -1,0 +1,69 @@
+#include "apps/lapservo/live_images.h"
+
+#include <string_view>
+#include <utility>
+
+#include "apps/lapservo/transports.h"
+#include "lapservo/core/error.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+constexpr std::string_view gst = "gst:", device = "/dev/video";
+
+std::unique_ptr<LiveCamera> open_pipeline(const std::string& text, const std::string& option, ImageSink sink) {
+#ifdef LAPSERVO_GST
+  (void)option;
+  return open_gst_camera(text.substr(gst.size()), std::move(sink));
+#else
+  (void)sink;
+  throw InputError(option, "is " + text +
+                               ", which this build lacks: it was built without libgstreamer1.0-dev and "
+                               "libgstreamer-plugins-base1.0-dev");
+#endif
+}
+
+}  // namespace
+
+Transport& Transports::get(const std::string& transport, const std::string& option) {
+  auto& made = transports_[transport];
+  if (!made) made = make_transport(transport, node_name_, option);
+  return *made;
+}
+
+bool names_live_images(const std::string& text) {
+  for (const std::string_view beginning : {std::string_view("ros1:"), std::string_view("ros2:"), gst, device})
+    if (text.starts_with(beginning)) return true;
+  return false;
+}
+
+LiveImages::LiveImages(const std::string& text, const std::string& option, const Camera& camera, const Clock& clock,
+                       Transports& transports)
+    : clock_(clock),
+      receiver_(camera.width_px, camera.height_px, text.starts_with("ros") ? StampsBy::sender : StampsBy::loop) {
+  if (!names_live_images(text))
+    throw InputError(option, (text.empty() ? "is missing" : "is " + text) +
+                                 ", expected ros2:/topic, ros1:/topic, /dev/videoN or gst:PIPELINE");
+  if (text.starts_with(device)) {
+    camera_ = open_v4l2_camera(text, camera.width_px, camera.height_px, sink());
+  } else if (text.starts_with(gst)) {
+    camera_ = open_pipeline(text, option, sink());
+  } else {
+    const Address address = address_of(text, option);
+    subscribe(transports.get(address.transport, option), address.name);
+  }
+}
+
+ImageSink LiveImages::sink() {
+  return {[this](ImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); },
+          [this](CompressedImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); }};
+}
+
+void LiveImages::subscribe(Transport& transport, const std::string& topic) {
+  ImageSink to = sink();
+  subscription_ = topic.ends_with("/compressed") ? transport.subscribe_compressed_images(topic, to.compressed)
+                                                 : transport.subscribe_images(topic, to.image);
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,161 @@
+#include "transports/ros1/ros1_decoder.h"
+
+#include <cmath>
+#include <cstring>
+#include <ros/serialization.h>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "transports/ros1/ros1_messages.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double stamp_s = 1700000000.123456;
+
+// As ROS itself writes it.
+template <typename Type>
+std::vector<std::uint8_t> bytes_of(const Type& wire) {
+  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(wire));
+  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  ros::serialization::serialize(stream, wire);
+  return bytes;
+}
+
+template <typename Message>
+Message there_and_back(const Message& message) {
+  const auto decoded = decode_ros1<Message>(bytes_of(ros1_message(message)));
+  EXPECT_TRUE(decoded);
+  if (!decoded) return {};
+  EXPECT_NEAR(decoded->stamp_s, message.stamp_s, 1e-6);
+  return *decoded;
+}
+
+TEST(Ros1Decoder, ReadsWhatRosWrites) {
+  const JointMessage joints = there_and_back(JointMessage{stamp_s, {"yaw", "", "pitch"}, {0.25, NAN, -1.5}});
+  EXPECT_EQ(joints.names, (std::vector<std::string>{"yaw", "", "pitch"}));
+  ASSERT_EQ(joints.positions.size(), 3u);
+  EXPECT_EQ(joints.positions[2], -1.5);
+  EXPECT_TRUE(std::isnan(joints.positions[1]));
+  const auto state = there_and_back(OperatingStateMessage{stamp_s, "ENABLED", true, false});
+  EXPECT_EQ(state.state, "ENABLED");
+  EXPECT_TRUE(state.is_homed);
+  EXPECT_FALSE(state.is_busy);
+  EXPECT_EQ(there_and_back(StringMessage{stamp_s, "enable"}).text, "enable");
+  const auto image = there_and_back(ImageMessage{stamp_s, 2, 1, 6, "bgr8", true, {1, 2, 3, 4, 5, 6}});
+  EXPECT_EQ(image.width, 2u);
+  EXPECT_EQ(image.height, 1u);
+  EXPECT_EQ(image.step, 6u);
+  EXPECT_EQ(image.encoding, "bgr8");
+  EXPECT_TRUE(image.is_bigendian);
+  EXPECT_EQ(image.data, (std::vector<std::uint8_t>{1, 2, 3, 4, 5, 6}));
+  const auto compressed = there_and_back(CompressedImageMessage{stamp_s, "jpeg", {7, 8}});
+  EXPECT_EQ(compressed.format, "jpeg");
+  EXPECT_EQ(compressed.data, (std::vector<std::uint8_t>{7, 8}));
+}
+
+TEST(Ros1Decoder, SkipsWhatItDoesNotUse) {
+  ros1::JointState wire;
+  wire.header.seq = 7;
+  wire.header.frame_id = "base";
+  wire.name = {"yaw"};
+  wire.position = {1};
+  wire.velocity = {2};
+  wire.effort = {3, 4};
+  const auto joints = decode_ros1<JointMessage>(bytes_of(wire));
+  ASSERT_TRUE(joints);
+  EXPECT_EQ(joints->positions, std::vector<double>{1});
+}
+
+TEST(Ros1Decoder, AStampThatIsNoneIsNotANumber) {
+  ros1::JointState wire;
+  wire.header.stamp.sec = 5;
+  wire.header.stamp.nsec = 1000000000u;
+  EXPECT_TRUE(std::isnan(decode_ros1<JointMessage>(bytes_of(wire))->stamp_s));
+  wire.header.stamp.nsec = 999999999u;
+  EXPECT_NEAR(decode_ros1<JointMessage>(bytes_of(wire))->stamp_s, 6, 1e-8);
+  EXPECT_EQ(decode_ros1<JointMessage>(bytes_of(ros1_message(JointMessage{NAN, {}, {}})))->stamp_s, 0);
+}
+
+template <typename Message>
+void refuses_all_but_the_whole(const Message& message) {
+  std::vector<std::uint8_t> bytes = bytes_of(ros1_message(message));
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_FALSE(decode_ros1<Message>(std::span(bytes).first(size))) << size;
+  bytes.push_back(0);
+  EXPECT_FALSE(decode_ros1<Message>(bytes));
+}
+
+TEST(Ros1Decoder, RefusesWhatIsCutShortOrLeftOver) {
+  refuses_all_but_the_whole(JointMessage{stamp_s, {"yaw", "pitch"}, {1, 2}});
+  refuses_all_but_the_whole(OperatingStateMessage{stamp_s, "ENABLED", true, false});
+  refuses_all_but_the_whole(StringMessage{stamp_s, "enable"});
+  refuses_all_but_the_whole(ImageMessage{stamp_s, 2, 1, 6, "bgr8", true, {1, 2, 3, 4, 5, 6}});
+  refuses_all_but_the_whole(CompressedImageMessage{stamp_s, "jpeg", {7, 8}});
+}
+
+// A length stands at every place once: none of them makes it reserve 32 GB.
+TEST(Ros1Decoder, BelievesNoLengthThatIsNotThere) {
+  const auto whole = bytes_of(ros1_message(JointMessage{stamp_s, {"yaw", "pitch"}, {1, 2}}));
+  for (std::size_t at = 0; at + 4 <= whole.size(); ++at) {
+    auto bytes = whole;
+    std::memset(bytes.data() + at, 0xff, 4);
+    const auto joints = decode_ros1<JointMessage>(bytes);
+    EXPECT_TRUE(!joints || joints->positions.size() <= whole.size() / 8);
+  }
+}
+
+// As in collaborative-robotics/crtk_msgs for ROS 1, so that its nodes take ours for theirs.
+TEST(Ros1Messages, CarryTheTypesSums) {
+  using namespace ros::message_traits;
+  EXPECT_STREQ(md5sum<ros1::OperatingState>(), "b1bd4021639d9d9c5fbfff78d6ff3158");
+  EXPECT_STREQ(md5sum<ros1::StringStamped>(), "5e3e46086181199270f1ac3a28a5977f");
+  EXPECT_STREQ(datatype<ros1::OperatingState>(), "crtk_msgs/OperatingState");
+  EXPECT_STREQ(datatype<ros1::Observation>(), "lapservo_msgs/Observation");
+  for (const std::string definition : {definition<ros1::OperatingState>(), definition<ros1::Observation>()}) {
+    EXPECT_NE(definition.find("MSG: std_msgs/Header\n"), std::string::npos) << definition;
+    EXPECT_NE(definition.find("uint32 seq\n"), std::string::npos) << definition;
+  }
+}
+
+TEST(Ros1Messages, TellOfTheLoop) {
+  PoseMessage pose{stamp_s, "endoscope", {1, 2, 3}, {0, 0.6, 0, 0.8}, {}};
+  pose.covariance[7] = 5;
+  const auto pose_wire = ros1_message(pose);
+  EXPECT_EQ(pose_wire.header.stamp.sec, 1700000000u);
+  EXPECT_EQ(pose_wire.header.frame_id, "endoscope");
+  EXPECT_EQ(pose_wire.pose.pose.position.z, 3);
+  EXPECT_EQ(pose_wire.pose.pose.orientation.w, 0.8);
+  EXPECT_EQ(pose_wire.pose.covariance[7], 5);
+
+  const DiagnosticMessage state{
+      stamp_s, DiagnosticMessage::Level::warning, "lapservo", "hold", {{"reason", "outlier"}}};
+  const auto state_wire = ros1_message(state);
+  ASSERT_EQ(state_wire.status.size(), 1u);
+  EXPECT_EQ(state_wire.status[0].level, 1);
+  EXPECT_EQ(state_wire.status[0].values.at(0).value, "outlier");
+
+  ObservationMessage seen;
+  seen.status = "ok";
+  seen.q = {1, 2, 3, 4};
+  seen.feature_covariance[15] = 6;
+  seen.error[3] = 7;
+  const auto seen_wire = ros1_message(seen);
+  EXPECT_EQ(seen_wire.status, "ok");
+  EXPECT_EQ(seen_wire.q[3], 4);
+  EXPECT_EQ(seen_wire.feature_covariance[15], 6);
+  EXPECT_EQ(seen_wire.error[3], 7);
+
+  const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}};
+  const auto camera_wire = ros1_message(camera);
+  EXPECT_EQ(camera_wire.distortion_model, "plumb_bob");
+  EXPECT_EQ(camera_wire.D.at(4), 5);
+  EXPECT_EQ(camera_wire.K[4], 551);
+  const std::array<double, 12> p{550, 0, 319.5, 0, 0, 551, 179.5, 0, 0, 0, 1, 0};
+  for (std::size_t i = 0; i < p.size(); ++i) EXPECT_EQ(camera_wire.P[i], p[i]) << i;
+}
+
+}  // namespace
+}  // namespace lapservo::internal

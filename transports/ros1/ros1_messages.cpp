@@ -1,0 +1,120 @@
+#include "transports/ros1/ros1_messages.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lapservo::internal {
+namespace {
+
+ros::Time time_of(double stamp_s) {
+  constexpr double last_s = 4294967295.0;
+  if (!(stamp_s >= 0 && stamp_s <= last_s)) return {};
+  const double whole = std::floor(stamp_s);
+  return {static_cast<std::uint32_t>(whole),
+          static_cast<std::uint32_t>(std::min(std::round((stamp_s - whole) * 1e9), 999999999.0))};
+}
+
+template <typename Type>
+Type with_stamp(double stamp_s) {
+  Type wire;
+  wire.header.stamp = time_of(stamp_s);
+  return wire;
+}
+
+}  // namespace
+
+ros1::JointState ros1_message(const JointMessage& message) {
+  auto wire = with_stamp<ros1::JointState>(message.stamp_s);
+  wire.name.assign(message.names.begin(), message.names.end());
+  wire.position.assign(message.positions.begin(), message.positions.end());
+  return wire;
+}
+
+ros1::OperatingState ros1_message(const OperatingStateMessage& message) {
+  auto wire = with_stamp<ros1::OperatingState>(message.stamp_s);
+  wire.state = message.state;
+  wire.is_homed = message.is_homed;
+  wire.is_busy = message.is_busy;
+  return wire;
+}
+
+ros1::StringStamped ros1_message(const StringMessage& message) {
+  auto wire = with_stamp<ros1::StringStamped>(message.stamp_s);
+  wire.string = message.text;
+  return wire;
+}
+
+ros1::Image ros1_message(const ImageMessage& message) {
+  auto wire = with_stamp<ros1::Image>(message.stamp_s);
+  wire.height = message.height;
+  wire.width = message.width;
+  wire.encoding = message.encoding;
+  wire.is_bigendian = message.is_bigendian;
+  wire.step = message.step;
+  wire.data.assign(message.data.begin(), message.data.end());
+  return wire;
+}
+
+ros1::CompressedImage ros1_message(const CompressedImageMessage& message) {
+  auto wire = with_stamp<ros1::CompressedImage>(message.stamp_s);
+  wire.format = message.format;
+  wire.data.assign(message.data.begin(), message.data.end());
+  return wire;
+}
+
+ros1::CameraInfo ros1_message(const CameraInfoMessage& message) {
+  auto wire = with_stamp<ros1::CameraInfo>(message.stamp_s);
+  wire.height = message.height;
+  wire.width = message.width;
+  wire.distortion_model = "plumb_bob";
+  wire.D.assign(message.d.begin(), message.d.end());
+  std::copy(message.k.begin(), message.k.end(), wire.K.begin());
+  for (const std::size_t i : {0u, 4u, 8u}) wire.R[i] = 1;
+  for (std::size_t i = 0; i < 9; ++i) wire.P[i + i / 3] = message.k[i];
+  return wire;
+}
+
+ros1::PoseWithCovarianceStamped ros1_message(const PoseMessage& message) {
+  auto wire = with_stamp<ros1::PoseWithCovarianceStamped>(message.stamp_s);
+  wire.header.frame_id = message.frame;
+  auto& position = wire.pose.pose.position;
+  position.x = message.position_m[0], position.y = message.position_m[1], position.z = message.position_m[2];
+  auto& turn = wire.pose.pose.orientation;
+  const auto& q = message.quaternion_xyzw;
+  turn.x = q[0], turn.y = q[1], turn.z = q[2], turn.w = q[3];
+  std::copy(message.covariance.begin(), message.covariance.end(), wire.pose.covariance.begin());
+  return wire;
+}
+
+ros1::DiagnosticArray ros1_message(const DiagnosticMessage& message) {
+  auto wire = with_stamp<ros1::DiagnosticArray>(message.stamp_s);
+  auto& status = wire.status.emplace_back();
+  status.level = static_cast<std::int8_t>(message.level);
+  status.name = message.name;
+  status.message = message.message;
+  for (const auto& [key, value] : message.values) {
+    auto& pair = status.values.emplace_back();
+    pair.key = key;
+    pair.value = value;
+  }
+  return wire;
+}
+
+ros1::Observation ros1_message(const ObservationMessage& message) {
+  auto wire = with_stamp<ros1::Observation>(message.stamp_s);
+  wire.header.frame_id = message.frame;
+  wire.instrument = message.instrument;
+  wire.status = message.status;
+  wire.action = message.action;
+  wire.reason = message.reason;
+  const auto fill = [](const auto& values, auto& to) { std::copy(values.begin(), values.end(), to.begin()); };
+  fill(message.q, wire.q);
+  fill(message.q_covariance, wire.q_covariance);
+  fill(message.features, wire.features);
+  fill(message.feature_covariance, wire.feature_covariance);
+  fill(message.edges_px, wire.edges_px);
+  fill(message.error, wire.error);
+  return wire;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,134 @@
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "transports/ros1/ros1_decoder.h"
+#include "transports/ros1/ros1_messages.h"
+#include "transports/ros1/ros1_node.h"
+
+namespace lapservo::internal {
+
+/// The type of ROS 1 that carries a message.
+template <typename Message>
+using Ros1Type = decltype(ros1_message(std::declval<const Message&>()));
+
+/// What came of the type that carries Message: nothing when it can't be read. roscpp's own deserialiser would
+/// reserve what a message claims to hold.
+template <typename Message>
+struct Ros1Received {
+  std::optional<Message> message;
+};
+
+/// The type of a topic that is published by the master's word, when it is another one.
+std::optional<std::string> other_type_on(const std::string& topic, const std::string& type);
+
+/// A topic with the thread that takes from it, until destroyed.
+template <typename Message>
+class Ros1Subscription {
+ public:
+  Ros1Subscription(std::shared_ptr<Ros1Node> node, const std::string& topic, std::uint32_t queue_size,
+                   std::function<void(Message&&)> handler)
+      : node_(std::move(node)), topic_(topic), handler_(std::move(handler)) {
+    ros::SubscribeOptions options;
+    options.initByFullCallbackType<const Event&>(topic, queue_size, [this](const Event& event) { take(event); });
+    options.callback_queue = queue_.get();
+    options.transport_hints = ros::TransportHints().tcpNoDelay();
+    subscriber_ = ros::NodeHandle().subscribe(options);
+    if (!subscriber_) throw std::runtime_error("ROS: can't subscribe to " + topic);
+    thread_ = std::thread([this] { work(); });
+  }
+  ~Ros1Subscription() {
+    ended_ = true;
+    queue_->disable();
+    thread_.join();
+    using Both = std::pair<std::shared_ptr<ros::CallbackQueue>, ros::Subscriber>;
+    node_->end([this] { subscriber_.shutdown(); }, std::make_shared<Both>(queue_, subscriber_));
+  }
+  Ros1Subscription(const Ros1Subscription&) = delete;
+  Ros1Subscription& operator=(const Ros1Subscription&) = delete;
+
+ private:
+  using Event = ros::MessageEvent<Ros1Received<Message>>;  // not const: its own copy, where it is not the only one
+
+  void work() {
+    constexpr double longest_s = 30;
+    for (double moment_s = 1; !ended_; moment_s = std::min(2 * moment_s, longest_s)) {
+      queue_->callAvailable(ros::WallDuration(moment_s));
+      if (!ended_ && !connected_) look_for_other_types();
+    }
+  }
+  void take(const Event& event) {
+    connected_ = true;
+    if (!event.getConnectionHeaderPtr() || event.getPublisherName() == ros::this_node::getName()) return;
+    const auto received = event.getMessage();
+    if (received->message) {
+      handler_(std::move(*received->message));
+    } else if (unreadable_++ == 0) {
+      std::fprintf(stderr, "ROS: %s: dropping messages of %s that can't be read as %s\n", topic_.c_str(),
+                   event.getPublisherName().c_str(), ros::message_traits::datatype<Ros1Type<Message>>());
+    }
+  }
+  // A publisher of another type refuses, of which roscpp says nothing.
+  void look_for_other_types() {
+    const std::string type = ros::message_traits::datatype<Ros1Type<Message>>();
+    const auto other = node_->answers() ? other_type_on(subscriber_.getTopic(), type) : std::nullopt;
+    connected_ = subscriber_.getNumPublishers() > 0;
+    if (!other || connected_ || ++refused_ < 2) return;  // a connection takes its time
+    connected_ = true;
+    std::fprintf(stderr, "ROS: %s is %s, expected %s\n", topic_.c_str(), other->c_str(), type.c_str());
+  }
+
+  std::shared_ptr<Ros1Node> node_;
+  std::string topic_;
+  std::function<void(Message&&)> handler_;
+  std::shared_ptr<ros::CallbackQueue> queue_ = std::make_shared<ros::CallbackQueue>();
+  ros::Subscriber subscriber_;
+  std::atomic<bool> ended_ = false;
+  bool connected_ = false;  // or told of why not
+  long unreadable_ = 0, refused_ = 0;
+  std::thread thread_;
+};
+
+}  // namespace lapservo::internal
+
+namespace ros {
+namespace message_traits {
+
+template <typename Message>
+struct MD5Sum<lapservo::internal::Ros1Received<Message>> : MD5Sum<lapservo::internal::Ros1Type<Message>> {};
+
+template <typename Message>
+struct DataType<lapservo::internal::Ros1Received<Message>> : DataType<lapservo::internal::Ros1Type<Message>> {};
+
+template <typename Message>
+struct Definition<lapservo::internal::Ros1Received<Message>> : Definition<lapservo::internal::Ros1Type<Message>> {};
+
+}  // namespace message_traits
+
+namespace serialization {
+
+template <typename Message>
+struct Serializer<lapservo::internal::Ros1Received<Message>> {
+  template <typename Stream>
+  static void read(Stream& stream, lapservo::internal::Ros1Received<Message>& received) {
+    received.message =
+        lapservo::internal::decode_ros1<Message>(std::span<const std::uint8_t>(stream.getData(), stream.getLength()));
+  }
+};
+
+}  // namespace serialization
+}  // namespace ros

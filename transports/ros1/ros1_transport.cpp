@@ -1,0 +1,122 @@
+#include "transports/ros1/ros1_transport.h"
+
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <stdexcept>
+#include <utility>
+
+#include "transports/ros1/ros1_names.h"
+#include "transports/ros1/ros1_node.h"
+#include "transports/ros1/ros1_subscription.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr std::uint32_t few = 10;    // as ROS 2 keeps by default
+constexpr std::uint32_t newest = 2;  // of pictures
+
+std::string full_name(const std::string& topic) {
+  const char* const space = std::getenv("ROS_NAMESPACE");
+  return resolved_ros1_name(topic, space ? space : "", "topic");
+}
+
+template <typename Message>
+Transport::Publisher<Message> publisher(const std::shared_ptr<void>& node, const std::string& topic,
+                                        std::uint32_t queue_size, bool latched = false) {
+  const ros::Publisher to = ros::NodeHandle().advertise<Ros1Type<Message>>(full_name(topic), queue_size, latched);
+  if (!to) throw std::runtime_error("ROS: can't publish " + topic);
+  const auto end = [node = std::static_pointer_cast<Ros1Node>(node)](ros::Publisher* publisher) {
+    const std::shared_ptr<ros::Publisher> kept(publisher);
+    node->end([&] { kept->shutdown(); }, kept);
+  };
+  const std::shared_ptr<ros::Publisher> shared(new ros::Publisher(to), end);
+  return [shared, latched](const Message& message) {
+    if (latched || shared->getNumSubscribers() > 0) shared->publish(ros1_message(message));
+  };
+}
+
+template <typename Message>
+Transport::Subscription subscription(const std::shared_ptr<void>& node, const std::string& topic,
+                                     std::uint32_t queue_size, const Transport::Handler<Message>& handler) {
+  return std::make_shared<Ros1Subscription<Message>>(std::static_pointer_cast<Ros1Node>(node), full_name(topic),
+                                                     queue_size, handler);
+}
+
+}  // namespace
+
+std::optional<std::string> other_type_on(const std::string& topic, const std::string& type) {
+  ros::master::V_TopicInfo topics;
+  if (!ros::master::getTopics(topics)) return std::nullopt;
+  for (const auto& published : topics)
+    if (published.name == topic && published.datatype != type && published.datatype != "*") return published.datatype;
+  return std::nullopt;
+}
+
+Ros1Transport::Ros1Transport(const std::string& node_name) : node_(Ros1Node::get(node_name)) {}
+
+Ros1Transport::~Ros1Transport() = default;
+
+double Ros1Transport::stamp_now_s() const {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+Transport::Publisher<JointMessage> Ros1Transport::joint_publisher(const std::string& topic) {
+  return publisher<JointMessage>(node_, topic, few);
+}
+
+Transport::Publisher<OperatingStateMessage> Ros1Transport::operating_state_publisher(const std::string& topic) {
+  return publisher<OperatingStateMessage>(node_, topic, few, true);
+}
+
+Transport::Publisher<StringMessage> Ros1Transport::string_publisher(const std::string& topic) {
+  return publisher<StringMessage>(node_, topic, few);
+}
+
+Transport::Publisher<ImageMessage> Ros1Transport::image_publisher(const std::string& topic) {
+  return publisher<ImageMessage>(node_, topic, newest);
+}
+
+Transport::Publisher<CompressedImageMessage> Ros1Transport::compressed_image_publisher(const std::string& topic) {
+  return publisher<CompressedImageMessage>(node_, topic, newest);
+}
+
+Transport::Publisher<CameraInfoMessage> Ros1Transport::camera_info_publisher(const std::string& topic) {
+  return publisher<CameraInfoMessage>(node_, topic, few);
+}
+
+Transport::Publisher<PoseMessage> Ros1Transport::pose_publisher(const std::string& topic) {
+  return publisher<PoseMessage>(node_, topic, few);
+}
+
+Transport::Publisher<DiagnosticMessage> Ros1Transport::diagnostic_publisher(const std::string& topic) {
+  return publisher<DiagnosticMessage>(node_, topic, few);
+}
+
+Transport::Publisher<ObservationMessage> Ros1Transport::observation_publisher(const std::string& topic) {
+  return publisher<ObservationMessage>(node_, topic, few);
+}
+
+Transport::Subscription Ros1Transport::subscribe_joints(const std::string& topic, Handler<JointMessage> handler) {
+  return subscription<JointMessage>(node_, topic, few, handler);
+}
+
+Transport::Subscription Ros1Transport::subscribe_operating_state(const std::string& topic,
+                                                                 Handler<OperatingStateMessage> handler) {
+  return subscription<OperatingStateMessage>(node_, topic, few, handler);
+}
+
+Transport::Subscription Ros1Transport::subscribe_strings(const std::string& topic, Handler<StringMessage> handler) {
+  return subscription<StringMessage>(node_, topic, few, handler);
+}
+
+Transport::Subscription Ros1Transport::subscribe_images(const std::string& topic, Handler<ImageMessage> handler) {
+  return subscription<ImageMessage>(node_, topic, newest, handler);
+}
+
+Transport::Subscription Ros1Transport::subscribe_compressed_images(const std::string& topic,
+                                                                   Handler<CompressedImageMessage> handler) {
+  return subscription<CompressedImageMessage>(node_, topic, newest, handler);
+}
+
+}  // namespace lapservo::internal

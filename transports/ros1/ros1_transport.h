@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "lapservo/crtk/transport.h"
+
+namespace lapservo::internal {
+
+/// ROS 1 by roscpp: topics and types as ROS 1's nodes have them, at the master of ROS_MASTER_URI; ROS_NAMESPACE, ROS_IP
+/// and ROS_HOSTNAME as everywhere in ROS 1. All transports of a process are one node, of the first one's name, and none
+/// hears what another one of the same process says. Each subscription has its own thread. A topic of another type, and
+/// messages that can't be read, which are dropped, are told of on stderr, once a topic. Throws InputError for a topic
+/// that is none or when no master answers, std::runtime_error when roscpp fails.
+class Ros1Transport : public Transport {
+ public:
+  explicit Ros1Transport(const std::string& node_name);
+  ~Ros1Transport() override;
+
+  Publisher<JointMessage> joint_publisher(const std::string& topic) override;
+  Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) override;
+  Publisher<StringMessage> string_publisher(const std::string& topic) override;
+  Publisher<ImageMessage> image_publisher(const std::string& topic) override;
+  Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) override;
+  Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) override;
+  Publisher<PoseMessage> pose_publisher(const std::string& topic) override;
+  Publisher<DiagnosticMessage> diagnostic_publisher(const std::string& topic) override;
+  Publisher<ObservationMessage> observation_publisher(const std::string& topic) override;
+
+  Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) override;
+  Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> handler) override;
+  Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) override;
+  Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) override;
+  Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override;
+
+  double stamp_now_s() const override;
+
+ private:
+  std::shared_ptr<void> node_;  // publishers and subscriptions keep it
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,195 @@
+#include "transports/ros1/ros1_transport.h"
+
+#include <atomic>
+#include <chrono>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/crtk/test_inbox.h"
+#include "lapservo/testing/input_error.h"
+#include "transports/ros1/ros1_master.h"
+#include "transports/ros1/test_ros_master.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double stamp_s = 1700000000.123456;
+
+bool wait_for(const std::function<bool()>& condition) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (!condition() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  return condition();
+}
+
+TEST(Ros1Master, IsMissedInOneLineWithinTwoSeconds) {
+  const TestPort closed, silent(true);
+  for (const int port : {closed.number(), silent.number()}) {
+    const auto begin = std::chrono::steady_clock::now();
+    const std::string said = testing::input_error([&] { require_ros1_master({"127.0.0.1", port}); });
+    EXPECT_NE(said.find("ROS_MASTER_URI: is http://127.0.0.1:" + std::to_string(port)), std::string::npos) << said;
+    EXPECT_NE(said.find("start roscore"), std::string::npos) << said;
+    EXPECT_EQ(said.find('\n'), std::string::npos) << said;
+    EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2)) << said;
+  }
+}
+
+// A master, this process's node, and another process that says again what it hears.
+class Ros1Wire : public ::testing::Test {
+ protected:
+  void SetUp() override { transport_ = std::make_unique<Ros1Transport>("tester"); }
+  static std::unique_ptr<TestChild> peer() {
+    return std::make_unique<TestChild>(std::vector<std::string>{LAPSERVO_ROS1_PEER});
+  }
+
+  TestRosMaster master_;
+  std::unique_ptr<TestChild> peer_ = peer();
+  std::unique_ptr<Ros1Transport> transport_;
+};
+
+TEST_F(Ros1Wire, CarriesEveryKindOfMessageThereAndBack) {
+  TestInbox<OperatingStateMessage> states;
+  const auto state_subscription = transport_->subscribe_operating_state("out/state", states.handler());
+  EXPECT_EQ(states.get([] {}).state, "DISABLED");  // said before anybody listened
+  states.clear();
+  const auto say_state = transport_->operating_state_publisher("in/state");
+  const OperatingStateMessage state = states.get([&] { say_state({stamp_s, "ENABLED", true, false}); });
+  EXPECT_NEAR(state.stamp_s, stamp_s, 1e-6);
+  EXPECT_EQ(state.state, "ENABLED");
+  EXPECT_TRUE(state.is_homed);
+  EXPECT_FALSE(state.is_busy);
+
+  TestInbox<JointMessage> joints;
+  const auto joint_subscription = transport_->subscribe_joints("/out/joints", joints.handler());
+  const auto say_joints = transport_->joint_publisher("/in/joints");
+  const JointMessage js = joints.get([&] { say_joints({stamp_s, {"yaw", "pitch"}, {0.25, -1.5}}); });
+  EXPECT_EQ(js.names, (std::vector<std::string>{"yaw", "pitch"}));
+  EXPECT_EQ(js.positions, (std::vector<double>{0.25, -1.5}));
+
+  TestInbox<StringMessage> strings;
+  const auto string_subscription = transport_->subscribe_strings("/out/text", strings.handler());
+  const auto say_string = transport_->string_publisher("/in/text");
+  EXPECT_EQ(strings.get([&] { say_string({stamp_s, "enable"}); }).text, "enable");
+
+  TestInbox<ImageMessage> images;
+  const auto image_subscription = transport_->subscribe_images("/out/image", images.handler());
+  const auto say_image = transport_->image_publisher("/in/image");
+  ImageMessage picture{stamp_s, 640, 360, 1920, "bgr8", true, {}};
+  for (unsigned i = 0; i < 1920 * 360; ++i) picture.data.push_back(static_cast<std::uint8_t>(i * i));
+  const ImageMessage image = images.get([&] { say_image(picture); });
+  EXPECT_EQ(image.width, 640u);
+  EXPECT_EQ(image.height, 360u);
+  EXPECT_EQ(image.encoding, "bgr8");
+  EXPECT_TRUE(image.is_bigendian);
+  EXPECT_EQ(image.data, picture.data);
+
+  TestInbox<CompressedImageMessage> compressed;
+  const auto compressed_subscription = transport_->subscribe_compressed_images("/out/compressed", compressed.handler());
+  const auto say_compressed = transport_->compressed_image_publisher("/in/compressed");
+  const CompressedImageMessage jpeg = compressed.get([&] { say_compressed({stamp_s, "jpeg", {1, 2, 3}}); });
+  EXPECT_EQ(jpeg.format, "jpeg");
+  EXPECT_EQ(jpeg.data, (std::vector<std::uint8_t>{1, 2, 3}));
+}
+
+TEST_F(Ros1Wire, HearsOthersOnItsOwnTopicButNotItself) {
+  TestInbox<JointMessage> heard;
+  const auto subscription = transport_->subscribe_joints("/out/joints", heard.handler());
+  const auto say = transport_->joint_publisher("/out/joints"), ask = transport_->joint_publisher("/in/joints");
+  heard.get([&] {
+    say({stamp_s, {}, {1}});
+    ask({stamp_s, {}, {2}});
+  });
+  for (int i = 0; i < 20; ++i) {
+    say({stamp_s, {}, {1}});
+    ask({stamp_s, {}, {3}});
+  }
+  ASSERT_TRUE(wait_for([&] { return heard.count() > 10; }));
+  for (const JointMessage& message : heard.all()) EXPECT_NE(message.positions, std::vector<double>{1});
+}
+
+TEST_F(Ros1Wire, NoTopicWaitsForAnother) {
+  std::atomic<bool> release = false, blocked = false;
+  const auto slow = transport_->subscribe_strings("/out/text", [&](StringMessage&&) {
+    blocked = true;
+    while (!release) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  });
+  const auto ask = transport_->string_publisher("/in/text");
+  ASSERT_TRUE(wait_for([&] {
+    ask({stamp_s, "x"});
+    return blocked.load();
+  }));
+  TestInbox<JointMessage> joints;
+  const auto subscription = transport_->subscribe_joints("/out/joints", joints.handler());
+  const auto say = transport_->joint_publisher("/in/joints");
+  EXPECT_EQ(joints.get([&] { say({stamp_s, {}, {1}}); }).positions, std::vector<double>{1});
+  release = true;
+}
+
+TEST_F(Ros1Wire, StrangersMessagesAreDroppedAndTold) {
+  ::testing::internal::CaptureStderr();
+  TestInbox<JointMessage> odd, pretended;
+  const auto odd_subscription = transport_->subscribe_joints("/out/odd", odd.handler());
+  const auto pretended_subscription = transport_->subscribe_joints("/out/pretender", pretended.handler());
+  TestInbox<StringMessage> echo;
+  const auto echo_subscription = transport_->subscribe_strings("/out/text", echo.handler());
+  const auto ask = transport_->string_publisher("/in/text");
+  for (int i = 0; i < 4; ++i) {
+    echo.clear();
+    echo.get([&] { ask({stamp_s, "pretend"}); });
+    std::this_thread::sleep_for(std::chrono::seconds(1));  // the master is asked after 1 s and 3 s
+  }
+  const std::string said = ::testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(odd.empty());
+  EXPECT_TRUE(pretended.empty());
+  EXPECT_NE(said.find("ROS: /out/odd is sensor_msgs/Image, expected sensor_msgs/JointState\n"), std::string::npos)
+      << said;
+  const std::string unreadable =
+      "ROS: /out/pretender: dropping messages of /peer that can't be read as sensor_msgs/JointState\n";
+  EXPECT_NE(said.find(unreadable), std::string::npos) << said;
+  EXPECT_EQ(said.find(unreadable), said.rfind(unreadable)) << said;
+}
+
+// What runs goes on when the master dies; a publisher that dies falls silent, and is heard when it is back.
+TEST_F(Ros1Wire, OutlivesMasterAndPeer) {
+  TestInbox<JointMessage> joints;
+  const auto subscription = transport_->subscribe_joints("/out/joints", joints.handler());
+  const auto say = transport_->joint_publisher("/in/joints");
+  const auto hear = [&] { joints.get([&] { say({stamp_s, {}, {1}}); }); };
+  hear();
+  peer_ = nullptr;
+  joints.clear();
+  say({stamp_s, {}, {1}});
+  peer_ = peer();
+  hear();
+  master_.kill();
+  joints.clear();
+  hear();
+}
+
+// Last: what could not be unregistered stays for the rest of this process.
+TEST_F(Ros1Wire, EndsThoughItsMasterHangs) {
+  TestInbox<JointMessage> joints;
+  auto subscription = transport_->subscribe_joints("/out/joints", joints.handler());
+  auto say = transport_->joint_publisher("/in/joints");
+  joints.get([&] { say({stamp_s, {}, {1}}); });
+  auto lonely = transport_->subscribe_joints("/nobody", joints.handler());
+  master_.stop();
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));  // it asks the master for such a topic
+  const auto begin = std::chrono::steady_clock::now();
+  lonely = subscription = nullptr;
+  say = nullptr;
+  transport_ = nullptr;
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+  const std::size_t heard = joints.count();
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(joints.count(), heard);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

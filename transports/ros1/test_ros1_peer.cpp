@@ -1,0 +1,85 @@
+// The other process of ros1_transport_test: what comes on /in/X goes out on /out/X. A string may ask for more.
+
+#include <cstring>
+#include <ros/ros.h>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include "transports/ros1/ros1_messages.h"
+#include "transports/ros1/ros1_transport.h"
+
+namespace {
+
+// Says that it is a JointState, and is what its bytes are.
+struct Pretender {
+  std::vector<std::uint8_t> bytes;
+};
+
+}  // namespace
+
+namespace ros {
+namespace message_traits {
+
+template <>
+struct MD5Sum<Pretender> : MD5Sum<lapservo::internal::ros1::JointState> {
+  using MD5Sum<lapservo::internal::ros1::JointState>::value;
+  static const char* value(const Pretender&) { return value(); }
+};
+template <>
+struct DataType<Pretender> : DataType<lapservo::internal::ros1::JointState> {
+  using DataType<lapservo::internal::ros1::JointState>::value;
+  static const char* value(const Pretender&) { return value(); }
+};
+template <>
+struct Definition<Pretender> : Definition<lapservo::internal::ros1::JointState> {
+  using Definition<lapservo::internal::ros1::JointState>::value;
+  static const char* value(const Pretender&) { return value(); }
+};
+
+}  // namespace message_traits
+
+namespace serialization {
+
+template <>
+struct Serializer<Pretender> {
+  template <typename Stream>
+  static void write(Stream& stream, const Pretender& message) {
+    if (!message.bytes.empty())
+      std::memcpy(stream.advance(serializedLength(message)), message.bytes.data(), message.bytes.size());
+  }
+  static std::uint32_t serializedLength(const Pretender& message) {
+    return static_cast<std::uint32_t>(message.bytes.size());
+  }
+};
+
+}  // namespace serialization
+}  // namespace ros
+
+int main() {
+  using namespace lapservo::internal;
+  Ros1Transport transport("peer");
+  std::vector<Transport::Subscription> subscriptions;
+  const auto joints = transport.joint_publisher("/out/joints");
+  subscriptions.push_back(transport.subscribe_joints("/in/joints", [&](JointMessage&& m) { joints(m); }));
+  const auto state = transport.operating_state_publisher("/out/state");
+  state({1700000000, "DISABLED", false, false});  // before anybody listens: it is latched
+  subscriptions.push_back(
+      transport.subscribe_operating_state("/in/state", [&](OperatingStateMessage&& m) { state(m); }));
+  const auto image = transport.image_publisher("/out/image");
+  subscriptions.push_back(transport.subscribe_images("/in/image", [&](ImageMessage&& m) { image(m); }));
+  const auto compressed = transport.compressed_image_publisher("/out/compressed");
+  subscriptions.push_back(
+      transport.subscribe_compressed_images("/in/compressed", [&](CompressedImageMessage&& m) { compressed(m); }));
+  const auto odd = transport.image_publisher("/out/odd");
+  ros::Publisher pretender = ros::NodeHandle().advertise<Pretender>("/out/pretender", 10);
+  const auto text = transport.string_publisher("/out/text");
+  subscriptions.push_back(transport.subscribe_strings("/in/text", [&](StringMessage&& m) {
+    if (m.text == "pretend") {
+      pretender.publish(Pretender{std::vector<std::uint8_t>(40, 0xff)});
+      pretender.publish(Pretender{});
+    }
+    text(m);
+  }));
+  while (ros::ok()) ::pause();
+}
