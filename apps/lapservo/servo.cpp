@@ -91,7 +91,8 @@ int simulate(const ServoOptions& options) {
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.fps;
   const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
-  Simulator simulator(true_rig, simulated, start);
+  const auto made = make_simulator(options.simulation, true_rig, simulated, start);
+  Simulator& simulator = *made;
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, true_rig, config.controller);
@@ -202,6 +203,7 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--fps", options->fps, "Control periods, and frames in sim, a second")
       ->capture_default_str()
       ->check(number_between(6.0, 500.0));
+  add_simulation_options(*command, options->simulation, "sim: ");
   command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")
       ->check(finite_number())
       ->delimiter(',')

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "apps/lapservo/simulation.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/servo/run.h"
 
@@ -19,6 +20,7 @@ struct ServoOptions {
   double duration_s = 20, latency_ms = 80, fps = 60;
   std::uint64_t seed = 1;
   bool view = false, force = false, enable_motion = false;
+  SimulationOptions simulation;
 };
 
 Eigen::Vector4d four(const std::vector<double>& values);

@@ -75,7 +75,7 @@ class Watcher : public RunObserver {
 
   bool on_tick(const ControlTick& tick) override {
     const double time_s = tick.input.time_s;
-    Arm& arm = simulator_.arm();
+    SimulatedArm& arm = simulator_.arm();
     if (case_.faulted && case_.faulted->contains(time_s) && !arm.faulted()) arm.fault();
     if (case_.faulted && time_s >= case_.faulted->end_s && arm.faulted()) arm.recover();
     done.records.push_back({tick.input, tick.decision, truth_at(true_model_, simulator_.true_q())});
