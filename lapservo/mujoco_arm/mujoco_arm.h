@@ -20,8 +20,8 @@ struct MujocoArmConfig {
   Eigen::Vector3d gravity_in_rcm{6.9, 0, -6.9};            ///< m/s^2, in the RCM's frame
   Eigen::Vector4d motor_inertia{0.03, 0.03, 1, 1e-4};      ///< reflected to the joint
   Eigen::Vector4d link_inertia{0.03, 0.03, 0, 2e-5};       ///< beside the carriage's
-  Eigen::Vector4d stiffness{2000, 2000, 40000, 2};         ///< of the transmissions: N m/rad, N/m
-  Eigen::Vector4d transmission_damping{3, 3, 60, 2e-3};    ///< N m s/rad, N s/m
+  Eigen::Vector4d stiffness{2000, 2000, 40000, 8};         ///< of the transmissions: N m/rad, N/m
+  Eigen::Vector4d transmission_damping{3, 3, 60, 4e-3};    ///< N m s/rad, N s/m
   Eigen::Vector4d friction{0.1, 0.1, 1, 0.004};            ///< Coulomb's, at the motors: N m, N
   Eigen::Vector4d proportional_gain{350, 350, 5000, 0.5};  ///< of the servos: N m/rad, N/m
   Eigen::Vector4d derivative_gain{7, 7, 100, 0.01};        ///< N m s/rad, N s/m

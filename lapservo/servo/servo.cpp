@@ -45,7 +45,7 @@ void Servo::start_anew_when_at_rest(const ServoInput& input, HoldReason reason) 
     not_following_since_s_ = input.time_s;
     q_then_ = q;
   } else if (input.time_s - *not_following_since_s_ > at_rest_s) {
-    controller_.reset(input.time_s, q);
+    controller_.start_over(input.time_s, q);
     not_following_since_s_.reset();
   }
 }
