@@ -19,7 +19,7 @@ struct ServoOptions {
   std::vector<double> set_point, via, start, rcm_px, hide;
   double duration_s = 20, latency_ms = 80, fps = 60;
   std::uint64_t seed = 1;
-  bool view = false, force = false, enable_motion = false;
+  bool view = false, force = false, enable_motion = false, strict = false;
   SimulationOptions simulation;
 };
 
