@@ -53,4 +53,5 @@
 #include "lapservo/sim/endoscope.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/scene.h"
+#include "lapservo/sim/simulated_arm.h"
 #include "lapservo/sim/simulator.h"

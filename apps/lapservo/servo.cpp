@@ -47,19 +47,21 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
 class Watcher : public RunObserver {
  public:
   Watcher(const Rig& rig, const FeatureModel& true_model, const Simulator& simulator, RunFolder* folder, LiveView* view,
-          int ticks)
+          int ticks, bool strict)
       : rig_(rig),
         true_model_(true_model),
         simulator_(simulator),
         folder_(folder),
         view_(view),
-        progress_(std::make_unique<Progress>(ticks)) {}
+        progress_(std::make_unique<Progress>(ticks)),
+        strict_(strict) {}
 
   bool on_tick(const ControlTick& tick) override {
     const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
     summary_.add(tick, truth);
     if (folder_) folder_->log().add(tick.input, tick.decision, truth);
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
+    if (strict_ && summary_.registration_contradicted()) return false;
     return !interrupted() && (!view_ || show(*view_, tick, rig_));
   }
   const Summary& finish() {
@@ -74,6 +76,7 @@ class Watcher : public RunObserver {
   RunFolder* folder_;
   LiveView* view_;
   std::unique_ptr<Progress> progress_;
+  bool strict_;
   Summary summary_;
   int done_ = 0;
 };
@@ -91,14 +94,15 @@ int simulate(const ServoOptions& options) {
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.fps;
   const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
-  Simulator simulator(true_rig, simulated, start);
+  const auto made = make_simulator(options.simulation, true_rig, simulated, start);
+  Simulator& simulator = *made;
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, true_rig, config.controller);
   watch_for_interrupts();
 
   Watcher watcher(config.rig, true_model, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
-                  static_cast<int>(std::lround(options.duration_s / config.controller.period_s)));
+                  static_cast<int>(std::lround(options.duration_s / config.controller.period_s)), options.strict);
   lapservo::run(simulator, simulator, simulator, config, trajectory, options.duration_s, watcher);
   const Summary& summary = watcher.finish();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
@@ -108,7 +112,7 @@ int simulate(const ServoOptions& options) {
     folder->commit();
     std::printf("log, rig and controller: %s\n", options.out.c_str());
   }
-  return summary.converged() ? 0 : 1;
+  return summary.converged() && !(options.strict && summary.registration_contradicted()) ? 0 : 1;
 }
 
 int replay_log(const ServoOptions& options) {
@@ -189,6 +193,8 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--out", options->out,
                       std::string("Folder for log.csv, rig.yaml and controller.yaml") + OutputFolder::help);
   command->add_flag("--force", options->force, OutputFolder::force_help);
+  command->add_flag("--strict", options->strict,
+                    "End with exit code 1 when the images contradict the rig's camera_from_rcm or lens");
   command->add_flag("--view", options->view, "Show it live");
   command->add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
   command->add_option("--start", options->start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
@@ -204,6 +210,7 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--fps", options->fps, "Control periods, and frames in sim, a second")
       ->capture_default_str()
       ->check(number_between(6.0, 500.0));
+  add_simulation_options(*command, options->simulation, "sim: ");
   command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")
       ->check(finite_number())
       ->delimiter(',')

@@ -78,6 +78,7 @@ class ArmWatcher : public RunObserver {
     grant(topics_.wishes(), tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
     if (blocked == Blocked::foreign_command) return false;
+    if (options_.strict && summary_.registration_contradicted()) return false;
     return !interrupted() && (!view_ || show(*view_, tick, run_.rig));
   }
   const Summary& summary() const { return summary_; }
@@ -209,7 +210,8 @@ int steer_arm(const ServoOptions& options) {
   std::printf("%s\n", watcher.summary().text().c_str());
   if (folder) folder->commit();
   const bool ended_early = robot.blocked() == Blocked::foreign_command;
-  return watcher.summary().converged() && !ended_early ? 0 : 1;
+  const bool refused = options.strict && watcher.summary().registration_contradicted();
+  return watcher.summary().converged() && !ended_early && !refused ? 0 : 1;
 }
 
 }  // namespace lapservo::app

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "apps/lapservo/simulation.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/servo/run.h"
 
@@ -18,7 +19,8 @@ struct ServoOptions {
   std::vector<double> set_point, via, start, rcm_px, hide;
   double duration_s = 20, latency_ms = 80, fps = 60;
   std::uint64_t seed = 1;
-  bool view = false, force = false, enable_motion = false;
+  bool view = false, force = false, enable_motion = false, strict = false;
+  SimulationOptions simulation;
 };
 
 Eigen::Vector4d four(const std::vector<double>& values);

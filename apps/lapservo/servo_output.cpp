@@ -45,6 +45,7 @@ void RunFolder::commit() {
 void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {
   const ControlStep& control = tick.decision.control;
   ++ticks_;
+  contradicted_ += tick.decision.registration_contradicted;
   if (control.action == ControlAction::hold) ++held_[std::string(to_string(control.reason))];
   Eigen::Vector4d error = control.error;
   if (truth && truth->features) {
@@ -66,6 +67,11 @@ std::string Summary::text() const {
         *reached_s, 1000 * rms[0], rms[1], rms[2], rms[3]);
   }
   for (const auto& [reason, count] : held_) text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
+  if (contradicted_ > 0)
+    text += fmt::format(
+        "\nregistration_contradicted in {} of {} ticks: the images fit neither camera_from_rcm nor lens "
+        "of the rig, and r is off by what is wrong with them",
+        contradicted_, ticks_);
   return text;
 }
 

@@ -31,10 +31,12 @@ class Summary {
   /// By the truth, where it is known, else by the estimate.
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
   bool converged() const { return convergence_.reached_s().has_value(); }
+  bool registration_contradicted() const { return contradicted_ > 0; }
   std::string text() const;
 
  private:
   std::optional<double> start_s_;
+  long contradicted_ = 0;
   long ticks_ = 0;
   std::map<std::string, long> held_;
   Convergence convergence_;

@@ -9,6 +9,7 @@
 
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/numbers.h"
+#include "apps/lapservo/simulation.h"
 #include "apps/lapservo/subcommands.h"
 #include "apps/lapservo/transports.h"
 #include "lapservo/control/paper_trajectory.h"
@@ -29,6 +30,7 @@ struct Options {
   std::vector<double> start;
   double latency_ms = 80, fps = 30, duration_s = 0;
   std::uint64_t seed = 1;
+  SimulationOptions simulation;
 };
 
 // Where the paper's trajectory can be followed from, unless said.
@@ -51,7 +53,8 @@ int run(const Options& options) {
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.fps;
   simulated.endoscope.real_time = true;
-  Simulator simulator(rig, simulated, start_of(options, rig, simulated.arm));
+  const auto made = make_simulator(options.simulation, rig, simulated, start_of(options, rig, simulated.arm));
+  Simulator& simulator = *made;
   const auto transport = make_transport(options.transport, "lapservo_sim_robot", "--transport");
   SimRobotConfig config;
   config.arm = resolved_name({options.transport, options.arm}, "--arm");
@@ -98,6 +101,7 @@ void add_sim_robot(CLI::App& app, Run& run_later) {
   command->add_option("--fps", options->fps, "Frames a second")
       ->capture_default_str()
       ->check(number_between(6.0, 120.0));
+  add_simulation_options(*command, options->simulation, "");
   command->add_option("--duration", options->duration_s, "Seconds; 0: until interrupted")
       ->capture_default_str()
       ->check(number_between(0.0, 1e6));

@@ -16,7 +16,7 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
   const double interval_s = started_ ? std::max(0.0, stamp_s - last_stamp_s_) : 0.0;
   const double kept = std::exp(-interval_s / config_.forgetting_s);
   // A plain mean at first, a running one once the time constant has passed.
-  const double fraction = std::max(1 / (1 + weight_), -std::expm1(-interval_s / config_.offset_time_s));
+  const double fraction = std::max(1 / (1 + since_), -std::expm1(-interval_s / config_.offset_time_s));
   for (std::size_t i = 0; i < candidates; ++i) {
     Candidate& candidate = grid_[i];
     const Eigen::Vector4d difference = q_image - *history.at(stamp_s - step_s * static_cast<double>(i));
@@ -25,6 +25,7 @@ void DelayEstimator::add(double stamp_s, const Eigen::Vector4d& q_image, const E
     candidate.squares = kept * candidate.squares + (1 - fraction) * before.dot(information * before);
   }
   weight_ = kept * weight_ + 1;
+  since_ += 1;
   seen_s_ += interval_s;
   last_stamp_s_ = stamp_s;
   started_ = true;

@@ -32,6 +32,9 @@ class DelayEstimator {
   void add(double stamp_s, const Eigen::Vector4d& q_image, const Eigen::Matrix4d& covariance,
            const JointHistory& history);
 
+  /// The offset jumped: keeps what is known, but compares nothing across.
+  void interrupt() { since_ = 0; }
+
   /// The image stamped t shows the joints at t - delay.
   std::optional<DelayEstimate> estimate() const;
 
@@ -45,6 +48,7 @@ class DelayEstimator {
   double last_stamp_s_ = 0;
   double seen_s_ = 0;
   double weight_ = 0;  ///< number of frames, forgotten likewise
+  double since_ = 0;   ///< frames since the last interruption
   bool started_ = false;
 };
 

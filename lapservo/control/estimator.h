@@ -29,6 +29,11 @@ class Estimator {
 
   /// The images' delay as believed now, known or estimated.
   virtual double delay_s() const = 0;
+  /// False while it is a guess that motion will tell better.
+  virtual bool delay_is_known() const { return true; }
+
+  /// The measured joints jumped: nothing is to be learnt across.
+  virtual void interrupt() {}
 
   /// The motion of the joints, `time_s` after the last advance_probing(), that it needs to see before it can estimate
   /// anything; nullopt when it needs none.

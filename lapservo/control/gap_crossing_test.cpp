@@ -1,5 +1,7 @@
 #include "lapservo/control/gap_crossing.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "lapservo/robot/backlash.h"
@@ -22,7 +24,7 @@ struct Crossing {
     gap.width[3] = width;
     gap.shift[3] = instrument() - motor;
     Eigen::Vector4d q(0, 1, 0.1, motor), v(0, 0, 0, velocity), asked(0, 0, 0, wanted);
-    const double next = cross_gaps(limits, {q, v}, gap, q, asked, asked, period_s)[3];
+    const double next = cross_gaps(limits, {q, v}, gap, DriveState{}, q, asked, asked, period_s)[3];
     ASSERT_LE(std::abs(next - velocity), limits.acceleration[3] * period_s + 1e-12);
     ASSERT_LE(std::abs(next), limits.rate[3]);
     motor += (velocity + next) / 2 * period_s;
@@ -45,6 +47,28 @@ TEST(CrossGaps, CrossesTheGapFastAndEndsSoftly) {
   EXPECT_NEAR(world.velocity, wanted, 1e-3);
 }
 
+// The set-point of a joint that stands goes on beyond load and friction, and no faster once the joint follows.
+TEST(CrossGaps, CrossesFriction) {
+  const JointLimits limits;
+  DriveState drive;
+  drive.friction[2] = 2e-4;
+  drive.load[2] = -4e-4;
+  const Eigen::Vector4d q(0, 1, 0.1, 0), asked(0, 0, 1e-3, 0);
+  double position = q[2] - 6e-4, velocity = 0;  // came from above
+  int ticks = 0;
+  while (position - q[2] < -2e-4 && ++ticks < 60) {
+    const MotionState setpoint{{0, 1, position, 0}, {0, 0, velocity, 0}};
+    const double next = cross_gaps(limits, setpoint, GapState{}, drive, q, asked, asked, period_s)[2];
+    EXPECT_LE(std::abs(next - velocity), limits.acceleration[2] * period_s + 1e-12);
+    position += period_s * (velocity + next) / 2;
+    velocity = next;
+  }
+  EXPECT_LT(ticks * period_s, 0.2);  // 0.4 s by the wanted motion alone
+  drive.velocity[2] = 1e-3;
+  const MotionState setpoint{{0, 1, q[2] - 4e-4, 0}, {0, 0, 1e-3, 0}};
+  EXPECT_EQ(cross_gaps(limits, setpoint, GapState{}, drive, q, asked, asked, period_s), asked);
+}
+
 TEST(CrossGaps, LeavesAloneWhatHasNoDirection) {
   GapState gap;
   gap.width << 0, 0, 1e-4, 0.02;
@@ -55,13 +79,15 @@ TEST(CrossGaps, LeavesAloneWhatHasNoDirection) {
     Eigen::Vector4d noise;
     for (int i = 0; i < 4; ++i) noise[i] = 0.01 * random.normal();
     const MotionState rest{q, Eigen::Vector4d::Zero()};
-    EXPECT_EQ(cross_gaps(limits, rest, gap, q, Eigen::Vector4d::Zero(), noise, period_s), noise) << "a set-point";
+    EXPECT_EQ(cross_gaps(limits, rest, gap, DriveState{}, q, Eigen::Vector4d::Zero(), noise, period_s), noise)
+        << "a set-point";
     const MotionState elsewhere{q - noise, Eigen::Vector4d::Zero()};
-    EXPECT_EQ(cross_gaps(limits, elsewhere, GapState{}, q, noise, noise, period_s), noise) << "no gap";
+    EXPECT_EQ(cross_gaps(limits, elsewhere, GapState{}, DriveState{}, q, noise, noise, period_s), noise) << "no gap";
     GapState pressed = gap;
     for (int i = 0; i < 4; ++i) pressed.shift[i] = noise[i] > 0 ? -gap.width[i] / 2 : gap.width[i] / 2;
-    EXPECT_EQ(cross_gaps(limits, elsewhere, pressed, q, noise, noise, period_s), noise) << "crossed";
-    EXPECT_EQ(cross_gaps(limits, rest, gap, q, -noise, noise, period_s), noise) << "an error that goes against it";
+    EXPECT_EQ(cross_gaps(limits, elsewhere, pressed, DriveState{}, q, noise, noise, period_s), noise) << "crossed";
+    EXPECT_EQ(cross_gaps(limits, rest, gap, DriveState{}, q, -noise, noise, period_s), noise)
+        << "an error that goes against it";
   }
 }
 
@@ -79,7 +105,7 @@ TEST(CrossGaps, StaysWithinRateAndAcceleration) {
       const double change = limits.acceleration[i] * period_s;
       asked[i] = std::clamp(v[i] + random.uniform(-1, 1) * change, -limits.rate[i], limits.rate[i]);
     }
-    const Eigen::Vector4d velocity = cross_gaps(limits, {q, v}, gap, q, asked, asked, period_s);
+    const Eigen::Vector4d velocity = cross_gaps(limits, {q, v}, gap, DriveState{}, q, asked, asked, period_s);
     EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
     EXPECT_LE(((velocity - v).cwiseAbs() - limits.acceleration * period_s).maxCoeff(), 1e-12);
   }

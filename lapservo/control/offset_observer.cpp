@@ -146,8 +146,13 @@ Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q
   q_driven_then_ = q_driven_then;
   outliers_ = 0;
   started_ = true;
-  backlash_estimator_.interrupt();
+  interrupt();
   return Update::reacquired;
+}
+
+void OffsetObserver::interrupt() {
+  backlash_estimator_.interrupt();
+  delay_estimator_.interrupt();
 }
 
 bool OffsetObserver::agrees_with_last_outlier(const Eigen::Vector4d& seen_offset,
@@ -171,6 +176,7 @@ void OffsetObserver::follow_delay(double interval_s) {
   if (!seen) return;
   constexpr double fastest = 0.1;  // seconds of delay per second, so that the prediction does not jump
   delay_s_ += std::clamp(seen->delay_s - delay_s_, -fastest * interval_s, fastest * interval_s);
+  delay_seen_ = delay_seen_ || delay_is_right();
 }
 
 bool OffsetObserver::delay_is_right() const {

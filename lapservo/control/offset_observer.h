@@ -50,7 +50,11 @@ class OffsetObserver {
   /// nullopt before the first image and where the model sees nothing.
   std::optional<Estimate> estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint, double time_s) const;
 
+  /// The measured joints jumped: nothing is learnt across.
+  void interrupt();
   double delay_s() const { return delay_s_; }
+  /// Given, or estimated once.
+  bool delay_is_known() const { return config_.delay_s || delay_seen_; }
   /// What the data say; nullopt when the delay is given or there was too little motion.
   std::optional<DelayEstimate> delay_estimate() const;
   const Eigen::Vector4d& offset() const { return offset_; }
@@ -78,6 +82,7 @@ class OffsetObserver {
   Backlashes backlashes_then_, backlashes_;  ///< at the last image, at the last reading before it came
   double followed_s_ = 0;                    ///< the time of backlashes_then_
   double delay_s_ = 0;
+  bool delay_seen_ = false;
   bool started_ = false;
   double updated_s_ = 0;                                      ///< stamp of the last accepted image
   Eigen::Vector4d q_driven_then_ = Eigen::Vector4d::Zero();   ///< measured joints through their backlash at that image

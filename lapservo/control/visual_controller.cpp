@@ -6,6 +6,7 @@
 
 #include "lapservo/control/gap_crossing.h"
 #include "lapservo/control/motion_limits.h"
+#include "lapservo/control/setpoint_leash.h"
 #include "lapservo/control/tracking_law.h"
 
 namespace lapservo::internal {
@@ -33,16 +34,29 @@ VisualController::VisualController(const ControllerConfig& config, FeatureModel 
     : config_(checked(config)),
       exact_gains_(exact_gains(config)),
       estimator_(make_estimator(config, std::move(model))),
-      arm_lag_(config.scales),
+      arm_response_(config.scales),
+      leash_(config.limits),
       frozen_image_(config.scales),
       wild_joints_(config.limits.rate),
       path_(config.limits.acceleration) {}
 
 void VisualController::reset(double time_s, const Eigen::Vector4d& q_joint) {
   path_.reset(time_s, q_joint);
+  arm_response_.restart();
+  leash_.restart();
   now_s_ = time_s;
   usable_s_ = time_s;
   started_ = true;
+}
+
+void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint) {
+  const DriveState drive = arm_response_.drive();
+  const Eigen::Vector4d position = q_joint + drive.load;
+  const Eigen::Vector4d lower = config_.limits.lower.cwiseMin(q_joint), upper = config_.limits.upper.cwiseMax(q_joint);
+  path_.reset(time_s, position.cwiseMax(lower).cwiseMin(upper));
+  leash_ = SetpointLeash(config_.limits);
+  now_s_ = time_s;
+  usable_s_ = time_s;
 }
 
 ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint,
@@ -60,7 +74,11 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   const Law law = decide(step.reason, step.estimate, desired);
   step.reason = law.reason;
   step.velocity = brake(config_.limits, path_.at(now_s_).velocity, config_.period_s);
-  if (step.reason == HoldReason::none) limit(law, q_joint, step);
+  if (step.reason == HoldReason::none) {
+    limit(law, q_joint, step);
+  } else if (measured_) {
+    step.velocity = leashed_hold(step.velocity);
+  }
   if (step.action == ControlAction::probe) estimator_->advance_probing(config_.period_s);
 
   // Without a time to start from, the path is left to brake by itself when the period before ends.
@@ -73,6 +91,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
 }
 
 HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired) {
+  measured_ = false;
   if (!std::isfinite(time_s)) return HoldReason::non_finite;
   if (started_ && !(time_s > now_s_)) return HoldReason::bad_time;
   if (!q_joint.allFinite()) {
@@ -85,14 +104,23 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
     now_s_ = time_s;
     return HoldReason::wild_joints;
   }
-  if (verdict == WildJoints::Verdict::jumped) history_.clear();
+  if (verdict == WildJoints::Verdict::jumped) {
+    history_.clear();
+    estimator_->interrupt();
+    arm_response_.restart();
+    leash_.restart();
+    image_reason_ = HoldReason::wild_joints;  // until an image tells where the instrument is
+  }
   const MotionState setpoint = path_.at(time_s);
-  arm_lag_.add(setpoint, q_joint, time_s - now_s_);
+  arm_response_.add(setpoint, q_joint, time_s - now_s_);
+  leash_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), time_s - now_s_);
   history_.push(time_s, q_joint);
   now_s_ = time_s;
+  measured_ = true;
   if (!all_finite(desired)) return HoldReason::non_finite;
   const Eigen::Array4d behind = (setpoint.position - q_joint).array().abs();
-  return (behind > config_.max_following_error.array()).any() ? HoldReason::not_following : HoldReason::none;
+  const bool far = (behind > config_.max_following_error.array()).any();
+  return far || leash_.taut() ? HoldReason::not_following : HoldReason::none;
 }
 
 HoldReason VisualController::update(const ImageMeasurement& image) {
@@ -153,9 +181,13 @@ VisualController::Law VisualController::tracking_law(const std::optional<Estimat
     return law;
   }
   // The velocity is reached when the period ends, and by the arm a little later: feed forward what is desired then.
-  const double lead_s = config_.period_s + arm_lag_.seconds();
+  const double lead_s = config_.period_s + arm_response_.lag_s();
   const Eigen::Vector4d rate = desired.rate + lead_s * desired.acceleration;
-  law.velocity = damped.inverse * wanted_feature_rate(exact_gains_, estimate->features, desired.features, rate);
+  // Gain x error of the delay below 1/e does not overshoot.
+  constexpr double careful = 0.4;
+  TrackingGains gains = exact_gains_;
+  if (!estimator_->delay_is_known()) gains.per_s *= careful;
+  law.velocity = damped.inverse * wanted_feature_rate(gains, estimate->features, desired.features, rate);
   law.feed_forward = damped.inverse * rate;
   return law;
 }
@@ -169,8 +201,10 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
   if (step.estimate) {
     const Estimate& now = *step.estimate;
     ends = {now.ends_px + now.ends_jacobian * (motion.position - q_joint), now.ends_jacobian};
-    wanted = cross_gaps(config_.limits, motion, now.gap, q_joint, law.feed_forward, slowed, config_.period_s);
+    wanted = cross_gaps(config_.limits, motion, now.gap, arm_response_.drive(), q_joint, law.feed_forward, slowed,
+                        config_.period_s);
   }
+  wanted = leash_.limit(motion.velocity, wanted, config_.period_s);
   const auto limited =
       limit_velocity(config_.limits, config_.window, motion, ends, wanted, law.weight, config_.period_s);
   if (!limited.velocity.allFinite()) {
@@ -180,6 +214,15 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
   step.velocity = limited.velocity;
   step.limited = limited.limited || slowed != law.velocity;
   step.action = law.action;
+}
+
+/// Braking, unless set-points have to come back to a joint that did not come along.
+Eigen::Vector4d VisualController::leashed_hold(const Eigen::Vector4d& braking) const {
+  const MotionState motion = path_.at(now_s_);
+  const Eigen::Vector4d wanted = leash_.limit(motion.velocity, braking, config_.period_s);
+  if (wanted == braking) return braking;
+  const Eigen::Matrix4d weight = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal();
+  return limit_velocity(config_.limits, {}, motion, {}, wanted, weight, config_.period_s).velocity;
 }
 
 /// Deviations count by what they do to the features; a little by the joints', so that it is positive definite.

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/control/arm_lag.h"
+#include "lapservo/control/arm_response.h"
 #include "lapservo/control/control_step.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/estimator.h"
@@ -15,6 +15,7 @@
 #include "lapservo/control/hold_reason.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
+#include "lapservo/control/setpoint_leash.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
@@ -34,6 +35,9 @@ class VisualController {
   /// first step() too.
   void reset(double time_s, const Eigen::Vector4d& q_joint);
 
+  /// The same after a hold, of an arm that was enabled all the while: under its load it keeps the place that it has.
+  void start_over(double time_s, const Eigen::Vector4d& q_joint);
+
   /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`.
   ControlStep step(double time_s, const Eigen::Vector4d& q_joint, const std::optional<ImageMeasurement>& image,
                    const DesiredFeatures& desired);
@@ -43,7 +47,7 @@ class VisualController {
   const ControllerConfig& config() const { return config_; }
   /// The delay as believed now, known or estimated.
   double delay_s() const { return estimator_->delay_s(); }
-  double arm_lag_s() const { return arm_lag_.seconds(); }
+  double arm_lag_s() const { return arm_response_.lag_s(); }
 
  private:
   struct Law {
@@ -61,6 +65,7 @@ class VisualController {
   Law probing_law(const Eigen::Vector4d& velocity) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
+  Eigen::Vector4d leashed_hold(const Eigen::Vector4d& braking) const;
   Eigen::Matrix4d deviation_weight(const Eigen::Matrix4d& jacobian) const;
   Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity) const;
 
@@ -68,11 +73,13 @@ class VisualController {
   TrackingGains exact_gains_;
   std::unique_ptr<Estimator> estimator_;
   JointHistory history_;
-  ArmLag arm_lag_;
+  ArmResponse arm_response_;
+  SetpointLeash leash_;
   FrozenImage frozen_image_;
   WildJoints wild_joints_;
   JointPath path_;
   bool started_ = false;
+  bool measured_ = false;  ///< the joints of this tick are believed
   double now_s_ = 0;
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
   std::optional<double> image_s_;                       ///< stamp of the latest image

@@ -549,9 +549,13 @@ TEST_P(Holding, NamesEveryReason) {
   EXPECT_EQ(reason_for(t += config.period_s, q, wild), HoldReason::non_finite);
   EXPECT_EQ(reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.5, 0, 0), desired), HoldReason::wild_joints);
   // Pushed away and back again, no faster than is plausible.
-  for (int k = 1; k < 6; ++k) reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.02 * k, 0, 0), desired);
-  EXPECT_EQ(reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.12, 0, 0), desired), HoldReason::not_following);
-  for (int k = 5; k >= 0; --k) reason_for(t += config.period_s, q + Eigen::Vector4d(0, 0.02 * k, 0, 0), desired);
+  const auto pushed = [&](int k) {
+    const double by = 0.06 * (1 - std::cos(EIGEN_PI * k / 12));
+    return reason_for(t += config.period_s, q + Eigen::Vector4d(0, by, 0, 0), desired);
+  };
+  for (int k = 0; k < 12; ++k) pushed(k);
+  EXPECT_EQ(pushed(12), HoldReason::not_following);
+  for (int k = 13; k <= 24; ++k) pushed(k);
   controller.reset(t, q);
   EXPECT_EQ(good(), HoldReason::none);
 }

@@ -8,7 +8,7 @@ namespace lapservo::internal {
 /// set. What only flashes up is passed over; where the joints stay three times in a row, they are.
 class WildJoints {
  public:
-  /// `rate`: the joints' largest wanted speeds; three times as fast is believed.
+  /// `rate`: the joints' largest wanted speeds; three times as fast is believed, where the speed does not jump.
   explicit WildJoints(const Eigen::Vector4d& rate) : rate_(rate) {}
 
   enum class Verdict {
@@ -25,9 +25,12 @@ class WildJoints {
     Eigen::Vector4d q = Eigen::Vector4d::Zero();
   };
   bool reachable(const Reading& from, const Reading& to) const;
+  bool goes_on(const Reading& now) const;
 
   Eigen::Vector4d rate_;
   Reading believed_, latest_;
+  Eigen::Vector4d velocity_ = Eigen::Vector4d::Zero();  // of what is believed
+  double interval_s_ = 0;                               // between the last two that were
   bool started_ = false;
   int staying_ = 0;  // measured joints in a row that agree with each other and not with what is believed
 };

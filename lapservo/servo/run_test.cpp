@@ -75,7 +75,7 @@ class Watcher : public RunObserver {
 
   bool on_tick(const ControlTick& tick) override {
     const double time_s = tick.input.time_s;
-    Arm& arm = simulator_.arm();
+    SimulatedArm& arm = simulator_.arm();
     if (case_.faulted && case_.faulted->contains(time_s) && !arm.faulted()) arm.fault();
     if (case_.faulted && time_s >= case_.faulted->end_s && arm.faulted()) arm.recover();
     done.records.push_back({tick.input, tick.decision, truth_at(true_model_, simulator_.true_q())});
@@ -243,6 +243,35 @@ TEST(Run, HoldsWhileTheMarkerIsHiddenAndGoesOnWithoutAJump) {
   }
   expect_within_limits(done, controller);
   EXPECT_LT(done.error(done.records.size() - 1).tail<3>().cwiseAbs().maxCoeff(), 1);
+}
+
+// What is believed of the room is wrong: said where r is wrong with it, or nothing is moved. A turn about the RCM is no
+// more than an offset of the joints.
+TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
+  const Rig rig = testing::small_test_rig();
+  const auto last_of = [&](const Rig& believed) {
+    const Case c;
+    Simulator simulator(rig, {}, {0.05, 1.57, 0.064, 1.2});
+    Watcher watcher(c, rig, simulator);
+    run(simulator, simulator, simulator, config_of(believed, c), small_trajectory(), 1, watcher);
+    return watcher.done.records.back().decision;
+  };
+  EXPECT_FALSE(last_of(rig).registration_contradicted);
+  Rig turned = rig;
+  Rigid3& camera_from_rcm = *turned.instruments[0].camera_from_rcm;
+  camera_from_rcm.rotation = Eigen::AngleAxisd(0.0873, Eigen::Vector3d::UnitY()) * camera_from_rcm.rotation;
+  EXPECT_FALSE(last_of(turned).registration_contradicted);
+  for (const Eigen::Vector3d& by : {Eigen::Vector3d(0.01, 0, 0), Eigen::Vector3d(0, -0.01, 0)}) {
+    Rig moved = rig;
+    moved.instruments[0].camera_from_rcm->translation += by;
+    EXPECT_TRUE(last_of(moved).registration_contradicted) << by.transpose();
+  }
+  for (const double times : {0.9, 1.1}) {
+    Rig other_lens = rig;
+    other_lens.camera.fx_px *= times, other_lens.camera.fy_px *= times;
+    const ServoDecision last = last_of(other_lens);
+    EXPECT_TRUE(last.registration_contradicted || last.control.action == ControlAction::hold) << times;
+  }
 }
 
 // Held within 100 ms of the first picture that repeats, and no farther away then than braking takes it; then on again.

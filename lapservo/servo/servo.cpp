@@ -1,7 +1,7 @@
 #include "lapservo/servo/servo.h"
 
+#include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace lapservo::internal {
 namespace {
@@ -10,18 +10,23 @@ namespace {
 constexpr double at_rest_s = 0.5;
 const Eigen::Vector4d at_rest(0.002, 0.002, 0.0003, 0.01);
 
+constexpr int contradicted_after = 10;
+
 bool orderly(const ControlStep& control) {
   return control.has_setpoint && control.setpoint.position.allFinite() && control.setpoint.velocity.allFinite();
 }
 
 }  // namespace
 
-Servo::Servo(const ControllerConfig& config, FeatureModel model) : controller_(config, std::move(model)) {}
+Servo::Servo(const ControllerConfig& config, FeatureModel model)
+    : controller_(config, model), registered_(model != nullptr) {}
 
 ServoDecision Servo::step(const ServoInput& input) {
   const Eigen::Vector4d q = input.joints.q.vector();
   ServoDecision decision;
   decision.control = controller_.step(input.time_s, q, input.image, input.desired);
+  watch_registration(input);
+  decision.registration_contradicted = images_contradicting_ >= contradicted_after;
   decision.send = orderly(decision.control);
   start_anew_when_at_rest(input, decision.control.reason);
   if (input.joints.operating_state != OperatingState::enabled) {
@@ -32,6 +37,12 @@ ServoDecision Servo::step(const ServoInput& input) {
     if (std::isfinite(input.time_s) && q.allFinite()) controller_.reset(input.time_s, q);
   }
   return decision;
+}
+
+// A marker that is hidden in part may be seen without q for a few images; a wrong registration is there in all of them.
+void Servo::watch_registration(const ServoInput& input) {
+  if (!registered_ || !input.image || !input.image->found) return;
+  images_contradicting_ = input.image->q ? 0 : std::min(images_contradicting_ + 1, contradicted_after);
 }
 
 void Servo::start_anew_when_at_rest(const ServoInput& input, HoldReason reason) {
@@ -45,7 +56,7 @@ void Servo::start_anew_when_at_rest(const ServoInput& input, HoldReason reason) 
     not_following_since_s_ = input.time_s;
     q_then_ = q;
   } else if (input.time_s - *not_following_since_s_ > at_rest_s) {
-    controller_.reset(input.time_s, q);
+    controller_.start_over(input.time_s, q);
     not_following_since_s_.reset();
   }
 }

@@ -22,7 +22,11 @@ class Servo {
  private:
   void start_anew_when_at_rest(const ServoInput& input, HoldReason reason);
 
+  void watch_registration(const ServoInput& input);
+
   VisualController controller_;
+  bool registered_;               ///< the rig says where the RCM is
+  int images_contradicting_ = 0;  ///< in a row
   std::optional<double> not_following_since_s_;
   Eigen::Vector4d q_then_ = Eigen::Vector4d::Zero();
 };

@@ -20,6 +20,9 @@ struct ServoInput {
 /// What one step decides.
 struct ServoDecision {
   ControlStep control;
+  /// Images show the marker well, but for some time nowhere where camera_from_rcm, lens and RCM agree on a
+  /// configuration: one of them is wrong, r with it, and nothing in the image tells by how much.
+  bool registration_contradicted = false;
   bool send = false;  ///< the arm is to follow path(); else it is left alone and holds by itself
 };
 

@@ -30,7 +30,8 @@ class PerfectWorld {
     if (sees) {
       const FeatureState state_now = model_(q_).value();
       input.image = ImageMeasurement{visible,           time_s_, state_now.features, 1e-4 * Eigen::Matrix4d::Identity(),
-                                     state_now.ends_px, q_};
+                                     state_now.ends_px, {}};
+      if (registered) input.image->q = q_;
     }
     if (broken_joints) input.joints.q.phi_rad = std::numeric_limits<double>::quiet_NaN();
     time_s_ += period_s;
@@ -45,7 +46,7 @@ class PerfectWorld {
   }
 
   OperatingState state = OperatingState::enabled;
-  bool sees = true, visible = true, broken_joints = false, stuck = false;
+  bool sees = true, visible = true, registered = true, broken_joints = false, stuck = false;
   const Eigen::Vector4d& q() const { return q_; }
   void push(const Eigen::Vector4d& by) { q_ += by; }
 
@@ -63,6 +64,18 @@ TEST(Servo, Tracks) {
   EXPECT_EQ(last.control.action, ControlAction::track);
   EXPECT_EQ(last.control.reason, HoldReason::none);
   EXPECT_LT(last.control.error.norm(), 0.01);
+}
+
+TEST(Servo, SaysThatImagesContradictTheRegistration) {
+  PerfectWorld world;
+  EXPECT_FALSE(world.steps(60).registration_contradicted);
+  world.registered = false;
+  EXPECT_FALSE(world.steps(5).registration_contradicted);
+  EXPECT_TRUE(world.steps(5).registration_contradicted);
+  world.visible = false;
+  EXPECT_TRUE(world.step().registration_contradicted);
+  world.visible = world.registered = true;
+  EXPECT_FALSE(world.step().registration_contradicted);
 }
 
 TEST(Servo, HoldsWithinAPeriodWhenTheMarkerIsLostAndGoesOnWithoutAJump) {

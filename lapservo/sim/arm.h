@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/sim/simulated_arm.h"
+
 namespace lapservo {
 
 /// What a real arm does to its setpoints. Joints: theta_rad, phi_rad, rho_m, psi_rad.
@@ -21,27 +23,22 @@ struct ArmConfig {
   const ArmConfig& checked() const;
 };
 
-/// An arm that pivots at its RCM and takes joint positions (CRTK servo_jp). Time is simulated; between setpoints its
-/// motion is exact, however finely it is stepped.
-class Arm {
+/// First order: light, for fast tests. Between setpoints its motion is exact, however finely it is stepped.
+class Arm : public SimulatedArm {
  public:
   /// At rest with these measured joints, which must lie within the limits (else InputError).
   Arm(const ArmConfig& config, const Eigen::Vector4d& q_measured);
 
-  /// Goes there from now on. Beyond the limits it goes to the limit and counts; a value that isn't finite is a fault:
-  /// the arm stops and stays until recover().
-  void servo_jp(const Eigen::Vector4d& setpoint);
-  void step(double dt_s);
-
-  /// What the encoders say: the motors' positions, rounded.
-  Eigen::Vector4d measured_jp() const;
-  /// Where the instrument is: the motors' positions through backlash and offsets.
-  Eigen::Vector4d true_jp() const { return q_driven_ + config_.joint_offset; }
+  void servo_jp(const Eigen::Vector4d& setpoint) override;
+  void step(double dt_s) override;
+  Eigen::Vector4d measured_jp() const override;
+  /// The motors' positions through backlash and offsets.
+  Eigen::Vector4d true_jp() const override { return q_driven_ + config_.joint_offset; }
+  bool faulted() const override { return faulted_; }
+  void fault() override;
+  void recover() override;
 
   long setpoints_beyond_limits() const { return beyond_limits_; }
-  bool faulted() const { return faulted_; }
-  void fault();
-  void recover();
 
  private:
   ArmConfig config_;

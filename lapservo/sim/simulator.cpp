@@ -33,15 +33,18 @@ Endoscope make_endoscope(const Rig& rig, const SimulatorConfig& config) {
 }  // namespace
 
 Simulator::Simulator(const Rig& rig, const SimulatorConfig& config, const JointVector& q_measured)
+    : Simulator(rig, config, std::make_unique<Arm>(config.arm, q_measured.vector())) {}
+
+Simulator::Simulator(const Rig& rig, const SimulatorConfig& config, std::unique_ptr<SimulatedArm> arm)
     : camera_from_rcm_(*first_instrument(rig).camera_from_rcm *
                        Rigid3{Eigen::Quaterniond::Identity(), config.arm.rcm_offset_m}),
-      arm_(config.arm, q_measured.vector()),
+      arm_(std::move(arm)),
       endoscope_(make_endoscope(rig, config)),
       arm_period_s_(1 / config.arm_rate_hz) {}
 
 JointState Simulator::state() {
-  return {time_s_, JointVector::from_vector(arm_.measured_jp()),
-          arm_.faulted() ? OperatingState::fault : OperatingState::enabled};
+  return {time_s_, JointVector::from_vector(arm_->measured_jp()),
+          arm_->faulted() ? OperatingState::fault : OperatingState::enabled};
 }
 
 void Simulator::send(const JointPath& path) {
@@ -56,9 +59,9 @@ std::optional<StampedImage> Simulator::newest() {
 
 void Simulator::sleep_until(double time_s) {
   while (time_s - time_s_ > same_s) {
-    if (arm_.faulted()) path_.reset();
+    if (arm_->faulted()) path_.reset();
     const double next_s = path_ ? std::min(time_s, time_s_ + arm_period_s_) : time_s;
-    if (path_) arm_.servo_jp(path_->at(next_s).position);
+    if (path_) arm_->servo_jp(path_->at(next_s).position);
     step(next_s - time_s_);
   }
 }
@@ -77,7 +80,7 @@ void Simulator::step(double dt_s) {
     const std::vector<double> moments_s = endoscope_.next_moments_s();
     const double next_s = moments_s[exposing_.size()];
     if (next_s > end_s + same_s) break;
-    arm_.step(std::max(0.0, next_s - time_s_));
+    arm_->step(std::max(0.0, next_s - time_s_));
     time_s_ = std::max(time_s_, next_s);
     if (exposing_.size() == moments_s.size() / 2) truth_[taken_] = true_q();
     exposing_.push_back({placement()});
@@ -85,7 +88,7 @@ void Simulator::step(double dt_s) {
     endoscope_.expose(std::exchange(exposing_, {}));
     ++taken_;
   }
-  arm_.step(std::max(0.0, end_s - time_s_));
+  arm_->step(std::max(0.0, end_s - time_s_));
   time_s_ = end_s;
 }
 

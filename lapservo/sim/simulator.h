@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -46,6 +47,8 @@ class Simulator : public Robot, public ImageStream, public Clock {
   /// `rig` is how things really are; what a program believes may differ. Its first instrument needs camera_from_rcm
   /// (else InputError). The arm starts at rest with these measured joints.
   Simulator(const Rig& rig, const SimulatorConfig& config, const JointVector& q_measured);
+  /// With an arm of another kind; of SimulatorConfig::arm only rcm_offset_m counts.
+  Simulator(const Rig& rig, const SimulatorConfig& config, std::unique_ptr<SimulatedArm> arm);
 
   JointState state() override;
   void send(const JointPath& path) override;
@@ -55,27 +58,27 @@ class Simulator : public Robot, public ImageStream, public Clock {
   void sleep_until(double time_s) override;
 
   /// A single setpoint instead of a path.
-  void servo_jp(const Eigen::Vector4d& setpoint) { arm_.servo_jp(setpoint); }
+  void servo_jp(const Eigen::Vector4d& setpoint) { arm_->servo_jp(setpoint); }
   /// Lets time pass; frames are taken when they are due, also within a step. Not backwards (std::invalid_argument).
   void step(double dt_s);
-  Eigen::Vector4d measured_jp() const { return arm_.measured_jp(); }
+  Eigen::Vector4d measured_jp() const { return arm_->measured_jp(); }
   /// Frames that have arrived by now and since the last call, with their truth. newest() takes from the same.
   std::vector<SimulatedFrame> arrived();
 
-  Arm& arm() { return arm_; }
-  const Arm& arm() const { return arm_; }
+  SimulatedArm& arm() { return *arm_; }
+  const SimulatedArm& arm() const { return *arm_; }
   /// Light on the scene from now on: 1 is usual.
   void set_light(float light) { endoscope_.set_light(light); }
   /// Something lies over the whole marker then.
   void cover_marker(const Interval& when) { covered_.push_back(when); }
 
   /// The instrument in the camera's truth, now.
-  JointVector true_q() const { return JointVector::from_vector(arm_.true_jp()); }
+  JointVector true_q() const { return JointVector::from_vector(arm_->true_jp()); }
   ShaftPlacement placement() const;
 
  private:
   Rigid3 camera_from_rcm_;
-  Arm arm_;
+  std::unique_ptr<SimulatedArm> arm_;
   Endoscope endoscope_;
   double arm_period_s_;
   std::optional<JointPath> path_;

@@ -1,0 +1,85 @@
+#include "lapservo/control/arm_response.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double period_s = 1.0 / 60;
+
+/// An arm of first order behind sinusoidal setpoints, read with noise.
+double lag_found(double lag_s, double amplitude, std::uint64_t seed) {
+  Random random(seed);
+  ArmResponse response{Scales{}};
+  Eigen::Vector4d arm = Eigen::Vector4d::Zero();
+  for (int k = 0; k < 1200; ++k) {
+    const double t = k * period_s;
+    const Eigen::Vector4d size = amplitude * Scales{}.joints;
+    const MotionState setpoint{size * std::sin(t), size * std::cos(t)};
+    arm = lag_s > 0 ? Eigen::Vector4d(setpoint.position + (arm - setpoint.position) * std::exp(-period_s / lag_s))
+                    : setpoint.position;
+    Eigen::Vector4d measured = arm;
+    for (int i = 0; i < 4; ++i) measured[i] += 1e-4 * Scales{}.joints[i] * random.normal();
+    response.add(setpoint, measured, period_s);
+  }
+  return response.lag_s();
+}
+
+TEST(ArmResponse, LagIsFoundFromMotion) {
+  for (const double lag_s : {0.0, 0.01, 0.03, 0.06}) {
+    // The arm of this test follows the setpoint at the end of each period: half a period less than a continuous one.
+    const double expected_s = lag_s > 0 ? std::exp(-period_s / lag_s) * period_s / -std::expm1(-period_s / lag_s) : 0;
+    EXPECT_NEAR(lag_found(lag_s, 0.5, 3), expected_s, 0.05 * expected_s + 5e-4);
+  }
+}
+
+TEST(ArmResponse, LagIsZeroWithoutMotionAndBounded) {
+  EXPECT_LT(lag_found(0.05, 0, 4), 1e-3);
+  EXPECT_LE(lag_found(2, 0.5, 5), 0.1);
+}
+
+// Coulomb friction and gravity before a PD servo: set-points go `friction` to either side of `load` before joints
+// follow.
+struct StickingArm {
+  Eigen::Vector4d friction{3e-4, 3e-4, 2e-4, 8e-3}, load{-1e-3, 1e-3, -4e-4, 0}, q = Eigen::Vector4d::Zero();
+  void follow(const Eigen::Vector4d& setpoint) {
+    q = q.cwiseMax(setpoint - load - friction).cwiseMin(setpoint - load + friction);
+  }
+};
+
+TEST(ArmResponse, FindsFrictionAndLoad) {
+  ArmResponse response{Scales{}};
+  StickingArm arm;
+  for (int k = 0; k < 900; ++k) {
+    const double t = k * period_s;
+    const Eigen::Vector4d size = 0.5 * Scales{}.joints;
+    const MotionState setpoint{size * std::sin(t), size * std::cos(t)};
+    arm.follow(setpoint.position);
+    response.add(setpoint, arm.q, period_s);
+  }
+  EXPECT_TRUE(((response.drive().friction - arm.friction).cwiseAbs().array() < 0.05 * arm.friction.array()).all());
+  EXPECT_TRUE(((response.drive().load - arm.load).cwiseAbs().array() < 0.05 * arm.friction.array()).all());
+  EXPECT_LT(response.lag_s(), 2e-3);
+  response.restart();
+  EXPECT_TRUE(response.drive().load.isZero());
+  EXPECT_TRUE(((response.drive().friction - arm.friction).cwiseAbs().array() < 0.05 * arm.friction.array()).all());
+}
+
+// One that is blocked tells nothing.
+TEST(ArmResponse, LearnsNothingFromABlockedJoint) {
+  ArmResponse response{Scales{}};
+  for (int k = 0; k < 300; ++k) {
+    const Eigen::Vector4d velocity = 0.3 * Scales{}.joints;
+    response.add({velocity * (k * period_s), velocity}, Eigen::Vector4d::Zero(), period_s);
+  }
+  EXPECT_EQ(response.lag_s(), 0);
+  EXPECT_TRUE(response.drive().load.isZero());
+  EXPECT_TRUE(response.drive().friction.isZero());
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,55 @@
+#include "lapservo/control/setpoint_leash.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "lapservo/control/gap_crossing.h"
+
+namespace lapservo::internal {
+
+void SetpointLeash::update(const MotionState& setpoint, const Eigen::Vector4d& q_joint, const DriveState& drive,
+                           double lag_s, double interval_s) {
+  constexpr double nearly = 0.9;
+  constexpr double faster = 1.1, least_lag_s = 0.02;  // an arm lags at least by about this, whatever is known of it
+  drive_ = drive;
+  allowed_ = faster * std::max(lag_s, least_lag_s) * limits_.rate + drive.friction;
+  const Eigen::Vector4d lead = setpoint.position - q_joint - drive.load;
+  if (std::exchange(restarted_, false)) beyond_ = lead;
+  for (int i = 0; i < 4; ++i) {
+    const double side = lead[i] > 0 ? 1 : -1, excess = side * lead[i] - allowed_[i];
+    if (excess <= 0) {
+      beyond_[i] = 0;
+    } else if (drive.follows[static_cast<std::size_t>(i)]) {
+      const double v = setpoint.velocity[i];
+      beyond_[i] = lead[i] - lag_s * v - std::copysign(drive.friction[i], v);
+    }
+  }
+  ahead_ = lead - beyond_;
+  bool at_end = false;
+  for (int i = 0; i < 4; ++i)
+    at_end |= std::abs(ahead_[i]) > nearly * allowed_[i] && !drive.follows[static_cast<std::size_t>(i)];
+  taut_s_ = at_end ? taut_s_ + interval_s : 0;
+}
+
+bool SetpointLeash::taut() const {
+  constexpr double some_s = 0.3;
+  return taut_s_ > some_s;
+}
+
+Eigen::Vector4d SetpointLeash::limit(const Eigen::Vector4d& setpoint_velocity, const Eigen::Vector4d& wanted,
+                                     double period_s) const {
+  Eigen::Vector4d velocity = wanted;
+  for (int i = 0; i < 4; ++i) {
+    const double side = ahead_[i] > 0 ? 1 : -1, left = allowed_[i] - side * ahead_[i];
+    const double closing = std::copysign(closing_speed(std::abs(left), limits_.acceleration[i]), left);
+    const double fastest = std::max(0.0, side * drive_.velocity[i]) + closing;
+    if (side * wanted[i] <= fastest) continue;
+    const double slowest = side * setpoint_velocity[i] - limits_.acceleration[i] * period_s;
+    velocity[i] = side * std::max({fastest, slowest, -limits_.rate[i]});
+  }
+  return velocity;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,95 @@
+#include "lapservo/control/setpoint_leash.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double period_s = 1.0 / 60, lag_s = 0.03;
+const JointLimits limits;
+const Eigen::Vector4d q(0, 1, 0.1, 0);
+
+// Set-points at full speed, joints that follow with their lag, then stand.
+TEST(SetpointLeash, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
+  SetpointLeash leash(limits);
+  MotionState setpoint{q, Eigen::Vector4d::Zero()};
+  DriveState drive;
+  drive.load << 0.001, -0.001, 0.0005, 0.01;
+  Eigen::Vector4d joint = q, farthest = Eigen::Vector4d::Zero();
+  for (int k = 0; k < 240; ++k) {
+    const bool stands = k >= 60;
+    const Eigen::Vector4d before = joint;
+    const Eigen::Vector4d change = limits.acceleration * period_s;
+    const Eigen::Vector4d wanted = limits.rate.cwiseMin(setpoint.velocity + change);
+    leash.update(setpoint, joint, drive, lag_s, period_s);
+    const Eigen::Vector4d velocity = leash.limit(setpoint.velocity, wanted, period_s);
+    if (!stands) EXPECT_EQ(velocity, wanted) << k;
+    if (k < 75) EXPECT_FALSE(leash.taut()) << k;
+    if (k > 120) EXPECT_TRUE(leash.taut()) << k;
+    EXPECT_LE(((velocity - setpoint.velocity).cwiseAbs() - change).maxCoeff(), 1e-12);
+    EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
+    setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
+    setpoint.velocity = velocity;
+    if (!stands) joint += -std::expm1(-period_s / lag_s) * (setpoint.position - drive.load - joint);
+    drive.velocity = (joint - before) / period_s;
+    drive.follows.fill(!stands);
+    farthest = farthest.cwiseMax(setpoint.position - drive.load - joint);
+  }
+  const Eigen::Vector4d stopping = limits.rate.cwiseAbs2().cwiseQuotient(2 * limits.acceleration);
+  EXPECT_LE((farthest - stopping - limits.rate * (lag_s + 2 * period_s)).maxCoeff(), 0);
+  const Eigen::Vector4d ahead = setpoint.position - drive.load - joint;
+  EXPECT_LE((ahead - 1.1 * lag_s * limits.rate).maxCoeff(), 1e-3 * lag_s);
+  EXPECT_GE((ahead - 0.8 * lag_s * limits.rate).minCoeff(), 0);
+}
+
+// An arm that hangs far below its set-points follows them nevertheless: it is not pulled down and down.
+TEST(SetpointLeash, DoesNotTakeALoadForABlockedJoint) {
+  SetpointLeash leash(limits);
+  MotionState setpoint{q, Eigen::Vector4d::Zero()};
+  DriveState drive;
+  const Eigen::Vector4d sag = 5 * 1.1 * lag_s * limits.rate;
+  Eigen::Vector4d joint = q - sag;
+  for (int k = 0; k < 240; ++k) {
+    const Eigen::Vector4d before = joint;
+    leash.update(setpoint, joint, drive, lag_s, period_s);
+    const Eigen::Vector4d velocity = leash.limit(setpoint.velocity, Eigen::Vector4d::Zero(), period_s);
+    setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
+    setpoint.velocity = velocity;
+    joint += -std::expm1(-period_s / lag_s) * (setpoint.position - sag - joint);
+    drive.velocity = (joint - before) / period_s;
+    for (int i = 0; i < 4; ++i)
+      drive.follows[static_cast<std::size_t>(i)] =
+          velocity[i] < -0.02 * limits.rate[i] && drive.velocity[i] < 0.7 * velocity[i];
+  }
+  EXPECT_LE((q - setpoint.position - sag).maxCoeff(), 0);
+  EXPECT_LE(setpoint.velocity.norm(), 1e-3);
+}
+
+TEST(SetpointLeash, StaysWithinTheLimitsWhateverIsWanted) {
+  Random random(3);
+  for (int k = 0; k < 1000; ++k) {
+    MotionState setpoint;
+    DriveState drive;
+    Eigen::Vector4d wanted;
+    for (int i = 0; i < 4; ++i) {
+      setpoint.position[i] = q[i] + random.uniform(-1, 1) * limits.rate[i];
+      setpoint.velocity[i] = random.uniform(-1, 1) * limits.rate[i];
+      drive.velocity[i] = random.uniform(-1, 1) * limits.rate[i];
+      const double change = limits.acceleration[i] * period_s;
+      wanted[i] = std::clamp(setpoint.velocity[i] + random.uniform(-1, 1) * change, -limits.rate[i], limits.rate[i]);
+    }
+    SetpointLeash leash(limits);
+    leash.update(setpoint, q, drive, lag_s, period_s);
+    const Eigen::Vector4d velocity = leash.limit(setpoint.velocity, wanted, period_s);
+    EXPECT_LE(((velocity - setpoint.velocity).cwiseAbs() - limits.acceleration * period_s).maxCoeff(), 1e-12);
+    EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace lapservo::internal
