@@ -8,8 +8,9 @@ function(run)
   execute_process(COMMAND ${ARGV} COMMAND_ERROR_IS_FATAL ANY)
 endfunction()
 
+# Further arguments go to CMake.
 function(build_project source name)
-  run(${CMAKE_COMMAND} -S ${source} -B ${folder}/${name} -G Ninja -DCMAKE_PREFIX_PATH=${prefix}
+  run(${CMAKE_COMMAND} -S ${source} -B ${folder}/${name} -G Ninja -DCMAKE_PREFIX_PATH=${prefix} ${ARGN}
       -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_CXX_COMPILER_LAUNCHER=${LAUNCHER})
   run(${CMAKE_COMMAND} --build ${folder}/${name})
 endfunction()
@@ -44,9 +45,26 @@ target_link_libraries(each_header PRIVATE lapservo::lapservo)
   build_project(${folder}/each_header each_header.build)
 endfunction()
 
+# Who controls and sees nothing needs no package for pictures.
+function(check_control_alone)
+  file(WRITE ${folder}/control_alone/main.cpp "#include <lapservo/control/hold_reason.h>
+int main() { return lapservo::to_string(lapservo::HoldReason::outlier) == \"outlier\" ? 0 : 1; }
+")
+  file(WRITE ${folder}/control_alone/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)
+project(control_alone LANGUAGES CXX)
+find_package(lapservo REQUIRED COMPONENTS control)
+add_executable(control_alone main.cpp)
+target_link_libraries(control_alone PRIVATE lapservo::control)
+")
+  build_project(${folder}/control_alone control_alone.build -DCMAKE_DISABLE_FIND_PACKAGE_OpenCV=ON
+                -DCMAKE_DISABLE_FIND_PACKAGE_PkgConfig=ON -DCMAKE_DISABLE_FIND_PACKAGE_hwy=ON)
+  run(${folder}/control_alone.build/control_alone)
+endfunction()
+
 file(REMOVE_RECURSE ${folder})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
 check_headers()
+check_control_alone()
 build_project(${EXAMPLES}/find_package find_package)
 build_project(${EXAMPLES}/own_robot own_robot)
 run(${prefix}/bin/lapservo render --rig ${prefix}/share/lapservo/configs/example.yaml --out ${folder}/frames --count 1)
