@@ -409,10 +409,13 @@ TEST_F(CommandLine, ExperimentsWriteAReport) {
 
 TEST_F(CommandLine, HelpShowsExamples) {
   for (const char* command : {"track", "render", "marker", "marker design", "marker print", "marker show", "servo",
-                              "experiment", "estimate-rcm"}) {
+                              "experiment", "estimate-rcm", "sim-robot", "calibrate", "calibrate camera", "calibrate marker",
+                              "calibrate registration"}) {
     EXPECT_EQ(run(std::string(command) + " --help"), 0);
     EXPECT_NE(output().find("Example"), std::string::npos) << command;
   }
+  EXPECT_EQ(run("--version"), 0);
+  EXPECT_EQ(output().rfind("lapservo ", 0), 0U);
   EXPECT_EQ(run("fly"), 2);
 }
 

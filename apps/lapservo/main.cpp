@@ -48,6 +48,7 @@ int flushed(int exit_code) {
 
 int parse_and_run(int argc, char** argv) {
   CLI::App app{"See and steer a laparoscopic instrument by its camera.", "lapservo"};
+  app.set_version_flag("--version", "lapservo " LAPSERVO_VERSION);
   app.require_subcommand(1);
   app.footer(
       "`lapservo SUBCOMMAND --help` shows its options and an example.\n"

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <vector>
 
-#include "apps/lapservo/calibration_report.h"
+#include "apps/lapservo/calibrated_number.h"
 #include "lapservo/calibration/registration.h"
 
 namespace lapservo::app {

@@ -197,7 +197,9 @@ TEST(JointRecording, IsRefinedSmoothlyAndKeepsItsPauses) {
   }
   const JointRecording fine = refined(coarse, 5e-3);
   for (std::size_t i = 0; i < fine.time_s.size(); ++i) {
-    if (i > 0) EXPECT_GT(fine.time_s[i], fine.time_s[i - 1]);
+    if (i > 0) {
+      EXPECT_GT(fine.time_s[i], fine.time_s[i - 1]);
+    }
     EXPECT_NEAR(fine.joints[i][0], std::sin(3 * fine.time_s[i]), 2e-3);
   }
   EXPECT_TRUE(fine.at(0.501));

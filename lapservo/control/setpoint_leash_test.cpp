@@ -28,9 +28,15 @@ TEST(SetpointLeash, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
     const Eigen::Vector4d wanted = limits.rate.cwiseMin(setpoint.velocity + change);
     leash.update(setpoint, joint, drive, lag_s, period_s);
     const Eigen::Vector4d velocity = leash.limit(setpoint.velocity, wanted, period_s);
-    if (!stands) EXPECT_EQ(velocity, wanted) << k;
-    if (k < 75) EXPECT_FALSE(leash.taut()) << k;
-    if (k > 120) EXPECT_TRUE(leash.taut()) << k;
+    if (!stands) {
+      EXPECT_EQ(velocity, wanted) << k;
+    }
+    if (k < 75) {
+      EXPECT_FALSE(leash.taut()) << k;
+    }
+    if (k > 120) {
+      EXPECT_TRUE(leash.taut()) << k;
+    }
     EXPECT_LE(((velocity - setpoint.velocity).cwiseAbs() - change).maxCoeff(), 1e-12);
     EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
     setpoint.position += period_s * (setpoint.velocity + velocity) / 2;

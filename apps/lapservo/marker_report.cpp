@@ -1,4 +1,4 @@
-#include "apps/lapservo/calibration_report.h"
+#include "apps/lapservo/marker_report.h"
 
 #include <algorithm>
 #include <array>
@@ -107,7 +107,7 @@ std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Mar
   return numbers;
 }
 
-void write_calibration_report(const std::filesystem::path& path, const Instrument& instrument,
+void write_marker_report(const std::filesystem::path& path, const Instrument& instrument,
                               const MarkerCalibration& calibration) {
   ReportSection section;
   section.id = "marker";

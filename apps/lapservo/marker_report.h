@@ -1,24 +1,19 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <vector>
 
+#include "apps/lapservo/calibrated_number.h"
 #include "lapservo/calibration/marker_calibration.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
 
-/// A number of the rig that was measured, in the unit that its name ends in; sigma: one standard deviation.
-struct CalibratedNumber {
-  std::string name;
-  double before, after, sigma;
-};
 std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Marker& after, bool with_seam);
 
 /// One HTML page: what each boundary misses the print by over the turn, for the rig's print and for the calibrated one,
 /// and both prints unrolled. Throws InputError when it can't be written.
-void write_calibration_report(const std::filesystem::path& path, const Instrument& instrument,
-                              const internal::MarkerCalibration& calibration);
+void write_marker_report(const std::filesystem::path& path, const Instrument& instrument,
+                         const internal::MarkerCalibration& calibration);
 
 }  // namespace lapservo::app
