@@ -106,7 +106,7 @@ void add_sim_robot(CLI::App& app, Run& run_later) {
       ->capture_default_str()
       ->check(number_between(0.0, 1e6));
   command->footer(
-      "Two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
+      "Example, in two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
       "  lapservo sim-robot --rig configs/paper.yaml\n"
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera ros2:/endoscope/image_raw --enable-motion");
   command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
