@@ -247,6 +247,10 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
   EXPECT_NE(errors().find("tick"), std::string::npos);
   // It has not converged after half a second.
   EXPECT_EQ(run("servo --rig " + paper + " --robot sim --duration 0.5"), 1);
+  // It converges, and then ends in a hold.
+  EXPECT_EQ(run("servo --rig " + paper + " --robot sim --duration 4.5 --seed 2 --hide 4,9"), 1);
+  EXPECT_NE(output().find("within 1 px and 5 mrad from"), std::string::npos) << output();
+  EXPECT_NE(output().find("ended in a hold: marker_lost"), std::string::npos) << output();
 }
 
 // Section V-D, to the letter: omega is 0.5 rad/s for all features, K holds per control period (60 a second).

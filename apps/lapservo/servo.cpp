@@ -112,7 +112,8 @@ int simulate(const ServoOptions& options) {
     folder->commit();
     std::printf("log, rig and controller: %s\n", options.out.c_str());
   }
-  return summary.converged() && !(options.strict && summary.registration_contradicted()) ? 0 : 1;
+  const bool refused = options.strict && summary.registration_contradicted();
+  return summary.converged() && !summary.ended_in_hold() && !refused ? 0 : 1;
 }
 
 int replay_log(const ServoOptions& options) {

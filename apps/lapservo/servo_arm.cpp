@@ -210,8 +210,9 @@ int steer_arm(const ServoOptions& options) {
   std::printf("%s\n", watcher.summary().text().c_str());
   if (folder) folder->commit();
   const bool ended_early = robot.blocked() == Blocked::foreign_command;
-  const bool refused = options.strict && watcher.summary().registration_contradicted();
-  return watcher.summary().converged() && !ended_early && !refused ? 0 : 1;
+  const Summary& summary = watcher.summary();
+  const bool refused = options.strict && summary.registration_contradicted();
+  return summary.converged() && !summary.ended_in_hold() && !ended_early && !refused ? 0 : 1;
 }
 
 }  // namespace lapservo::app

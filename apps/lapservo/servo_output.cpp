@@ -46,7 +46,9 @@ void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>&
   const ControlStep& control = tick.decision.control;
   ++ticks_;
   contradicted_ += tick.decision.registration_contradicted;
-  if (control.action == ControlAction::hold) ++held_[std::string(to_string(control.reason))];
+  const bool holds = control.action == ControlAction::hold;
+  if (holds) ++held_[std::string(to_string(control.reason))];
+  held_at_end_ = holds ? std::optional(control.reason) : std::nullopt;
   Eigen::Vector4d error = control.error;
   if (truth && truth->features) {
     error = feature_error(*truth->features, tick.input.desired.features);
@@ -67,6 +69,7 @@ std::string Summary::text() const {
         *reached_s, 1000 * rms[0], rms[1], rms[2], rms[3]);
   }
   for (const auto& [reason, count] : held_) text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
+  if (held_at_end_) text += fmt::format("\nended in a hold: {}", to_string(*held_at_end_));
   if (contradicted_ > 0)
     text += fmt::format(
         "\nregistration_contradicted in {} of {} ticks: the images fit neither camera_from_rcm nor lens "

@@ -31,6 +31,7 @@ class Summary {
   /// By the truth, where it is known, else by the estimate.
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
   bool converged() const { return convergence_.reached_s().has_value(); }
+  bool ended_in_hold() const { return held_at_end_.has_value(); }
   bool registration_contradicted() const { return contradicted_ > 0; }
   std::string text() const;
 
@@ -39,6 +40,7 @@ class Summary {
   long contradicted_ = 0;
   long ticks_ = 0;
   std::map<std::string, long> held_;
+  std::optional<HoldReason> held_at_end_;  // by the last tick
   Convergence convergence_;
 };
 
