@@ -116,7 +116,8 @@ bool solve(Linearisation& at, Eigen::VectorXd& x, const Eigen::VectorXd& weights
   problem.AddResidualBlock(new PriorCost(priors), nullptr, x.data());
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  solver.max_num_iterations = 60;
+  solver.max_num_iterations = 100;
+  solver.function_tolerance = 1e-12;  // what priors alone hold costs next to nothing
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);

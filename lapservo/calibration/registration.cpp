@@ -45,12 +45,12 @@ Eigen::Vector3d rotation_vector(Eigen::Quaterniond q) {
 }
 
 // x: rotation about the RCM frame's axes (3), translation (3), offsets of phi, rho, psi, delay; what frames have in
-// common and no number of them averages out: the scale of distances, the axis' tilt along the view, the turn about it;
-// backlash of those joints that move.
+// common and no number of them averages out: the scale of distances, the axis' tilt along the view; backlash of those
+// joints that move.
 class ArmModel {
  public:
-  static constexpr Eigen::Index rotation = 0, translation = 3, offsets = 6, delay = 9, scale = 10, tilt = 11, roll = 12,
-                                backlash = 13;
+  static constexpr Eigen::Index rotation = 0, translation = 3, offsets = 6, delay = 9, scale = 10, tilt = 11,
+                                backlash = 12;
 
   ArmModel(const Instrument& instrument, std::vector<TimedPose> poses, const JointRecording& recording,
            const ArmGuess& guess)
@@ -64,18 +64,14 @@ class ArmModel {
   }
 
   std::vector<Unknown> unknowns(double delay_s) const {
-    // Half of what a frame says of its rotation is the film's, the print's and the picture's processing; compressed
-    // video moves the outline by some hundredths of a pixel, and the foreshortened length by more.
-    constexpr double common_fraction = 0.5, scale_prior = 2e-3, tilt_prior_rad = 5e-3;
-    std::vector<double> sigmas_rad;
-    for (const TimedPose& pose : poses_) sigmas_rad.push_back(pose.marker.sigma_roll_rad);
+    // Compressed video moves the outline by some hundredths of a pixel, and the foreshortened length by more.
+    constexpr double scale_prior = 2e-3, tilt_prior_rad = 5e-3;
     const Eigen::Vector3d& rcm_m = guess_.camera_from_rcm.translation;
     const auto& offset = guess_.joints.offset;
     std::vector<Unknown> all{{0, 1e-4},         {0, 1e-4},         {0, 1e-4},         {rcm_m.x(), 1e-5},
                              {rcm_m.y(), 1e-5}, {rcm_m.z(), 1e-5}, {offset[1], 1e-4}, {offset[2], 1e-5},
                              {offset[3], 1e-4}, {delay_s, 1e-3}};
-    for (const double prior : {scale_prior, tilt_prior_rad, common_fraction * median(sigmas_rad)})
-      all.push_back({0, 1e-4, prior});
+    for (const double prior : {scale_prior, tilt_prior_rad}) all.push_back({0, 1e-4, prior});
     for (const std::size_t joint : moving_) all.push_back({0, joint == 2 ? 1e-5 : 1e-4});
     return all;
   }
@@ -149,7 +145,7 @@ class ArmModel {
     Eigen::Matrix<double, 6, 1> d;
     d << side.dot(off_m) / seen.sigma_xy_m, ray.cross(side).dot(off_m) / seen.sigma_xy_m,
         ray.dot(off_m) / seen.sigma_z_m, hinge.cross(axis).dot(turn) / sigma_axis_rad,
-        (hinge.dot(turn) - x[tilt]) / sigma_axis_rad, (axis.dot(turn) - x[roll]) / seen.sigma_roll_rad;
+        (hinge.dot(turn) - x[tilt]) / sigma_axis_rad, axis.dot(turn) / seen.sigma_roll_rad;
     return d;
   }
 
@@ -237,6 +233,14 @@ Eigen::Quaterniond usual_rotation(const std::vector<TimedPose>& poses) {
 constexpr auto swing_more =
     "swing the instrument by 0.5 rad in both directions, insert it by 20 mm and turn it, in 20 s or more";
 
+// Half of what a frame says of its turn about the axis is the film's, the print's and the picture's processing: common
+// to all frames, and not told from psi's offset.
+double common_turn_rad(const std::vector<TimedPose>& poses) {
+  std::vector<double> sigmas_rad;
+  for (const TimedPose& pose : poses) sigmas_rad.push_back(pose.marker.sigma_roll_rad);
+  return 0.5 * median(sigmas_rad);
+}
+
 void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result) {
   result.camera_from_rcm = model.camera_from_rcm(fit.x);
   const Eigen::MatrixXd covariance = unmodelled * fit.covariance;
@@ -248,6 +252,7 @@ void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result
   Registration::Arm arm;
   arm.joints = model.joints(fit.x);
   for (Eigen::Index i = 0; i < 3; ++i) arm.sigma_offset[static_cast<std::size_t>(i) + 1] = sigma[ArmModel::offsets + i];
+  arm.sigma_offset[3] = std::hypot(arm.sigma_offset[3], common_turn_rad(model.poses()));
   arm.image_delay_s = fit.x[ArmModel::delay], arm.sigma_image_delay_s = sigma[ArmModel::delay];
   arm.backlash = model.backlash_of(fit.x);
   result.arm = arm;
