@@ -5,10 +5,11 @@
 #include <ceres/rotation.h>
 #include <cmath>
 #include <cstddef>
-#include <glog/logging.h>
 #include <utility>
 
-#include <Eigen/Geometry>
+#include "lapservo/calibration/robust_scale.h"
+#include "lapservo/calibration/solve_quietly.h"
+#include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {
 namespace {
@@ -73,26 +74,12 @@ Camera camera_of(const CameraBlock& block, const std::array<double, 2>& magnific
 }
 
 PoseBlock block_of(const Rigid3& pose) {
-  const Eigen::AngleAxisd turn(pose.rotation);
-  const Eigen::Vector3d rotation = turn.angle() * turn.axis();
-  return {rotation.x(), rotation.y(), rotation.z(), pose.translation.x(), pose.translation.y(), pose.translation.z()};
+  const Eigen::Vector3d rotation = rotation_vector_of(pose.rotation), &t = pose.translation;
+  return {rotation.x(), rotation.y(), rotation.z(), t.x(), t.y(), t.z()};
 }
 
 Rigid3 pose_of(const PoseBlock& block) {
-  const Eigen::Vector3d rotation(block[0], block[1], block[2]);
-  const double angle = rotation.norm();
-  Rigid3 pose;
-  if (angle > 0) pose.rotation = Eigen::AngleAxisd(angle, rotation / angle);
-  pose.translation = {block[3], block[4], block[5]};
-  return pose;
-}
-
-double robust_scale(std::vector<double> sigmas) {
-  if (sigmas.empty()) return 1;
-  for (double& value : sigmas) value = std::abs(value);
-  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-  std::nth_element(sigmas.begin(), middle, sigmas.end());
-  return *middle / 0.6745;
+  return {rotation_by({block[0], block[1], block[2]}), {block[3], block[4], block[5]}};
 }
 
 struct Sigmas {
@@ -169,15 +156,12 @@ std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::ve
       if (problem.HasParameterBlock(wider.data()))
         problem.SetManifold(wider.data(), new ceres::SubsetManifold(channels, fixed_channels));
 
-  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres complains of, its results say
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_SCHUR;
   solver.max_num_iterations = 50;
   solver.function_tolerance = 1e-10;
-  solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  if (!summary.IsSolutionUsable()) return std::nullopt;
+  if (!solve_quietly(solver, problem, summary)) return std::nullopt;
 
   CameraAdjustment result;
   result.camera = camera_of(camera, magnifications, start);

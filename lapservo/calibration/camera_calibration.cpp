@@ -4,13 +4,13 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <opencv2/calib3d.hpp>
 
 #include "lapservo/calibration/board_edges.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {
 namespace {
@@ -38,11 +38,10 @@ Points points_of(const Board& board, const std::vector<BoardCorner>& corners) {
 }
 
 Rigid3 pose_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
-  const Eigen::Vector3d r(rotation_vector.at<double>(0), rotation_vector.at<double>(1), rotation_vector.at<double>(2));
-  Rigid3 pose;
-  if (r.norm() > 0) pose.rotation = Eigen::AngleAxisd(r.norm(), r.normalized());
-  pose.translation = {translation.at<double>(0), translation.at<double>(1), translation.at<double>(2)};
-  return pose;
+  const auto vector_of = [](const cv::Mat& m) {
+    return Eigen::Vector3d(m.at<double>(0), m.at<double>(1), m.at<double>(2));
+  };
+  return {rotation_by(vector_of(rotation_vector)), vector_of(translation)};
 }
 
 struct Fit {

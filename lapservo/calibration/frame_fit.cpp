@@ -9,7 +9,8 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
-#include "lapservo/core/median.h"
+#include "lapservo/calibration/robust_scale.h"
+#include "lapservo/calibration/solve_quietly.h"
 
 namespace lapservo::internal {
 namespace {
@@ -118,18 +119,15 @@ bool solve(Linearisation& at, Eigen::VectorXd& x, const Eigen::VectorXd& weights
   solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
   solver.max_num_iterations = 100;
   solver.function_tolerance = 1e-12;  // what priors alone hold costs next to nothing
-  solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  return summary.IsSolutionUsable() && x.allFinite();
+  return solve_quietly(solver, problem, summary) && x.allFinite();
 }
 
 Eigen::VectorXd robust_scales(const Eigen::MatrixXd& residuals) {
   Eigen::VectorXd scales(residuals.rows());
   for (Eigen::Index c = 0; c < residuals.rows(); ++c) {
-    std::vector<double> sizes(static_cast<std::size_t>(residuals.cols()));
-    for (std::size_t i = 0; i < sizes.size(); ++i) sizes[i] = std::abs(residuals(c, static_cast<Eigen::Index>(i)));
-    scales[c] = std::max(1e-3, 1.4826 * median(sizes));
+    const Eigen::VectorXd channel = residuals.row(c);
+    scales[c] = std::max(1e-3, robust_scale({channel.begin(), channel.end()}));
   }
   return scales;
 }

@@ -5,12 +5,12 @@
 #include <ceres/ceres.h>
 #include <cmath>
 #include <cstddef>
-#include <glog/logging.h>
 #include <utility>
 
 #include <Eigen/Cholesky>
 
-#include "lapservo/core/median.h"
+#include "lapservo/calibration/robust_scale.h"
+#include "lapservo/calibration/solve_quietly.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -168,13 +168,6 @@ void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& sha
     add(i, zero * shared_sigmas[static_cast<std::size_t>(i - shared_film)]);
 }
 
-// Of residuals over sigma, by the median of their size.
-double robust_scale(std::vector<double> sigmas) {
-  if (sigmas.empty()) return 1;
-  for (double& value : sigmas) value = std::abs(value);
-  return median(sigmas) / 0.6745;
-}
-
 // As the tracker has it (fine_fit.cpp): compression and motion blur move edges, in all frames alike.
 double doubt_scale(const std::vector<ViewMeasurements>& frames) {
   std::vector<double> sigmas_px, blurs_px;
@@ -234,15 +227,12 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
     fixed.push_back(gap);
   if (!fixed.empty()) problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, fixed));
 
-  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres complains of, its results say
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   solver.max_num_iterations = 30;
   solver.function_tolerance = 1e-9;
-  solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  if (!summary.IsSolutionUsable()) return std::nullopt;
+  if (!solve_quietly(solver, problem, summary)) return std::nullopt;
 
   Adjustment result;
   for (int i = 0; i < print_numbers; ++i) result.print[i] = shared[static_cast<std::size_t>(i)] * (i == gap ? 1 : mm);

@@ -13,6 +13,7 @@
 #include "lapservo/calibration/frame_fit.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/median.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/robot/backlash.h"
 
@@ -30,18 +31,6 @@ constexpr double unmodelled = 4;  // times the variance
 
 std::string too_few(std::size_t poses) {
   return fmt::format("the marker was found in {} frames, at least {} are needed", poses, min_poses);
-}
-
-Eigen::Quaterniond rotation_by(const Eigen::Vector3d& vector_rad) {
-  const double angle_rad = vector_rad.norm();
-  if (angle_rad < 1e-12) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, vector_rad / angle_rad));
-}
-
-Eigen::Vector3d rotation_vector(Eigen::Quaterniond q) {
-  if (q.w() < 0) q.coeffs() *= -1;
-  const Eigen::AngleAxisd turn(q);
-  return turn.angle() * turn.axis();
 }
 
 // x: rotation about the RCM frame's axes (3), translation (3), offsets of phi, rho, psi, delay; what frames have in
@@ -138,7 +127,7 @@ class ArmModel {
     const Observation::MarkerPose& seen = pose.marker;
     const Eigen::Vector3d ray = pose.origin().normalized(), side = ray.unitOrthogonal();
     const Eigen::Quaterniond& seen_rotation = seen.camera_from_marker.rotation;
-    const Eigen::Vector3d turn = seen_rotation * rotation_vector(expected.rotation.conjugate() * seen_rotation);
+    const Eigen::Vector3d turn = seen_rotation * rotation_vector_of(expected.rotation.conjugate() * seen_rotation);
     const Eigen::Vector3d axis = pose.axis(), hinge = axis.cross(ray).normalized();
     const Eigen::Vector3d off_m = (1 + x[scale]) * pose.origin() - expected.translation;
     const double sigma_axis_rad = seen.sigma_axis_rad / std::sqrt(2.0);

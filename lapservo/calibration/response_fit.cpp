@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
-#include <glog/logging.h>
 #include <limits>
 #include <numeric>
 #include <tuple>
@@ -17,7 +16,9 @@
 #include <Eigen/LU>
 #include <fmt/format.h>
 
+#include "lapservo/calibration/solve_quietly.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/median.h"
 
 namespace lapservo::internal {
 namespace {
@@ -251,12 +252,6 @@ Shared start_of(const Response& response) {
   return shared;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // The largest difference of values between two responses over [low, high], after the exposure that makes it smallest.
 double difference(const Response& a, const Response& b, double low, double high) {
   double best = std::numeric_limits<double>::max();
@@ -352,7 +347,6 @@ class ProfileFit {
     solver_.max_num_iterations = 40;
     solver_.function_tolerance = 1e-6;
     solver_.num_threads = 2;
-    solver_.logging_type = ceres::SILENT;
   }
 
   /// Of values over their sigmas.
@@ -425,8 +419,7 @@ class ProfileFit {
   }
   bool run(const std::vector<int>& fixed) {
     problem_.SetManifold(shared_.data(), fixed.empty() ? nullptr : new ceres::SubsetManifold(shared_numbers, fixed));
-    ceres::Solve(solver_, &problem_, &summary_);
-    return summary_.IsSolutionUsable();
+    return solve_quietly(solver_, problem_, summary_);
   }
 
   const std::vector<EdgeProfile>& profiles_;
@@ -511,7 +504,6 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
                                         bool try_named) {
   constexpr std::size_t least_profiles = 50;
   if (profiles.size() < least_profiles) return std::nullopt;
-  FLAGS_minloglevel = google::GLOG_FATAL;  // what Ceres complains of, its results say
   ResponseFit fit;
   ProfileFit fitted(profiles, start);
   fit.misfit[0] = fitted.misfit();

@@ -21,4 +21,15 @@ Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Ve
   return rotation.normalized();
 }
 
+Eigen::Quaterniond rotation_by(const Eigen::Vector3d& vector_rad) {
+  const double angle_rad = vector_rad.norm();
+  if (!(angle_rad > 0)) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, vector_rad / angle_rad));
+}
+
+Eigen::Vector3d rotation_vector_of(const Eigen::Quaterniond& rotation) {
+  const Eigen::AngleAxisd turn(rotation);
+  return turn.angle() * turn.axis();
+}
+
 }  // namespace lapservo::internal

@@ -9,4 +9,8 @@ namespace lapservo::internal {
 /// one, for a minute under sanitizers.
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
 
+/// The rotation about a vector's direction by its length, and back: the vector of the shorter way, of at most pi.
+Eigen::Quaterniond rotation_by(const Eigen::Vector3d& vector_rad);
+Eigen::Vector3d rotation_vector_of(const Eigen::Quaterniond& rotation);
+
 }  // namespace lapservo::internal

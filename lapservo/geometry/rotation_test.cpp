@@ -37,5 +37,15 @@ TEST(RotationBetween, OfEqualDirectionsIsNoneAndOfOppositeOnesHalfATurn) {
     }
 }
 
+TEST(RotationVector, GoesThereAndBackTheShorterWay) {
+  for (const double angle_rad : {0.0, 1e-9, 0.3, 3.1}) {
+    const Eigen::Vector3d vector = angle_rad * Eigen::Vector3d(1, -2, 2) / 3;
+    Eigen::Quaterniond rotation = rotation_by(vector);
+    EXPECT_LT((rotation_vector_of(rotation) - vector).norm(), 1e-12);
+    rotation.coeffs() *= -1;  // the same rotation
+    EXPECT_LT((rotation_vector_of(rotation) - vector).norm(), 1e-12);
+  }
+}
+
 }  // namespace
 }  // namespace lapservo::internal
