@@ -10,6 +10,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/median.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/joint_conversion.h"
 
 namespace lapservo::internal {
 namespace {
@@ -73,17 +74,12 @@ void turn_over(Rigid3& camera_from_rcm, Joints& joints) {
   joints.offset[1] = pi - joints.offset[1];
 }
 
-double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
-  return a.angularDistance(b);
-}
-
 // psi as the joint's sign makes it agree with the turns seen: direction and length of the mean of exp(i difference).
 std::complex<double> mean_turn(const std::vector<TimedPose>& poses, const std::vector<std::array<double, 4>>& joints,
                                const Marker& marker, const ArmGuess& guess, double sign) {
   std::complex<double> sum = 0;
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const JointVector q{guess.joints.sign[0] * joints[i][0] + guess.joints.offset[0],
-                        guess.joints.sign[1] * joints[i][1] + guess.joints.offset[1], 0, 0};
+    const auto q = JointVector::from_vector(q_from_joints(guess.joints, Eigen::Vector4d(joints[i].data())));
     const Rigid3 unturned = camera_from_marker(marker, guess.camera_from_rcm * rcm_from_unrolled(q), 0);
     const Eigen::Matrix3d turn =
         (unturned.rotation.conjugate() * poses[i].marker.camera_from_marker.rotation).toRotationMatrix();
@@ -108,7 +104,7 @@ ArmGuess guess_arm(const Instrument& instrument, const std::vector<TimedPose>& p
     ArmGuess over = guess;
     turn_over(over.camera_from_rcm, over.joints);
     const Eigen::Quaterniond& given = instrument.camera_from_rcm->rotation;
-    if (angle_between(over.camera_from_rcm.rotation, given) < angle_between(guess.camera_from_rcm.rotation, given))
+    if (given.angularDistance(over.camera_from_rcm.rotation) < given.angularDistance(guess.camera_from_rcm.rotation))
       guess = over;
   }
 

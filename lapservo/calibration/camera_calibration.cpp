@@ -10,6 +10,7 @@
 
 #include "lapservo/calibration/board_edges.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/geometry/invertible.h"
 #include "lapservo/geometry/rotation.h"
 
 namespace lapservo::internal {
@@ -185,18 +186,6 @@ std::string too_alike(const CameraAdjustment& adjustment) {
       sigmas.fx_px, camera.fx_px, sigmas.cx_px, sigmas.cy_px);
 }
 
-// A rig needs a ray for every pixel: distortion that was seen in the middle only may fold at the border.
-bool covers_picture(const Camera& camera) {
-  constexpr int steps = 8;
-  for (int i = 0; i <= steps; ++i) {
-    const double u = (camera.width_px - 1.0) * i / steps, v = (camera.height_px - 1.0) * i / steps;
-    for (const Eigen::Vector2d& border : {Eigen::Vector2d(u, 0), Eigen::Vector2d(u, camera.height_px - 1),
-                                          Eigen::Vector2d(0, v), Eigen::Vector2d(camera.width_px - 1, v)})
-      if (!camera.ideal_from_raw(border)) return false;
-  }
-  return true;
-}
-
 struct Tilts {
   double up_down_rad = 0, sideways_rad = 0;  // the largest
 };
@@ -339,7 +328,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   calibration.poses = adjustment->camera_from_board;
   add_residuals(*adjustment, edges, calibration);
   if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
-  if (!covers_picture(calibration.camera))
+  if (!is_invertible(calibration.camera))
     return refuse("the distortion that fits the views can't be inverted at the picture's border: show the board there");
   return calibration;
 }

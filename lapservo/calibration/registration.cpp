@@ -15,6 +15,7 @@
 #include "lapservo/core/median.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/joint_conversion.h"
 #include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
@@ -93,9 +94,8 @@ class ArmModel {
           std::clamp(poses_[i].time_s - x[delay], instrument.time_s.front(), instrument.time_s.back());
       const auto at = instrument.at(time_s);
       if (!at) continue;
-      std::array<double, 4> q;
-      for (std::size_t j = 0; j < 4; ++j) q[j] = joints.sign[j] * (*at)[j] + joints.offset[j];
-      all.col(static_cast<Eigen::Index>(i)) = difference(poses_[i], camera_from_rcm, {q[0], q[1], q[2], q[3]}, x);
+      const auto q = JointVector::from_vector(q_from_joints(joints, Eigen::Vector4d(at->data())));
+      all.col(static_cast<Eigen::Index>(i)) = difference(poses_[i], camera_from_rcm, q, x);
     }
     return all;
   }

@@ -9,6 +9,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/median.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/joint_conversion.h"
 
 namespace lapservo::internal {
 namespace {
@@ -17,7 +18,7 @@ constexpr std::size_t min_frames = 8;
 
 std::optional<double> psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
   const auto at = recording.at(time_s);
-  return at ? std::optional(joints.sign[3] * (*at)[3] + joints.offset[3]) : std::nullopt;
+  return at ? std::optional(q_from_joints(joints, Eigen::Vector4d(at->data()))[3]) : std::nullopt;
 }
 
 // psi in the RCM's azimuths of a shaft in a free pose: its axis as theta and phi have it, its turn about that.

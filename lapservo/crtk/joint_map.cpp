@@ -3,21 +3,6 @@
 #include <algorithm>
 
 namespace lapservo::internal {
-namespace {
-
-Eigen::Vector4d vector_of(const std::array<double, 4>& values) {
-  return Eigen::Vector4d(values.data());
-}
-
-}  // namespace
-
-Eigen::Vector4d q_from_joints(const Joints& joints, const Eigen::Vector4d& positions) {
-  return vector_of(joints.sign).cwiseProduct(positions) + vector_of(joints.offset);
-}
-
-Eigen::Vector4d joints_from_q(const Joints& joints, const Eigen::Vector4d& q) {
-  return vector_of(joints.sign).cwiseProduct(q - vector_of(joints.offset));
-}
 
 JointLimits limits_of_q(const Joints& joints, const JointLimits& limits) {
   const Eigen::Vector4d a = q_from_joints(joints, limits.lower), b = q_from_joints(joints, limits.upper);

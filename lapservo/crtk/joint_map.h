@@ -6,17 +6,10 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "lapservo/control/controller_config.h"
-#include "lapservo/rig/rig.h"
+#include "lapservo/rig/joint_conversion.h"
 
 namespace lapservo::internal {
-
-/// theta, phi, rho, psi of the arm's four joints, in the order of Joints::names, and back: q_i = sign_i * joint_i +
-/// offset_i.
-Eigen::Vector4d q_from_joints(const Joints& joints, const Eigen::Vector4d& positions);
-Eigen::Vector4d joints_from_q(const Joints& joints, const Eigen::Vector4d& q);
 
 /// Bounds of q from bounds of the arm's joints.
 JointLimits limits_of_q(const Joints& joints, const JointLimits& limits);

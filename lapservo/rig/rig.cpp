@@ -10,6 +10,7 @@
 
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
+#include "lapservo/geometry/invertible.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/rig/response_field.h"
 
@@ -30,15 +31,8 @@ int parse_image_size(const YamlField& field) {
 
 // Every pixel must have a ray, else a marker there would be seen and not understood.
 void check_invertible(const Camera& camera, const YamlField& coefficients) {
-  const double u_end = camera.width_px - 1, v_end = camera.height_px - 1;
-  constexpr int steps = 8;
-  for (int i = 0; i <= steps; ++i)
-    for (const Eigen::Vector2d& border :
-         {Eigen::Vector2d(u_end * i / steps, 0), Eigen::Vector2d(u_end * i / steps, v_end),
-          Eigen::Vector2d(0, v_end * i / steps), Eigen::Vector2d(u_end, v_end * i / steps)})
-      if (!camera.ideal_from_raw(border))
-        coefficients.fail("not invertible at the image's border",
-                          "k1 k2 p1 p2 k3 of a calibration that covers the image");
+  if (!is_invertible(camera))
+    coefficients.fail("not invertible at the image's border", "k1 k2 p1 p2 k3 of a calibration that covers the image");
 }
 
 constexpr double rotation_tolerance = 2e-4;  // what four typed digits leave

@@ -1,0 +1,16 @@
+#include "lapservo/geometry/invertible.h"
+
+namespace lapservo::internal {
+
+bool is_invertible(const Camera& camera) {
+  const double u_end = camera.width_px - 1, v_end = camera.height_px - 1;
+  constexpr int steps = 8;
+  for (int i = 0; i <= steps; ++i)
+    for (const Eigen::Vector2d& border :
+         {Eigen::Vector2d(u_end * i / steps, 0), Eigen::Vector2d(u_end * i / steps, v_end),
+          Eigen::Vector2d(0, v_end * i / steps), Eigen::Vector2d(u_end, v_end * i / steps)})
+      if (!camera.ideal_from_raw(border)) return false;
+  return true;
+}
+
+}  // namespace lapservo::internal
