@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/calibrate_inputs.h"
 #include "apps/lapservo/camera_report.h"
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
@@ -72,7 +73,7 @@ Board board_of(const CameraOptions& options) {
   return board;
 }
 
-InputFiles checked_files(const CameraOptions& options, const std::optional<Rig>& rig) {
+void check_files(const CameraOptions& options, const std::optional<Rig>& rig) {
   if (options.rig.empty() && options.out.empty() && options.camera_info.empty())
     throw InputError("calibrate camera", "has no place for its result, expected --rig, --out or --camera-info");
   InputFiles files;
@@ -90,10 +91,9 @@ InputFiles checked_files(const CameraOptions& options, const std::optional<Rig>&
       throw InputError(place, "is the place for two results, expected a place for each");
     places.push_back(canonical);
   }
-  if (!rig) return files;
+  if (!rig) return;
   files.add_rig(options.rig, *rig);
   files.refuse_as_output(options.camera_info), files.refuse_as_output(options.report);
-  return files;
 }
 
 struct Seen {
@@ -101,13 +101,6 @@ struct Seen {
   std::vector<std::string> without_board;
   bool stopped = false;
 };
-
-void check_size(const Frame& frame, const std::string& input, const cv::Size& expected, const std::string& whose) {
-  if (frame.bgr.size() != expected)
-    throw InputError(frame.file.empty() ? input : frame.file.string(), "size",
-                     fmt::format("{} x {}", frame.bgr.cols, frame.bgr.rows),
-                     fmt::format("{} x {}, as {} has it", expected.width, expected.height, whose));
-}
 
 // Every picture of a folder; of videos and cameras those that differ, a few a second.
 void look_at(const std::string& input, BoardViews& views, std::optional<cv::Size>& size, std::string& whose,
@@ -141,8 +134,7 @@ void look_at(const std::string& input, BoardViews& views, std::optional<cv::Size
   }
   // A camera is stopped when there are enough views: that is how its calibration ends.
   if (live) seen.stopped = false;
-  if (const std::string complaint = source->complaint(); !complaint.empty())
-    std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", input.c_str(), complaint.c_str());
+  say_complaint(input, *source);
 }
 
 int refuse(const CameraOptions& options, const std::string& why) {
@@ -199,7 +191,7 @@ int run_camera(const CameraOptions& options) {
   const Board board = board_of(options);
   std::optional<Rig> rig;
   if (!options.rig.empty()) rig = load_rig(options.rig);
-  checked_files(options, rig);
+  check_files(options, rig);
   watch_for_interrupts();
 
   BoardViews chosen(board, options.views);

@@ -53,6 +53,18 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
   inputs.refuse_as_output(options.report);
 }
 
+void check_size(const Frame& frame, const std::string& input, const cv::Size& expected, const std::string& whose) {
+  if (frame.bgr.size() != expected)
+    throw InputError(frame.file.empty() ? input : frame.file.string(), "size",
+                     fmt::format("{} x {}", frame.bgr.cols, frame.bgr.rows),
+                     fmt::format("{} x {}, as {} has it", expected.width, expected.height, whose));
+}
+
+void say_complaint(const std::string& input, const FrameSource& source) {
+  if (const std::string complaint = source.complaint(); !complaint.empty())
+    std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", input.c_str(), complaint.c_str());
+}
+
 FramesRead read_frames(const CalibrateOptions& options, const Rig& rig, FrameSource& source, int every,
                        const std::function<std::string(const cv::Mat&, double)>& look) {
   const bool deinterlace = options.deinterlace || rig.camera.deinterlace;
@@ -63,10 +75,7 @@ FramesRead read_frames(const CalibrateOptions& options, const Rig& rig, FrameSou
   while (!(frames.stopped = interrupted())) {
     const auto frame = source.next();
     if (!frame) break;
-    if (frame->bgr.cols != rig.camera.width_px || frame->bgr.rows != rig.camera.height_px)
-      throw InputError(frame->file.empty() ? options.input : frame->file.string(), "size",
-                       fmt::format("{} x {}", frame->bgr.cols, frame->bgr.rows),
-                       fmt::format("{} x {}, as the rig's camera has it", rig.camera.width_px, rig.camera.height_px));
+    check_size(*frame, options.input, {rig.camera.width_px, rig.camera.height_px}, "the rig's camera");
     if (read++ % every != 0) continue;
     if (frame->flaw) {
       ++frames.flawed;

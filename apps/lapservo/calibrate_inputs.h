@@ -25,6 +25,12 @@ std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options);
 /// Throws InputError when a result would go over an input or over the other result.
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
 
+/// Throws InputError, naming the frame's file or else `input`, at a frame of another size than `whose`.
+void check_size(const Frame& frame, const std::string& input, const cv::Size& expected, const std::string& whose);
+
+/// What a source could not read, on stderr, when there is such.
+void say_complaint(const std::string& input, const FrameSource& source);
+
 /// What became of a recording's frames.
 struct FramesRead {
   int looked_at = 0, flawed = 0;

@@ -75,8 +75,7 @@ int run_marker(const CalibrateOptions& options) {
 
   Seen frames = seen(options, rig, index, *source);
   if (frames.read.stopped) return refuse_calibration(options, "stopped");
-  if (const std::string complaint = source->complaint(); !complaint.empty())
-    std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", options.input.c_str(), complaint.c_str());
+  say_complaint(options.input, *source);
   if (frames.found == 0)
     return refuse_calibration(
         options, fmt::format("{} is in none of {} frames{}: look at the rig's hues_deg and diameter_m", instrument.name,

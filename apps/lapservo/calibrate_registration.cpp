@@ -82,8 +82,7 @@ Poses poses_in_frames(const CalibrateOptions& options, Rig rig, std::size_t inde
                                         return fmt::format(", {} in {}", rig.instruments[index].name, poses.all.size());
                                       });
   poses.stopped = read.stopped;
-  if (const std::string complaint = source->complaint(); !complaint.empty())
-    std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", options.input.c_str(), complaint.c_str());
+  say_complaint(options.input, *source);
   if (poses.all.empty())
     poses.none = fmt::format("{} is in none of {} frames{}", rig.instruments[index].name, read.looked_at,
                              read.flawed ? fmt::format(" ({} are damaged)", read.flawed) : "");

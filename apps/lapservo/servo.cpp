@@ -112,8 +112,7 @@ int simulate(const ServoOptions& options) {
     folder->commit();
     std::printf("log, rig and controller: %s\n", options.out.c_str());
   }
-  const bool refused = options.strict && summary.registration_contradicted();
-  return summary.converged() && !summary.ended_in_hold() && !refused ? 0 : 1;
+  return summary.succeeded(options.strict) ? 0 : 1;
 }
 
 int replay_log(const ServoOptions& options) {

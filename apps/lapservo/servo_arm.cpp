@@ -210,9 +210,7 @@ int steer_arm(const ServoOptions& options) {
   std::printf("%s\n", watcher.summary().text().c_str());
   if (folder) folder->commit();
   const bool ended_early = robot.blocked() == Blocked::foreign_command;
-  const Summary& summary = watcher.summary();
-  const bool refused = options.strict && summary.registration_contradicted();
-  return summary.converged() && !summary.ended_in_hold() && !ended_early && !refused ? 0 : 1;
+  return watcher.summary().succeeded(options.strict) && !ended_early ? 0 : 1;
 }
 
 }  // namespace lapservo::app

@@ -31,7 +31,8 @@ class Summary {
   /// By the truth, where it is known, else by the estimate.
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
   bool converged() const { return convergence_.reached_s().has_value(); }
-  bool ended_in_hold() const { return held_at_end_.has_value(); }
+  /// Converged and not in a hold at the end; when `strict`, with a registration that no image contradicted.
+  bool succeeded(bool strict) const { return converged() && !held_at_end_ && !(strict && registration_contradicted()); }
   bool registration_contradicted() const { return contradicted_ > 0; }
   std::string text() const;
 

@@ -1,7 +1,7 @@
 #include "apps/lapservo/simulation.h"
 
 #include "lapservo/core/error.h"
-#ifdef LAPSERVO_MUJOCO
+#ifdef LAPSERVO_MUJOCO_ARM
 #include "lapservo/mujoco_arm/mujoco_arm.h"
 #endif
 
@@ -18,7 +18,7 @@ void add_simulation_options(CLI::App& command, SimulationOptions& options, const
 std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, const Rig& rig,
                                           const SimulatorConfig& config, const JointVector& q_measured) {
   if (options.dynamics == "first-order") return std::make_unique<Simulator>(rig, config, q_measured);
-#ifdef LAPSERVO_MUJOCO
+#ifdef LAPSERVO_MUJOCO_ARM
   internal::MujocoArmConfig arm;
   arm.joints = config.arm;
   return std::make_unique<Simulator>(rig, config, std::make_unique<internal::MujocoArm>(arm, q_measured.vector()));

@@ -1,7 +1,5 @@
 #include "apps/lapservo/transports.h"
 
-#include <cstdlib>
-
 #include "lapservo/core/error.h"
 #ifdef LAPSERVO_ROS1
 #include "transports/ros1/ros1_names.h"
@@ -24,8 +22,7 @@ namespace {
 
 std::string resolved_name(const Address& address, [[maybe_unused]] const std::string& option) {
 #ifdef LAPSERVO_ROS1
-  const char* const space = std::getenv("ROS_NAMESPACE");
-  if (address.transport == "ros1") return resolved_ros1_name(address.name, space ? space : "", option);
+  if (address.transport == "ros1") return resolved_ros1_name(address.name, ros1_namespace(), option);
 #endif
   return address.name;
 }

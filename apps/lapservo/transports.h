@@ -11,8 +11,8 @@ namespace lapservo::app {
 struct Address {
   std::string transport, name;
 };
-/// A name as the transport knows it: in ROS 1 it stands in ROS_NAMESPACE unless it begins with a slash. Throws InputError,
-/// naming `option`, for what is none.
+/// A name as the transport knows it: in ROS 1 it stands in ROS_NAMESPACE unless it begins with a slash. Throws
+/// InputError, naming `option`, for what is none.
 std::string resolved_name(const Address& address, const std::string& option);
 /// With its name resolved. Throws InputError, naming `option`, for what has no such form.
 Address address_of(const std::string& text, const std::string& option);

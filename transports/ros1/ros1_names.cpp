@@ -1,6 +1,7 @@
 #include "transports/ros1/ros1_names.h"
 
 #include <charconv>
+#include <cstdlib>
 
 #include "lapservo/core/error.h"
 
@@ -49,6 +50,11 @@ MasterAddress master_address(const std::string& text) {
 
 std::string to_string(const MasterAddress& address) {
   return "http://" + address.host + ":" + std::to_string(address.port);
+}
+
+std::string ros1_namespace() {
+  const char* const space = std::getenv("ROS_NAMESPACE");
+  return space ? space : "";
 }
 
 std::string resolved_ros1_name(const std::string& name, const std::string& ros_namespace, const std::string& what) {

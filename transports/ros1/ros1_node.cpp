@@ -10,6 +10,7 @@
 
 #include "lapservo/core/error.h"
 #include "transports/ros1/ros1_master.h"
+#include "transports/ros1/ros1_names.h"
 
 namespace lapservo::internal {
 namespace {
@@ -37,7 +38,7 @@ std::shared_ptr<Ros1Node> Ros1Node::get(const std::string& name) {
 
 // What roscpp answers with an end of the process, or waits for without one, is checked before.
 Ros1Node::Ros1Node(const std::string& name) : master_(master_address(environment("ROS_MASTER_URI"))) {
-  resolved_ros1_name(name, environment("ROS_NAMESPACE"), "ROS_NAMESPACE");
+  resolved_ros1_name(name, ros1_namespace(), "ROS_NAMESPACE");
   require_ros1_master(master_);
   ros::console::initialize();
   ros::console::backend::function_print = say;

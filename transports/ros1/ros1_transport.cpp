@@ -2,7 +2,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
@@ -17,8 +16,7 @@ constexpr std::uint32_t few = 10;    // as ROS 2 keeps by default
 constexpr std::uint32_t newest = 2;  // of pictures
 
 std::string full_name(const std::string& topic) {
-  const char* const space = std::getenv("ROS_NAMESPACE");
-  return resolved_ros1_name(topic, space ? space : "", "topic");
+  return resolved_ros1_name(topic, ros1_namespace(), "topic");
 }
 
 template <typename Message>
