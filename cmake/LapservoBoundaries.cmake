@@ -1,8 +1,8 @@
 # What lapservo_module() was told, kept for check_boundaries.cmake, which compares what the files include with it.
 function(lapservo_remember_module name)
-  cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;LONG_TESTS;TEST_USES" ${ARGN})
   set(text "list(APPEND modules ${name})\n")
-  foreach(what IN ITEMS PUBLIC_HEADERS USES PRIVATE TESTS TEST_USES)
+  foreach(what IN ITEMS PUBLIC_HEADERS USES PRIVATE TESTS LONG_TESTS TEST_USES)
     string(APPEND text "set(${name}_${what} \"${M_${what}}\")\n")
   endforeach()
   set_property(GLOBAL APPEND_STRING PROPERTY LAPSERVO_MODULES "${text}")

@@ -1,10 +1,11 @@
 # One folder of lapservo/ is one target. lapservo_module(NAME SOURCES ... USES ... TESTS ...) declares what the folder
 # compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE), its tests,
-# which stand beside the sources, and the headers that are installed (PUBLIC_HEADERS); all other headers are internal. The
-# linker and the test `boundaries` (LapservoBoundaries.cmake) enforce the direction of dependencies.
+# which stand beside the sources (LONG_TESTS: those with something that is too slow under sanitizers), and the headers that
+# are installed (PUBLIC_HEADERS); all other headers are internal. The linker and the test `boundaries`
+# (LapservoBoundaries.cmake) enforce the direction of dependencies.
 # What has no public header is nobody's library: it goes into the tool.
 function(lapservo_module name)
-  cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;LONG_TESTS;TEST_USES" ${ARGN})
   set(target lapservo_${name})
   set(scope PUBLIC)
   if(NOT M_SOURCES)
@@ -32,8 +33,12 @@ function(lapservo_module name)
     lapservo_install(${target} ${M_PUBLIC_HEADERS})
   endif()
   lapservo_remember_module(${name} ${ARGN})
-  if(LAPSERVO_BUILD_TESTS AND M_TESTS)
-    add_executable(${name}_test ${M_TESTS})
+  set(tests ${M_LONG_TESTS})
+  if(LAPSERVO_SHORT_TESTS)
+    list(APPEND tests ${M_TESTS})
+  endif()
+  if(LAPSERVO_BUILD_TESTS AND tests)
+    add_executable(${name}_test ${tests})
     target_link_libraries(${name}_test PRIVATE lapservo::${name} ${M_TEST_USES} lapservo_testing lapservo_flags GTest::gtest_main)
     lapservo_compile_quickly(${name}_test)
     gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 900)
@@ -51,11 +56,24 @@ function(lapservo_install target)
   install(TARGETS ${target} EXPORT lapservoTargets FILE_SET HEADERS)
 endfunction()
 
-# For tests: they are compiled more often than they run.
+# For tests and the tool: they are compiled more often than they run. (Clang's sanitizers cost optimisation most of all; GCC
+# takes longer to compile Eigen without it.)
+if(LAPSERVO_SANITIZE)
+  set(lapservo_quick_options -O0)
+else()
+  set(lapservo_quick_options -O1)
+endif()
 function(lapservo_compile_quickly target)
-  target_compile_options(${target} PRIVATE -O1)
+  target_compile_options(${target} PRIVATE ${lapservo_quick_options})
   if(LAPSERVO_PRECOMPILE)
     target_precompile_headers(${target} REUSE_FROM lapservo_tests_precompiled)
+  endif()
+endfunction()
+
+# Of a folder's tests, those that compute much themselves: where sanitized, too slow without optimisation.
+function(lapservo_optimise)
+  if(LAPSERVO_SANITIZE)
+    set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -O1 SKIP_PRECOMPILE_HEADERS ON)
   endif()
 endfunction()
 
@@ -66,13 +84,21 @@ target_compile_options(lapservo_flags INTERFACE -Wall -Wextra -Wpedantic -Wshado
   $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond -Wlogical-op -Wno-restrict>)
 if(LAPSERVO_SANITIZE)
   # Not those checks of UBSan that AddressSanitizer makes as well: they take a quarter of the time to compile Eigen.
-  add_compile_options(-fsanitize=address,undefined -fno-sanitize=null,object-size,pointer-overflow,vptr
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize=null,object-size,pointer-overflow,vptr,alignment
     -fno-sanitize-recover=undefined -fno-omit-frame-pointer)
   add_link_options(-fsanitize=address,undefined -fno-sanitize=vptr)
 endif()
-if(LAPSERVO_BUILD_FUZZERS)
-  add_compile_options(-fsanitize=fuzzer-no-link)
-endif()
+
+# For what reads what others wrote: bytes that are cast to numbers are aligned, and libFuzzer sees which branches an input
+# takes (what -fsanitize=fuzzer-no-link means, but that one does not go with headers that were precompiled without).
+function(lapservo_fuzzed target)
+  if(LAPSERVO_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=alignment)
+  endif()
+  if(LAPSERVO_BUILD_FUZZERS)
+    target_compile_options(${target} PRIVATE -fsanitize-coverage=inline-8bit-counters,indirect-calls,trace-cmp,pc-table)
+  endif()
+endfunction()
 
 # What nearly every file includes, compiled once for the library and once for the tests: halves the time to build from
 # nothing. Not with ccache, which does better alone.
@@ -87,7 +113,7 @@ if(LAPSERVO_PRECOMPILE)
   if(LAPSERVO_BUILD_TESTS)
     add_library(lapservo_tests_precompiled OBJECT ${CMAKE_BINARY_DIR}/precompiled.cpp)
     target_precompile_headers(lapservo_tests_precompiled PRIVATE ${headers} <gtest/gtest.h>)
-    target_compile_options(lapservo_tests_precompiled PRIVATE -O1)
+    target_compile_options(lapservo_tests_precompiled PRIVATE ${lapservo_quick_options})
     target_link_libraries(lapservo_tests_precompiled PRIVATE lapservo_flags Eigen3::Eigen GTest::gtest)
   endif()
 endif()

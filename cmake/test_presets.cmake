@@ -1,13 +1,41 @@
-# CMake's regular expressions know nine groups; ctest leaves a filter with more aside without a word.
+# Of CMakePresets.json: that each filter is an expression, and that what is left out of the sanitized tests runs elsewhere.
+# MODULES: what lapservo_module() was told.
 cmake_minimum_required(VERSION 3.25)
-file(READ ${CMAKE_CURRENT_LIST_DIR}/../CMakePresets.json presets)
+include(${MODULES})
+set(source ${CMAKE_CURRENT_LIST_DIR}/..)
+file(READ ${source}/CMakePresets.json presets)
+
+# A folder's tests are built a second time, without sanitizers, only if they stand in a file of LONG_TESTS.
+function(check_built_elsewhere test)
+  if(NOT test MATCHES "^\\^([a-z_]+)\\.([A-Za-z]+)\\.([A-Za-z]+)\\$$" OR NOT CMAKE_MATCH_1 IN_LIST modules)
+    return()
+  endif()
+  set(module ${CMAKE_MATCH_1})
+  set(declared "\\(${CMAKE_MATCH_2}, ${CMAKE_MATCH_3}\\)")
+  foreach(file IN LISTS ${module}_LONG_TESTS)
+    file(STRINGS ${source}/lapservo/${module}/${file} found REGEX "${declared}")
+    if(found)
+      return()
+    endif()
+  endforeach()
+  message(SEND_ERROR "CMakePresets.json leaves ${test} out of the sanitized tests, and no file of ${module}'s LONG_TESTS has it")
+endfunction()
+
 string(JSON count LENGTH ${presets} testPresets)
 math(EXPR last "${count} - 1")
 foreach(i RANGE ${last})
   foreach(kind include exclude)
     string(JSON name ERROR_VARIABLE none GET ${presets} testPresets ${i} filter ${kind} name)
     if(NOT none)
-      string(REGEX MATCH "${name}" matched "a test")  # an error when it is no expression
+      # CMake's expressions know nine groups; ctest leaves a filter with more aside without a word. Here it is an error.
+      string(REGEX MATCH "${name}" matched "a test")
+    endif()
+    string(JSON preset GET ${presets} testPresets ${i} name)
+    if(NOT none AND preset STREQUAL asan-ubsan)
+      string(REPLACE "|" ";" left_out "${name}")
+      foreach(test IN LISTS left_out)
+        check_built_elsewhere("${test}")
+      endforeach()
     endif()
   endforeach()
 endforeach()

@@ -170,7 +170,8 @@ double direction_spread_rad(const Lines& lines) {
     const Eigen::Vector2d along = (line.to_px - line.from_px).normalized();
     mean += along * along.transpose() / static_cast<double>(lines.size());
   }
-  const double across = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(mean, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  const double across =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(mean, Eigen::EigenvaluesOnly).eigenvalues()[0];
   return std::asin(std::sqrt(std::clamp(across, 0.0, 1.0)));
 }
 
@@ -186,7 +187,9 @@ double lever_px(const Lines& lines, const Eigen::Vector2d& o) {
 }
 
 double larger_sigma(const Eigen::Matrix2d& covariance) {
-  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(covariance, Eigen::EigenvaluesOnly).eigenvalues()[1]);
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>()
+                       .computeDirect(covariance, Eigen::EigenvaluesOnly)
+                       .eigenvalues()[1]);
 }
 
 constexpr Words<RcmStatus, 4> words{{{RcmStatus::ok, "ok"},

@@ -65,7 +65,7 @@ std::optional<BlobShape> shape_of(const Scene& scene, const Blob& blob) {
   shape.centre /= static_cast<double>(shape.ideal_px.size());
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (const Eigen::Vector2d& p : shape.ideal_px) scatter += (p - shape.centre) * (p - shape.centre).transpose();
-  shape.main_direction = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(scatter).eigenvectors().col(1);
+  shape.main_direction = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(scatter).eigenvectors().col(1);
   for (std::size_t i = 0; i < 3; ++i)
     if (shape.band_samples[i]) shape.band_centres[i] /= shape.band_samples[i];
   return shape;
