@@ -178,9 +178,9 @@ TEST(CdrDecoder, ReadsBothByteOrdersAndNothingThatIsCutShort) {
     for (std::size_t size = 0; size < bytes.size(); ++size)
       EXPECT_FALSE(decode_cdr<JointMessage>(std::span(bytes).first(size))) << size;
     auto longer = bytes;
-    longer.resize(bytes.size() + 3);
+    longer.resize(bytes.size() + 8);
     EXPECT_TRUE(decode_cdr<JointMessage>(longer));  // filled up
-    longer.resize(bytes.size() + 4);
+    longer.resize(bytes.size() + 9);
     EXPECT_FALSE(decode_cdr<JointMessage>(longer));
   }
 }

@@ -58,8 +58,8 @@ class CdrBytes {
     text();  // frame_id
     return nanosec < 1000000000u ? sec + 1e-9 * nanosec : std::numeric_limits<double>::quiet_NaN();
   }
-  /// Some writers fill up to a multiple of four bytes.
-  bool whole() const { return whole_ && bytes_.size() - at_ < 4; }
+  /// Some writers fill up to a multiple of four or eight bytes.
+  bool whole() const { return whole_ && bytes_.size() - at_ <= 8; }
 
  private:
   template <typename T>
