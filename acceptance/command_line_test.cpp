@@ -206,6 +206,7 @@ TEST_F(CommandLine, BagsThatCannotBeRead) {
                                             {"run.db3", "SQLite format 3", "ROS 2 bag"}}) {
     const std::string bag = in(name, content);
     expect_refused(track(bag), {name, what});
+    expect_refused("servo --replay " + bag, {name, "lapservo track"});
     expect_refused("calibrate registration " + bag + " --rig " + rig_ + " --out " + out("rig.yaml"), {name, what});
   }
   expect_refused("track " + in("picture.png", "?") + " --image-topic /image --out " + out("obs.csv"),

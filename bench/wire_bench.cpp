@@ -30,12 +30,7 @@
 #include "lapservo/servo/image_window.h"
 #include "lapservo/servo/run.h"
 #include "lapservo/sim_robot/sim_robot.h"
-#ifdef LAPSERVO_ROS1
-#include "transports/ros1/ros1_transport.h"
-#endif
-#ifdef LAPSERVO_ROS2
-#include "transports/ros2/ros2_transport.h"
-#endif
+#include "transports/named_transport.h"
 
 namespace lapservo::internal {
 namespace {
@@ -47,16 +42,6 @@ struct Options {
   std::string transport, images;
   double duration_s = 60, ticks_per_s = 120;
 };
-
-std::unique_ptr<Transport> make_transport(const std::string& name, const std::string& node) {
-#ifdef LAPSERVO_ROS1
-  if (name == "ros1") return std::make_unique<Ros1Transport>(node);
-#endif
-#ifdef LAPSERVO_ROS2
-  if (name == "ros2") return std::make_unique<Ros2Transport>(node);
-#endif
-  throw std::invalid_argument("no transport " + name + " in this build");
-}
 
 ControllerConfig controller_of(const Rig& rig, double ticks_per_s) {
   ControllerConfig config;
@@ -78,7 +63,7 @@ void be_the_arm(const Options& options, const Rig& rig, int to) {
   const JointVector start = random_start(sinusoids(paper_sinusoids()), 20, feature_model(rig), controller_of(rig, 30),
                                          simulated.arm.joint_offset, random, "the paper's trajectory");
   Simulator simulator(rig, simulated, start);
-  const auto transport = make_transport(options.transport, "lapservo_bench_robot");
+  const auto transport = named_transport(options.transport, "lapservo_bench_robot");
   SimRobotConfig config;
   Transport::Publisher<CompressedImageMessage> say_compressed;
   if (options.images == "compressed") {
@@ -205,7 +190,7 @@ std::vector<double> stamps_of(pid_t arm, int from) {
 }
 
 void measure(const Options& options, const Rig& rig, pid_t arm, int from) {
-  const auto transport = make_transport(options.transport, "lapservo_bench");
+  const auto transport = named_transport(options.transport, "lapservo_bench");
   const SteadyClock clock;
   SteadyClock loop_clock;
   InterlockConfig interlock;

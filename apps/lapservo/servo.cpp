@@ -25,6 +25,7 @@
 #include "lapservo/servo/run.h"
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/sim/simulator.h"
+#include "recordings/open_bag.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -116,6 +117,9 @@ int simulate(const ServoOptions& options) {
 }
 
 int replay_log(const ServoOptions& options) {
+  if (is_bag(options.replay))
+    throw InputError(options.replay,
+                     "is a bag, which holds no decisions, expected a run's log.csv: `lapservo track` measures a bag");
   const fs::path log = options.replay, folder = log.parent_path();
   const Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});

@@ -49,6 +49,7 @@ class Bytes {
     text();  // frame_id
     return nsec < 1000000000u ? sec + 1e-9 * nsec : std::numeric_limits<double>::quiet_NaN();
   }
+  bool whole() const { return whole_; }
   template <typename Message>
   std::optional<Message> result(Message&& message) const {
     if (!whole_ || !rest_.empty()) return std::nullopt;
@@ -69,6 +70,18 @@ class Bytes {
   std::span<const std::uint8_t> rest_;
   bool whole_ = true;
 };
+
+void read_fields(Bytes& from, TrajectoryMessage& message) {
+  message.names = from.texts();
+  for (auto count = from.number<std::uint32_t>(); count > 0 && from.whole(); --count) {
+    TrajectoryMessage::Point point;
+    point.positions = from.numbers<double>();
+    for (int i = 0; i < 3; ++i) from.numbers<double>();  // velocities, accelerations, effort
+    point.time_s = from.number<std::int32_t>();
+    point.time_s += 1e-9 * from.number<std::int32_t>();
+    message.points.push_back(std::move(point));
+  }
+}
 
 void read_fields(Bytes& from, OperatingStateMessage& message) {
   message.state = from.text();
@@ -94,6 +107,11 @@ std::optional<Message> decode(std::span<const std::uint8_t> bytes) {
 template <>
 std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
   return decode<JointMessage>(bytes);
+}
+
+template <>
+std::optional<TrajectoryMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
+  return decode<TrajectoryMessage>(bytes);
 }
 
 template <>

@@ -149,6 +149,14 @@ TEST(WireBytes, OfWhatSteersAnArm) {
                          {"position[2]", "1e-300"},
                          {"velocity", "0 of them"},
                          {"effort", "0 of them"}});
+  const TrajectoryMessage trajectory{stamp_s, {"s_rad", "r_px"}, {{0, {1, 2}}, {2.25, {3, 4}}}};
+  expect_fields(sent_as("trajectory_msgs/JointTrajectory", trajectory),
+                {{"joint_names[1]", "r_px"},
+                 {"points", "2 of them"},
+                 {"points[0].velocities", "0 of them"},
+                 {"points[1].positions[1]", "4"},
+                 {"points[1].time_from_start.sec", "2"},
+                 {"points[1].time_from_start.nanosec", "250000000"}});
   const Fields state = sent_as("crtk_msgs/OperatingState", OperatingStateMessage{stamp_s, "ENABLED", true, false});
   expect_fields(state, stamp);
   expect_fields(state, {{"state", "ENABLED"}, {"is_homed", "true"}, {"is_busy", "false"}});
