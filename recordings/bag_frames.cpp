@@ -17,7 +17,7 @@ namespace {
 
 struct StampedDecoded {
   double stamp_s = 0;
-  DecodedImage image = BadImage{"is no message of the topic's type"};
+  DecodedImage image = BadImage{"no message of its type; message by message compressed bags want `ros2 bag convert`"};
 };
 
 StampedDecoded decoded(const BagMessage& message) {
