@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <sys/wait.h>
@@ -22,6 +24,11 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/testing/boards.h"
 #include "lapservo/testing/sample_frames.h"
+#ifdef LAPSERVO_TEST_BAGS
+#include <fmt/format.h>
+
+#include "recordings/test_bags.h"
+#endif
 
 namespace lapservo {
 using namespace internal;
@@ -74,6 +81,67 @@ class CommandLine : public ::testing::Test {
   std::string track(const std::string& input) const {
     return "track " + input + " --rig " + rig_ + " --out " + out("obs.csv") + " --overlay " + out("overlay");
   }
+
+#ifdef LAPSERVO_TEST_BAGS
+  // in/run.bag and in/run, a bag of ROS 2: a folder's pictures as PNG, and joints by the same clock.
+  void write_bags_of(const std::string& pictures, double fps, const CsvTable& joints) {
+    constexpr double begin_s = 1700000000;
+    std::vector<lapservo::testing::BagEntry> ros1, ros2;
+    const auto add = [&](const char* topic, const char* type, const auto& message) {
+      ros1.push_back({topic, type, message.stamp_s, lapservo::testing::ros1_bytes(message)});
+      ros2.push_back({topic, type, message.stamp_s, lapservo::testing::cdr_bytes(message)});
+    };
+    JointMessage reading{0, {"wrist"}, {0}};
+    for (const std::string& name : joints.columns())
+      if (name != "time_s") reading.names.push_back(name);
+    for (std::size_t row = 0; row < joints.rows(); ++row) {
+      reading.stamp_s = begin_s + joints.number(row, "time_s");
+      reading.positions = {7};
+      for (std::size_t i = 1; i < reading.names.size(); ++i)
+        reading.positions.push_back(joints.number(row, reading.names[i]));
+      add("/PSM1/measured_js", "sensor_msgs/JointState", reading);
+    }
+    for (int i = 0; fs::exists(in(pictures) + fmt::format("/{:04}.png", i)); ++i) {
+      const std::string png = read(in(pictures) + fmt::format("/{:04}.png", i));
+      add("/endoscope/image_raw/compressed", "sensor_msgs/CompressedImage",
+          CompressedImageMessage{begin_s + i / fps, "png", {png.begin(), png.end()}});
+    }
+    lapservo::testing::write_ros1_bag(in("run.bag"), ros1, "lz4");
+    fs::create_directories(in("run"));
+    lapservo::testing::write_ros2_bag(in("run") + "/run_0.db3", ros2);
+    lapservo::testing::write_ros2_metadata(in("run"), {"run_0.db3"});
+  }
+  // Every number as in a run on the pictures themselves, but for the last digits of times.
+  void expect_tracked_as(const std::string& observations, const std::string& bag, const std::string& rig) {
+    ASSERT_EQ(run("track " + bag + " --fps 8 --rig " + rig + " --out " + out("bag.csv")), 0) << errors();
+    const CsvTable expected = CsvTable::read(observations), found = CsvTable::read(out("bag.csv"));
+    ASSERT_EQ(found.rows(), expected.rows());
+    for (std::size_t row = 0; row < found.rows(); ++row)
+      for (const std::string& column : expected.columns())
+        if (column == "time_s") {
+          EXPECT_NEAR(found.number(row, column), static_cast<double>(row) / 8, 1e-6);
+        } else if (column != "file") {
+          EXPECT_EQ(found.text(row, column), expected.text(row, column)) << column;
+        }
+  }
+  // Two rigs' measured numbers, of times that differ in their last digits.
+  static void expect_same_numbers(const std::string& one, const std::string& other) {
+    const auto words_of = [](const std::string& text) {
+      std::istringstream from(text);
+      return std::vector<std::string>(std::istream_iterator<std::string>(from), {});
+    };
+    const auto a = words_of(one), b = words_of(other);
+    ASSERT_EQ(a.size(), b.size());
+    const auto number = [](const std::string& word) {
+      const std::size_t at = word.find_first_of("-0123456789");
+      return at == std::string::npos ? std::nullopt : std::optional(std::stod(word.substr(at)));
+    };
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      if (a[i] == b[i]) continue;
+      EXPECT_NEAR(number(a[i]).value(), number(b[i]).value(), 1e-5) << a[i] << " " << b[i];
+    }
+  }
+#endif
 
   fs::path folder_;
   const std::string rig_ = lapservo::testing::source_folder().string() + "/configs/example.yaml";
@@ -130,6 +198,23 @@ TEST_F(CommandLine, GStreamersPipelinesAreTracked) {
   expect_refused("track gst:videotestsrc --out " + out("obs.csv"), {"--rig", "is missing"});
 }
 #endif
+
+TEST_F(CommandLine, BagsThatCannotBeRead) {
+  for (const auto& [name, content, what] : {std::array{"new.mcap", "\x89MCAP0", "ros2 bag convert"},
+                                            {"packed.db3.zstd", "(\xb5/\xfd", "zstd -d"},
+                                            {"run.bag", "#ROSBAG V2.0\n", "ROS 1 bag"},
+                                            {"run.db3", "SQLite format 3", "ROS 2 bag"}}) {
+    expect_refused(track(in(name, content)), {name, what});
+  }
+  expect_refused("servo --replay " + in("run.bag"), {"run.bag", "lapservo track"});
+  expect_refused("calibrate registration " + in("run.db3") + " --rig " + rig_ + " --out " + out("rig.yaml"),
+                 {"run.db3", "ROS 2 bag"});
+  expect_refused("track " + in("picture.png", "?") + " --image-topic /image --out " + out("obs.csv"),
+                 {"--image-topic", "is /image, which is for bags"});
+  expect_refused("calibrate registration " + in("obs.csv", "a\n") + " --joint-topic /joints --rig " + rig_ + " --out " +
+                     out("rig.yaml"),
+                 {"--joint-topic", "is /joints, which is for bags"});
+}
 
 TEST_F(CommandLine, CamerasThatAreNone) {
   const std::string servo = "servo --rig " + lapservo::testing::source_folder().string() +
@@ -412,9 +497,9 @@ TEST_F(CommandLine, ExperimentsWriteAReport) {
 }
 
 TEST_F(CommandLine, HelpShowsExamples) {
-  for (const char* command : {"track", "render", "marker", "marker design", "marker print", "marker show", "servo",
-                              "experiment", "estimate-rcm", "sim-robot", "calibrate", "calibrate camera", "calibrate marker",
-                              "calibrate registration"}) {
+  for (const char* command :
+       {"track", "render", "marker", "marker design", "marker print", "marker show", "servo", "experiment",
+        "estimate-rcm", "sim-robot", "calibrate", "calibrate camera", "calibrate marker", "calibrate registration"}) {
     EXPECT_EQ(run(std::string(command) + " --help"), 0);
     EXPECT_NE(output().find("Example"), std::string::npos) << command;
   }
@@ -488,6 +573,16 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
 
   EXPECT_EQ(run(calibrate + " --joints " + in("other.csv", "time_s,a,b,c,d\n0,1,2,3,4\n1,1,2,3,4\n")), 2);
   EXPECT_NE(errors().find("yaw"), std::string::npos);
+#ifdef LAPSERVO_TEST_BAGS
+  write_bags_of("swing", fps, CsvTable::read(in("joints.csv")));
+  expect_tracked_as(out("bound.csv"), in("run.bag"), out("rig.yaml"));
+  expect_tracked_as(out("bound.csv"), in("run"), out("rig.yaml"));
+  for (const char* bag : {"run.bag", "run"}) {
+    ASSERT_EQ(run("calibrate registration " + in(bag) + " --rig " + unregistered + " --out " + out("bag.yaml")), 0)
+        << errors();
+    expect_same_numbers(written, read(out("bag.yaml")));
+  }
+#endif
 }
 
 // A turn of a print that is not the rig's: the marker is wrapped askew, and joints say where its seam lies.

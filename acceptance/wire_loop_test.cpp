@@ -31,12 +31,9 @@
 #include "lapservo/sim_robot/sim_robot.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "transports/named_transport.h"
 #ifdef LAPSERVO_ROS1
-#include "transports/ros1/ros1_transport.h"
 #include "transports/ros1/test_ros_master.h"
-#endif
-#ifdef LAPSERVO_ROS2
-#include "transports/ros2/ros2_transport.h"
 #endif
 
 namespace lapservo::internal {
@@ -56,16 +53,6 @@ std::vector<std::string> transports() {
       "ros1",
 #endif
   };
-}
-
-std::unique_ptr<Transport> make_transport(const std::string& name, const std::string& node_name) {
-#ifdef LAPSERVO_ROS1
-  if (name == "ros1") return std::make_unique<Ros1Transport>(node_name);
-#endif
-#ifdef LAPSERVO_ROS2
-  if (name == "ros2") return std::make_unique<Ros2Transport>(node_name);
-#endif
-  throw std::invalid_argument(name);
 }
 
 double now_s() {
@@ -252,7 +239,7 @@ INSTANTIATE_TEST_SUITE_P(Over, FirstWireLoop, ::testing::Values(transports().fro
 class Arm {
  public:
   Arm(const std::string& transport, const Rig& rig)
-      : transport_(make_transport(transport, "arm")),
+      : transport_(named_transport(transport, "arm")),
         simulator_(rig, simulated(), {0.05, 1.57, 0.064, 1.2}),
         robot_(*transport_, rig, simulator_, config()) {
     thread_ = std::thread([this] {
@@ -330,7 +317,7 @@ TEST_P(FirstWireLoop, AMasterThatIsNotThereIsSaidWithinTwoSeconds) {
 
 TEST_P(FirstWireLoop, ObservesOnlyWithoutEnableMotion) {
   Arm room(GetParam(), rig_);
-  const auto ears = make_transport(GetParam(), "ears");
+  const auto ears = named_transport(GetParam(), "ears");
   Spy spy(*ears);
   const auto loop = servo(3, "servo.txt", false);
   loop->wait();
@@ -356,7 +343,7 @@ TEST_P(FirstWireLoop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
       {"repeated stamps", [](Arm& a) { a.frozen = true; }, [](Arm& a) { a.frozen = false; }, "stale_image", false},
   };
   Arm room(GetParam(), rig_);
-  const auto ears = make_transport(GetParam(), "ears");
+  const auto ears = named_transport(GetParam(), "ears");
   Spy spy(*ears);
   const auto loop = servo(600);
   for (const Fault& fault : faults) {
@@ -386,7 +373,7 @@ TEST_P(FirstWireLoop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
 
 TEST_P(WireLoop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
   Arm room(GetParam(), rig_);
-  const auto ears = make_transport(GetParam(), "ears"), foreign = make_transport(GetParam(), "foreign");
+  const auto ears = named_transport(GetParam(), "ears"), foreign = named_transport(GetParam(), "foreign");
   const auto say = foreign->joint_publisher("/PSM1/servo_jp");
   const auto loop = servo(600);
   Spy spy(*ears);
@@ -406,12 +393,13 @@ TEST_P(WireLoop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
   EXPECT_LE(last_s, first_s + allowed_s);
 }
 
-TEST_P(FirstWireLoop, StopsAndStartsAndTakesASetPointByTopic) {
+TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
   Arm room(GetParam(), rig_);
-  const auto ears = make_transport(GetParam(), "ears");
+  const auto ears = named_transport(GetParam(), "ears");
   Spy spy(*ears);
   const auto command = ears->string_publisher("/lapservo/PSM1/command");
   const auto wish = ears->joint_publisher("/lapservo/PSM1/set_point");
+  const auto plan = ears->trajectory_publisher("/lapservo/PSM1/trajectory");
   const auto loop = servo(600);
   ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
   command({now_s(), "stop"});
@@ -430,7 +418,18 @@ TEST_P(FirstWireLoop, StopsAndStartsAndTakesASetPointByTopic) {
   wish({now_s(), names, {there[0], there[1] / 2, there[2] / 2, there[3] / 2}});
   ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("a set-point came") != std::string::npos; }))
       << said("servo.txt");
+  sleep(2);
+  const Eigen::Vector4d here = {there[0], there[1] / 2, there[2] / 2, there[3] / 2};
+  const std::vector<double> begin(here.data(), here.data() + 4), end{here[0], here[1] + 10, here[2], here[3]};
+  plan({now_s(), names, {{0, begin}, {0.1, {here[0], 1e6, here[2], here[3]}}}});
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("refused: trajectory") != std::string::npos; }))
+      << said("servo.txt");
+  const double planned_s = now_s();
+  plan({planned_s, names, {{0, begin}, {0.5, begin}, {1.5, end}}});
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("a trajectory came") != std::string::npos; }))
+      << said("servo.txt");
   sleep(4);
+  EXPECT_TRUE(spy.moves_after(planned_s + 0.4));
   loop->signal(SIGINT);
   loop->wait();
   const auto heard = spy.heard();
@@ -439,7 +438,7 @@ TEST_P(FirstWireLoop, StopsAndStartsAndTakesASetPointByTopic) {
 }
 
 TEST_P(WireLoop, SurvivesWhenEitherSideIsKilledOrStopped) {
-  const auto ears = make_transport(GetParam(), "ears");
+  const auto ears = named_transport(GetParam(), "ears");
   Spy spy(*ears);
   auto room = arm();
   auto loop = servo(600);
@@ -467,7 +466,7 @@ TEST_P(WireLoop, SurvivesWhenEitherSideIsKilledOrStopped) {
 
 TEST_P(FirstWireLoop, InterruptedItBringsTheArmToRestAndSaysWhatItCameTo) {
   Arm room(GetParam(), rig_);
-  const auto ears = make_transport(GetParam(), "ears");
+  const auto ears = named_transport(GetParam(), "ears");
   Spy spy(*ears);
   const auto loop = servo(600);
   ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");

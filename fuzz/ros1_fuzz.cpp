@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <span>
 
-#include "fuzz/require.h"
+#include "fuzz/require_messages.h"
 #include "transports/ros1/ros1_decoder.h"
 
 // Any bytes are a message that holds no more than they do, or none.
@@ -12,12 +12,9 @@ using namespace lapservo::internal;
 using fuzz::require;
 
 void read(std::span<const std::uint8_t> bytes) {
-  if (const auto joints = decode_ros1<JointMessage>(bytes))
-    require(4 * joints->names.size() + 8 * joints->positions.size() <= bytes.size(), "joints are in the bytes");
-  if (const auto image = decode_ros1<ImageMessage>(bytes))
-    require(image->data.size() + image->encoding.size() < bytes.size(), "pixels are in the bytes");
-  if (const auto image = decode_ros1<CompressedImageMessage>(bytes))
-    require(image->data.size() + image->format.size() < bytes.size(), "a picture is in the bytes");
+  fuzz::require_messages_within([]<typename Message>(const auto& from) { return decode_ros1<Message>(from); }, bytes);
+  if (const auto trajectory = decode_ros1<TrajectoryMessage>(bytes))
+    require(4 * trajectory->names.size() + 24 * trajectory->points.size() <= bytes.size(), "points are in the bytes");
   if (const auto state = decode_ros1<OperatingStateMessage>(bytes))
     require(state->state.size() < bytes.size(), "a state is in the bytes");
   if (const auto text = decode_ros1<StringMessage>(bytes))

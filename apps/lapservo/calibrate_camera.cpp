@@ -14,6 +14,7 @@
 
 #include "apps/lapservo/calibrate_inputs.h"
 #include "apps/lapservo/camera_report.h"
+#include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/numbers.h"
@@ -33,7 +34,7 @@ namespace fs = std::filesystem;
 
 struct CameraOptions {
   std::vector<std::string> inputs;
-  std::string rig, out, camera_info, board, dictionary, report;
+  std::string rig, out, camera_info, board, dictionary, report, image_topic;
   double square_mm = 0;
   std::optional<double> marker_mm;
   std::size_t views = 30;
@@ -103,9 +104,9 @@ struct Seen {
 };
 
 // Every picture of a folder; of videos and cameras those that differ, a few a second.
-void look_at(const std::string& input, BoardViews& views, std::optional<cv::Size>& size, std::string& whose,
-             Seen& seen) {
-  const auto source = open_frame_source(input, 30);
+void look_at(const std::string& input, const std::string& image_topic, BoardViews& views, std::optional<cv::Size>& size,
+             std::string& whose, Seen& seen) {
+  const auto source = open_frames(input, 30, image_topic);
   const bool pictures = source->kind() == FrameSource::Kind::image || source->kind() == FrameSource::Kind::folder;
   const bool live = source->kind() == FrameSource::Kind::live;
   const int every = pictures || live ? 1 : std::max(1, static_cast<int>(source->frames_per_second() / 4));
@@ -200,7 +201,7 @@ int run_camera(const CameraOptions& options) {
   std::string whose = "the rig's camera";
   if (rig) size = cv::Size(rig->camera.width_px, rig->camera.height_px);
   for (const std::string& input : options.inputs) {
-    look_at(input, chosen, size, whose, seen);
+    look_at(input, options.image_topic, chosen, size, whose, seen);
     if (seen.stopped) return refuse(options, "stopped");
   }
   const std::vector<BoardView> views = chosen.take();
@@ -239,9 +240,11 @@ void add_calibrate_camera(CLI::App* parent, Run& run_later) {
   CLI::App* command = parent->add_subcommand(
       "camera", "Measure a camera with a chessboard: matrix, distortion, lateral chromatic aberration, response.");
   command
-      ->add_option("input", options->inputs,
-                   "Pictures of the board from different sides: pictures, folders, a video, a camera or a stream")
+      ->add_option(
+          "input", options->inputs,
+          "Pictures of the board from different sides: pictures, folders, a video, a bag, a camera or a stream")
       ->required();
+  add_image_topic_option(command, options->image_topic);
   command->add_option("--board", options->board, "Inner corners of the board, COLUMNSxROWS, for example 9x6")
       ->required();
   command->add_option("--square-mm", options->square_mm, "Width of a square")

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/numbers.h"
@@ -24,6 +25,7 @@ void add_calibrate_options(CLI::App* command, CalibrateOptions& options) {
       ->required();
   command->add_option("--instrument", options.instrument, "Its name, where the rig has several");
   command->add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
+  add_image_topic_option(command, options.image_topic);
   command->add_option("--fps", options.fps, "Frames per second of a folder of pictures")
       ->capture_default_str()
       ->check(number_between(0.001, 1000.0));
@@ -44,7 +46,8 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
   InputFiles inputs;
   inputs.add(options.input), inputs.add(options.joints);
   std::error_code error;
-  if (fs::is_directory(options.input, error)) inputs.add_pictures_in(options.input);
+  for (const std::string& input : {options.input, options.joints})
+    if (fs::is_directory(input, error)) inputs.add_pictures_in(input);
   for (const std::string& out : {options.out, options.report}) inputs.refuse_as_output(out);
   if (!options.report.empty() &&
       fs::weakly_canonical(options.out, error) == fs::weakly_canonical(options.report, error))

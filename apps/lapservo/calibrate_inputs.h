@@ -11,7 +11,7 @@ namespace lapservo::app {
 
 /// What the subcommands that measure one instrument of a rig from frames are told.
 struct CalibrateOptions {
-  std::string input, rig, out, instrument, joints, report;
+  std::string input, rig, out, instrument, joints, report, image_topic, joint_topic;
   double fps = 30;
   bool deinterlace = false;
 };

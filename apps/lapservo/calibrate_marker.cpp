@@ -9,7 +9,9 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/joint_input.h"
 #include "apps/lapservo/marker_report.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
@@ -26,13 +28,14 @@ using namespace internal;
 namespace {
 
 // What the joints are compared with must be there before the work.
-std::optional<JointRecording> recording_of(const CalibrateOptions& options, const Instrument& instrument) {
+std::optional<JointRecording> recording_of(const CalibrateOptions& options, const Instrument& instrument,
+                                           const FrameSource& frames) {
   if (options.joints.empty()) return std::nullopt;
   for (const auto& [there, key] : {std::pair{instrument.camera_from_rcm.has_value(), "camera_from_rcm"},
                                    {instrument.joints.has_value(), "joints"}})
     if (!there)
       throw InputError(options.rig, fmt::format("--joints needs {} of {}, which the rig lacks", key, instrument.name));
-  return read_joint_recording(options.joints, *instrument.joints);
+  return read_joint_input(options, instrument, &frames).recording;
 }
 
 struct Seen {
@@ -68,8 +71,8 @@ int run_marker(const CalibrateOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  const auto recording = recording_of(options, instrument);
-  const auto source = open_frame_source(options.input, options.fps);
+  const auto source = open_frames(options.input, options.fps, options.image_topic);
+  const auto recording = recording_of(options, instrument, *source);
   AtomicFile out(options.out);
   watch_for_interrupts();
 
@@ -122,13 +125,15 @@ void add_calibrate_marker(CLI::App* parent, Run& run_later) {
   CLI::App* command = parent->add_subcommand(
       "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.");
   command
-      ->add_option("input", options->input,
-                   "Pictures of a slow full turn about the shaft's axis: a folder, a video, a camera or a stream")
+      ->add_option(
+          "input", options->input,
+          "Pictures of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
       ->required();
   add_calibrate_options(command, *options);
-  command->add_option("--joints", options->joints,
-                      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints): "
-                      "seam_rad too, which pictures alone can't tell");
+  add_joint_options(
+      command, *options,
+      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
+      "bag, the input itself for example: seam_rad too, which pictures alone can't tell");
   command->add_option("--report", options->report,
                       "HTML page with what the boundaries miss the print by, before and after");
   command->footer(

@@ -10,16 +10,16 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/joint_input.h"
 #include "apps/lapservo/registration_report.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/calibration/pose_table.h"
 #include "lapservo/calibration/registration.h"
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/rig_updater.h"
 #include "lapservo/vision/tracker.h"
@@ -27,22 +27,6 @@
 namespace lapservo::app {
 using namespace internal;
 namespace {
-
-// The rig's, else the recording's own four columns in the order theta, phi, rho, psi.
-Joints joints_of(const CalibrateOptions& options, const Instrument& instrument) {
-  if (instrument.joints) return *instrument.joints;
-  Joints joints;
-  std::vector<std::string> names;
-  const CsvTable table = CsvTable::read(options.joints);
-  for (const std::string& column : table.columns())
-    if (column != "time_s") names.push_back(column);
-  if (names.size() != joints.names.size())
-    throw InputError(options.joints, "columns", fmt::format("{}", fmt::join(names, ", ")),
-                     "time_s and four joints (theta's, phi's, rho's, psi's), since " + instrument.name +
-                         " has no joints entry in " + options.rig + " that would name them");
-  std::copy(names.begin(), names.end(), joints.names.begin());
-  return joints;
-}
 
 struct Poses {
   std::vector<TimedPose> all;
@@ -68,13 +52,12 @@ Poses poses_in_table(const CalibrateOptions& options, const Instrument& instrume
 }
 
 // Without what is to be measured: poses by the image alone.
-Poses poses_in_frames(const CalibrateOptions& options, Rig rig, std::size_t index) {
+Poses poses_in_frames(const CalibrateOptions& options, Rig rig, std::size_t index, FrameSource& source) {
   constexpr int enough = 3600;
-  const auto source = open_frame_source(options.input, options.fps);
   for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
   Tracker tracker(rig);
   Poses poses;
-  const FramesRead read = read_frames(options, rig, *source, std::max(1, source->frame_count().value_or(0) / enough),
+  const FramesRead read = read_frames(options, rig, source, std::max(1, source.frame_count().value_or(0) / enough),
                                       [&](const cv::Mat& bgr, double time_s) {
                                         const Observation& seen = tracker.track(bgr)[index];
                                         if (seen.status == Status::ok && seen.marker)
@@ -82,7 +65,7 @@ Poses poses_in_frames(const CalibrateOptions& options, Rig rig, std::size_t inde
                                         return fmt::format(", {} in {}", rig.instruments[index].name, poses.all.size());
                                       });
   poses.stopped = read.stopped;
-  say_complaint(options.input, *source);
+  say_complaint(options.input, source);
   if (poses.all.empty())
     poses.none = fmt::format("{} is in none of {} frames{}", rig.instruments[index].name, read.looked_at,
                              read.flawed ? fmt::format(" ({} are damaged)", read.flawed) : "");
@@ -145,20 +128,17 @@ int run_registration(const CalibrateOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  std::optional<JointRecording> recording;
-  if (!options.joints.empty()) {
-    instrument.joints = joints_of(options, instrument);
-    recording = read_joint_recording(options.joints, *instrument.joints);
-  }
+  const auto frames = is_table(options.input) ? nullptr : open_frames(options.input, options.fps, options.image_topic);
+  const auto joints = find_joint_input(options, instrument, frames.get());
+  if (joints) instrument.joints = joints->joints;
   AtomicFile out(options.out);
   watch_for_interrupts();
 
-  const Poses poses =
-      is_table(options.input) ? poses_in_table(options, instrument) : poses_in_frames(options, rig, index);
+  const Poses poses = frames ? poses_in_frames(options, rig, index, *frames) : poses_in_table(options, instrument);
   if (poses.stopped) return refuse_calibration(options, "stopped");
   if (!poses.none.empty()) return refuse_calibration(options, poses.none);
-  const Registration registration =
-      recording ? register_arm(instrument, poses.all, *recording, options.joints) : register_rcm(instrument, poses.all);
+  const Registration registration = joints ? register_arm(instrument, poses.all, joints->recording, joints->source)
+                                           : register_rcm(instrument, poses.all);
   if (!registration.refusal.empty()) return refuse_calibration(options, registration.refusal);
   print_numbers(instrument, registration);
   print_residuals(registration);
@@ -181,14 +161,17 @@ void add_calibrate_registration(CLI::App* parent, Run& run_later) {
       "registration",
       "Measure where the arm stands before the camera, its joints' signs and offsets, and the video's delay.");
   command
-      ->add_option("input", options->input,
-                   "The marker in motion: a folder, a video, a camera, a stream, or a CSV of observations that were "
-                   "tracked without camera_from_rcm")
+      ->add_option(
+          "input", options->input,
+          "The marker in motion: a folder, a video, a bag (which brings its joints along), a camera, a stream, or "
+          "a CSV of observations that were tracked without camera_from_rcm")
       ->required();
   add_calibrate_options(command, *options);
-  command->add_option("--joints", options->joints,
-                      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints). "
-                      "Without it only the RCM's position can be told");
+  add_joint_options(
+      command, *options,
+      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
+      "bag; without it those in the input, where it is a bag. Without any only the RCM's position can be "
+      "told");
   command->add_option("--report", options->report, "HTML page with what is left at each frame");
   command->footer(
       "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "

@@ -32,7 +32,9 @@ void InputFiles::add_rig(const fs::path& path, const Rig& rig) {
 void InputFiles::add_pictures_in(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
-    if (has_image_extension(entry->path()) || entry->path().extension() == ".yaml") add(entry->path());
+    if (has_image_extension(entry->path()) || entry->path().extension() == ".yaml" ||
+        entry->path().extension() == ".db3")
+      add(entry->path());
 }
 
 void InputFiles::refuse_as_output(const fs::path& path) const {

@@ -25,6 +25,7 @@
 #include "lapservo/servo/run.h"
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/sim/simulator.h"
+#include "recordings/open_bag.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -92,7 +93,7 @@ int simulate(const ServoOptions& options) {
   SimulatorConfig simulated;
   simulated.seed = options.seed;
   simulated.endoscope.latency_s = options.latency_ms / 1000;
-  simulated.endoscope.frame_rate_hz = options.fps;
+  simulated.endoscope.frame_rate_hz = periods_per_s(options);
   const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
   const auto made = make_simulator(options.simulation, true_rig, simulated, start);
   Simulator& simulator = *made;
@@ -116,6 +117,9 @@ int simulate(const ServoOptions& options) {
 }
 
 int replay_log(const ServoOptions& options) {
+  if (is_bag(options.replay))
+    throw InputError(options.replay,
+                     "is a bag, which holds no decisions, expected a run's log.csv: `lapservo track` measures a bag");
   const fs::path log = options.replay, folder = log.parent_path();
   const Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
@@ -207,8 +211,9 @@ void add_servo(CLI::App& app, Run& run_later) {
   command->add_option("--latency-ms", options->latency_ms, "sim: from exposure to arrival")
       ->capture_default_str()
       ->check(number_between(0.0, 1000.0));
-  command->add_option("--fps", options->fps, "Control periods, and frames in sim, a second")
-      ->capture_default_str()
+  command
+      ->add_option("--fps", options->fps,
+                   "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
       ->check(number_between(6.0, 500.0));
   add_simulation_options(*command, options->simulation, "sim: ");
   command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")

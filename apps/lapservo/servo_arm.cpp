@@ -2,10 +2,12 @@
 
 #include <chrono>
 #include <cstdio>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -101,16 +103,28 @@ class ArmWatcher : public RunObserver {
   }
   void grant(const LoopWishes& wishes, const ControlTick& tick, double time_s) {
     if (wishes.hold) robot_.hold(*wishes.hold);
-    if (!wishes.set_point) return;
-    const Trajectory wanted = set_point(*wishes.set_point);
-    try {
-      if (run_.rig.instruments.front().camera_from_rcm)
-        refuse_infeasible(wanted, 1, feature_model(run_.rig), run_.controller, tick.input.joints.q, "set_point");
-      goal_.replace(wanted);
-      say(time_s, "a set-point came");
-    } catch (const InputError& error) {
-      say(time_s, std::string("refused: ") + error.what());
-    }
+    if (wishes.set_point) wanted_ = Wanted{"set_point", 1, set_point(*wishes.set_point)};
+    if (wishes.trajectory) wanted_ = Wanted{"trajectory", wishes.trajectory->duration_s, *wishes.trajectory};
+    if (refusal_.valid() && refusal_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
+      begin_or_refuse(refusal_.get(), time_s);
+    if (!wanted_ || refusal_.valid()) return;
+    asked_ = *std::exchange(wanted_, std::nullopt);
+    // A long trajectory takes longer to walk along than a tick has.
+    refusal_ = std::async(std::launch::async, [this, wanted = asked_, q = tick.input.joints.q]() -> std::string {
+      try {
+        if (run_.rig.instruments.front().camera_from_rcm)
+          refuse_infeasible(wanted.trajectory, wanted.duration_s, feature_model(run_.rig), run_.controller, q,
+                            wanted.name);
+      } catch (const InputError& error) {
+        return error.what();
+      }
+      return {};
+    });
+  }
+  void begin_or_refuse(const std::string& refusal, double time_s) {
+    if (!refusal.empty()) return say(time_s, "refused: " + refusal);
+    goal_.replace({0, [at = asked_.trajectory.at, time_s](double now_s) { return at(now_s - time_s); }});
+    say(time_s, std::string("a ") + (asked_.name == "set_point" ? "set-point" : "trajectory") + " came");
   }
   void say_images(double time_s) {
     if (const auto ended = images_.ended(); ended && !said_ended_) {
@@ -138,11 +152,20 @@ class ArmWatcher : public RunObserver {
   Goal& goal_;
   RunFolder* folder_;
   LiveView* view_;
+  struct Wanted {
+    std::string name;
+    double duration_s = 0;
+    Trajectory trajectory;
+  };
+  std::optional<Wanted> wanted_;  // to be asked about next
+  Wanted asked_;
   Summary summary_;
   std::optional<double> start_s_;
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string state_, said_counts_;
   bool said_ended_ = false;
+  std::future<std::string>
+      refusal_;  // of what was asked about, empty when it can be followed; last: it uses the others
 };
 
 // Where the arm is, once it says so.

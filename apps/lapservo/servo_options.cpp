@@ -32,9 +32,9 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
   ControllerConfig config;
   const auto mode = control_mode_from_string(options.method);
   if (!mode) throw InputError("--method", "is " + options.method + ", expected default, paper or uncalibrated");
-  if (*mode == ControlMode::paper) config = paper_controller(1 / options.fps);
+  if (*mode == ControlMode::paper) config = paper_controller(1 / periods_per_s(options));
   config.mode = *mode;
-  config.period_s = 1 / options.fps;
+  config.period_s = 1 / periods_per_s(options);
   config.window = image_window(rig.camera, window_margin_px);
   if (options.delay != "estimate") {
     const auto delay_ms = parse_finite(options.delay);
@@ -62,6 +62,10 @@ std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
 }
 
 }  // namespace
+
+double periods_per_s(const ServoOptions& options) {
+  return options.fps.value_or(options.robot == "sim" ? 60 : 120);
+}
 
 Eigen::Vector4d four(const std::vector<double>& values) {
   return Eigen::Vector4d(values.data());

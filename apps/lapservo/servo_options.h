@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,8 @@ struct ServoOptions {
   std::string rig, robot, camera, joint_limits, trajectory = "paper", method = "default", tracker, controller,
                                                 delay = "estimate", out, replay;
   std::vector<double> set_point, via, start, rcm_px, hide;
-  double duration_s = 20, latency_ms = 80, fps = 60;
+  double duration_s = 20, latency_ms = 80;
+  std::optional<double> fps;  // control periods a second, and frames of the simulation
   std::uint64_t seed = 1;
   bool view = false, force = false, enable_motion = false, strict = false;
   SimulationOptions simulation;
@@ -31,6 +33,9 @@ RunConfig run_config_of(const ServoOptions& options);
 void forget_registration(RunConfig& run, const ServoOptions& options);
 /// The rig's `joints` entry. Throws InputError when there is none.
 const Joints& joints_of(const ServoOptions& options, const Rig& rig);
+
+/// What is asked for, else 60 in the simulation and 120 with an arm, where an image waits for the next period.
+double periods_per_s(const ServoOptions& options);
 
 Trajectory trajectory_of(const ServoOptions& options);
 /// What the trajectory is called in complaints.

@@ -17,7 +17,7 @@ namespace {
 
 std::uintmax_t needed_bytes(const ServoOptions& options) {
   constexpr std::uintmax_t bytes_a_tick = 2000;
-  return bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * options.fps) + (1 << 20);
+  return bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * periods_per_s(options)) + (1 << 20);
 }
 
 InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {

@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_frames.h"
@@ -31,7 +32,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Options {
-  std::string input, rig, out = "obs.csv", overlay;
+  std::string input, rig, out = "obs.csv", overlay, image_topic;
   std::string method = "surface";
   bool single = false, deinterlace = false, view = false;
   double fps = 30;
@@ -148,7 +149,7 @@ int run(const Options& options) {
   refuse_outputs(options, inputs_of(options));
   RigByFrame rigs(options);
   const auto live = open_live(options);
-  const auto file = live ? nullptr : open_frame_source(options.input, options.fps);
+  const auto file = live ? nullptr : open_frames(options.input, options.fps, options.image_topic);
   FrameSource* const source = live ? live.get() : file.get();
   std::optional<LiveView> view;
   if (options.view) view.emplace("track", "use --overlay to write pictures instead");
@@ -208,13 +209,16 @@ int run(const Options& options) {
 
 void add_track(CLI::App& app, Run& run_later) {
   auto options = std::make_shared<Options>();
-  CLI::App* command = app.add_subcommand("track", "Measure the instruments in pictures, a video or a camera's frames.");
+  CLI::App* command =
+      app.add_subcommand("track", "Measure the instruments in pictures, a video, a bag or a camera's frames.");
   command
       ->add_option(
           "input", options->input,
-          "Picture, folder of pictures, video file, camera (0, /dev/video0), stream (rtsp://...), topic "
+          "Picture, folder of pictures, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
+          "topic "
           "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
       ->required();
+  add_image_topic_option(command, options->image_topic);
   command->add_option("--rig", options->rig,
                       "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
   command

@@ -94,27 +94,16 @@ DesiredFeatures spline_at(const Spline& spline, double time_s) {
 }
 
 Trajectory from_table(const CsvTable& table, const std::string& source) {
-  if (table.rows() < 2) throw InputError(source, "expected at least two rows of time_s,s_rad,r_px,l_px,d_px");
   std::vector<double> times_s;
   std::vector<Eigen::Vector4d> values;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const double time_s = table.number(row, "time_s");
     Eigen::Vector4d value;
     for (int i = 0; i < 4; ++i) value[i] = table.number(row, feature_names[static_cast<std::size_t>(i)]);
-    if (!times_s.empty()) {
-      if (!(time_s > times_s.back())) {
-        throw InputError(source, "row " + std::to_string(row + 1) + ".time_s", std::to_string(time_s),
-                         "a time after " + std::to_string(times_s.back()));
-      }
-      value[0] = values.back()[0] + wrap_pi(value[0] - values.back()[0]);
-    }
     times_s.push_back(time_s);
     values.push_back(value);
   }
-  const double start_s = times_s.front(), end_s = times_s.back();
-  return between(start_s, end_s, [spline = natural_spline(std::move(times_s), std::move(values))](double time_s) {
-    return spline_at(spline, time_s);
-  });
+  return trajectory_through(std::move(times_s), std::move(values), source);
 }
 
 }  // namespace
@@ -162,6 +151,23 @@ Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::V
     const auto next = std::upper_bound(segments.begin() + 1, segments.end(), time_s,
                                        [](double t, const Segment& segment) { return t < segment.start_s; });
     return minimum_jerk(*(next - 1), time_s);
+  });
+}
+
+Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Vector4d> features,
+                              const std::string& source) {
+  if (times_s.size() < 2 || times_s.size() != features.size())
+    throw InputError(source, "expected at least two rows of time_s,s_rad,r_px,l_px,d_px");
+  for (std::size_t row = 0; row < times_s.size(); ++row) {
+    require_finite("features", features[row]);
+    if (!std::isfinite(times_s[row]) || (row > 0 && !(times_s[row] > times_s[row - 1])))
+      throw InputError(source, "row " + std::to_string(row + 1) + ".time_s", std::to_string(times_s[row]),
+                       row == 0 ? "a number" : "a time after " + std::to_string(times_s[row - 1]));
+    if (row > 0) features[row][0] = features[row - 1][0] + wrap_pi(features[row][0] - features[row - 1][0]);
+  }
+  const double start_s = times_s.front(), end_s = times_s.back();
+  return between(start_s, end_s, [spline = natural_spline(std::move(times_s), std::move(features))](double time_s) {
+    return spline_at(spline, time_s);
   });
 }
 

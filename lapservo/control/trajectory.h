@@ -41,8 +41,11 @@ Trajectory sinusoids(const Sinusoids& sinusoids);
 /// Throws InputError for fewer than two points and rates that are not positive.
 Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& max_rate, double dwell_s = 0);
 
-/// Natural cubic spline (twice continuously differentiable) through rows of time_s,s_rad,r_px,l_px,d_px with times that
-/// increase; starts at the first row's time. s is unwrapped. Throws InputError naming file, line and field.
+/// Natural cubic spline (twice continuously differentiable) through two points or more with times that increase; starts
+/// at the first one's time. s is unwrapped. Throws InputError naming `source`, row and field.
+Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Vector4d> features,
+                              const std::string& source);
+/// The same through rows of time_s,s_rad,r_px,l_px,d_px.
 Trajectory trajectory_from_csv(const std::filesystem::path& path);
 Trajectory trajectory_from_csv_text(std::string_view text, const std::string& source);
 

@@ -2,9 +2,20 @@
 
 #include <algorithm>
 #include <chrono>
+#include <pthread.h>
+#include <sched.h>
 #include <utility>
 
 namespace lapservo::internal {
+namespace {
+
+// What computes elsewhere then delays no set-point. Who may not have it does without.
+void ask_for_real_time() {
+  const sched_param priority{.sched_priority = 20};
+  pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
+}
+
+}  // namespace
 
 std::string topic_of(const std::string& arm, const std::string& name) {
   return (arm.rfind('/', 0) == 0 ? "" : "/") + arm + "/" + name;
@@ -77,6 +88,7 @@ std::optional<Eigen::Vector4d> CrtkRobot::set_point() const {
 }
 
 void CrtkRobot::command() {
+  ask_for_real_time();
   const auto period =
       std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s_));
   auto next = std::chrono::steady_clock::now();

@@ -17,6 +17,17 @@ struct JointMessage {
   std::vector<double> positions;  ///< rad, m
 };
 
+/// trajectory_msgs/JointTrajectory. Velocities, accelerations and efforts are not used.
+struct TrajectoryMessage {
+  struct Point {
+    double time_s = 0;  ///< from the start
+    std::vector<double> positions;
+  };
+  double stamp_s = 0;
+  std::vector<std::string> names;
+  std::vector<Point> points;
+};
+
 /// crtk_msgs/OperatingState.
 struct OperatingStateMessage {
   double stamp_s = 0;

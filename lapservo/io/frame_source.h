@@ -32,6 +32,8 @@ class FrameSource {
   /// Where it is known beforehand.
   virtual std::optional<int> frame_count() const = 0;
   virtual double frames_per_second() const = 0;
+  /// What `time_s` counts from, by the clock that a recording's other messages are stamped with, where there are such.
+  virtual std::optional<double> first_stamp_s() const { return std::nullopt; }
   /// After the end: what is wrong with the file as a whole, for example that it ends early; empty when nothing is.
   virtual std::string complaint() const { return {}; }
 };

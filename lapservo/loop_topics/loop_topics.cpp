@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "lapservo/core/error.h"
 #include "lapservo/io/overlay.h"
 
 namespace lapservo::internal {
@@ -36,6 +37,28 @@ std::string topic(const Rig& rig, const std::string& name) {
 
 Rigid3 camera_from_marker_at(const Instrument& instrument, const JointVector& q) {
   return camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+}
+
+// Nothing for what makes no sense, and for one of more than an hour or ten thousand points, which takes too long to
+// check.
+std::optional<Trajectory> trajectory_of(const TrajectoryMessage& message) {
+  constexpr double longest_s = 3600;
+  constexpr std::size_t most = 10000;
+  if (message.names != feature_names() || message.points.empty() || message.points.size() > most ||
+      !(message.points.front().time_s >= 0) || !(message.points.back().time_s <= longest_s))
+    return std::nullopt;
+  std::vector<double> times_s;
+  std::vector<Eigen::Vector4d> features;
+  for (const TrajectoryMessage::Point& point : message.points) {
+    if (point.positions.size() != FeatureVector::size) return std::nullopt;
+    times_s.push_back(point.time_s);
+    features.emplace_back(point.positions.data());
+  }
+  try {
+    return trajectory_through(std::move(times_s), std::move(features), "trajectory");
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace
@@ -72,6 +95,8 @@ LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const std::string& 
       transport.subscribe_strings(topic(rig, "command"), [this](StringMessage&& command) { hear(command); }));
   subscriptions_.push_back(
       transport.subscribe_joints(topic(rig, "set_point"), [this](JointMessage&& set_point) { hear(set_point); }));
+  subscriptions_.push_back(transport.subscribe_trajectories(
+      topic(rig, "trajectory"), [this](TrajectoryMessage&& trajectory) { hear(trajectory); }));
   thread_ = std::thread([this] { draw(); });
 }
 
@@ -179,6 +204,18 @@ void LoopTopics::hear(const JointMessage& set_point) {
   const std::lock_guard lock(mutex_);
   if (whole) {
     wishes_.set_point = Eigen::Vector4d(set_point.positions.data());
+    wishes_.trajectory.reset();
+  } else {
+    ++malformed_;
+  }
+}
+
+void LoopTopics::hear(const TrajectoryMessage& message) {
+  const auto trajectory = trajectory_of(message);
+  const std::lock_guard lock(mutex_);
+  if (trajectory) {
+    wishes_.trajectory = trajectory;
+    wishes_.set_point.reset();
   } else {
     ++malformed_;
   }

@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/control/trajectory.h"
 #include "lapservo/crtk/transport.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/servo/run.h"
@@ -19,6 +20,7 @@ namespace lapservo::internal {
 struct LoopWishes {
   std::optional<bool> hold;                  ///< true: stop; false: start
   std::optional<Eigen::Vector4d> set_point;  ///< s_rad, r_px, l_px, d_px
+  std::optional<Trajectory> trajectory;      ///< of time since it is begun; of this and set_point the last
 };
 
 /// The loop's topics for those who watch and command it, of the rig's first instrument NAME:
@@ -26,8 +28,8 @@ struct LoopWishes {
 /// camera_from_rcm is known) of every image; /lapservo/NAME/desired and /lapservo/NAME/error (JointState: s_rad, r_px,
 /// l_px, d_px) every tick; /diagnostics (DiagnosticArray) once a second and when something changes;
 /// /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second. It hears
-/// /lapservo/NAME/command (StringStamped: start, stop) and /lapservo/NAME/set_point (JointState: s_rad, r_px, l_px,
-/// d_px).
+/// /lapservo/NAME/command (StringStamped: start, stop), /lapservo/NAME/set_point (JointState: s_rad, r_px, l_px, d_px)
+/// and /lapservo/NAME/trajectory (JointTrajectory of these).
 class LoopTopics {
  public:
   LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame);
@@ -47,6 +49,7 @@ class LoopTopics {
   void publish_state(const ControlTick& tick, const std::string& state, double stamp_s);
   void hear(const StringMessage& command);
   void hear(const JointMessage& set_point);
+  void hear(const TrajectoryMessage& trajectory);
   void draw();
 
   struct Drawing {

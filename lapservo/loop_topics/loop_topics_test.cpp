@@ -131,5 +131,35 @@ TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
   EXPECT_EQ(topics.malformed(), 4);
 }
 
+TEST(LoopTopics, HearsTrajectories) {
+  const Rig rig = testing::small_test_rig();
+  TestTransport transport;
+  LoopTopics topics(transport, rig, "endoscope");
+  const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
+  using Points = std::vector<TrajectoryMessage::Point>;
+  const auto say = [&](const std::vector<std::string>& of, const Points& points) {
+    transport.say("/lapservo/PSM1/trajectory", TrajectoryMessage{0, of, points});
+  };
+  transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.8, 390, 170, 90}});
+  const Points points{{0, {0.9, 400, 180, 100}}, {2, {0.9, 420, 180, 100}}, {4, {0.9, 400, 180, 100}}};
+  say(names, points);
+  const LoopWishes wishes = topics.wishes();
+  EXPECT_FALSE(wishes.set_point);  // what came last counts
+  ASSERT_TRUE(wishes.trajectory);
+  EXPECT_EQ(wishes.trajectory->duration_s, 4);
+  EXPECT_EQ(wishes.trajectory->at(2).features, Eigen::Vector4d(0.9, 420, 180, 100));
+  EXPECT_NEAR(wishes.trajectory->at(2).rate[1], 0, 1e-9);
+  EXPECT_EQ(wishes.trajectory->at(9).features, Eigen::Vector4d(0.9, 400, 180, 100));  // it stays at the end
+
+  for (const Points& bad :
+       {Points{}, Points{points[0]}, Points{points[1], points[0]}, Points{points[0], {1, {0.9, 400, 180}}},
+        Points{points[0], {1, {0.9, NAN, 180, 100}}}, Points{points[0], {NAN, points[1].positions}},
+        Points{{-1, points[0].positions}, points[1]}, Points{points[0], {3601, points[1].positions}}})
+    say(names, bad);
+  say({"r_px", "s_rad", "l_px", "d_px"}, points);
+  EXPECT_FALSE(topics.wishes().trajectory);
+  EXPECT_EQ(topics.malformed(), 9);
+}
+
 }  // namespace
 }  // namespace lapservo::internal

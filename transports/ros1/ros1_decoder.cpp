@@ -4,7 +4,10 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
+
+#include "transports/message_fields.h"
 
 namespace lapservo::internal {
 namespace {
@@ -46,6 +49,7 @@ class Bytes {
     text();  // frame_id
     return nsec < 1000000000u ? sec + 1e-9 * nsec : std::numeric_limits<double>::quiet_NaN();
   }
+  bool whole() const { return whole_; }
   template <typename Message>
   std::optional<Message> result(Message&& message) const {
     if (!whole_ || !rest_.empty()) return std::nullopt;
@@ -67,62 +71,67 @@ class Bytes {
   bool whole_ = true;
 };
 
+void read_fields(Bytes& from, TrajectoryMessage& message) {
+  message.names = from.texts();
+  for (auto count = from.number<std::uint32_t>(); count > 0 && from.whole(); --count) {
+    TrajectoryMessage::Point point;
+    point.positions = from.numbers<double>();
+    for (int i = 0; i < 3; ++i) from.numbers<double>();  // velocities, accelerations, effort
+    point.time_s = from.number<std::int32_t>();
+    point.time_s += 1e-9 * from.number<std::int32_t>();
+    message.points.push_back(std::move(point));
+  }
+}
+
+void read_fields(Bytes& from, OperatingStateMessage& message) {
+  message.state = from.text();
+  message.is_homed = from.number<std::uint8_t>() != 0;
+  message.is_busy = from.number<std::uint8_t>() != 0;
+}
+
+void read_fields(Bytes& from, StringMessage& message) {
+  message.text = from.text();
+}
+
+template <typename Message>
+std::optional<Message> decode(std::span<const std::uint8_t> bytes) {
+  Bytes from(bytes);
+  Message message;
+  message.stamp_s = from.stamp_s();
+  read_fields(from, message);
+  return from.result(std::move(message));
+}
+
 }  // namespace
 
 template <>
 std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  Bytes from(bytes);
-  JointMessage message;
-  message.stamp_s = from.stamp_s();
-  message.names = from.texts();
-  message.positions = from.numbers<double>();
-  from.numbers<double>();  // velocity
-  from.numbers<double>();  // effort
-  return from.result(std::move(message));
+  return decode<JointMessage>(bytes);
+}
+
+template <>
+std::optional<TrajectoryMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
+  return decode<TrajectoryMessage>(bytes);
 }
 
 template <>
 std::optional<OperatingStateMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  Bytes from(bytes);
-  OperatingStateMessage message;
-  message.stamp_s = from.stamp_s();
-  message.state = from.text();
-  message.is_homed = from.number<std::uint8_t>() != 0;
-  message.is_busy = from.number<std::uint8_t>() != 0;
-  return from.result(std::move(message));
+  return decode<OperatingStateMessage>(bytes);
 }
 
 template <>
 std::optional<StringMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  Bytes from(bytes);
-  StringMessage message;
-  message.stamp_s = from.stamp_s();
-  message.text = from.text();
-  return from.result(std::move(message));
+  return decode<StringMessage>(bytes);
 }
 
 template <>
 std::optional<ImageMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  Bytes from(bytes);
-  ImageMessage message;
-  message.stamp_s = from.stamp_s();
-  message.height = from.number<std::uint32_t>();
-  message.width = from.number<std::uint32_t>();
-  message.encoding = from.text();
-  message.is_bigendian = from.number<std::uint8_t>() != 0;
-  message.step = from.number<std::uint32_t>();
-  message.data = from.numbers<std::uint8_t>();
-  return from.result(std::move(message));
+  return decode<ImageMessage>(bytes);
 }
 
 template <>
 std::optional<CompressedImageMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  Bytes from(bytes);
-  CompressedImageMessage message;
-  message.stamp_s = from.stamp_s();
-  message.format = from.text();
-  message.data = from.numbers<std::uint8_t>();
-  return from.result(std::move(message));
+  return decode<CompressedImageMessage>(bytes);
 }
 
 }  // namespace lapservo::internal

@@ -18,6 +18,8 @@ std::optional<Message> decode_ros1(std::span<const std::uint8_t> bytes);
 template <>
 std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t> bytes);
 template <>
+std::optional<TrajectoryMessage> decode_ros1(std::span<const std::uint8_t> bytes);
+template <>
 std::optional<OperatingStateMessage> decode_ros1(std::span<const std::uint8_t> bytes);
 template <>
 std::optional<StringMessage> decode_ros1(std::span<const std::uint8_t> bytes);

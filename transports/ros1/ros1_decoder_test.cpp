@@ -44,6 +44,11 @@ TEST(Ros1Decoder, ReadsWhatRosWrites) {
   EXPECT_TRUE(state.is_homed);
   EXPECT_FALSE(state.is_busy);
   EXPECT_EQ(there_and_back(StringMessage{stamp_s, "enable"}).text, "enable");
+  const auto trajectory = there_and_back(TrajectoryMessage{stamp_s, {"s_rad"}, {{0, {1}}, {2.25, {3, 4}}}});
+  EXPECT_EQ(trajectory.names, (std::vector<std::string>{"s_rad"}));
+  ASSERT_EQ(trajectory.points.size(), 2u);
+  EXPECT_EQ(trajectory.points[1].time_s, 2.25);
+  EXPECT_EQ(trajectory.points[1].positions, (std::vector<double>{3, 4}));
   const auto image = there_and_back(ImageMessage{stamp_s, 2, 1, 6, "bgr8", true, {1, 2, 3, 4, 5, 6}});
   EXPECT_EQ(image.width, 2u);
   EXPECT_EQ(image.height, 1u);

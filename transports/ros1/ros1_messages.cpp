@@ -30,6 +30,17 @@ ros1::JointState ros1_message(const JointMessage& message) {
   return wire;
 }
 
+ros1::JointTrajectory ros1_message(const TrajectoryMessage& message) {
+  auto wire = with_stamp<ros1::JointTrajectory>(message.stamp_s);
+  wire.joint_names.assign(message.names.begin(), message.names.end());
+  for (const auto& point : message.points) {
+    auto& to = wire.points.emplace_back();
+    to.positions.assign(point.positions.begin(), point.positions.end());
+    to.time_from_start.fromSec(point.time_s);
+  }
+  return wire;
+}
+
 ros1::OperatingState ros1_message(const OperatingStateMessage& message) {
   auto wire = with_stamp<ros1::OperatingState>(message.stamp_s);
   wire.state = message.state;

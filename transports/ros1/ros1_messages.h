@@ -10,6 +10,7 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/JointState.h>
+#include <trajectory_msgs/JointTrajectory.h>
 #include <type_traits>
 
 #include "lapservo/crtk/messages.h"
@@ -26,6 +27,7 @@ struct Ros1Allocator : std::allocator<T> {
 };
 namespace ros1 {
 using JointState = sensor_msgs::JointState_<Ros1Allocator<char>>;
+using JointTrajectory = trajectory_msgs::JointTrajectory_<Ros1Allocator<char>>;
 using OperatingState = crtk_msgs::OperatingState_<Ros1Allocator<char>>;
 using StringStamped = crtk_msgs::StringStamped_<Ros1Allocator<char>>;
 using Image = sensor_msgs::Image_<Ros1Allocator<char>>;
@@ -38,6 +40,7 @@ using Observation = lapservo_msgs::Observation_<Ros1Allocator<char>>;
 
 // A message as ROS 1's type.
 ros1::JointState ros1_message(const JointMessage& message);
+ros1::JointTrajectory ros1_message(const TrajectoryMessage& message);
 ros1::OperatingState ros1_message(const OperatingStateMessage& message);
 ros1::StringStamped ros1_message(const StringMessage& message);
 ros1::Image ros1_message(const ImageMessage& message);

@@ -71,6 +71,10 @@ Transport::Publisher<StringMessage> Ros1Transport::string_publisher(const std::s
   return publisher<StringMessage>(node_, topic, few);
 }
 
+Transport::Publisher<TrajectoryMessage> Ros1Transport::trajectory_publisher(const std::string& topic) {
+  return publisher<TrajectoryMessage>(node_, topic, few);
+}
+
 Transport::Publisher<ImageMessage> Ros1Transport::image_publisher(const std::string& topic) {
   return publisher<ImageMessage>(node_, topic, newest);
 }
@@ -106,6 +110,11 @@ Transport::Subscription Ros1Transport::subscribe_operating_state(const std::stri
 
 Transport::Subscription Ros1Transport::subscribe_strings(const std::string& topic, Handler<StringMessage> handler) {
   return subscription<StringMessage>(node_, topic, few, handler);
+}
+
+Transport::Subscription Ros1Transport::subscribe_trajectories(const std::string& topic,
+                                                              Handler<TrajectoryMessage> handler) {
+  return subscription<TrajectoryMessage>(node_, topic, few, handler);
 }
 
 Transport::Subscription Ros1Transport::subscribe_images(const std::string& topic, Handler<ImageMessage> handler) {

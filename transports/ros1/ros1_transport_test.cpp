@@ -77,6 +77,16 @@ TEST_F(Ros1Wire, CarriesEveryKindOfMessageThereAndBack) {
   const auto say_string = transport_->string_publisher("/in/text");
   EXPECT_EQ(strings.get([&] { say_string({stamp_s, "enable"}); }).text, "enable");
 
+  TestInbox<TrajectoryMessage> trajectories;
+  const auto trajectory_subscription = transport_->subscribe_trajectories("/out/trajectory", trajectories.handler());
+  const auto say_trajectory = transport_->trajectory_publisher("/in/trajectory");
+  const TrajectoryMessage trajectory = trajectories.get([&] {
+    say_trajectory({stamp_s, {"s_rad"}, {{0, {1}}, {2.25, {3, 4}}}});
+  });
+  ASSERT_EQ(trajectory.points.size(), 2u);
+  EXPECT_EQ(trajectory.points[1].time_s, 2.25);
+  EXPECT_EQ(trajectory.points[1].positions, (std::vector<double>{3, 4}));
+
   TestInbox<ImageMessage> images;
   const auto image_subscription = transport_->subscribe_images("/out/image", images.handler());
   const auto say_image = transport_->image_publisher("/in/image");

@@ -66,6 +66,9 @@ int main() {
   state({1700000000, "DISABLED", false, false});  // before anybody listens: it is latched
   subscriptions.push_back(
       transport.subscribe_operating_state("/in/state", [&](OperatingStateMessage&& m) { state(m); }));
+  const auto trajectory = transport.trajectory_publisher("/out/trajectory");
+  subscriptions.push_back(
+      transport.subscribe_trajectories("/in/trajectory", [&](TrajectoryMessage&& m) { trajectory(m); }));
   const auto image = transport.image_publisher("/out/image");
   subscriptions.push_back(transport.subscribe_images("/in/image", [&](ImageMessage&& m) { image(m); }));
   const auto compressed = transport.compressed_image_publisher("/out/compressed");

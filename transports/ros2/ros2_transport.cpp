@@ -135,6 +135,10 @@ Transport::Publisher<StringMessage> Ros2Transport::string_publisher(const std::s
   return implementation_->publisher<StringMessage>(topic, Delivery::reliable);
 }
 
+Transport::Publisher<TrajectoryMessage> Ros2Transport::trajectory_publisher(const std::string& topic) {
+  return implementation_->publisher<TrajectoryMessage>(topic, Delivery::reliable);
+}
+
 Transport::Publisher<ImageMessage> Ros2Transport::image_publisher(const std::string& topic) {
   return implementation_->publisher<ImageMessage>(topic, Delivery::best_effort);
 }
@@ -171,6 +175,11 @@ Transport::Subscription Ros2Transport::subscribe_operating_state(const std::stri
 
 Transport::Subscription Ros2Transport::subscribe_strings(const std::string& topic, Handler<StringMessage> handler) {
   return implementation_->subscribe<StringMessage>(topic, {Delivery::reliable, Delivery::best_effort}, handler);
+}
+
+Transport::Subscription Ros2Transport::subscribe_trajectories(const std::string& topic,
+                                                              Handler<TrajectoryMessage> handler) {
+  return implementation_->subscribe<TrajectoryMessage>(topic, {Delivery::reliable, Delivery::best_effort}, handler);
 }
 
 Transport::Subscription Ros2Transport::subscribe_images(const std::string& topic, Handler<ImageMessage> handler) {

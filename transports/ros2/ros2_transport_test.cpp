@@ -47,6 +47,17 @@ TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   const auto say_string = from.string_publisher("/PSM1/state_command");
   EXPECT_EQ(strings.get([&] { say_string({stamp_s, "enable"}); }).text, "enable");
 
+  TestInbox<TrajectoryMessage> trajectories;
+  const auto trajectory_subscription = to.subscribe_trajectories("/trajectory", trajectories.handler());
+  const auto say_trajectory = from.trajectory_publisher("/trajectory");
+  const TrajectoryMessage trajectory = trajectories.get([&] {
+    say_trajectory({stamp_s, {"s_rad"}, {{0, {1}}, {2.25, {3, 4}}}});
+  });
+  EXPECT_EQ(trajectory.names, (std::vector<std::string>{"s_rad"}));
+  ASSERT_EQ(trajectory.points.size(), 2u);
+  EXPECT_EQ(trajectory.points[1].time_s, 2.25);
+  EXPECT_EQ(trajectory.points[1].positions, (std::vector<double>{3, 4}));
+
   TestInbox<ImageMessage> images;
   const auto image_subscription = to.subscribe_images("/image", images.handler());
   const auto say_image = from.image_publisher("/image");

@@ -20,8 +20,10 @@ void point(Sequence& sequence, const std::vector<T>& values) {
   sequence._release = false;
 }
 
-builtin_interfaces_msg_dds__Time_ time_of(double stamp_s) {
-  builtin_interfaces_msg_dds__Time_ time{};
+// A Time or a Duration.
+template <typename Time = builtin_interfaces_msg_dds__Time_>
+Time time_of(double stamp_s) {
+  Time time{};
   const double whole = std::floor(stamp_s);
   time.sec_ = static_cast<std::int32_t>(whole);
   time.nanosec_ = static_cast<std::uint32_t>(std::min(std::round((stamp_s - whole) * 1e9), 999999999.0));
@@ -37,13 +39,25 @@ Type with_header(double stamp_s) {
   return wire;
 }
 
+template <typename Time>
+double seconds_of(const Time& time) {
+  if (time.nanosec_ >= 1000000000u) return std::numeric_limits<double>::quiet_NaN();
+  return time.sec_ + 1e-9 * time.nanosec_;
+}
+
 double stamp_of(const std_msgs_msg_dds__Header_& header) {
-  if (header.stamp_.nanosec_ >= 1000000000u) return std::numeric_limits<double>::quiet_NaN();
-  return header.stamp_.sec_ + 1e-9 * header.stamp_.nanosec_;
+  return seconds_of(header.stamp_);
 }
 
 std::string text_of(const char* text) {
   return text ? text : "";
+}
+
+template <typename Sequence>
+std::vector<std::string> texts_of(const Sequence& sequence) {
+  std::vector<std::string> texts;
+  for (std::uint32_t i = 0; i < sequence._length; ++i) texts.push_back(text_of(sequence._buffer[i]));
+  return texts;
 }
 
 template <typename Sequence>
@@ -64,8 +78,29 @@ void Wire<JointMessage>::write(dds_entity_t writer, const JointMessage& message)
 }
 
 JointMessage Wire<JointMessage>::read(const Type& wire) {
-  JointMessage message{stamp_of(wire.header_), {}, vector_of(wire.position_)};
-  for (std::uint32_t i = 0; i < wire.name_._length; ++i) message.names.push_back(text_of(wire.name_._buffer[i]));
+  return {stamp_of(wire.header_), texts_of(wire.name_), vector_of(wire.position_)};
+}
+
+void Wire<TrajectoryMessage>::write(dds_entity_t writer, const TrajectoryMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  std::vector<char*> names;
+  for (const std::string& name : message.names) names.push_back(pointer(name));
+  std::vector<trajectory_msgs_msg_dds__JointTrajectoryPoint_> points(message.points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    point(points[i].positions_, message.points[i].positions);
+    points[i].time_from_start_ = time_of<builtin_interfaces_msg_dds__Duration_>(message.points[i].time_s);
+  }
+  point(wire.joint_names_, names);
+  point(wire.points_, points);
+  dds_write(writer, &wire);
+}
+
+TrajectoryMessage Wire<TrajectoryMessage>::read(const Type& wire) {
+  TrajectoryMessage message{stamp_of(wire.header_), texts_of(wire.joint_names_), {}};
+  for (std::uint32_t i = 0; i < wire.points_._length; ++i) {
+    const auto& from = wire.points_._buffer[i];
+    message.points.push_back({seconds_of(from.time_from_start_), vector_of(from.positions_)});
+  }
   return message;
 }
 

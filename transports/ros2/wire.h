@@ -20,6 +20,14 @@ struct Wire<JointMessage> {
 };
 
 template <>
+struct Wire<TrajectoryMessage> {
+  using Type = trajectory_msgs_msg_dds__JointTrajectory_;
+  static const dds_topic_descriptor_t& descriptor() { return trajectory_msgs_msg_dds__JointTrajectory__desc; }
+  static void write(dds_entity_t writer, const TrajectoryMessage& message);
+  static TrajectoryMessage read(const Type& wire);
+};
+
+template <>
 struct Wire<OperatingStateMessage> {
   using Type = crtk_msgs_msg_dds__OperatingState_;
   static const dds_topic_descriptor_t& descriptor() { return crtk_msgs_msg_dds__OperatingState__desc; }

@@ -1,0 +1,21 @@
+#include "apps/lapservo/frame_input.h"
+
+#include "lapservo/core/error.h"
+#include "recordings/bag_frames.h"
+#include "recordings/open_bag.h"
+
+namespace lapservo::app {
+using namespace internal;
+
+std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic) {
+  if (is_bag(input)) return std::make_unique<BagFrames>(open_bag(input), image_topic);
+  if (!image_topic.empty())
+    throw InputError("--image-topic", "is " + image_topic + ", which is for bags, and " + input + " is none");
+  return open_frame_source(input, folder_fps);
+}
+
+void add_image_topic_option(CLI::App* command, std::string& image_topic) {
+  command->add_option("--image-topic", image_topic, "Of a bag with several: the topic whose images are meant");
+}
+
+}  // namespace lapservo::app

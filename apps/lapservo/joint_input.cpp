@@ -1,0 +1,90 @@
+#include "apps/lapservo/joint_input.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "recordings/bag_joints.h"
+#include "recordings/bag_topics.h"
+#include "recordings/open_bag.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+Joints joints_of(const CalibrateOptions& options, const Instrument& instrument,
+                 const std::vector<std::string>& recorded, const std::string& source) {
+  if (instrument.joints) return *instrument.joints;
+  Joints joints;
+  if (recorded.size() != joints.names.size())
+    throw InputError(source, "columns", fmt::format("{}", fmt::join(recorded, ", ")),
+                     "time_s and four joints (theta's, phi's, rho's, psi's), since " + instrument.name +
+                         " has no joints entry in " + options.rig + " that would name them");
+  std::copy(recorded.begin(), recorded.end(), joints.names.begin());
+  return joints;
+}
+
+std::vector<std::string> columns_of(const std::string& path) {
+  std::vector<std::string> names = CsvTable::read(path).columns();
+  std::erase(names, "time_s");
+  return names;
+}
+
+JointInput read_table(const CalibrateOptions& options, const Instrument& instrument) {
+  if (!options.joint_topic.empty())
+    throw InputError("--joint-topic",
+                     "is " + options.joint_topic + ", which is for bags, and " + options.joints + " is none");
+  const Joints joints = joints_of(
+      options, instrument, instrument.joints ? std::vector<std::string>() : columns_of(options.joints), options.joints);
+  return {joints, read_joint_recording(options.joints, joints), options.joints};
+}
+
+JointInput read_topic(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames,
+                      const Bag& bag, const BagTopic& topic) {
+  const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
+  if (!begin_s)
+    throw InputError("--joints", "is the bag " + bag.path() + ", expected a CSV: " + options.input +
+                                     " is no bag, and so has no stamps that would go with a bag's");
+  const Joints joints = joints_of(options, instrument, joint_names_in_bag(bag, topic), bag.path() + ": " + topic.name);
+  return {joints, joints_in_bag(bag, topic, joints, *begin_s), bag.path()};
+}
+
+}  // namespace
+
+void add_joint_options(CLI::App* command, CalibrateOptions& options, const std::string& help) {
+  command->add_option("--joints", options.joints, help);
+  command->add_option("--joint-topic", options.joint_topic,
+                      "Of a bag with several: the topic of the arm's measured joints; else .../INSTRUMENT/measured_js, "
+                      "or the only measured_js");
+}
+
+JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames) {
+  if (!is_bag(options.joints)) return read_table(options, instrument);
+  const auto bag = open_bag(options.joints);
+  const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
+  if (!topic)
+    throw InputError(options.joints, std::string("has no messages of ") + joint_type + ", expected the joints'");
+  return read_topic(options, instrument, frames, *bag, *topic);
+}
+
+std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
+                                           const FrameSource* frames) {
+  if (!options.joints.empty()) return read_joint_input(options, instrument, frames);
+  if (is_bag(options.input)) {
+    const auto bag = open_bag(options.input);
+    const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
+    if (topic) return read_topic(options, instrument, frames, *bag, *topic);
+  } else if (!options.joint_topic.empty()) {
+    throw InputError("--joint-topic",
+                     "is " + options.joint_topic + ", which is for bags, and " + options.input + " is none");
+  }
+  return std::nullopt;
+}
+
+}  // namespace lapservo::app

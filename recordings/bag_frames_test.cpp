@@ -1,0 +1,127 @@
+#include "recordings/bag_frames.h"
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+#include "recordings/bag_joints.h"
+#include "recordings/bag_topics.h"
+#include "recordings/open_bag.h"
+#include "recordings/test_bags.h"
+
+namespace lapservo::internal {
+namespace {
+using testing::BagEntry;
+using testing::input_error;
+
+ImageMessage image_at(double stamp_s, const std::string& encoding = "bgr8") {
+  return {stamp_s, 2, 1, 6, encoding, false, {1, 2, 3, 4, 5, 6}};
+}
+
+class BagOfImages {
+ public:
+  explicit BagOfImages(const std::vector<ImageMessage>& images) {
+    std::vector<BagEntry> entries;
+    for (const ImageMessage& image : images)
+      entries.push_back(
+          {"/image", image_type, 50 + 0.1 * static_cast<double>(entries.size()), testing::cdr_bytes(image)});
+    testing::write_ros2_bag(folder_ / "run.db3", entries);
+  }
+  std::unique_ptr<BagFrames> open(const std::string& topic = "") const {
+    return std::make_unique<BagFrames>(open_bag(folder_ / "run.db3"), topic);
+  }
+
+ private:
+  testing::TemporaryFolder folder_;
+};
+
+TEST(BagFrames, HaveTheTimesOfTheirStamps) {
+  const BagOfImages bag({image_at(100), image_at(100.04), image_at(100.2)});
+  const auto frames = bag.open();
+  EXPECT_EQ(frames->frame_count(), 3);
+  EXPECT_NEAR(frames->frames_per_second(), 10, 1e-6);
+  std::vector<double> times_s;
+  while (const auto frame = frames->next()) {
+    EXPECT_EQ(frame->index, static_cast<int>(times_s.size()));
+    EXPECT_EQ(frame->bgr.at<cv::Vec3b>(0, 1), cv::Vec3b(4, 5, 6));
+    times_s.push_back(frame->time_s);
+  }
+  ASSERT_EQ(times_s.size(), 3u);
+  EXPECT_NEAR(times_s[1], 0.04, 1e-6);
+  EXPECT_NEAR(times_s[2], 0.2, 1e-6);
+  EXPECT_EQ(frames->first_stamp_s(), 100);
+  EXPECT_EQ(frames->complaint(), "");
+}
+
+TEST(BagFrames, LeaveOutWhatIsNoFrameAndSayIt) {
+  ImageMessage short_of_pixels = image_at(101);
+  short_of_pixels.data.pop_back();
+  const BagOfImages bag({image_at(0), image_at(100), image_at(100), image_at(99), short_of_pixels, image_at(102)});
+  const auto frames = bag.open();
+  int count = 0;
+  while (frames->next()) ++count;
+  EXPECT_EQ(count, 2);
+  EXPECT_EQ(frames->complaint(), "/image: 4 of 6 images are left out (no stamp)");
+}
+
+TEST(BagFrames, WithoutAnyThatCanBeReadAreRefused) {
+  const BagOfImages bag({image_at(100, "mono8"), image_at(101, "mono8")});
+  const std::string error = input_error([&] { bag.open(); });
+  EXPECT_NE(error.find("/image: none of 2 images can be read: "), std::string::npos) << error;
+  EXPECT_NE(error.find("mono8"), std::string::npos) << error;
+}
+
+class BagOfJoints {
+ public:
+  explicit BagOfJoints(const std::vector<JointMessage>& readings) {
+    std::vector<BagEntry> entries;
+    for (const JointMessage& reading : readings)
+      entries.push_back({"/PSM1/measured_js", joint_type, 50, testing::ros1_bytes(reading)});
+    testing::write_ros1_bag(folder_ / "run.bag", entries);
+    bag_ = open_bag(folder_ / "run.bag");
+  }
+  JointRecording read() const { return joints_in_bag(*bag_, topic(), Joints{{"b", "a", "d", "c"}, {}, {}}, 99); }
+  std::vector<std::string> names() const { return joint_names_in_bag(*bag_, topic()); }
+
+ private:
+  const BagTopic& topic() const { return *joint_topic_of(*bag_, "", "PSM1"); }
+
+  testing::TemporaryFolder folder_;
+  std::shared_ptr<const Bag> bag_;
+};
+
+TEST(BagJoints, AreThoseOfTheRigInItsOrder) {
+  const std::vector<std::string> names{"a", "b", "c", "d", "wrist"};
+  const BagOfJoints bag({{100, names, {1, 2, 3, 4, 5}},
+                         {100, names, {9, 9, 9, 9, 9}},  // the same stamp again
+                         {100.5, names, {NAN, 2, 3, 4, 5}},
+                         {0, names, {9, 9, 9, 9, 9}},
+                         {101, names, {1.5, 2, 3, 4, 5}}});
+  const JointRecording recording = bag.read();
+  EXPECT_EQ(recording.time_s, (std::vector<double>{1, 2}));
+  EXPECT_EQ(recording.joints[1], (std::array<double, 4>{2, 1.5, 4, 3}));
+  EXPECT_EQ(bag.names(), names);
+}
+
+TEST(BagJoints, ThatAreNotThereAreMissed) {
+  const std::string error = input_error([] { BagOfJoints({{100, {"a", "b", "c"}, {1, 2, 3}}}).read(); });
+  EXPECT_NE(error.find("/PSM1/measured_js: has no position of d, expected"), std::string::npos) << error;
+  EXPECT_NE(error.find("it names a, b, c"), std::string::npos) << error;
+  const std::vector<std::string> names{"a", "b", "c", "d"};
+  EXPECT_NE(input_error([&] {
+              BagOfJoints({{100, names, {1, 2, 3}}}).read();
+            }).find("has no position of d"),
+            std::string::npos);
+  EXPECT_NE(input_error([&] {
+              BagOfJoints({{100, names, {1, 2, 3, 4}}}).read();
+            }).find("has 1 readings"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

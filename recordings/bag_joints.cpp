@@ -1,0 +1,61 @@
+#include "recordings/bag_joints.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <variant>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::internal {
+namespace {
+
+std::array<double, 4> chosen(const JointMessage& message, const Joints& joints, const std::string& source) {
+  std::array<double, 4> values{};
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto found = std::find(message.names.begin(), message.names.end(), joints.names[i]);
+    const auto place = static_cast<std::size_t>(found - message.names.begin());
+    if (place >= std::min(message.names.size(), message.positions.size()))
+      throw InputError(source,
+                       fmt::format("has no position of {}, expected one of each of the rig's joints: it names {}",
+                                   joints.names[i], fmt::join(message.names, ", ")));
+    values[i] = message.positions[place];
+  }
+  return values;
+}
+
+}  // namespace
+
+std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topic) {
+  const auto messages = bag.messages(topic);
+  const auto message = messages->next();
+  const auto* reading = message ? std::get_if<JointMessage>(&*message) : nullptr;
+  return reading ? reading->names : std::vector<std::string>();
+}
+
+JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints, double begin_s) {
+  const std::string source = bag.path() + ": " + topic.name;
+  const auto messages = bag.messages(topic);
+  JointRecording recording;
+  while (const auto message = messages->next()) {
+    const auto* reading = std::get_if<JointMessage>(&*message);
+    if (!reading || !(reading->stamp_s > 0)) continue;
+    const auto values = chosen(*reading, joints, source);
+    const double time_s = reading->stamp_s - begin_s;
+    const bool later = recording.time_s.empty() || time_s > recording.time_s.back();
+    if (!later || !std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); }))
+      continue;
+    recording.time_s.push_back(time_s);
+    recording.joints.push_back(values);
+  }
+  if (recording.time_s.size() < 2)
+    throw InputError(source, fmt::format("has {} readings that are numbers with a stamp, expected two or more",
+                                         recording.time_s.size()));
+  return recording;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "lapservo/calibration/joint_recording.h"
+#include "recordings/bag.h"
+
+namespace lapservo::internal {
+
+/// As the topic's first message has them.
+std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topic);
+
+/// The arm's joints in a bag's topic, by the times of their headers' stamps after `begin_s`. Readings without a stamp
+/// later than the one before, or that are no numbers, are left out. Throws InputError for messages without one of the
+/// joints, and for fewer than two readings.
+JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints& joints, double begin_s);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "recordings/bag.h"
+
+namespace lapservo::internal {
+
+/// Whether a file or folder is a bag by what it begins with, or means to be one by its name.
+bool is_bag(const std::string& path);
+
+/// A ROS 1 bag, a ROS 2 bag's folder or a .db3. Throws InputError for what is none, and for what this build lacks the
+/// libraries for.
+std::shared_ptr<const Bag> open_bag(const std::string& path);
+
+}  // namespace lapservo::internal

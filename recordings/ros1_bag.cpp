@@ -1,0 +1,282 @@
+#include "recordings/ros1_bag.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
+#include "recordings/ros1_chunk.h"
+#include "transports/ros1/ros1_decoder.h"
+
+namespace lapservo::internal {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "ROS 1 bags are little-endian, and so is what is copied");
+
+using Bytes = std::span<const std::uint8_t>;
+using Fields = std::map<std::string, std::string, std::less<>>;
+
+enum Op : std::uint8_t { message_op = 2, bag_op = 3, chunk_op = 5, chunk_info_op = 6, connection_op = 7 };
+
+constexpr std::string_view magic = "#ROSBAG V2.0\n";
+
+[[noreturn]] void refuse(const std::string& path, const std::string& what) {
+  throw InputError(path, what + ": copy it again, or try `rosbag reindex`");
+}
+[[noreturn]] void refuse_damage(const std::string& path, std::uint64_t at) {
+  refuse(path, fmt::format("is cut short or damaged at byte {}, expected a whole ROS 1 bag", at));
+}
+
+// The first of the bytes; nullopt where there are fewer.
+template <typename T>
+std::optional<T> taken(Bytes& from) {
+  if (from.size() < sizeof(T)) return std::nullopt;
+  T value;
+  std::memcpy(&value, from.data(), sizeof value);
+  from = from.subspan(sizeof value);
+  return value;
+}
+std::optional<Bytes> block_taken(Bytes& from) {
+  const auto size = taken<std::uint32_t>(from);
+  if (!size || *size > from.size()) return std::nullopt;
+  const Bytes block = from.first(*size);
+  from = from.subspan(*size);
+  return block;
+}
+
+std::optional<Fields> fields_of(Bytes header) {
+  Fields fields;
+  while (!header.empty()) {
+    const auto field = block_taken(header);
+    if (!field) return std::nullopt;
+    const std::string text(field->begin(), field->end());
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos) return std::nullopt;
+    fields[text.substr(0, equals)] = text.substr(equals + 1);
+  }
+  return fields;
+}
+
+template <typename T>
+std::optional<T> number_in(const Fields& fields, std::string_view name) {
+  const auto field = fields.find(name);
+  if (field == fields.end() || field->second.size() != sizeof(T)) return std::nullopt;
+  T value;
+  std::memcpy(&value, field->second.data(), sizeof value);
+  return value;
+}
+std::string text_in(const Fields& fields, std::string_view name) {
+  const auto field = fields.find(name);
+  return field == fields.end() ? std::string() : field->second;
+}
+std::optional<double> time_in(const Fields& fields, std::string_view name) {
+  const auto time = number_in<std::array<std::uint32_t, 2>>(fields, name);
+  return time ? std::optional((*time)[0] + 1e-9 * (*time)[1]) : std::nullopt;
+}
+bool is(const Fields& fields, Op op) {
+  return number_in<std::uint8_t>(fields, "op") == op;
+}
+
+struct Record {
+  Fields fields;
+  std::vector<std::uint8_t> data;
+};
+
+// Records by their place in a file.
+class RecordFile {
+ public:
+  explicit RecordFile(const std::string& path) : path_(path), file_(path, std::ios::binary) {
+    file_.seekg(0, std::ios::end);
+    if (!file_) throw InputError(path, "can't be read, expected a ROS 1 bag");
+    size_ = static_cast<std::uint64_t>(file_.tellg());
+  }
+
+  std::uint64_t size() const { return size_; }
+  std::vector<std::uint8_t> bytes(std::uint64_t at, std::uint64_t count) {
+    if (at > size_ || count > size_ - at) refuse_damage(path_, at);
+    std::vector<std::uint8_t> bytes(count);
+    file_.seekg(static_cast<std::streamoff>(at));
+    if (!file_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(count)))
+      refuse_damage(path_, at);
+    return bytes;
+  }
+  /// Moves `at` behind it.
+  Record record(std::uint64_t& at) {
+    const std::uint64_t begin = at;
+    const auto header = block(at);
+    auto fields = fields_of(header);
+    if (!fields) refuse_damage(path_, begin);
+    return {std::move(*fields), block(at)};
+  }
+
+ private:
+  std::vector<std::uint8_t> block(std::uint64_t& at) {
+    const auto length = bytes(at, 4);
+    Bytes from(length);
+    const std::uint32_t size = *taken<std::uint32_t>(from);
+    auto content = bytes(at + 4, size);
+    at += 4 + size;
+    return content;
+  }
+
+  std::string path_;
+  std::ifstream file_;
+  std::uint64_t size_ = 0;
+};
+
+struct Chunk {
+  std::uint64_t at = 0;
+  std::map<std::uint32_t, std::uint32_t> messages;  // by connection
+  double begin_s = 0, end_s = 0;
+};
+
+class Ros1Messages : public BagMessages {
+ public:
+  Ros1Messages(const std::string& path, std::string type, std::vector<std::uint32_t> connections,
+               std::vector<std::uint64_t> chunks)
+      : path_(path),
+        type_(std::move(type)),
+        connections_(std::move(connections)),
+        chunks_(std::move(chunks)),
+        file_(path) {}
+
+  std::optional<BagMessage> next() override {
+    while (true) {
+      if (rest_.empty() && !next_chunk()) return std::nullopt;
+      const auto header = block_taken(rest_), data = block_taken(rest_);
+      const auto fields = header && data ? fields_of(*header) : std::nullopt;
+      if (!fields) refuse_damage(path_, chunks_[next_ - 1]);
+      const auto connection = number_in<std::uint32_t>(*fields, "conn");
+      if (!is(*fields, message_op) || !connection ||
+          !std::binary_search(connections_.begin(), connections_.end(), *connection))
+        continue;
+      return decode_bag_message(
+          type_, []<typename Message>(const Bytes& bytes) { return decode_ros1<Message>(bytes); }, *data);
+    }
+  }
+
+ private:
+  bool next_chunk() {
+    if (next_ == chunks_.size()) return false;
+    std::uint64_t at = chunks_[next_++];
+    const std::uint64_t begin = at;
+    Record record = file_.record(at);
+    const auto size = number_in<std::uint32_t>(record.fields, "size");
+    if (!is(record.fields, chunk_op) || !size) refuse_damage(path_, begin);
+    auto content = uncompressed_chunk(text_in(record.fields, "compression"), std::move(record.data), *size);
+    if (!content) refuse_damage(path_, begin);
+    content_ = std::move(*content);
+    rest_ = content_;
+    return true;
+  }
+
+  std::string path_, type_;
+  std::vector<std::uint32_t> connections_;
+  std::vector<std::uint64_t> chunks_;
+  RecordFile file_;
+  std::size_t next_ = 0;
+  std::vector<std::uint8_t> content_;
+  Bytes rest_;
+};
+
+class Ros1Bag : public Bag {
+ public:
+  explicit Ros1Bag(const std::string& path) : path_(path) {
+    RecordFile file(path);
+    if (file.size() == 0) throw InputError(path, "is empty, expected a ROS 1 bag");
+    const auto begin = file.bytes(0, std::min<std::uint64_t>(file.size(), magic.size()));
+    if (!std::equal(begin.begin(), begin.end(), magic.begin(), magic.end()))
+      throw InputError(path, "is no ROS 1 bag of format 2.0: older ones can be converted by `rosbag fix`");
+    read_index(file, index_position(file));
+    list_topics();
+  }
+
+  const std::string& path() const override { return path_; }
+  const std::vector<BagTopic>& topics() const override { return topics_; }
+  std::unique_ptr<BagMessages> messages(const BagTopic& topic) const override {
+    const auto wanted = connections_.at({topic.name, topic.type});
+    std::vector<std::uint64_t> chunks;
+    for (const Chunk& chunk : chunks_)
+      if (std::any_of(wanted.begin(), wanted.end(),
+                      [&](auto connection) { return chunk.messages.contains(connection); }))
+        chunks.push_back(chunk.at);
+    return std::make_unique<Ros1Messages>(path_, topic.type, wanted, std::move(chunks));
+  }
+
+ private:
+  std::uint64_t index_position(RecordFile& file) {
+    std::uint64_t at = magic.size();
+    const Fields header = file.record(at).fields;
+    const auto index = number_in<std::uint64_t>(header, "index_pos");
+    if (!is(header, bag_op) || !index) refuse_damage(path_, magic.size());
+    if (!text_in(header, "encryptor").empty())
+      throw InputError(path_, "is encrypted, expected a bag without: decrypt it with `rosbag decrypt`");
+    if (*index == 0) refuse(path_, "was not closed by its recorder and has no index, expected a whole ROS 1 bag");
+    if (*index >= file.size())
+      refuse(path_, fmt::format("is cut short: its index begins at byte {} of {}", *index, file.size()));
+    return *index;
+  }
+  void read_index(RecordFile& file, std::uint64_t at) {
+    while (at < file.size()) {
+      const std::uint64_t begin = at;
+      const Record record = file.record(at);
+      if (is(record.fields, connection_op)) {
+        add_connection(record, begin);
+      } else if (is(record.fields, chunk_info_op)) {
+        add_chunk(record, begin);
+      }
+    }
+    std::sort(chunks_.begin(), chunks_.end(), [](const Chunk& a, const Chunk& b) { return a.at < b.at; });
+  }
+  void add_connection(const Record& record, std::uint64_t at) {
+    const auto number = number_in<std::uint32_t>(record.fields, "conn");
+    const auto header = fields_of(record.data);
+    if (!number || !header) refuse_damage(path_, at);
+    auto& numbers = connections_[{text_in(record.fields, "topic"), text_in(*header, "type")}];
+    numbers.insert(std::upper_bound(numbers.begin(), numbers.end(), *number), *number);
+  }
+  void add_chunk(const Record& record, std::uint64_t at) {
+    const auto place = number_in<std::uint64_t>(record.fields, "chunk_pos");
+    const auto begin_s = time_in(record.fields, "start_time"), end_s = time_in(record.fields, "end_time");
+    if (!place || !begin_s || !end_s || record.data.size() % 8 != 0) refuse_damage(path_, at);
+    Chunk chunk{*place, {}, *begin_s, *end_s};
+    for (Bytes counts(record.data); !counts.empty();) {
+      const auto connection = *taken<std::uint32_t>(counts);
+      chunk.messages[connection] = *taken<std::uint32_t>(counts);
+    }
+    chunks_.push_back(std::move(chunk));
+  }
+  void list_topics() {
+    for (const auto& [names, numbers] : connections_) {
+      BagTopic topic{names.first, names.second, 0, 0};
+      std::optional<double> begin_s;
+      for (const Chunk& chunk : chunks_)
+        for (const std::uint32_t number : numbers)
+          if (const auto counted = chunk.messages.find(number); counted != chunk.messages.end()) {
+            topic.messages += counted->second;
+            if (!begin_s) begin_s = chunk.begin_s;
+            topic.duration_s = chunk.end_s - *begin_s;
+          }
+      topics_.push_back(std::move(topic));
+    }
+  }
+
+  std::string path_;
+  std::vector<BagTopic> topics_;
+  std::map<std::pair<std::string, std::string>, std::vector<std::uint32_t>> connections_;  // by topic and type
+  std::vector<Chunk> chunks_;
+};
+
+}  // namespace
+
+std::unique_ptr<Bag> open_ros1_bag(const std::string& path) {
+  return std::make_unique<Ros1Bag>(path);
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,136 @@
+#include "recordings/test_bags.h"
+
+#include <cmath>
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <ros/serialization.h>
+#include <sqlite3.h>
+#include <stdexcept>
+
+#include "recordings/test_ros1_bag.h"
+#include "transports/ros1/ros1_messages.h"
+
+namespace lapservo::testing {
+using namespace internal;
+namespace {
+
+using eprosima::fastcdr::Cdr;
+
+template <typename Type>
+std::vector<std::uint8_t> bytes_of(const Type& wire) {
+  std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(wire));
+  ros::serialization::OStream stream(bytes.data(), static_cast<std::uint32_t>(bytes.size()));
+  ros::serialization::serialize(stream, wire);
+  return bytes;
+}
+
+// A message whose fields after the header are as they are given.
+template <typename... Fields>
+std::vector<std::uint8_t> written(double stamp_s, bool big_endian, const Fields&... fields) {
+  eprosima::fastcdr::FastBuffer buffer;
+  Cdr cdr(buffer, big_endian ? Cdr::BIG_ENDIANNESS : Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
+  cdr.serialize_encapsulation();
+  const double whole_s = std::floor(stamp_s);
+  cdr << static_cast<std::int32_t>(whole_s) << static_cast<std::uint32_t>(std::lround(1e9 * (stamp_s - whole_s)))
+      << std::string("frame");
+  (cdr << ... << fields);
+  const auto* const begin = reinterpret_cast<const std::uint8_t*>(buffer.getBuffer());
+  return {begin, begin + cdr.getSerializedDataLength()};
+}
+
+class Database {
+ public:
+  explicit Database(const std::string& path) {
+    if (sqlite3_open(path.c_str(), &database_) != SQLITE_OK) throw std::runtime_error(path);
+  }
+  ~Database() { sqlite3_close(database_); }
+  Database(const Database&) = delete;
+  Database& operator=(const Database&) = delete;
+
+  void run(const std::string& command) {
+    if (sqlite3_exec(database_, command.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK)
+      throw std::runtime_error(sqlite3_errmsg(database_));
+  }
+  void add_message(int topic, std::int64_t time_ns, const std::vector<std::uint8_t>& bytes) {
+    sqlite3_stmt* made = nullptr;
+    sqlite3_prepare_v2(database_, "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", -1, &made,
+                       nullptr);
+    const std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement(made, sqlite3_finalize);
+    sqlite3_bind_int(made, 1, topic);
+    sqlite3_bind_int64(made, 2, time_ns);
+    sqlite3_bind_blob(made, 3, bytes.data(), static_cast<int>(bytes.size()), SQLITE_STATIC);
+    if (sqlite3_step(made) != SQLITE_DONE) throw std::runtime_error(sqlite3_errmsg(database_));
+  }
+
+ private:
+  sqlite3* database_ = nullptr;
+};
+
+}  // namespace
+
+std::vector<std::uint8_t> ros1_bytes(const JointMessage& message) {
+  return bytes_of(ros1_message(message));
+}
+std::vector<std::uint8_t> ros1_bytes(const ImageMessage& message) {
+  return bytes_of(ros1_message(message));
+}
+std::vector<std::uint8_t> ros1_bytes(const CompressedImageMessage& message) {
+  return bytes_of(ros1_message(message));
+}
+
+std::vector<std::uint8_t> cdr_bytes(const JointMessage& message, bool big_endian) {
+  const std::vector<double> velocities(message.positions.size(), 0.5), no_efforts;
+  return written(message.stamp_s, big_endian, message.names, message.positions, velocities, no_efforts);
+}
+std::vector<std::uint8_t> cdr_bytes(const ImageMessage& message, bool big_endian) {
+  return written(message.stamp_s, big_endian, message.height, message.width, message.encoding,
+                 static_cast<std::uint8_t>(message.is_bigendian), message.step, message.data);
+}
+std::vector<std::uint8_t> cdr_bytes(const CompressedImageMessage& message, bool big_endian) {
+  return written(message.stamp_s, big_endian, message.format, message.data);
+}
+
+void write_ros1_bag(const std::filesystem::path& path, const std::vector<BagEntry>& entries,
+                    const std::string& compression) {
+  Ros1BagWriter bag(path.string(), compression);
+  for (const BagEntry& entry : entries)
+    bag.write(entry.topic, entry.type, entry.time_s, entry.bytes.data(), entry.bytes.size());
+}
+
+void write_ros2_bag(const std::filesystem::path& path, const std::vector<BagEntry>& entries) {
+  Database database(path.string());
+  database.run(
+      "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;"
+      "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);"
+      "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);"
+      "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT "
+      "NOT NULL, offered_qos_profiles TEXT NOT NULL);"
+      "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL, data BLOB "
+      "NOT NULL);"
+      "CREATE INDEX timestamp_idx ON messages (timestamp ASC);"
+      "INSERT INTO schema VALUES (3, 'humble'); BEGIN");
+  std::map<std::string, int> numbers;
+  for (const BagEntry& entry : entries) {
+    const auto [number, is_new] = numbers.emplace(entry.topic, static_cast<int>(numbers.size()) + 1);
+    std::string type = entry.type;
+    if (is_new)
+      database.run("INSERT INTO topics VALUES (" + std::to_string(number->second) + ", '" + entry.topic + "', '" +
+                   type.insert(type.find('/'), "/msg") + "', 'cdr', '')");
+    database.add_message(number->second, std::llround(1e9 * entry.time_s), entry.bytes);
+  }
+  database.run("COMMIT");
+}
+
+void write_ros2_metadata(const std::filesystem::path& folder, const std::vector<std::string>& files,
+                         const std::string& storage, const std::string& compression) {
+  std::ofstream file(folder / "metadata.yaml");
+  file << "rosbag2_bagfile_information:\n  version: 5\n  storage_identifier: " << storage
+       << "\n  duration:\n    nanoseconds: 1\n  compression_format: \"" << compression
+       << "\"\n  compression_mode: \"\"\n  relative_file_paths:\n";
+  for (const std::string& name : files) file << "    - " << name << "\n";
+}
+
+}  // namespace lapservo::testing

@@ -1,0 +1,246 @@
+// What is on the wire, read by eProsima's Fast CDR, which ROS 2's nodes use by default, along the .msg files: every
+// field has its number, in its place, and nothing is left over.
+
+#include <cstdlib>
+#include <dds/ddsi/ddsi_serdata.h>
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <regex>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/sample_frames.h"
+#include "transports/ros2/cdr_decoder.h"
+#include "transports/ros2/dds_node.h"
+#include "transports/ros2/ros2_names.h"
+#include "transports/ros2/wire.h"
+
+namespace lapservo::internal {
+namespace {
+
+using eprosima::fastcdr::Cdr;
+using Fields = std::map<std::string, std::string>;  // by name: pose.pose.position.x, status[0].values[1].key
+
+class MessageReader {
+ public:
+  explicit MessageReader(std::vector<char> bytes)
+      : bytes_(std::move(bytes)),
+        buffer_(bytes_.data(), bytes_.size()),
+        cdr_(buffer_, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR) {
+    cdr_.read_encapsulation();
+  }
+
+  Fields read(const std::string& type) {
+    read_message(type, "");
+    EXPECT_LT(bytes_.size() - cdr_.getSerializedDataLength(), 4u) << "left over";
+    return fields_;
+  }
+
+ private:
+  void read_message(const std::string& type, const std::string& prefix) {
+    const std::string package = type.substr(0, type.find('/'));
+    std::ifstream file(testing::source_folder() / "transports/ros2/msg" / (type + ".msg"));
+    ASSERT_TRUE(file) << type;
+    static const std::regex field(R"(([^\s\[#]+)(\[(\d*)\])?\s+(\w+).*)");
+    std::smatch part;
+    for (std::string line; std::getline(file, line);)
+      if (std::regex_match(line, part, field))
+        read_field(part[1], package, part[2].matched, part[3], prefix + std::string(part[4]));
+  }
+  void read_field(const std::string& type, const std::string& package, bool is_array, const std::string& size,
+                  const std::string& name) {
+    if (!is_array) return read_value(type, package, name);
+    const auto count = size.empty() ? number<std::uint32_t>() : static_cast<std::uint32_t>(std::stoul(size));
+    fields_[name] = fmt::format("{} of them", count);
+    for (std::uint32_t i = 0; i < count; ++i) read_value(type, package, fmt::format("{}[{}]", name, i));
+  }
+  void read_value(const std::string& type, const std::string& package, const std::string& name) {
+    if (type == "float64") {
+      fields_[name] = fmt::format("{}", number<double>());
+    } else if (type == "int32") {
+      fields_[name] = fmt::format("{}", number<std::int32_t>());
+    } else if (type == "uint32") {
+      fields_[name] = fmt::format("{}", number<std::uint32_t>());
+    } else if (type == "uint8" || type == "byte") {
+      fields_[name] = fmt::format("{}", number<std::uint8_t>());
+    } else if (type == "bool") {
+      fields_[name] = fmt::format("{}", number<bool>());
+    } else if (type == "string") {
+      fields_[name] = number<std::string>();
+    } else {
+      read_message(type.find('/') == std::string::npos ? package + "/" + type : type, name + ".");
+    }
+  }
+  template <typename T>
+  T number() {
+    T value{};
+    cdr_ >> value;
+    return value;
+  }
+
+  std::vector<char> bytes_;
+  eprosima::fastcdr::FastBuffer buffer_;
+  Cdr cdr_;
+  Fields fields_;
+};
+
+// As DDS sends them. Writer and reader are of one process, and wait for nobody.
+template <typename Message>
+std::vector<char> sent(const Message& message) {
+  const char* const domain = std::getenv("ROS_DOMAIN_ID");
+  const DdsNode node("wire_bytes", domain_id(domain ? domain : ""));
+  const dds_entity_t participant = node.participant();
+  const dds_entity_t topic =
+      dds_create_topic(participant, &Wire<Message>::descriptor(), "wire_bytes", nullptr, nullptr);
+  const dds_entity_t reader = dds_create_reader(participant, topic, nullptr, nullptr);
+  const dds_entity_t writer = dds_create_writer(participant, topic, nullptr, nullptr);
+  Wire<Message>::write(writer, message);
+  ddsi_serdata* data = nullptr;
+  dds_sample_info_t info;
+  std::vector<char> bytes;
+  if (dds_takecdr(reader, &data, 1, &info, DDS_ANY_STATE) == 1) {
+    bytes.resize(ddsi_serdata_size(data));
+    ddsi_serdata_to_ser(data, 0, bytes.size(), bytes.data());
+    ddsi_serdata_unref(data);
+  }
+  return bytes;
+}
+
+template <typename Message>
+Fields sent_as(const std::string& type, const Message& message) {
+  auto bytes = sent(message);
+  if (bytes.size() < 4) {
+    ADD_FAILURE() << "nothing was sent of " << type;
+    return {};
+  }
+  return MessageReader(std::move(bytes)).read(type);
+}
+
+void expect_fields(const Fields& found, const Fields& expected) {
+  for (const auto& [name, value] : expected) {
+    const auto field = found.find(name);
+    ASSERT_TRUE(field != found.end()) << name;
+    EXPECT_EQ(field->second, value) << name;
+  }
+}
+
+constexpr double stamp_s = 1700000000.25;
+const Fields stamp{{"header.stamp.sec", "1700000000"}, {"header.stamp.nanosec", "250000000"}};
+
+TEST(WireBytes, OfWhatSteersAnArm) {
+  const Fields joints =
+      sent_as("sensor_msgs/JointState", JointMessage{stamp_s, {"yaw", "", "pitch"}, {0.25, -1.5, 1e-300}});
+  expect_fields(joints, stamp);
+  expect_fields(joints, {{"header.frame_id", ""},
+                         {"name", "3 of them"},
+                         {"name[0]", "yaw"},
+                         {"name[1]", ""},
+                         {"name[2]", "pitch"},
+                         {"position", "3 of them"},
+                         {"position[0]", "0.25"},
+                         {"position[1]", "-1.5"},
+                         {"position[2]", "1e-300"},
+                         {"velocity", "0 of them"},
+                         {"effort", "0 of them"}});
+  const TrajectoryMessage trajectory{stamp_s, {"s_rad", "r_px"}, {{0, {1, 2}}, {2.25, {3, 4}}}};
+  expect_fields(sent_as("trajectory_msgs/JointTrajectory", trajectory),
+                {{"joint_names[1]", "r_px"},
+                 {"points", "2 of them"},
+                 {"points[0].velocities", "0 of them"},
+                 {"points[1].positions[1]", "4"},
+                 {"points[1].time_from_start.sec", "2"},
+                 {"points[1].time_from_start.nanosec", "250000000"}});
+  const Fields state = sent_as("crtk_msgs/OperatingState", OperatingStateMessage{stamp_s, "ENABLED", true, false});
+  expect_fields(state, stamp);
+  expect_fields(state, {{"state", "ENABLED"}, {"is_homed", "true"}, {"is_busy", "false"}});
+  expect_fields(sent_as("crtk_msgs/StringStamped", StringMessage{stamp_s, "enable"}), {{"string", "enable"}});
+}
+
+TEST(WireBytes, OfPictures) {
+  const Fields image =
+      sent_as("sensor_msgs/Image", ImageMessage{stamp_s, 2, 1, 7, "rgb8", true, {1, 2, 3, 4, 5, 6, 255}});
+  expect_fields(image, stamp);
+  expect_fields(image, {{"height", "1"},
+                        {"width", "2"},
+                        {"encoding", "rgb8"},
+                        {"is_bigendian", "1"},
+                        {"step", "7"},
+                        {"data", "7 of them"},
+                        {"data[6]", "255"}});
+  expect_fields(sent_as("sensor_msgs/CompressedImage", CompressedImageMessage{stamp_s, "jpeg", {7, 8}}),
+                {{"format", "jpeg"}, {"data", "2 of them"}, {"data[1]", "8"}});
+  const CameraInfoMessage camera{stamp_s, 640, 360, {1, 2, 3, 4, 5}, {550, 0, 319.5, 0, 551, 179.5, 0, 0, 1}};
+  expect_fields(sent_as("sensor_msgs/CameraInfo", camera), {{"height", "360"},
+                                                            {"width", "640"},
+                                                            {"distortion_model", "plumb_bob"},
+                                                            {"d", "5 of them"},
+                                                            {"d[4]", "5"},
+                                                            {"k[4]", "551"},
+                                                            {"r[0]", "1"},
+                                                            {"r[1]", "0"},
+                                                            {"p[6]", "179.5"},
+                                                            {"p[3]", "0"},
+                                                            {"binning_x", "0"},
+                                                            {"roi.do_rectify", "false"}});
+}
+
+TEST(WireBytes, OfWhatTheLoopTells) {
+  PoseMessage pose{stamp_s, "endoscope", {1, 2, 3}, {0, 0.6, 0, 0.8}, {}};
+  pose.covariance[35] = 5;
+  const Fields told = sent_as("geometry_msgs/PoseWithCovarianceStamped", pose);
+  expect_fields(told, stamp);
+  expect_fields(told, {{"header.frame_id", "endoscope"},
+                       {"pose.pose.position.z", "3"},
+                       {"pose.pose.orientation.y", "0.6"},
+                       {"pose.pose.orientation.w", "0.8"},
+                       {"pose.covariance[34]", "0"},
+                       {"pose.covariance[35]", "5"}});
+  const DiagnosticMessage state{
+      stamp_s, DiagnosticMessage::Level::error, "lapservo", "hold", {{"reason", "outlier"}, {"delay_s", ""}}};
+  expect_fields(sent_as("diagnostic_msgs/DiagnosticArray", state), {{"status", "1 of them"},
+                                                                    {"status[0].level", "2"},
+                                                                    {"status[0].name", "lapservo"},
+                                                                    {"status[0].message", "hold"},
+                                                                    {"status[0].hardware_id", ""},
+                                                                    {"status[0].values", "2 of them"},
+                                                                    {"status[0].values[0].value", "outlier"},
+                                                                    {"status[0].values[1].key", "delay_s"}});
+  ObservationMessage seen;
+  seen.stamp_s = stamp_s;
+  seen.frame = "endoscope", seen.instrument = "PSM1", seen.status = "ok", seen.action = "track", seen.reason = "";
+  seen.q = {1, 2, 3, std::numeric_limits<double>::quiet_NaN()};
+  seen.q_covariance[15] = 4, seen.features[0] = 5, seen.feature_covariance[1] = 6, seen.edges_px[7] = 7;
+  seen.error = {8, 9, 10, 11};
+  expect_fields(sent_as("lapservo_msgs/Observation", seen), {{"instrument", "PSM1"},
+                                                             {"status", "ok"},
+                                                             {"q[2]", "3"},
+                                                             {"q[3]", "nan"},
+                                                             {"q_covariance[15]", "4"},
+                                                             {"features[0]", "5"},
+                                                             {"feature_covariance[1]", "6"},
+                                                             {"edges_px[7]", "7"},
+                                                             {"action", "track"},
+                                                             {"reason", ""},
+                                                             {"error[3]", "11"}});
+}
+
+// What bags hold are these bytes.
+TEST(WireBytes, AreReadAsBagsAre) {
+  const JointMessage joints{stamp_s, {"yaw", "", "pitch"}, {0.25, -1.5, 3}};
+  const auto bytes = sent(joints);
+  const auto read = decode_cdr<JointMessage>({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->stamp_s, joints.stamp_s);
+  EXPECT_EQ(read->names, joints.names);
+  EXPECT_EQ(read->positions, joints.positions);
+}
+
+}  // namespace
+}  // namespace lapservo::internal
