@@ -1,15 +1,19 @@
 #include "apps/lapservo/calibrate_inputs.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
+#include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/instrument_index.h"
 #include "lapservo/vision/interlacing.h"
@@ -38,6 +42,21 @@ std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options) {
   const auto index = instrument_index(rig, options.instrument);
   if (!index) throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
   return *index;
+}
+
+Joints joints_of(const CalibrateOptions& options, const Instrument& instrument) {
+  if (instrument.joints) return *instrument.joints;
+  Joints joints;
+  std::vector<std::string> names;
+  const CsvTable table = CsvTable::read(options.joints);
+  for (const std::string& column : table.columns())
+    if (column != "time_s") names.push_back(column);
+  if (names.size() != joints.names.size())
+    throw InputError(options.joints, "columns", fmt::format("{}", fmt::join(names, ", ")),
+                     "time_s and four joints (theta's, phi's, rho's, psi's), since " + instrument.name +
+                         " has no joints entry in " + options.rig + " that would name them");
+  std::copy(names.begin(), names.end(), joints.names.begin());
+  return joints;
 }
 
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig) {

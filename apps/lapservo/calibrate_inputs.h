@@ -22,6 +22,10 @@ void add_calibrate_options(CLI::App* command, CalibrateOptions& options);
 /// Place in the rig of the instrument that is meant. Throws InputError where that is open or unknown.
 std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options);
 
+/// The rig's joints, else the recording's own four columns in the order theta, phi, rho, psi. Throws InputError when
+/// they are not four.
+Joints joints_of(const CalibrateOptions& options, const Instrument& instrument);
+
 /// Throws InputError when a result would go over an input or over the other result.
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
 

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "apps/lapservo/calibrate_inputs.h"
 #include "apps/lapservo/interrupt.h"
@@ -19,30 +18,12 @@
 #include "lapservo/calibration/pose_table.h"
 #include "lapservo/calibration/registration.h"
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/core/csv.h"
-#include "lapservo/core/error.h"
 #include "lapservo/rig/rig_updater.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::app {
 using namespace internal;
 namespace {
-
-// The rig's, else the recording's own four columns in the order theta, phi, rho, psi.
-Joints joints_of(const CalibrateOptions& options, const Instrument& instrument) {
-  if (instrument.joints) return *instrument.joints;
-  Joints joints;
-  std::vector<std::string> names;
-  const CsvTable table = CsvTable::read(options.joints);
-  for (const std::string& column : table.columns())
-    if (column != "time_s") names.push_back(column);
-  if (names.size() != joints.names.size())
-    throw InputError(options.joints, "columns", fmt::format("{}", fmt::join(names, ", ")),
-                     "time_s and four joints (theta's, phi's, rho's, psi's), since " + instrument.name +
-                         " has no joints entry in " + options.rig + " that would name them");
-  std::copy(names.begin(), names.end(), joints.names.begin());
-  return joints;
-}
 
 struct Poses {
   std::vector<TimedPose> all;
