@@ -114,15 +114,31 @@ class Guide {
     const auto joints = [](const std::string& file) {
       return file.empty() ? std::vector<std::string>{} : std::vector<std::string>{"--joints", file};
     };
-    return {{"camera", "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
-             &o.boards, "--boards", {o.boards}, board},
+    return {{"camera",
+             "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
+             &o.boards,
+             "--boards",
+             {o.boards},
+             board},
             {"colour", "the mounted marker moved through the picture, 10 s", &o.motion, "--motion", {o.motion}, {}},
-            {"marker", "a slow full turn about the shaft's axis, 20 s or more, near and sharp", &o.turn, "--turn",
-             {o.turn, o.turn_joints}, joints(o.turn_joints)},
-            {"registration", "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
-             &o.swing, "--swing", {o.swing, o.joints}, joints(o.joints)},
-            {"check", "another swing, or the same, with a full turn", &o.judged, "--check",
-             {o.judged, o.judged_joints}, joints(o.judged_joints)}};
+            {"marker",
+             "a slow full turn about the shaft's axis, 20 s or more, near and sharp",
+             &o.turn,
+             "--turn",
+             {o.turn, o.turn_joints},
+             joints(o.turn_joints)},
+            {"registration",
+             "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
+             &o.swing,
+             "--swing",
+             {o.swing, o.joints},
+             joints(o.joints)},
+            {"check",
+             "another swing, or the same, with a full turn",
+             &o.judged,
+             "--check",
+             {o.judged, o.judged_joints},
+             joints(o.judged_joints)}};
   }
 
   std::vector<std::string> arguments_of(const Step& step) const {
@@ -182,8 +198,8 @@ class Guide {
       write_record(record_file_, record_);
     }
     if (code == 0 && !interrupted()) return 0;
-    std::fprintf(stderr, "lapservo: stopped %s %s: the same command goes on from there\n",
-                 code == 0 ? "after" : "at", step.name.c_str());
+    std::fprintf(stderr, "lapservo: stopped %s %s: the same command goes on from there\n", code == 0 ? "after" : "at",
+                 step.name.c_str());
     return 1;
   }
 
@@ -230,8 +246,10 @@ void add_calibrate_all(CLI::App* parent, Run& run_later) {
   command->add_flag("--no-questions", options->no_questions,
                     "Leave out what no option names; on a terminal it is asked for");
   command->footer(
-      "What was done, by which command and when stands beside the rig (RIG.calibration.yaml): a second run goes on where\n"
-      "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig changed.\n"
+      "What was done, by which command and when stands beside the rig (RIG.calibration.yaml): a second run goes on "
+      "where\n"
+      "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
+      "changed.\n"
       "Example:\n  lapservo calibrate all --rig rig.yaml --boards boards/ --board 9x6 --square-mm 5 --turn turn.mp4 "
       "--swing swing.mp4 --joints joints.csv --reports pages");
   command->callback([options, &run_later] { run_later = [options] { return run_all(*options); }; });

@@ -145,7 +145,8 @@ void add_calibrate_colour(CLI::App* parent, Run& run_later) {
   command->add_option("--report", options->report, "HTML page with the segmentation before and after");
   command->add_flag("--view", options->view, "Show the segmentation before and after in a window");
   command->footer(
-      "Move the instrument through the picture and turn it, 10 s or more, wholly in view and not overexposed. The rig's\n"
+      "Move the instrument through the picture and turn it, 10 s or more, wholly in view and not overexposed. The "
+      "rig's\n"
       "hues may be up to 60 degrees off; the response is written where the frames tell another than the rig's.\n"
       "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml --report colour.html");
   command->callback([options, &run_later] { run_later = [options] { return run_colour(*options); }; });

@@ -59,6 +59,12 @@ Joints joints_of(const CalibrateOptions& options, const Instrument& instrument) 
   return joints;
 }
 
+std::optional<JointRecording> recording_with_joints(const CalibrateOptions& options, Instrument& instrument) {
+  if (options.joints.empty()) return std::nullopt;
+  instrument.joints = joints_of(options, instrument);
+  return read_joint_recording(options.joints, *instrument.joints);
+}
+
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig) {
   InputFiles inputs;
   inputs.add(options.input), inputs.add(options.joints);

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "apps/lapservo/subcommands.h"
+#include "lapservo/calibration/joint_recording.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/rig/rig.h"
 
@@ -25,6 +27,9 @@ std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options);
 /// The rig's joints, else the recording's own four columns in the order theta, phi, rho, psi. Throws InputError when
 /// they are not four.
 Joints joints_of(const CalibrateOptions& options, const Instrument& instrument);
+
+/// The joints' recording, when --joints names one; the instrument is given joints_of() then.
+std::optional<internal::JointRecording> recording_with_joints(const CalibrateOptions& options, Instrument& instrument);
 
 /// Throws InputError when a result would go over an input or over the other result.
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);

@@ -126,11 +126,7 @@ int run_registration(const CalibrateOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  std::optional<JointRecording> recording;
-  if (!options.joints.empty()) {
-    instrument.joints = joints_of(options, instrument);
-    recording = read_joint_recording(options.joints, *instrument.joints);
-  }
+  const auto recording = recording_with_joints(options, instrument);
   AtomicFile out(options.out);
   watch_for_interrupts();
 

@@ -74,11 +74,7 @@ int run_check(const CalibrateOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  std::optional<JointRecording> recording;
-  if (!options.joints.empty()) {
-    instrument.joints = joints_of(options, instrument);
-    recording = read_joint_recording(options.joints, *instrument.joints);
-  }
+  const auto recording = recording_with_joints(options, instrument);
   const auto source = open_frame_source(options.input, options.fps);
   watch_for_interrupts();
 
@@ -103,7 +99,8 @@ int run_check(const CalibrateOptions& options) {
     if (checked.findings.light) checked.findings.print = check_print(rig, index, evidence.take_key_frames());
     progress.show(2, " of 3: the arm");
     if (recording && !evidence.poses().empty())
-      checked.findings.arm = check_arm(instrument, rig.camera, evidence.poses(), *recording, options.joints);
+      checked.findings.arm =
+          check_arm(instrument, rig.camera, evidence.poses(), evidence.tracked_psi(), *recording, options.joints);
     else
       checked.findings.rcm = check_rcm(instrument, evidence.poses());
     progress.show(3, " of 3: the work space");

@@ -45,6 +45,17 @@ Plot arm_plot(const ArmCheck& arm, const std::string& title, const std::string& 
   return plot;
 }
 
+Plot encoder_plot(const ArmCheck& arm) {
+  Plot plot = over_time("Rotation against encoder", "psi beyond the encoder", "mrad");
+  plot.y.low.reset();
+  plot.references = {{"the encoder", 0}};
+  Series series = points("as the rig has it", 1);
+  for (const TrackedPsi& off : arm.beyond_encoder)
+    series.x.push_back(off.time_s), series.y.push_back(1e3 * off.psi_rad);
+  plot.series.push_back(std::move(series));
+  return plot;
+}
+
 template <typename Value>
 Plot frame_plot(const std::vector<FrameEvidence>& frames, const std::string& title, const std::string& label,
                 const std::string& unit, Value value) {
@@ -113,13 +124,13 @@ std::string told(const Told& t, double factor, const char* unit) {
 std::vector<CheckLine> arm_lines(const ArmCheck& arm) {
   if (!arm.refusal.empty()) return {{"joints", "can't be compared: " + arm.refusal}};
   const auto px = [](const ArmResidual& r) { return r.pixel_px; };
-  const auto roll = [](const ArmResidual& r) { return 1e3 * r.roll_rad; };
+  const auto psi = [](const TrackedPsi& off) { return 1e3 * off.psi_rad; };
   const bool rig = !arm.by_rig.empty();
   std::vector<CheckLine> lines{
       {"reprojection", (rig ? fmt::format("{:.2f} px rms; ", rms(arm.by_rig, px)) : "") +
                            fmt::format("{:.2f} px after a calibration", rms(arm.at_best, px))},
-      {"rotation against encoder", (rig ? fmt::format("{:.1f} mrad rms; ", rms(arm.by_rig, roll)) : "") +
-                                       fmt::format("{:.1f} mrad after a calibration", rms(arm.at_best, roll))},
+      {"rotation against encoder",
+       rig && !arm.beyond_encoder.empty() ? fmt::format("{:.1f} mrad rms", rms(arm.beyond_encoder, psi)) : "unknown"},
       {"focal length", "off by " + told(arm.focal, 100, "%")},
       {"drift", "the marker moves by " + told(arm.drift_m, 1e3, "mm") + " over the recording, directions by " +
                     told(arm.drift_rad, 1e3, "mrad")},
@@ -135,9 +146,10 @@ std::vector<CheckLine> arm_lines(const ArmCheck& arm) {
 std::vector<CheckLine> rcm_lines(const RcmCheck& rcm) {
   if (!rcm.refusal.empty()) return {{"RCM", "can't be told: " + rcm.refusal}};
   std::vector<CheckLine> lines;
-  lines.push_back({"RCM", fmt::format("axes miss where they meet by {:.2f} mm rms",
-                                      1e3 * rms(rcm.misses_m, [](const auto& miss) { return miss.second; })) +
-                              (rcm.distance_m ? ", which is off the rig's by " + told(*rcm.distance_m, 1e3, "mm") : "")});
+  lines.push_back(
+      {"RCM", fmt::format("axes miss where they meet by {:.2f} mm rms",
+                          1e3 * rms(rcm.misses_m, [](const auto& miss) { return miss.second; })) +
+                  (rcm.distance_m ? ", which is off the rig's by " + told(*rcm.distance_m, 1e3, "mm") : "")});
   lines.push_back({"drift", "the RCM moves by " + told(rcm.drift_m, 1e3, "mm") + " over the recording"});
   return lines;
 }
@@ -148,8 +160,9 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
   if (f.arm && f.arm->refusal.empty()) {
     figures.push_back({arm_plot(*f.arm, "Reprojection", "px", 1, &ArmResidual::pixel_px),
                        "Between the marker's image and where joints and registration put it."});
-    figures.push_back({arm_plot(*f.arm, "Rotation against encoder", "mrad", 1e3, &ArmResidual::roll_rad),
-                       "The same for the turn about the shaft. Steps that come with reversals are backlash."});
+    figures.push_back(
+        {encoder_plot(*f.arm),
+         "psi as the rig tracks it, less what the joints say. Steps that come with reversals are backlash."});
     figures.push_back({arm_plot(*f.arm, "The marker's place", "mm", 1e3, &ArmResidual::position_m),
                        "The same in space. What grows with time is drift, what goes with speed is delay."});
   }
@@ -211,9 +224,10 @@ std::vector<CheckLine> check_lines(const CheckedRig& checked) {
   const auto more = f.arm ? arm_lines(*f.arm) : f.rcm ? rcm_lines(*f.rcm) : std::vector<CheckLine>{};
   lines.insert(lines.end(), more.begin(), more.end());
   if (f.work_space)
-    lines.push_back({"work space", fmt::format("sigma of psi at most {:.0f} mrad in {:.0f} % of {} places, up to {:.1f}",
-                                               1e3 * rig_limits.sigma_rad, 100 * f.work_space->good,
-                                               f.work_space->places, 1e3 * f.work_space->worst_rad)});
+    lines.push_back(
+        {"work space", fmt::format("sigma of psi at most {:.0f} mrad in {:.0f} % of {} places, up to {:.1f}",
+                                   1e3 * rig_limits.sigma_rad, 100 * f.work_space->good, f.work_space->places,
+                                   1e3 * f.work_space->worst_rad)});
   return lines;
 }
 
@@ -235,9 +249,10 @@ void write_check_report(const std::filesystem::path& path, const std::string& in
   Table table{"What was found", {"", ""}, {}, true};
   for (const CheckLine& line : check_lines(checked)) table.rows.push_back({line.name, line.found});
   section.tables = {table};
-  section.notes = {"Each of focal length, drift, delay and registration is what is left of it with the others taken out.",
-                   "Sigmas over the work space are those of rendered frames, times what the recording's own have over "
-                   "renderings of the same poses."};
+  section.notes = {
+      "Each of focal length, drift, delay and registration is what is left of it with the others taken out.",
+      "Sigmas over the work space are those of rendered frames, times what the recording's own have over "
+      "renderings of the same poses."};
   Report report;
   report.title = "lapservo check";
   report.sections = {section};

@@ -8,6 +8,7 @@
 #include "lapservo/calibration/arm_model.h"
 #include "lapservo/calibration/arm_start.h"
 #include "lapservo/calibration/frame_fit.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
@@ -112,7 +113,7 @@ Eigen::Vector3d registration_sigmas(const Fitted& f) {
 }  // namespace
 
 ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std::vector<TimedPose>& poses,
-                   const JointRecording& recording, const std::string& source) {
+                   const std::vector<TrackedPsi>& tracked, const JointRecording& recording, const std::string& source) {
   ArmCheck check;
   const ArmStart start = start_arm(instrument, poses, recording, source);
   if (!start.refusal.empty()) return check.refusal = start.refusal, check;
@@ -134,13 +135,20 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
     check.delay_s = Told{std::abs(*instrument.image_delay_s - check.measured_delay_s),
                          unmodelled * std::sqrt(best->fit.covariance(ArmModel::delay, ArmModel::delay))};
   if (!instrument.camera_from_rcm) return check;
-  check.by_rig = residuals(instrument, camera, start, recording, *instrument.camera_from_rcm, *instrument.joints,
-                           instrument.image_delay_s.value_or(check.measured_delay_s));
+  const double delay_s = instrument.image_delay_s.value_or(check.measured_delay_s);
+  check.by_rig =
+      residuals(instrument, camera, start, recording, *instrument.camera_from_rcm, *instrument.joints, delay_s);
+  for (const TrackedPsi& seen : tracked)
+    if (const auto at = recording.at(seen.time_s - delay_s)) {
+      const double psi_rad = q_from_joints(*instrument.joints, Eigen::Vector4d(at->data()))[3];
+      check.beyond_encoder.push_back({seen.time_s, wrap_pi(seen.psi_rad - psi_rad)});
+    }
   std::vector<ArmResidual> between;
   for (std::size_t i = 0; i < start.poses.size(); ++i)
-    between.push_back(difference(camera, instrument.marker, start.poses[i].time_s,
-                                 marker_at(instrument, *instrument.camera_from_rcm, *instrument.joints, start.joints[i]),
-                                 marker_at(instrument, camera_from_rcm, joints, start.joints[i])));
+    between.push_back(
+        difference(camera, instrument.marker, start.poses[i].time_s,
+                   marker_at(instrument, *instrument.camera_from_rcm, *instrument.joints, start.joints[i]),
+                   marker_at(instrument, camera_from_rcm, joints, start.joints[i])));
   const Eigen::Vector3d sigmas = registration_sigmas(*best);
   check.place_m = Told{rms(between, &ArmResidual::position_m), sigmas[0]};
   check.axis_rad = Told{rms(between, &ArmResidual::axis_rad), sigmas[1]};

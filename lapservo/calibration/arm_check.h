@@ -24,12 +24,18 @@ struct ArmResidual {
   double position_m, axis_rad, roll_rad;
 };
 
+/// psi at a frame's time, as the rig's own tracker has it, through its RCM.
+struct TrackedPsi {
+  double time_s, psi_rad;
+};
+
 /// What a recording of a marker in motion and of its arm's joints tells of a rig: what each of its faults alone makes
 /// of where the marker is expected, the others taken out. Values are sizes, none below 0.
 struct ArmCheck {
   /// Why it is not told, and what to do about it: then nothing else counts. Empty when it is.
   std::string refusal;
   std::vector<ArmResidual> by_rig, at_best;  ///< as the rig has it, and as it would after a calibration
+  std::vector<TrackedPsi> beyond_encoder;    ///< psi as it is tracked less what the joints say, in [-pi, pi)
   Told focal;                                ///< relative error of the focal length
   Told drift_m, drift_rad;                   ///< of the marker, over the recording, and of the directions
   std::optional<Told> delay_s;               ///< error of the rig's image_delay_s, when it has one
@@ -41,6 +47,6 @@ struct ArmCheck {
 /// Needs TimedPose::by_focal for `focal`. Throws as register_arm() does. Where the instrument has no camera_from_rcm,
 /// what compares with it is empty.
 ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std::vector<TimedPose>& poses,
-                   const JointRecording& recording, const std::string& source);
+                   const std::vector<TrackedPsi>& tracked, const JointRecording& recording, const std::string& source);
 
 }  // namespace lapservo::internal

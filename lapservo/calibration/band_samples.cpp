@@ -36,7 +36,8 @@ std::vector<BandSample> band_samples(const cv::Mat& bgr, const Camera& camera, c
       if (!clear || !(point.z() > 1e-3)) continue;
       const Eigen::Vector2d px = camera.raw_from_point(point);
       if (!camera.contains(px, 1)) continue;
-      const auto& pixel = bgr.at<cv::Vec3b>(static_cast<int>(std::lround(px.y())), static_cast<int>(std::lround(px.x())));
+      const auto& pixel =
+          bgr.at<cv::Vec3b>(static_cast<int>(std::lround(px.y())), static_cast<int>(std::lround(px.x())));
       samples.push_back({band, {pixel[0], pixel[1], pixel[2]}});
     }
   }

@@ -26,10 +26,10 @@ std::vector<BandSample> band_samples(const cv::Mat& bgr, const Camera& camera, c
 
 /// How a marker is lit in a frame, by encoded values.
 struct MarkerLight {
-  double clipped = 0;   ///< fraction of the pixels that have a saturated channel
-  double value = 0;     ///< median of the brightest channel, of 255
-  double chroma = 0;    ///< median of the brightest channel less the darkest one
-  double colored = 0;   ///< fraction that has a hue at all
+  double clipped = 0;                ///< fraction of the pixels that have a saturated channel
+  double value = 0;                  ///< median of the brightest channel, of 255
+  double chroma = 0;                 ///< median of the brightest channel less the darkest one
+  double colored = 0;                ///< fraction that has a hue at all
   std::array<double, 3> hues_deg{};  ///< of the bands: medians of what has a hue, near the marker's own
 };
 

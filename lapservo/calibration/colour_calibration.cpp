@@ -18,11 +18,11 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t min_frames = 8, trial_frames = 8;
-constexpr double reach_deg = 65;              // between an ink's hue and the rig's
-constexpr double least_apart_deg = 40;        // between two bands: nearer, and each keeps no room for light and shade
-constexpr double max_clipped = 0.3;           // of the marker's pixels: their hues are the sensor's, not the ink's
+constexpr double reach_deg = 65;        // between an ink's hue and the rig's
+constexpr double least_apart_deg = 40;  // between two bands: nearer, and each keeps no room for light and shade
+constexpr double max_clipped = 0.3;     // of the marker's pixels: their hues are the sensor's, not the ink's
 constexpr double least_move_m = 1.5e-3, least_turn_rad = 0.5;  // of the marker, rms: either
-constexpr double hue_floor_deg = 0.5;         // light, shade and white balance of the day
+constexpr double hue_floor_deg = 0.5;                          // light, shade and white balance of the day
 
 Rig with_hues(Rig rig, std::size_t instrument, const std::array<double, 3>& hues_deg) {
   // A print or a registration that are off are not to hide the marker.
@@ -146,28 +146,32 @@ Measured measure(const Rig& rig, std::size_t instrument, const std::vector<cv::M
   for (const auto& place : places) squares += (place - mean).squaredNorm();
   measured.moved_m = std::sqrt(squares / static_cast<double>(places.size()));
   // Circular standard deviation.
-  measured.turned_rad = std::sqrt(-2 * std::log(std::clamp(turn.norm() / static_cast<double>(places.size()), 1e-9, 1.0)));
+  measured.turned_rad =
+      std::sqrt(-2 * std::log(std::clamp(turn.norm() / static_cast<double>(places.size()), 1e-9, 1.0)));
   return measured;
 }
 
 std::string refusal_of(const Measured& measured, std::size_t frames, const std::string& name) {
   const auto& hues = measured.hues_deg;
   if (2 * static_cast<std::size_t>(measured.found) < frames)
-    return fmt::format("with the hues that suit best {} is in {} of {} frames: show it wholly, near, lit and in motion; "
-                       "diameter_m and bands must be the rig's to half a millimetre",
-                       name, measured.found, frames);
+    return fmt::format(
+        "with the hues that suit best {} is in {} of {} frames: show it wholly, near, lit and in motion; "
+        "diameter_m and bands must be the rig's to half a millimetre",
+        name, measured.found, frames);
   if (measured.clipped > max_clipped)
-    return fmt::format("{:.0f} % of the marker's pixels are saturated, which have the sensor's hue and not the ink's: "
-                       "lower the exposure",
-                       100 * measured.clipped);
+    return fmt::format(
+        "{:.0f} % of the marker's pixels are saturated, which have the sensor's hue and not the ink's: "
+        "lower the exposure",
+        100 * measured.clipped);
   if (measured.moved_m < least_move_m && measured.turned_rad < least_turn_rad)
     return "the frames are all alike: move the instrument through the picture and turn it, 10 s or more";
   const double apart_deg =
       std::min({hue_gap_deg(hues[0], hues[1]), hue_gap_deg(hues[1], hues[2]), hue_gap_deg(hues[0], hues[2])});
   if (apart_deg < least_apart_deg)
-    return fmt::format("two bands' hues are {:.0f} degrees apart, at least {:.0f} are needed: print with other inks, or "
-                       "look at the white balance",
-                       apart_deg, least_apart_deg);
+    return fmt::format(
+        "two bands' hues are {:.0f} degrees apart, at least {:.0f} are needed: print with other inks, or "
+        "look at the white balance",
+        apart_deg, least_apart_deg);
   return {};
 }
 
@@ -203,8 +207,8 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
   constexpr int rounds = 2;
   for (int round = 0; round < rounds; ++round) {
     say("the bands' hues");
-    measured = measure(with_hues(rig, instrument, hues_deg), instrument, frames,
-                       round + 1 == rounds ? &response : nullptr);
+    measured =
+        measure(with_hues(rig, instrument, hues_deg), instrument, frames, round + 1 == rounds ? &response : nullptr);
     hues_deg = measured.hues_deg;
   }
   calibration.refusal = refusal_of(measured, frames.size(), of.name);

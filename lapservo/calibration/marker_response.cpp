@@ -59,8 +59,7 @@ bool sample(const LightImage& light, const Place& place, EdgeProfile& profile) {
     return false;
   profile.first_px = -reach_px, profile.count = 2 * reach_px + 1;
   for (std::size_t i = 0; i < profile.count; ++i) {
-    const Eigen::Vector2f at =
-        (place.centre_px + (static_cast<double>(i) - reach_px) * place.direction).cast<float>();
+    const Eigen::Vector2f at = (place.centre_px + (static_cast<double>(i) - reach_px) * place.direction).cast<float>();
     const auto seen = light.at(at.x(), at.y());
     for (std::size_t c = 0; c < 3; ++c) {
       if (seen.saturated[c]) return false;
@@ -116,7 +115,8 @@ MarkerResponse::MarkerResponse(const Camera& camera) : camera_(camera) {
   };
   add("as it is", camera.response);
   add("srgb", {Response::Kind::srgb}), add("rec709", {Response::Kind::rec709}), add("linear", {Response::Kind::power});
-  for (const auto& [name, gamma] : {std::pair("gamma:1.8", 1.8), {"gamma:2.0", 2.0}, {"gamma:2.2", 2.2}, {"gamma:2.4", 2.4}})
+  for (const auto& [name, gamma] :
+       {std::pair("gamma:1.8", 1.8), {"gamma:2.0", 2.0}, {"gamma:2.2", 2.2}, {"gamma:2.4", 2.4}})
     add(name, {Response::Kind::power, gamma});
 }
 

@@ -60,7 +60,8 @@ class Advisor {
 
   std::vector<Advice> all() {
     light(), colours(), camera(), print(), movement(), delay(), registration(), found(), view();
-    std::stable_sort(advice_.begin(), advice_.end(), [](const Advice& a, const Advice& b) { return a.needed > b.needed; });
+    std::stable_sort(advice_.begin(), advice_.end(),
+                     [](const Advice& a, const Advice& b) { return a.needed > b.needed; });
     return std::move(advice_);
   }
 
@@ -123,7 +124,8 @@ class Advisor {
           "lapservo calibrate marker",
           fmt::format("psi: {:.1f} mrad rms less, and no marker_mismatch", 1e3 * print.psi_rad.value));
     else if (5 * static_cast<std::size_t>(f_.mismatched) > f_.frames)
-      add(true, fmt::format("{} of {} frames are marker_mismatch: the print is not the rig's", f_.mismatched, f_.frames),
+      add(true,
+          fmt::format("{} of {} frames are marker_mismatch: the print is not the rig's", f_.mismatched, f_.frames),
           "lapservo calibrate marker", "psi, where it is refused now");
     else if (!print.refusal.empty() && f_.light)
       add(false, "whether the print is the rig's can't be told: " + print.refusal,
@@ -232,9 +234,8 @@ RcmCheck check_rcm(const Instrument& instrument, const std::vector<TimedPose>& p
   if (!registration.refusal.empty()) return check.refusal = registration.refusal, check;
   for (const RegistrationResidual& r : registration.residuals) check.misses_m.emplace_back(r.time_s, r.position_m);
   if (instrument.camera_from_rcm)
-    check.distance_m =
-        Told{(instrument.camera_from_rcm->translation - registration.camera_from_rcm.translation).norm(),
-             registration.sigma_translation_m.norm()};
+    check.distance_m = Told{(instrument.camera_from_rcm->translation - registration.camera_from_rcm.translation).norm(),
+                            registration.sigma_translation_m.norm()};
   const auto middle = poses.begin() + static_cast<std::ptrdiff_t>(poses.size() / 2);
   const auto first = axes_meeting_point({poses.begin(), middle}), second = axes_meeting_point({middle, poses.end()});
   if (first && second)

@@ -15,12 +15,12 @@ namespace lapservo::internal {
 /// From when on a rig is not good enough. One number each, below which the loop's own errors (docs/accuracy.md) or its
 /// limits are larger.
 struct RigLimits {
-  double found = 0.95;  ///< fraction of the frames
+  double found = 0.95;                                          ///< fraction of the frames
   double dark_value = 70, dark_chroma = 45, dark_picture = 40;  ///< of 255
   double clipped = 0.1, clipped_picture = 0.25;                 ///< fraction of the pixels
-  double hue_deg = 12;     ///< between a band and the rig's hue
-  double print_rad = 5e-3;      ///< rms of psi, by a print that is not the rig's
-  double focal = 5e-3;      ///< relative
+  double hue_deg = 12;                                          ///< between a band and the rig's hue
+  double print_rad = 5e-3;                                      ///< rms of psi, by a print that is not the rig's
+  double focal = 5e-3;                                          ///< relative
   double drift_m = 1e-3, drift_rad = 5e-3;
   double delay_s = 15e-3;
   double place_m = 1e-3, axis_rad = 7e-3, roll_rad = 10e-3;  ///< by the registration
@@ -43,8 +43,8 @@ PrintCheck check_print(const Rig& rig, std::size_t instrument, std::vector<KeyFr
 /// The RCM by the image alone, for recordings without joints.
 struct RcmCheck {
   std::string refusal;
-  std::optional<Told> distance_m;  ///< of the rig's RCM from it
-  Told drift_m;                    ///< between the recording's halves
+  std::optional<Told> distance_m;                   ///< of the rig's RCM from it
+  Told drift_m;                                     ///< between the recording's halves
   std::vector<std::pair<double, double>> misses_m;  ///< time, by how much the axis misses it
 };
 RcmCheck check_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses);

@@ -40,7 +40,8 @@ std::vector<cv::Mat> rendered(int count, const RenderOptions& options) {
   Renderer renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 5), options);
   std::vector<cv::Mat> pictures;
   for (int i = 0; i < count; ++i)
-    pictures.push_back(renderer.render({placement_of(rig.instruments[0], q_at(i / fps))}, static_cast<std::uint64_t>(i)));
+    pictures.push_back(
+        renderer.render({placement_of(rig.instruments[0], q_at(i / fps))}, static_cast<std::uint64_t>(i)));
   return pictures;
 }
 
@@ -51,8 +52,7 @@ JointRecording joints_meanwhile(double slip_rad = 0) {
   for (double t = -0.6; t < frames / fps + 0.6; t += 0.02) {
     const Eigen::Vector4d q = q_at(t).vector();
     std::array<double, 4> at;
-    for (std::size_t j = 0; j < 4; ++j)
-      at[j] = (q[static_cast<Eigen::Index>(j)] - joints.offset[j]) / joints.sign[j];
+    for (std::size_t j = 0; j < 4; ++j) at[j] = (q[static_cast<Eigen::Index>(j)] - joints.offset[j]) / joints.sign[j];
     at[0] += slip_rad * t * fps / frames;
     recording.time_s.push_back(t - delay_s), recording.joints.push_back(at);
   }
@@ -65,7 +65,8 @@ RigFindings found_out(const Rig& rig, const std::vector<cv::Mat>& pictures, cons
   for (std::size_t i = 0; i < pictures.size(); ++i) evidence.add(pictures[i], static_cast<double>(i) / fps);
   RigFindings findings = findings_of(rig, 0, evidence);
   if (evidence.poses().size() > 40)
-    findings.arm = check_arm(rig.instruments[0], rig.camera, evidence.poses(), recording, "joints.csv");
+    findings.arm =
+        check_arm(rig.instruments[0], rig.camera, evidence.poses(), evidence.tracked_psi(), recording, "joints.csv");
   if (with_print) findings.print = check_print(rig, 0, evidence.take_key_frames());
   return findings;
 }
@@ -106,6 +107,8 @@ TEST_F(CheckRig, AGoodRigIsGoodEnough) {
   EXPECT_LT(findings.arm->focal.value, 2e-3);
   EXPECT_LT(findings.print->psi_rad.value, 3e-3);
   EXPECT_EQ(findings.arm->by_rig.size(), findings.arm->at_best.size());
+  EXPECT_GT(findings.arm->beyond_encoder.size(), 100U);
+  for (const TrackedPsi& off : findings.arm->beyond_encoder) EXPECT_NEAR(off.psi_rad, 0, 6e-3) << off.time_s;
 }
 
 TEST_F(CheckRig, NamesAWrongFocalLengthFirst) {

@@ -74,10 +74,18 @@ void RigEvidence::add(const cv::Mat& bgr, double time_s) {
   }
 
   const Observation& as_it_is = as_it_is_.track(bgr)[instrument_];
-  FrameEvidence frame{time_s, as_it_is.status, as_it_is.marker ? as_it_is.marker->sigma_roll_rad : 0, {}, 0};
+  FrameEvidence frame{time_s, as_it_is.status, as_it_is.marker ? as_it_is.marker->sigma_roll_rad : 0, {}, {}, 0};
+  if (as_it_is.status == Status::ok && as_it_is.rcm) frame.psi_rad = as_it_is.rcm->q.psi_rad;
   if (!look_with(exact_, bgr, frame)) look_with(tolerant_, bgr, frame);
   frames_.push_back(frame);
   key_frames_.add(bgr, time_s);
+}
+
+std::vector<TrackedPsi> RigEvidence::tracked_psi() const {
+  std::vector<TrackedPsi> tracked;
+  for (const FrameEvidence& frame : frames_)
+    if (frame.psi_rad) tracked.push_back({frame.time_s, *frame.psi_rad});
+  return tracked;
 }
 
 PictureLight RigEvidence::picture() const {

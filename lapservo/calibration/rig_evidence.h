@@ -6,6 +6,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/calibration/arm_check.h"
 #include "lapservo/calibration/band_samples.h"
 #include "lapservo/calibration/marker_calibration.h"
 #include "lapservo/calibration/timed_pose.h"
@@ -19,6 +20,7 @@ struct FrameEvidence {
   double time_s;
   Status status;
   double sigma_roll_rad = 0;         ///< when ok: about the axis, in a fit as it is tracked
+  std::optional<double> psi_rad{};   ///< when ok and the rig has camera_from_rcm
   std::optional<MarkerLight> light;  ///< where the marker was found, be its print the rig's or not
   double width_px = 0;               ///< of the shaft, there
 };
@@ -40,6 +42,7 @@ class RigEvidence {
   const std::vector<FrameEvidence>& frames() const { return frames_; }
   /// By the image alone, whatever the print; with TimedPose::by_focal.
   const std::vector<TimedPose>& poses() const { return poses_; }
+  std::vector<TrackedPsi> tracked_psi() const;
   PictureLight picture() const;
   int count(Status status) const;
   /// Empties what it takes.

@@ -76,8 +76,7 @@ std::optional<double> sigma_at(Judge& judge, const Eigen::Vector3d& middle, cons
   double squares = 0;
   int found = 0;
   for (int i = 0; i < turns; ++i)
-    if (const auto sigma_rad = judge.sigma_rad(*shaft, two_pi * i / turns))
-      squares += *sigma_rad * *sigma_rad, ++found;
+    if (const auto sigma_rad = judge.sigma_rad(*shaft, two_pi * i / turns)) squares += *sigma_rad * *sigma_rad, ++found;
   if (2 * found < turns) return std::nullopt;
   return scale * std::sqrt(squares / found);
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
+#include <limits>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -19,7 +20,7 @@ namespace fs = std::filesystem;
 
 struct FileState {
   std::uint64_t bytes = 0, files = 0;
-  std::int64_t changed = 0;  // the last of them, in the file system's clock
+  std::int64_t changed = std::numeric_limits<std::int64_t>::min();  // the last of them; now is below 0 in this clock
 
   void add(const fs::path& file) {
     std::error_code error;
@@ -58,7 +59,8 @@ CalibrationRecord read_record(const fs::path& path) {
   for (const YamlField& entry : root["steps"].list("steps")) {
     expect_keys(entry, {{"name", "command", "inputs", "when"}, {}});
     const auto text = [&](const char* key) { return entry[key].text("a text"); };
-    record.steps.push_back({text("name"), text("command"), entry["inputs"].present() ? text("inputs") : "", text("when")});
+    record.steps.push_back(
+        {text("name"), text("command"), entry["inputs"].present() ? text("inputs") : "", text("when")});
   }
   return record;
 }
@@ -73,8 +75,8 @@ void write_record(const fs::path& path, const CalibrationRecord& record) {
     out << YAML::Key << "when" << YAML::Value << step.when << YAML::EndMap;
   }
   out << YAML::EndSeq << YAML::EndMap;
-  write_file(path, std::string("# What `lapservo calibrate all` did to the rig beside this, and when.\n") + out.c_str() +
-                       "\n");
+  write_file(path, std::string("# What `lapservo calibrate all` did to the rig beside this, and when.\n") +
+                       out.c_str() + "\n");
 }
 
 std::string content_state(const fs::path& path) {

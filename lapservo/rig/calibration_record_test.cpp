@@ -1,5 +1,8 @@
 #include "lapservo/rig/calibration_record.h"
 
+#include <chrono>
+#include <filesystem>
+
 #include <gtest/gtest.h>
 
 #include "lapservo/testing/input_error.h"
@@ -16,7 +19,8 @@ TEST(CalibrationRecord, ComesBackAsItWasWritten) {
   const auto path = folder / "rig.calibration.yaml";
   EXPECT_TRUE(read_record(path).steps.empty());
   CalibrationRecord record{"fnv1a-1", {}};
-  record.add({"camera", "lapservo calibrate camera 'my: boards' --board 9x6", "3 files, 20 bytes, 7", "2026-01-02T03:04:05Z"});
+  record.add(
+      {"camera", "lapservo calibrate camera 'my: boards' --board 9x6", "3 files, 20 bytes, 7", "2026-01-02T03:04:05Z"});
   record.add({"marker", "lapservo calibrate marker 0", "", "2026-01-02T03:04:06Z"});
   write_record(path, record);
   const CalibrationRecord read = read_record(path);
@@ -47,6 +51,9 @@ TEST(CalibrationRecord, StatesTellWhetherFilesAreTheSame) {
   const std::string content = content_state(file), input = input_state(file), both = input_state(folder.path());
   EXPECT_EQ(content_state(file), content);
   EXPECT_EQ(input_state(file), input);
+  std::filesystem::last_write_time(file, std::filesystem::last_write_time(file) + std::chrono::seconds(1));
+  EXPECT_NE(input_state(file), input);
+  EXPECT_EQ(content_state(file), content);
   write_file(file, "1,3,4\n");
   EXPECT_NE(content_state(file), content);
   EXPECT_NE(input_state(file), input);

@@ -110,16 +110,16 @@ TEST(UpdatedRig, ChangesOneRegistrationAndNothingElse) {
 
 TEST(UpdatedRig, HoldsOtherColours) {
   const Files files;
-  MeasuredColour colour{{97.123456, 181, 269.5}, {0.5, 0.512345, 1}, {}};
+  MeasuredColour colour{{181, 97.123456, 269.5}, {0.5, 0.512345, 1}, {}};
   const auto place = files.folder / "elsewhere/new.yaml";
   testing::write_file(place, updated_rig_yaml(files.folder / "rig.yaml", place, 1, colour));
   Rig updated = load_rig(place);
-  EXPECT_EQ(updated.instruments[1].marker.hues_deg, (std::array<double, 3>{97.12, 181, 269.5}));
+  EXPECT_EQ(updated.instruments[1].marker.hues_deg, (std::array<double, 3>{181, 97.12, 269.5}));
   EXPECT_EQ((*updated.instruments[1].marker.sigmas.hues_deg)[1], 0.512);
   EXPECT_FALSE(updated.camera_file.empty()) << "as it was";
 
   // Another response can't go into a file that other rigs may name.
-  colour.response = Response{Response::Kind::power, 1.8};
+  colour.hues_deg = {90, 181, 270}, colour.response = Response{Response::Kind::power, 1.8};
   testing::write_file(place, updated_rig_yaml(files.folder / "rig.yaml", place, 0, colour));
   updated = load_rig(place);
   EXPECT_TRUE(updated.camera_file.empty());
