@@ -209,6 +209,11 @@ std::vector<CheckLine> check_lines(const CheckedRig& checked) {
                                           "brightest and darkest channel {:.0f}",
                                           f.light->value, 100 * f.light->clipped, f.light->chroma)});
     lines.push_back({"colours", fmt::format("within {:.0f} degrees of the rig's hues", f.hue_error_deg)});
+    if (f.response)
+      lines.push_back(
+          {"encoding", fmt::format("channels' edges lie {:.3f} px apart with the rig's response, {:.3f} with "
+                                   "the best of the usual ones",
+                                   f.response->before_px, f.response->after_px)});
     lines.push_back({"size", fmt::format("the shaft is {:.0f} px wide", f.width_px)});
   } else {
     lines.push_back({"light", fmt::format("the picture's values reach {:.0f} of 255, {:.0f} % saturated",

@@ -59,7 +59,7 @@ class Advisor {
   explicit Advisor(const RigFindings& findings) : f_(findings) {}
 
   std::vector<Advice> all() {
-    light(), colours(), camera(), print(), movement(), delay(), registration(), found(), view();
+    light(), colours(), response(), camera(), print(), movement(), delay(), registration(), found(), view();
     std::stable_sort(advice_.begin(), advice_.end(),
                      [](const Advice& a, const Advice& b) { return a.needed > b.needed; });
     return std::move(advice_);
@@ -105,6 +105,18 @@ class Advisor {
     if (!f_.light && !clipped() && !dark())
       add(true, found_text() + ": its colours are not the picture's", "lapservo calibrate colour",
           "finding it at all; look at diameter_m too, and whether the marker is in view");
+  }
+
+  void response() {
+    if (!f_.response || !f_.response->better || f_.response->before_px < rig_limits.response_px) return;
+    add(true,
+        fmt::format(
+            "the camera encodes light otherwise than the rig says, rather as {}: edges of channels that rise and "
+            "fall at one place lie {:.2f} px apart",
+            f_.response->name, f_.response->before_px),
+        "lapservo calibrate camera, or calibrate colour",
+        fmt::format("edges {:.2f} px nearer to each other, and psi with them",
+                    f_.response->before_px - f_.response->after_px));
   }
 
   void camera() {
@@ -264,6 +276,7 @@ RigFindings findings_of(const Rig& rig, std::size_t instrument, const RigEvidenc
     for (std::size_t band = 0; band < 3; ++band)
       findings.hue_error_deg =
           std::max(findings.hue_error_deg, hue_gap_deg(findings.light->hues_deg[band], of.marker.hues_deg[band]));
+  findings.response = evidence.response();
   findings.registered = of.camera_from_rcm.has_value();
   return findings;
 }

@@ -19,8 +19,9 @@ struct RigLimits {
   double dark_value = 70, dark_chroma = 45, dark_picture = 40;  ///< of 255
   double clipped = 0.1, clipped_picture = 0.25;                 ///< fraction of the pixels
   double hue_deg = 12;                                          ///< between a band and the rig's hue
-  double print_rad = 5e-3;                                      ///< rms of psi, by a print that is not the rig's
-  double focal = 5e-3;                                          ///< relative
+  double response_px = 0.05;  ///< between edges of channels that rise and fall at one place
+  double print_rad = 5e-3;    ///< rms of psi, by a print that is not the rig's
+  double focal = 5e-3;        ///< relative
   double drift_m = 1e-3, drift_rad = 5e-3;
   double delay_s = 15e-3;
   double place_m = 1e-3, axis_rad = 7e-3, roll_rad = 10e-3;  ///< by the registration
@@ -64,6 +65,7 @@ struct RigFindings {
   std::optional<MarkerLight> light;  ///< medians; empty when no frame shows the marker
   double hue_error_deg = 0;          ///< the largest of the three bands'
   double width_px = 0;               ///< median
+  std::optional<MarkerResponse::Result> response;
   std::optional<PrintCheck> print;
   std::optional<ArmCheck> arm;  ///< with joints
   std::optional<RcmCheck> rcm;  ///< without
@@ -82,8 +84,8 @@ struct Advice {
   std::string gain;     ///< what it would gain
 };
 
-/// What to do, the first thing first: in the order in which one makes the next one wrong (light, colours, camera,
-/// print, what moves, delay, registration, the view), what is needed before what may be.
+/// What to do, the first thing first: in the order in which one makes the next one wrong (light, colours, encoding,
+/// camera, print, what moves, delay, registration, the view), what is needed before what may be.
 std::vector<Advice> advice_on(const RigFindings& findings);
 
 }  // namespace lapservo::internal

@@ -147,6 +147,11 @@ TEST_F(CheckRig, NamesBadLightFirst) {
   expect_first(found_out(rig, rendered(8, options), joints), "overexposed");
 }
 
+TEST_F(CheckRig, NamesAWrongResponseFirst) {
+  rig.camera.response = {Response::Kind::power, 1.8};
+  expect_first(found_out(rig, pictures(), joints), "encodes light otherwise than the rig says, rather as srgb");
+}
+
 TEST_F(CheckRig, WithoutJointsComparesTheRcm) {
   RigEvidence evidence(rig, 0);
   for (std::size_t i = 0; i < pictures().size(); ++i) evidence.add(pictures()[i], static_cast<double>(i) / fps);

@@ -35,11 +35,16 @@ RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument)
       as_it_is_(rig),
       exact_{Tracker(free_rig(rig, 0, 0)), Tracker(free_rig(rig, 0, focal_step))},
       tolerant_{Tracker(free_rig(rig, print_tolerance_m, 0)), Tracker(free_rig(rig, print_tolerance_m, focal_step))},
-      key_frames_(rig, instrument) {}
+      key_frames_(rig, instrument),
+      response_(rig.camera) {}
 
-void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FrameEvidence& frame) const {
+void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FrameEvidence& frame) {
   const Marker& marker = rig_.instruments[instrument_].marker;
-  const auto samples = band_samples(bgr, rig_.camera, marker, {seen.camera_from_unrolled, seen.psi_rad});
+  // Each edge costs as much as tracking a frame: some of a long recording's are enough.
+  constexpr std::size_t every = 3;
+  const ShaftPose pose{seen.camera_from_unrolled, seen.psi_rad};
+  if (frames_.size() % every == 0) response_.add(bgr, marker, pose);
+  const auto samples = band_samples(bgr, rig_.camera, marker, pose);
   if (samples.empty()) return;
   frame.light = light_of(samples, marker);
   frame.width_px = marker.diameter_m * rig_.camera.fx_px / seen.camera_from_unrolled.translation.z();

@@ -9,6 +9,7 @@
 #include "lapservo/calibration/arm_check.h"
 #include "lapservo/calibration/band_samples.h"
 #include "lapservo/calibration/marker_calibration.h"
+#include "lapservo/calibration/marker_response.h"
 #include "lapservo/calibration/timed_pose.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/tracker.h"
@@ -43,6 +44,8 @@ class RigEvidence {
   /// By the image alone, whatever the print; with TimedPose::by_focal.
   const std::vector<TimedPose>& poses() const { return poses_; }
   std::vector<TrackedPsi> tracked_psi() const;
+  /// Nullopt when the marker's edges are too few to tell.
+  std::optional<MarkerResponse::Result> response() const { return response_.result(); }
   PictureLight picture() const;
   int count(Status status) const;
   /// Empties what it takes.
@@ -56,13 +59,14 @@ class RigEvidence {
   };
   // Whether the marker was found.
   bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, FrameEvidence& frame);
-  void look_at_light(const cv::Mat& bgr, const Observation& seen, FrameEvidence& frame) const;
+  void look_at_light(const cv::Mat& bgr, const Observation& seen, FrameEvidence& frame);
 
   Rig rig_;
   std::size_t instrument_;
   Tracker as_it_is_;
   FreeTrackers exact_, tolerant_;
   KeyFrames key_frames_;
+  MarkerResponse response_;
   std::vector<FrameEvidence> frames_;
   std::vector<TimedPose> poses_;
   std::vector<double> values_, clipped_;
