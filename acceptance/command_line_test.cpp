@@ -497,9 +497,9 @@ TEST_F(CommandLine, ExperimentsWriteAReport) {
 }
 
 TEST_F(CommandLine, HelpShowsExamples) {
-  for (const char* command :
-       {"track", "render", "marker", "marker design", "marker print", "marker show", "servo", "experiment",
-        "estimate-rcm", "sim-robot", "calibrate", "calibrate camera", "calibrate marker", "calibrate registration"}) {
+  for (const char* command : {"track", "render", "marker", "marker design", "marker print", "marker show", "servo",
+                              "experiment", "estimate-rcm", "sim-robot", "check", "calibrate", "calibrate all",
+                              "calibrate camera", "calibrate colour", "calibrate marker", "calibrate registration"}) {
     EXPECT_EQ(run(std::string(command) + " --help"), 0);
     EXPECT_NE(output().find("Example"), std::string::npos) << command;
   }
@@ -558,6 +558,16 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   EXPECT_NEAR(translation[2], 0.059220, 3e-4);
   const std::string delay = "\n    image_delay_s: ";
   EXPECT_NEAR(std::stod(written.substr(written.find(delay) + delay.size())), clock_s, 5e-3);
+
+  // The same swing judges both rigs: the first knows nothing yet.
+  const std::string check = "check " + in("swing") + " --fps 8 --joints " + in("joints.csv") + " --rig ";
+  EXPECT_EQ(run(check + out("rig.yaml") + " --out " + out("check.html")), 0) << errors() << output();
+  EXPECT_NE(output().find("\ngood enough\n"), std::string::npos) << output();
+  EXPECT_NE(read(out("check.html")).find("Rotation against encoder"), std::string::npos);
+  EXPECT_EQ(run(check + unregistered), 1);
+  EXPECT_NE(output().find("not good enough: the rig has no camera_from_rcm"), std::string::npos) << output();
+  EXPECT_EQ(run(check + out("rig.yaml") + " --out " + out("rig.yaml")), 2);
+  EXPECT_EQ(run("check " + in("nothing") + " --rig " + out("rig.yaml")), 2);
 
   // Without joints: from what was tracked without a registration; with one, the axes would pass through it anyway.
   ASSERT_EQ(run("track " + in("swing") + " --rig " + unregistered + " --out " + out("free.csv")), 0) << errors();

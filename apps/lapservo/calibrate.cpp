@@ -7,10 +7,14 @@ void add_calibrate(CLI::App& app, Run& run_later) {
   calibrate->require_subcommand(1);
   calibrate->footer(
       "Examples:\n"
+      "  lapservo calibrate all --rig rig.yaml --turn turn.mp4 --swing swing.mp4 --joints joints.csv\n"
       "  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml\n"
+      "  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml\n"
       "  lapservo calibrate marker turn.mp4 --rig rig.yaml --out rig.yaml\n"
       "  lapservo calibrate registration swing.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
+  add_calibrate_all(calibrate, run_later);
   add_calibrate_camera(calibrate, run_later);
+  add_calibrate_colour(calibrate, run_later);
   add_calibrate_marker(calibrate, run_later);
   add_calibrate_registration(calibrate, run_later);
 }

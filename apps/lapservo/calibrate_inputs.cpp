@@ -1,8 +1,10 @@
 #include "apps/lapservo/calibrate_inputs.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 

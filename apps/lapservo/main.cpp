@@ -56,6 +56,7 @@ int parse_and_run(int argc, char** argv) {
   lapservo::app::Run run;
   lapservo::app::add_track(app, run);
   lapservo::app::add_calibrate(app, run);
+  lapservo::app::add_check(app, run);
   lapservo::app::add_experiment(app, run);
   lapservo::app::add_render(app, run);
   lapservo::app::add_servo(app, run);

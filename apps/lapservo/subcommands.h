@@ -12,9 +12,12 @@ using Run = std::function<int()>;
 
 // Each adds its subcommand (one file each) and, when the command line names it, sets `run`.
 void add_calibrate(CLI::App& app, Run& run);
+void add_calibrate_all(CLI::App* calibrate, Run& run);
 void add_calibrate_camera(CLI::App* calibrate, Run& run);
+void add_calibrate_colour(CLI::App* calibrate, Run& run);
 void add_calibrate_marker(CLI::App* calibrate, Run& run);
 void add_calibrate_registration(CLI::App* calibrate, Run& run);
+void add_check(CLI::App& app, Run& run);
 void add_estimate_rcm(CLI::App& app, Run& run);
 void add_experiment(CLI::App& app, Run& run);
 void add_marker(CLI::App& app, Run& run);

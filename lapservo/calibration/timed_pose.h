@@ -13,6 +13,13 @@ struct TimedPose {
   double time_s = 0;
   Observation::MarkerPose marker;
 
+  /// What the same frame says where the focal length is larger by 1, to first order: where the origin moves to and how
+  /// the marker turns, in the camera frame. Zero where it was not asked.
+  struct ByFocal {
+    Eigen::Vector3d origin_m = Eigen::Vector3d::Zero(), turn_rad = Eigen::Vector3d::Zero();
+  };
+  ByFocal by_focal = {};
+
   Eigen::Vector3d origin() const { return marker.camera_from_marker.translation; }  ///< in the camera frame
   Eigen::Vector3d axis() const { return marker.camera_from_marker.rotation * Eigen::Vector3d::UnitZ(); }
 };

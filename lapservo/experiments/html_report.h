@@ -20,6 +20,7 @@ struct Table {
   std::string caption;
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;  ///< each as long as the header
+  bool words = false;                          ///< sentences, which may break, not numbers
 };
 
 /// 8-bit BGR.

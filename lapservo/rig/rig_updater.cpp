@@ -25,19 +25,28 @@ std::string text_of(const YAML::Node& root) {
   return std::string(out.c_str()) + "\n";
 }
 
-// The file with one instrument's entry edited.
+// A file's content with one instrument's entry edited.
 template <typename Edit>
-std::string with_instrument(const fs::path& path, const fs::path& destination, std::size_t instrument, Edit edit) {
-  YAML::Node root = YAML::LoadFile(path.string());
+std::string edited(YAML::Node root, const fs::path& path, const fs::path& destination, std::size_t instrument,
+                   Edit edit) {
   if (YAML::Node camera = root["camera"]; camera.IsScalar())
     root["camera"] = camera_path_from(camera.Scalar(), path, destination);
   edit(root["instruments"][instrument]);
   return text_of(root);
 }
 
+template <typename Edit>
+std::string with_instrument(const fs::path& path, const fs::path& destination, std::size_t instrument, Edit edit) {
+  return edited(YAML::LoadFile(path.string()), path, destination, instrument, edit);
+}
+
 // As short as reads back to the same bits.
 std::string exact(double value) {
   return fmt::format("{}", value);
+}
+// To a hundredth of a degree.
+std::string rounded_hue(double value) {
+  return fmt::format("{:.2f}", value);
 }
 // Of a standard deviation.
 std::string rounded(double value) {
@@ -89,6 +98,23 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
       entry["sigma_image_delay_s"] = rounded(measured.sigma_image_delay_s);
     }
   });
+}
+
+std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, std::size_t instrument,
+                             const MeasuredColour& colour) {
+  YAML::Node root = YAML::LoadFile(path.string());
+  if (colour.response) {
+    YAML::Node camera = root["camera"];
+    if (camera.IsScalar()) root["camera"] = camera = YAML::LoadFile((path.parent_path() / camera.Scalar()).string());
+    camera["response"] = YAML::Load(response_yaml(*colour.response));
+    camera.remove("sigma_response");
+  }
+  const auto with_colour = [&](YAML::Node entry) {
+    YAML::Node marker = entry["marker"];
+    marker["hues_deg"] = list_of(colour.hues_deg, rounded_hue);
+    marker["sigma_hues_deg"] = list_of(colour.sigma_hues_deg, rounded);
+  };
+  return edited(root, path, destination, instrument, with_colour);
 }
 
 std::string updated_rig_yaml(const fs::path& path, const Camera& camera, const CameraSigmas& sigmas) {

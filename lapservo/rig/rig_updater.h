@@ -33,6 +33,18 @@ struct MeasuredRegistration {
 std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
                              std::size_t instrument, const MeasuredRegistration& registration);
 
+/// How a camera shows the bands of a marker, with one standard deviation of each hue; `response` without a value: as the
+/// file has it.
+struct MeasuredColour {
+  std::array<double, 3> hues_deg{}, sigma_hues_deg{};
+  std::optional<Response> response;
+};
+
+/// The same, with other colours. A response that is another goes into the rig itself, with what stands beside it,
+/// whatever file the camera came from.
+std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
+                             std::size_t instrument, const MeasuredColour& colour);
+
 /// The same with another camera, which stands in the rig itself whatever file the old one came from.
 std::string updated_rig_yaml(const std::filesystem::path& path, const Camera& camera, const CameraSigmas& sigmas);
 

@@ -108,6 +108,26 @@ TEST(UpdatedRig, ChangesOneRegistrationAndNothingElse) {
     EXPECT_NE(whole_text.find(key), std::string::npos) << key;
 }
 
+TEST(UpdatedRig, HoldsOtherColours) {
+  const Files files;
+  MeasuredColour colour{{181, 97.123456, 269.5}, {0.5, 0.512345, 1}, {}};
+  const auto place = files.folder / "elsewhere/new.yaml";
+  testing::write_file(place, updated_rig_yaml(files.folder / "rig.yaml", place, 1, colour));
+  Rig updated = load_rig(place);
+  EXPECT_EQ(updated.instruments[1].marker.hues_deg, (std::array<double, 3>{181, 97.12, 269.5}));
+  EXPECT_EQ((*updated.instruments[1].marker.sigmas.hues_deg)[1], 0.512);
+  EXPECT_FALSE(updated.camera_file.empty()) << "as it was";
+
+  // Another response can't go into a file that other rigs may name.
+  colour.hues_deg = {90, 181, 270}, colour.response = Response{Response::Kind::power, 1.8};
+  testing::write_file(place, updated_rig_yaml(files.folder / "rig.yaml", place, 0, colour));
+  updated = load_rig(place);
+  EXPECT_TRUE(updated.camera_file.empty());
+  EXPECT_EQ(updated.camera.response.gamma, 1.8);
+  EXPECT_EQ(updated.camera.fx_px, 500);
+  EXPECT_NE(testing::read_file(place).find("sigma_camera_matrix"), std::string::npos);
+}
+
 TEST(UpdatedRig, HoldsAnotherCamera) {
   const Files files;
   const auto path = files.folder / "rig.yaml";

@@ -27,20 +27,6 @@ std::string quoted(const std::string& text) {
   return quoted + '"';
 }
 
-std::string response_yaml(const Response& response) {
-  switch (response.kind) {
-    case Response::Kind::srgb:
-      return "srgb";
-    case Response::Kind::rec709:
-      return "rec709";
-    case Response::Kind::power:
-      return fmt::format("gamma:{}", response.gamma);
-    case Response::Kind::table:
-      return fmt::format("{{light: {}, value: {}}}", list_of(response.table_light), list_of(response.table_value));
-  }
-  return "srgb";
-}
-
 std::string joints_yaml(const Joints& joints) {
   std::array<std::string, 4> names;
   for (std::size_t i = 0; i < names.size(); ++i) names[i] = quoted(joints.names[i]);
@@ -78,6 +64,20 @@ std::string instrument_yaml(const Instrument& instrument) {
 }
 
 }  // namespace
+
+std::string response_yaml(const Response& response) {
+  switch (response.kind) {
+    case Response::Kind::srgb:
+      return "srgb";
+    case Response::Kind::rec709:
+      return "rec709";
+    case Response::Kind::power:
+      return fmt::format("gamma:{}", response.gamma);
+    case Response::Kind::table:
+      return fmt::format("{{light: {}, value: {}}}", list_of(response.table_light), list_of(response.table_value));
+  }
+  return "srgb";
+}
 
 std::string measured_camera_yaml(const Camera& camera, const CameraSigmas& sigmas) {
   const std::array matrix{camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0};

@@ -21,6 +21,9 @@ struct CameraSigmas {
 /// The lines of a rig's `camera`, or of a camera file, with one standard deviation of each number.
 std::string measured_camera_yaml(const Camera& camera, const CameraSigmas& sigmas);
 
+/// What stands for it in a rig's `camera`.
+std::string response_yaml(const Response& response);
+
 /// The lines of a rig's `marker`, each after so many spaces.
 std::string marker_yaml(const Marker& marker, int indent);
 

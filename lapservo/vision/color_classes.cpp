@@ -2,27 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
-namespace {
-
 double hue_gap_deg(double a_deg, double b_deg) {
   return std::abs(std::remainder(a_deg - b_deg, 360.0));
 }
 
-// HSV hue of encoded values, or nullopt for what is too grey or too dark to have one.
-std::optional<double> hue_of(double b, double g, double r) {
+std::optional<double> hue_deg_of(double b, double g, double r) {
   const double highest = std::max({b, g, r}), chroma = highest - std::min({b, g, r});
   if (chroma < color_limits.min_chroma || chroma < color_limits.min_saturation * highest) return std::nullopt;
   if (highest == r) return 60 * (g - b) / chroma;
   if (highest == g) return 120 + 60 * (b - r) / chroma;
   return 240 + 60 * (r - g) / chroma;
 }
-
-}  // namespace
 
 ColorClasses::ColorClasses(const std::vector<Instrument>& instruments) {
   for (const Instrument& instrument : instruments) {
@@ -49,7 +43,7 @@ ColorClasses::ColorClasses(const std::vector<Instrument>& instruments) {
   for (int b = 0; b < levels; ++b)
     for (int g = 0; g < levels; ++g)
       for (int r = 0; r < levels; ++r) {
-        const auto hue_deg = hue_of(centre(b), centre(g), centre(r));
+        const auto hue_deg = hue_deg_of(centre(b), centre(g), centre(r));
         for (std::size_t i = 0; hue_deg && i < hues_deg_.size(); ++i)
           if (hue_gap_deg(*hue_deg, hues_deg_[i]) < reach_deg[i])
             table_[static_cast<std::size_t>(b << 2 * bits | g << bits | r)] = static_cast<std::uint8_t>(i + 1);

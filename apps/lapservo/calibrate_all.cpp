@@ -1,0 +1,258 @@
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/numbers.h"
+#include "apps/lapservo/subcommands.h"
+#include "lapservo/core/error.h"
+#include "lapservo/rig/calibration_record.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+namespace fs = std::filesystem;
+
+struct AllOptions {
+  std::string rig, boards, board, aruco, motion, turn, turn_joints, swing, joints, judged, judged_joints, reports,
+      instrument, redo;
+  double square_mm = 0, fps = 30;
+  bool deinterlace = false, no_questions = false;
+};
+
+// One step: what the user is to record for it, and the command that measures it.
+struct Step {
+  std::string name, what_to_record;
+  std::string* input;
+  const char* flag;  // of the input
+  std::vector<std::string> inputs;
+  std::vector<std::string> arguments;  // beyond the subcommand, the input and the rig
+};
+
+std::string quoted(const std::string& word) {
+  const bool plain = word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./:,=") ==
+                     std::string::npos;
+  if (plain && !word.empty()) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
+std::string command_line(const std::vector<std::string>& arguments) {
+  std::string text = "lapservo";
+  for (const std::string& argument : arguments) text += " " + quoted(argument);
+  return text;
+}
+
+// As if the user had typed it.
+int run_command(std::vector<std::string> arguments) {
+  CLI::App app{"", "lapservo"};
+  app.require_subcommand(1);
+  Run run;
+  add_calibrate(app, run);
+  add_check(app, run);
+  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
+  try {
+    app.parse(reversed);
+  } catch (const CLI::ParseError& error) {
+    throw InputError("calibrate all", error.what());
+  }
+  return run();
+}
+
+std::string now_utc() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+// Empty: leave the step out.
+std::string asked(const Step& step) {
+  std::fprintf(stderr, "\n%s: %s\n  where is it (a folder, a video, a camera; empty: leave this step out)? ",
+               step.name.c_str(), step.what_to_record.c_str());
+  std::string answer;
+  if (!std::getline(std::cin, answer)) return {};
+  return answer;
+}
+
+class Guide {
+ public:
+  explicit Guide(AllOptions& options)
+      : options_(options), record_file_(record_path(options.rig)), record_(read_record(record_file_)) {
+    if (record_.steps.empty() || record_.rig == content_state(options.rig)) return;
+    std::printf("%s is not as the last step left it: all steps are done anew\n", options.rig.c_str());
+    record_.steps.clear();
+  }
+
+  int run() {
+    watch_for_interrupts();
+    for (Step& step : steps()) {
+      const int code = take(step);
+      if (code != 0) return code;
+    }
+    return 0;
+  }
+
+ private:
+  std::vector<Step> steps() {
+    AllOptions& o = options_;
+    std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm)};
+    if (!o.aruco.empty()) board.insert(board.end(), {"--aruco", o.aruco});
+    const auto joints = [](const std::string& file) {
+      return file.empty() ? std::vector<std::string>{} : std::vector<std::string>{"--joints", file};
+    };
+    return {{"camera",
+             "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
+             &o.boards,
+             "--boards",
+             {o.boards},
+             board},
+            {"colour", "the mounted marker moved through the picture, 10 s", &o.motion, "--motion", {o.motion}, {}},
+            {"marker",
+             "a slow full turn about the shaft's axis, 20 s or more, near and sharp",
+             &o.turn,
+             "--turn",
+             {o.turn, o.turn_joints},
+             joints(o.turn_joints)},
+            {"registration",
+             "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
+             &o.swing,
+             "--swing",
+             {o.swing, o.joints},
+             joints(o.joints)},
+            {"check",
+             "another swing, or the same, with a full turn",
+             &o.judged,
+             "--check",
+             {o.judged, o.judged_joints},
+             joints(o.judged_joints)}};
+  }
+
+  std::vector<std::string> arguments_of(const Step& step) const {
+    const bool check = step.name == "check", camera = step.name == "camera";
+    std::vector<std::string> all;
+    if (!check) all.push_back("calibrate");
+    all.insert(all.end(), {step.name, *step.input, "--rig", options_.rig});
+    if (!check && !camera) all.insert(all.end(), {"--out", options_.rig});
+    all.insert(all.end(), step.arguments.begin(), step.arguments.end());
+    if (camera) return all;
+    if (!options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
+    if (options_.deinterlace) all.push_back("--deinterlace");
+    all.insert(all.end(), {"--fps", fmt::format("{}", options_.fps)});
+    return all;
+  }
+
+  // Where its page goes is no part of what was done.
+  std::vector<std::string> with_report(std::vector<std::string> arguments, const Step& step) const {
+    if (!options_.reports.empty())
+      arguments.insert(arguments.end(), {step.name == "check" ? "--out" : "--report",
+                                         (fs::path(options_.reports) / (step.name + ".html")).string()});
+    return arguments;
+  }
+
+  static std::string state_of(const Step& step) {
+    std::string state = input_state(*step.input);
+    if (state.empty()) return state;
+    for (std::size_t i = 1; i < step.inputs.size(); ++i)
+      if (!step.inputs[i].empty()) state += "; " + input_state(step.inputs[i]);
+    return state;
+  }
+
+  int take(Step& step) {
+    if (step.input->empty() && !options_.no_questions && ::isatty(STDIN_FILENO)) *step.input = asked(step);
+    const CalibrationStep* done = record_.find(step.name);
+    if (step.input->empty()) {
+      if (done)
+        std::printf("%s: done on %s by %s\n", step.name.c_str(), done->when.c_str(), done->command.c_str());
+      else
+        std::printf("%s: left out; %s names %s\n", step.name.c_str(), step.flag, step.what_to_record.c_str());
+      return 0;
+    }
+    if (step.name == "camera" && (options_.board.empty() || options_.square_mm <= 0))
+      throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
+    const std::vector<std::string> arguments = arguments_of(step);
+    const CalibrationStep now{step.name, command_line(arguments), state_of(step), now_utc()};
+    if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs &&
+        !now.inputs.empty()) {
+      std::printf("%s: done on %s by %s\n", step.name.c_str(), done->when.c_str(), done->command.c_str());
+      return 0;
+    }
+    std::printf("\n%s: %s\n", step.name.c_str(), now.command.c_str());
+    std::fflush(stdout);
+    const int code = run_command(with_report(arguments, step));
+    if (code == 0) {
+      record_.add(now), record_.rig = content_state(options_.rig);
+      write_record(record_file_, record_);
+    }
+    if (code == 0 && !interrupted()) return 0;
+    std::fprintf(stderr, "lapservo: stopped %s %s: the same command goes on from there\n", code == 0 ? "after" : "at",
+                 step.name.c_str());
+    return 1;
+  }
+
+  AllOptions& options_;
+  fs::path record_file_;
+  CalibrationRecord record_;
+};
+
+int run_all(AllOptions options) {
+  load_rig(options.rig);
+  if (options.motion.empty()) options.motion = options.swing.empty() ? options.turn : options.swing;
+  if (options.judged.empty()) options.judged = options.swing;
+  if (options.judged_joints.empty() && options.judged == options.swing) options.judged_joints = options.joints;
+  if (!options.reports.empty()) fs::create_directories(options.reports);
+  return Guide(options).run();
+}
+
+}  // namespace
+
+void add_calibrate_all(CLI::App* parent, Run& run_later) {
+  auto options = std::make_shared<AllOptions>();
+  CLI::App* command = parent->add_subcommand(
+      "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.");
+  command->add_option("--rig", options->rig, "The rig as it is known so far; each step replaces it")->required();
+  command->add_option("--boards", options->boards, "For the camera: pictures of a chessboard");
+  command->add_option("--board", options->board, "Its inner corners, COLUMNSxROWS, for example 9x6");
+  command->add_option("--square-mm", options->square_mm, "Width of its squares")->check(number_between(0.1, 1000.0));
+  command->add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
+  command->add_option("--motion", options->motion, "For the colours: the marker in motion; else --swing, else --turn");
+  command->add_option("--turn", options->turn, "For the marker: a slow full turn about the shaft's axis");
+  command->add_option("--turn-joints", options->turn_joints, "CSV of the joints meanwhile: the seam too");
+  command->add_option("--swing", options->swing, "For the registration: a smooth swing");
+  command->add_option("--joints", options->joints, "CSV of the joints meanwhile");
+  command->add_option("--check", options->judged, "For the check: a recording; else --swing");
+  command->add_option("--check-joints", options->judged_joints, "CSV of the joints meanwhile; else --joints");
+  command->add_option("--reports", options->reports, "Folder for a page a step");
+  command->add_option("--instrument", options->instrument, "Its name, where the rig has several");
+  command->add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
+  command->add_option("--fps", options->fps, "Frames per second of folders of pictures")
+      ->capture_default_str()
+      ->check(number_between(0.001, 1000.0));
+  command->add_option("--redo", options->redo, "A step that is done again though it was done, with those after it")
+      ->check(CLI::IsMember({"camera", "colour", "marker", "registration", "check"}));
+  command->add_flag("--no-questions", options->no_questions,
+                    "Leave out what no option names; on a terminal it is asked for");
+  command->footer(
+      "What was done, by which command and when stands beside the rig (RIG.calibration.yaml): a second run goes on "
+      "where\n"
+      "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
+      "changed.\n"
+      "Example:\n  lapservo calibrate all --rig rig.yaml --boards boards/ --board 9x6 --square-mm 5 --turn turn.mp4 "
+      "--swing swing.mp4 --joints joints.csv --reports pages");
+  command->callback([options, &run_later] { run_later = [options] { return run_all(*options); }; });
+}
+
+}  // namespace lapservo::app

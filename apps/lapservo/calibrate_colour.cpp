@@ -1,0 +1,156 @@
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/frame_input.h"
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/live_view.h"
+#include "apps/lapservo/progress.h"
+#include "apps/lapservo/subcommands.h"
+#include "lapservo/calibration/colour_calibration.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/experiments/html_report.h"
+#include "lapservo/rig/rig_updater.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+struct ColourOptions : CalibrateOptions {
+  bool view = false;
+};
+
+Rig with_colour(Rig rig, std::size_t index, const ColourCalibration& calibration) {
+  rig.instruments[index].marker.hues_deg = calibration.hues_deg;
+  if (calibration.response) rig.camera.response = *calibration.response;
+  return rig;
+}
+
+cv::Mat halved(const cv::Mat& picture) {
+  cv::Mat small;
+  cv::resize(picture, small, {}, 0.5, 0.5, cv::INTER_AREA);
+  return small;
+}
+
+// The frame, what the rig's colours are in it, and what the calibrated ones are.
+cv::Mat before_and_after(const cv::Mat& frame, const Rig& before, const Rig& after) {
+  cv::Mat row;
+  cv::hconcat(std::vector<cv::Mat>{halved(frame), halved(segmentation_picture(frame, before)),
+                                   halved(segmentation_picture(frame, after))},
+              row);
+  return row;
+}
+
+void print(const Instrument& instrument, const ColourCalibration& calibration, std::size_t frames) {
+  std::printf("%s: found in %d of %zu frames before, in %d after\n\n          hue before   after   sigma [deg]\n",
+              instrument.name.c_str(), calibration.found_before, frames, calibration.found);
+  for (std::size_t band = 0; band < 3; ++band)
+    std::printf("  band %zu   %8.1f   %7.1f   %5.1f\n", band, instrument.marker.hues_deg[band],
+                calibration.hues_deg[band], calibration.sigma_hues_deg[band]);
+  std::printf("\nresponse: %s\n", calibration.response_found.c_str());
+}
+
+void write_colour_report(const std::string& path, const Instrument& instrument, const ColourCalibration& calibration,
+                         const SpreadFrames& kept, const Rig& before, const Rig& after) {
+  ReportSection section;
+  section.id = "colour";
+  section.title = "The colours of " + instrument.name;
+  section.text = {fmt::format("Found in {} of {} frames before, in {} after.", calibration.found_before,
+                              kept.frames().size(), calibration.found)};
+  for (const std::size_t at : {kept.frames().size() / 4, 3 * kept.frames().size() / 4}) {
+    const cv::Mat& frame = kept.frames()[at];
+    section.figures.push_back({Picture{"Before", segmentation_picture(frame, before)}, "With the rig's hues."});
+    section.figures.push_back({Picture{"After", segmentation_picture(frame, after)}, "With the calibrated hues."});
+  }
+  Table table{"Hues [deg], one standard deviation each", {"", "before", "after", "sigma"}, {}};
+  for (std::size_t band = 0; band < 3; ++band)
+    table.rows.push_back({fmt::format("band {}", band), fmt::format("{:.1f}", instrument.marker.hues_deg[band]),
+                          fmt::format("{:.1f}", calibration.hues_deg[band]),
+                          fmt::format("{:.1f}", calibration.sigma_hues_deg[band])});
+  section.tables = {table};
+  section.notes = {"Response: " + calibration.response_found + "."};
+  Report report;
+  report.title = "lapservo calibrate colour";
+  report.sections = {section};
+  write_report(path, report);
+}
+
+// Until the user has seen them.
+void show(LiveView& view, const SpreadFrames& kept, const Rig& before, const Rig& after) {
+  for (std::size_t i = 0; i < kept.frames().size() && !interrupted(); ++i)
+    if (!view.show(before_and_after(kept.frames()[i], before, after))) return;
+}
+
+int run_colour(const ColourOptions& options) {
+  const Rig rig = load_rig(options.rig);
+  const std::size_t index = instrument_meant(rig, options);
+  const Instrument& instrument = rig.instruments[index];
+  refuse_outputs_over_inputs(options, rig);
+  const auto source = open_frames(options.input, options.fps, options.image_topic);
+  std::optional<LiveView> view;
+  if (options.view) view.emplace("calibrate colour", "use --report for a page with the pictures");
+  AtomicFile out(options.out);
+  watch_for_interrupts();
+
+  constexpr std::size_t most = 48;
+  SpreadFrames kept(most);
+  const bool live = source->kind() == FrameSource::Kind::live;
+  FramesRead read;
+  read = read_frames(options, rig, *source, live ? 10 : 1, [&](const cv::Mat& bgr, double) {
+    kept.add(bgr);
+    // A camera goes on for ever: the user ends what is enough.
+    if (view && live) view->show(segmentation_picture(bgr, rig));
+    return fmt::format(", {} kept", kept.frames().size());
+  });
+  if (read.stopped && !live) return refuse_calibration(options, "stopped");
+  say_complaint(options.input, *source);
+  ColourCalibration calibration;
+  {
+    Progress progress(std::nullopt);
+    int step = 0;
+    calibration = calibrate_colour(rig, index, kept.frames(),
+                                   [&](const std::string& what) { progress.show(++step, ": " + what); });
+  }
+  if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
+  print(instrument, calibration, kept.frames().size());
+  const Rig after = with_colour(rig, index, calibration);
+  if (view) show(*view, kept, rig, after);
+  if (!options.report.empty()) {
+    write_colour_report(options.report, instrument, calibration, kept, rig, after);
+    std::printf("report: %s\n", options.report.c_str());
+  }
+  out.stream() << updated_rig_yaml(
+      options.rig, options.out, index,
+      MeasuredColour{calibration.hues_deg, calibration.sigma_hues_deg, calibration.response});
+  out.commit();
+  std::printf("rig: %s\n", options.out.c_str());
+  return 0;
+}
+
+}  // namespace
+
+void add_calibrate_colour(CLI::App* parent, Run& run_later) {
+  auto options = std::make_shared<ColourOptions>();
+  CLI::App* command = parent->add_subcommand(
+      "colour", "Measure the hues of a mounted marker's bands as the camera has them, and how it encodes light.");
+  command
+      ->add_option("input", options->input,
+                   "The marker in motion: pictures, a folder, a video, or a camera until Ctrl-C")
+      ->required();
+  add_calibrate_options(command, *options);
+  command->add_option("--report", options->report, "HTML page with the segmentation before and after");
+  command->add_flag("--view", options->view, "Show the segmentation before and after in a window");
+  command->footer(
+      "Move the instrument through the picture and turn it, 10 s or more, wholly in view and not overexposed. The "
+      "rig's\n"
+      "hues may be up to 60 degrees off; the response is written where the frames tell another than the rig's.\n"
+      "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml --report colour.html");
+  command->callback([options, &run_later] { run_later = [options] { return run_colour(*options); }; });
+}
+
+}  // namespace lapservo::app

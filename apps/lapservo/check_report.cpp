@@ -1,0 +1,267 @@
+#include "apps/lapservo/check_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/experiments/html_report.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+template <typename Items, typename Value>
+double rms(const Items& items, Value value) {
+  double squares = 0;
+  for (const auto& item : items) squares += value(item) * value(item);
+  return items.empty() ? 0 : std::sqrt(squares / static_cast<double>(items.size()));
+}
+
+Series points(const std::string& name, int color) {
+  return {.name = name, .x = {}, .y = {}, .sigma = {}, .draw = Draw::points, .color = color};
+}
+
+Plot over_time(const std::string& title, const std::string& label, const std::string& unit) {
+  Plot plot;
+  plot.title = title;
+  plot.x = {.label = "time", .unit = "s", .low = {}, .high = {}};
+  plot.y = {.label = label, .unit = unit, .low = 0, .high = {}};
+  return plot;
+}
+
+Plot arm_plot(const ArmCheck& arm, const std::string& title, const std::string& unit, double factor,
+              double ArmResidual::*what) {
+  Plot plot = over_time(title, "off by", unit);
+  const auto add = [&](const std::vector<ArmResidual>& residuals, const std::string& name, int color) {
+    Series series = points(name, color);
+    for (const ArmResidual& r : residuals) series.x.push_back(r.time_s), series.y.push_back(factor * (r.*what));
+    if (!series.x.empty()) plot.series.push_back(std::move(series));
+  };
+  add(arm.by_rig, "as the rig has it", 1), add(arm.at_best, "after a calibration", 0);
+  return plot;
+}
+
+Plot encoder_plot(const ArmCheck& arm) {
+  Plot plot = over_time("Rotation against encoder", "psi beyond the encoder", "mrad");
+  plot.y.low.reset();
+  plot.references = {{"the encoder", 0}};
+  Series series = points("as the rig has it", 1);
+  for (const TrackedPsi& off : arm.beyond_encoder)
+    series.x.push_back(off.time_s), series.y.push_back(1e3 * off.psi_rad);
+  plot.series.push_back(std::move(series));
+  return plot;
+}
+
+template <typename Value>
+Plot frame_plot(const std::vector<FrameEvidence>& frames, const std::string& title, const std::string& label,
+                const std::string& unit, Value value) {
+  Plot plot = over_time(title, label, unit);
+  Series series = points(label, 0);
+  for (const FrameEvidence& frame : frames)
+    if (const std::optional<double> y = value(frame)) series.x.push_back(frame.time_s), series.y.push_back(*y);
+  plot.series.push_back(std::move(series));
+  return plot;
+}
+
+// Means over so many parts of the turn, as the report of calibrate marker has them.
+Plot print_plot(const PrintCheck& print) {
+  constexpr std::size_t parts = 60;
+  constexpr double degrees = 360, rad_turn = 6.283185307179586;
+  Plot plot;
+  plot.title = "Boundaries about the rig's print";
+  plot.x = {.label = "tau", .unit = "deg", .low = 0, .high = degrees};
+  plot.y = {.label = "along the shaft", .unit = "mm", .low = {}, .high = {}};
+  plot.references = {{"the rig's print", 0}};
+  for (std::size_t k = 0; k < 4; ++k) {
+    std::array<double, parts> sums{}, counts{};
+    for (const PrintResidual& r : print.residuals) {
+      if (r.boundary != k) continue;
+      const auto part = static_cast<std::size_t>(std::clamp(r.tau_rad / rad_turn * parts, 0.0, parts - 1.0));
+      sums[part] += r.residual_m, counts[part] += 1;
+    }
+    Series series = points(fmt::format("e{}", k), static_cast<int>(k));
+    for (std::size_t part = 0; part < parts; ++part)
+      if (counts[part] >= 3)
+        series.x.push_back(degrees * (static_cast<double>(part) + 0.5) / parts),
+            series.y.push_back(1e3 * sums[part] / counts[part]);
+    plot.series.push_back(std::move(series));
+  }
+  return plot;
+}
+
+// Light where sigma is small, orange at the limit, dark beyond it; told apart by lightness alone, too.
+cv::Scalar color_of(double sigma_rad) {
+  const double part = std::min(1.0, sigma_rad / (2 * rig_limits.sigma_rad));
+  const cv::Scalar small(250, 240, 225), large(20, 70, 190);
+  return small + part * (large - small);
+}
+
+Picture map_picture(const SigmaMap& map) {
+  constexpr int cell_px = 92;
+  cv::Mat canvas(cell_px * SigmaMap::rows, cell_px * SigmaMap::columns, CV_8UC3, cv::Scalar(255, 255, 255));
+  for (int row = 0; row < SigmaMap::rows; ++row)
+    for (int column = 0; column < SigmaMap::columns; ++column) {
+      const cv::Rect cell(cell_px * column, cell_px * row, cell_px, cell_px);
+      const auto& sigma_rad = map.sigma_rad[static_cast<std::size_t>(row * SigmaMap::columns + column)];
+      if (sigma_rad) cv::rectangle(canvas, cell, color_of(*sigma_rad), cv::FILLED);
+      cv::rectangle(canvas, cell, cv::Scalar(200, 200, 200));
+      const std::string text = sigma_rad ? fmt::format("{:.2g}", 1e3 * *sigma_rad) : "-";
+      const bool beyond = sigma_rad && *sigma_rad > 1.4 * rig_limits.sigma_rad;
+      cv::putText(canvas, text, cell.tl() + cv::Point(24, 54), cv::FONT_HERSHEY_SIMPLEX, 0.8,
+                  beyond ? cv::Scalar(255, 255, 255) : cv::Scalar(50, 50, 50), 2, cv::LINE_AA);
+    }
+  return {fmt::format("Sigma of psi [mrad] at {:.0f} mm", 1e3 * map.depth_m), canvas};
+}
+
+std::string told(const Told& t, double factor, const char* unit) {
+  return fmt::format("{:.2f} {} (sigma {:.2f})", factor * t.value, unit, factor * t.sigma);
+}
+
+std::vector<CheckLine> arm_lines(const ArmCheck& arm) {
+  if (!arm.refusal.empty()) return {{"joints", "can't be compared: " + arm.refusal}};
+  const auto px = [](const ArmResidual& r) { return r.pixel_px; };
+  const auto psi = [](const TrackedPsi& off) { return 1e3 * off.psi_rad; };
+  const bool rig = !arm.by_rig.empty();
+  std::vector<CheckLine> lines{
+      {"reprojection", (rig ? fmt::format("{:.2f} px rms; ", rms(arm.by_rig, px)) : "") +
+                           fmt::format("{:.2f} px after a calibration", rms(arm.at_best, px))},
+      {"rotation against encoder",
+       rig && !arm.beyond_encoder.empty() ? fmt::format("{:.1f} mrad rms", rms(arm.beyond_encoder, psi)) : "unknown"},
+      {"focal length", "off by " + told(arm.focal, 100, "%")},
+      {"drift", "the marker moves by " + told(arm.drift_m, 1e3, "mm") + " over the recording, directions by " +
+                    told(arm.drift_rad, 1e3, "mrad")},
+      {"delay", arm.delay_s ? "off by " + told(*arm.delay_s, 1e3, "ms")
+                            : fmt::format("{:.3f} s; the rig has none", arm.measured_delay_s)}};
+  if (arm.place_m)
+    lines.push_back({"registration", "puts the marker off by " + told(*arm.place_m, 1e3, "mm") + ", its axis by " +
+                                         told(*arm.axis_rad, 1e3, "mrad") + ", its turn by " +
+                                         told(*arm.roll_rad, 1e3, "mrad")});
+  return lines;
+}
+
+std::vector<CheckLine> rcm_lines(const RcmCheck& rcm) {
+  if (!rcm.refusal.empty()) return {{"RCM", "can't be told: " + rcm.refusal}};
+  std::vector<CheckLine> lines;
+  lines.push_back(
+      {"RCM", fmt::format("axes miss where they meet by {:.2f} mm rms",
+                          1e3 * rms(rcm.misses_m, [](const auto& miss) { return miss.second; })) +
+                  (rcm.distance_m ? ", which is off the rig's by " + told(*rcm.distance_m, 1e3, "mm") : "")});
+  lines.push_back({"drift", "the RCM moves by " + told(rcm.drift_m, 1e3, "mm") + " over the recording"});
+  return lines;
+}
+
+std::vector<Figure> figures_of(const CheckedRig& checked) {
+  std::vector<Figure> figures;
+  const RigFindings& f = checked.findings;
+  if (f.arm && f.arm->refusal.empty()) {
+    figures.push_back({arm_plot(*f.arm, "Reprojection", "px", 1, &ArmResidual::pixel_px),
+                       "Between the marker's image and where joints and registration put it."});
+    figures.push_back(
+        {encoder_plot(*f.arm),
+         "psi as the rig tracks it, less what the joints say. Steps that come with reversals are backlash."});
+    figures.push_back({arm_plot(*f.arm, "The marker's place", "mm", 1e3, &ArmResidual::position_m),
+                       "The same in space. What grows with time is drift, what goes with speed is delay."});
+  }
+  if (f.rcm && f.rcm->refusal.empty()) {
+    Plot plot = over_time("Axes and the RCM", "miss", "mm");
+    Series series = points("miss", 0);
+    for (const auto& [time_s, miss_m] : f.rcm->misses_m) series.x.push_back(time_s), series.y.push_back(1e3 * miss_m);
+    plot.series.push_back(std::move(series));
+    figures.push_back({std::move(plot), "By how much each frame's axis misses the point where they meet."});
+  }
+  figures.push_back({frame_plot(checked.frames, "Sigma of psi", "sigma", "mrad",
+                                [](const FrameEvidence& frame) -> std::optional<double> {
+                                  if (frame.status != Status::ok) return std::nullopt;
+                                  return 1e3 * frame.sigma_roll_rad;
+                                }),
+                     "What the tracker says of the rotation in each frame where it is ok."});
+  for (const SigmaMap& map : checked.maps)
+    figures.push_back({map_picture(map),
+                       fmt::format("Sigma of psi [mrad] to expect with the marker in each part of the picture, {:.0f} "
+                                   "mm away; empty: it is not wholly in view, or not measured.",
+                                   1e3 * map.depth_m)});
+  figures.push_back({frame_plot(checked.frames, "Light on the marker", "brightest channel", "of 255",
+                                [](const FrameEvidence& frame) -> std::optional<double> {
+                                  if (!frame.light) return std::nullopt;
+                                  return frame.light->value;
+                                }),
+                     "Median over the marker. Near 255 boundaries are lost."});
+  if (f.print && f.print->refusal.empty())
+    figures.push_back({print_plot(*f.print), "Means over 6 degrees. Straight lines off 0 are the print's errors."});
+  return figures;
+}
+
+}  // namespace
+
+bool CheckedRig::good_enough() const {
+  return std::none_of(advice.begin(), advice.end(), [](const Advice& a) { return a.needed; });
+}
+
+std::vector<CheckLine> check_lines(const CheckedRig& checked) {
+  const RigFindings& f = checked.findings;
+  std::vector<CheckLine> lines{{"marker", fmt::format("found in {} of {} frames", f.found, f.frames)}};
+  if (f.light) {
+    lines.push_back({"light", fmt::format("the marker's values reach {:.0f} of 255, {:.1f} % saturated; between its "
+                                          "brightest and darkest channel {:.0f}",
+                                          f.light->value, 100 * f.light->clipped, f.light->chroma)});
+    lines.push_back({"colours", fmt::format("within {:.0f} degrees of the rig's hues", f.hue_error_deg)});
+    if (f.response)
+      lines.push_back(
+          {"encoding", fmt::format("channels' edges lie {:.3f} px apart with the rig's response, {:.3f} with "
+                                   "the best of the usual ones",
+                                   f.response->before_px, f.response->after_px)});
+    lines.push_back({"size", fmt::format("the shaft is {:.0f} px wide", f.width_px)});
+  } else {
+    lines.push_back({"light", fmt::format("the picture's values reach {:.0f} of 255, {:.0f} % saturated",
+                                          f.picture.value, 100 * f.picture.clipped)});
+  }
+  if (f.print)
+    lines.push_back({"print", f.print->refusal.empty()
+                                  ? fmt::format("boundaries {:.2f} px rms about the rig's print, {:.2f} about the one "
+                                                "that fits best; psi off by ",
+                                                f.print->before_px, f.print->after_px) +
+                                        told(f.print->psi_rad, 1e3, "mrad")
+                                  : "can't be told: " + f.print->refusal});
+  const auto more = f.arm ? arm_lines(*f.arm) : f.rcm ? rcm_lines(*f.rcm) : std::vector<CheckLine>{};
+  lines.insert(lines.end(), more.begin(), more.end());
+  if (f.work_space)
+    lines.push_back(
+        {"work space", fmt::format("sigma of psi at most {:.0f} mrad in {:.0f} % of {} places, up to {:.1f}",
+                                   1e3 * rig_limits.sigma_rad, 100 * f.work_space->good, f.work_space->places,
+                                   1e3 * f.work_space->worst_rad)});
+  return lines;
+}
+
+std::string verdict_of(const CheckedRig& checked) {
+  if (checked.good_enough()) return "good enough";
+  return "not good enough: " + checked.advice.front().what;
+}
+
+void write_check_report(const std::filesystem::path& path, const std::string& instrument, const CheckedRig& checked) {
+  ReportSection section;
+  section.id = "check";
+  section.title = instrument + ": " + verdict_of(checked);
+  int rank = 0;
+  for (const Advice& advice : checked.advice)
+    section.text.push_back(fmt::format("{}. {}{}. Do: {}. Gains: {}.", ++rank,
+                                       advice.needed ? "" : "Good enough without, but: ", advice.what, advice.command,
+                                       advice.gain));
+  section.figures = figures_of(checked);
+  Table table{"What was found", {"", ""}, {}, true};
+  for (const CheckLine& line : check_lines(checked)) table.rows.push_back({line.name, line.found});
+  section.tables = {table};
+  section.notes = {
+      "Each of focal length, drift, delay and registration is what is left of it with the others taken out.",
+      "Sigmas over the work space are those of rendered frames, times what the recording's own have over "
+      "renderings of the same poses."};
+  Report report;
+  report.title = "lapservo check";
+  report.sections = {section};
+  write_report(path, report);
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/geometry/response.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// Keeps some frames of a recording, evenly spread over it, however long it is.
+class SpreadFrames {
+ public:
+  explicit SpreadFrames(std::size_t most) : most_(most) {}
+  void add(const cv::Mat& bgr);
+  const std::vector<cv::Mat>& frames() const { return frames_; }
+
+ private:
+  std::size_t most_, seen_ = 0, every_ = 1;
+  std::vector<cv::Mat> frames_;
+};
+
+struct ColourCalibration {
+  /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
+  std::string refusal;
+  std::array<double, 3> hues_deg{}, sigma_hues_deg{};  ///< [0, 360); one standard deviation each
+  std::optional<Response> response;                    ///< another than the rig's, when the frames say so
+  std::string response_found;                          ///< what they say, in words
+  int found_before = 0, found = 0;                     ///< of the frames
+};
+
+/// The hues of a mounted marker's bands as the camera has them, and how it encodes light, from frames of it in motion
+/// (8-bit BGR of the rig's size). The rig's hues may be so wrong that it is not found at all: up to 60 degrees each.
+ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
+                                   const std::function<void(const std::string&)>& progress = {});
+
+/// The frame in grey, with what is one of the rig's colours painted in its hue.
+cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig);
+
+}  // namespace lapservo::internal

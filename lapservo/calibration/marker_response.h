@@ -1,0 +1,50 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/marker/marker.h"
+#include "lapservo/vision/shaft_pose.h"
+
+namespace lapservo::internal {
+
+/// How pixel values encode light, by a marker's inner boundaries: only in light does a blurred edge lie at one place in
+/// all channels, whichever of them rise there and whichever fall. Another response moves it to the brighter or to the
+/// darker side.
+class MarkerResponse {
+ public:
+  /// Judges the camera's own response and the usual ones.
+  explicit MarkerResponse(const Camera& camera);
+
+  /// 8-bit BGR of the camera's size, with the marker at a pose that is good to a pixel.
+  void add(const cv::Mat& bgr, const Marker& marker, const ShaftPose& pose);
+
+  struct Result {
+    std::optional<Response> better;  ///< than the camera's own; empty when its own explains the edges as well
+    std::string name;                ///< of the best, which may be the camera's own
+    /// Between the edges of channels that rise and of those that fall at one place: medians, with the camera's own
+    /// response and with the best.
+    double before_px = 0, after_px = 0;
+    std::size_t edges = 0;
+  };
+  /// Nullopt when edges are too few to tell.
+  std::optional<Result> result() const;
+
+ private:
+  struct Candidate {
+    std::string name;
+    Response response;
+    std::array<float, 256> light;
+    std::vector<double> apart_px;  ///< of each edge
+  };
+
+  Camera camera_;
+  std::vector<Candidate> candidates_;  // the first: the camera's own
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,106 @@
+#include "lapservo/calibration/rig_evidence.h"
+
+#include <algorithm>
+
+#include "lapservo/core/median.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/vision/light_image.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Where the print is off: it is not to hide what else is wrong.
+constexpr double print_tolerance_m = 0.1e-3;
+
+// Without a registration that bends poses.
+Rig free_rig(Rig rig, double print_tolerance_m, double focal_change) {
+  for (Instrument& instrument : rig.instruments) {
+    instrument.camera_from_rcm.reset();
+    instrument.marker.tolerance_m = std::max(instrument.marker.tolerance_m, print_tolerance_m);
+  }
+  rig.camera.fx_px *= 1 + focal_change, rig.camera.fy_px *= 1 + focal_change;
+  return rig;
+}
+
+TimedPose::ByFocal slope_of(const Rigid3& before, const Rigid3& after, double focal_change) {
+  return {(after.translation - before.translation) / focal_change,
+          rotation_vector_of(after.rotation * before.rotation.conjugate()) / focal_change};
+}
+
+}  // namespace
+
+RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument)
+    : rig_(rig),
+      instrument_(instrument),
+      as_it_is_(rig),
+      exact_{Tracker(free_rig(rig, 0, 0)), Tracker(free_rig(rig, 0, focal_step))},
+      tolerant_{Tracker(free_rig(rig, print_tolerance_m, 0)), Tracker(free_rig(rig, print_tolerance_m, focal_step))},
+      key_frames_(rig, instrument),
+      response_(rig.camera) {}
+
+void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FrameEvidence& frame) {
+  const Marker& marker = rig_.instruments[instrument_].marker;
+  // Each edge costs as much as tracking a frame: some of a long recording's are enough.
+  constexpr std::size_t every = 3;
+  const ShaftPose pose{seen.camera_from_unrolled, seen.psi_rad};
+  if (frames_.size() % every == 0) response_.add(bgr, marker, pose);
+  const auto samples = band_samples(bgr, rig_.camera, marker, pose);
+  if (samples.empty()) return;
+  frame.light = light_of(samples, marker);
+  frame.width_px = marker.diameter_m * rig_.camera.fx_px / seen.camera_from_unrolled.translation.z();
+}
+
+bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, FrameEvidence& frame) {
+  const Observation& seen = trackers.at.track(bgr)[instrument_];
+  if (seen.status != Status::ok) return false;
+  look_at_light(bgr, seen, frame);
+  const Observation& longer = trackers.longer.track(bgr)[instrument_];
+  if (longer.status == Status::ok && seen.marker && longer.marker)
+    poses_.push_back({frame.time_s, *seen.marker,
+                      slope_of(seen.marker->camera_from_marker, longer.marker->camera_from_marker, focal_step)});
+  return true;
+}
+
+void RigEvidence::add(const cv::Mat& bgr, double time_s) {
+  constexpr int every = 16;  // pixels
+  std::vector<int> brightest;
+  int clipped = 0;
+  for (int v = every / 2; v < bgr.rows; v += every)
+    for (int u = every / 2; u < bgr.cols; u += every) {
+      const auto& pixel = bgr.at<cv::Vec3b>(v, u);
+      brightest.push_back(std::max({pixel[0], pixel[1], pixel[2]}));
+      clipped += brightest.back() >= LightImage::saturated_value;
+    }
+  if (!brightest.empty()) {
+    clipped_.push_back(static_cast<double>(clipped) / static_cast<double>(brightest.size()));
+    const auto tenth = brightest.begin() + static_cast<std::ptrdiff_t>(brightest.size() * 9 / 10);
+    std::nth_element(brightest.begin(), tenth, brightest.end());
+    values_.push_back(*tenth);
+  }
+
+  const Observation& as_it_is = as_it_is_.track(bgr)[instrument_];
+  FrameEvidence frame{time_s, as_it_is.status, as_it_is.marker ? as_it_is.marker->sigma_roll_rad : 0, {}, {}, 0};
+  if (as_it_is.status == Status::ok && as_it_is.rcm) frame.psi_rad = as_it_is.rcm->q.psi_rad;
+  if (!look_with(exact_, bgr, frame)) look_with(tolerant_, bgr, frame);
+  frames_.push_back(frame);
+  key_frames_.add(bgr, time_s);
+}
+
+std::vector<TrackedPsi> RigEvidence::tracked_psi() const {
+  std::vector<TrackedPsi> tracked;
+  for (const FrameEvidence& frame : frames_)
+    if (frame.psi_rad) tracked.push_back({frame.time_s, *frame.psi_rad});
+  return tracked;
+}
+
+PictureLight RigEvidence::picture() const {
+  if (values_.empty()) return {};
+  return {median(std::vector(values_)), median(std::vector(clipped_))};
+}
+
+int RigEvidence::count(Status status) const {
+  return static_cast<int>(std::count_if(frames_.begin(), frames_.end(),
+                                        [&](const FrameEvidence& frame) { return frame.status == status; }));
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/calibration/arm_check.h"
+#include "lapservo/calibration/band_samples.h"
+#include "lapservo/calibration/marker_calibration.h"
+#include "lapservo/calibration/marker_response.h"
+#include "lapservo/calibration/timed_pose.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+
+/// One frame, as the rig sees its marker.
+struct FrameEvidence {
+  double time_s;
+  Status status;
+  double sigma_roll_rad = 0;         ///< when ok: about the axis, in a fit as it is tracked
+  std::optional<double> psi_rad{};   ///< when ok and the rig has camera_from_rcm
+  std::optional<MarkerLight> light;  ///< where the marker was found, be its print the rig's or not
+  double width_px = 0;               ///< of the shaft, there
+};
+
+/// The whole frame by encoded values: what is left to say when no marker is found.
+struct PictureLight {
+  double value = 0;    ///< median over frames of the 90th percentile of the brightest channel, of 255
+  double clipped = 0;  ///< median over frames of the fraction with a saturated channel
+};
+
+/// Looks at a recording's frames with all that tells whether the rig is right.
+class RigEvidence {
+ public:
+  RigEvidence(const Rig& rig, std::size_t instrument);
+
+  /// 8-bit BGR of the rig's size.
+  void add(const cv::Mat& bgr, double time_s);
+
+  const std::vector<FrameEvidence>& frames() const { return frames_; }
+  /// By the image alone, whatever the print; with TimedPose::by_focal.
+  const std::vector<TimedPose>& poses() const { return poses_; }
+  std::vector<TrackedPsi> tracked_psi() const;
+  /// Nullopt when the marker's edges are too few to tell.
+  std::optional<MarkerResponse::Result> response() const { return response_.result(); }
+  PictureLight picture() const;
+  int count(Status status) const;
+  /// Empties what it takes.
+  std::vector<KeyFrame> take_key_frames() { return key_frames_.take(); }
+
+ private:
+  static constexpr double focal_step = 0.01;
+  // By the image alone, with the rig's focal length and with one that is longer.
+  struct FreeTrackers {
+    Tracker at, longer;
+  };
+  // Whether the marker was found.
+  bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, FrameEvidence& frame);
+  void look_at_light(const cv::Mat& bgr, const Observation& seen, FrameEvidence& frame);
+
+  Rig rig_;
+  std::size_t instrument_;
+  Tracker as_it_is_;
+  FreeTrackers exact_, tolerant_;
+  KeyFrames key_frames_;
+  MarkerResponse response_;
+  std::vector<FrameEvidence> frames_;
+  std::vector<TimedPose> poses_;
+  std::vector<double> values_, clipped_;
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,107 @@
+#include "lapservo/experiments/sigma_map.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/median.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/kinematics/visibility.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+namespace {
+
+// The one instrument, each frame on its own.
+class Judge {
+ public:
+  Judge(const Rig& rig, std::size_t instrument) : rig_(only(rig, instrument)), tracker_(rig_, {.single = true}) {
+    const Camera& camera = rig_.camera;
+    renderer_.emplace(camera, shafts_of(rig_), make_tissue(camera.width_px, camera.height_px, 1));
+  }
+
+  // Nullopt where it is not found.
+  std::optional<double> sigma_rad(const Rigid3& camera_from_unrolled, double psi_rad) {
+    const cv::Mat picture = renderer_->render({{camera_from_unrolled, psi_rad}}, ++seed_);
+    const Observation& seen = tracker_.track(picture)[0];
+    if (seen.status != Status::ok || !seen.marker) return std::nullopt;
+    return seen.marker->sigma_roll_rad;
+  }
+  const Instrument& instrument() const { return rig_.instruments[0]; }
+  const Camera& camera() const { return rig_.camera; }
+
+ private:
+  static Rig only(Rig rig, std::size_t instrument) {
+    rig.instruments = {rig.instruments[instrument]};
+    return rig;
+  }
+
+  Rig rig_;
+  Tracker tracker_;
+  std::optional<Renderer> renderer_;
+  std::uint64_t seed_ = 0;
+};
+
+double real_over_rendered(Judge& judge, const std::vector<MeasuredSigma>& measured) {
+  constexpr std::size_t enough = 12;
+  std::vector<double> ratios;
+  const std::size_t step = std::max<std::size_t>(1, measured.size() / enough);
+  for (std::size_t i = 0; i < measured.size(); i += step)
+    if (const auto rendered = judge.sigma_rad(measured[i].camera_from_unrolled, measured[i].psi_rad))
+      ratios.push_back(measured[i].sigma_rad / *rendered);
+  return ratios.empty() ? 1 : median(ratios);
+}
+
+// A shaft whose marker's proximal end lies there.
+std::optional<Rigid3> shaft_at(const Judge& judge, const Eigen::Vector3d& place, const MeasuredSigma& like) {
+  const auto& camera_from_rcm = judge.instrument().camera_from_rcm;
+  if (!camera_from_rcm) return Rigid3{like.camera_from_unrolled.rotation, place};
+  const auto q = configuration_through(*camera_from_rcm, place);
+  if (!q) return std::nullopt;
+  return *camera_from_rcm * rcm_from_unrolled(*q);
+}
+
+std::optional<double> sigma_at(Judge& judge, const Eigen::Vector3d& middle, const MeasuredSigma& like, double scale) {
+  constexpr int turns = 3;
+  const Marker& marker = judge.instrument().marker;
+  auto shaft = shaft_at(judge, middle, like);
+  if (!shaft) return std::nullopt;
+  const Eigen::Vector3d axis = shaft->rotation * Eigen::Vector3d::UnitZ();
+  shaft = shaft_at(judge, middle - marker.length_m() / 2 * axis, like);
+  if (!shaft || !marker_in_view(judge.camera(), marker, *shaft, {.steepest_rad = 1.2, .border_px = 2}))
+    return std::nullopt;
+  double squares = 0;
+  int found = 0;
+  for (int i = 0; i < turns; ++i)
+    if (const auto sigma_rad = judge.sigma_rad(*shaft, two_pi * i / turns)) squares += *sigma_rad * *sigma_rad, ++found;
+  if (2 * found < turns) return std::nullopt;
+  return scale * std::sqrt(squares / found);
+}
+
+}  // namespace
+
+std::vector<SigmaMap> sigma_maps(const Rig& rig, std::size_t instrument, const std::vector<double>& depths_m,
+                                 const std::vector<MeasuredSigma>& measured) {
+  Judge judge(rig, instrument);
+  const double scale = real_over_rendered(judge, measured);
+  std::vector<SigmaMap> maps;
+  for (const double depth_m : depths_m) {
+    SigmaMap map{depth_m, {}};
+    for (int row = 0; row < SigmaMap::rows; ++row)
+      for (int column = 0; column < SigmaMap::columns; ++column) {
+        const Eigen::Vector2d raw_px((column + 0.5) / SigmaMap::columns * rig.camera.width_px,
+                                     (row + 0.5) / SigmaMap::rows * rig.camera.height_px);
+        const auto ideal_px = rig.camera.ideal_from_raw(raw_px);
+        if (!ideal_px) continue;
+        map.sigma_rad[static_cast<std::size_t>(row * SigmaMap::columns + column)] =
+            sigma_at(judge, depth_m * rig.camera.ray_from_ideal(*ideal_px), measured[measured.size() / 2], scale);
+      }
+    maps.push_back(map);
+  }
+  return maps;
+}
+
+}  // namespace lapservo::internal

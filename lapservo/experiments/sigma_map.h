@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// One standard deviation of the rotation about the shaft, over the picture at one depth.
+struct SigmaMap {
+  static constexpr int columns = 7, rows = 5;
+  double depth_m = 0;  ///< of the marker's middle
+  /// By row, rms over rotations; empty where the marker is not wholly in view or was not measured.
+  std::array<std::optional<double>, static_cast<std::size_t>(columns* rows)> sigma_rad{};
+};
+
+/// What a rig is to be judged by at a place: its marker there, and what the camera really said of it.
+struct MeasuredSigma {
+  Rigid3 camera_from_unrolled;
+  double psi_rad = 0, sigma_rad = 0;
+};
+
+/// Sigmas as the tracker's fit has them on rendered frames, of shafts that come from the rig's RCM (or, without
+/// camera_from_rcm, run like `measured`), times what the measured ones have over renderings of the same places: their
+/// light, noise and blur. `measured`: at least one.
+std::vector<SigmaMap> sigma_maps(const Rig& rig, std::size_t instrument, const std::vector<double>& depths_m,
+                                 const std::vector<MeasuredSigma>& measured);
+
+}  // namespace lapservo::internal

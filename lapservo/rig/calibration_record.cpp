@@ -1,0 +1,106 @@
+#include "lapservo/rig/calibration_record.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/known_keys.h"
+#include "lapservo/core/yaml_field.h"
+
+namespace lapservo::internal {
+namespace {
+namespace fs = std::filesystem;
+
+struct FileState {
+  std::uint64_t bytes = 0, files = 0;
+  std::int64_t changed = std::numeric_limits<std::int64_t>::min();  // the last of them; now is below 0 in this clock
+
+  void add(const fs::path& file) {
+    std::error_code error;
+    const auto size = fs::file_size(file, error);
+    const auto time = fs::last_write_time(file, error);
+    if (error) return;
+    bytes += size, ++files;
+    changed = std::max<std::int64_t>(changed, time.time_since_epoch().count());
+  }
+};
+
+}  // namespace
+
+const CalibrationStep* CalibrationRecord::find(const std::string& name) const {
+  const auto step = std::find_if(steps.begin(), steps.end(), [&](const auto& s) { return s.name == name; });
+  return step == steps.end() ? nullptr : &*step;
+}
+
+void CalibrationRecord::add(const CalibrationStep& step) {
+  steps.erase(std::find_if(steps.begin(), steps.end(), [&](const auto& s) { return s.name == step.name; }),
+              steps.end());
+  steps.push_back(step);
+}
+
+fs::path record_path(const fs::path& rig) {
+  return fs::path(rig).replace_extension(".calibration.yaml");
+}
+
+CalibrationRecord read_record(const fs::path& path) {
+  CalibrationRecord record;
+  std::error_code error;
+  if (!fs::exists(path, error)) return record;
+  const YamlField root = YamlField::read(path, "calibration record");
+  expect_keys(root, {{"rig", "steps"}, {}});
+  record.rig = root["rig"].text("what the rig file was");
+  for (const YamlField& entry : root["steps"].list("steps")) {
+    expect_keys(entry, {{"name", "command", "inputs", "when"}, {}});
+    const auto text = [&](const char* key) { return entry[key].text("a text"); };
+    record.steps.push_back(
+        {text("name"), text("command"), entry["inputs"].present() ? text("inputs") : "", text("when")});
+  }
+  return record;
+}
+
+void write_record(const fs::path& path, const CalibrationRecord& record) {
+  YAML::Emitter out;
+  out << YAML::BeginMap << YAML::Key << "rig" << YAML::Value << record.rig << YAML::Key << "steps" << YAML::BeginSeq;
+  for (const CalibrationStep& step : record.steps) {
+    out << YAML::BeginMap << YAML::Key << "name" << YAML::Value << step.name << YAML::Key << "command" << YAML::Value
+        << step.command;
+    if (!step.inputs.empty()) out << YAML::Key << "inputs" << YAML::Value << step.inputs;
+    out << YAML::Key << "when" << YAML::Value << step.when << YAML::EndMap;
+  }
+  out << YAML::EndSeq << YAML::EndMap;
+  write_file(path, std::string("# What `lapservo calibrate all` did to the rig beside this, and when.\n") +
+                       out.c_str() + "\n");
+}
+
+std::string content_state(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return {};
+  std::uint64_t hash = 14695981039346656037U;
+  std::array<char, 4096> bytes;
+  while (file.read(bytes.data(), bytes.size()), file.gcount() > 0)
+    for (std::streamsize i = 0; i < file.gcount(); ++i)
+      hash = (hash ^ static_cast<unsigned char>(bytes[static_cast<std::size_t>(i)])) * 1099511628211U;
+  return fmt::format("fnv1a-{:016x}", hash);
+}
+
+std::string input_state(const fs::path& path) {
+  FileState state;
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    for (const auto& entry : fs::directory_iterator(path, error))
+      if (entry.is_regular_file(error)) state.add(entry.path());
+  } else if (fs::is_regular_file(path, error)) {
+    state.add(path);
+  }
+  if (state.files == 0) return {};
+  return fmt::format("{} files, {} bytes, {}", state.files, state.bytes, state.changed);
+}
+
+}  // namespace lapservo::internal

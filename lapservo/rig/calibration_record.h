@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace lapservo::internal {
+
+/// One step of a rig's calibration that was done.
+struct CalibrationStep {
+  std::string name;     ///< a word: camera, colour, ...
+  std::string command;  ///< as a user types it, the input included
+  std::string inputs;   ///< what was read: input_state() of it
+  std::string when;     ///< UTC, ISO 8601
+};
+
+/// What was done to a rig, in that order, and the rig's content as the last of it left it: RIG.calibration.yaml beside
+/// the rig.
+struct CalibrationRecord {
+  std::string rig;  ///< content_state() of the rig file; empty when nothing was done
+  std::vector<CalibrationStep> steps;
+
+  /// Nullptr when it was not done.
+  const CalibrationStep* find(const std::string& name) const;
+  /// In the place of one of that name, whose successors go with it: they were measured with what it changes.
+  void add(const CalibrationStep& step);
+};
+
+/// Where the record of a rig stands.
+std::filesystem::path record_path(const std::filesystem::path& rig);
+
+/// An empty one when there is none. Throws InputError when there is one that can't be read.
+CalibrationRecord read_record(const std::filesystem::path& path);
+/// Appears whole or not at all. Throws InputError when it can't be written.
+void write_record(const std::filesystem::path& path, const CalibrationRecord& record);
+
+/// Tells whether a file is the same as then: from its bytes (FNV-1a). Empty when it can't be read.
+std::string content_state(const std::filesystem::path& path);
+
+/// The same for recordings, which are large, by size and time of change: of a file, or of a folder's files together.
+/// Empty for what is no file: a camera, a stream.
+std::string input_state(const std::filesystem::path& path);
+
+}  // namespace lapservo::internal
