@@ -148,6 +148,8 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.group = k;
   place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
+  place.measurement.expected_px = image.point_px.cast<float>();
+  place.measurement.normal = normal.cast<float>();
   return place;
 }
 
@@ -174,6 +176,7 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
   for (const Candidate& candidate : candidates)
     if (candidate.colors_agree) values.push_back(candidate.edge->residual_variance);
   const double typical_variance = median(values);
+  out.residual_variance[candidates[0].place->measurement.group] = typical_variance;
   const auto dot = [](const std::array<float, 3>& a, const std::array<float, 3>& b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   };

@@ -93,6 +93,9 @@ struct FineFitLimits {
   /// And as a fraction of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. A occluding contour
   /// that motion blurs is worst: the part of its blur that the boundaries do not have.
   double usual_blur_px = 1.2, common_fraction_of_blur = 0.05, side_fraction_of_motion_blur = 0.15;
+  /// And as a fraction (rms) of what the camera's processing moves boundaries by, which is known so well: z is 0.5 to
+  /// 1.3 with it (bench/camera_effects).
+  double fraction_of_processing = 0.2;
   /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
   /// sigma grows by so much for all that is missing.
   double usual_fraction = 0.7, doubt_of_hidden = 4;
@@ -106,6 +109,14 @@ struct FineFitLimits {
   double settled_sigmas = 0.01;  ///< a reweighting that moves the unknowns by less is the last
 };
 inline constexpr FineFitLimits fine_fit_limits;
+
+/// What a first guess at the camera's processing has to exceed to be looked at (picture_processing.cpp). Of 72 frames
+/// without any (none, bayer, ca, crosstalk, rec709, vignette; bench/camera_effects 12 3) 69 lie below, of 60 with it
+/// (sharpen, chroma420, tone, camera, jpeg) none.
+struct ProcessingLimits {
+  double chroma_variance_px2 = 0.5, sharpening = 0.3, saturation = 0.1;
+};
+inline constexpr ProcessingLimits processing_limits;
 
 /// What is assumed of prints that are not the rig's (print_fit.cpp).
 struct PrintLimits {
