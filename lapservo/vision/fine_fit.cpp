@@ -57,16 +57,23 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   const FineFitLimits& limits = fine_fit_limits;
   const double motion_blur_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
   const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - limits.usual_blur_px);
-  double bias_squares_px2 = 0;
-  if (processed)
-    for (const double bias_px : processed->bias_px) bias_squares_px2 += bias_px * bias_px / 4;
   const double boundary_px = limits.common_boundary_px +
                              limits.common_fraction_of_blur * std::max(0.0, blur.boundaries_px - limits.usual_blur_px);
-  return {std::hypot(boundary_px, limits.fraction_of_processing * std::sqrt(bias_squares_px2)),
-          limits.common_side_px + limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
-              limits.side_fraction_of_motion_blur * motion_blur_px,
-          std::max(1.0, scatter_sigmas(measurements, lines)),
-          std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px};
+  const double side_px = limits.common_side_px +
+                         limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
+                         limits.side_fraction_of_motion_blur * motion_blur_px;
+  CommonErrors errors;
+  double bias_squares_px2 = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double bias_px = processed ? processed->bias_px[k] : 0;
+    errors.px[k] = std::hypot(boundary_px, limits.fraction_of_processing * bias_px);
+    bias_squares_px2 += bias_px * bias_px / 4;
+  }
+  errors.px[4] = errors.px[5] = side_px;
+  errors.noise_scale = std::max(1.0, scatter_sigmas(measurements, lines));
+  errors.doubt_scale = std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px +
+                       std::sqrt(bias_squares_px2) / limits.doubted_processing_px;
+  return errors;
 }
 
 // What the camera made of the boundaries, where it did more to the picture than its response says.

@@ -93,9 +93,9 @@ struct FineFitLimits {
   /// And as a fraction of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. A occluding contour
   /// that motion blurs is worst: the part of its blur that the boundaries do not have.
   double usual_blur_px = 1.2, common_fraction_of_blur = 0.05, side_fraction_of_motion_blur = 0.15;
-  /// And as a fraction (rms) of what the camera's processing moves boundaries by, which is known so well: z is 0.5 to
-  /// 1.3 with it (bench/camera_effects).
-  double fraction_of_processing = 0.2;
+  /// And as a fraction of what the camera's processing moves a boundary by, which is known so well. A processing that
+  /// moves them by doubted_processing_px (rms) doubles the noise before the print is blamed.
+  double fraction_of_processing = 0.25, doubted_processing_px = 0.1;
   /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
   /// sigma grows by so much for all that is missing.
   double usual_fraction = 0.7, doubt_of_hidden = 4;
