@@ -150,6 +150,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   place.measurement.expected_px = image.point_px.cast<float>();
   place.measurement.normal = normal.cast<float>();
+  place.measurement.clear_px = static_cast<float>(0.6 * gap_px * std::abs(place.normal_cosine) - blur_px);
   return place;
 }
 
@@ -176,7 +177,6 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
   for (const Candidate& candidate : candidates)
     if (candidate.colors_agree) values.push_back(candidate.edge->residual_variance);
   const double typical_variance = median(values);
-  out.residual_variance[candidates[0].place->measurement.group] = typical_variance;
   const auto dot = [](const std::array<float, 3>& a, const std::array<float, 3>& b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   };

@@ -33,6 +33,7 @@ struct Measurement {
   double turn_fraction = 0;   ///< tau by what the print covers
   double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides
   Eigen::Vector2f expected_px{0, 0}, normal{0, 0};  ///< of boundaries: where the pose has it, and the image normal
+  float clear_px = 0;  ///< of boundaries: how far along the normal no other boundary and its blur reaches
 };
 inline constexpr std::size_t measurement_groups = 6;
 
@@ -63,7 +64,6 @@ struct EdgeMeasurements {
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at
   BlurEvidence boundary_blur, side_blur;
-  std::array<double, 4> residual_variance{};  ///< of the light about a boundary's steps, typically
 };
 
 /// Looks around `unknowns` in linear light, to a fraction of a pixel. Nothing when the pose shows no shaft.

@@ -62,11 +62,13 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   const double side_px = limits.common_side_px +
                          limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
                          limits.side_fraction_of_motion_blur * motion_blur_px;
+  const double unexplained = processed ? std::max(0.0, processed->misfit - limits.usual_misfit) : 0;
+  const double unexplained_px = limits.px_per_misfit * unexplained;
   CommonErrors errors;
   double bias_squares_px2 = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     const double bias_px = processed ? processed->bias_px[k] : 0;
-    errors.px[k] = std::hypot(boundary_px, limits.fraction_of_processing * bias_px);
+    errors.px[k] = std::hypot(boundary_px, limits.fraction_of_processing * bias_px, unexplained_px);
     bias_squares_px2 += bias_px * bias_px / 4;
   }
   errors.px[4] = errors.px[5] = side_px;
@@ -80,9 +82,12 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
 std::optional<ProcessedEdges> processed_edges(const LightImage& light, std::span<const Measurement> measurements,
                                               double blur_px) {
   constexpr int glance = 12, look = EdgeMeasurements::max_lines;  // places of a boundary
+  if (blur_px > processing_limits.max_blur_px) return std::nullopt;
   const auto& light_of_value = light.light_of_value();
-  if (!is_processed(first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px))) return std::nullopt;
-  return explain(light_of_value, pool_edges(light, measurements, look), blur_px);
+  const auto guess = first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px);
+  if (!guess || !is_processed(*guess)) return std::nullopt;
+  const auto explained = explain(light_of_value, pool_edges(light, measurements, look), blur_px);
+  return explained && is_believed(*explained) ? explained : std::nullopt;
 }
 
 // What a pass changed.

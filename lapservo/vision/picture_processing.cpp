@@ -138,6 +138,11 @@ class Encoding {
   const std::array<float, 256>& light_;
 };
 
+bool is_seen(const PooledEdge& edge) {
+  constexpr int least_clear_px = 3;
+  return edge.places >= processing_limits.min_places && edge.clear_px >= least_clear_px;
+}
+
 // The unknowns: the frame's processing, then for each boundary its place and both plateaus.
 constexpr int shared = 5, own = 7;
 enum Shared : int { log_blur, chroma_variance, saturation, sharpening, log_radius };
@@ -225,14 +230,20 @@ Jacobian derivatives(const Filters& filters, const Encoded& encoded, double satu
   return out;
 }
 
-// One sigma of what is expected before a frame is seen.
+// One sigma of what is expected before a frame is seen: of any processing, of none but blur, of a boundary.
 SharedVector expected_sigmas() {
   SharedVector sigmas;
   sigmas << 0.3, 0.7, 0.15, 0.5, 0.25;
   return sigmas;
 }
+SharedVector sigmas_of_none() {
+  SharedVector sigmas = SharedVector::Constant(1e-4);
+  sigmas[log_blur] = 0.3;
+  return sigmas;
+}
+// What is clipped at black hides its plateau, so that these are wide.
 OwnVector own_sigmas() {
-  OwnVector sigmas = OwnVector::Constant(0.1);
+  OwnVector sigmas = OwnVector::Constant(0.3);
   sigmas[0] = 0.3;
   return sigmas;
 }
@@ -245,8 +256,9 @@ State expected(const PooledEdges& edges, double blur_px) {
     state.boundaries[k][0] = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto& value = edges[k].value[c];
-      state.boundaries[k][1 + static_cast<int>(c)] = static_cast<double>(value[0] + value[1]) / 2;
-      state.boundaries[k][4 + static_cast<int>(c)] = static_cast<double>(value[samples - 1] + value[samples - 2]) / 2;
+      const auto first = static_cast<std::size_t>(PooledEdge::reach - edges[k].clear_px), last = samples - 1 - first;
+      state.boundaries[k][1 + static_cast<int>(c)] = static_cast<double>(value[first] + value[first + 1]) / 2;
+      state.boundaries[k][4 + static_cast<int>(c)] = static_cast<double>(value[last] + value[last - 1]) / 2;
     }
   }
   return state;
@@ -262,11 +274,20 @@ struct Block {
 // Gauss-Newton with boundaries eliminated.
 class Problem {
  public:
-  Problem(const std::array<float, 256>& light_of_value, const PooledEdges& edges, double blur_px)
-      : encoding_(light_of_value), edges_(edges), prior_(expected(edges, blur_px)) {
+  Problem(const std::array<float, 256>& light_of_value, const PooledEdges& edges, double blur_px,
+          const SharedVector& sigmas)
+      : encoding_(light_of_value),
+        edges_(edges),
+        prior_(expected(edges, blur_px)),
+        certainty_(sigmas.cwiseAbs2().cwiseInverse()) {
     for (std::size_t k = 0; k < 4; ++k)
       for (std::size_t c = 0; c < 3; ++c)
-        for (std::size_t i = 0; i < samples; ++i) measured_[k][static_cast<int>(rows * c + i)] = edges[k].value[c][i];
+        for (int i = 0; i < samples; ++i) {
+          const float value = edges[k].value[c][static_cast<std::size_t>(i)];
+          const int row = rows * static_cast<int>(c) + i;
+          measured_[k][row] = value;
+          usable_[k][row] = value < saturated && std::abs(i - PooledEdge::reach) <= edges[k].clear_px ? 1.0F : 0.0F;
+        }
   }
   const State& prior() const { return prior_; }
 
@@ -275,30 +296,34 @@ class Problem {
     const Filters filters(processing_of(state.processing), false);
     double sum = 0;
     for (std::size_t k = 0; k < 4; ++k)
-      if (edges_[k].places > 0)
+      if (is_seen(edges_[k]))
         sum += static_cast<double>(
             missed(k, predicted(filters,
                                 encode(encoding_, std::exp(state.processing[log_blur]), state.boundaries[k]).value))
                 .squaredNorm());
     return sum;
   }
+  double misfit(const State& state) const {
+    float values = 0;
+    for (std::size_t k = 0; k < 4; ++k)
+      if (is_seen(edges_[k])) values += usable_[k].sum();
+    return std::sqrt(squares(state) / std::max(1.0F, values));
+  }
   double cost(const State& state) const {
     double sum = squares(state) / (value_sigma * value_sigma) +
-                 (state.processing - prior_.processing).cwiseQuotient(expected_sigmas()).squaredNorm();
+                 (state.processing - prior_.processing).cwiseAbs2().dot(certainty_);
     for (std::size_t k = 0; k < 4; ++k)
       sum += (state.boundaries[k] - prior_.boundaries[k]).cwiseQuotient(own_sigmas()).squaredNorm();
     return sum;
   }
-  // The state after a step; `information` is of the processing, whatever the boundaries are.
-  State improved(const State& state, double damping, Eigen::Matrix<double, shared, shared>& information) const {
-    const SharedVector certainty = expected_sigmas().cwiseAbs2().cwiseInverse();
-    information = certainty.asDiagonal();
-    SharedVector gradient = (prior_.processing - state.processing).cwiseProduct(certainty);
+  State improved(const State& state, double damping) const {
+    Eigen::Matrix<double, shared, shared> information = certainty_.asDiagonal();
+    SharedVector gradient = (prior_.processing - state.processing).cwiseProduct(certainty_);
     const PictureProcessing processing = processing_of(state.processing);
     const Filters filters(processing, true);
     std::array<Block, 4> blocks;
     for (std::size_t k = 0; k < 4; ++k)
-      if (edges_[k].places > 0) blocks[k] = eliminated(state, k, processing, filters, damping, information, gradient);
+      if (is_seen(edges_[k])) blocks[k] = eliminated(state, k, processing, filters, damping, information, gradient);
     Eigen::Matrix<double, shared, shared> damped = information;
     damped.diagonal() *= 1 + damping;
     const SharedVector step = damped.llt().solve(gradient);
@@ -306,10 +331,10 @@ class Problem {
     next.processing += step;
     next.processing[chroma_variance] = std::clamp(next.processing[chroma_variance], 0.0, max_chroma_variance_px2);
     next.processing[saturation] = std::clamp(next.processing[saturation], 0.5, 2.0);
-    next.processing[sharpening] = std::clamp(next.processing[sharpening], -0.2, 2.0);
+    next.processing[sharpening] = std::clamp(next.processing[sharpening], -0.35, 2.0);
     const SharedVector taken = next.processing - state.processing;
     for (std::size_t k = 0; k < 4; ++k)
-      if (edges_[k].places > 0)
+      if (is_seen(edges_[k]))
         next.boundaries[k] += blocks[k].inverse * (blocks[k].gradient - blocks[k].cross.transpose() * taken);
     return next;
   }
@@ -320,10 +345,7 @@ class Problem {
 
   AllSamples missed(std::size_t k, const AllSamples& predicted_values) const {
     AllSamples miss = measured_[k] - predicted_values.cwiseMax(0.0F).cwiseMin(1.0F);
-    for (int i = 0; i < all_rows; ++i)
-      if (measured_[k][i] > saturated) miss[i] = 0;
-    for (int c = 0; c < 3; ++c) miss.segment<rows - samples>(rows * c + samples).setZero();
-    return miss;
+    return miss.cwiseProduct(usable_[k]);
   }
   Block eliminated(const State& state, std::size_t k, const PictureProcessing& processing, const Filters& filters,
                    double damping, Eigen::Matrix<double, shared, shared>& information, SharedVector& gradient) const {
@@ -331,7 +353,7 @@ class Problem {
     const AllSamples values = predicted(filters, encoded.value), miss = missed(k, values);
     Jacobian jacobian = derivatives(filters, encoded, processing.saturation);
     for (int i = 0; i < all_rows; ++i)
-      if (!(values[i] > 0 && values[i] < 1) || measured_[k][i] > saturated) jacobian.row(i).setZero();
+      if (!(values[i] > 0 && values[i] < 1) || usable_[k][i] == 0) jacobian.row(i).setZero();
     constexpr double certainty = 1 / (value_sigma * value_sigma);
     Eigen::Matrix<double, shared + own, shared + own> square;
     for (int a = 0; a < shared + own; ++a)
@@ -356,7 +378,9 @@ class Problem {
   Encoding encoding_;
   const PooledEdges& edges_;
   State prior_;
+  SharedVector certainty_;
   std::array<AllSamples, 4> measured_{AllSamples::Zero(), AllSamples::Zero(), AllSamples::Zero(), AllSamples::Zero()};
+  std::array<AllSamples, 4> usable_ = measured_;  // 1 or 0
 };
 
 // By which fit_step mislocates the edge of these values, which lies at the middle sample.
@@ -384,13 +408,28 @@ EdgeValues values_of(const AllSamples& samples_of_all) {
   return out;
 }
 
-// Squared distance of chroma's variance, saturation and sharpening from none.
-double significance_of(const State& state, const Eigen::Matrix<double, shared, shared>& information) {
-  const Eigen::Matrix<double, shared, shared> covariance =
-      information.llt().solve(Eigen::Matrix<double, shared, shared>::Identity());
-  const Eigen::Vector3d off = state.processing.segment<3>(chroma_variance) - Eigen::Vector3d(0, 1, 0);
-  const Eigen::Matrix3d of_off = covariance.block<3, 3>(chroma_variance, chroma_variance);
-  return off.dot(of_off.llt().solve(off));
+bool is_enough(const PooledEdges& edges) {
+  return std::count_if(edges.begin(), edges.end(), is_seen) >= processing_limits.min_boundaries;
+}
+
+// Levenberg and Marquardt's way.
+State minimised(const Problem& problem) {
+  constexpr int max_steps = 8;
+  constexpr double settled = 0.02;  // of the cost
+  State state = problem.prior();
+  double cost = problem.cost(state), damping = 1e-3;
+  for (int i = 0; i < max_steps; ++i) {
+    const State next = problem.improved(state, damping);
+    const double next_cost = problem.cost(next);
+    if (!(next_cost < cost)) {
+      damping *= 10;
+      continue;
+    }
+    const bool small = next_cost > (1 - settled) * cost;
+    state = next, cost = next_cost, damping /= 10;
+    if (small) break;
+  }
+  return state;
 }
 
 }  // namespace
@@ -406,44 +445,35 @@ EdgeValues processed_edge(const std::array<float, 256>& light_of_value, const Pi
 
 bool is_processed(const PictureProcessing& p) {
   const ProcessingLimits& limits = processing_limits;
-  return p.chroma_variance_px2 > limits.chroma_variance_px2 || p.sharpening > limits.sharpening ||
-         std::abs(p.saturation - 1) > limits.saturation;
+  return p.chroma_variance_px2 > limits.chroma_variance_px2 || p.sharpening > limits.max_sharpening ||
+         p.sharpening < limits.min_sharpening || std::abs(p.saturation - 1) > limits.saturation;
 }
 
-PictureProcessing first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges, double blur_px) {
-  const Problem problem(light_of_value, edges, blur_px);
-  Eigen::Matrix<double, shared, shared> information;
-  return processing_of(problem.improved(problem.prior(), 0, information).processing);
+bool is_believed(const ProcessedEdges& edges) {
+  return edges.misfit < processing_limits.max_misfit &&
+         edges.misfit < processing_limits.max_misfit_fraction * edges.misfit_without;
+}
+
+std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
+                                             double blur_px) {
+  if (!is_enough(edges)) return std::nullopt;
+  const Problem problem(light_of_value, edges, blur_px, expected_sigmas());
+  return processing_of(problem.improved(problem.prior(), 0).processing);
 }
 
 std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
                                       double blur_px) {
-  constexpr int max_steps = 8;
-  constexpr double settled = 0.02;  // of the cost
-  const auto seen = std::count_if(edges.begin(), edges.end(), [](const PooledEdge& edge) { return edge.places > 0; });
-  if (seen == 0) return std::nullopt;
-  const Problem problem(light_of_value, edges, blur_px);
-  State state = problem.prior();
-  Eigen::Matrix<double, shared, shared> information;
-  double cost = problem.cost(state), damping = 1e-3;
-  for (int i = 0; i < max_steps; ++i) {
-    const State next = problem.improved(state, damping, information);
-    const double next_cost = problem.cost(next);
-    if (!(next_cost < cost)) {
-      damping *= 10;
-      continue;
-    }
-    const bool small = next_cost > (1 - settled) * cost;
-    state = next, cost = next_cost, damping /= 10;
-    if (small) break;
-  }
+  if (!is_enough(edges)) return std::nullopt;
+  const Problem problem(light_of_value, edges, blur_px, expected_sigmas());
+  const Problem without(light_of_value, edges, blur_px, sigmas_of_none());
+  const State state = minimised(problem);
   ProcessedEdges out;
   out.processing = processing_of(state.processing);
-  out.significance = significance_of(state, information);
-  out.misfit = std::sqrt(problem.squares(state) / (3.0 * samples * static_cast<double>(seen)));
+  out.misfit = problem.misfit(state);
+  out.misfit_without = without.misfit(minimised(without));
   const Filters filters(out.processing, false);
   for (std::size_t k = 0; k < 4; ++k) {
-    if (edges[k].places == 0) continue;
+    if (!is_seen(edges[k])) continue;
     OwnVector centred = state.boundaries[k];
     centred[0] = 0;
     const Encoded encoded = encode(Encoding(light_of_value), out.processing.blur_px, centred);

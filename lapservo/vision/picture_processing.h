@@ -30,18 +30,23 @@ EdgeValues processed_edge(const std::array<float, 256>& light_of_value, const Pi
 struct ProcessedEdges {
   PictureProcessing processing;
   std::array<double, 4> bias_px{};  ///< by which fit_step mislocates each boundary
-  double significance = 0;  ///< how far chroma's variance, saturation and sharpening are from none, in sigmas (squared)
-  double misfit = 0;        ///< rms of what the model leaves of the values
+  double misfit = 0;                ///< rms of what the model leaves of the values
+  double misfit_without = 0;        ///< and of what one without any processing does
 };
 
-/// Whether that is more than nothing seen through noise.
+/// Whether a first guess is more than nothing seen through noise.
 bool is_processed(const PictureProcessing& processing);
 
-/// A first guess at the processing, for a tenth of the time.
-PictureProcessing first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges, double blur_px);
+/// A first guess at the processing, for a fifth of the time. Nullopt when too little was seen.
+std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
+                                             double blur_px);
 
-/// The likeliest processing, from what all boundaries look like. `blur_px` is what fit_step was told.
+/// The likeliest processing, from what all boundaries look like. `blur_px` is what fit_step was told. Nullopt when too
+/// little was seen.
 std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
                                       double blur_px);
+
+/// Whether the frame looks like that rather than like none.
+bool is_believed(const ProcessedEdges& edges);
 
 }  // namespace lapservo::internal

@@ -15,6 +15,7 @@ struct PooledEdge {
   static constexpr int reach = 6, samples = 2 * reach + 1;
   std::array<std::array<float, samples>, 3> value{};  ///< b, g, r
   int places = 0;                                     ///< 0: not seen
+  int clear_px = reach;  ///< so far on either side no other boundary shows, wherever it was located
 };
 using PooledEdges = std::array<PooledEdge, 4>;
 
