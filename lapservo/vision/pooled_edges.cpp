@@ -46,7 +46,7 @@ PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> mea
     const Eigen::Vector2f first = m.expected_px - reach, last = m.expected_px + reach;
     if (!light.contains(first.cast<double>()) || !light.contains(last.cast<double>())) continue;
     PooledEdge& edge = edges[m.group];
-    edge.clear_px = std::min(edge.clear_px, static_cast<int>(m.clear_px));
+    edge.clear_px = std::clamp(static_cast<int>(m.clear_px), 0, edge.clear_px);
     for (std::size_t i = 0; i < PooledEdge::samples; ++i)
       add_values(light, first + static_cast<float>(i) * m.normal, i, edge);
     ++edge.places;
