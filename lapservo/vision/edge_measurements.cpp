@@ -148,6 +148,9 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.group = k;
   place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
+  place.measurement.expected_px = image.point_px.cast<float>();
+  place.measurement.normal = normal.cast<float>();
+  place.measurement.clear_px = static_cast<float>(0.6 * gap_px * std::abs(place.normal_cosine) - blur_px);
   return place;
 }
 

@@ -10,6 +10,8 @@
 #include "lapservo/core/median.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
+#include "lapservo/vision/picture_processing.h"
+#include "lapservo/vision/pooled_edges.h"
 
 namespace lapservo::internal {
 namespace {
@@ -50,17 +52,42 @@ double median_sigma_px(std::span<const Measurement> measurements) {
 }
 
 // What each boundary and side as a whole may be off, and the noise as it is.
-CommonErrors common_errors(std::span<const Measurement> measurements, const ResidualLines& lines,
-                           const EdgeBlur& blur) {
+CommonErrors common_errors(std::span<const Measurement> measurements, const ResidualLines& lines, const EdgeBlur& blur,
+                           const std::optional<ProcessedEdges>& processed) {
   const FineFitLimits& limits = fine_fit_limits;
   const double motion_blur_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
   const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - limits.usual_blur_px);
-  return {limits.common_boundary_px +
-              limits.common_fraction_of_blur * std::max(0.0, blur.boundaries_px - limits.usual_blur_px),
-          limits.common_side_px + limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
-              limits.side_fraction_of_motion_blur * motion_blur_px,
-          std::max(1.0, scatter_sigmas(measurements, lines)),
-          std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px};
+  const double boundary_px = limits.common_boundary_px +
+                             limits.common_fraction_of_blur * std::max(0.0, blur.boundaries_px - limits.usual_blur_px);
+  const double side_px = limits.common_side_px +
+                         limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
+                         limits.side_fraction_of_motion_blur * motion_blur_px;
+  const double unexplained = processed ? std::max(0.0, processed->misfit - limits.usual_misfit) : 0;
+  const double unexplained_px = limits.px_per_misfit * unexplained;
+  CommonErrors errors;
+  double bias_squares_px2 = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const double bias_px = processed ? processed->bias_px[k] : 0;
+    errors.px[k] = std::hypot(boundary_px, limits.fraction_of_processing * bias_px, unexplained_px);
+    bias_squares_px2 += bias_px * bias_px / 4;
+  }
+  errors.px[4] = errors.px[5] = side_px;
+  errors.noise_scale = std::max(1.0, scatter_sigmas(measurements, lines));
+  errors.doubt_scale = std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px +
+                       std::sqrt(bias_squares_px2) / limits.doubted_processing_px;
+  return errors;
+}
+
+// What the camera made of the boundaries, where it did more to the picture than its response says.
+std::optional<ProcessedEdges> processed_edges(const LightImage& light, std::span<const Measurement> measurements,
+                                              double blur_px) {
+  constexpr int glance = 12, look = EdgeMeasurements::max_lines;  // places of a boundary
+  if (blur_px > processing_limits.max_blur_px) return std::nullopt;
+  const auto& light_of_value = light.light_of_value();
+  const auto guess = first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px);
+  if (!guess || !is_processed(*guess)) return std::nullopt;
+  const auto explained = explain(light_of_value, pool_edges(light, measurements, look), blur_px);
+  return explained && is_believed(*explained) ? explained : std::nullopt;
 }
 
 // What a pass changed.
@@ -89,7 +116,8 @@ double FineFit::located_fraction() const {
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
 }
 
-FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur) {
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
+                   AskProcessing ask_processing) {
   constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
   FineFit fit;
   fit.unknowns = start;
@@ -97,25 +125,31 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const int unknowns = start.size();
   double film_m = film_mean_m;
   EdgeMeasurements pass;
+  // To where the measurements are; how far the farthest of them moved [px].
+  const auto move = [&] {
+    const double film_prior = (film_mean_m - film_m) / film_sigma_m;
+    const UnknownVector step = unknowns == 4 ? solve<5>(pass.all, film_prior) : solve<7>(pass.all, film_prior);
+    double farthest_px = 0;
+    for (Measurement& m : pass.all) {
+      const double shift_px = m.row.dot(step);
+      m.residual_px -= shift_px;
+      m.expected_px += static_cast<float>(shift_px) * m.normal;
+      farthest_px = std::max(farthest_px, std::abs(shift_px));
+    }
+    fit.unknowns = fit.unknowns.changed_by(step.head(unknowns));
+    film_m = std::clamp(film_m + step[unknowns] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
+    return farthest_px;
+  };
   // Nullopt when too little was seen.
   const auto refine = [&](const Effort& effort) -> std::optional<Change> {
     pass = measure_edges(scene, light, fit.unknowns, film_m, effort, fit.blur);
     if (static_cast<int>(pass.all.size()) < 2 * fit.unknowns.size()) return std::nullopt;
-    const double film_prior = (film_mean_m - film_m) / film_sigma_m;
-    const UnknownVector step = unknowns == 4 ? solve<5>(pass.all, film_prior) : solve<7>(pass.all, film_prior);
-    Change change;
-    for (Measurement& m : pass.all) {
-      const double shift_px = m.row.dot(step);
-      m.residual_px -= shift_px;
-      change.points_px = std::max(change.points_px, std::abs(shift_px));
-    }
+    Change change{move()};
     const EdgeBlur improved{pass.boundary_blur.improved(fit.blur.boundaries_px),
                             pass.side_blur.improved(fit.blur.sides_px)};
     change.add_blur(fit.blur.boundaries_px, improved.boundaries_px);
     change.add_blur(fit.blur.sides_px, improved.sides_px);
     fit.blur = improved;
-    fit.unknowns = fit.unknowns.changed_by(step.head(unknowns));
-    film_m = std::clamp(film_m + step[unknowns] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
     if (!fit.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
     return change;
   };
@@ -128,13 +162,21 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
     if (change->settled()) break;
   }
   if (!change->settled()) return fit;
+  std::optional<ProcessedEdges> processed;
+  if (ask_processing == AskProcessing::yes) processed = processed_edges(light, pass.all, fit.blur.boundaries_px);
+  if (processed) {
+    fit.processed = true;
+    for (Measurement& m : pass.all)
+      if (m.group < 4) m.residual_px -= processed->bias_px[m.group];
+    move();
+  }
   fit.lines = pass.lines;
   fit.in_image = pass.in_image;
   fit.sides_in_image = pass.sides_in_image;
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
   const ResidualLines lines = residual_lines(pass.all);
   const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker.tolerance_m,
-                               common_errors(pass.all, lines, fit.blur));
+                               common_errors(pass.all, lines, fit.blur, processed));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;

@@ -93,6 +93,11 @@ struct FineFitLimits {
   /// And as a fraction of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. A occluding contour
   /// that motion blurs is worst: the part of its blur that the boundaries do not have.
   double usual_blur_px = 1.2, common_fraction_of_blur = 0.05, side_fraction_of_motion_blur = 0.15;
+  /// And as a fraction of what the camera's processing moves a boundary by, which is known so well. A processing that
+  /// moves them by doubted_processing_px (rms) doubles the noise before the print is blamed.
+  double fraction_of_processing = 0.25, doubted_processing_px = 0.1;
+  /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
+  double usual_misfit = 0.004, px_per_misfit = 8;
   /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
   /// sigma grows by so much for all that is missing.
   double usual_fraction = 0.7, doubt_of_hidden = 4;
@@ -106,6 +111,20 @@ struct FineFitLimits {
   double settled_sigmas = 0.01;  ///< a reweighting that moves the unknowns by less is the last
 };
 inline constexpr FineFitLimits fine_fit_limits;
+
+/// When a camera's processing is believed (picture_processing.cpp).
+struct ProcessingLimits {
+  /// By bench/camera_effects 12 3, 69 first guesses of 72 frames without any (none, bayer, ca, crosstalk, rec709,
+  /// vignette) lie below these sizes, and of 60 with it (sharpen, chroma420, tone, camera, jpeg) none.
+  double chroma_variance_px2 = 0.5, max_sharpening = 0.3, min_sharpening = -0.2, saturation = 0.1;
+  double max_blur_px = 1.65;  ///< beyond, motion and defocus are taken for processing, and flat parts are out of reach
+  /// Of a value, and of what is left without any processing: blood, highlights and noise are not explained by it (0.87
+  /// and more), processing is (0.2 to 0.7).
+  double max_misfit = 0.013, max_misfit_fraction = 0.8;
+  int min_places = 8;  ///< of a boundary, else it tells more noise than shape
+  int min_boundaries = 3;
+};
+inline constexpr ProcessingLimits processing_limits;
 
 /// What is assumed of prints that are not the rig's (print_fit.cpp).
 struct PrintLimits {

@@ -180,7 +180,7 @@ Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lin
   sums.equations.add(UnknownVector::Unit(unknowns, pose_unknowns), PrintVector::Zero(), certainty, film_prior);
   for (std::size_t group = 0; group < measurement_groups; ++group) {
     sums.pulls[group] = gathered(products[group], group, unknowns, sums.equations);
-    sums.pulls[group].error_px = errors.noise_scale * (group < 4 ? errors.boundary_px : errors.side_px);
+    sums.pulls[group].error_px = errors.noise_scale * errors.px[group];
   }
   return sums;
 }

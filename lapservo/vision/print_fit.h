@@ -13,7 +13,8 @@ namespace lapservo::internal {
 /// says, and by how much it is to be taken larger still before the print is blamed: motion blur and compression move
 /// boundaries as a print's errors would.
 struct CommonErrors {
-  double boundary_px = 0, side_px = 0, noise_scale = 1, doubt_scale = 1;
+  std::array<double, measurement_groups> px{};
+  double noise_scale = 1, doubt_scale = 1;
 };
 
 /// A group's residuals as a straight line over the print: of boundaries in metres along the shaft, of sides a constant

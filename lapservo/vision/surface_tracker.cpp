@@ -19,6 +19,9 @@
 namespace lapservo::internal {
 namespace {
 
+// A camera that did nothing to its pictures is asked again after so many frames; one that does, in every frame.
+constexpr int ask_every = 16;
+
 bool contradicts_registration(const FineFit& free) {
   const Eigen::Index psi = free.unknowns.size() - 1;
   return free.located_fraction() > registration_limits.well_seen_fraction &&
@@ -136,7 +139,13 @@ void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
   UnknownVector velocity = UnknownVector::Zero(fit.unknowns.size());
   if (memory_[i] && memory_[i]->last.q() && fit.unknowns.q())
     velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
-  memory_[i] = Memory{fit.unknowns, velocity, fit.blur};
+  const bool asked = !memory_[i] || memory_[i]->ask() == AskProcessing::yes;
+  const int unasked = fit.processed ? ask_every : asked ? 1 : memory_[i]->unasked + 1;
+  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked};
+}
+
+AskProcessing SurfaceTracker::Memory::ask() const {
+  return unasked >= ask_every ? AskProcessing::yes : AskProcessing::no;
 }
 
 SurfaceTracker::Found SurfaceTracker::refusal(Status status, const PoseUnknowns& unknowns) {
@@ -148,11 +157,11 @@ SurfaceTracker::Found SurfaceTracker::refusal(Status status, const PoseUnknowns&
 
 SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImage& light, const Memory& memory) const {
   const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
-  const FineFit near = fit_finely(scene, light, expected, memory.blur);
+  const FineFit near = fit_finely(scene, light, expected, memory.blur, memory.ask());
   if (validate(scene, near) == Status::ok) return {Status::ok, near, {}};
   const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
   if (!coarse.found) return {};
-  const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur);
+  const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur, memory.ask());
   const Status status = validate(scene, fit);
   return status == Status::ok ? Found{status, fit, {}} : refusal(status, fit.unknowns);
 }

@@ -32,6 +32,8 @@ class SurfaceTracker {
     PoseUnknowns last;
     UnknownVector velocity;  // per frame
     EdgeBlur blur;
+    int unasked = 0;  // frames since the camera was found to do nothing to its pictures
+    AskProcessing ask() const;
   };
   struct Found {
     Status status = Status::no_marker;

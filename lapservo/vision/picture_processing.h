@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "lapservo/vision/pooled_edges.h"
+
+namespace lapservo::internal {
+
+/// What a camera does to encoded values after its response, the same everywhere in a frame.
+struct PictureProcessing {
+  double blur_px = 1;              ///< of the light, before all that
+  double chroma_variance_px2 = 0;  ///< of the blur of colour differences: subsampling, compression
+  double saturation = 1;           ///< by which colour differences (Rec. 601) are multiplied
+  double sharpening = 0;           ///< unsharp mask: so much of what the blur takes away is added
+  double sharpening_px = 1.2;      ///< that blur
+};
+
+/// The light on both sides of a boundary, as encoded values b, g, r before the processing.
+struct Plateaus {
+  std::array<double, 3> before, after;
+};
+
+/// The encoded values that a camera makes of a step of light at `offset_px` from the middle sample.
+using EdgeValues = std::array<std::array<float, PooledEdge::samples>, 3>;
+EdgeValues processed_edge(const std::array<float, 256>& light_of_value, const PictureProcessing& processing,
+                          const Plateaus& plateaus, double offset_px);
+
+/// What is to be known of a frame's processing for its boundaries' sake.
+struct ProcessedEdges {
+  PictureProcessing processing;
+  std::array<double, 4> bias_px{};  ///< by which fit_step mislocates each boundary
+  double misfit = 0;                ///< rms of what the model leaves of the values
+  double misfit_without = 0;        ///< and of what one without any processing does
+};
+
+/// Whether a first guess is more than nothing seen through noise.
+bool is_processed(const PictureProcessing& processing);
+
+/// A first guess at the processing, for a fifth of the time. Nullopt when too little was seen.
+std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
+                                             double blur_px);
+
+/// The likeliest processing, from what all boundaries look like. `blur_px` is what fit_step was told. Nullopt when too
+/// little was seen.
+std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
+                                      double blur_px);
+
+/// Whether the frame looks like that rather than like none.
+bool is_believed(const ProcessedEdges& edges);
+
+}  // namespace lapservo::internal

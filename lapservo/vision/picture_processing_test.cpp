@@ -1,0 +1,104 @@
+#include "lapservo/vision/picture_processing.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/geometry/response.h"
+#include "lapservo/testing/camera_effects.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+const std::array<float, 256>& srgb() {
+  static const auto table = Response{}.table();
+  return table;
+}
+
+// Dark shaft, three inks, dark shaft.
+constexpr std::array<std::array<double, 3>, 5> inks{
+    {{0.15, 0.15, 0.16}, {0.25, 0.75, 0.5}, {0.8, 0.75, 0.25}, {0.8, 0.3, 0.5}, {0.15, 0.15, 0.16}}};
+
+PooledEdges edges_of(const PictureProcessing& processing, double offset_px) {
+  PooledEdges edges;
+  for (std::size_t k = 0; k < edges.size(); ++k) {
+    edges[k].value = processed_edge(srgb(), processing, {inks[k], inks[k + 1]}, offset_px);
+    edges[k].places = 64;
+  }
+  return edges;
+}
+
+TEST(PictureProcessing, AStepOfLightIsLocatedWhereItIs) {
+  const auto explained = explain(srgb(), edges_of({.blur_px = 1}, 0.2), 1);
+  ASSERT_TRUE(explained);
+  EXPECT_FALSE(is_believed(*explained));
+  for (const double bias_px : explained->bias_px) EXPECT_NEAR(bias_px, 0, 0.01);
+}
+
+TEST(PictureProcessing, IsToldFromTheBoundaries) {
+  for (const PictureProcessing& truth :
+       {PictureProcessing{.blur_px = 1, .sharpening = 0.7, .sharpening_px = 1.3},
+        PictureProcessing{.blur_px = 0.9, .chroma_variance_px2 = 1},
+        PictureProcessing{.blur_px = 1.1, .saturation = 1.25},
+        PictureProcessing{.blur_px = 1, .chroma_variance_px2 = 1.5, .saturation = 1.1, .sharpening = 0.4}}) {
+    const PooledEdges edges = edges_of(truth, 0.1);
+    const auto guess = first_guess(srgb(), edges, 1);
+    ASSERT_TRUE(guess);
+    EXPECT_TRUE(is_processed(*guess));
+    const auto explained = explain(srgb(), edges, 1);
+    ASSERT_TRUE(explained);
+    EXPECT_TRUE(is_believed(*explained));
+    EXPECT_LT(explained->misfit, 0.002);
+    EXPECT_NEAR(explained->processing.blur_px, truth.blur_px, 0.05);
+    EXPECT_NEAR(explained->processing.chroma_variance_px2, truth.chroma_variance_px2, 0.15);
+    EXPECT_NEAR(explained->processing.saturation, truth.saturation, 0.05);
+    EXPECT_NEAR(explained->processing.sharpening, truth.sharpening, 0.25);
+  }
+}
+
+TEST(PictureProcessing, TooLittleTellsNothing) {
+  PooledEdges edges = edges_of({.blur_px = 1, .sharpening = 0.7}, 0);
+  edges[0].places = edges[1].places = 2;
+  EXPECT_FALSE(first_guess(srgb(), edges, 1));
+  EXPECT_FALSE(explain(srgb(), edges, 1));
+}
+
+constexpr std::uint64_t shots = 6;
+
+FineFit fit_through(const effects::CameraEffects& effects, std::uint64_t seed, AskProcessing ask = AskProcessing::yes) {
+  const scenes::Shot& shot = scenes::usual_shot(seed);
+  const scenes::Sight sight(shot.rig, effects::seen_through(effects, shot.bgr, shot.rig.camera));
+  return fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, ask);
+}
+
+double mean_error_rad(const effects::CameraEffects& effects, AskProcessing ask) {
+  double sum_rad = 0;
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    const FineFit fit = fit_through(effects, seed, ask);
+    EXPECT_TRUE(fit.converged);
+    EXPECT_EQ(fit.processed, ask == AskProcessing::yes);
+    sum_rad += fit.unknowns.q()->psi_rad - scenes::usual_shot(seed).q.psi_rad;
+  }
+  return sum_rad / static_cast<double>(shots);
+}
+
+TEST(PictureProcessing, SharpeningDoesNotMoveTheRotation) {
+  effects::CameraEffects sharpened;
+  sharpened.sharpening = 0.9, sharpened.sharpening_px = 1.3;
+  EXPECT_GT(std::abs(mean_error_rad(sharpened, AskProcessing::no)), 3e-3);
+  EXPECT_LT(std::abs(mean_error_rad(sharpened, AskProcessing::yes)), 1.5e-3);
+}
+
+TEST(PictureProcessing, SubsampledChromaIsTold) {
+  effects::CameraEffects subsampled;
+  subsampled.subsampled = true;
+  EXPECT_LT(std::abs(mean_error_rad(subsampled, AskProcessing::yes)), 3e-3);
+}
+
+TEST(PictureProcessing, IsNotSeenWhereThereIsNone) {
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) EXPECT_FALSE(fit_through({}, seed).processed);
+}
+
+}  // namespace
+}  // namespace lapservo::internal
