@@ -1,0 +1,15 @@
+"""rcm_image.py INPUT RIG.yaml: where the incision's image is, from an instrument that swings about it."""
+
+import sys
+
+import lapservo
+
+rig = lapservo.Rig.load(sys.argv[2])
+free = lapservo.Rig(rig.camera, [lapservo.Instrument(i.name, i.marker) for i in rig.instruments])
+tracker = lapservo.Tracker(free)
+seen = [tracker.track(frame)[0] for frame in lapservo.open_frames(sys.argv[1])]
+estimate = lapservo.estimate_rcm(seen)
+if estimate.point_px is None:
+    sys.exit(f"no estimate: {estimate.status}")
+u, v = estimate.point_px
+print(f"RCM at ({u:.1f}, {v:.1f}) px from {estimate.lines} positions")

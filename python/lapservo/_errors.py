@@ -1,0 +1,16 @@
+class InputError(ValueError):
+    """A configuration or an input that can't be used.
+
+    str() is one line naming source, field, value and expectation; problem is set where the source has no fields.
+    """
+
+    def __init__(self, message, source="", field="", value="", expectation="", problem=""):
+        super().__init__(message, source, field, value, expectation, problem)
+        self.source = source
+        self.field = field
+        self.value = value
+        self.expectation = expectation
+        self.problem = problem
+
+    def __str__(self):
+        return self.args[0]

@@ -1,0 +1,12 @@
+#pragma once
+#include <pybind11/pybind11.h>
+
+/// What each file adds to the module.
+namespace lapservo::python {
+void bind_rig(pybind11::module_& m);
+void bind_tracker(pybind11::module_& m);
+void bind_marker(pybind11::module_& m);
+void bind_kinematics(pybind11::module_& m);
+void bind_servo(pybind11::module_& m);
+void bind_simulation(pybind11::module_& m);
+}  // namespace lapservo::python

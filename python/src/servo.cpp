@@ -1,0 +1,297 @@
+#include <functional>
+#include <memory>
+#include <pybind11/functional.h>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "lapservo/control/paper_trajectory.h"
+#include "lapservo/control/trajectory.h"
+#include "lapservo/control/trajectory_check.h"
+#include "lapservo/core/error.h"
+#include "lapservo/robot/robot.h"
+#include "lapservo/robot/steady_clock.h"
+#include "lapservo/servo/controller_file.h"
+#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
+#include "lapservo/servo/run.h"
+#include "python/src/bindings.h"
+#include "python/src/conversions.h"
+#include "python/src/observed.h"
+
+namespace lapservo::python {
+namespace {
+
+OperatingState operating_state_of(const std::string& word) {
+  if (const auto state = operating_state_from_string(word)) return *state;
+  throw InputError("JointState", "operating_state", word, "DISABLED, ENABLED, PAUSED or FAULT");
+}
+
+// The ports, implemented in Python.
+class PythonRobot : public Robot {
+ public:
+  JointState state() override { PYBIND11_OVERRIDE_PURE(JointState, Robot, state); }
+  void send(const JointPath& path) override { PYBIND11_OVERRIDE_PURE(void, Robot, send, path); }
+};
+
+class PythonClock : public Clock {
+ public:
+  double now_s() const override { PYBIND11_OVERRIDE_PURE(double, Clock, now_s); }
+  void sleep_until(double time_s) override { PYBIND11_OVERRIDE_PURE(void, Clock, sleep_until, time_s); }
+};
+
+// newest() gives (time_s, image) or None. The picture is copied: the array may be written to again.
+class PythonImageStream : public ImageStream {
+ public:
+  std::optional<StampedImage> newest() override {
+    const py::gil_scoped_acquire mine;
+    const py::function method = py::get_override(static_cast<const ImageStream*>(this), "newest");
+    if (!method) throw py::type_error("ImageStream.newest() is not implemented");
+    const py::object given = method();
+    if (given.is_none()) return std::nullopt;
+    const auto [time_s, image] = given.cast<std::pair<double, Image>>();
+    return StampedImage{time_s, view_of(image, "ImageStream.newest()").clone()};
+  }
+};
+
+void bind_ports(py::module_& m) {
+  py::class_<JointState>(m, "JointState", "What an arm says of itself.")
+      .def(py::init([](double time_s, const Eigen::Vector4d& q, const std::string& operating_state) {
+             return JointState{time_s, JointVector::from_vector(q), operating_state_of(operating_state)};
+           }),
+           py::arg("time_s"), py::arg("q"), py::arg("operating_state") = "ENABLED",
+           "time_s: when the joints were read, on the loop's clock; q: float[4], theta, phi [rad], rho [m], psi [rad]; "
+           "operating_state: CRTK's word.")
+      .def_readonly("time_s", &JointState::time_s)
+      .def_property_readonly(
+          "q", [](const JointState& self) { return self.q.vector(); }, "float[4]")
+      .def_property_readonly("operating_state",
+                             [](const JointState& self) { return std::string(to_string(self.operating_state)); });
+
+  py::class_<JointPath>(m, "JointPath",
+                        R"(Set-points over time. Where no newer path comes it brakes to rest by itself.)")
+      .def("copy", [](const JointPath& self) { return JointPath(self); })
+      .def(
+          "at",
+          [](const JointPath& self, double time_s) {
+            const MotionState state = self.at(time_s);
+            return std::pair(state.position, state.velocity);
+          },
+          py::arg("time_s"), "(float[4] positions, float[4] velocities) at a time of the loop's clock.");
+
+  py::class_<Robot, PythonRobot>(m, "Robot", R"(The port to an arm: subclass it.
+
+Both calls come from the loop's thread once a control tick and must return at once. An arm samples the last path at its
+own rate, and forgets it as soon as it is not enabled.)")
+      .def(py::init<>())
+      .def("state", &Robot::state, py::call_guard<py::gil_scoped_release>(), "JointState: the latest reading.")
+      .def("send", &Robot::send, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
+           "Follow this JointPath from now on; it is yours.");
+  py::class_<ImageStream, PythonImageStream>(m, "ImageStream", "The port to a camera: subclass it.")
+      .def(py::init<>())
+      .def(
+          "newest",
+          [](ImageStream& self) -> std::optional<std::pair<double, Image>> {
+            auto image = [&self] {
+              const py::gil_scoped_release others_run;
+              return self.newest();
+            }();
+            if (!image) return std::nullopt;
+            return std::pair(image->time_s, array_of(image->bgr));
+          },
+          R"((time_s, uint8[H, W, 3]) that came since the last call, or None. Must not block.
+
+time_s, on the loop's clock: of the exposure where it is known (then set the controller's delay_s to 0), else of the
+arrival.)");
+  py::class_<Clock, PythonClock>(m, "Clock", "The loop's time: subclass it, or take SteadyClock.")
+      .def(py::init<>())
+      .def("now_s", &Clock::now_s, py::call_guard<py::gil_scoped_release>(), "Seconds; never backwards.")
+      .def("sleep_until", &Clock::sleep_until, py::arg("time_s"), py::call_guard<py::gil_scoped_release>(),
+           "Returns at that time, or at once when it has passed.");
+  py::class_<SteadyClock, Clock>(m, "SteadyClock", "The computer's monotonic clock.").def(py::init<>());
+}
+
+DesiredFeatures desired_of(const py::object& given) {
+  const auto [features, rate, acceleration] =
+      given.cast<std::tuple<Eigen::Vector4d, Eigen::Vector4d, Eigen::Vector4d>>();
+  return {features, rate, acceleration};
+}
+
+// A Python function may be called and let go by any thread.
+Trajectory trajectory_of(double duration_s, py::function at) {
+  const auto held = std::shared_ptr<py::function>(new py::function(std::move(at)), [](py::function* function) {
+    const py::gil_scoped_acquire mine;
+    delete function;
+  });
+  return {duration_s, [held](double time_s) {
+            const py::gil_scoped_acquire mine;
+            return desired_of((*held)(time_s));
+          }};
+}
+
+void bind_trajectories(py::module_& m) {
+  py::class_<Trajectory>(m, "Trajectory", "Desired features s [rad], r, l, d [px] over time.")
+      .def(py::init(&trajectory_of), py::arg("duration_s"), py::arg("at"),
+           "at(time_s) gives (features, rates, accelerations), each float[4]; duration_s 0: endless.")
+      .def_readonly("duration_s", &Trajectory::duration_s)
+      .def(
+          "at",
+          [](const Trajectory& self, double time_s) {
+            const DesiredFeatures desired = self.at(time_s);
+            return std::tuple(desired.features, desired.rate, desired.acceleration);
+          },
+          py::arg("time_s"), "(features, rates, accelerations), each float[4].");
+  m.def("set_point", &set_point, py::arg("features"), "Trajectory that stays at float[4].");
+  m.def(
+      "paper_trajectory", [] { return sinusoids(paper_sinusoids()); }, "Section V-D's.");
+  m.def(
+      "sinusoids",
+      [](const Eigen::Vector4d& offset, const Eigen::Vector4d& amplitude, const Eigen::Vector4d& omega_rad_s,
+         const Eigen::Vector4d& phase_rad) {
+        return sinusoids({offset, amplitude, omega_rad_s, phase_rad});
+      },
+      py::arg("offset"), py::arg("amplitude"), py::arg("omega_rad_s"),
+      py::arg("phase_rad") = Eigen::Vector4d(Eigen::Vector4d::Zero()), "offset + amplitude sin(omega t + phase).");
+  m.def("via_points", &via_points, py::arg("points"), py::arg("max_rate"), py::arg("dwell_s") = 0.0,
+        "From point to point, at rest in each, by minimum-jerk motions within max_rate.");
+  m.def(
+      "load_trajectory", [](const std::filesystem::path& path) { return trajectory_from_csv(path); }, py::arg("path"),
+      "A spline through a CSV's rows of time_s,s_rad,r_px,l_px,d_px.");
+}
+
+ControllerConfig make_controller(const Rig& rig, const std::string& mode, const std::optional<std::string>& path,
+                                 double period_s, const std::optional<Eigen::Vector4d>& gains_per_s,
+                                 const std::optional<double>& delay_s, double window_margin_px) {
+  const auto known = control_mode_from_string(mode);
+  if (!known) throw InputError("Controller", "mode", mode, "default, fused, paper or uncalibrated");
+  ControllerConfig config = *known == ControlMode::paper ? paper_controller(period_s) : ControllerConfig{};
+  config.mode = *known;
+  config.period_s = period_s;
+  config.window = image_window(rig.camera, window_margin_px);
+  if (gains_per_s) config.gains.per_s = *gains_per_s;
+  if (delay_s) config.observer.delay_s = *delay_s;
+  if (path) config = load_controller(*path, config);
+  return checked(config);
+}
+
+class PythonObserver : public RunObserver {
+ public:
+  PythonObserver(py::object on_tick, std::shared_ptr<const Rig> rig)
+      : on_tick_(std::move(on_tick)), rig_(std::move(rig)) {}
+  bool on_tick(const ControlTick& tick) override;
+
+ private:
+  py::object on_tick_;
+  std::shared_ptr<const Rig> rig_;
+};
+
+// A tick as Python keeps it.
+struct Tick {
+  ControlTick tick;
+  std::shared_ptr<const Rig> rig;
+  const ControlStep& step() const { return tick.decision.control; }
+};
+
+// False ends the run; so does Ctrl-C.
+bool PythonObserver::on_tick(const ControlTick& tick) {
+  const py::gil_scoped_acquire mine;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  if (on_tick_.is_none()) return true;
+  const py::object answer = on_tick_(Tick{tick, rig_});
+  return answer.is_none() || answer.cast<bool>();
+}
+
+void bind_tick(py::module_& m) {
+  py::class_<Tick>(m, "ControlTick", "One control tick: what the loop went by and what it decided.")
+      .def_property_readonly("time_s", [](const Tick& self) { return self.tick.input.time_s; })
+      .def_property_readonly(
+          "joints", [](const Tick& self) { return self.tick.input.joints; }, "JointState")
+      .def_property_readonly(
+          "desired", [](const Tick& self) { return self.tick.input.desired.features; }, "float[4]: s, r, l, d")
+      .def_property_readonly(
+          "action", [](const Tick& self) { return std::string(to_string(self.step().action)); },
+          "'track', 'probe' or 'hold'")
+      .def_property_readonly(
+          "hold_reason", [](const Tick& self) { return std::string(to_string(self.step().reason)); },
+          "'none' unless it holds")
+      .def_property_readonly(
+          "error",
+          [](const Tick& self) { return self.step().estimate ? std::optional(self.step().error) : std::nullopt; },
+          "float[4]: estimated features less the desired ones; None without an estimate")
+      .def_property_readonly(
+          "features",
+          [](const Tick& self) {
+            return self.step().estimate ? std::optional(self.step().estimate->features) : std::nullopt;
+          },
+          "float[4]: estimated for now; None without an estimate")
+      .def_property_readonly(
+          "q",
+          [](const Tick& self) { return self.step().estimate ? std::optional(self.step().estimate->q) : std::nullopt; },
+          "float[4]: estimated for now; None without an estimate")
+      .def_property_readonly(
+          "velocity", [](const Tick& self) { return self.step().velocity; }, "float[4], of the joints: rad/s, m/s")
+      .def_property_readonly(
+          "delay_s", [](const Tick& self) { return self.step().delay_s; }, "of the images, as believed now")
+      .def_property_readonly("registration_contradicted",
+                             [](const Tick& self) { return self.tick.decision.registration_contradicted; })
+      .def_property_readonly("sent", [](const Tick& self) { return self.tick.decision.send; })
+      .def_property_readonly(
+          "image",
+          [](const Tick& self) -> std::optional<Image> {
+            if (!self.tick.seen) return std::nullopt;
+            return array_of(self.tick.seen->image.bgr);
+          },
+          "uint8[H, W, 3] that came since the tick before, or None")
+      .def_property_readonly(
+          "observations",
+          [](const Tick& self) {
+            if (!self.tick.seen) return std::vector<Observed>{};
+            return observed(self.tick.seen->observations, self.rig, self.tick.seen->image.time_s);
+          },
+          "list[Observation] of that image");
+}
+
+void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared_ptr<Rig>& rig,
+              const Trajectory& trajectory, double duration_s, const std::optional<ControllerConfig>& controller,
+              const std::optional<Eigen::Vector2d>& rcm_px, bool own_thread, py::object on_tick) {
+  RunConfig config;
+  config.rig = *rig;
+  config.controller =
+      controller ? *controller : make_controller(*rig, "fused", {}, ControllerConfig{}.period_s, {}, {}, 20);
+  config.rcm_px = rcm_px;
+  config.tracking_thread = own_thread ? TrackingThread::own : TrackingThread::callers;
+  if (config.controller.mode == ControlMode::paper) config.tracker.method = Method::centerline;
+  PythonObserver observer(std::move(on_tick), rig);
+  const py::gil_scoped_release others_run;
+  run(robot, images, clock, config, trajectory, duration_s, observer);
+}
+
+}  // namespace
+
+void bind_servo(py::module_& m) {
+  bind_ports(m);
+  bind_trajectories(m);
+  py::class_<ControllerConfig>(m, "Controller", "How a loop steers.")
+      .def(
+          py::init(&make_controller), py::arg("rig"), py::kw_only(), py::arg("mode") = "fused",
+          py::arg("path") = py::none(), py::arg("period_s") = ControllerConfig{}.period_s,
+          py::arg("gains_per_s") = py::none(), py::arg("delay_s") = py::none(), py::arg("window_margin_px") = 20.0,
+          "mode: 'fused', 'paper' or 'uncalibrated'; path: a controller.yaml, read over the rest; delay_s: known, else "
+          "estimated.")
+      .def_property_readonly("mode", [](const ControllerConfig& self) { return std::string(to_string(self.mode)); })
+      .def_readonly("period_s", &ControllerConfig::period_s)
+      .def("to_yaml", &controller_yaml, "What a controller.yaml can say of it.");
+  bind_tick(m);
+  m.def("run", &run_loop, py::arg("robot"), py::arg("images"), py::arg("clock"), py::arg("rig"), py::arg("trajectory"),
+        py::arg("duration_s"), py::kw_only(), py::arg("controller") = py::none(), py::arg("rcm_px") = py::none(),
+        py::arg("own_thread") = false, py::arg("on_tick") = py::none(),
+        R"(The servo loop: reads the joints, sees, decides, sends, then tells on_tick, once every period.
+
+It holds by itself, within the tick, on a missing or stale image, a lost marker, an outlier, numbers that are not finite
+or an arm that is not enabled, and goes on when all is well again. own_thread: vision in a thread of its own, so that
+set-points never wait for it (for real arms). on_tick(ControlTick) may return False, which ends the run. At the end the
+arm brakes to rest.)");
+}
+
+}  // namespace lapservo::python

@@ -1,0 +1,321 @@
+#include "lapservo/vision/tracker.h"
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "lapservo/core/error.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/io/image_file.h"
+#include "lapservo/io/overlay.h"
+#include "lapservo/kinematics/centre_line.h"
+#include "lapservo/rig/instrument_index.h"
+#include "python/src/bindings.h"
+#include "python/src/conversions.h"
+#include "python/src/observed.h"
+
+namespace lapservo::python {
+namespace {
+
+using Points = Eigen::Matrix<double, 4, 2, Eigen::RowMajor>;
+
+Points points_of(const std::array<Eigen::Vector2d, 4>& edges) {
+  Points points;
+  for (int i = 0; i < 4; ++i) points.row(i) = edges[static_cast<std::size_t>(i)].transpose();
+  return points;
+}
+
+std::optional<Eigen::Vector2d> rcm_px(const Observed& seen) {
+  const auto index = internal::instrument_index(*seen.rig, seen.observation.instrument);
+  if (!index || !seen.rig->instruments[*index].camera_from_rcm) return std::nullopt;
+  return internal::projected_rcm_px(seen.rig->camera, *seen.rig->instruments[*index].camera_from_rcm);
+}
+
+bool is_ok(const Observed& seen) {
+  return seen.observation.status == Status::ok;
+}
+
+// The member of lapservo.Status, which is Python's own kind of enumeration.
+py::object status_to_python(Status status) {
+  return py::module_::import("lapservo._status").attr("Status")(std::string(to_string(status)));
+}
+
+// Numbers mean something of an observation that is ok only; of others they are None.
+template <typename Read>
+auto when_ok(Read read) {
+  return [read](const Observed& seen) {
+    using Value = decltype(read(seen));
+    return is_ok(seen) ? std::optional<Value>(read(seen)) : std::nullopt;
+  };
+}
+
+Eigen::Vector4d features_of(const Observed& seen) {
+  const Features& f = seen.observation.features;
+  return {f.s_rad, f.r_px.value_or(std::numeric_limits<double>::quiet_NaN()), f.l_px, f.d_px};
+}
+
+Eigen::Matrix4d features_covariance_of(const Observed& seen) {
+  const auto rcm = rcm_px(seen);
+  Eigen::Matrix4d covariance =
+      internal::features_covariance(seen.observation.edges_ideal_px, seen.observation.edges_covariance_px2, rcm);
+  if (!rcm) {
+    covariance.row(1).setConstant(std::numeric_limits<double>::quiet_NaN());
+    covariance.col(1).setConstant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return covariance;
+}
+
+std::string summary(const Observed& seen) {
+  const Observation& o = seen.observation;
+  std::string text = o.instrument + ": " + std::string(to_string(o.status));
+  if (!is_ok(seen)) return text;
+  char numbers[160];
+  std::snprintf(numbers, sizeof numbers, ", tau %.4f rad (sigma %.1f mrad)", o.tau_rad, 1e3 * o.sigma_tau_rad);
+  text += numbers;
+  if (!o.rcm) return text;
+  const JointVector& q = o.rcm->q;
+  std::snprintf(numbers, sizeof numbers, ", q = [%.4f rad, %.4f rad, %.5f m, %.4f rad]", q.theta_rad, q.phi_rad,
+                q.rho_m, q.psi_rad);
+  return text + numbers;
+}
+
+Image overlay(const Observed& seen, const Image& image) {
+  const cv::Mat bgr = view_of(image);
+  const py::gil_scoped_release others_run;
+  std::vector<Observation> all(1, seen.observation);
+  Rig rig{seen.rig->camera, {}, {}};
+  if (const auto index = internal::instrument_index(*seen.rig, seen.observation.instrument))
+    rig.instruments.push_back(seen.rig->instruments[*index]);
+  const cv::Mat drawn = draw_overlay(bgr, rig, all);
+  const py::gil_scoped_acquire mine;
+  return array_of(drawn);
+}
+
+// As bytes, to be pickled: every member is a number or holds numbers.
+py::tuple rigid_state(const Rigid3& pose) {
+  return py::make_tuple(Eigen::Vector4d(pose.rotation.coeffs()), pose.translation);
+}
+Rigid3 rigid_from_state(const py::tuple& state) {
+  return {Eigen::Quaterniond(state[0].cast<Eigen::Vector4d>()), state[1].cast<Eigen::Vector3d>()};
+}
+
+py::tuple state_of(const Observed& seen) {
+  const Observation& o = seen.observation;
+  const Features& f = o.features;
+  const py::object rcm =
+      o.rcm ? py::object(py::make_tuple(o.rcm->q.vector(), o.rcm->covariance)) : py::object(py::none());
+  const py::object marker =
+      o.marker ? py::object(py::make_tuple(rigid_state(o.marker->camera_from_marker), o.marker->sigma_xy_m,
+                                           o.marker->sigma_z_m, o.marker->sigma_axis_rad, o.marker->sigma_roll_rad))
+               : py::object(py::none());
+  return py::make_tuple(*seen.rig, seen.stamp_s, static_cast<int>(o.status), o.instrument, rcm, marker,
+                        py::make_tuple(o.tau_rad, o.sigma_tau_rad), o.edges_ideal_px, o.edges_raw_px,
+                        o.edges_covariance_px2, py::make_tuple(f.s_rad, f.r_px, f.l_px, f.d_px, f.cross_ratio),
+                        rigid_state(o.camera_from_unrolled), o.psi_rad,
+                        py::make_tuple(static_cast<int>(o.refused.what), rigid_state(o.refused.camera_from_unrolled),
+                                       o.refused.psi_rad, o.refused.edges_raw_px));
+}
+
+Observed from_state(const py::tuple& state) {
+  Observed seen;
+  seen.rig = std::make_shared<const Rig>(state[0].cast<Rig>());
+  seen.stamp_s = state[1].cast<std::optional<double>>();
+  Observation& o = seen.observation;
+  o.status = static_cast<Status>(state[2].cast<int>());
+  o.instrument = state[3].cast<std::string>();
+  if (!state[4].is_none()) {
+    const auto rcm = state[4].cast<py::tuple>();
+    o.rcm = {JointVector::from_vector(rcm[0].cast<Eigen::Vector4d>()), rcm[1].cast<Eigen::Matrix4d>()};
+  }
+  if (!state[5].is_none()) {
+    const auto marker = state[5].cast<py::tuple>();
+    o.marker = {rigid_from_state(marker[0]), marker[1].cast<double>(), marker[2].cast<double>(),
+                marker[3].cast<double>(), marker[4].cast<double>()};
+  }
+  std::tie(o.tau_rad, o.sigma_tau_rad) = state[6].cast<std::pair<double, double>>();
+  o.edges_ideal_px = state[7].cast<std::array<Eigen::Vector2d, 4>>();
+  o.edges_raw_px = state[8].cast<std::array<Eigen::Vector2d, 4>>();
+  o.edges_covariance_px2 = state[9].cast<EdgesCovariance>();
+  const auto features = state[10].cast<py::tuple>();
+  o.features = {features[0].cast<double>(), features[1].cast<std::optional<double>>(), features[2].cast<double>(),
+                features[3].cast<double>(), features[4].cast<double>()};
+  o.camera_from_unrolled = rigid_from_state(state[11]);
+  o.psi_rad = state[12].cast<double>();
+  const auto refused = state[13].cast<py::tuple>();
+  o.refused = {static_cast<Observation::Refused::What>(refused[0].cast<int>()), rigid_from_state(refused[1]),
+               refused[2].cast<double>(), refused[3].cast<std::array<Eigen::Vector2d, 4>>()};
+  return seen;
+}
+
+void bind_observation(py::module_& m) {
+  std::vector<std::string> words;
+  for (int i = 0; i <= static_cast<int>(Status::interlaced); ++i) words.emplace_back(to_string(static_cast<Status>(i)));
+  m.attr("_statuses") = words;
+
+  using Pose = Observation::MarkerPose;
+  py::class_<Pose>(m, "MarkerPose", R"(The marker's pose, with or without an RCM.
+
+Origin at the marker's proximal end on the axis, z along the axis to the tip, x towards tau = 0.)")
+      .def_property_readonly(
+          "camera_from_marker", [](const Pose& pose) { return matrix_of(pose.camera_from_marker); },
+          "float[4, 4], metres")
+      .def_readonly("sigma_xy_m", &Pose::sigma_xy_m, "of the origin, across the camera's axis")
+      .def_readonly("sigma_z_m", &Pose::sigma_z_m, "of its depth")
+      .def_readonly("sigma_axis_rad", &Pose::sigma_axis_rad, "of the angle between the axis and the true one")
+      .def_readonly("sigma_roll_rad", &Pose::sigma_roll_rad, "about the axis");
+
+  py::class_<Observed>(m, "Observation", R"(What one frame tells of one instrument.
+
+Sigmas are one standard deviation. Of an observation whose status is not ok, every number is None.)")
+      .def_property_readonly("status", [](const Observed& seen) { return status_to_python(seen.observation.status); })
+      .def_property_readonly("ok", &is_ok, "whether status is Status.ok")
+      .def_property_readonly(
+          "instrument", [](const Observed& seen) { return seen.observation.instrument; }, "its name in the rig")
+      .def_readonly("stamp_s", &Observed::stamp_s, "as given to track()")
+      .def_property_readonly(
+          "q",
+          [](const Observed& seen) {
+            const auto& rcm = seen.observation.rcm;
+            return is_ok(seen) && rcm ? std::optional(rcm->q.vector()) : std::nullopt;
+          },
+          "float[4]: theta, phi [rad], rho [m], psi [rad]; None without camera_from_rcm")
+      .def_property_readonly(
+          "q_covariance",
+          [](const Observed& seen) {
+            const auto& rcm = seen.observation.rcm;
+            return is_ok(seen) && rcm ? std::optional(rcm->covariance) : std::nullopt;
+          },
+          "float[4, 4], of q")
+      .def_property_readonly("features", when_ok(&features_of),
+                             "float[4]: s [rad], r, l, d [px] (eq. 12 to 15); r is NaN where the RCM is unknown")
+      .def_property_readonly("features_covariance", when_ok(&features_covariance_of),
+                             "float[4, 4], of features, to first order; r's row and column are NaN where r is")
+      .def_property_readonly("cross_ratio",
+                             when_ok([](const Observed& seen) { return seen.observation.features.cross_ratio; }))
+      .def_property_readonly("tau_rad", when_ok([](const Observed& seen) { return seen.observation.tau_rad; }),
+                             "azimuth of the marker on the centre line, [0, 2 pi)")
+      .def_property_readonly("sigma_tau_rad",
+                             when_ok([](const Observed& seen) { return seen.observation.sigma_tau_rad; }))
+      .def_property_readonly("edges_px",
+                             when_ok([](const Observed& seen) { return points_of(seen.observation.edges_raw_px); }),
+                             "float[4, 2]: e0 to e3 on the centre line, raw pixels")
+      .def_property_readonly("edges_ideal_px",
+                             when_ok([](const Observed& seen) { return points_of(seen.observation.edges_ideal_px); }),
+                             "float[4, 2]: the same, undistorted")
+      .def_property_readonly("edges_covariance_px2",
+                             when_ok([](const Observed& seen) { return seen.observation.edges_covariance_px2; }),
+                             "float[8, 8], of edges_ideal_px, row by row")
+      .def_property_readonly(
+          "marker_pose", [](const Observed& seen) { return is_ok(seen) ? seen.observation.marker : std::nullopt; },
+          "MarkerPose; None by method 'centerline'")
+      .def("overlay", &overlay, py::arg("image").noconvert(),
+           "The frame with what was seen drawn in, as a new uint8[H, W, 3]; what was refused in dashes.")
+      .def(py::pickle(&state_of, &from_state))
+      .def("__repr__", [](const Observed& seen) { return "<lapservo.Observation " + summary(seen) + ">"; });
+}
+
+Method method_of(const std::string& word) {
+  if (const auto method = method_from_string(word)) return *method;
+  throw InputError("Tracker", "method", word, "surface or centerline");
+}
+
+// One frame after another, by one thread at a time whoever calls.
+class SafeTracker {
+ public:
+  SafeTracker(std::shared_ptr<const Rig> rig, const TrackerOptions& options)
+      : rig_(std::move(rig)), tracker_(*rig_, options) {}
+
+  std::vector<Observed> track(const Image& image, std::optional<double> stamp_s) {
+    const cv::Mat bgr = view_of(image);
+    const py::gil_scoped_release others_run;
+    const std::lock_guard lock(mutex_);
+    return observed(tracker_.track(bgr), rig_, stamp_s);
+  }
+  std::vector<Observed> track_frame(const Frame& frame) {
+    const py::gil_scoped_release others_run;
+    const std::lock_guard lock(mutex_);
+    return observed(frame.flaw ? tracker_.refuse(*frame.flaw) : tracker_.track(frame.bgr), rig_, frame.time_s);
+  }
+  void reset() {
+    const py::gil_scoped_release others_run;
+    const std::lock_guard lock(mutex_);
+    tracker_.reset();
+  }
+
+ private:
+  std::shared_ptr<const Rig> rig_;
+  std::mutex mutex_;
+  Tracker tracker_;
+};
+
+void bind_frames(py::module_& m) {
+  py::class_<Frame>(m, "Frame", "A picture of a source.")
+      .def_property_readonly(
+          "image", [](const Frame& frame) { return array_of(frame.bgr); }, "uint8[H, W, 3]")
+      .def_readonly("index", &Frame::index, "from 0")
+      .def_readonly("time_s", &Frame::time_s, "since the first frame")
+      .def_readonly("file", &Frame::file, "the picture's path; empty for videos and cameras")
+      .def_property_readonly(
+          "flaw", [](const Frame& frame) { return frame.flaw ? status_to_python(*frame.flaw) : py::none(); },
+          "Status: why nothing is to be measured in it, or None");
+  py::class_<FrameSource>(m, "FrameSource", "Frames of pictures, a video or a camera, to be iterated over once.")
+      .def_property_readonly("frame_count", &FrameSource::frame_count, "where it is known beforehand")
+      .def_property_readonly("frames_per_second", &FrameSource::frames_per_second)
+      .def_property_readonly("complaint", &FrameSource::complaint,
+                             "after the end: what is wrong with the file as a whole, or ''")
+      .def("__iter__", [](FrameSource& source) -> FrameSource& { return source; })
+      .def("__next__", [](FrameSource& source) {
+        auto frame = [&source] {
+          const py::gil_scoped_release others_run;
+          return source.next();
+        }();
+        if (!frame) throw py::stop_iteration();
+        return *frame;
+      });
+  m.def(
+      "open_frames",
+      [](const std::filesystem::path& input, double fps) { return open_frame_source(input.string(), fps); },
+      py::arg("input"), py::arg("fps") = 30.0,
+      "A picture, a folder of pictures (with `fps`), a video, '/dev/video0' or 'rtsp://...': a FrameSource.");
+  m.def(
+      "read_image", [](const std::filesystem::path& path) { return array_of(read_image(path)); }, py::arg("path"),
+      "uint8[H, W, 3] of a picture file; InputError for what is damaged, has a palette or is to be turned.");
+}
+
+}  // namespace
+
+std::vector<Observed> observed(const std::vector<Observation>& observations, const std::shared_ptr<const Rig>& rig,
+                               std::optional<double> stamp_s) {
+  std::vector<Observed> seen;
+  seen.reserve(observations.size());
+  for (const Observation& observation : observations) seen.push_back({observation, rig, stamp_s});
+  return seen;
+}
+
+void bind_tracker(py::module_& m) {
+  bind_observation(m);
+  bind_frames(m);
+  py::class_<SafeTracker>(m, "Tracker", R"(Finds all instruments of a rig in the frames of one camera.
+
+Holds what it learnt from the frame before. Threads may share it; frames are then tracked one after another.)")
+      .def(py::init([](std::shared_ptr<Rig> rig, const std::string& method, bool single, bool deinterlace) {
+             return std::make_unique<SafeTracker>(std::move(rig),
+                                                  TrackerOptions{method_of(method), single, deinterlace});
+           }),
+           py::arg("rig"), py::kw_only(), py::arg("method") = "surface", py::arg("single") = false,
+           py::arg("deinterlace") = false,
+           "method: 'surface', or the paper's 'centerline'; single: every frame on its own; deinterlace: track the "
+           "field of the even rows.")
+      .def("track", &SafeTracker::track, py::arg("image").noconvert(), py::arg("stamp_s") = py::none(),
+           R"(list[Observation], one per instrument, of uint8[H, W, 3] in blue green red, of the rig's size.
+
+The image is not copied; other Python threads run meanwhile.)")
+      .def("track", &SafeTracker::track_frame, py::arg("frame"),
+           "The same of a Frame; one that is flawed is refused, with its flaw for a status.")
+      .def("reset", &SafeTracker::reset, "Forgets the frame before: the next one is searched anew.");
+}
+
+}  // namespace lapservo::python

@@ -1,0 +1,23 @@
+import pathlib
+
+import hypothesis
+import numpy as np
+import pytest
+
+import lapservo
+
+hypothesis.settings.register_profile("here", derandomize=True, database=None, deadline=None)
+hypothesis.settings.load_profile("here")
+
+SOURCE = pathlib.Path(__file__).resolve().parents[2]
+Q = np.array([0.05, 1.57, 0.064, 1.2])
+
+
+@pytest.fixture(scope="session")
+def rig():
+    return lapservo.Rig.load(SOURCE / "configs" / "paper.yaml")
+
+
+@pytest.fixture(scope="session")
+def image(rig):
+    return lapservo.Renderer(rig).render(Q, seed=3)

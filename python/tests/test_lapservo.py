@@ -1,0 +1,303 @@
+import csv
+import os
+import pickle
+import re
+import subprocess
+import threading
+
+import numpy as np
+import pytest
+from conftest import Q, SOURCE
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import lapservo
+
+
+def free(rig):
+    """The rig without camera_from_rcm."""
+    return lapservo.Rig(rig.camera, [lapservo.Instrument("PSM1", rig.instruments[0].marker)])
+
+
+def test_a_rendered_instrument_is_where_it_was_put(rig, image):
+    seen = lapservo.Tracker(rig).track(image, 12.5)[0]
+    assert seen.ok and seen.status is lapservo.Status.ok and seen.instrument == "PSM1" and seen.stamp_s == 12.5
+    assert np.all(np.abs(seen.q - Q) < 4 * np.sqrt(np.diag(seen.q_covariance)))
+    assert np.all(np.abs(seen.q - Q) < [1e-3, 1e-3, 1e-4, 5e-3])
+    truth = lapservo.camera_from_marker(rig.instruments[0], Q)
+    assert np.allclose(seen.marker_pose.camera_from_marker, truth, atol=5e-3)
+    assert np.allclose(seen.features, lapservo.Kinematics(rig).features(Q), atol=[0.001, 0.5, 0.5, 0.5])
+    assert seen.features_covariance.shape == (4, 4) and np.all(np.linalg.eigvalsh(seen.features_covariance) > 0)
+
+
+def test_without_a_marker_every_number_is_none(rig):
+    seen = lapservo.Tracker(rig).track(np.full((720, 1280, 3), 90, np.uint8))[0]
+    assert not seen.ok and seen.status is lapservo.Status.no_marker
+    for name in "q q_covariance features cross_ratio tau_rad sigma_tau_rad edges_px marker_pose stamp_s".split():
+        assert getattr(seen, name) is None, name
+
+
+def test_without_an_rcm_r_is_not_a_number(rig, image):
+    seen = lapservo.Tracker(free(rig)).track(image)[0]
+    assert seen.ok and seen.q is None and seen.marker_pose is not None
+    assert np.array_equal(np.isnan(seen.features), [False, True, False, False])
+
+
+def test_numbers_are_the_command_lines(tmp_path):
+    source, tool = SOURCE / "acceptance" / "frames", os.environ["LAPSERVO_TOOL"]
+    rows = 0
+    for folder in sorted(p.parent for p in source.glob("*/rig.yaml")):
+        out = tmp_path / "obs.csv"
+        subprocess.run([tool, "track", folder, "--rig", folder / "rig.yaml", "--out", out], check=True,
+                       capture_output=True)
+        tracker = lapservo.Tracker(lapservo.Rig.load(folder / "rig.yaml"))
+        with open(out) as file:
+            table = list(csv.DictReader(file))
+        seen = [o for frame in lapservo.open_frames(folder) for o in tracker.track(frame)]
+        assert len(seen) == len(table)
+        for ours, row in zip(seen, table):
+            assert ours.status.value == row["status"]
+            if not ours.ok:
+                continue
+            rows += 1
+            numbers = dict(zip(("theta_rad", "phi_rad", "rho_m", "psi_rad"), ours.q if ours.q is not None else ()))
+            numbers |= {f"e{i}_{n}_px": ours.edges_px[i][k] for i in range(4) for k, n in enumerate("uv")}
+            numbers |= {"tau_rad": ours.tau_rad, "s_rad": ours.features[0], "l_px": ours.features[2]}
+            for name, value in numbers.items():
+                assert f"{value:.{len(row[name].partition('.')[2])}f}" == row[name], name
+    assert rows > 3
+
+
+def test_rows_of_an_image_may_lie_apart(rig, image):
+    wide = np.zeros((720, 1400, 3), np.uint8)
+    wide[:, :1280] = image
+    a, b = lapservo.Tracker(rig).track(image)[0], lapservo.Tracker(rig).track(wide[:, :1280])[0]
+    assert np.array_equal(a.q, b.q)
+
+
+@pytest.mark.parametrize("bad", [lambda i: i[:, :, :2], lambda i: i[0], lambda i: i[:, ::2], lambda i: i[:, :, ::-1],
+                                 lambda i: i[:-1]])
+def test_other_arrays_are_refused(rig, image, bad):
+    with pytest.raises(lapservo.InputError):
+        lapservo.Tracker(rig).track(bad(image))
+
+
+def test_other_types_are_refused(rig, image):
+    with pytest.raises(TypeError):
+        lapservo.Tracker(rig).track(image.astype(float))
+
+
+def test_an_overlay_is_a_new_picture(rig, image):
+    before = image.copy()
+    drawn = lapservo.Tracker(rig).track(image)[0].overlay(image)
+    assert drawn.shape == image.shape and not np.array_equal(drawn, image) and np.array_equal(image, before)
+
+
+def test_results_pickle(rig, image):
+    for seen in (lapservo.Tracker(rig).track(image)[0], lapservo.Tracker(free(rig)).track(image, 1.0)[0]):
+        again = pickle.loads(pickle.dumps(seen))
+        assert repr(again) == repr(seen) and again.stamp_s == seen.stamp_s
+        assert np.array_equal(again.features, seen.features, equal_nan=True)
+        assert np.array_equal(again.edges_covariance_px2, seen.edges_covariance_px2)
+        assert np.array_equal(again.overlay(image), seen.overlay(image))
+    assert pickle.loads(pickle.dumps(rig)).to_yaml() == rig.to_yaml()
+
+
+def test_threads_share_a_tracker(rig, image):
+    tracker, seen = lapservo.Tracker(rig), []
+    threads = [threading.Thread(target=lambda: seen.extend(tracker.track(image))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(seen) == 4 and all(o.ok for o in seen)
+
+
+def test_errors_have_fields(rig):
+    text = rig.to_yaml()
+    seam = re.search(r"seam_rad: \S+", text)[0]
+    with pytest.raises(lapservo.InputError) as caught:
+        lapservo.Rig.parse(text.replace(seam, "seam_rad: left"))
+    error = caught.value
+    assert isinstance(error, ValueError) and error.source == "rig" and error.field.endswith("seam_rad")
+    assert error.value == "left" and error.field in str(error) and error.expectation in str(error)
+    assert pickle.loads(pickle.dumps(error)).field == error.field
+
+
+def test_a_rig_of_keywords_is_that_of_the_file(rig):
+    marker, camera = rig.instruments[0].marker, rig.camera
+    again = lapservo.Rig(
+        lapservo.Camera(camera.width_px, camera.height_px, camera.matrix, distortion=camera.distortion,
+                        response=camera.response),
+        [lapservo.Instrument("PSM1", lapservo.Marker(
+            diameter_m=marker.diameter_m, bands_upper_m=marker.bands_upper_m, bands_lower_m=marker.bands_lower_m,
+            hues_deg=marker.hues_deg, seam_rad=marker.seam_rad),
+            camera_from_rcm=rig.instruments[0].camera_from_rcm)])
+    assert np.allclose(lapservo.Kinematics(again).features(Q), lapservo.Kinematics(rig).features(Q), atol=1e-9)
+    with pytest.raises(lapservo.InputError):
+        lapservo.Instrument("x", marker, camera_from_rcm=np.diag([1, 1, 2, 1.0]))
+    with pytest.raises(lapservo.InputError):
+        lapservo.Camera(100, 100, np.ones((3, 3)))
+
+
+configurations = st.tuples(st.floats(-0.3, 0.3), st.floats(1.3, 1.8), st.floats(0.05, 0.08), st.floats(-3, 3))
+
+
+@settings(max_examples=50)
+@given(configurations)
+def test_kinematics_round_trip_and_differentiate(q):
+    kinematics = lapservo.Kinematics(lapservo.Rig.load(SOURCE / "configs" / "paper.yaml"))
+    q = np.array(q)
+    f, jacobian = kinematics.features(q), kinematics.jacobian(q)
+    if f is None or abs(np.linalg.det(jacobian)) < 1:
+        return
+    step = 1e-6 * np.ones(4)
+    numeric = np.empty((4, 4))
+    for i in range(4):
+        d = np.zeros(4)
+        d[i] = step[i]
+        ahead, behind = kinematics.features(q + d), kinematics.features(q - d)
+        if ahead is None or behind is None or np.any(np.abs(ahead - behind) > 1):
+            return  # across the seam
+        numeric[:, i] = (ahead - behind) / (2 * step[i])
+    assert np.allclose(jacobian, numeric, rtol=1e-4, atol=1e-2)
+    found = kinematics.inverse(f, q + 1e-4)
+    assert found is None or np.allclose(kinematics.features(found), f, atol=1e-6)
+
+
+@settings(max_examples=50)
+@given(st.floats(0.02, 6.26))
+def test_a_cross_ratio_decodes(tau):
+    marker = lapservo.Rig.load(SOURCE / "configs" / "paper.yaml").instruments[0].marker
+    assert marker.decode(marker.cross_ratio(tau)) == pytest.approx(tau, abs=1e-9)
+
+
+def test_a_marker_is_designed_and_printed(tmp_path):
+    marker = lapservo.design_marker(0.005, focal_px=1100, distance_m=0.1)
+    assert marker.diameter_m == 0.005 and marker.length_m == pytest.approx(0.015)
+    lapservo.print_marker(tmp_path / "m.pdf", marker, copies=2)
+    assert (tmp_path / "m.pdf").read_bytes().startswith(b"%PDF")
+    with pytest.raises(lapservo.InputError):
+        lapservo.print_marker(tmp_path / "m.doc", marker)
+    with pytest.raises(lapservo.InputError):
+        lapservo.design_marker(0.005, length_m=0.001)
+
+
+def test_the_rcm_is_where_lines_meet(rig):
+    renderer, tracker = lapservo.Renderer(rig), lapservo.Tracker(free(rig), single=True)
+    seen = []
+    for theta in np.linspace(-0.3, 0.3, 9):
+        seen += tracker.track(renderer.render([theta, 1.5, 0.064, 1.0]))
+    estimate = lapservo.estimate_rcm(seen)
+    truth = rig.camera.matrix @ rig.instruments[0].camera_from_rcm[:3, 3]
+    off = estimate.point_px - truth[:2] / truth[2]
+    assert estimate.status == "ok" and estimate.lines >= 6
+    assert np.linalg.norm(off) < 30 and off @ np.linalg.solve(estimate.covariance_px2, off) < 20
+    assert lapservo.estimate_rcm(seen[:1]).point_px is None
+
+
+class Arm(lapservo.Robot):
+    def __init__(self, simulator):
+        super().__init__()
+        self.simulator, self.sent = simulator, 0
+
+    def state(self):
+        return self.simulator.state()
+
+    def send(self, path):
+        assert len(path.at(self.simulator.now_s())) == 2
+        self.sent += 1
+        self.simulator.send(path)
+
+
+class Eye(lapservo.ImageStream):
+    def __init__(self, simulator):
+        super().__init__()
+        self.simulator = simulator
+
+    def newest(self):
+        return self.simulator.newest()
+
+
+class Time(lapservo.Clock):
+    def __init__(self, simulator):
+        super().__init__()
+        self.simulator = simulator
+
+    def now_s(self):
+        return self.simulator.now_s()
+
+    def sleep_until(self, time_s):
+        self.simulator.sleep_until(time_s)
+
+
+def errors_of_a_run(rig, robot, images, clock, duration_s=2.5):
+    errors = []
+    target = lapservo.set_point(lapservo.Kinematics(rig).features(Q) + [0.02, 10, 5, 5])
+    lapservo.run(robot, images, clock, rig, target, duration_s,
+                 on_tick=lambda tick: errors.append(tick.error) if tick.error is not None else None)
+    return np.array(errors)
+
+
+def test_ports_in_python_do_what_the_simulators_do(rig):
+    simulator = lapservo.Simulator(rig, Q, seed=4)
+    errors = errors_of_a_run(rig, simulator, simulator, simulator)
+    assert np.all(np.abs(errors[-1]) < [0.005, 1, 1, 1])
+    simulator = lapservo.Simulator(rig, Q, seed=4)
+    arm = Arm(simulator)
+    assert np.array_equal(errors_of_a_run(rig, arm, Eye(simulator), Time(simulator)), errors)
+    assert arm.sent > 100
+
+
+def test_what_a_port_raises_leaves_the_run(rig):
+    class Broken(Arm):
+        def state(self):
+            raise ZeroDivisionError("the arm's driver")
+
+    simulator = lapservo.Simulator(rig, Q)
+    with pytest.raises(ZeroDivisionError, match="the arm's driver"):
+        errors_of_a_run(rig, Broken(simulator), simulator, simulator)
+    with pytest.raises(RuntimeError, match="pure virtual"):
+        errors_of_a_run(rig, lapservo.Robot(), simulator, simulator)
+
+
+def test_a_run_ends_when_told(rig):
+    simulator, ticks = lapservo.Simulator(rig, Q), []
+
+    def on_tick(tick):
+        ticks.append(tick)
+        return len(ticks) < 20
+
+    lapservo.run(simulator, simulator, simulator, rig, lapservo.paper_trajectory(), 60, on_tick=on_tick)
+    assert len(ticks) == 20 and simulator.now_s() < 5
+    seen = [tick for tick in ticks if tick.image is not None]
+    assert seen and seen[0].observations[0].ok and seen[0].image.shape == (720, 1280, 3)
+    assert ticks[0].action == "hold" and ticks[0].hold_reason == "no_image_yet" and ticks[0].error is None
+
+
+def test_a_covered_marker_makes_it_hold(rig):
+    simulator, reasons = lapservo.Simulator(rig, Q), []
+    simulator.cover_marker(0.6, 2)
+    lapservo.run(simulator, simulator, simulator, rig, lapservo.set_point(lapservo.Kinematics(rig).features(Q)), 1.2,
+                 on_tick=lambda tick: reasons.append(tick.hold_reason))
+    assert "none" in reasons and reasons[-1] == "marker_lost"
+
+
+def test_trajectories(tmp_path):
+    wave = lapservo.sinusoids([1, 2, 3, 4], [0.1, 0.2, 0.3, 0.4], [1, 1, 1, 1])
+    f, rate, acceleration = wave.at(0.5)
+    own = lapservo.Trajectory(3.0, lambda t: wave.at(t))
+    assert np.array_equal(own.at(0.5)[0], f) and own.duration_s == 3
+    assert np.allclose((wave.at(0.5 + 1e-6)[0] - f) / 1e-6, rate, atol=1e-5)
+    path = lapservo.via_points([[0, 1, 2, 3], [1, 2, 3, 4]], [1, 1, 1, 1])
+    assert np.allclose(path.at(path.duration_s)[0], [1, 2, 3, 4])
+    with pytest.raises(lapservo.InputError):
+        lapservo.load_trajectory(tmp_path / "none.csv")
+
+
+def test_a_controller_says_what_a_file_can(rig):
+    controller = lapservo.Controller(rig, mode="paper", period_s=1 / 30, delay_s=0.05)
+    assert controller.mode == "paper" and "delay_s: 0.05" in controller.to_yaml()
+    with pytest.raises(lapservo.InputError) as caught:
+        lapservo.Controller(rig, mode="fast")
+    assert caught.value.field == "mode"
