@@ -70,6 +70,10 @@ class ArmWatcher : public RunObserver {
     if (!start_s_) start_s_ = tick.input.time_s;
     const double time_s = tick.input.time_s - *start_s_;
     summary_.add(tick, std::nullopt);
+    if (const auto& motions = summary_.endoscope_motions(); motions.size() > said_motions_) {
+      say(time_s, motions.back());
+      said_motions_ = motions.size();
+    }
     if (folder_) folder_->log().add(tick.input, tick.decision, std::nullopt);
     const Blocked blocked = robot_.blocked();
     say_state(time_s, tick.decision.control, blocked);
@@ -104,8 +108,9 @@ class ArmWatcher : public RunObserver {
     if (!wishes.set_point) return;
     const Trajectory wanted = set_point(*wishes.set_point);
     try {
-      if (run_.rig.instruments.front().camera_from_rcm)
-        refuse_infeasible(wanted, 1, feature_model(run_.rig), run_.controller, tick.input.joints.q, "set_point");
+      if (const auto& camera_from_rcm = tick.decision.camera_from_rcm)
+        refuse_infeasible(wanted, 1, feature_model(run_.rig, *camera_from_rcm), run_.controller, tick.input.joints.q,
+                          "set_point");
       goal_.replace(wanted);
       say(time_s, "a set-point came");
     } catch (const InputError& error) {
@@ -143,6 +148,7 @@ class ArmWatcher : public RunObserver {
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string state_, said_counts_;
   bool said_ended_ = false;
+  std::size_t said_motions_ = 0;
 };
 
 // Where the arm is, once it says so.

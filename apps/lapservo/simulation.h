@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -9,9 +10,10 @@
 
 namespace lapservo::app {
 
-/// How the simulated arm is made.
+/// How the simulated arm and its endoscope are made.
 struct SimulationOptions {
   std::string dynamics = "first-order";
+  std::vector<double> endoscope_motion;  ///< s, s, 3 x mm, 3 x degrees
 };
 
 /// `only`: precedes what the options say, for a command that does other things too.

@@ -9,6 +9,12 @@
 
 namespace lapservo::internal {
 
+std::optional<Eigen::Vector4d> Estimator::driven_at(const ImageMeasurement&, const JointHistory&) {
+  return std::nullopt;
+}
+
+void Estimator::set_model(const FeatureModel&) {}
+
 std::optional<Eigen::Vector4d> Estimator::probing_velocity(double) const {
   return std::nullopt;
 }

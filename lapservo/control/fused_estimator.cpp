@@ -31,6 +31,11 @@ HoldReason FusedEstimator::update(const ImageMeasurement& image, const JointHist
   return reason_of(observer_.update(model_, history, image));
 }
 
+void FusedEstimator::set_model(const FeatureModel& model) {
+  model_ = model;
+  observer_.start_anew();
+}
+
 std::optional<Estimate> FusedEstimator::at(double time_s, const Eigen::Vector4d& q_joint) const {
   return observer_.estimate(model_, q_joint, time_s);
 }

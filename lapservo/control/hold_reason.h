@@ -12,6 +12,7 @@ enum class HoldReason {
   stale_image,      ///< no usable image for too long, or one that was too old when it came
   frozen_image,     ///< the joints move and the image's features don't: the same picture again, whatever its stamp
   wild_joints,      ///< measured joints that no arm can have come to since the last ones
+  endoscope_moved,  ///< the shaft misses the RCM all of a sudden: camera_from_rcm is being measured anew
   outlier,          ///< the latest image contradicts the measured joints and the images before
   no_history,       ///< the image is older than the measured joints
   not_modelled,     ///< the model has no features where the instrument is, or none that match

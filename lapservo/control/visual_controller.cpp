@@ -25,7 +25,9 @@ bool all_finite(const DesiredFeatures& desired) {
 bool all_finite(const ImageMeasurement& image) {
   return std::isfinite(image.time_s) &&
          (!image.found || (image.features.allFinite() && image.covariance.allFinite() && image.ends_px.allFinite() &&
-                           (!image.q || image.q->allFinite())));
+                           (!image.q || image.q->allFinite()))) &&
+         (!image.marker || (image.marker->inner_px.allFinite() && image.marker->position_m.allFinite() &&
+                            image.marker->rotation.coeffs().allFinite() && image.ends_px.allFinite()));
 }
 
 }  // namespace
@@ -59,6 +61,16 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
   usable_s_ = time_s;
 }
 
+void VisualController::recovered(const FeatureModel& model) {
+  recovery_.reset();
+  estimator_->set_model(model);
+  image_reason_ = HoldReason::endoscope_moved;  // until an image tells where the instrument is
+}
+
+std::optional<Eigen::Vector4d> VisualController::driven_at(const ImageMeasurement& image) {
+  return estimator_->driven_at(image, history_);
+}
+
 ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint,
                                    const std::optional<ImageMeasurement>& image, const DesiredFeatures& desired) {
   ControlStep step;
@@ -67,7 +79,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   if (timed && q_joint.allFinite()) {
     if (image) image_reason_ = update(*image);
     watch_image_age();
-    step.estimate = estimator_->at(time_s, q_joint);
+    if (!recovery_) step.estimate = estimator_->at(time_s, q_joint);
   }
   if (step.reason == HoldReason::none) step.reason = image_reason_;
 
@@ -79,7 +91,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   } else if (measured_) {
     step.velocity = leashed_hold(step.velocity);
   }
-  if (step.action == ControlAction::probe) estimator_->advance_probing(config_.period_s);
+  if (step.action == ControlAction::probe && !recovery_) estimator_->advance_probing(config_.period_s);
 
   // Without a time to start from, the path is left to brake by itself when the period before ends.
   if (timed && started_) path_.ramp_to(now_s_, step.velocity, config_.period_s);
@@ -125,13 +137,13 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
 
 HoldReason VisualController::update(const ImageMeasurement& image) {
   if (!all_finite(image)) return HoldReason::non_finite;
-  if (!image.found) return HoldReason::marker_lost;
+  if (!image.found && !(recovery_ && image.marker)) return HoldReason::marker_lost;
   if (now_s_ - image.time_s > config_.max_image_age_s) return HoldReason::stale_image;
   // The same stamp again, or an older one, tells nothing: the age of what was told before goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
   image_s_ = image.time_s;
   if (frozen_image_.add(image, history_)) return HoldReason::frozen_image;
-  const HoldReason reason = estimator_->update(image, history_);
+  const HoldReason reason = recovery_ ? HoldReason::none : estimator_->update(image, history_);
   if (reason == HoldReason::none) usable_s_ = now_s_;
   return reason;
 }
@@ -148,9 +160,17 @@ VisualController::Law VisualController::decide(HoldReason reason, const std::opt
     law.reason = reason;
     return law;
   }
+  if (recovery_) return recovery_law();
   const auto probing_velocity = estimator_->probing_velocity(config_.period_s);
   law = probing_velocity ? probing_law(*probing_velocity) : tracking_law(estimate, desired);
   if (!law.velocity.allFinite() || !law.weight.allFinite()) law.reason = HoldReason::non_finite;
+  return law;
+}
+
+VisualController::Law VisualController::recovery_law() const {
+  if (recovery_->velocity) return probing_law(*recovery_->velocity);
+  Law law;
+  law.reason = HoldReason::endoscope_moved;
   return law;
 }
 

@@ -38,6 +38,18 @@ class VisualController {
   /// The same after a hold, of an arm that was enabled all the while: under its load it keeps the place that it has.
   void start_over(double time_s, const Eigen::Vector4d& q_joint);
 
+  /// While camera_from_rcm is measured anew: no image is believed, the arm holds (HoldReason::endoscope_moved) or,
+  /// where there is a velocity (rad/s, m/s), moves by it within its limits (ControlAction::probe). For the steps from
+  /// now on.
+  struct Recovery {
+    std::optional<Eigen::Vector4d> velocity;
+  };
+  void recover(const Recovery& recovery) { recovery_ = recovery; }
+  /// And on again, with the model that was found.
+  void recovered(const FeatureModel& model);
+  /// Where the measured joints, through their backlash, were at that image; nullopt when not known.
+  std::optional<Eigen::Vector4d> driven_at(const ImageMeasurement& image);
+
   /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`.
   ControlStep step(double time_s, const Eigen::Vector4d& q_joint, const std::optional<ImageMeasurement>& image,
                    const DesiredFeatures& desired);
@@ -62,6 +74,7 @@ class VisualController {
   HoldReason update(const ImageMeasurement& image);
   void watch_image_age();
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
+  Law recovery_law() const;
   Law probing_law(const Eigen::Vector4d& velocity) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
@@ -78,6 +91,7 @@ class VisualController {
   FrozenImage frozen_image_;
   WildJoints wild_joints_;
   JointPath path_;
+  std::optional<Recovery> recovery_;
   bool started_ = false;
   bool measured_ = false;  ///< the joints of this tick are believed
   double now_s_ = 0;

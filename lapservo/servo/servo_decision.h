@@ -5,6 +5,7 @@
 #include "lapservo/control/control_step.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/trajectory.h"
+#include "lapservo/geometry/rigid3.h"
 #include "lapservo/robot/robot.h"
 
 namespace lapservo {
@@ -23,7 +24,11 @@ struct ServoDecision {
   /// Images show the marker well, but for some time nowhere where camera_from_rcm, lens and RCM agree on a
   /// configuration: one of them is wrong, r with it, and nothing in the image tells by how much.
   bool registration_contradicted = false;
-  bool send = false;  ///< the arm is to follow path(); else it is left alone and holds by itself
+  /// Which camera_from_rcm the loop goes by: 0 the rig's, then one more whenever the endoscope moved and when it has
+  /// been measured anew. Images that were tracked with another one do not count.
+  int registration = 0;
+  std::optional<Rigid3> camera_from_rcm;  ///< nullopt while it is being measured, and where the rig has none
+  bool send = false;                      ///< the arm is to follow path(); else it is left alone and holds by itself
 };
 
 }  // namespace lapservo

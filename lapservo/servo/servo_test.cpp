@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/registration_watch.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo::internal {
@@ -76,6 +77,32 @@ TEST(Servo, SaysThatImagesContradictTheRegistration) {
   EXPECT_TRUE(world.step().registration_contradicted);
   world.visible = world.registered = true;
   EXPECT_FALSE(world.step().registration_contradicted);
+}
+
+TEST(RegistrationWatch, SaysOnceThatShaftsMissTheRcmWhichTheyPassed) {
+  Observation passes, misses, lost;
+  passes.status = misses.status = Status::ok;
+  passes.rcm.emplace();
+  const auto frames = [](RegistrationWatch& watch, const std::vector<Observation>& observations, int count) {
+    int said = 0;
+    for (int i = 0; i < count; ++i) said += watch.add(observations);
+    return said;
+  };
+  RegistrationWatch never;
+  EXPECT_EQ(frames(never, {misses}, 50), 0);  // wrong all along: not moved
+  RegistrationWatch watch;
+  EXPECT_EQ(frames(watch, {passes}, 20) + frames(watch, {lost}, 20) + frames(watch, {misses}, 4), 0);
+  EXPECT_EQ(frames(watch, {misses}, 50), 1);
+  EXPECT_EQ(frames(watch, {passes}, 20), 0);
+  EXPECT_EQ(frames(watch, {misses}, 50), 1);
+  // One of two: its own registration, not the endoscope.
+  Observation other = passes;
+  other.instrument = "other";
+  RegistrationWatch two;
+  EXPECT_EQ(frames(two, {passes, other}, 20) + frames(two, {misses, other}, 20), 0);
+  other = lost;
+  other.instrument = "other";
+  EXPECT_EQ(frames(two, {misses, other}, 20), 1);
 }
 
 TEST(Servo, HoldsWithinAPeriodWhenTheMarkerIsLostAndGoesOnWithoutAJump) {

@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/geometry/rigid3.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/clock.h"
@@ -30,6 +31,17 @@ struct SimulatorConfig {
 struct Interval {
   double begin_s = 0, end_s = 0;
   bool contains(double time_s) const { return begin_s <= time_s && time_s < end_s; }
+};
+
+/// The endoscope moves: the camera goes evenly, within `duration_s` (0: at once), by this much in its own frame as it
+/// was when it began.
+struct EndoscopeMotion {
+  double begin_s = 0, duration_s = 0;
+  Eigen::Vector3d translation_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();  ///< vector: about its direction, by its length
+
+  /// Returns itself if all its numbers make sense; else throws InputError naming the first field that doesn't.
+  const EndoscopeMotion& checked() const;
 };
 
 /// A frame with its truth.
@@ -72,6 +84,11 @@ class Simulator : public Robot, public ImageStream, public Clock {
   /// Something lies over the whole marker then.
   void cover_marker(const Interval& when) { covered_.push_back(when); }
 
+  /// Motions that overlap in time add up in the order in which they were given.
+  void move_endoscope(const EndoscopeMotion& motion) { endoscope_motions_.push_back(motion.checked()); }
+  /// What stood in the camera's frame at the beginning stands there now.
+  Rigid3 camera_from_first_camera() const;
+
   /// The instrument in the camera's truth, now.
   JointVector true_q() const { return JointVector::from_vector(arm_->true_jp()); }
   ShaftPlacement placement() const;
@@ -83,6 +100,7 @@ class Simulator : public Robot, public ImageStream, public Clock {
   double arm_period_s_;
   std::optional<JointPath> path_;
   std::vector<Interval> covered_;
+  std::vector<EndoscopeMotion> endoscope_motions_;
   double time_s_ = 0;
   Exposure exposing_;                  // the moments of the current frame so far
   std::map<long, JointVector> truth_;  // of frames on their way
