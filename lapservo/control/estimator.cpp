@@ -13,7 +13,7 @@ std::optional<Eigen::Vector4d> Estimator::driven_at(const ImageMeasurement&, con
   return std::nullopt;
 }
 
-void Estimator::set_model(const FeatureModel&) {}
+void Estimator::set_model(const FeatureModel&, bool) {}
 
 std::optional<Eigen::Vector4d> Estimator::probing_velocity(double) const {
   return std::nullopt;

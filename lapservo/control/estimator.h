@@ -35,9 +35,9 @@ class Estimator {
   /// The measured joints at that image, through their backlash; nullopt where they don't reach back so far. No image
   /// is learnt from.
   virtual std::optional<Eigen::Vector4d> driven_at(const ImageMeasurement& image, const JointHistory& history);
-  /// Another camera_from_rcm: what was learnt of delay and backlash holds, where the instrument is the next image
-  /// tells.
-  virtual void set_model(const FeatureModel& model);
+  /// Another camera_from_rcm: what was learnt of delay and backlash holds. Where the instrument is the next image tells,
+  /// if `anew`.
+  virtual void set_model(const FeatureModel& model, bool anew);
 
   /// The measured joints jumped: nothing is to be learnt across.
   virtual void interrupt() {}

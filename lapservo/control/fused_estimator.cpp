@@ -31,9 +31,9 @@ HoldReason FusedEstimator::update(const ImageMeasurement& image, const JointHist
   return reason_of(observer_.update(model_, history, image));
 }
 
-void FusedEstimator::set_model(const FeatureModel& model) {
+void FusedEstimator::set_model(const FeatureModel& model, bool anew) {
   model_ = model;
-  observer_.start_anew();
+  if (anew) observer_.start_anew();
 }
 
 std::optional<Estimate> FusedEstimator::at(double time_s, const Eigen::Vector4d& q_joint) const {

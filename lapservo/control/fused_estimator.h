@@ -14,7 +14,7 @@ class FusedEstimator : public Estimator {
   std::optional<Eigen::Vector4d> driven_at(const ImageMeasurement& image, const JointHistory& history) override {
     return observer_.driven_at(image.time_s, history);
   }
-  void set_model(const FeatureModel& model) override;
+  void set_model(const FeatureModel& model, bool anew) override;
   void interrupt() override { observer_.interrupt(); }
   bool delay_is_known() const override { return observer_.delay_is_known(); }
 

@@ -63,7 +63,7 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
 
 void VisualController::recovered(const FeatureModel& model) {
   recovery_.reset();
-  estimator_->set_model(model);
+  estimator_->set_model(model, true);
   image_reason_ = HoldReason::endoscope_moved;  // until an image tells where the instrument is
 }
 

@@ -47,6 +47,8 @@ class VisualController {
   void recover(const Recovery& recovery) { recovery_ = recovery; }
   /// And on again, with the model that was found.
   void recovered(const FeatureModel& model);
+  /// A slightly better model while all goes on.
+  void refine(const FeatureModel& model) { estimator_->set_model(model, false); }
   /// Where the measured joints, through their backlash, were at that image; nullopt when not known.
   std::optional<Eigen::Vector4d> driven_at(const ImageMeasurement& image);
 

@@ -20,6 +20,9 @@ constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
 constexpr double rest_s = 0.3, rest_px = 1.5;
 constexpr std::size_t min_rest_images = 5, min_images = 60, max_images = 400;
 
+// Of the images, one in so many makes it finer.
+constexpr int refining_each = 4;
+
 // What a registration has to be to be gone by.
 constexpr double max_rms_px = 1, max_sigma_m = 2e-3, max_sigma_rad = 0.02;
 
@@ -70,14 +73,16 @@ bool EndoscopeRecovery::follow_joints(const ImageMeasurement& image, VisualContr
       now.sides[k] = std::abs(moved[2 + k]) > plain[k] ? (moved[2 + k] > 0 ? 1 : -1) : driven_->sides[k];
   }
   driven_ = now;
-  if (phase_ != Phase::watching && path_.joints.back() != now.q.tail<2>()) path_.joints.emplace_back(now.q.tail<2>());
+  const bool collects = phase_ != Phase::watching || !refine_at_s_.empty();
+  if (collects && path_.joints.back() != now.q.tail<2>()) path_.joints.emplace_back(now.q.tail<2>());
   return true;
 }
 
 void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step, VisualController& controller) {
   switch (phase_) {
     case Phase::watching:
-      return trust(input, step);
+      trust(input, step);
+      return refine(input, controller);
     case Phase::resting:
       return wait_for_rest(input);
     case Phase::exploring:
@@ -105,12 +110,14 @@ void EndoscopeRecovery::notice(VisualController& controller) {
     offsets_.pop_back();
   }
   later.push_front(offsets_.back());
-  offsets_ = {offsets_.back()};
-  path_ = {offsets_.back().driven.sides, {}};
+  trusted_ = offsets_.back().q;
+  offsets_.clear();
+  path_ = {later.front().driven.sides, {}};
   for (const Offset& offset : later) path_.joints.emplace_back(offset.driven.q.tail<2>());
   path_.joints.emplace_back(driven_->q.tail<2>());
   camera_from_rcm_.reset();
-  ++registration_;
+  refine_at_s_.clear();
+  oldest_counted_ = ++registration_;
   rest_again(controller);
 }
 
@@ -125,7 +132,7 @@ std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurem
   MarkerSighting sighting;
   sighting.edges_px = edges_of(image);
   sighting.camera_from_marker = {image.marker->rotation, image.marker->position_m};
-  sighting.q = driven_->q + offsets_.back().q;
+  sighting.q = driven_->q + trusted_;
   sighting.q_rate = driven_->rate;
   sighting.path_index = path_.joints.size() - 1;
   return sighting;
@@ -153,10 +160,10 @@ void EndoscopeRecovery::explore(const ServoInput& input, const ControlStep& step
   if (input.image && sightings_.size() < max_images)
     if (const auto seen = sighting_of(*input.image)) sightings_.push_back(*seen);
   if (explored_s_ < motion_.duration_s()) return controller.recover({motion_.velocity(explored_s_)});
-  conclude(controller);
+  conclude(input, controller);
 }
 
-void EndoscopeRecovery::conclude(VisualController& controller) {
+void EndoscopeRecovery::conclude(const ServoInput& input, VisualController& controller) {
   const Marker& marker = rig_.instruments.front().marker;
   const auto fit =
       fit_registration(rig_.camera, marker, sightings_, path_, camera_from_rcm_by(marker, sightings_.front()));
@@ -168,8 +175,26 @@ void EndoscopeRecovery::conclude(VisualController& controller) {
   failed_ = contradicting_ = 0;
   phase_ = Phase::watching;
   camera_from_rcm_ = fit->camera_from_rcm;
-  ++registration_;
+  oldest_counted_ = ++registration_;
+  refine_at_s_ = {input.time_s + 1.5, input.time_s + 4};
   controller.recovered(feature_model(rig_, fit->camera_from_rcm));
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < sightings_.size(); i += refining_each) sightings_[kept++] = sightings_[i];
+  sightings_.resize(kept);
+}
+
+// Of the images that were seen from here to there, few are enough.
+void EndoscopeRecovery::refine(const ServoInput& input, VisualController& controller) {
+  if (refine_at_s_.empty()) return;
+  if (input.image && ++images_ % refining_each == 0)
+    if (const auto seen = sighting_of(*input.image)) sightings_.push_back(*seen);
+  if (input.time_s < refine_at_s_.front()) return;
+  refine_at_s_.pop_front();
+  const auto fit = fit_registration(rig_.camera, rig_.instruments.front().marker, sightings_, path_, *camera_from_rcm_);
+  if (!fit || !(fit->rms_px < max_rms_px)) return;
+  camera_from_rcm_ = fit->camera_from_rcm;
+  ++registration_;
+  controller.refine(feature_model(rig_, fit->camera_from_rcm));
 }
 
 }  // namespace lapservo::internal

@@ -19,15 +19,18 @@ namespace lapservo::internal {
 /// hides a marker, freezes a picture, sets an encoder or blocks a joint does. The arm holds until the marker's place in
 /// the image rests; moves its joints a little, one after the other; and what images and joints say of these motions
 /// gives camera_from_rcm. If they disagree, the endoscope has moved again and all begins anew; three times, then the
-/// arm holds for good.
+/// arm holds for good. What the images show in the next seconds, with the larger motions of the task, makes it finer
+/// twice.
 class EndoscopeRecovery {
  public:
   EndoscopeRecovery(const Rig& rig, const ControllerConfig& config);
 
-  /// Which images count now, and what they are tracked with.
+  /// What images are to be tracked with from now on.
   int registration() const { return registration_; }
   const std::optional<Rigid3>& camera_from_rcm() const { return camera_from_rcm_; }
 
+  /// Whether images that were tracked with that one count.
+  bool counts(int registration) const { return registration >= oldest_counted_ && registration <= registration_; }
   /// Before a step: an image that came, if it counts. Tells the controller what to do.
   void see(const ServoInput& input, VisualController& controller);
   /// After it.
@@ -40,7 +43,8 @@ class EndoscopeRecovery {
   void notice(VisualController& controller);
   void wait_for_rest(const ServoInput& input);
   void explore(const ServoInput& input, const ControlStep& step, VisualController& controller);
-  void conclude(VisualController& controller);
+  void conclude(const ServoInput& input, VisualController& controller);
+  void refine(const ServoInput& input, VisualController& controller);
   void rest_again(VisualController& controller);
   void trust(const ServoInput& input, const ControlStep& step);
   bool follow_joints(const ImageMeasurement& image, VisualController& controller);
@@ -59,15 +63,18 @@ class EndoscopeRecovery {
   };
   Rig rig_;
   JointLimits limits_;
-  int registration_ = 0;
+  int registration_ = 0, oldest_counted_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
   Phase phase_ = Phase::watching;
   int agreeing_ = 0, contradicting_ = 0, failed_ = 0;  ///< images in a row; attempts
   std::deque<Offset> offsets_;                         ///< while images agreed, in order of time
   std::optional<Driven> driven_;                       ///< at the latest image
   GapPath path_;                                       ///< since the offset that is trusted
+  Eigen::Vector4d trusted_ = Eigen::Vector4d::Zero();  ///< offset, of before the endoscope moved
   std::vector<MarkerSighting> sightings_;
+  int images_ = 0;
   double rests_since_s_ = 0, explored_s_ = 0;
+  std::deque<double> refine_at_s_;  ///< what is to come; then the sightings have done their work
   ProbingMotion motion_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
+#include <cstdio>
 #include <mutex>
 #include <string>
 
@@ -359,7 +360,7 @@ void expect_replays(const PastRun& done, const Rig& rig, const ControllerConfig&
   EXPECT_FALSE(difference) << difference->tick << " " << difference->column;
 }
 
-void expect_measured_anew(const Rig& rig, const Case& c) {
+void expect_measured_anew(const Rig& rig, const Case& c, double max_px) {
   const PastRun done = run_case(c);
   const ControllerConfig controller = config_of(rig, c).controller;
   std::optional<double> held_s, measured_s;
@@ -371,15 +372,19 @@ void expect_measured_anew(const Rig& rig, const Case& c) {
     if (!held_s && decision.control.action == ControlAction::hold) held_s = since_s;
     if (!measured_s && decision.registration == 2) measured_s = since_s;
     const bool right = done.records[k].truth.features && std::abs(done.error(k)[0]) < 5e-3 &&
-                       done.error(k).tail<3>().cwiseAbs().maxCoeff() < 1;
+                       done.error(k).tail<3>().cwiseAbs().maxCoeff() < max_px;
     if (!right) wrong_s = since_s;
   }
-  if (held_s && measured_s)
-    std::printf("held after %.3f s, measured after %.2f s, within 1 px and 5 mrad after %.2f s\n", *held_s, *measured_s,
-                wrong_s);
   ASSERT_TRUE(held_s && measured_s);
+  const Eigen::Vector4d last = done.error(done.records.size() - 1);
+  std::printf(
+      "held after %.3f s, measured after %.2f s, within %.1f px and 5 mrad after %.2f s; at last %.2f mrad, %.2f %.2f "
+      "%.2f "
+      "px%s\n",
+      *held_s, *measured_s, max_px, wrong_s, 1e3 * last[0], last[1], last[2], last[3],
+      done.records.back().decision.control.limited ? ", limited" : "");
   expect_replays(done, rig, controller);
-  EXPECT_LE(*held_s, c.endoscope->duration_s > 0 ? 0.2 : 0.1);
+  EXPECT_LE(*held_s, c.endoscope->duration_s > 0 ? 0.4 : 0.1);
   EXPECT_LE(wrong_s, c.duration_s - endoscope_moves_s - 0.3);
   expect_within_limits(done, controller);
   if (c.endoscope->duration_s == 0) expect_right_where_ok(done, c.latency_s, controller.period_s);
@@ -395,7 +400,7 @@ TEST(Run, MeasuresTheRegistrationAnewWhenTheEndoscopeMoved) {
     Case c;
     c.duration_s = 10;
     c.endoscope = random_motion(rig, duration_s, random);
-    expect_measured_anew(rig, c);
+    expect_measured_anew(rig, c, 1);
   }
 }
 
@@ -409,7 +414,7 @@ TEST(Run, DISABLED_MeasuresManyMovedEndoscopes) {
     c.seed = 1 + static_cast<std::uint64_t>(i);
     c.duration_s = 12.5;
     c.endoscope = random_motion(rig, i % 2 ? random.uniform(0, 2) : 0, random);
-    expect_measured_anew(rig, c);
+    expect_measured_anew(rig, c, 1.5);
   }
 }
 

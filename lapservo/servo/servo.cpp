@@ -31,7 +31,7 @@ Servo::Servo(const ControllerConfig& config, const Rig& rig) : Servo(config, fea
 ServoDecision Servo::step(const ServoInput& input) {
   if (!recovery_) return decide(input);
   ServoInput counted = input;
-  if (input.image && input.image->registration != recovery_->registration()) counted.image.reset();
+  if (input.image && !recovery_->counts(input.image->registration)) counted.image.reset();
   recovery_->see(counted, controller_);
   ServoDecision decision = decide(counted);
   recovery_->follow(counted, decision.control, controller_);
