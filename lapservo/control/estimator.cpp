@@ -9,10 +9,6 @@
 
 namespace lapservo::internal {
 
-std::optional<Eigen::Vector4d> Estimator::driven_at(const ImageMeasurement&, const JointHistory&) {
-  return std::nullopt;
-}
-
 void Estimator::set_model(const FeatureModel&, bool) {}
 
 std::optional<Eigen::Vector4d> Estimator::probing_velocity(double) const {

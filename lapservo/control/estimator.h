@@ -32,9 +32,6 @@ class Estimator {
   /// False while it is a guess that motion will tell better.
   virtual bool delay_is_known() const { return true; }
 
-  /// The measured joints at that image, through their backlash; nullopt where they don't reach back so far. No image
-  /// is learnt from.
-  virtual std::optional<Eigen::Vector4d> driven_at(const ImageMeasurement& image, const JointHistory& history);
   /// Another camera_from_rcm: what was learnt of delay and backlash holds. Where the instrument is the next image tells,
   /// if `anew`.
   virtual void set_model(const FeatureModel& model, bool anew);

@@ -11,9 +11,6 @@ class FusedEstimator : public Estimator {
   HoldReason update(const ImageMeasurement& image, const JointHistory& history) override;
   std::optional<Estimate> at(double time_s, const Eigen::Vector4d& q_joint) const override;
   double delay_s() const override { return observer_.delay_s(); }
-  std::optional<Eigen::Vector4d> driven_at(const ImageMeasurement& image, const JointHistory& history) override {
-    return observer_.driven_at(image.time_s, history);
-  }
   void set_model(const FeatureModel& model, bool anew) override;
   void interrupt() override { observer_.interrupt(); }
   bool delay_is_known() const override { return observer_.delay_is_known(); }

@@ -151,13 +151,6 @@ Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q
   return Update::reacquired;
 }
 
-std::optional<Eigen::Vector4d> OffsetObserver::driven_at(double stamp_s, const JointHistory& history) {
-  const auto q_then = history.at(stamp_s - delay_s_);
-  if (!started_ || !q_then) return std::nullopt;
-  follow_measured(history, stamp_s - delay_s_, *q_then);
-  return instrument(backlashes_then_, backlash_);
-}
-
 void OffsetObserver::interrupt() {
   backlash_estimator_.interrupt();
   delay_estimator_.interrupt();

@@ -50,9 +50,6 @@ class OffsetObserver {
   /// nullopt before the first image and where the model sees nothing.
   std::optional<Estimate> estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint, double time_s) const;
 
-  /// The measured joints at an image of that stamp, through their backlash as it is followed from then on; nullopt
-  /// before the first update() and where there are none.
-  std::optional<Eigen::Vector4d> driven_at(double stamp_s, const JointHistory& history);
   /// The model changes: what the next update() shows is where the instrument is. Delay and backlash stay.
   void start_anew() { anew_ = true; }
 

@@ -67,10 +67,6 @@ void VisualController::recovered(const FeatureModel& model) {
   image_reason_ = HoldReason::endoscope_moved;  // until an image tells where the instrument is
 }
 
-std::optional<Eigen::Vector4d> VisualController::driven_at(const ImageMeasurement& image) {
-  return estimator_->driven_at(image, history_);
-}
-
 ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint,
                                    const std::optional<ImageMeasurement>& image, const DesiredFeatures& desired) {
   ControlStep step;

@@ -49,8 +49,10 @@ class VisualController {
   void recovered(const FeatureModel& model);
   /// A slightly better model while all goes on.
   void refine(const FeatureModel& model) { estimator_->set_model(model, false); }
-  /// Where the measured joints, through their backlash, were at that image; nullopt when not known.
-  std::optional<Eigen::Vector4d> driven_at(const ImageMeasurement& image);
+  /// Where the joints were measured when that image was exposed; nullopt when not known.
+  std::optional<Eigen::Vector4d> measured_at(const ImageMeasurement& image) const {
+    return history_.at(image.time_s - delay_s());
+  }
 
   /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`.
   ControlStep step(double time_s, const Eigen::Vector4d& q_joint, const std::optional<ImageMeasurement>& image,

@@ -57,22 +57,22 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
 // A turn about the RCM looks like a jump of the joints, which these would have told.
 bool EndoscopeRecovery::jumped(const Eigen::Vector4d& q_seen) const {
   if (offsets_.empty()) return false;
-  const Eigen::Vector4d off = q_seen - driven_->q - offsets_.back().q;
+  const Eigen::Vector4d off = q_seen - measured_->q - offsets_.back().q;
   return (off.head<3>().cwiseAbs().array() > max_jump.array()).any();
 }
 
 bool EndoscopeRecovery::follow_joints(const ImageMeasurement& image, VisualController& controller) {
   const Eigen::Array2d plain(5e-5, 1e-3);  // motion from image to image
-  const auto q = controller.driven_at(image);
+  const auto q = controller.measured_at(image);
   if (!q || !std::isfinite(image.time_s)) return false;
-  Driven now{image.time_s, *q, Eigen::Vector4d::Zero(), Eigen::Vector2i::Zero()};
-  if (driven_ && now.stamp_s > driven_->stamp_s) {
-    const Eigen::Vector4d moved = now.q - driven_->q;
-    now.rate = moved / (now.stamp_s - driven_->stamp_s);
+  Measured now{image.time_s, *q, Eigen::Vector4d::Zero(), Eigen::Vector2i::Zero()};
+  if (measured_ && now.stamp_s > measured_->stamp_s) {
+    const Eigen::Vector4d moved = now.q - measured_->q;
+    now.rate = moved / (now.stamp_s - measured_->stamp_s);
     for (Eigen::Index k = 0; k < 2; ++k)
-      now.sides[k] = std::abs(moved[2 + k]) > plain[k] ? (moved[2 + k] > 0 ? 1 : -1) : driven_->sides[k];
+      now.sides[k] = std::abs(moved[2 + k]) > plain[k] ? (moved[2 + k] > 0 ? 1 : -1) : measured_->sides[k];
   }
-  driven_ = now;
+  measured_ = now;
   const bool collects = phase_ != Phase::watching || !refine_at_s_.empty();
   if (collects && path_.joints.back() != now.q.tail<2>()) path_.joints.emplace_back(now.q.tail<2>());
   return true;
@@ -95,9 +95,10 @@ void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step,
 void EndoscopeRecovery::trust(const ServoInput& input, const ControlStep& step) {
   if (step.reason == HoldReason::wild_joints) agreeing_ = 0;  // what jumped were the joints
   const auto& image = input.image;
-  if (!image || !image->found || !image->q || step.action != ControlAction::track || !step.estimate || !driven_) return;
+  if (!image || !image->found || !image->q || step.action != ControlAction::track || !step.estimate || !measured_)
+    return;
   agreeing_ = std::min(agreeing_ + 1, agreed_after);
-  offsets_.push_back({input.time_s, step.estimate->q - step.estimate->gap.shift - input.joints.q.vector(), *driven_});
+  offsets_.push_back({input.time_s, step.estimate->q - input.joints.q.vector(), *measured_});
   while (input.time_s - offsets_.front().time_s > offset_memory_s) offsets_.pop_front();
 }
 
@@ -112,9 +113,9 @@ void EndoscopeRecovery::notice(VisualController& controller) {
   later.push_front(offsets_.back());
   trusted_ = offsets_.back().q;
   offsets_.clear();
-  path_ = {later.front().driven.sides, {}};
-  for (const Offset& offset : later) path_.joints.emplace_back(offset.driven.q.tail<2>());
-  path_.joints.emplace_back(driven_->q.tail<2>());
+  path_ = {later.front().measured.sides, {}};
+  for (const Offset& offset : later) path_.joints.emplace_back(offset.measured.q.tail<2>());
+  path_.joints.emplace_back(measured_->q.tail<2>());
   camera_from_rcm_.reset();
   refine_at_s_.clear();
   oldest_counted_ = ++registration_;
@@ -128,12 +129,12 @@ void EndoscopeRecovery::rest_again(VisualController& controller) {
 }
 
 std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurement& image) const {
-  if (!image.marker || !driven_ || driven_->stamp_s != image.time_s) return std::nullopt;
+  if (!image.marker || !measured_ || measured_->stamp_s != image.time_s) return std::nullopt;
   MarkerSighting sighting;
   sighting.edges_px = edges_of(image);
   sighting.camera_from_marker = {image.marker->rotation, image.marker->position_m};
-  sighting.q = driven_->q + trusted_;
-  sighting.q_rate = driven_->rate;
+  sighting.q = measured_->q + trusted_;
+  sighting.q_rate = measured_->rate;
   sighting.path_index = path_.joints.size() - 1;
   return sighting;
 }

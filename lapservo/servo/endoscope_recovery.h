@@ -50,8 +50,8 @@ class EndoscopeRecovery {
   bool follow_joints(const ImageMeasurement& image, VisualController& controller);
   std::optional<MarkerSighting> sighting_of(const ImageMeasurement& image) const;
 
-  /// The measured joints at an image, through their backlash as far as it is known.
-  struct Driven {
+  /// The measured joints at an image.
+  struct Measured {
     double stamp_s = 0;
     Eigen::Vector4d q = Eigen::Vector4d::Zero(), rate = Eigen::Vector4d::Zero();
     Eigen::Vector2i sides = Eigen::Vector2i::Zero();  ///< of their gaps, rho's and psi's: 1 rising, -1 falling
@@ -59,7 +59,7 @@ class EndoscopeRecovery {
   struct Offset {
     double time_s = 0;
     Eigen::Vector4d q = Eigen::Vector4d::Zero();  ///< of the instrument from the measured joints
-    Driven driven;
+    Measured measured;
   };
   Rig rig_;
   JointLimits limits_;
@@ -68,7 +68,7 @@ class EndoscopeRecovery {
   Phase phase_ = Phase::watching;
   int agreeing_ = 0, contradicting_ = 0, failed_ = 0;  ///< images in a row; attempts
   std::deque<Offset> offsets_;                         ///< while images agreed, in order of time
-  std::optional<Driven> driven_;                       ///< at the latest image
+  std::optional<Measured> measured_;                   ///< at the latest image
   GapPath path_;                                       ///< since the offset that is trusted
   Eigen::Vector4d trusted_ = Eigen::Vector4d::Zero();  ///< offset, of before the endoscope moved
   std::vector<MarkerSighting> sightings_;
