@@ -88,7 +88,7 @@ int simulate(const ServoOptions& options) {
   std::optional<LiveView> view;
   if (options.view) view.emplace("servo", "use --out to write a log instead");
   RunConfig config = run_config_of(options);
-  const Rig true_rig = config.rig;
+  const Rig true_rig = true_rig_of(options.simulation, config.rig);
   const FeatureModel true_model = feature_model(true_rig);
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);

@@ -18,6 +18,7 @@ class FusedEstimator : public Estimator {
  private:
   FeatureModel model_;
   OffsetObserver observer_;
+  double max_psi_offset_rad_;
 };
 
 }  // namespace lapservo::internal

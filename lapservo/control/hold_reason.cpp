@@ -6,7 +6,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<HoldReason, 16> words{{{HoldReason::none, "none"},
+constexpr Words<HoldReason, 17> words{{{HoldReason::none, "none"},
                                        {HoldReason::no_image_yet, "no_image_yet"},
                                        {HoldReason::marker_lost, "marker_lost"},
                                        {HoldReason::stale_image, "stale_image"},
@@ -15,6 +15,7 @@ constexpr Words<HoldReason, 16> words{{{HoldReason::none, "none"},
                                        {HoldReason::endoscope_moved, "endoscope_moved"},
                                        {HoldReason::outlier, "outlier"},
                                        {HoldReason::no_history, "no_history"},
+                                       {HoldReason::psi_contradicted, "psi_contradicted"},
                                        {HoldReason::not_modelled, "not_modelled"},
                                        {HoldReason::singular, "singular"},
                                        {HoldReason::not_following, "not_following"},

@@ -68,10 +68,11 @@ void VisualController::recovered(const FeatureModel& model) {
 }
 
 ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint,
-                                   const std::optional<ImageMeasurement>& image, const DesiredFeatures& desired) {
+                                   const std::optional<ImageMeasurement>& image, const DesiredFeatures& desired,
+                                   std::span<const JointReading> readings) {
   ControlStep step;
   const bool timed = std::isfinite(time_s) && (!started_ || time_s > now_s_);
-  step.reason = read(time_s, q_joint, desired);
+  step.reason = read(time_s, q_joint, desired, readings);
   if (timed && q_joint.allFinite()) {
     if (image) image_reason_ = update(*image);
     watch_image_age();
@@ -98,7 +99,8 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   return step;
 }
 
-HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired) {
+HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired,
+                                  std::span<const JointReading> readings) {
   measured_ = false;
   if (!std::isfinite(time_s)) return HoldReason::non_finite;
   if (started_ && !(time_s > now_s_)) return HoldReason::bad_time;
@@ -122,13 +124,24 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
   const MotionState setpoint = path_.at(time_s);
   arm_response_.add(setpoint, q_joint, time_s - now_s_);
   leash_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), time_s - now_s_);
-  history_.push(time_s, q_joint);
+  remember(time_s, q_joint, readings);
   now_s_ = time_s;
   measured_ = true;
   if (!all_finite(desired)) return HoldReason::non_finite;
   const Eigen::Array4d behind = (setpoint.position - q_joint).array().abs();
   const bool far = (behind > config_.max_following_error.array()).any();
   return far || leash_.taut() ? HoldReason::not_following : HoldReason::none;
+}
+
+void VisualController::remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings) {
+  bool any = false;
+  for (const JointReading& reading : readings) {
+    const Eigen::Vector4d q = reading.q.vector();
+    if (!(reading.time_s <= time_s) || !q.allFinite() || !wild_joints_.reaches(reading.time_s, q)) continue;
+    history_.push(reading.time_s, q);
+    any = true;
+  }
+  if (!any) history_.push(time_s, q_joint);
 }
 
 HoldReason VisualController::update(const ImageMeasurement& image) {

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include <Eigen/Core>
@@ -19,6 +20,7 @@
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
+#include "lapservo/robot/robot.h"
 
 namespace lapservo::internal {
 
@@ -54,9 +56,10 @@ class VisualController {
     return history_.at(image.time_s - delay_s());
   }
 
-  /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`.
+  /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`; `readings`: see
+  /// Robot::readings().
   ControlStep step(double time_s, const Eigen::Vector4d& q_joint, const std::optional<ImageMeasurement>& image,
-                   const DesiredFeatures& desired);
+                   const DesiredFeatures& desired, std::span<const JointReading> readings = {});
 
   /// The setpoints from the latest step on.
   const JointPath& path() const { return path_; }
@@ -74,7 +77,9 @@ class VisualController {
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();    ///< of deviations from it
   };
 
-  HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired);
+  HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired,
+                  std::span<const JointReading> readings);
+  void remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings);
   HoldReason update(const ImageMeasurement& image);
   void watch_image_age();
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;

@@ -35,6 +35,7 @@ void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& confi
     ControlTick tick;
     tick.seen = vision->newest();
     tick.input.time_s = clock.now_s();
+    tick.input.readings = robot.readings();
     tick.input.joints = robot.state();
     tick.input.desired = trajectory.at(tick.input.time_s - start_s);
     if (tick.seen) tick.input.image = tick.seen->measurement;

@@ -48,6 +48,10 @@ struct Case {
   std::optional<Interval> frozen{};  ///< the picture from its beginning arrives again and again
   bool new_stamps = true;            ///< then, as if it were new
   std::optional<EndoscopeMotion> endoscope{};
+  double exposure_s = 0;
+  float smoke = 0;
+  std::vector<Blotch> blotches{};
+  std::optional<Interval> dark{};
 };
 
 struct Record {
@@ -113,6 +117,10 @@ class InStep : public Robot, public ImageStream, public Clock {
     const std::lock_guard lock(mutex_);
     return simulator_.state();
   }
+  std::vector<JointReading> readings() override {
+    const std::lock_guard lock(mutex_);
+    return simulator_.readings();
+  }
   void send(const JointPath& path) override {
     const std::lock_guard lock(mutex_);
     simulator_.send(path);
@@ -167,12 +175,16 @@ PastRun run_case(const Case& c) {
   SimulatorConfig simulated;
   simulated.seed = c.seed;
   simulated.endoscope.latency_s = c.latency_s;
+  simulated.endoscope.exposure_s = c.exposure_s;
+  simulated.render.smoke = c.smoke;
+  simulated.blotches = c.blotches;
   Random random(c.seed);
   const Trajectory trajectory = small_trajectory();
   Simulator simulator(rig, simulated,
                       random_start(trajectory, c.duration_s, feature_model(rig), config.controller,
                                    simulated.arm.joint_offset, random, "trajectory"));
   if (c.hidden) simulator.cover_marker(*c.hidden);
+  if (c.dark) simulator.change_light(*c.dark, 0.01F);
   if (c.endoscope) simulator.move_endoscope(*c.endoscope);
   Watcher watcher(c, rig, simulator);
   if (c.frozen) {
@@ -253,6 +265,7 @@ TEST(Run, HoldsWhileTheMarkerIsHiddenAndGoesOnWithoutAJump) {
   }
   expect_within_limits(done, controller);
   EXPECT_LT(done.error(done.records.size() - 1).tail<3>().cwiseAbs().maxCoeff(), 1);
+  EXPECT_EQ(done.records.back().decision.registration, 0);
 }
 
 // What is believed of the room is wrong: said where r is wrong with it, or nothing is moved. A turn about the RCM is no
@@ -303,6 +316,7 @@ TEST(Run, HoldsWhenThePictureFreezesWhateverItsStamps) {
     expect_within_limits(done, controller);
     EXPECT_EQ(done.records.back().decision.control.action, ControlAction::track);
     EXPECT_LT(done.error(done.records.size() - 1).tail<3>().cwiseAbs().maxCoeff(), 1);
+    EXPECT_EQ(done.records.back().decision.registration, 0);
   }
 }
 
@@ -348,6 +362,34 @@ void expect_right_where_ok(const PastRun& done, double latency_s, double period_
     Eigen::Vector4d off = seen->rcm->q.vector() - done.records[i - late].truth.q;
     off[3] = wrap_pi(off[3]);
     EXPECT_TRUE((off.array().abs() < right).all()) << done.records[i].input.time_s << " s: " << off.transpose();
+  }
+}
+
+// Pictures with motion in them: blurred, veiled, stained, dark for a while; and all at once.
+TEST(Run, IsNeverWrongByPicturesThatAreHardToRead) {
+  Case blurred, veiled, stained, darkened;
+  blurred.exposure_s = 0.015;
+  veiled.smoke = 0.35F;
+  stained.blotches = {{0.5, 0.012, 0.002}, {2.5, 0.02, 0.0015}, {4.5, 0.03, 0.002}, {5.5, 0.008, 0.0015}};
+  darkened.dark = Interval{2, 2.6};
+  Case all = blurred;
+  all.smoke = veiled.smoke, all.blotches = stained.blotches, all.dark = darkened.dark;
+  const ControllerConfig controller = config_of(testing::small_test_rig(), all).controller;
+  for (Case c : {darkened, all}) {
+    SCOPED_TRACE(::testing::Message() << c.exposure_s << " " << c.smoke << " " << c.blotches.size());
+    c.duration_s = 5;
+    const PastRun done = run_case(c);
+    for (const Record& record : done.records) {
+      EXPECT_EQ(record.decision.registration, 0);
+      const double time_s = record.input.time_s;
+      if (!c.dark || time_s < c.dark->begin_s + 0.1 + 2 * controller.period_s || time_s > c.dark->end_s + 0.07)
+        continue;
+      EXPECT_EQ(record.decision.control.action, ControlAction::hold) << time_s;
+    }
+    expect_right_where_ok(done, c.latency_s, controller.period_s);
+    expect_within_limits(done, controller);
+    EXPECT_EQ(done.records.back().decision.control.action, ControlAction::track);
+    EXPECT_LT(done.error(done.records.size() - 1).tail<3>().cwiseAbs().maxCoeff(), 1);
   }
 }
 

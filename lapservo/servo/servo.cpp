@@ -44,7 +44,7 @@ ServoDecision Servo::decide(const ServoInput& input) {
   const Eigen::Vector4d q = input.joints.q.vector();
   ServoDecision decision;
   decision.camera_from_rcm = camera_from_rcm_;
-  decision.control = controller_.step(input.time_s, q, input.image, input.desired);
+  decision.control = controller_.step(input.time_s, q, input.image, input.desired, input.readings);
   watch_registration(input);
   decision.registration_contradicted = images_contradicting_ >= contradicted_after;
   decision.send = orderly(decision.control);

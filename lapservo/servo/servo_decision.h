@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "lapservo/control/control_step.h"
 #include "lapservo/control/image_measurement.h"
@@ -16,6 +17,7 @@ struct ServoInput {
   JointState joints;
   std::optional<ImageMeasurement> image;  ///< the newest frame since the step before, if any
   DesiredFeatures desired;                ///< at time_s
+  std::vector<JointReading> readings{};   ///< since the step before: Robot::readings()
 };
 
 /// What one step decides.

@@ -47,6 +47,7 @@ std::string covariance_column(int row, int column) {
 std::vector<std::string> make_input_columns() {
   std::vector<std::string> columns{"time_s", "arm_state"};
   name(columns, "joint_", joints);
+  columns.emplace_back("readings");
   columns.insert(columns.end(), {"image", "image_time_s", "image_registration"});
   name(columns, "seen_", features);
   for (int i = 0; i < 4; ++i)
@@ -102,11 +103,21 @@ void write_image(std::vector<std::string>& fields, const std::optional<ImageMeas
   write(fields, Rigid3{image->marker->rotation, image->marker->position_m});
 }
 
+// time_s theta_rad phi_rad rho_m psi_rad; time_s ...
+std::string text_of(const std::vector<JointReading>& readings) {
+  std::string text;
+  for (const auto& [time_s, q] : readings)
+    text +=
+        fmt::format("{}{} {} {} {} {}", text.empty() ? "" : ";", time_s, q.theta_rad, q.phi_rad, q.rho_m, q.psi_rad);
+  return text;
+}
+
 std::vector<std::string> input_fields(const ServoInput& input) {
   std::vector<std::string> fields;
   write(fields, input.time_s);
   fields.emplace_back(to_string(input.joints.operating_state));
   write(fields, input.joints.q.vector());
+  fields.push_back(text_of(input.readings));
   write_image(fields, input.image);
   write(fields, input.desired.features);
   write(fields, input.desired.rate);
@@ -143,6 +154,25 @@ class Row {
   std::string source_;
 };
 
+std::vector<JointReading> read_readings(const Row& row) {
+  constexpr auto column = "readings", expected = "five numbers a reading, readings parted by ;";
+  const std::string& text = row.text(column);
+  std::vector<JointReading> readings;
+  for (const char* at = text.c_str(); *at;) {
+    std::array<double, 5> numbers{};
+    for (double& number : numbers) {
+      char* end = nullptr;
+      number = std::strtod(at, &end);
+      if (end == at) row.complain(column, expected);
+      at = end;
+    }
+    readings.push_back({numbers[0], {numbers[1], numbers[2], numbers[3], numbers[4]}});
+    if (*at && *at != ';') row.complain(column, expected);
+    if (*at) ++at;
+  }
+  return readings;
+}
+
 std::optional<ImageMeasurement> read_image(const Row& row) {
   const std::string& word = row.text("image");
   if (word == "none") return std::nullopt;
@@ -174,6 +204,7 @@ ServoInput read_input(const Row& row) {
   const auto state = operating_state_from_string(row.text("arm_state"));
   if (!state) row.complain("arm_state", "DISABLED, ENABLED, PAUSED or FAULT");
   input.joints.operating_state = *state;
+  input.readings = read_readings(row);
   input.image = read_image(row);
   input.desired.features = row.numbers("desired_", features);
   input.desired.rate = row.numbers("desired_", rates);

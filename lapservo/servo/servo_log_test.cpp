@@ -33,6 +33,8 @@ Record any_record(Random& random, int kind) {
   record.input.joints = {record.input.time_s, JointVector::from_vector(any(random)),
                          kind % 2 ? OperatingState::enabled : OperatingState::fault};
   record.input.desired = {any(random), any(random), any(random)};
+  for (int i = 0; i < kind % 4; ++i)
+    record.input.readings.push_back({random.uniform(), JointVector::from_vector(any(random))});
   if (kind % 3) {
     ImageMeasurement image;
     image.found = kind % 3 == 1;
@@ -64,6 +66,11 @@ void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   EXPECT_EQ(a.time_s, b.time_s);
   EXPECT_EQ(a.joints.q.vector(), b.joints.q.vector());
   EXPECT_EQ(a.joints.operating_state, b.joints.operating_state);
+  ASSERT_EQ(a.readings.size(), b.readings.size());
+  for (std::size_t i = 0; i < a.readings.size(); ++i) {
+    EXPECT_EQ(a.readings[i].time_s, b.readings[i].time_s);
+    EXPECT_EQ(a.readings[i].q.vector(), b.readings[i].q.vector());
+  }
   EXPECT_EQ(a.desired.features, b.desired.features);
   EXPECT_EQ(a.desired.rate, b.desired.rate);
   EXPECT_EQ(a.desired.acceleration, b.desired.acceleration);

@@ -31,7 +31,9 @@ Endoscope make_endoscope(const Rig& rig, const SimulatorConfig& config) {
   const Camera& camera = rig.camera;
   const cv::Mat tissue =
       config.endoscope.pictures ? make_tissue(camera.width_px, camera.height_px, config.seed) : cv::Mat();
-  return Endoscope(camera, {shaft_of(first_instrument(rig))}, tissue, config.render, config.endoscope, config.seed);
+  ShaftModel shaft = shaft_of(first_instrument(rig));
+  shaft.blotches = config.blotches;
+  return Endoscope(camera, {shaft}, tissue, config.render, config.endoscope, config.seed);
 }
 
 void check(bool right, const char* field, double value, const char* expected) {
@@ -86,6 +88,8 @@ void Simulator::sleep_until(double time_s) {
     const double next_s = path_ ? std::min(time_s, time_s_ + arm_period_s_) : time_s;
     if (path_) arm_->servo_jp(path_->at(next_s).position);
     step(next_s - time_s_);
+    constexpr std::size_t max_readings = 1000;  // where nobody takes them
+    if (readings_.size() < max_readings) readings_.push_back({time_s_, JointVector::from_vector(arm_->measured_jp())});
   }
 }
 
@@ -102,6 +106,13 @@ Rigid3 Simulator::camera_from_first_camera() const {
   return now;
 }
 
+float Simulator::light_now() const {
+  float light = light_;
+  for (const LightChange& change : light_changes_)
+    if (change.when.contains(time_s_)) light *= change.times;
+  return light;
+}
+
 void Simulator::step(double dt_s) {
   if (!(dt_s >= 0 && dt_s < 1e6)) throw std::invalid_argument("time passes by 0 or more");
   const double end_s = time_s_ + dt_s;
@@ -114,6 +125,7 @@ void Simulator::step(double dt_s) {
     if (exposing_.size() == moments_s.size() / 2) truth_[taken_] = true_q();
     exposing_.push_back({placement()});
     if (exposing_.size() < moments_s.size()) continue;
+    endoscope_.set_light(light_now());
     endoscope_.expose(std::exchange(exposing_, {}));
     ++taken_;
   }

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,8 +24,9 @@ struct SimulatorConfig {
   ArmConfig arm;
   EndoscopeConfig endoscope;
   RenderOptions render;
-  double arm_rate_hz = 1000;  ///< at which the arm samples a path
-  std::uint64_t seed = 1;     ///< of tissue, noise, jitter and lost frames
+  std::vector<Blotch> blotches;  ///< of blood, on the marker
+  double arm_rate_hz = 1000;     ///< at which the arm samples a path
+  std::uint64_t seed = 1;        ///< of tissue, noise, jitter and lost frames
 };
 
 /// An interval of simulated time, for example in which the marker is covered: from `begin_s` up to `end_s`.
@@ -63,6 +65,8 @@ class Simulator : public Robot, public ImageStream, public Clock {
   Simulator(const Rig& rig, const SimulatorConfig& config, std::unique_ptr<SimulatedArm> arm);
 
   JointState state() override;
+  /// As often as the arm samples its path.
+  std::vector<JointReading> readings() override { return std::exchange(readings_, {}); }
   void send(const JointPath& path) override;
   std::optional<StampedImage> newest() override;
   double now_s() const override { return time_s_; }
@@ -80,7 +84,9 @@ class Simulator : public Robot, public ImageStream, public Clock {
   SimulatedArm& arm() { return *arm_; }
   const SimulatedArm& arm() const { return *arm_; }
   /// Light on the scene from now on: 1 is usual.
-  void set_light(float light) { endoscope_.set_light(light); }
+  void set_light(float light) { light_ = light; }
+  /// So many times as much then.
+  void change_light(const Interval& when, float times) { light_changes_.push_back({when, times}); }
   /// Something lies over the whole marker then.
   void cover_marker(const Interval& when) { covered_.push_back(when); }
 
@@ -94,12 +100,21 @@ class Simulator : public Robot, public ImageStream, public Clock {
   ShaftPlacement placement() const;
 
  private:
+  float light_now() const;
+
   Rigid3 camera_from_rcm_;
   std::unique_ptr<SimulatedArm> arm_;
   Endoscope endoscope_;
   double arm_period_s_;
   std::optional<JointPath> path_;
+  std::vector<JointReading> readings_;
   std::vector<Interval> covered_;
+  struct LightChange {
+    Interval when;
+    float times = 1;
+  };
+  float light_ = 1;
+  std::vector<LightChange> light_changes_;
   std::vector<EndoscopeMotion> endoscope_motions_;
   double time_s_ = 0;
   Exposure exposing_;                  // the moments of the current frame so far
