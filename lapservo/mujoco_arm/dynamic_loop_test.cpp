@@ -103,23 +103,6 @@ TEST(DynamicLoop, AnEncoderThatIsSetIsFoundOut) {
   }
 }
 
-// From the first image that repeats, an image period and the latency after the freeze; then on again.
-TEST(DynamicLoop, HoldsWithinATenthOfASecondWhenThePictureFreezes) {
-  for (const double begin_s : {0.8, 3.0, 6.0}) {
-    SCOPED_TRACE(begin_s);
-    DynamicLoop loop;
-    loop.frozen = [=](double time_s) { return time_s >= begin_s && time_s < begin_s + 2; };
-    const auto ticks = loop.run(papers, begin_s + 5);
-    const double known_s = begin_s + loop.latency_s + 1.0 / 30;
-    for (const DynamicTick& tick : ticks) {
-      if (tick.time_s < known_s + 0.1 || tick.time_s > begin_s + 2) continue;
-      EXPECT_TRUE(holds(tick)) << tick.time_s;
-      EXPECT_EQ(tick.decision.control.reason, HoldReason::frozen_image) << tick.time_s;
-    }
-    EXPECT_LT(ticks.back().error.tail<3>().cwiseAbs().maxCoeff(), 1);
-  }
-}
-
 // The first guess is 100 ms.
 TEST(DynamicLoop, DoesNotOvershootWhileTheDelayIsUnknown) {
   for (const double latency_s : {0.0, 0.1, 0.2}) {

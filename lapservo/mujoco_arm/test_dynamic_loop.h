@@ -41,8 +41,6 @@ class DynamicLoop {
     return Eigen::Vector4d(Eigen::Vector4d::Zero());
   };
   std::function<void(double time_s, MujocoArm& arm)> meddle = [](double, MujocoArm&) {};
-  /// The image that was the newest then is shown again and again, under new stamps.
-  std::function<bool(double time_s)> frozen = [](double) { return false; };
   /// What of the configuration an image tells, as where a registration fits.
   bool images_know_q = true;
 
@@ -52,7 +50,6 @@ class DynamicLoop {
     Servo servo(controller, model);
     Random random(1);
     std::deque<ImageMeasurement> on_the_way;
-    ImageMeasurement shown;
     std::vector<DynamicTick> ticks;
     std::optional<JointPath> path;
     const double period_s = controller.period_s;
@@ -64,8 +61,6 @@ class DynamicLoop {
       const DesiredFeatures desired = trajectory.at(tick.time_s);
       tick.error = feature_error(seen.features, desired.features);
       if (k % 2 == 0) on_the_way.push_back(exposed(seen, arm.true_jp(), tick.time_s + latency_s, random));
-      if (k % 2 == 0 && frozen(tick.time_s)) on_the_way.back() = repeated(shown, tick.time_s + latency_s);
-      shown = on_the_way.empty() ? shown : on_the_way.back();
       ServoInput input;
       input.time_s = tick.time_s;
       input.joints = {tick.time_s, JointVector::from_vector(arm.measured_jp() + misread(tick.time_s)),
@@ -93,10 +88,6 @@ class DynamicLoop {
     for (int i = 0; i < 4; ++i) image.ends_px[i] = seen.ends_px[i] + 0.15 * random.normal();
     image.covariance = sigma.cwiseAbs2().asDiagonal();
     if (images_know_q) image.q = q;
-    return image;
-  }
-  static ImageMeasurement repeated(ImageMeasurement image, double stamp_s) {
-    image.time_s = stamp_s;
     return image;
   }
   static void move(MujocoArm& arm, const std::optional<JointPath>& path, DynamicTick& tick, double period_s) {
