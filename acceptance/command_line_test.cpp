@@ -487,6 +487,21 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
                  {"/proc/nowhere", "folder"});
 }
 
+// A registration that is off by 10 mm: without --strict it is said, with it the run ends.
+TEST_F(CommandLine, ServoStrictRefusesAContradictedRegistration) {
+  const std::string servo = "servo --rig " + lapservo::testing::source_folder().string() +
+                            "/configs/paper.yaml --robot sim --start 0.05,1.57,0.064,1.2 --duration 1.5 ";
+  const std::string off = "--registration-error 10,0,0 ";
+  const auto contradicted = [&] { return output().find("registration_contradicted") != std::string::npos; };
+  EXPECT_NE(run(servo), 2) << errors();
+  EXPECT_FALSE(contradicted()) << output();
+  EXPECT_EQ(run(servo + off), 1) << errors();
+  EXPECT_TRUE(contradicted()) << output();
+  EXPECT_EQ(run(servo + off + "--strict"), 1) << errors();
+  EXPECT_TRUE(contradicted()) << output();
+  EXPECT_NE(output().find("registration_contradicted in 1 of"), std::string::npos) << output();
+}
+
 TEST_F(CommandLine, ExperimentsWriteAReport) {
   ASSERT_EQ(run("experiment rcm --method surface --seed 3 --out " + out("report")), 0) << errors();
   EXPECT_TRUE(fs::exists(out("report") + "/report.html"));

@@ -47,10 +47,11 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
 // What the user gets of a run: the log, the picture, the progress, the last lines.
 class Watcher : public RunObserver {
  public:
-  Watcher(const Rig& rig, const FeatureModel& true_model, const Simulator& simulator, RunFolder* folder, LiveView* view,
-          int ticks, bool strict)
+  /// `true_rig`: as things are until the endoscope moves.
+  Watcher(const Rig& rig, const Rig& true_rig, const Simulator& simulator, RunFolder* folder, LiveView* view, int ticks,
+          bool strict)
       : rig_(rig),
-        true_model_(true_model),
+        true_rig_(true_rig),
         simulator_(simulator),
         folder_(folder),
         view_(view),
@@ -58,7 +59,9 @@ class Watcher : public RunObserver {
         strict_(strict) {}
 
   bool on_tick(const ControlTick& tick) override {
-    const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
+    const Rigid3 camera_from_rcm =
+        simulator_.camera_from_first_camera() * *true_rig_.instruments.front().camera_from_rcm;
+    const InstrumentTruth truth = truth_at(feature_model(true_rig_, camera_from_rcm), simulator_.true_q());
     summary_.add(tick, truth);
     if (folder_) folder_->log().add(tick.input, tick.decision, truth);
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
@@ -72,7 +75,7 @@ class Watcher : public RunObserver {
 
  private:
   Rig rig_;
-  FeatureModel true_model_;
+  Rig true_rig_;
   const Simulator& simulator_;
   RunFolder* folder_;
   LiveView* view_;
@@ -86,7 +89,7 @@ int simulate(const ServoOptions& options) {
   std::optional<LiveView> view;
   if (options.view) view.emplace("servo", "use --out to write a log instead");
   RunConfig config = run_config_of(options);
-  const Rig true_rig = config.rig;
+  const Rig true_rig = true_rig_of(options.simulation, config.rig);
   const FeatureModel true_model = feature_model(true_rig);
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
@@ -102,7 +105,7 @@ int simulate(const ServoOptions& options) {
   if (!options.out.empty()) folder.emplace(options, true_rig, config.controller);
   watch_for_interrupts();
 
-  Watcher watcher(config.rig, true_model, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
+  Watcher watcher(config.rig, true_rig, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
                   static_cast<int>(std::lround(options.duration_s / config.controller.period_s)), options.strict);
   lapservo::run(simulator, simulator, simulator, config, trajectory, options.duration_s, watcher);
   const Summary& summary = watcher.finish();

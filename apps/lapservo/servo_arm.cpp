@@ -72,6 +72,10 @@ class ArmWatcher : public RunObserver {
     if (!start_s_) start_s_ = tick.input.time_s;
     const double time_s = tick.input.time_s - *start_s_;
     summary_.add(tick, std::nullopt);
+    if (const auto& motions = summary_.endoscope_motions(); motions.size() > said_motions_) {
+      say(time_s, motions.back());
+      said_motions_ = motions.size();
+    }
     if (folder_) folder_->log().add(tick.input, tick.decision, std::nullopt);
     const Blocked blocked = robot_.blocked();
     say_state(time_s, tick.decision.control, blocked);
@@ -110,16 +114,19 @@ class ArmWatcher : public RunObserver {
     if (!wanted_ || refusal_.valid()) return;
     asked_ = *std::exchange(wanted_, std::nullopt);
     // A long trajectory takes longer to walk along than a tick has.
-    refusal_ = std::async(std::launch::async, [this, wanted = asked_, q = tick.input.joints.q]() -> std::string {
-      try {
-        if (run_.rig.instruments.front().camera_from_rcm)
-          refuse_infeasible(wanted.trajectory, wanted.duration_s, feature_model(run_.rig), run_.controller, q,
-                            wanted.name);
-      } catch (const InputError& error) {
-        return error.what();
-      }
-      return {};
-    });
+    refusal_ =
+        std::async(std::launch::async,
+                   [this, wanted = asked_, q = tick.input.joints.q,
+                    camera_from_rcm = tick.decision.camera_from_rcm]() -> std::string {
+                     try {
+                       if (camera_from_rcm)
+                         refuse_infeasible(wanted.trajectory, wanted.duration_s,
+                                           feature_model(run_.rig, *camera_from_rcm), run_.controller, q, wanted.name);
+                     } catch (const InputError& error) {
+                       return error.what();
+                     }
+                     return {};
+                   });
   }
   void begin_or_refuse(const std::string& refusal, double time_s) {
     if (!refusal.empty()) return say(time_s, "refused: " + refusal);
@@ -164,6 +171,7 @@ class ArmWatcher : public RunObserver {
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string state_, said_counts_;
   bool said_ended_ = false;
+  std::size_t said_motions_ = 0;
   std::future<std::string>
       refusal_;  // of what was asked about, empty when it can be followed; last: it uses the others
 };

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/control/tracking_law.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/servo/controller_file.h"
@@ -42,9 +43,30 @@ void RunFolder::commit() {
   folder_.commit();
 }
 
+void Summary::follow_registration(const ControlTick& tick) {
+  const auto& now = tick.decision.camera_from_rcm;
+  if (camera_from_rcm_ && !now && !moved_s_) {
+    moved_s_ = tick.input.time_s;
+    convergence_ = {};
+  }
+  if (moved_s_ && now) {
+    const Rigid3 before_from_now = *camera_from_rcm_ * now->inverse();
+    endoscope_motions_.push_back(fmt::format(
+        "the endoscope moved by {:.1f} mm and {:.1f} degrees (noticed at {:.2f} s): camera_from_rcm was measured anew "
+        "in "
+        "{:.1f} s",
+        1e3 * before_from_now.translation.norm(), deg_from_rad(Eigen::AngleAxisd(before_from_now.rotation).angle()),
+        *moved_s_ - start_s_.value_or(*moved_s_), tick.input.time_s - *moved_s_));
+    moved_s_.reset();
+  }
+  if (now) camera_from_rcm_ = now;
+}
+
 void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {
   const ControlStep& control = tick.decision.control;
+  if (!start_s_) start_s_ = tick.input.time_s;
   ++ticks_;
+  follow_registration(tick);
   contradicted_ += tick.decision.registration_contradicted;
   const bool holds = control.action == ControlAction::hold;
   if (holds) ++held_[std::string(to_string(control.reason))];
@@ -56,7 +78,6 @@ void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>&
     if (converged()) return;
     error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
   }
-  if (!start_s_) start_s_ = tick.input.time_s;
   convergence_.add(tick.input.time_s - *start_s_, error);
 }
 
@@ -69,6 +90,7 @@ std::string Summary::text() const {
         *reached_s, 1000 * rms[0], rms[1], rms[2], rms[3]);
   }
   for (const auto& [reason, count] : held_) text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
+  for (const std::string& motion : endoscope_motions_) text += "\n" + motion;
   if (held_at_end_) text += fmt::format("\nended in a hold: {}", to_string(*held_at_end_));
   if (contradicted_ > 0)
     text += fmt::format(

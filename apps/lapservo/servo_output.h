@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "apps/lapservo/live_view.h"
 #include "apps/lapservo/output_folder.h"
@@ -34,10 +35,16 @@ class Summary {
   /// Converged and not in a hold at the end; when `strict`, with a registration that no image contradicted.
   bool succeeded(bool strict) const { return converged() && !held_at_end_ && !(strict && registration_contradicted()); }
   bool registration_contradicted() const { return contradicted_ > 0; }
+  /// One line for each time that camera_from_rcm was measured anew.
+  const std::vector<std::string>& endoscope_motions() const { return endoscope_motions_; }
   std::string text() const;
 
  private:
-  std::optional<double> start_s_;
+  void follow_registration(const ControlTick& tick);
+
+  std::optional<double> start_s_, moved_s_;  ///< moved_s_: the endoscope, and not measured anew yet
+  std::optional<Rigid3> camera_from_rcm_;
+  std::vector<std::string> endoscope_motions_;
   long contradicted_ = 0;
   long ticks_ = 0;
   std::map<std::string, long> held_;

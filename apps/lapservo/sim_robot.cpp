@@ -53,7 +53,8 @@ int run(const Options& options) {
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.fps;
   simulated.endoscope.real_time = true;
-  const auto made = make_simulator(options.simulation, rig, simulated, start_of(options, rig, simulated.arm));
+  const Rig true_rig = true_rig_of(options.simulation, rig);
+  const auto made = make_simulator(options.simulation, true_rig, simulated, start_of(options, true_rig, simulated.arm));
   Simulator& simulator = *made;
   const auto transport = make_transport(options.transport, "lapservo_sim_robot", "--transport");
   SimRobotConfig config;

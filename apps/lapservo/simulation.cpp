@@ -1,22 +1,38 @@
 #include "apps/lapservo/simulation.h"
 
+#include <algorithm>
+#include <cstdint>
+
+#include "apps/lapservo/numbers.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
 #ifdef LAPSERVO_MUJOCO_ARM
 #include "lapservo/mujoco_arm/mujoco_arm.h"
 #endif
 
 namespace lapservo::app {
+namespace {
 
-void add_simulation_options(CLI::App& command, SimulationOptions& options, const std::string& only) {
-  command
-      .add_option("--dynamics", options.dynamics,
-                  only + "first-order, or mujoco: motors with PD servos, friction, gravity, elastic transmissions")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"first-order", "mujoco"}));
+EndoscopeMotion motion_of(const std::vector<double>& numbers) {
+  constexpr double m_per_mm = 1e-3;
+  EndoscopeMotion motion{numbers[0], numbers[1], Eigen::Vector3d(&numbers[2]), Eigen::Vector3d(&numbers[5])};
+  motion.translation_m *= m_per_mm;
+  motion.rotation_rad *= internal::rad_from_deg(1);
+  return motion;
 }
 
-std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, const Rig& rig,
-                                          const SimulatorConfig& config, const JointVector& q_measured) {
+std::vector<Blotch> blotches_of(const SimulationOptions& options, const Marker& marker, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<Blotch> blotches;
+  for (int i = 0; i < options.blood; ++i)
+    blotches.push_back(
+        {random.uniform(0, internal::two_pi), random.uniform(0, marker.length_m()), random.uniform(5e-4, 2e-3)});
+  return blotches;
+}
+
+std::unique_ptr<Simulator> with_arm(const SimulationOptions& options, const Rig& rig, const SimulatorConfig& config,
+                                    const JointVector& q_measured) {
   if (options.dynamics == "first-order") return std::make_unique<Simulator>(rig, config, q_measured);
 #ifdef LAPSERVO_MUJOCO_ARM
   internal::MujocoArmConfig arm;
@@ -25,6 +41,74 @@ std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, cons
 #else
   throw InputError("--dynamics", "is mujoco, which this program was built without: it needs libmujoco-dev");
 #endif
+}
+
+}  // namespace
+
+void add_simulation_options(CLI::App& command, SimulationOptions& options, const std::string& only) {
+  command
+      .add_option("--dynamics", options.dynamics,
+                  only + "first-order, or mujoco: motors with PD servos, friction, gravity, elastic transmissions")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"first-order", "mujoco"}));
+  command
+      .add_option("--endoscope-motion", options.endoscope_motion,
+                  only +
+                      "at,duration,x,y,z,rx,ry,rz: then (s) and for so long (s; 0: at once) the camera moves in its "
+                      "own frame by so many mm, and turns about that vector by its length in degrees")
+      ->check(finite_number())
+      ->delimiter(',')
+      ->expected(8);
+  command.add_option("--exposure-ms", options.exposure_ms, only + "the shutter is open for so long: motion blur")
+      ->capture_default_str()
+      ->check(number_between(0.0, 200.0));
+  command.add_option("--smoke", options.smoke, only + "fraction of grey veil in front of everything")
+      ->capture_default_str()
+      ->check(number_between(0.0, 1.0));
+  command.add_option("--blood", options.blood, only + "so many blotches on the marker")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 100));
+  command
+      .add_option("--light", options.light,
+                  only + "at,duration,times: then (s) and for so long (s) so many times as much light")
+      ->check(finite_number())
+      ->delimiter(',')
+      ->expected(3);
+  command
+      .add_option("--registration-error", options.registration_error,
+                  only + "x,y,z: the true RCM lies by so many mm, in the camera's frame, beside the rig's")
+      ->check(finite_number())
+      ->delimiter(',')
+      ->expected(3);
+  command
+      .add_option("--lens-error", options.lens_error,
+                  only + "the true focal length is by this fraction longer than the rig's")
+      ->capture_default_str()
+      ->check(number_between(-0.5, 0.5));
+}
+
+Rig true_rig_of(const SimulationOptions& options, const Rig& rig) {
+  Rig truth = rig;
+  truth.camera.fx_px *= 1 + options.lens_error;
+  truth.camera.fy_px *= 1 + options.lens_error;
+  auto& camera_from_rcm = truth.instruments.front().camera_from_rcm;
+  if (camera_from_rcm && !options.registration_error.empty())
+    camera_from_rcm->translation += 1e-3 * Eigen::Vector3d(options.registration_error.data());
+  return truth;
+}
+
+std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, const Rig& true_rig,
+                                          const SimulatorConfig& config, const JointVector& q_measured) {
+  SimulatorConfig all = config;
+  all.endoscope.exposure_s = options.exposure_ms / 1000;
+  all.render.smoke = static_cast<float>(options.smoke);
+  all.blotches = blotches_of(options, true_rig.instruments.front().marker, config.seed);
+  auto simulator = with_arm(options, true_rig, all, q_measured);
+  if (!options.light.empty())
+    simulator->change_light({options.light[0], options.light[0] + options.light[1]},
+                            static_cast<float>(std::max(0.0, options.light[2])));
+  if (!options.endoscope_motion.empty()) simulator->move_endoscope(motion_of(options.endoscope_motion));
+  return simulator;
 }
 
 }  // namespace lapservo::app

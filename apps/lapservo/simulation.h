@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -9,16 +10,25 @@
 
 namespace lapservo::app {
 
-/// How the simulated arm is made.
+/// How the simulated arm and its endoscope are made.
 struct SimulationOptions {
   std::string dynamics = "first-order";
+  std::vector<double> endoscope_motion;  ///< s, s, 3 x mm, 3 x degrees
+  double exposure_ms = 0, smoke = 0;
+  int blood = 0;                           ///< blotches
+  std::vector<double> light;               ///< s, s, times
+  std::vector<double> registration_error;  ///< 3 x mm
+  double lens_error = 0;                   ///< fraction of the focal length
 };
 
 /// `only`: precedes what the options say, for a command that does other things too.
 void add_simulation_options(CLI::App& command, SimulationOptions& options, const std::string& only);
 
-/// Throws InputError for dynamics that this program was built without.
-std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, const Rig& rig,
+/// As things are in the simulation, where `rig` is what is believed of them.
+Rig true_rig_of(const SimulationOptions& options, const Rig& rig);
+
+/// `true_rig`: see true_rig_of(). Throws InputError for dynamics that this program was built without.
+std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, const Rig& true_rig,
                                           const SimulatorConfig& config, const JointVector& q_measured);
 
 }  // namespace lapservo::app

@@ -24,6 +24,7 @@
 #include "lapservo/io/observation_csv.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/overlay_writer.h"
+#include "lapservo/servo/registration_watch.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::app {
@@ -128,6 +129,14 @@ struct Tally {
   }
 };
 
+void say_moved(const Options& options, const Frame& frame) {
+  std::fprintf(
+      stderr,
+      "lapservo: %s: the endoscope moved: from %d frames before frame %d (%.2f s) on shafts miss the RCM of the "
+      "rig, and q is empty or off; lapservo calibrate registration measures camera_from_rcm anew\n",
+      options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s);
+}
+
 [[noreturn]] void rethrow_with_frame(const InputError& error, const Options& options, const Frame& frame) {
   if (error.source() == "image") throw error.with_source(frame.file.empty() ? options.input : frame.file.string());
   throw error;
@@ -158,6 +167,7 @@ int run(const Options& options) {
   watch_for_interrupts();
 
   Tally tally;
+  RegistrationWatch registration;
   bool stopped = false;
   {
     Progress progress(source->frame_count());
@@ -171,6 +181,7 @@ int run(const Options& options) {
       try {
         const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
         tally.add(observations);
+        if (registration.add(observations)) say_moved(options, *frame);
         for (const Observation& observation : observations)
           csv.add(frame->index, frame->time_s, frame->file.filename().string(), observation);
         if (overlay || view) {

@@ -9,6 +9,8 @@
 
 namespace lapservo::internal {
 
+void Estimator::set_model(const FeatureModel&, bool) {}
+
 std::optional<Eigen::Vector4d> Estimator::probing_velocity(double) const {
   return std::nullopt;
 }

@@ -10,7 +10,6 @@ namespace {
 constexpr double same = 0.02;  // of the feature scales: 0.1 mrad, 0.02 px
 // Theta and phi have no backlash worth its name; rho and psi count beyond the widest that is looked for.
 const Eigen::Vector4d moved(5e-4, 5e-4, 6e-4, 0.12);
-constexpr double max_delay_s = 0.3, delay_step_s = 0.05;
 
 }  // namespace
 
@@ -22,14 +21,21 @@ bool FrozenImage::same_features(const Eigen::Vector4d& features) const {
 bool FrozenImage::add(const ImageMeasurement& image, const JointHistory& history) {
   if (!first_ || !same_features(image.features)) {
     first_ = image;
+    joints_then_ = joints_at(image, history);
     return false;
   }
-  for (double delay_s = 0; delay_s <= max_delay_s + 1e-9; delay_s += delay_step_s) {
-    const auto then = history.at(first_->time_s - delay_s), now = history.at(image.time_s - delay_s);
-    if (!then || !now) return false;
-    if (((*now - *then).array().abs() <= moved.array()).all()) return false;
+  const Joints joints_now = joints_at(image, history);
+  for (std::size_t i = 0; i < delays; ++i) {
+    if (!joints_then_[i] || !joints_now[i]) return false;
+    if (((*joints_now[i] - *joints_then_[i]).array().abs() <= moved.array()).all()) return false;
   }
   return true;
+}
+
+FrozenImage::Joints FrozenImage::joints_at(const ImageMeasurement& image, const JointHistory& history) {
+  Joints joints;
+  for (std::size_t i = 0; i < delays; ++i) joints[i] = history.at(image.time_s - delay_step_s * static_cast<double>(i));
+  return joints;
 }
 
 }  // namespace lapservo::internal

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <optional>
 
 #include <Eigen/Core>
@@ -22,10 +24,15 @@ class FrozenImage {
   bool add(const ImageMeasurement& image, const JointHistory& history);
 
  private:
+  static constexpr double delay_step_s = 0.05;
+  static constexpr std::size_t delays = 7;                            ///< 0 to 300 ms
+  using Joints = std::array<std::optional<Eigen::Vector4d>, delays>;  ///< where they were, were that the delay
+  static Joints joints_at(const ImageMeasurement& image, const JointHistory& history);
   bool same_features(const Eigen::Vector4d& features) const;
 
   Scales scales_;
   std::optional<ImageMeasurement> first_;  // of those that are the same
+  Joints joints_then_;                     // at it: a freeze may last longer than the history
 };
 
 }  // namespace lapservo::internal

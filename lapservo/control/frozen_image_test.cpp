@@ -37,6 +37,17 @@ TEST(FrozenImage, TellsAPictureThatRepeatsWhileTheArmMoves) {
   EXPECT_FALSE(frozen.add(image_at(3 + 3 * frame_s, f + Eigen::Vector4d(0, 1, 0, 0)), history));  // it goes on
 }
 
+// Longer than any history reaches back, the arm standing after it has moved.
+TEST(FrozenImage, StaysFrozenHoweverLong) {
+  FrozenImage frozen{Scales()};
+  JointHistory history = moving({0.05, 0, 0, 0});
+  EXPECT_FALSE(frozen.add(image_at(3, f), history));
+  EXPECT_TRUE(frozen.add(image_at(4, f), history));
+  for (int k = 0; k < 2000; ++k) history.push(5.1 + 0.02 * k, Eigen::Vector4d(0.25, 0, 0, 0));
+  ASSERT_GT(history.oldest_s(), 3);
+  EXPECT_TRUE(frozen.add(image_at(45, f), history));
+}
+
 TEST(FrozenImage, NoisyPicturesOfAnArmThatStandsOrMovesAreNotFrozen) {
   Random random(1);
   for (const double speed : {0.0, 0.01, 0.3}) {

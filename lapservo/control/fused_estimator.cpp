@@ -1,6 +1,9 @@
 #include "lapservo/control/fused_estimator.h"
 
+#include <cmath>
 #include <utility>
+
+#include "lapservo/core/angles.h"
 
 namespace lapservo::internal {
 namespace {
@@ -25,10 +28,20 @@ HoldReason reason_of(Update update) {
 }  // namespace
 
 FusedEstimator::FusedEstimator(const ControllerConfig& config, FeatureModel model)
-    : model_(std::move(model)), observer_(config.observer, config.scales) {}
+    : model_(std::move(model)),
+      observer_(config.observer, config.scales),
+      max_psi_offset_rad_(config.observer.max_offset[3]) {}
 
 HoldReason FusedEstimator::update(const ImageMeasurement& image, const JointHistory& history) {
+  const auto measured = history.at(image.time_s - observer_.delay_s());
+  if (image.q && measured && std::abs(wrap_pi((*image.q)[3] - (*measured)[3])) > max_psi_offset_rad_)
+    return HoldReason::psi_contradicted;
   return reason_of(observer_.update(model_, history, image));
+}
+
+void FusedEstimator::set_model(const FeatureModel& model, bool anew) {
+  model_ = model;
+  if (anew) observer_.start_anew();
 }
 
 std::optional<Estimate> FusedEstimator::at(double time_s, const Eigen::Vector4d& q_joint) const {

@@ -6,14 +6,16 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<HoldReason, 15> words{{{HoldReason::none, "none"},
+constexpr Words<HoldReason, 17> words{{{HoldReason::none, "none"},
                                        {HoldReason::no_image_yet, "no_image_yet"},
                                        {HoldReason::marker_lost, "marker_lost"},
                                        {HoldReason::stale_image, "stale_image"},
                                        {HoldReason::frozen_image, "frozen_image"},
                                        {HoldReason::wild_joints, "wild_joints"},
+                                       {HoldReason::endoscope_moved, "endoscope_moved"},
                                        {HoldReason::outlier, "outlier"},
                                        {HoldReason::no_history, "no_history"},
+                                       {HoldReason::psi_contradicted, "psi_contradicted"},
                                        {HoldReason::not_modelled, "not_modelled"},
                                        {HoldReason::singular, "singular"},
                                        {HoldReason::not_following, "not_following"},

@@ -3,10 +3,18 @@
 #include <optional>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "lapservo/control/feature_model.h"
 
 namespace lapservo {
+
+/// The marker as one frame shows it, whether or not it is known where the RCM is.
+struct SeenMarker {
+  Eigen::Vector4d inner_px = Eigen::Vector4d::Zero();    ///< e1 u, v, e2 u, v on ideal pixels
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();  ///< camera_from_marker
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+};
 
 /// What one frame tells the controller. The image stamped `time_s` shows the scene at time_s - delay: stamp it when it
 /// arrives and the delay is the whole chain's, or when it was exposed and the delay is zero.
@@ -17,6 +25,8 @@ struct ImageMeasurement {
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();  ///< of the features
   Eigen::Vector4d ends_px = Eigen::Vector4d::Zero();         ///< e0 u, v, e3 u, v
   std::optional<Eigen::Vector4d> q;                          ///< a start for the first frame, when known
+  std::optional<SeenMarker> marker{};  ///< also where `found` is false because nobody knows where the RCM is
+  int registration = 0;                ///< which camera_from_rcm it was seen with: ServoDecision::registration
 };
 
 /// Covariance of features from that of q.

@@ -57,7 +57,7 @@ Update OffsetObserver::update(const FeatureModel& model, const JointHistory& his
   if (!q_then) return Update::no_history;
   follow_measured(history, image.time_s - delay_s_, *q_then);
   const Eigen::Vector4d q_driven_then = instrument(backlashes_then_, backlash_);
-  if (!started_) return start(model, q_driven_then, image);
+  if (!started_ || anew_) return start(model, q_driven_then, image);
   const auto state = model(q_driven_then + offset_);
   if (!state) return start(model, q_driven_then, image);
 
@@ -146,6 +146,7 @@ Update OffsetObserver::start(const FeatureModel& model, const Eigen::Vector4d& q
   q_driven_then_ = q_driven_then;
   outliers_ = 0;
   started_ = true;
+  anew_ = false;
   interrupt();
   return Update::reacquired;
 }
@@ -205,7 +206,7 @@ std::optional<DelayEstimate> OffsetObserver::delay_estimate() const {
 
 std::optional<Estimate> OffsetObserver::estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint,
                                                  double time_s) const {
-  if (!started_) return std::nullopt;
+  if (!started_ || anew_) return std::nullopt;
   Estimate now;
   Backlashes backlashes = backlashes_;
   follow(backlashes, q_joint, backlash_);

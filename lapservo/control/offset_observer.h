@@ -5,7 +5,6 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/robot/backlash.h"
 #include "lapservo/control/backlash_estimator.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/delay_estimator.h"
@@ -13,6 +12,7 @@
 #include "lapservo/control/feature_model.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
+#include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
 
@@ -50,6 +50,9 @@ class OffsetObserver {
   /// nullopt before the first image and where the model sees nothing.
   std::optional<Estimate> estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint, double time_s) const;
 
+  /// The model changes: what the next update() shows is where the instrument is. Delay and backlash stay.
+  void start_anew() { anew_ = true; }
+
   /// The measured joints jumped: nothing is learnt across.
   void interrupt();
   double delay_s() const { return delay_s_; }
@@ -84,6 +87,7 @@ class OffsetObserver {
   double delay_s_ = 0;
   bool delay_seen_ = false;
   bool started_ = false;
+  bool anew_ = false;                                         ///< the offset belongs to another model
   double updated_s_ = 0;                                      ///< stamp of the last accepted image
   Eigen::Vector4d q_driven_then_ = Eigen::Vector4d::Zero();   ///< measured joints through their backlash at that image
   Eigen::Vector4d offset_ = Eigen::Vector4d::Zero();          ///< b

@@ -25,7 +25,9 @@ bool all_finite(const DesiredFeatures& desired) {
 bool all_finite(const ImageMeasurement& image) {
   return std::isfinite(image.time_s) &&
          (!image.found || (image.features.allFinite() && image.covariance.allFinite() && image.ends_px.allFinite() &&
-                           (!image.q || image.q->allFinite())));
+                           (!image.q || image.q->allFinite()))) &&
+         (!image.marker || (image.marker->inner_px.allFinite() && image.marker->position_m.allFinite() &&
+                            image.marker->rotation.coeffs().allFinite() && image.ends_px.allFinite()));
 }
 
 }  // namespace
@@ -59,15 +61,22 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
   usable_s_ = time_s;
 }
 
+void VisualController::recovered(const FeatureModel& model) {
+  recovery_.reset();
+  estimator_->set_model(model, true);
+  image_reason_ = HoldReason::endoscope_moved;  // until an image tells where the instrument is
+}
+
 ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint,
-                                   const std::optional<ImageMeasurement>& image, const DesiredFeatures& desired) {
+                                   const std::optional<ImageMeasurement>& image, const DesiredFeatures& desired,
+                                   std::span<const JointReading> readings) {
   ControlStep step;
   const bool timed = std::isfinite(time_s) && (!started_ || time_s > now_s_);
-  step.reason = read(time_s, q_joint, desired);
+  step.reason = read(time_s, q_joint, desired, readings);
   if (timed && q_joint.allFinite()) {
     if (image) image_reason_ = update(*image);
     watch_image_age();
-    step.estimate = estimator_->at(time_s, q_joint);
+    if (!recovery_) step.estimate = estimator_->at(time_s, q_joint);
   }
   if (step.reason == HoldReason::none) step.reason = image_reason_;
 
@@ -79,7 +88,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   } else if (measured_) {
     step.velocity = leashed_hold(step.velocity);
   }
-  if (step.action == ControlAction::probe) estimator_->advance_probing(config_.period_s);
+  if (step.action == ControlAction::probe && !recovery_) estimator_->advance_probing(config_.period_s);
 
   // Without a time to start from, the path is left to brake by itself when the period before ends.
   if (timed && started_) path_.ramp_to(now_s_, step.velocity, config_.period_s);
@@ -90,7 +99,8 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   return step;
 }
 
-HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired) {
+HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired,
+                                  std::span<const JointReading> readings) {
   measured_ = false;
   if (!std::isfinite(time_s)) return HoldReason::non_finite;
   if (started_ && !(time_s > now_s_)) return HoldReason::bad_time;
@@ -114,7 +124,7 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
   const MotionState setpoint = path_.at(time_s);
   arm_response_.add(setpoint, q_joint, time_s - now_s_);
   leash_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), time_s - now_s_);
-  history_.push(time_s, q_joint);
+  remember(time_s, q_joint, readings);
   now_s_ = time_s;
   measured_ = true;
   if (!all_finite(desired)) return HoldReason::non_finite;
@@ -123,15 +133,26 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
   return far || leash_.taut() ? HoldReason::not_following : HoldReason::none;
 }
 
+void VisualController::remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings) {
+  bool any = false;
+  for (const JointReading& reading : readings) {
+    const Eigen::Vector4d q = reading.q.vector();
+    if (!(reading.time_s <= time_s) || !q.allFinite() || !wild_joints_.reaches(reading.time_s, q)) continue;
+    history_.push(reading.time_s, q);
+    any = true;
+  }
+  if (!any) history_.push(time_s, q_joint);
+}
+
 HoldReason VisualController::update(const ImageMeasurement& image) {
   if (!all_finite(image)) return HoldReason::non_finite;
-  if (!image.found) return HoldReason::marker_lost;
+  if (!image.found && !(recovery_ && image.marker)) return HoldReason::marker_lost;
   if (now_s_ - image.time_s > config_.max_image_age_s) return HoldReason::stale_image;
   // The same stamp again, or an older one, tells nothing: the age of what was told before goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
   image_s_ = image.time_s;
   if (frozen_image_.add(image, history_)) return HoldReason::frozen_image;
-  const HoldReason reason = estimator_->update(image, history_);
+  const HoldReason reason = recovery_ ? HoldReason::none : estimator_->update(image, history_);
   if (reason == HoldReason::none) usable_s_ = now_s_;
   return reason;
 }
@@ -148,9 +169,17 @@ VisualController::Law VisualController::decide(HoldReason reason, const std::opt
     law.reason = reason;
     return law;
   }
+  if (recovery_) return recovery_law();
   const auto probing_velocity = estimator_->probing_velocity(config_.period_s);
   law = probing_velocity ? probing_law(*probing_velocity) : tracking_law(estimate, desired);
   if (!law.velocity.allFinite() || !law.weight.allFinite()) law.reason = HoldReason::non_finite;
+  return law;
+}
+
+VisualController::Law VisualController::recovery_law() const {
+  if (recovery_->velocity) return probing_law(*recovery_->velocity);
+  Law law;
+  law.reason = HoldReason::endoscope_moved;
   return law;
 }
 

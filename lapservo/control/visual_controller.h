@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 
 #include <Eigen/Core>
@@ -19,6 +20,7 @@
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
+#include "lapservo/robot/robot.h"
 
 namespace lapservo::internal {
 
@@ -38,9 +40,26 @@ class VisualController {
   /// The same after a hold, of an arm that was enabled all the while: under its load it keeps the place that it has.
   void start_over(double time_s, const Eigen::Vector4d& q_joint);
 
-  /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`.
+  /// While camera_from_rcm is measured anew: no image is believed, the arm holds (HoldReason::endoscope_moved) or,
+  /// where there is a velocity (rad/s, m/s), moves by it within its limits (ControlAction::probe). For the steps from
+  /// now on.
+  struct Recovery {
+    std::optional<Eigen::Vector4d> velocity;
+  };
+  void recover(const Recovery& recovery) { recovery_ = recovery; }
+  /// And on again, with the model that was found.
+  void recovered(const FeatureModel& model);
+  /// A slightly better model while all goes on.
+  void refine(const FeatureModel& model) { estimator_->set_model(model, false); }
+  /// Where the joints were measured when that image was exposed; nullopt when not known.
+  std::optional<Eigen::Vector4d> measured_at(const ImageMeasurement& image) const {
+    return history_.at(image.time_s - delay_s());
+  }
+
+  /// `image` is given once, in the first step after it arrived; `desired` is for the time `time_s`; `readings`: see
+  /// Robot::readings().
   ControlStep step(double time_s, const Eigen::Vector4d& q_joint, const std::optional<ImageMeasurement>& image,
-                   const DesiredFeatures& desired);
+                   const DesiredFeatures& desired, std::span<const JointReading> readings = {});
 
   /// The setpoints from the latest step on.
   const JointPath& path() const { return path_; }
@@ -58,10 +77,13 @@ class VisualController {
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();    ///< of deviations from it
   };
 
-  HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired);
+  HoldReason read(double time_s, const Eigen::Vector4d& q_joint, const DesiredFeatures& desired,
+                  std::span<const JointReading> readings);
+  void remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings);
   HoldReason update(const ImageMeasurement& image);
   void watch_image_age();
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
+  Law recovery_law() const;
   Law probing_law(const Eigen::Vector4d& velocity) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
@@ -78,6 +100,7 @@ class VisualController {
   FrozenImage frozen_image_;
   WildJoints wild_joints_;
   JointPath path_;
+  std::optional<Recovery> recovery_;
   bool started_ = false;
   bool measured_ = false;  ///< the joints of this tick are believed
   double now_s_ = 0;

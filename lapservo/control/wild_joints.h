@@ -18,6 +18,8 @@ class WildJoints {
   };
   /// Times that increase, finite joints.
   Verdict validate(double time_s, const Eigen::Vector4d& q);
+  /// Whether the arm can have been there then, and where it is believed to be now.
+  bool reaches(double time_s, const Eigen::Vector4d& q) const { return reachable({time_s, q}, believed_); }
 
  private:
   struct Reading {

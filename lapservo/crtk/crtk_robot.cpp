@@ -57,6 +57,11 @@ JointState CrtkRobot::state() {
   return interlock_.state(clock_.now_s());
 }
 
+std::vector<JointReading> CrtkRobot::readings() {
+  const std::lock_guard lock(mutex_);
+  return interlock_.take_readings();
+}
+
 void CrtkRobot::send(const JointPath& path) {
   const std::lock_guard lock(mutex_);
   interlock_.follow(path);

@@ -26,6 +26,7 @@ class CrtkRobot : public Robot {
   CrtkRobot& operator=(const CrtkRobot&) = delete;
 
   JointState state() override;
+  std::vector<JointReading> readings() override;
   void send(const JointPath& path) override;
 
   /// See Interlock::hold().

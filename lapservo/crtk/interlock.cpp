@@ -86,6 +86,9 @@ void Interlock::on_measured(const JointMessage& message, double arrival_s) {
   ++counts_.joint_states;
   finite_ = all_finite(message.positions);
   if (finite_) measured_ = Reading{*time_s, arrival_s, message.positions, q_of(message, *places)};
+  constexpr std::size_t max_readings = 1000;  // where nobody takes them
+  if (finite_ && readings_.size() < max_readings)
+    readings_.push_back({*time_s, JointVector::from_vector(measured_->q)});
   watch(arrival_s);
 }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -81,6 +82,8 @@ class Interlock {
 
   /// Robot::state. An arm that must not be moved now is not enabled, whatever it says itself.
   JointState state(double now_s);
+  /// Robot::readings.
+  std::vector<JointReading> take_readings() { return std::exchange(readings_, {}); }
   /// To be called every period: the set-point of all the arm's joints to be sent now, if any.
   std::optional<std::vector<double>> tick(double now_s);
 
@@ -119,6 +122,7 @@ class Interlock {
   InterlockCounts counts_;
   StampClock measured_clock_, setpoint_clock_;
   std::optional<Reading> measured_, setpoint_;
+  std::vector<JointReading> readings_;  ///< since they were taken
   bool finite_ = true;
   OperatingStateMessage operating_state_;
   bool operating_state_known_ = false, held_ = false, foreign_ = false, stopped_ = false;

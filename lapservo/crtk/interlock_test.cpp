@@ -92,6 +92,19 @@ class Bench {
 
 const Eigen::Vector4d slow(0.1, -0.1, 0.01, 0.3), fast(9, 9, 9, 9);
 
+TEST(Interlock, TellsEveryReadingOnce) {
+  Bench bench;
+  bench.pass(0.1);
+  bench.interlock.take_readings();
+  bench.pass(0.1);
+  const auto readings = bench.interlock.take_readings();
+  ASSERT_NEAR(static_cast<double>(readings.size()), 0.1 / joints_period_s, 1);
+  for (std::size_t i = 1; i < readings.size(); ++i)
+    EXPECT_NEAR(readings[i].time_s - readings[i - 1].time_s, joints_period_s, 1e-6);
+  EXPECT_LE(readings.back().time_s, bench.now_s);
+  EXPECT_TRUE(bench.interlock.take_readings().empty());
+}
+
 TEST(Interlock, FollowsFromTheArmsOwnSetPointOn) {
   Bench bench;
   bench.control(0.05, Eigen::Vector4d::Zero());

@@ -136,7 +136,9 @@ void LoopTopics::publish_numbers(const ControlTick& tick, double stamp_s) {
 void LoopTopics::publish_observation(const ControlTick& tick, double stamp_s) {
   const Observation& seen = tick.seen->observations.front();
   const ImageMeasurement& measured = tick.seen->measurement;
-  const Instrument& instrument = rig_.instruments.front();
+  Instrument instrument = rig_.instruments.front();
+  if (tick.decision.registration > 0) instrument.camera_from_rcm = tick.decision.camera_from_rcm;
+  const bool current = measured.registration == tick.decision.registration;
   ObservationMessage message;
   message.stamp_s = stamp_s;
   message.frame = frame_;
@@ -148,14 +150,14 @@ void LoopTopics::publish_observation(const ControlTick& tick, double stamp_s) {
   for (auto* values : {&message.q_covariance, &message.feature_covariance}) values->fill(unknown);
   message.edges_px.fill(unknown);
   if (tick.decision.control.estimate) message.error = rows_of<4>(tick.decision.control.error);
-  if (measured.found) {
+  if (measured.found && current) {
     message.features = rows_of<4>(measured.features);
     message.feature_covariance = rows_of<16>(measured.covariance);
   }
   if (seen.status == Status::ok)
     for (std::size_t i = 0; i < 4; ++i)
       message.edges_px[2 * i] = seen.edges_raw_px[i].x(), message.edges_px[2 * i + 1] = seen.edges_raw_px[i].y();
-  if (seen.status == Status::ok && seen.rcm) {
+  if (seen.status == Status::ok && seen.rcm && instrument.camera_from_rcm && current) {
     message.q = rows_of<4>(seen.rcm->q.vector());
     message.q_covariance = rows_of<16>(seen.rcm->covariance);
     PoseMessage pose = pose_message(instrument, *seen.rcm);
@@ -179,7 +181,8 @@ void LoopTopics::publish_state(const ControlTick& tick, const std::string& state
   message.values = {{"action", std::string(to_string(control.action))},
                     {"reason", std::string(to_string(control.reason))},
                     {"limited", control.limited ? "true" : "false"},
-                    {"delay_s", fmt::format("{:.4f}", control.delay_s)}};
+                    {"delay_s", fmt::format("{:.4f}", control.delay_s)},
+                    {"registration", std::to_string(tick.decision.registration)}};
   for (std::size_t i = 0; i < FeatureVector::size; ++i)
     message.values.emplace_back(fmt::format("error_{}", FeatureVector::names[i]),
                                 fmt::format("{:.6g}", control.error[static_cast<Eigen::Index>(i)]));

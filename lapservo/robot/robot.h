@@ -1,5 +1,7 @@
 #pragma once
 
+#include <vector>
+
 #include "lapservo/core/joint_vector.h"
 #include "lapservo/robot/joint_path.h"
 #include "lapservo/robot/operating_state.h"
@@ -8,9 +10,17 @@ namespace lapservo {
 
 /// What an arm says of itself (CRTK measured_js and operating_state).
 struct JointState {
-  double time_s = 0;  ///< when the joints were read, on the loop's clock
+  /// When the joints were read, on the loop's clock: not when the reading arrived. The loop takes the joints that it
+  /// gets in a tick for those of the tick; a reading that is older by some time adds this to the images' delay.
+  double time_s = 0;
   JointVector q;
   OperatingState operating_state = OperatingState::disabled;
+};
+
+/// The joints at one time, on the loop's clock.
+struct JointReading {
+  double time_s = 0;
+  JointVector q;
 };
 
 /// The port to an arm. Both calls come from the loop's thread, once a control tick, and must return at once: what talks
@@ -25,6 +35,10 @@ class Robot {
   virtual ~Robot() = default;
   /// The latest reading. Numbers that are not finite are allowed: the loop holds then.
   virtual JointState state() = 0;
+  /// For an arm that is read more often than a control tick comes: all readings since the last call, in order of time,
+  /// with that of the next state(), so that an image is compared with the joints at its exposure. The times are those
+  /// at which the joints were read. Called just before state(). Without any, state()'s counts for the time of the tick.
+  virtual std::vector<JointReading> readings() { return {}; }
   /// Follow this path from now on; it replaces the one before and goes on from it without a jump. To be copied.
   virtual void send(const JointPath& path) = 0;
 };

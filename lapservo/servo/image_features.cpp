@@ -20,8 +20,11 @@ Eigen::Vector4d both_ends(const Eigen::Vector2d& first, const Eigen::Vector2d& l
 
 FeatureModel feature_model(const Rig& rig) {
   const Instrument& instrument = rig.instruments.at(0);
-  if (!instrument.camera_from_rcm) return {};
-  const ImageModel image{rig.camera, instrument.marker, *instrument.camera_from_rcm};
+  return instrument.camera_from_rcm ? feature_model(rig, *instrument.camera_from_rcm) : FeatureModel();
+}
+
+FeatureModel feature_model(const Rig& rig, const Rigid3& camera_from_rcm) {
+  const ImageModel image{rig.camera, rig.instruments.at(0).marker, camera_from_rcm};
   return [image](const Eigen::Vector4d& q) -> std::optional<FeatureState> {
     const auto [reason, point] = feature_map(image, JointVector::from_vector(q));
     if (!point) return std::nullopt;
@@ -43,15 +46,18 @@ ImageMeasurement measurement_of(const Observation& observation, double stamp_s,
                                 const std::optional<Eigen::Vector2d>& rcm_px) {
   ImageMeasurement measurement;
   measurement.time_s = stamp_s;
-  if (observation.status != Status::ok || !rcm_px) return measurement;
+  if (observation.status != Status::ok) return measurement;
   const auto& edges_px = observation.edges_ideal_px;
   const Features& f = observation.features;
-  measurement.features << f.s_rad, (edges_px[0] - *rcm_px).norm(), f.l_px, f.d_px;
+  measurement.features << f.s_rad, rcm_px ? (edges_px[0] - *rcm_px).norm() : 0.0, f.l_px, f.d_px;
   measurement.ends_px = both_ends(edges_px[0], edges_px[3]);
   measurement.covariance = features_covariance(edges_px, observation.edges_covariance_px2, rcm_px);
   measurement.covariance += min_sigma.cwiseAbs2().asDiagonal();
-  measurement.found = measurement.covariance.allFinite();
+  measurement.found = rcm_px && measurement.covariance.allFinite();
   if (observation.rcm) measurement.q = observation.rcm->q.vector();
+  if (const auto& seen = observation.marker)
+    measurement.marker = SeenMarker{both_ends(edges_px[1], edges_px[2]), seen->camera_from_marker.translation,
+                                    seen->camera_from_marker.rotation};
   return measurement;
 }
 

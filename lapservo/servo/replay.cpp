@@ -7,7 +7,7 @@ namespace lapservo::internal {
 
 std::optional<ReplayDifference> replay(const std::vector<LoggedTick>& log, const Rig& rig,
                                        const ControllerConfig& controller) {
-  Servo servo(controller, feature_model(rig));
+  Servo servo(controller, rig);
   for (std::size_t i = 0; i < log.size(); ++i) {
     const auto fields = decision_fields(servo.step(log[i].input));
     for (std::size_t k = 0; k < fields.size(); ++k)

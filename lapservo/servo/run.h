@@ -28,7 +28,7 @@ struct RunConfig {
 struct ControlTick {
   ServoInput input;
   ServoDecision decision;
-  std::optional<TrackedImage> seen;
+  std::optional<TrackedImage> seen;  ///< without q and r where the joints contradict them
 };
 
 /// Told of every tick after its set-points were sent, in the loop's thread: what takes long here makes the next tick
@@ -43,7 +43,8 @@ class RunObserver {
 /// The servo loop: reads the joints, sees, decides, sends, then tells the observer, once every
 /// ControllerConfig::period_s for `duration_s`; then lets the arm brake to rest. A missing or stale image, a lost
 /// marker, an outlier, a number that is not finite or an arm that is not enabled make it hold within the tick; it goes
-/// on by itself when all is well again. A late tick shifts none of those after it.
+/// on by itself when all is well again. A late tick shifts none of those after it. Where the endoscope moves it holds,
+/// and once that rests measures camera_from_rcm anew by small motions of the arm (ControlAction::probe).
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 

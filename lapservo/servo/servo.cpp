@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lapservo/servo/image_features.h"
+
 namespace lapservo::internal {
 namespace {
 
@@ -21,10 +23,28 @@ bool orderly(const ControlStep& control) {
 Servo::Servo(const ControllerConfig& config, FeatureModel model)
     : controller_(config, model), registered_(model != nullptr) {}
 
+Servo::Servo(const ControllerConfig& config, const Rig& rig) : Servo(config, feature_model(rig)) {
+  camera_from_rcm_ = rig.instruments.front().camera_from_rcm;
+  if (config.mode == ControlMode::fused) recovery_.emplace(rig, config);
+}
+
 ServoDecision Servo::step(const ServoInput& input) {
+  if (!recovery_) return decide(input);
+  ServoInput counted = input;
+  if (input.image && !recovery_->counts(input.image->registration)) counted.image.reset();
+  recovery_->see(counted, controller_);
+  ServoDecision decision = decide(counted);
+  recovery_->follow(counted, decision.control, controller_);
+  decision.registration = recovery_->registration();
+  decision.camera_from_rcm = recovery_->camera_from_rcm();
+  return decision;
+}
+
+ServoDecision Servo::decide(const ServoInput& input) {
   const Eigen::Vector4d q = input.joints.q.vector();
   ServoDecision decision;
-  decision.control = controller_.step(input.time_s, q, input.image, input.desired);
+  decision.camera_from_rcm = camera_from_rcm_;
+  decision.control = controller_.step(input.time_s, q, input.image, input.desired, input.readings);
   watch_registration(input);
   decision.registration_contradicted = images_contradicting_ >= contradicted_after;
   decision.send = orderly(decision.control);

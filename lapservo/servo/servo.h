@@ -3,6 +3,8 @@
 #include <optional>
 
 #include "lapservo/control/visual_controller.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/servo/endoscope_recovery.h"
 #include "lapservo/servo/servo_decision.h"
 
 namespace lapservo::internal {
@@ -12,6 +14,9 @@ class Servo {
  public:
   /// Throws InputError for a configuration that can't work.
   Servo(const ControllerConfig& config, FeatureModel model);
+  /// Of the rig's first instrument. With ControlMode::fused and where the rig has camera_from_rcm, this is measured
+  /// anew when the endoscope moved.
+  Servo(const ControllerConfig& config, const Rig& rig);
 
   ServoDecision step(const ServoInput& input);
 
@@ -20,11 +25,13 @@ class Servo {
   const VisualController& controller() const { return controller_; }
 
  private:
+  ServoDecision decide(const ServoInput& input);
   void start_anew_when_at_rest(const ServoInput& input, HoldReason reason);
-
   void watch_registration(const ServoInput& input);
 
   VisualController controller_;
+  std::optional<Rigid3> camera_from_rcm_;  ///< the rig's
+  std::optional<EndoscopeRecovery> recovery_;
   bool registered_;               ///< the rig says where the RCM is
   int images_contradicting_ = 0;  ///< in a row
   std::optional<double> not_following_since_s_;

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "lapservo/control/control_step.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/trajectory.h"
+#include "lapservo/geometry/rigid3.h"
 #include "lapservo/robot/robot.h"
 
 namespace lapservo {
@@ -15,6 +17,7 @@ struct ServoInput {
   JointState joints;
   std::optional<ImageMeasurement> image;  ///< the newest frame since the step before, if any
   DesiredFeatures desired;                ///< at time_s
+  std::vector<JointReading> readings{};   ///< since the step before: Robot::readings()
 };
 
 /// What one step decides.
@@ -23,7 +26,11 @@ struct ServoDecision {
   /// Images show the marker well, but for some time nowhere where camera_from_rcm, lens and RCM agree on a
   /// configuration: one of them is wrong, r with it, and nothing in the image tells by how much.
   bool registration_contradicted = false;
-  bool send = false;  ///< the arm is to follow path(); else it is left alone and holds by itself
+  /// Which camera_from_rcm the loop goes by: 0 the rig's, then one more whenever the endoscope moved and when it has
+  /// been measured anew. Images that were tracked with another one do not count.
+  int registration = 0;
+  std::optional<Rigid3> camera_from_rcm;  ///< nullopt while it is being measured, and where the rig has none
+  bool send = false;                      ///< the arm is to follow path(); else it is left alone and holds by itself
 };
 
 }  // namespace lapservo

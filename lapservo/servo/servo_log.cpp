@@ -19,9 +19,13 @@ constexpr Names rates{"s_rad_s", "r_px_s", "l_px_s", "d_px_s"};
 constexpr Names accelerations{"s_rad_s2", "r_px_s2", "l_px_s2", "d_px_s2"};
 constexpr auto joints = JointVector::names;
 constexpr Names joint_rates{"theta_rad_s", "phi_rad_s", "rho_m_s", "psi_rad_s"};
+constexpr Names inner{"e1_u_px", "e1_v_px", "e2_u_px", "e2_v_px"};
+constexpr std::array<std::string_view, 3> positions{"x_m", "y_m", "z_m"};
+constexpr Names rotations{"qx", "qy", "qz", "qw"};
 constexpr Names ends{"e0_u_px", "e0_v_px", "e3_u_px", "e3_v_px"};
 
-void name(std::vector<std::string>& columns, const char* prefix, const Names& names) {
+template <std::size_t N>
+void name(std::vector<std::string>& columns, const char* prefix, const std::array<std::string_view, N>& names) {
   for (const std::string_view each : names) columns.push_back(prefix + std::string(each));
 }
 
@@ -43,12 +47,16 @@ std::string covariance_column(int row, int column) {
 std::vector<std::string> make_input_columns() {
   std::vector<std::string> columns{"time_s", "arm_state"};
   name(columns, "joint_", joints);
-  columns.insert(columns.end(), {"image", "image_time_s"});
+  columns.emplace_back("readings");
+  columns.insert(columns.end(), {"image", "image_time_s", "image_registration"});
   name(columns, "seen_", features);
   for (int i = 0; i < 4; ++i)
     for (int j = i; j < 4; ++j) columns.push_back(covariance_column(i, j));
   name(columns, "seen_", ends);
   name(columns, "seen_", joints);
+  name(columns, "seen_", inner);
+  name(columns, "seen_marker_", positions);
+  name(columns, "seen_marker_", rotations);
   name(columns, "desired_", features);
   name(columns, "desired_", rates);
   name(columns, "desired_", accelerations);
@@ -61,7 +69,9 @@ const std::vector<std::string>& input_columns() {
 }
 
 std::vector<std::string> make_decision_columns() {
-  std::vector<std::string> columns{"action", "reason", "send", "limited", "delay_s"};
+  std::vector<std::string> columns{"action", "reason", "send", "limited", "delay_s", "registration"};
+  name(columns, "camera_from_rcm_", positions);
+  name(columns, "camera_from_rcm_", rotations);
   name(columns, "velocity_", joint_rates);
   name(columns, "setpoint_", joints);
   name(columns, "setpoint_", joint_rates);
@@ -71,17 +81,35 @@ std::vector<std::string> make_decision_columns() {
   return columns;
 }
 
+void write(std::vector<std::string>& fields, const Rigid3& pose) {
+  for (const double number : pose.translation) write(fields, number);
+  write(fields, Eigen::Vector4d(pose.rotation.coeffs()));
+}
+
 void write_image(std::vector<std::string>& fields, const std::optional<ImageMeasurement>& image) {
-  constexpr int numbers = 4 + 10 + 4 + 4;
-  fields.emplace_back(!image ? "none" : image->found ? "found" : "lost");
-  if (!image) return leave_empty(fields, 1 + numbers);
+  constexpr int numbers = 4 + 10 + 4 + 4, of_marker = 4 + 7;
+  fields.emplace_back(!image ? "none" : image->found ? "found" : image->marker ? "marker" : "lost");
+  if (!image) return leave_empty(fields, 2 + numbers + of_marker);
   write(fields, image->time_s);
-  if (!image->found) return leave_empty(fields, numbers);
+  fields.push_back(fmt::format("{}", image->registration));
+  if (!image->found && !image->marker) return leave_empty(fields, numbers + of_marker);
   write(fields, image->features);
   for (int i = 0; i < 4; ++i)
     for (int j = i; j < 4; ++j) write(fields, image->covariance(i, j));
   write(fields, image->ends_px);
   image->q ? write(fields, *image->q) : leave_empty(fields, 4);
+  if (!image->marker) return leave_empty(fields, of_marker);
+  write(fields, image->marker->inner_px);
+  write(fields, Rigid3{image->marker->rotation, image->marker->position_m});
+}
+
+// time_s theta_rad phi_rad rho_m psi_rad; time_s ...
+std::string text_of(const std::vector<JointReading>& readings) {
+  std::string text;
+  for (const auto& [time_s, q] : readings)
+    text +=
+        fmt::format("{}{} {} {} {} {}", text.empty() ? "" : ";", time_s, q.theta_rad, q.phi_rad, q.rho_m, q.psi_rad);
+  return text;
 }
 
 std::vector<std::string> input_fields(const ServoInput& input) {
@@ -89,6 +117,7 @@ std::vector<std::string> input_fields(const ServoInput& input) {
   write(fields, input.time_s);
   fields.emplace_back(to_string(input.joints.operating_state));
   write(fields, input.joints.q.vector());
+  fields.push_back(text_of(input.readings));
   write_image(fields, input.image);
   write(fields, input.desired.features);
   write(fields, input.desired.rate);
@@ -125,19 +154,45 @@ class Row {
   std::string source_;
 };
 
+std::vector<JointReading> read_readings(const Row& row) {
+  constexpr auto column = "readings", expected = "five numbers a reading, readings parted by ;";
+  const std::string& text = row.text(column);
+  std::vector<JointReading> readings;
+  for (const char* at = text.c_str(); *at;) {
+    std::array<double, 5> numbers{};
+    for (double& number : numbers) {
+      char* end = nullptr;
+      number = std::strtod(at, &end);
+      if (end == at) row.complain(column, expected);
+      at = end;
+    }
+    readings.push_back({numbers[0], {numbers[1], numbers[2], numbers[3], numbers[4]}});
+    if (*at && *at != ';') row.complain(column, expected);
+    if (*at) ++at;
+  }
+  return readings;
+}
+
 std::optional<ImageMeasurement> read_image(const Row& row) {
   const std::string& word = row.text("image");
   if (word == "none") return std::nullopt;
-  if (word != "found" && word != "lost") row.complain("image", "none, lost or found");
+  if (word != "found" && word != "lost" && word != "marker") row.complain("image", "none, lost, marker or found");
   ImageMeasurement image;
   image.found = word == "found";
   image.time_s = row.number("image_time_s");
-  if (!image.found) return image;
+  image.registration = static_cast<int>(row.number("image_registration"));
+  if (word == "lost") return image;
   image.features = row.numbers("seen_", features);
   for (int i = 0; i < 4; ++i)
     for (int j = i; j < 4; ++j) image.covariance(i, j) = image.covariance(j, i) = row.number(covariance_column(i, j));
   image.ends_px = row.numbers("seen_", ends);
   if (!row.text("seen_theta_rad").empty()) image.q = row.numbers("seen_", joints);
+  if (row.text("seen_marker_x_m").empty()) return image;
+  image.marker.emplace();
+  image.marker->inner_px = row.numbers("seen_", inner);
+  for (int i = 0; i < 3; ++i)
+    image.marker->position_m[i] = row.number("seen_marker_" + std::string(positions[static_cast<std::size_t>(i)]));
+  image.marker->rotation.coeffs() = row.numbers("seen_marker_", rotations);
   return image;
 }
 
@@ -149,6 +204,7 @@ ServoInput read_input(const Row& row) {
   const auto state = operating_state_from_string(row.text("arm_state"));
   if (!state) row.complain("arm_state", "DISABLED, ENABLED, PAUSED or FAULT");
   input.joints.operating_state = *state;
+  input.readings = read_readings(row);
   input.image = read_image(row);
   input.desired.features = row.numbers("desired_", features);
   input.desired.rate = row.numbers("desired_", rates);
@@ -179,6 +235,8 @@ std::vector<std::string> decision_fields(const ServoDecision& decision) {
   std::vector<std::string> fields{std::string(to_string(control.action)), std::string(to_string(control.reason)),
                                   decision.send ? "1" : "0", control.limited ? "1" : "0"};
   write(fields, control.delay_s);
+  fields.push_back(fmt::format("{}", decision.registration));
+  decision.camera_from_rcm ? write(fields, *decision.camera_from_rcm) : leave_empty(fields, 7);
   write(fields, control.velocity);
   write(fields, control.setpoint.position);
   write(fields, control.setpoint.velocity);

@@ -33,10 +33,18 @@ Record any_record(Random& random, int kind) {
   record.input.joints = {record.input.time_s, JointVector::from_vector(any(random)),
                          kind % 2 ? OperatingState::enabled : OperatingState::fault};
   record.input.desired = {any(random), any(random), any(random)};
+  for (int i = 0; i < kind % 4; ++i)
+    record.input.readings.push_back({random.uniform(), JointVector::from_vector(any(random))});
   if (kind % 3) {
     ImageMeasurement image;
     image.found = kind % 3 == 1;
     image.time_s = random.uniform();
+    image.registration = kind % 4;
+    if (kind % 4 == 3) {
+      const Eigen::Vector4d position = any(random);
+      image.marker = SeenMarker{any(random), position.head<3>(), Eigen::Quaterniond(any(random))};
+      image.features = any(random), image.covariance.setZero(), image.ends_px = any(random);
+    }
     if (image.found) {
       image.features = any(random);
       const Eigen::Matrix4d root = any(random) * any(random).transpose();
@@ -48,6 +56,8 @@ Record any_record(Random& random, int kind) {
     record.input.image = image;
   }
   record.decision.control.velocity = any(random);
+  record.decision.registration = kind % 5;
+  if (kind % 5 == 2) record.decision.camera_from_rcm = Rigid3{};
   if (kind % 2) record.truth = InstrumentTruth{any(random), {}};
   return record;
 }
@@ -56,6 +66,11 @@ void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   EXPECT_EQ(a.time_s, b.time_s);
   EXPECT_EQ(a.joints.q.vector(), b.joints.q.vector());
   EXPECT_EQ(a.joints.operating_state, b.joints.operating_state);
+  ASSERT_EQ(a.readings.size(), b.readings.size());
+  for (std::size_t i = 0; i < a.readings.size(); ++i) {
+    EXPECT_EQ(a.readings[i].time_s, b.readings[i].time_s);
+    EXPECT_EQ(a.readings[i].q.vector(), b.readings[i].q.vector());
+  }
   EXPECT_EQ(a.desired.features, b.desired.features);
   EXPECT_EQ(a.desired.rate, b.desired.rate);
   EXPECT_EQ(a.desired.acceleration, b.desired.acceleration);
@@ -63,7 +78,14 @@ void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   if (!a.image) return;
   EXPECT_EQ(a.image->found, b.image->found);
   EXPECT_EQ(a.image->time_s, b.image->time_s);
-  if (!a.image->found) return;
+  EXPECT_EQ(a.image->registration, b.image->registration);
+  ASSERT_EQ(a.image->marker.has_value(), b.image->marker.has_value());
+  if (a.image->marker) {
+    EXPECT_EQ(a.image->marker->inner_px, b.image->marker->inner_px);
+    EXPECT_EQ(a.image->marker->position_m, b.image->marker->position_m);
+    EXPECT_EQ(a.image->marker->rotation.coeffs(), b.image->marker->rotation.coeffs());
+  }
+  if (!a.image->found && !a.image->marker) return;
   EXPECT_EQ(a.image->features, b.image->features);
   EXPECT_EQ(a.image->covariance, b.image->covariance);
   EXPECT_EQ(a.image->ends_px, b.image->ends_px);
@@ -126,7 +148,7 @@ TEST(ServoLog, NamesWhatIsWrong) {
     return testing::input_error([&] { read_servo_log(folder / "bad.csv"); });
   };
   EXPECT_NE(complaint("ENABLED", "SLEEPY").find("arm_state"), std::string::npos);
-  EXPECT_NE(complaint(",found,", ",maybe,").find("none, lost or found"), std::string::npos);
+  EXPECT_NE(complaint(",found,", ",maybe,").find("none, lost, marker or found"), std::string::npos);
   EXPECT_NE(complaint("joint_theta_rad", "joint_kappa_rad").find("joint_theta_rad"), std::string::npos);
   EXPECT_FALSE(testing::input_error([&] { read_servo_log(folder / "none.csv"); }).empty());
 }

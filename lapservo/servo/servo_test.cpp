@@ -1,10 +1,14 @@
 #include "lapservo/servo/servo.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include <gtest/gtest.h>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/registration_watch.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo::internal {
@@ -28,10 +32,11 @@ class PerfectWorld {
   ServoDecision step() {
     ServoInput input{time_s_, {time_s_, JointVector::from_vector(q_), state}, std::nullopt, desired_};
     if (sees) {
-      const FeatureState state_now = model_(q_).value();
+      const Eigen::Vector4d instrument = q_ + Eigen::Vector4d(0, 0, 0, psi_off_rad);
+      const FeatureState state_now = model_(instrument).value();
       input.image = ImageMeasurement{visible,           time_s_, state_now.features, 1e-4 * Eigen::Matrix4d::Identity(),
                                      state_now.ends_px, {}};
-      if (registered) input.image->q = q_;
+      if (registered) input.image->q = instrument;
     }
     if (broken_joints) input.joints.q.phi_rad = std::numeric_limits<double>::quiet_NaN();
     time_s_ += period_s;
@@ -46,6 +51,7 @@ class PerfectWorld {
   }
 
   OperatingState state = OperatingState::enabled;
+  double psi_off_rad = 0;  ///< of the instrument from the measured joint
   bool sees = true, visible = true, registered = true, broken_joints = false, stuck = false;
   const Eigen::Vector4d& q() const { return q_; }
   void push(const Eigen::Vector4d& by) { q_ += by; }
@@ -76,6 +82,32 @@ TEST(Servo, SaysThatImagesContradictTheRegistration) {
   EXPECT_TRUE(world.step().registration_contradicted);
   world.visible = world.registered = true;
   EXPECT_FALSE(world.step().registration_contradicted);
+}
+
+TEST(RegistrationWatch, SaysOnceThatShaftsMissTheRcmWhichTheyPassed) {
+  Observation passes, misses, lost;
+  passes.status = misses.status = Status::ok;
+  passes.rcm.emplace();
+  const auto frames = [](RegistrationWatch& watch, const std::vector<Observation>& observations, int count) {
+    int said = 0;
+    for (int i = 0; i < count; ++i) said += watch.add(observations);
+    return said;
+  };
+  RegistrationWatch never;
+  EXPECT_EQ(frames(never, {misses}, 50), 0);  // wrong all along: not moved
+  RegistrationWatch watch;
+  EXPECT_EQ(frames(watch, {passes}, 20) + frames(watch, {lost}, 20) + frames(watch, {misses}, 4), 0);
+  EXPECT_EQ(frames(watch, {misses}, 50), 1);
+  EXPECT_EQ(frames(watch, {passes}, 20), 0);
+  EXPECT_EQ(frames(watch, {misses}, 50), 1);
+  // One of two: its own registration, not the endoscope.
+  Observation other = passes;
+  other.instrument = "other";
+  RegistrationWatch two;
+  EXPECT_EQ(frames(two, {passes, other}, 20) + frames(two, {misses, other}, 20), 0);
+  other = lost;
+  other.instrument = "other";
+  EXPECT_EQ(frames(two, {misses, other}, 20), 1);
 }
 
 TEST(Servo, HoldsWithinAPeriodWhenTheMarkerIsLostAndGoesOnWithoutAJump) {
@@ -141,6 +173,49 @@ TEST(Servo, AnArmThatDoesNotFollowIsLeftAloneUntilItRests) {
   EXPECT_EQ(world.step().control.reason, HoldReason::not_following);
   world.stuck = false;
   EXPECT_LT(world.steps(400).control.error.norm(), 0.05);
+}
+
+// Offsets that are off by a quarter turn: said, and nothing is moved.
+TEST(Servo, DoesNotMoveWherePsiIsMeasuredElsewhere) {
+  for (const double by_rad : {1.5708, -1.5708, 3.1}) {
+    PerfectWorld world;
+    world.psi_off_rad = by_rad;
+    const Eigen::Vector4d before = world.q();
+    const ServoDecision decision = world.steps(60);
+    EXPECT_EQ(decision.control.reason, HoldReason::psi_contradicted);
+    EXPECT_EQ(world.q(), before);
+  }
+  PerfectWorld world;
+  world.psi_off_rad = two_pi - 0.1;  // whole turns are the arm's own business
+  EXPECT_LT(world.steps(240).control.error.norm(), 0.05);
+}
+
+// An arm that somebody moves, an image half-way between two slow ticks.
+TEST(Servo, ReadingsBetweenTicksTellWhereTheJointsWereAtAnImage) {
+  constexpr double slow_s = 0.05, reading_s = 0.002;
+  const FeatureModel model = feature_model(testing::paper_test_rig());
+  const auto q_at = [](double t) {
+    return Eigen::Vector4d(start + Eigen::Vector4d(0.05, 0, 0.003, 0.1) * std::sin(6 * t));
+  };
+  const auto worst_px = [&](bool between) {
+    ControllerConfig config = PerfectWorld::config();
+    config.period_s = slow_s;
+    Servo servo(config, model);
+    double worst = 0;
+    for (int k = 1; k < 80; ++k) {
+      const double t = k * slow_s, exposed_s = t - slow_s / 2;
+      ServoInput input{t, {t, JointVector::from_vector(q_at(t)), OperatingState::disabled}, {}, {}, {}};
+      for (double s = t - slow_s + reading_s; between && s < t + 1e-9; s += reading_s)
+        input.readings.push_back({s, JointVector::from_vector(q_at(s))});
+      const FeatureState then = model(q_at(exposed_s)).value(), now = model(q_at(t)).value();
+      input.image =
+          ImageMeasurement{true, exposed_s, then.features, 1e-4 * Eigen::Matrix4d::Identity(), then.ends_px, {}};
+      const auto estimate = servo.step(input).control.estimate;
+      if (k > 20) worst = std::max(worst, (estimate.value().features - now.features).tail<3>().cwiseAbs().maxCoeff());
+    }
+    return worst;
+  };
+  EXPECT_LT(worst_px(true), worst_px(false) / 5);
 }
 
 TEST(Servo, WithoutImagesItHolds) {

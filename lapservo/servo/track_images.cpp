@@ -16,7 +16,7 @@ class CallersTracking : public TrackedImageStream {
  public:
   CallersTracking(ImageStream& images, const Rig& rig, const TrackerOptions& options,
                   const std::optional<Eigen::Vector2d>& rcm_px)
-      : images_(images), tracker_(rig, options), rcm_px_(rcm_image_px(rig, rcm_px)) {}
+      : images_(images), rig_(rig), options_(options), tracker_(rig, options), rcm_px_(rcm_image_px(rig, rcm_px)) {}
 
   std::optional<TrackedImage> newest() override {
     auto image = images_.newest();
@@ -24,13 +24,23 @@ class CallersTracking : public TrackedImageStream {
     TrackedImage tracked{std::move(*image), {}, {}};
     tracked.observations = tracker_.track(tracked.image.bgr);
     tracked.measurement = measurement_of(tracked.observations[0], tracked.image.time_s, rcm_px_);
+    tracked.measurement.registration = registration_;
     return tracked;
+  }
+  void use(int registration, const std::optional<Rigid3>& camera_from_rcm) override {
+    registration_ = registration;
+    rig_.instruments.front().camera_from_rcm = camera_from_rcm;
+    tracker_ = Tracker(rig_, options_);
+    rcm_px_ = rcm_image_px(rig_, std::nullopt);
   }
 
  private:
   ImageStream& images_;
+  Rig rig_;
+  TrackerOptions options_;
   Tracker tracker_;
   std::optional<Eigen::Vector2d> rcm_px_;
+  int registration_ = 0;
 };
 
 class OwnThreadTracking : public TrackedImageStream {
@@ -49,12 +59,17 @@ class OwnThreadTracking : public TrackedImageStream {
     if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     return std::exchange(latest_, std::nullopt);
   }
+  void use(int registration, const std::optional<Rigid3>& camera_from_rcm) override {
+    const std::lock_guard lock(mutex_);
+    wanted_ = {registration, camera_from_rcm};
+  }
 
  private:
   void work() {
     constexpr std::chrono::microseconds between_looks(500);
     try {
       while (!stop_) {
+        if (const auto wanted = take_wanted()) tracking_->use(wanted->registration, wanted->camera_from_rcm);
         auto tracked = tracking_->newest();
         if (!tracked) {
           std::this_thread::sleep_for(between_looks);
@@ -69,9 +84,19 @@ class OwnThreadTracking : public TrackedImageStream {
     }
   }
 
+  struct Wanted {
+    int registration = 0;
+    std::optional<Rigid3> camera_from_rcm;
+  };
+  std::optional<Wanted> take_wanted() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(wanted_, std::nullopt);
+  }
+
   std::unique_ptr<TrackedImageStream> tracking_;
   std::mutex mutex_;
   std::optional<TrackedImage> latest_;
+  std::optional<Wanted> wanted_;
   std::exception_ptr failure_;
   std::atomic<bool> stop_ = false;
   std::thread thread_;  // last: it uses the others

@@ -18,6 +18,9 @@ class TrackedImageStream {
   virtual ~TrackedImageStream() = default;
   /// The newest one since the last call, if any.
   virtual std::optional<TrackedImage> newest() = 0;
+  /// Images are tracked with this camera_from_rcm of the first instrument, or without one, as soon as may be; they
+  /// carry that number (ImageMeasurement::registration).
+  virtual void use(int registration, const std::optional<Rigid3>& camera_from_rcm) = 0;
 };
 
 /// Tracks a rig's instruments in the images of a stream, which must outlive it. `rcm_px`: see measurement_of(). An

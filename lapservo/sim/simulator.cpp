@@ -1,11 +1,15 @@
 #include "lapservo/sim/simulator.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "lapservo/core/error.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 
@@ -27,10 +31,31 @@ Endoscope make_endoscope(const Rig& rig, const SimulatorConfig& config) {
   const Camera& camera = rig.camera;
   const cv::Mat tissue =
       config.endoscope.pictures ? make_tissue(camera.width_px, camera.height_px, config.seed) : cv::Mat();
-  return Endoscope(camera, {shaft_of(first_instrument(rig))}, tissue, config.render, config.endoscope, config.seed);
+  ShaftModel shaft = shaft_of(first_instrument(rig));
+  shaft.blotches = config.blotches;
+  return Endoscope(camera, {shaft}, tissue, config.render, config.endoscope, config.seed);
+}
+
+void check(bool right, const char* field, double value, const char* expected) {
+  if (!right) throw InputError("endoscope motion", field, fmt::format("{}", value), expected);
+}
+
+Rigid3 camera_from_camera_before(const EndoscopeMotion& motion, double time_s) {
+  const double passed_s = time_s + same_s - motion.begin_s;
+  if (passed_s < 0) return {};
+  const double part = passed_s < motion.duration_s ? passed_s / motion.duration_s : 1;
+  return Rigid3{rotation_by(part * motion.rotation_rad), part * motion.translation_m}.inverse();
 }
 
 }  // namespace
+
+const EndoscopeMotion& EndoscopeMotion::checked() const {
+  check(begin_s >= 0 && std::isfinite(begin_s), "begin_s", begin_s, "0 or more");
+  check(duration_s >= 0 && std::isfinite(duration_s), "duration_s", duration_s, "0 or more");
+  check(translation_m.norm() <= 1, "translation_m", translation_m.norm(), "at most 1 in length");
+  check(rotation_rad.norm() <= 4, "rotation_rad", rotation_rad.norm(), "at most 4 in length");
+  return *this;
+}
 
 Simulator::Simulator(const Rig& rig, const SimulatorConfig& config, const JointVector& q_measured)
     : Simulator(rig, config, std::make_unique<Arm>(config.arm, q_measured.vector())) {}
@@ -63,6 +88,8 @@ void Simulator::sleep_until(double time_s) {
     const double next_s = path_ ? std::min(time_s, time_s_ + arm_period_s_) : time_s;
     if (path_) arm_->servo_jp(path_->at(next_s).position);
     step(next_s - time_s_);
+    constexpr std::size_t max_readings = 1000;  // where nobody takes them
+    if (readings_.size() < max_readings) readings_.push_back({time_s_, JointVector::from_vector(arm_->measured_jp())});
   }
 }
 
@@ -70,7 +97,20 @@ ShaftPlacement Simulator::placement() const {
   const JointVector q = true_q();
   const bool covered =
       std::any_of(covered_.begin(), covered_.end(), [&](const Interval& when) { return when.contains(time_s_); });
-  return {camera_from_rcm_ * rcm_from_unrolled(q), q.psi_rad, covered};
+  return {camera_from_first_camera() * camera_from_rcm_ * rcm_from_unrolled(q), q.psi_rad, covered};
+}
+
+Rigid3 Simulator::camera_from_first_camera() const {
+  Rigid3 now;
+  for (const EndoscopeMotion& motion : endoscope_motions_) now = camera_from_camera_before(motion, time_s_) * now;
+  return now;
+}
+
+float Simulator::light_now() const {
+  float light = light_;
+  for (const LightChange& change : light_changes_)
+    if (change.when.contains(time_s_)) light *= change.times;
+  return light;
 }
 
 void Simulator::step(double dt_s) {
@@ -85,6 +125,7 @@ void Simulator::step(double dt_s) {
     if (exposing_.size() == moments_s.size() / 2) truth_[taken_] = true_q();
     exposing_.push_back({placement()});
     if (exposing_.size() < moments_s.size()) continue;
+    endoscope_.set_light(light_now());
     endoscope_.expose(std::exchange(exposing_, {}));
     ++taken_;
   }

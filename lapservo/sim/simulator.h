@@ -4,10 +4,12 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "lapservo/geometry/rigid3.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/clock.h"
@@ -22,14 +24,26 @@ struct SimulatorConfig {
   ArmConfig arm;
   EndoscopeConfig endoscope;
   RenderOptions render;
-  double arm_rate_hz = 1000;  ///< at which the arm samples a path
-  std::uint64_t seed = 1;     ///< of tissue, noise, jitter and lost frames
+  std::vector<Blotch> blotches;  ///< of blood, on the marker
+  double arm_rate_hz = 1000;     ///< at which the arm samples a path
+  std::uint64_t seed = 1;        ///< of tissue, noise, jitter and lost frames
 };
 
 /// An interval of simulated time, for example in which the marker is covered: from `begin_s` up to `end_s`.
 struct Interval {
   double begin_s = 0, end_s = 0;
   bool contains(double time_s) const { return begin_s <= time_s && time_s < end_s; }
+};
+
+/// The endoscope moves: the camera goes evenly, within `duration_s` (0: at once), by this much in its own frame as it
+/// was when it began.
+struct EndoscopeMotion {
+  double begin_s = 0, duration_s = 0;
+  Eigen::Vector3d translation_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();  ///< vector: about its direction, by its length
+
+  /// Returns itself if all its numbers make sense; else throws InputError naming the first field that doesn't.
+  const EndoscopeMotion& checked() const;
 };
 
 /// A frame with its truth.
@@ -51,6 +65,8 @@ class Simulator : public Robot, public ImageStream, public Clock {
   Simulator(const Rig& rig, const SimulatorConfig& config, std::unique_ptr<SimulatedArm> arm);
 
   JointState state() override;
+  /// As often as the arm samples its path.
+  std::vector<JointReading> readings() override { return std::exchange(readings_, {}); }
   void send(const JointPath& path) override;
   std::optional<StampedImage> newest() override;
   double now_s() const override { return time_s_; }
@@ -68,21 +84,38 @@ class Simulator : public Robot, public ImageStream, public Clock {
   SimulatedArm& arm() { return *arm_; }
   const SimulatedArm& arm() const { return *arm_; }
   /// Light on the scene from now on: 1 is usual.
-  void set_light(float light) { endoscope_.set_light(light); }
+  void set_light(float light) { light_ = light; }
+  /// So many times as much then.
+  void change_light(const Interval& when, float times) { light_changes_.push_back({when, times}); }
   /// Something lies over the whole marker then.
   void cover_marker(const Interval& when) { covered_.push_back(when); }
+
+  /// Motions that overlap in time add up in the order in which they were given.
+  void move_endoscope(const EndoscopeMotion& motion) { endoscope_motions_.push_back(motion.checked()); }
+  /// What stood in the camera's frame at the beginning stands there now.
+  Rigid3 camera_from_first_camera() const;
 
   /// The instrument in the camera's truth, now.
   JointVector true_q() const { return JointVector::from_vector(arm_->true_jp()); }
   ShaftPlacement placement() const;
 
  private:
+  float light_now() const;
+
   Rigid3 camera_from_rcm_;
   std::unique_ptr<SimulatedArm> arm_;
   Endoscope endoscope_;
   double arm_period_s_;
   std::optional<JointPath> path_;
+  std::vector<JointReading> readings_;
   std::vector<Interval> covered_;
+  struct LightChange {
+    Interval when;
+    float times = 1;
+  };
+  float light_ = 1;
+  std::vector<LightChange> light_changes_;
+  std::vector<EndoscopeMotion> endoscope_motions_;
   double time_s_ = 0;
   Exposure exposing_;                  // the moments of the current frame so far
   std::map<long, JointVector> truth_;  // of frames on their way

@@ -178,11 +178,34 @@ TEST(Simulator, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
   }
 }
 
+TEST(Simulator, TheEndoscopeMovesByWhatItIsTold) {
+  const Rig rig = small_rig();
+  SimulatorConfig config = without_offsets();
+  config.endoscope.pictures = false;
+  Simulator simulator(rig, config, in_view(rig));
+  const EndoscopeMotion motion{0.2, 0.4, {0.03, 0, -0.01}, {0, 0.3, 0.1}};
+  simulator.move_endoscope(motion);
+  const Rigid3 first = simulator.placement().camera_from_unrolled;
+  simulator.step(0.1);
+  EXPECT_EQ(simulator.camera_from_first_camera().translation.norm(), 0);
+  simulator.step(0.3);  // half of the way
+  const Rigid3 half = simulator.camera_from_first_camera().inverse();
+  EXPECT_LT((half.translation - motion.translation_m / 2).norm(), 1e-9);
+  EXPECT_NEAR(Eigen::AngleAxisd(half.rotation).angle(), motion.rotation_rad.norm() / 2, 1e-9);
+  simulator.step(0.4);
+  const Rigid3 whole = simulator.camera_from_first_camera().inverse();
+  EXPECT_LT((whole.translation - motion.translation_m).norm(), 1e-12);
+  EXPECT_LT((whole * simulator.placement().camera_from_unrolled.translation - first.translation).norm(), 1e-12);
+}
+
 TEST(Simulator, RefusesNonsense) {
   Rig rig = small_rig();
   rig.instruments[0].camera_from_rcm.reset();
   EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
   EXPECT_THROW(Simulator(small_rig(), {}, in_view(small_rig())).step(-0.1), std::invalid_argument);
+  Simulator simulator(small_rig(), {}, in_view(small_rig()));
+  EXPECT_THROW(simulator.move_endoscope({.begin_s = -1}), InputError);
+  EXPECT_THROW(simulator.move_endoscope({.translation_m = {0, 2, 0}}), InputError);
   rig.instruments.clear();
   EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
 }

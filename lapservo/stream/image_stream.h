@@ -7,7 +7,8 @@
 namespace lapservo {
 
 struct StampedImage {
-  /// On the loop's clock: when it was exposed if that is known (the estimator's delay is 0 then), else when it arrived.
+  /// On the loop's clock: the middle of the exposure if that is known (set ObserverConfig::delay_s to 0 then), else
+  /// when it arrived (leave delay_s empty: the delay is estimated). The same for all images of a run.
   double time_s = 0;
   cv::Mat bgr;  ///< 8-bit BGR of the rig's size; not changed by anybody afterwards
 };
