@@ -193,6 +193,11 @@ void add_servo(CLI::App& app, Run& run_later) {
       ->check(CLI::IsMember({"surface", "centerline"}));
   command->add_option("--controller", options->controller, "YAML: gains_per_s, limits, window, delay_s ...");
   command->add_option("--delay-ms", options->delay, "The images' age, or `estimate`")->capture_default_str();
+  command
+      ->add_option("--endoscope-attempts", options->endoscope_attempts,
+                   "How often the arm may move a little by itself to measure where an endoscope that moved now stands, "
+                   "else 3; 0: it holds instead")
+      ->check(CLI::Range(0, 100));
   command->add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
       ->check(finite_number())
       ->delimiter(',')

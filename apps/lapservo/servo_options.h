@@ -20,6 +20,7 @@ struct ServoOptions {
   std::vector<double> set_point, via, start, rcm_px, hide;
   double duration_s = 20, latency_ms = 80;
   std::optional<double> fps;  // control periods a second, and frames of the simulation
+  std::optional<int> endoscope_attempts;
   std::uint64_t seed = 1;
   bool view = false, force = false, enable_motion = false, strict = false;
   SimulationOptions simulation;

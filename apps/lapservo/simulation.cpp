@@ -23,7 +23,7 @@ EndoscopeMotion motion_of(const std::vector<double>& numbers) {
 }
 
 std::vector<Blotch> blotches_of(const SimulationOptions& options, const Marker& marker, std::uint64_t seed) {
-  Random random(seed);
+  internal::Random random(seed);
   std::vector<Blotch> blotches;
   for (int i = 0; i < options.blood; ++i)
     blotches.push_back(

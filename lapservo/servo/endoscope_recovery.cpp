@@ -8,7 +8,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int agreed_after = 10, moved_after = 2, max_attempts = 3;
+constexpr int agreed_after = 10, moved_after = 2;
 
 // Of theta, phi (rad), rho (m) against the joints, from one image to the next: more than these tell.
 const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
@@ -43,7 +43,10 @@ Eigen::Matrix<double, 8, 1> edges_of(const ImageMeasurement& image) {
 }  // namespace
 
 EndoscopeRecovery::EndoscopeRecovery(const Rig& rig, const ControllerConfig& config)
-    : rig_(rig), limits_(config.limits), camera_from_rcm_(rig.instruments.at(0).camera_from_rcm) {}
+    : rig_(rig),
+      limits_(config.limits),
+      max_attempts_(config.endoscope_attempts),
+      camera_from_rcm_(rig.instruments.at(0).camera_from_rcm) {}
 
 void EndoscopeRecovery::see(const ServoInput& input, VisualController& controller) {
   const auto& image = input.image;
@@ -123,7 +126,7 @@ void EndoscopeRecovery::notice(VisualController& controller) {
 }
 
 void EndoscopeRecovery::rest_again(VisualController& controller) {
-  phase_ = failed_ < max_attempts ? Phase::resting : Phase::failed;
+  phase_ = failed_ < max_attempts_ ? Phase::resting : Phase::failed;
   sightings_.clear();
   controller.recover({});
 }

@@ -18,8 +18,8 @@ namespace lapservo::internal {
 /// agreement with the joints, show the marker as well as before but nowhere where its shaft passes the RCM: not what
 /// hides a marker, freezes a picture, sets an encoder or blocks a joint does. The arm holds until the marker's place in
 /// the image rests; moves its joints a little, one after the other; and what images and joints say of these motions
-/// gives camera_from_rcm. If they disagree, the endoscope has moved again and all begins anew; three times, then the
-/// arm holds for good. What the images show in the next seconds, with the larger motions of the task, makes it finer
+/// gives camera_from_rcm. If they disagree, the endoscope has moved again and all begins anew;
+/// ControllerConfig::endoscope_attempts times, then the arm holds for good. What the images show in the next seconds, with the larger motions of the task, makes it finer
 /// twice.
 class EndoscopeRecovery {
  public:
@@ -63,6 +63,7 @@ class EndoscopeRecovery {
   };
   Rig rig_;
   JointLimits limits_;
+  int max_attempts_;
   int registration_ = 0, oldest_counted_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
   Phase phase_ = Phase::watching;

@@ -48,6 +48,7 @@ struct Case {
   std::optional<Interval> frozen{};  ///< the picture from its beginning arrives again and again
   bool new_stamps = true;            ///< then, as if it were new
   std::optional<EndoscopeMotion> endoscope{};
+  int endoscope_attempts = 3;
   double exposure_s = 0;
   float smoke = 0;
   std::vector<Blotch> blotches{};
@@ -74,6 +75,7 @@ RunConfig config_of(const Rig& rig, const Case& c) {
   RunConfig config;
   config.rig = rig;
   config.controller.mode = c.mode;
+  config.controller.endoscope_attempts = c.endoscope_attempts;
   config.controller.window = image_window(rig.camera, 10);
   config.tracking_thread = c.thread;
   return config;
@@ -443,6 +445,21 @@ TEST(Run, MeasuresTheRegistrationAnewWhenTheEndoscopeMoved) {
     c.duration_s = 10;
     c.endoscope = random_motion(rig, duration_s, random);
     expect_measured_anew(rig, c, 1);
+  }
+}
+
+TEST(Run, HoldsForGoodWhereItMayNotMeasureAMovedEndoscope) {
+  const Rig rig = testing::small_test_rig();
+  Random random(1);
+  Case c;
+  c.endoscope_attempts = 0;
+  c.duration_s = endoscope_moves_s + 3;
+  c.endoscope = random_motion(rig, 0, random);
+  const PastRun done = run_case(c);
+  for (const Record& record : done.records) {
+    if (record.input.time_s > endoscope_moves_s + 0.1) {
+      EXPECT_EQ(record.decision.control.reason, HoldReason::endoscope_moved) << record.input.time_s;
+    }
   }
 }
 
