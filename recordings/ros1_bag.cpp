@@ -121,7 +121,7 @@ class RecordFile {
     Bytes from(length);
     const std::uint32_t size = *taken<std::uint32_t>(from);
     auto content = bytes(at + 4, size);
-    at += 4 + size;
+    at += 4 + std::uint64_t{size};
     return content;
   }
 

@@ -65,7 +65,9 @@ class Ros2Bag : public Bag {
     }
     for (const auto& [names, counted] : counts_)
       topics_.push_back({names.first, names.second, counted.messages,
-                         counted.messages > 0 ? 1e-9 * static_cast<double>(counted.last_ns - counted.first_ns) : 0});
+                         counted.messages > 0
+                             ? 1e-9 * (static_cast<double>(counted.last_ns) - static_cast<double>(counted.first_ns))
+                             : 0});
   }
 
   const std::string& path() const override { return path_; }

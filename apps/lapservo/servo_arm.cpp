@@ -109,24 +109,32 @@ class ArmWatcher : public RunObserver {
     if (wishes.hold) robot_.hold(*wishes.hold);
     if (wishes.set_point) wanted_ = Wanted{"set_point", 1, set_point(*wishes.set_point)};
     if (wishes.trajectory) wanted_ = Wanted{"trajectory", wishes.trajectory->duration_s, *wishes.trajectory};
-    if (refusal_.valid() && refusal_.wait_for(std::chrono::seconds(0)) == std::future_status::ready)
-      begin_or_refuse(refusal_.get(), time_s);
-    if (!wanted_ || refusal_.valid()) return;
+    const ServoDecision& decision = tick.decision;
+    if (refusal_.valid() && refusal_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+      const std::string refusal = refusal_.get();
+      if (!wanted_ && asked_.registration != decision.registration) {
+        wanted_ = asked_;  // it was asked of where the endoscope stood before
+      } else if (!wanted_) {
+        begin_or_refuse(refusal, time_s);
+      }
+    }
+    const bool being_measured = run_.rig.instruments.front().camera_from_rcm && !decision.camera_from_rcm;
+    if (!wanted_ || refusal_.valid() || being_measured) return;
     asked_ = *std::exchange(wanted_, std::nullopt);
+    asked_.registration = decision.registration;
     // A long trajectory takes longer to walk along than a tick has.
-    refusal_ =
-        std::async(std::launch::async,
-                   [this, wanted = asked_, q = tick.input.joints.q,
-                    camera_from_rcm = tick.decision.camera_from_rcm]() -> std::string {
-                     try {
-                       if (camera_from_rcm)
-                         refuse_infeasible(wanted.trajectory, wanted.duration_s,
-                                           feature_model(run_.rig, *camera_from_rcm), run_.controller, q, wanted.name);
-                     } catch (const InputError& error) {
-                       return error.what();
-                     }
-                     return {};
-                   });
+    refusal_ = std::async(
+        std::launch::async,
+        [this, wanted = asked_, q = tick.input.joints.q, camera_from_rcm = decision.camera_from_rcm]() -> std::string {
+          try {
+            if (camera_from_rcm)
+              refuse_infeasible(wanted.trajectory, wanted.duration_s, feature_model(run_.rig, *camera_from_rcm),
+                                run_.controller, q, wanted.name);
+          } catch (const InputError& error) {
+            return error.what();
+          }
+          return {};
+        });
   }
   void begin_or_refuse(const std::string& refusal, double time_s) {
     if (!refusal.empty()) return say(time_s, "refused: " + refusal);
@@ -163,6 +171,7 @@ class ArmWatcher : public RunObserver {
     std::string name;
     double duration_s = 0;
     Trajectory trajectory;
+    int registration = 0;  ///< ServoDecision::registration when it was asked
   };
   std::optional<Wanted> wanted_;  // to be asked about next
   Wanted asked_;

@@ -103,7 +103,9 @@ std::string Summary::text() const {
 bool show(LiveView& view, const ControlTick& tick, const Rig& rig) {
   if (!tick.seen) return true;
   const ControlStep& control = tick.decision.control;
-  cv::Mat picture = draw_overlay(tick.seen->image.bgr, rig, tick.seen->observations);
+  Rig now = rig;
+  now.instruments.front().camera_from_rcm = tick.decision.camera_from_rcm;
+  cv::Mat picture = draw_overlay(tick.seen->image.bgr, now, tick.seen->observations);
   const std::string label = fmt::format("{:.2f} s  {} {}", tick.input.time_s, to_string(control.action),
                                         control.reason == HoldReason::none ? "" : to_string(control.reason));
   cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);

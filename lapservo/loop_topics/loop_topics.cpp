@@ -121,7 +121,7 @@ void LoopTopics::publish(const ControlTick& tick, const std::string& state) {
   if (stamp_s < next_drawing_s_) return;
   next_drawing_s_ = stamp_s + between_drawings_s;
   const std::lock_guard lock(mutex_);
-  to_draw_ = Drawing{seen_s, tick.seen->image.bgr, tick.seen->observations};
+  to_draw_ = Drawing{seen_s, tick.seen->image.bgr, tick.seen->observations, tick.decision.camera_from_rcm};
   changed_.notify_all();
 }
 
@@ -246,7 +246,9 @@ void LoopTopics::draw() {
     CompressedImageMessage message;
     message.stamp_s = drawing->stamp_s;
     message.format = "bgr8; jpeg compressed bgr8";
-    cv::imencode(".jpg", draw_overlay(drawing->bgr, rig_, drawing->observations), message.data,
+    Rig rig = rig_;
+    rig.instruments.front().camera_from_rcm = drawing->camera_from_rcm;
+    cv::imencode(".jpg", draw_overlay(drawing->bgr, rig, drawing->observations), message.data,
                  {cv::IMWRITE_JPEG_QUALITY, 80});
     overlay_(message);
   }

@@ -56,6 +56,7 @@ class LoopTopics {
     double stamp_s = 0;
     cv::Mat bgr;
     std::vector<Observation> observations;
+    std::optional<Rigid3> camera_from_rcm;
   };
 
   Transport& transport_;

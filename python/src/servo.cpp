@@ -32,6 +32,15 @@ OperatingState operating_state_of(const std::string& word) {
 class PythonRobot : public Robot {
  public:
   JointState state() override { PYBIND11_OVERRIDE_PURE(JointState, Robot, state); }
+  std::vector<JointReading> readings() override {
+    const py::gil_scoped_acquire mine;
+    const py::function method = py::get_override(static_cast<const Robot*>(this), "readings");
+    if (!method) return Robot::readings();
+    std::vector<JointReading> readings;
+    for (const auto& [time_s, q] : method().cast<std::vector<std::pair<double, Eigen::Vector4d>>>())
+      readings.push_back({time_s, JointVector::from_vector(q)});
+    return readings;
+  }
   void send(const JointPath& path) override { PYBIND11_OVERRIDE_PURE(void, Robot, send, path); }
 };
 
@@ -50,7 +59,9 @@ class PythonImageStream : public ImageStream {
     if (!method) throw py::type_error("ImageStream.newest() is not implemented");
     const py::object given = method();
     if (given.is_none()) return std::nullopt;
-    const auto [time_s, image] = given.cast<std::pair<double, Image>>();
+    const auto [time_s, image] = given.cast<std::pair<double, py::array>>();
+    if (!py::isinstance<Image>(image))
+      throw InputError("ImageStream.newest()", "dtype", py::str(image.dtype()).cast<std::string>(), "uint8");
     return StampedImage{time_s, view_of(image, "ImageStream.newest()").clone()};
   }
 };
@@ -86,6 +97,20 @@ Both calls come from the loop's thread once a control tick and must return at on
 own rate, and forgets it as soon as it is not enabled.)")
       .def(py::init<>())
       .def("state", &Robot::state, py::call_guard<py::gil_scoped_release>(), "JointState: the latest reading.")
+      .def(
+          "readings",
+          [](Robot& self) {
+            auto readings = [&self] {
+              const py::gil_scoped_release others_run;
+              return self.readings();
+            }();
+            std::vector<std::pair<double, Eigen::Vector4d>> pairs;
+            for (const JointReading& reading : readings) pairs.emplace_back(reading.time_s, reading.q.vector());
+            return pairs;
+          },
+          "list of (time_s, float[4]): of the joints, all since the last call, for an arm that reads them more often "
+          "than "
+          "the loop asks. May be left out.")
       .def("send", &Robot::send, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
            "Follow this JointPath from now on; it is yours.");
   py::class_<ImageStream, PythonImageStream>(m, "ImageStream", "The port to a camera: subclass it.")
@@ -191,6 +216,14 @@ struct Tick {
   ControlTick tick;
   std::shared_ptr<const Rig> rig;
   const ControlStep& step() const { return tick.decision.control; }
+  /// That of the image that came: after the endoscope moved with another camera_from_rcm, or without.
+  std::shared_ptr<const Rig> rig_seen_by() const {
+    if (tick.decision.registration == 0 && tick.seen->measurement.registration == 0) return rig;
+    auto moved = std::make_shared<Rig>(*rig);
+    const bool current = tick.seen->measurement.registration == tick.decision.registration;
+    moved->instruments.front().camera_from_rcm = current ? tick.decision.camera_from_rcm : std::nullopt;
+    return moved;
+  }
 };
 
 // False ends the run; so does Ctrl-C.
@@ -247,7 +280,7 @@ void bind_tick(py::module_& m) {
           "observations",
           [](const Tick& self) {
             if (!self.tick.seen) return std::vector<Observed>{};
-            return observed(self.tick.seen->observations, self.rig, self.tick.seen->image.time_s);
+            return observed(self.tick.seen->observations, self.rig_seen_by(), self.tick.seen->image.time_s);
           },
           "list[Observation] of that image");
 }

@@ -34,10 +34,7 @@ class RigRenderer {
         throw InputError("Renderer", "camera_from_rcm", "missing", "a transform: it says where the instrument is");
       placements.push_back(placement_of(rig_.instruments[i], JointVector::from_vector(q[i])));
     }
-    const py::gil_scoped_release others_run;
-    const cv::Mat bgr = renderer_.render(placements, seed);
-    const py::gil_scoped_acquire mine;
-    return array_of(bgr);
+    return array_of(renderer_.render(placements, seed));  // with Python's lock: threads may share the renderer
   }
 
  private:
@@ -100,7 +97,7 @@ commands give the same frames.)")
            py::arg("exposure_s") = endoscope.exposure_s, py::arg("joint_offset") = arm.joint_offset,
            py::arg("backlash") = arm.backlash,
            "q: float[4], the measured joints at the start; joint_offset: instrument less measured joints.")
-      .def("step", &Simulator::step, py::arg("dt_s"), py::call_guard<py::gil_scoped_release>(), "Lets time pass.")
+      .def("step", &Simulator::step, py::arg("dt_s"), "Lets time pass.")
       .def_property_readonly(
           "true_q", [](const Simulator& self) { return self.true_q().vector(); }, "float[4]: where the instrument is")
       .def("set_light", &Simulator::set_light, py::arg("light"), "On the scene from now on; 1 is usual.")

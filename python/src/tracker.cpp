@@ -58,7 +58,7 @@ Eigen::Vector4d features_of(const Observed& seen) {
 }
 
 Eigen::Matrix4d features_covariance_of(const Observed& seen) {
-  const auto rcm = rcm_px(seen);
+  const auto rcm = seen.observation.features.r_px ? rcm_px(seen) : std::nullopt;
   Eigen::Matrix4d covariance =
       internal::features_covariance(seen.observation.edges_ideal_px, seen.observation.edges_covariance_px2, rcm);
   if (!rcm) {
@@ -267,11 +267,8 @@ void bind_frames(py::module_& m) {
       .def_property_readonly("complaint", &FrameSource::complaint,
                              "after the end: what is wrong with the file as a whole, or ''")
       .def("__iter__", [](FrameSource& source) -> FrameSource& { return source; })
-      .def("__next__", [](FrameSource& source) {
-        auto frame = [&source] {
-          const py::gil_scoped_release others_run;
-          return source.next();
-        }();
+      .def("__next__", [](FrameSource& source) {  // with Python's lock: threads may share the source
+        auto frame = source.next();
         if (!frame) throw py::stop_iteration();
         return *frame;
       });

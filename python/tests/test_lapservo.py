@@ -204,6 +204,9 @@ class Arm(lapservo.Robot):
     def state(self):
         return self.simulator.state()
 
+    def readings(self):
+        return self.simulator.readings()
+
     def send(self, path):
         assert len(path.at(self.simulator.now_s())) == 2
         self.sent += 1
@@ -259,6 +262,16 @@ def test_what_a_port_raises_leaves_the_run(rig):
         errors_of_a_run(rig, Broken(simulator), simulator, simulator)
     with pytest.raises(RuntimeError, match="pure virtual"):
         errors_of_a_run(rig, lapservo.Robot(), simulator, simulator)
+
+
+def test_other_types_of_a_camera_are_refused(rig, image):
+    class Floats(lapservo.ImageStream):
+        def newest(self):
+            return 0.0, image / 255.0
+
+    simulator = lapservo.Simulator(rig, Q)
+    with pytest.raises(lapservo.InputError, match="float64"):
+        errors_of_a_run(rig, simulator, Floats(), simulator)
 
 
 def test_a_run_ends_when_told(rig):
