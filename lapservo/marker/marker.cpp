@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <sstream>
 
+#include <fmt/format.h>
+
 #include "lapservo/core/angles.h"
 
 namespace lapservo {
@@ -74,7 +76,7 @@ std::string marker_problem(const Marker& marker) {
   if (!within(marker.diameter_m, min_diameter_m, max_diameter_m))
     return problem("diameter_m", marker.diameter_m, "0.0005 to 0.1 (metres)");
   for (std::size_t i = 0; i < 3; ++i) {
-    const std::string index = "[" + std::to_string(i) + "]";
+    const std::string index = fmt::format("[{}]", i);
     if (!within(marker.hues_deg[i], 0, 360)) return problem("hues_deg" + index, marker.hues_deg[i], "0 to 360");
     if (!(marker.bands_upper_m[i] > 0 && marker.bands_upper_m[i] <= max_band_m))
       return problem("bands_upper_m" + index, marker.bands_upper_m[i], "a length above 0, up to 0.5 (metres)");

@@ -20,7 +20,7 @@ void map_values(cv::Mat& picture, const std::function<double(double)>& function)
   constexpr int levels = 4096;
   std::vector<float> table(levels + 2);
   for (int i = 0; i <= levels + 1; ++i)
-    table[static_cast<std::size_t>(i)] = static_cast<float>(function(std::pow(std::min(1.0, double{i} / levels), 2)));
+    table[static_cast<std::size_t>(i)] = static_cast<float>(function(std::pow(std::min(1.0, static_cast<double>(i) / levels), 2)));
   for (auto* value = picture.ptr<float>(); value != picture.ptr<float>() + 3 * picture.total(); ++value) {
     const float place = std::sqrt(std::clamp(*value, 0.0F, 1.0F)) * levels;
     const auto i = static_cast<std::size_t>(place);
@@ -167,7 +167,7 @@ Camera calibrated(const CameraEffects& effects, const Camera& camera) {
   out.response = {Response::Kind::table};
   constexpr int points = 64;
   for (int i = 0; i <= points; ++i) {
-    const double value = double{i} / points;
+    const double value = static_cast<double>(i) / points;
     out.response.table_light.push_back(encoded.light_from_value(value));
     out.response.table_value.push_back(s_curve(effects.contrast, value));
   }
