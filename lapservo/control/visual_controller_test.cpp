@@ -473,20 +473,21 @@ TEST(VisualController, KeepsReadingsThatComeATickLate) {
   }
 }
 
-// The arm stands, and so does a picture without noise.
+// The arm stands, and so does a picture without noise, once the measured joints reach back to before it.
 TEST(VisualController, JointsThatWereSetFreezeNoPicture) {
   const ControllerConfig config = testing::test_config({});
   const FeatureModel model = testing::model_of({});
   VisualController controller(config, model);
   const Eigen::Vector4d q(0.05, 1.57, 0.064, 1.2);
-  const FeatureState seen = model(q).value();
+  FeatureState seen = model(q).value();
   DesiredFeatures desired;
   desired.features = seen.features;
   HoldReason reason = HoldReason::none;
   for (int k = 0; k < 120; ++k) {
     const double time_s = k * config.period_s;
+    if (k == 30) seen.features[1] += 1;
     const ImageMeasurement image{true, time_s, seen.features, 1e-4 * Eigen::Matrix4d::Identity(), seen.ends_px, {}};
-    const Eigen::Vector4d measured = q + (k < 40 ? 0.0 : 0.05) * Eigen::Vector4d::UnitX();
+    const Eigen::Vector4d measured = q + (k < 60 ? 0.0 : 0.05) * Eigen::Vector4d::UnitX();
     controller.reset(time_s, measured);  // not enabled: it does not move
     reason = controller.step(time_s + 1e-6, measured, image, desired).reason;
   }

@@ -342,7 +342,9 @@ TEST(MovedEndoscope, IsMeasuredByCamerasOfAnyRate) {
 }
 
 TEST(MovedEndoscope, IsMeasuredAfterAPause) {
-  MovedEndoscope world;
+  ControllerConfig config = PerfectWorld::config();
+  config.endoscope_attempts = 1;
+  MovedEndoscope world(config);
   world.steps(60);
   world.move();
   ASSERT_TRUE(world.until_probing());
