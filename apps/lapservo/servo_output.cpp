@@ -17,7 +17,7 @@ using namespace internal;
 namespace {
 
 std::uintmax_t needed_bytes(const ServoOptions& options) {
-  constexpr std::uintmax_t bytes_a_tick = 2000;
+  constexpr std::uintmax_t bytes_a_tick = 4000;
   return bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * periods_per_s(options)) + (1 << 20);
 }
 

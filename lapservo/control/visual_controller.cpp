@@ -119,6 +119,7 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
     estimator_->interrupt();
     arm_response_.restart();
     leash_.restart();
+    frozen_image_ = FrozenImage(config_.scales);
     image_reason_ = HoldReason::wild_joints;  // until an image tells where the instrument is
   }
   const MotionState setpoint = path_.at(time_s);
@@ -134,14 +135,14 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
 }
 
 void VisualController::remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings) {
-  bool any = false;
   for (const JointReading& reading : readings) {
     const Eigen::Vector4d q = reading.q.vector();
     if (!(reading.time_s <= time_s) || !q.allFinite() || !wild_joints_.reaches(reading.time_s, q)) continue;
     history_.push(reading.time_s, q);
-    any = true;
+    has_readings_ = true;
   }
-  if (!any) history_.push(time_s, q_joint);
+  // Joints that were read some time before the tick, under its later time, would keep the next reading out.
+  if (!has_readings_ || history_.size() == 0) history_.push(time_s, q_joint);
 }
 
 HoldReason VisualController::update(const ImageMeasurement& image) {

@@ -102,7 +102,8 @@ class VisualController {
   JointPath path_;
   std::optional<Recovery> recovery_;
   bool started_ = false;
-  bool measured_ = false;  ///< the joints of this tick are believed
+  bool measured_ = false;      ///< the joints of this tick are believed
+  bool has_readings_ = false;  ///< between ticks
   double now_s_ = 0;
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
   std::optional<double> image_s_;                       ///< stamp of the latest image

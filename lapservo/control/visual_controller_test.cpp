@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -446,6 +447,51 @@ TEST(VisualController, OneWildReadingSpoilsNothing) {
     EXPECT_EQ(held, 1);
     expect_all_limits_kept(done, config);
   }
+}
+
+// A reading may come after the tick that it belongs to, and a tick without any say nothing new.
+TEST(VisualController, KeepsReadingsThatComeATickLate) {
+  const ControllerConfig config = testing::test_config({});
+  VisualController controller(config, testing::model_of({}));
+  const auto q_at = [](double t) { return Eigen::Vector4d(0.1 * t, 1.57, 0.064, 1.2); };
+  const double read_ago_s = 0.004;
+  double time_s = 0;
+  for (int k = 0; k < 30; ++k, time_s += config.period_s) {
+    const double read_s = time_s - read_ago_s;
+    const JointReading reading{read_s, JointVector::from_vector(q_at(read_s))};
+    const bool late = k % 3 == 1;
+    const JointReading before{read_s - config.period_s, JointVector::from_vector(q_at(read_s - config.period_s))};
+    std::vector<JointReading> readings;
+    if (k % 3 == 2) readings.push_back(before);
+    if (!late) readings.push_back(reading);
+    controller.step(time_s, q_at(late ? before.time_s : read_s), {}, {}, readings);
+  }
+  for (double t = 0.1; t < 0.4; t += 0.01) {
+    ImageMeasurement image;
+    image.time_s = t + controller.delay_s();
+    EXPECT_NEAR(controller.measured_at(image).value()[0], q_at(t)[0], 1e-9) << t;
+  }
+}
+
+// The arm stands, and so does a picture without noise, once the measured joints reach back to before it.
+TEST(VisualController, JointsThatWereSetFreezeNoPicture) {
+  const ControllerConfig config = testing::test_config({});
+  const FeatureModel model = testing::model_of({});
+  VisualController controller(config, model);
+  const Eigen::Vector4d q(0.05, 1.57, 0.064, 1.2);
+  FeatureState seen = model(q).value();
+  DesiredFeatures desired;
+  desired.features = seen.features;
+  HoldReason reason = HoldReason::none;
+  for (int k = 0; k < 120; ++k) {
+    const double time_s = k * config.period_s;
+    if (k == 30) seen.features[1] += 1;
+    const ImageMeasurement image{true, time_s, seen.features, 1e-4 * Eigen::Matrix4d::Identity(), seen.ends_px, {}};
+    const Eigen::Vector4d measured = q + (k < 60 ? 0.0 : 0.05) * Eigen::Vector4d::UnitX();
+    controller.reset(time_s, measured);  // not enabled: it does not move
+    reason = controller.step(time_s + 1e-6, measured, image, desired).reason;
+  }
+  EXPECT_NE(reason, HoldReason::frozen_image);
 }
 
 class Holding : public ::testing::TestWithParam<ControlMode> {

@@ -9,7 +9,7 @@
 namespace lapservo::internal {
 namespace {
 
-// What computes elsewhere then delays no set-point. Who may not have it does without.
+// What computes elsewhere then delays set-points less. Who may not have it does without.
 void ask_for_real_time() {
   const sched_param priority{.sched_priority = 20};
   pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);

@@ -105,6 +105,15 @@ TEST(Interlock, TellsEveryReadingOnce) {
   EXPECT_TRUE(bench.interlock.take_readings().empty());
 }
 
+TEST(Interlock, KeepsTheNewestReadingsWhereNobodyTakesThem) {
+  Bench bench;
+  bench.pass(1100 * joints_period_s);
+  const auto readings = bench.interlock.take_readings();
+  ASSERT_EQ(readings.size(), 1000U);
+  EXPECT_NEAR(readings.back().time_s, bench.now_s, 2 * joints_period_s);
+  EXPECT_NEAR(readings.back().time_s - readings.front().time_s, 999 * joints_period_s, 1e-6);
+}
+
 TEST(Interlock, FollowsFromTheArmsOwnSetPointOn) {
   Bench bench;
   bench.control(0.05, Eigen::Vector4d::Zero());

@@ -35,9 +35,9 @@ class Robot {
   virtual ~Robot() = default;
   /// The latest reading. Numbers that are not finite are allowed: the loop holds then.
   virtual JointState state() = 0;
-  /// For an arm that is read more often than a control tick comes: all readings since the last call, in order of time,
-  /// with that of the next state(), so that an image is compared with the joints at its exposure. The times are those
-  /// at which the joints were read. Called just before state(). Without any, state()'s counts for the time of the tick.
+  /// For an arm that is read more often than a control tick comes: the readings since the last call (the newest 1000),
+  /// in order of time, with that of the next state(), so that an image is compared with the joints at its exposure.
+  /// Times: when the joints were read. Called just before state(). Without any, state()'s counts for the tick's time.
   virtual std::vector<JointReading> readings() { return {}; }
   /// Follow this path from now on; it replaces the one before and goes on from it without a jump. To be copied.
   virtual void send(const JointPath& path) = 0;

@@ -18,10 +18,14 @@ constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
 
 // The endoscope rests when no edge moves farther in so long; a hundredth of a millimetre or two.
 constexpr double rest_s = 0.3, rest_px = 1.5;
-constexpr std::size_t min_rest_images = 5, min_images = 60, max_images = 400;
+constexpr std::size_t min_rest_images = 5, min_images = 30, max_images = 400;
 
-// Of the images, one in so many makes it finer.
-constexpr int refining_each = 4;
+// However fast the camera is: sightings are so far apart at least, those that make it finer farther.
+constexpr double apart_s = 0.012, refining_apart_s = 0.06;
+constexpr std::size_t refining_each = 4;
+
+// An attempt has failed when its images have not shown the marker for so long.
+constexpr double max_lost_s = 2;
 
 // What a registration has to be to be gone by.
 constexpr double max_rms_px = 1, max_sigma_m = 2e-3, max_sigma_rad = 0.02;
@@ -50,11 +54,24 @@ EndoscopeRecovery::EndoscopeRecovery(const Rig& rig, const ControllerConfig& con
 
 void EndoscopeRecovery::see(const ServoInput& input, VisualController& controller) {
   const auto& image = input.image;
-  if (!image || !(image->found || image->marker)) return;
+  if (!image) return;
+  if (!image->found && !image->marker) {
+    contradicting_ = 0;
+    return;
+  }
   if (!follow_joints(*image, controller) || phase_ != Phase::watching || !image->found) return;
-  const bool contradicts = image->q ? jumped(*image->q) : image->marker.has_value();
+  // Without a marker there would be nothing to measure with.
+  const bool contradicts = image->marker && (!image->q || jumped(*image->q));
   contradicting_ = contradicts ? contradicting_ + 1 : 0;
   if (agreeing_ >= agreed_after && contradicting_ >= moved_after) notice(controller);
+}
+
+void EndoscopeRecovery::doubt(HoldReason reason) {
+  if (reason != HoldReason::wild_joints && reason != HoldReason::frozen_image) return;
+  agreeing_ = contradicting_ = 0;
+  if (reason == HoldReason::frozen_image) return;
+  offsets_.clear();
+  refine_at_s_.clear();  // its sightings go by the joints of before
 }
 
 // A turn about the RCM looks like a jump of the joints, which these would have told.
@@ -76,9 +93,14 @@ bool EndoscopeRecovery::follow_joints(const ImageMeasurement& image, VisualContr
       now.sides[k] = std::abs(moved[2 + k]) > plain[k] ? (moved[2 + k] > 0 ? 1 : -1) : measured_->sides[k];
   }
   measured_ = now;
-  const bool collects = phase_ != Phase::watching || !refine_at_s_.empty();
-  if (collects && path_.joints.back() != now.q.tail<2>()) path_.joints.emplace_back(now.q.tail<2>());
+  if (collects() && path_.joints.back() != now.q.tail<2>()) path_.joints.emplace_back(now.q.tail<2>());
   return true;
+}
+
+// Until another offset is trusted, it is this path's.
+bool EndoscopeRecovery::collects() const {
+  if (path_.joints.empty() || phase_ == Phase::failed) return false;
+  return phase_ != Phase::watching || !refine_at_s_.empty() || (offsets_.empty() && agreeing_ >= agreed_after);
 }
 
 void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step, VisualController& controller) {
@@ -96,7 +118,6 @@ void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step,
 }
 
 void EndoscopeRecovery::trust(const ServoInput& input, const ControlStep& step) {
-  if (step.reason == HoldReason::wild_joints) agreeing_ = 0;  // what jumped were the joints
   const auto& image = input.image;
   if (!image || !image->found || !image->q || step.action != ControlAction::track || !step.estimate || !measured_)
     return;
@@ -106,6 +127,15 @@ void EndoscopeRecovery::trust(const ServoInput& input, const ControlStep& step) 
 }
 
 void EndoscopeRecovery::notice(VisualController& controller) {
+  // Where none was trusted since the last time, that time's still holds.
+  if (!offsets_.empty()) trust_before();
+  camera_from_rcm_.reset();
+  refine_at_s_.clear();
+  oldest_counted_ = ++registration_;
+  rest_again(controller);
+}
+
+void EndoscopeRecovery::trust_before() {
   // Where the latest are too young, the oldest that there is.
   const double last_s = offsets_.back().time_s;
   std::deque<Offset> later;
@@ -119,10 +149,6 @@ void EndoscopeRecovery::notice(VisualController& controller) {
   path_ = {later.front().measured.sides, {}};
   for (const Offset& offset : later) path_.joints.emplace_back(offset.measured.q.tail<2>());
   path_.joints.emplace_back(measured_->q.tail<2>());
-  camera_from_rcm_.reset();
-  refine_at_s_.clear();
-  oldest_counted_ = ++registration_;
-  rest_again(controller);
 }
 
 void EndoscopeRecovery::rest_again(VisualController& controller) {
@@ -152,19 +178,32 @@ void EndoscopeRecovery::wait_for_rest(const ServoInput& input) {
     rests_since_s_ = input.image->time_s;
   }
   if (!seen) return;
-  sightings_.push_back(*seen);
+  add_sighting(*seen, apart_s);
   if (sightings_.size() < min_rest_images || input.image->time_s - rests_since_s_ < rest_s) return;
   phase_ = Phase::exploring;
   explored_s_ = 0;
+  seen_s_ = input.time_s;
   motion_ = exploring_motion(limits_, input.joints.q.vector());
 }
 
 void EndoscopeRecovery::explore(const ServoInput& input, const ControlStep& step, VisualController& controller) {
-  if (step.action == ControlAction::probe) explored_s_ += controller.config().period_s;
-  if (input.image && sightings_.size() < max_images)
-    if (const auto seen = sighting_of(*input.image)) sightings_.push_back(*seen);
+  const bool moves = step.action == ControlAction::probe;
+  if (moves) explored_s_ += controller.config().period_s;
+  const auto seen = input.image ? sighting_of(*input.image) : std::nullopt;
+  if (seen) seen_s_ = input.time_s;
+  if (seen && moves && sightings_.size() < max_images) add_sighting(*seen, apart_s);
+  if (input.time_s - seen_s_ > max_lost_s) {
+    ++failed_;
+    return rest_again(controller);
+  }
   if (explored_s_ < motion_.duration_s()) return controller.recover({motion_.velocity(explored_s_)});
   conclude(input, controller);
+}
+
+void EndoscopeRecovery::add_sighting(const MarkerSighting& sighting, double min_apart_s) {
+  if (!(measured_->stamp_s - sighted_s_ >= min_apart_s)) return;
+  sighted_s_ = measured_->stamp_s;
+  sightings_.push_back(sighting);
 }
 
 void EndoscopeRecovery::conclude(const ServoInput& input, VisualController& controller) {
@@ -190,8 +229,8 @@ void EndoscopeRecovery::conclude(const ServoInput& input, VisualController& cont
 // Of the images that were seen from here to there, few are enough.
 void EndoscopeRecovery::refine(const ServoInput& input, VisualController& controller) {
   if (refine_at_s_.empty()) return;
-  if (input.image && ++images_ % refining_each == 0)
-    if (const auto seen = sighting_of(*input.image)) sightings_.push_back(*seen);
+  if (input.image)
+    if (const auto seen = sighting_of(*input.image)) add_sighting(*seen, refining_apart_s);
   if (input.time_s < refine_at_s_.front()) return;
   refine_at_s_.pop_front();
   const auto fit = fit_registration(rig_.camera, rig_.instruments.front().marker, sightings_, path_, *camera_from_rcm_);

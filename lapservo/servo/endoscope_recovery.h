@@ -19,8 +19,8 @@ namespace lapservo::internal {
 /// hides a marker, freezes a picture, sets an encoder or blocks a joint does. The arm holds until the marker's place in
 /// the image rests; moves its joints a little, one after the other; and what images and joints say of these motions
 /// gives camera_from_rcm. If they disagree, the endoscope has moved again and all begins anew;
-/// ControllerConfig::endoscope_attempts times, then the arm holds for good. What the images show in the next seconds, with the larger motions of the task, makes it finer
-/// twice.
+/// ControllerConfig::endoscope_attempts times, then the arm holds for good. What the images show in the next seconds,
+/// with the larger motions of the task, makes it finer twice.
 class EndoscopeRecovery {
  public:
   EndoscopeRecovery(const Rig& rig, const ControllerConfig& config);
@@ -33,6 +33,8 @@ class EndoscopeRecovery {
   bool counts(int registration) const { return registration >= oldest_counted_ && registration <= registration_; }
   /// Before a step: an image that came, if it counts. Tells the controller what to do.
   void see(const ServoInput& input, VisualController& controller);
+  /// In it, with the controller's own reason: a picture that repeats and joints that jump are no moved endoscope.
+  void doubt(HoldReason reason);
   /// After it.
   void follow(const ServoInput& input, const ControlStep& step, VisualController& controller);
 
@@ -41,6 +43,9 @@ class EndoscopeRecovery {
 
   bool jumped(const Eigen::Vector4d& q_seen) const;
   void notice(VisualController& controller);
+  void trust_before();
+  bool collects() const;
+  void add_sighting(const MarkerSighting& sighting, double min_apart_s);
   void wait_for_rest(const ServoInput& input);
   void explore(const ServoInput& input, const ControlStep& step, VisualController& controller);
   void conclude(const ServoInput& input, VisualController& controller);
@@ -67,14 +72,17 @@ class EndoscopeRecovery {
   int registration_ = 0, oldest_counted_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
   Phase phase_ = Phase::watching;
-  int agreeing_ = 0, contradicting_ = 0, failed_ = 0;  ///< images in a row; attempts
+  int agreeing_ = 0;                                   ///< images so far, at most 10
+  int contradicting_ = 0;                              ///< images in a row
+  int failed_ = 0;                                     ///< attempts
   std::deque<Offset> offsets_;                         ///< while images agreed, in order of time
   std::optional<Measured> measured_;                   ///< at the latest image
   GapPath path_;                                       ///< since the offset that is trusted
   Eigen::Vector4d trusted_ = Eigen::Vector4d::Zero();  ///< offset, of before the endoscope moved
   std::vector<MarkerSighting> sightings_;
-  int images_ = 0;
+  double sighted_s_ = 0;  ///< stamp of the latest of them
   double rests_since_s_ = 0, explored_s_ = 0;
+  double seen_s_ = 0;               ///< when the marker was last seen while exploring
   std::deque<double> refine_at_s_;  ///< what is to come; then the sightings have done their work
   ProbingMotion motion_;
 };

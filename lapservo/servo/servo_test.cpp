@@ -7,6 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/kinematics/centre_line.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/registration_watch.h"
 #include "lapservo/testing/rigs.h"
@@ -226,6 +228,189 @@ TEST(Servo, WithoutImagesItHolds) {
   EXPECT_EQ(world.steps(30).control.action, ControlAction::track);
   world.sees = false;
   EXPECT_EQ(world.steps(30).control.reason, HoldReason::stale_image);
+}
+
+// The same arm before an endoscope that may move; its images are tracked with what the servo goes by, and come a tick
+// after they were exposed.
+class MovedEndoscope {
+ public:
+  explicit MovedEndoscope(ControllerConfig config = PerfectWorld::config())
+      : period_s_(config.period_s), servo_(config, rig_) {
+    aim({0.03, 0.02, 0.004, 0.2});
+  }
+  void aim(const Eigen::Vector4d& from_start) {
+    desired_.features = feature_model(rig_)(start + from_start).value().features;
+  }
+  void move() { camera_from_rcm_.translation += Eigen::Vector3d(0.004, -0.006, 0.01); }
+
+  ServoDecision step() {
+    ServoInput input{time_s_, {time_s_, JointVector::from_vector(q_ + encoder_off), state}, std::nullopt, desired_, {}};
+    if (steps_++ % image_every == 0) input.image = image();
+    time_s_ += period_s_;
+    last_ = servo_.step(input);
+    q_exposed_ = q_;
+    if (last_.send) q_ = last_.control.setpoint.position - encoder_off;
+    return last_;
+  }
+  ServoDecision steps(int count) {
+    for (int i = 0; i < count; ++i) step();
+    return last_;
+  }
+  // False: it did not come to that in 15 s.
+  template <class Condition>
+  bool until(const Condition& condition) {
+    for (double end_s = time_s_ + 15; time_s_ < end_s;)
+      if (condition(step())) return true;
+    return false;
+  }
+  bool until_registration(int number) {
+    return until([number](const ServoDecision& decision) { return decision.registration == number; });
+  }
+  bool until_probing() {
+    return until([](const ServoDecision& decision) { return decision.control.action == ControlAction::probe; });
+  }
+
+  OperatingState state = OperatingState::enabled;
+  Eigen::Vector4d encoder_off = Eigen::Vector4d::Zero(), seen_off = Eigen::Vector4d::Zero();
+  bool visible = true, tells_q = true, tells_marker = true, frozen = false;
+  int image_every = 1;
+
+ private:
+  ImageMeasurement image() {
+    if (!frozen) q_shown_ = q_exposed_;
+    ImageMeasurement image;
+    image.time_s = time_s_ - period_s_;
+    image.registration = last_.registration;
+    if (!visible) return image;
+    const auto& believed = steps_ > 1 ? last_.camera_from_rcm : rig_.instruments[0].camera_from_rcm;
+    const Marker& marker = rig_.instruments[0].marker;
+    const Rigid3 unrolled = camera_from_rcm_ * rcm_from_unrolled(JointVector::from_vector(q_shown_));
+    const auto edges_px = centre_line(rig_.camera, marker, unrolled, q_shown_[3]).value().ideal_px;
+    const auto rcm_px = believed ? projected_rcm_px(rig_.camera, *believed) : std::nullopt;
+    const Features f = features_of(edges_px, rcm_px);
+    image.found = believed.has_value();
+    image.features << f.s_rad, f.r_px.value_or(0), f.l_px, f.d_px;
+    image.covariance *= 1e-4;
+    image.ends_px << edges_px[0], edges_px[3];
+    const bool fits = believed && (believed->translation - camera_from_rcm_.translation).norm() < 1e-3;
+    if (fits && tells_q) image.q = q_shown_ + seen_off;
+    const Rigid3 pose = camera_from_marker(marker, unrolled, q_shown_[3]);
+    SeenMarker seen{{}, pose.translation, pose.rotation};
+    seen.inner_px << edges_px[1], edges_px[2];
+    if (tells_marker) image.marker = seen;
+    return image;
+  }
+
+  Rig rig_ = testing::paper_test_rig();
+  double period_s_;
+  Servo servo_;
+  Rigid3 camera_from_rcm_ = *rig_.instruments[0].camera_from_rcm;
+  DesiredFeatures desired_;
+  ServoDecision last_;
+  Eigen::Vector4d q_ = start, q_exposed_ = start, q_shown_ = start;
+  double time_s_ = 0;
+  int steps_ = 0;
+};
+
+TEST(MovedEndoscope, IsMeasuredAnewAlsoWhenItMovesAgainBeforeAnImageAgreed) {
+  MovedEndoscope world;
+  EXPECT_EQ(world.steps(60).registration, 0);
+  world.move();
+  ASSERT_TRUE(world.until_registration(2));
+  world.tells_q = false;
+  EXPECT_EQ(world.steps(2).registration, 3);
+  world.tells_q = true;
+  ASSERT_TRUE(world.until_registration(4));
+  const ServoDecision last = world.steps(360);
+  EXPECT_EQ(last.registration, 6);  // refined twice
+  EXPECT_LT(last.control.error.norm(), 0.1);
+}
+
+TEST(MovedEndoscope, IsMeasuredByCamerasOfAnyRate) {
+  ControllerConfig config = PerfectWorld::config();
+  config.stale_after_s = 0.2;
+  MovedEndoscope slow(config);
+  slow.image_every = 5;
+  slow.steps(120);
+  slow.move();
+  EXPECT_TRUE(slow.until_registration(2));
+  config.period_s = 1.0 / 240;
+  MovedEndoscope fast(config);
+  fast.steps(120);
+  fast.move();
+  EXPECT_TRUE(fast.until_registration(2));
+}
+
+TEST(MovedEndoscope, IsMeasuredAfterAPause) {
+  ControllerConfig config = PerfectWorld::config();
+  config.endoscope_attempts = 1;
+  MovedEndoscope world(config);
+  world.steps(60);
+  world.move();
+  ASSERT_TRUE(world.until_probing());
+  world.state = OperatingState::paused;
+  EXPECT_EQ(world.steps(600).registration, 1);
+  world.state = OperatingState::enabled;
+  EXPECT_TRUE(world.until_registration(2));
+}
+
+TEST(MovedEndoscope, AnAttemptThatLosesTheMarkerHasFailed) {
+  ControllerConfig config = PerfectWorld::config();
+  config.endoscope_attempts = 1;
+  for (const double lost_s : {1.0, 3.0}) {
+    MovedEndoscope world(config);
+    world.steps(60);
+    world.move();
+    ASSERT_TRUE(world.until_probing());
+    world.visible = false;
+    world.steps(static_cast<int>(lost_s / period_s));
+    world.visible = true;
+    EXPECT_EQ(world.until_registration(2), lost_s < 2);
+  }
+}
+
+TEST(MovedEndoscope, IsNotWhatHidesTheMarkerNowAndThen) {
+  MovedEndoscope world;
+  world.steps(60);
+  for (int i = 0; i < 10; ++i) {
+    world.tells_q = false;
+    world.step();
+    world.tells_q = true, world.visible = false;
+    world.step();
+    world.visible = true;
+  }
+  EXPECT_EQ(world.steps(2).registration, 0);
+  world.tells_q = false;
+  EXPECT_EQ(world.steps(2).registration, 1);
+}
+
+TEST(MovedEndoscope, IsNotMeasuredByATrackerThatTellsNoMarker) {
+  MovedEndoscope world;
+  world.tells_marker = false;
+  world.steps(60);
+  world.seen_off[0] = 0.1;
+  EXPECT_EQ(world.steps(20).registration, 0);
+}
+
+TEST(MovedEndoscope, IsNoFrozenPictureOfAFastArm) {
+  MovedEndoscope world;
+  world.aim({0.35, 0, 0, 0});
+  world.steps(30);
+  world.frozen = true;
+  EXPECT_EQ(world.steps(60).control.reason, HoldReason::frozen_image);
+  world.frozen = false;
+  EXPECT_EQ(world.steps(60).registration, 0);
+}
+
+TEST(MovedEndoscope, IsNoEncoderThatIsSetWhileTheArmIsNotEnabled) {
+  MovedEndoscope world;
+  world.steps(60);
+  world.state = OperatingState::paused;
+  world.step();
+  world.encoder_off = {0.1, -0.05, 0, 0};
+  EXPECT_EQ(world.steps(60).registration, 0);
+  world.state = OperatingState::enabled;
+  EXPECT_EQ(world.steps(120).registration, 0);
 }
 
 }  // namespace

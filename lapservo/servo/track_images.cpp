@@ -29,6 +29,8 @@ class CallersTracking : public TrackedImageStream {
   }
   void use(int registration, const std::optional<Rigid3>& camera_from_rcm) override {
     registration_ = registration;
+    // Where the others' are in a moved camera is not measured.
+    for (Instrument& instrument : rig_.instruments) instrument.camera_from_rcm.reset();
     rig_.instruments.front().camera_from_rcm = camera_from_rcm;
     tracker_ = Tracker(rig_, options_);
     rcm_px_ = rcm_image_px(rig_, std::nullopt);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -66,7 +67,7 @@ class Simulator : public Robot, public ImageStream, public Clock {
 
   JointState state() override;
   /// As often as the arm samples its path.
-  std::vector<JointReading> readings() override { return std::exchange(readings_, {}); }
+  std::vector<JointReading> readings() override;
   void send(const JointPath& path) override;
   std::optional<StampedImage> newest() override;
   double now_s() const override { return time_s_; }
@@ -107,7 +108,7 @@ class Simulator : public Robot, public ImageStream, public Clock {
   Endoscope endoscope_;
   double arm_period_s_;
   std::optional<JointPath> path_;
-  std::vector<JointReading> readings_;
+  std::deque<JointReading> readings_;
   std::vector<Interval> covered_;
   struct LightChange {
     Interval when;

@@ -210,5 +210,18 @@ TEST(Simulator, RefusesNonsense) {
   EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
 }
 
+TEST(Simulator, KeepsTheNewestReadingsWhereNobodyTakesThem) {
+  const Rig rig = small_rig();
+  SimulatorConfig config;
+  config.endoscope.pictures = false;
+  Simulator simulator(rig, config, in_view(rig));
+  for (int k = 1; k <= 1100; ++k) simulator.sleep_until(1e-3 * k);
+  const auto readings = simulator.readings();
+  ASSERT_EQ(readings.size(), 1000U);
+  EXPECT_NEAR(readings.front().time_s, 0.101, 1e-9);
+  EXPECT_NEAR(readings.back().time_s, 1.1, 1e-9);
+  EXPECT_TRUE(simulator.readings().empty());
+}
+
 }  // namespace
 }  // namespace lapservo::internal
