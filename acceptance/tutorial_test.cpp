@@ -215,6 +215,10 @@ TEST_F(Tutorial, CalibrateAllSaysWhatItDidNot) {
   EXPECT_NE(said().find("mine.yaml is not as the last step left it"), std::string::npos) << said();
   EXPECT_EQ(run_in(recordings_, start + " --boards boards"), 2);
   EXPECT_NE(said().find("needs --board and --square-mm"), std::string::npos) << said();
+  EXPECT_EQ(run_in(recordings_, start + " --redo marker"), 2);
+  EXPECT_NE(said().find("--redo: marker needs --turn"), std::string::npos) << said();
+  EXPECT_EQ(run_in(recordings_, start + " --turn /dev/video0"), 2);
+  EXPECT_NE(said().find("expected a folder with files"), std::string::npos) << said();
 }
 
 }  // namespace

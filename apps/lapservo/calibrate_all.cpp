@@ -24,8 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct AllOptions {
-  std::string rig, boards, board, aruco, motion, turn, turn_joints, swing, joints, judged, judged_joints, reports,
-      instrument, redo;
+  std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, reports, instrument, redo;
   double square_mm = 0, fps = 30;
   bool deinterlace = false, no_questions = false;
 };
@@ -81,7 +80,7 @@ std::string now_utc() {
 
 // Empty: leave the step out.
 std::string asked(const Step& step) {
-  std::fprintf(stderr, "\n%s: %s\n  where is it (a folder, a video, a camera; empty: leave this step out)? ",
+  std::fprintf(stderr, "\n%s: %s\n  where is it (a folder, a video, a bag; empty: leave this step out)? ",
                step.name.c_str(), step.what_to_record.c_str());
   std::string answer;
   if (!std::getline(std::cin, answer)) return {};
@@ -99,7 +98,10 @@ class Guide {
 
   int run() {
     watch_for_interrupts();
-    for (Step& step : steps()) {
+    std::vector<Step> all = steps();
+    if (!asks())
+      for (const Step& step : all) expect_redone(step);
+    for (Step& step : all) {
       const int code = take(step);
       if (code != 0) return code;
     }
@@ -107,6 +109,21 @@ class Guide {
   }
 
  private:
+  bool asks() const { return !options_.no_questions && ::isatty(STDIN_FILENO); }
+
+  void expect_redone(const Step& step) const {
+    if (step.input->empty() && options_.redo == step.name)
+      throw InputError("--redo", fmt::format("{} needs {}: {}", step.name, step.flag, step.what_to_record));
+  }
+
+  // What goes on for ever can't be told from what was done before, and the Ctrl-C that ends it would end all steps.
+  static void expect_recording(const Step& step) {
+    if (input_state(*step.input).empty())
+      throw InputError(step.flag, fmt::format("is {}, expected a folder with files, a video or a bag; `lapservo {}` "
+                                              "alone takes a camera or a stream",
+                                              *step.input, (step.name == "check" ? "" : "calibrate ") + step.name));
+  }
+
   std::vector<Step> steps() {
     AllOptions& o = options_;
     std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm)};
@@ -125,8 +142,8 @@ class Guide {
              "a slow full turn about the shaft's axis, 20 s or more, near and sharp",
              &o.turn,
              "--turn",
-             {o.turn, o.turn_joints},
-             joints(o.turn_joints)},
+             {o.turn},
+             {}},
             {"registration",
              "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
              &o.swing,
@@ -165,14 +182,14 @@ class Guide {
 
   static std::string state_of(const Step& step) {
     std::string state = input_state(*step.input);
-    if (state.empty()) return state;
     for (std::size_t i = 1; i < step.inputs.size(); ++i)
       if (!step.inputs[i].empty()) state += "; " + input_state(step.inputs[i]);
     return state;
   }
 
   int take(Step& step) {
-    if (step.input->empty() && !options_.no_questions && ::isatty(STDIN_FILENO)) *step.input = asked(step);
+    if (step.input->empty() && asks()) *step.input = asked(step);
+    expect_redone(step);
     const CalibrationStep* done = record_.find(step.name);
     if (step.input->empty()) {
       if (done)
@@ -181,12 +198,12 @@ class Guide {
         std::printf("%s: left out; %s names %s\n", step.name.c_str(), step.flag, step.what_to_record.c_str());
       return 0;
     }
+    expect_recording(step);
     if (step.name == "camera" && (options_.board.empty() || options_.square_mm <= 0))
       throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
     const std::vector<std::string> arguments = arguments_of(step);
     const CalibrationStep now{step.name, command_line(arguments), state_of(step), now_utc()};
-    if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs &&
-        !now.inputs.empty()) {
+    if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs) {
       std::printf("%s: done on %s by %s\n", step.name.c_str(), done->when.c_str(), done->command.c_str());
       return 0;
     }
@@ -230,7 +247,6 @@ void add_calibrate_all(CLI::App* parent, Run& run_later) {
   command->add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
   command->add_option("--motion", options->motion, "For the colours: the marker in motion; else --swing, else --turn");
   command->add_option("--turn", options->turn, "For the marker: a slow full turn about the shaft's axis");
-  command->add_option("--turn-joints", options->turn_joints, "CSV of the joints meanwhile: the seam too");
   command->add_option("--swing", options->swing, "For the registration: a smooth swing");
   command->add_option("--joints", options->joints, "CSV of the joints meanwhile");
   command->add_option("--check", options->judged, "For the check: a recording; else --swing");

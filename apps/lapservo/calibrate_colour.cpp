@@ -22,7 +22,7 @@ using namespace internal;
 namespace {
 
 struct ColourOptions : CalibrateOptions {
-  bool view = false;
+  bool view = false, replace_response = false;
 };
 
 Rig with_colour(Rig rig, std::size_t index, const ColourCalibration& calibration) {
@@ -80,9 +80,9 @@ void write_colour_report(const std::string& path, const Instrument& instrument, 
   write_report(path, report);
 }
 
-// Until the user has seen them.
-void show(LiveView& view, const SpreadFrames& kept, const Rig& before, const Rig& after) {
-  for (std::size_t i = 0; i < kept.frames().size() && !interrupted(); ++i)
+// Until the user has seen them. It was Ctrl-C that ended live frames: it does not end this.
+void show(LiveView& view, const SpreadFrames& kept, const Rig& before, const Rig& after, bool live) {
+  for (std::size_t i = 0; i < kept.frames().size() && (live || !interrupted()); ++i)
     if (!view.show(before_and_after(kept.frames()[i], before, after))) return;
 }
 
@@ -113,13 +113,14 @@ int run_colour(const ColourOptions& options) {
   {
     Progress progress(std::nullopt);
     int step = 0;
-    calibration = calibrate_colour(rig, index, kept.frames(),
+    const bool keep_response = !options.replace_response && is_response_measured(options.rig);
+    calibration = calibrate_colour(rig, index, kept.frames(), keep_response,
                                    [&](const std::string& what) { progress.show(++step, ": " + what); });
   }
   if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
   print(instrument, calibration, kept.frames().size());
   const Rig after = with_colour(rig, index, calibration);
-  if (view) show(*view, kept, rig, after);
+  if (view) show(*view, kept, rig, after, live);
   if (!options.report.empty()) {
     write_colour_report(options.report, instrument, calibration, kept, rig, after);
     std::printf("report: %s\n", options.report.c_str());
@@ -144,6 +145,8 @@ void add_calibrate_colour(CLI::App* parent, Run& run_later) {
       ->required();
   add_calibrate_options(command, *options);
   command->add_option("--report", options->report, "HTML page with the segmentation before and after");
+  command->add_flag("--replace-response", options->replace_response,
+                    "Also a response that calibrate camera measured (sigma_response), which stays else");
   command->add_flag("--view", options->view, "Show the segmentation before and after in a window");
   command->footer(
       "Move the instrument through the picture and turn it, 10 s or more, wholly in view and not overexposed. The "

@@ -51,12 +51,15 @@ void look_over_work_space(const Rig& rig, std::size_t index, const RigEvidence& 
   checked.maps = sigma_maps(rig, index, depths_of(evidence.poses()), measured);
   WorkSpace work_space;
   int good = 0;
-  for (const SigmaMap& map : checked.maps)
+  for (const SigmaMap& map : checked.maps) {
+    const auto lost = static_cast<int>(std::count(map.lost.begin(), map.lost.end(), true));
+    work_space.places += lost, work_space.lost += lost;
     for (const auto& sigma_rad : map.sigma_rad) {
       if (!sigma_rad) continue;
       ++work_space.places, good += *sigma_rad <= rig_limits.sigma_rad;
       work_space.worst_rad = std::max(work_space.worst_rad, *sigma_rad);
     }
+  }
   if (work_space.places == 0) return;
   work_space.good = static_cast<double>(good) / work_space.places;
   checked.findings.work_space = work_space;
@@ -127,10 +130,11 @@ void add_check(CLI::App& app, Run& run_later) {
   command->add_option("input", options->input, "A short recording of the marker in motion: a folder, a video or a bag")
       ->required();
   command->add_option("--rig", options->rig, "The rig that is judged")->required();
-  add_joint_options(command, *options,
-                    "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
-                    "bag; without it those in the input, where it is a bag: registration, delay, focal length and "
-                    "drift too");
+  add_joint_options(
+      command, *options,
+      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
+      "bag; without it those in the input, where it is a bag: registration, delay, focal length and "
+      "drift too");
   add_image_topic_option(command, options->image_topic);
   command->add_option("--out", options->report, "HTML page with figures");
   command->add_option("--instrument", options->instrument, "Its name, where the rig has several");

@@ -106,11 +106,13 @@ Picture map_picture(const SigmaMap& map) {
   for (int row = 0; row < SigmaMap::rows; ++row)
     for (int column = 0; column < SigmaMap::columns; ++column) {
       const cv::Rect cell(cell_px * column, cell_px * row, cell_px, cell_px);
-      const auto& sigma_rad = map.sigma_rad[static_cast<std::size_t>(row * SigmaMap::columns + column)];
+      const auto at = static_cast<std::size_t>(row * SigmaMap::columns + column);
+      const auto& sigma_rad = map.sigma_rad[at];
+      if (map.lost[at]) cv::rectangle(canvas, cell, cv::Scalar(60, 60, 60), cv::FILLED);
       if (sigma_rad) cv::rectangle(canvas, cell, color_of(*sigma_rad), cv::FILLED);
       cv::rectangle(canvas, cell, cv::Scalar(200, 200, 200));
-      const std::string text = sigma_rad ? fmt::format("{:.2g}", 1e3 * *sigma_rad) : "-";
-      const bool beyond = sigma_rad && *sigma_rad > 1.4 * rig_limits.sigma_rad;
+      const std::string text = sigma_rad ? fmt::format("{:.2g}", 1e3 * *sigma_rad) : map.lost[at] ? "lost" : "-";
+      const bool beyond = map.lost[at] || (sigma_rad && *sigma_rad > 1.4 * rig_limits.sigma_rad);
       cv::putText(canvas, text, cell.tl() + cv::Point(24, 54), cv::FONT_HERSHEY_SIMPLEX, 0.8,
                   beyond ? cv::Scalar(255, 255, 255) : cv::Scalar(50, 50, 50), 2, cv::LINE_AA);
     }
@@ -182,7 +184,7 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
   for (const SigmaMap& map : checked.maps)
     figures.push_back({map_picture(map),
                        fmt::format("Sigma of psi [mrad] to expect with the marker in each part of the picture, {:.0f} "
-                                   "mm away; empty: it is not wholly in view, or not measured.",
+                                   "mm away; -: it is not wholly in view; lost: it is, and is not found.",
                                    1e3 * map.depth_m)});
   figures.push_back({frame_plot(checked.frames, "Light on the marker", "brightest channel", "of 255",
                                 [](const FrameEvidence& frame) -> std::optional<double> {
@@ -232,7 +234,8 @@ std::vector<CheckLine> check_lines(const CheckedRig& checked) {
     lines.push_back(
         {"work space", fmt::format("sigma of psi at most {:.0f} mrad in {:.0f} % of {} places, up to {:.1f}",
                                    1e3 * rig_limits.sigma_rad, 100 * f.work_space->good, f.work_space->places,
-                                   1e3 * f.work_space->worst_rad)});
+                                   1e3 * f.work_space->worst_rad) +
+                           (f.work_space->lost ? fmt::format("; not found in {}", f.work_space->lost) : "")});
   return lines;
 }
 

@@ -94,7 +94,7 @@ void add_points(const EdgePixels& edge, const EdgeFit& fit, int channel, std::ve
 
 struct Measured {
   std::vector<std::vector<EdgePoint>> points;  // by view
-  std::vector<EdgeProfile> profiles;
+  std::vector<BoardEdgeProfile> profiles;
 };
 
 constexpr int green = 1;
@@ -122,9 +122,9 @@ Measured measured(const Board& board, const std::vector<BoardView>& views, const
 }
 
 // As many as tell all that there is to tell.
-std::vector<EdgeProfile> some_of(std::vector<EdgeProfile> profiles, std::size_t most) {
+std::vector<BoardEdgeProfile> some_of(std::vector<BoardEdgeProfile> profiles, std::size_t most) {
   if (profiles.size() <= most) return profiles;
-  std::vector<EdgeProfile> some;
+  std::vector<BoardEdgeProfile> some;
   for (std::size_t i = 0; i < most; ++i) some.push_back(std::move(profiles[i * profiles.size() / most]));
   return some;
 }

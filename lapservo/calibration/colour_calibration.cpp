@@ -189,7 +189,7 @@ void SpreadFrames::add(const cv::Mat& bgr) {
 }
 
 ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
-                                   const std::function<void(const std::string&)>& progress) {
+                                   bool keep_response, const std::function<void(const std::string&)>& progress) {
   const auto say = [&](const std::string& what) {
     if (progress) progress(what);
   };
@@ -216,9 +216,12 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
   calibration.hues_deg = hues_deg, calibration.sigma_hues_deg = measured.sigma_deg;
   say("the response");
   if (const auto result = response.result()) {
-    calibration.response = result->better;
+    if (!keep_response) calibration.response = result->better;
     calibration.response_found =
-        result->better
+        result->better && keep_response
+            ? fmt::format("as it is: kept, though the marker alone says {}, as it does when the camera sharpens",
+                          result->name)
+        : result->better
             ? fmt::format("{}: channels that rise at {} edges lie {:.3f} px from those that fall, {:.3f} px before",
                           result->name, result->edges, result->after_px, result->before_px)
             : fmt::format("as it is: no usual one brings channels nearer at {} edges, they lie {:.3f} px apart",

@@ -37,7 +37,9 @@ struct ColourCalibration {
 
 /// The hues of a mounted marker's bands as the camera has them, and how it encodes light, from frames of it in motion
 /// (8-bit BGR of the rig's size). The rig's hues may be so wrong that it is not found at all: up to 60 degrees each.
+/// With keep_response the rig's stays, whatever the frames say: to a marker, sharpening looks like another response.
 ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
+                                   bool keep_response = false,
                                    const std::function<void(const std::string&)>& progress = {});
 
 /// The frame in grey, with what is one of the rig's colours painted in its hue.

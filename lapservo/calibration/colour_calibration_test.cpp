@@ -88,6 +88,9 @@ TEST_F(CalibrateColour, TellsAnotherResponse) {
     EXPECT_EQ(found.response_found.rfind(name, 0), 0U) << found.response_found;
     EXPECT_EQ(found.found, 24);
   }
+  const auto kept = calibrate_colour(rig, 0, filmed(real, {}), true);
+  EXPECT_FALSE(kept.response);
+  EXPECT_NE(kept.response_found.find("the marker alone says gamma:1.8"), std::string::npos) << kept.response_found;
 }
 
 TEST_F(CalibrateColour, RefusesWhatCanNotTell) {

@@ -99,7 +99,7 @@ struct Given {
 };
 
 struct ProfileCost {
-  const EdgeProfile* profile;
+  const BoardEdgeProfile* profile;
   const Given* given;
 
   // The values of a profile as the numbers have them.
@@ -222,7 +222,7 @@ struct ShapePrior {
 using Shared = std::array<double, shared_numbers>;
 using Shape = std::array<double, shape_numbers>;
 
-std::size_t shape_of(const EdgeProfile& profile) {
+std::size_t shape_of(const BoardEdgeProfile& profile) {
   std::size_t i = 0;
   while (i + 1 < shape_angles_rad.size() && profile.angle_rad > shape_angles_rad[i]) ++i;
   return i;
@@ -331,11 +331,11 @@ constexpr double least_variance = 0.002 * 0.002;  // rounding to 8 bits, and mor
 // Profiles, what explains them, and the problem that holds both together.
 class ProfileFit {
  public:
-  ProfileFit(const std::vector<EdgeProfile>& profiles, const Response& start)
+  ProfileFit(const std::vector<BoardEdgeProfile>& profiles, const Response& start)
       : profiles_(profiles), shared_(start_of(start)) {
     const Response from = table_of(shared_);
     std::vector<double> ratios;
-    for (const EdgeProfile& p : profiles_) {
+    for (const BoardEdgeProfile& p : profiles_) {
       const double bright = from.light_from_value(std::min(1.0, p.bright));
       ratios.push_back(std::log(std::max(1e-4, from.light_from_value(std::max(0.0, p.dark))) / bright));
       edges_.push_back({std::log(bright), 0, std::log(p.blur_px), 0});
@@ -354,7 +354,7 @@ class ProfileFit {
     double squares = 0;
     int count = 0;
     for (std::size_t i = 0; i < profiles_.size(); ++i) {
-      const EdgeProfile& profile = profiles_[i];
+      const BoardEdgeProfile& profile = profiles_[i];
       const auto values =
           ProfileCost{&profile, &given_}.values(shared_.data(), shapes_[shape_of(profile)].data(), edges_[i].data());
       for (std::size_t k = 0; k < values.size(); ++k)
@@ -422,7 +422,7 @@ class ProfileFit {
     return solve_quietly(solver_, problem_, summary_);
   }
 
-  const std::vector<EdgeProfile>& profiles_;
+  const std::vector<BoardEdgeProfile>& profiles_;
   Shared shared_;
   std::array<Shape, shape_angles_rad.size()> shapes_{};
   std::vector<std::array<double, edge_numbers>> edges_;
@@ -454,8 +454,8 @@ void name_response(ProfileFit& profiles, ResponseFit& fit) {
 
 }  // namespace
 
-std::optional<EdgeProfile> profile_of(const EdgePixels& edge, int towards_bright, int channel, double blur_px,
-                                      const Response& response) {
+std::optional<BoardEdgeProfile> profile_of(const EdgePixels& edge, int towards_bright, int channel, double blur_px,
+                                           const Response& response) {
   const std::array<float, 256> light = response.table();
   const auto c = static_cast<std::size_t>(channel);
   const int half = static_cast<int>(edge.reach_px / profile_step_px);
@@ -469,7 +469,7 @@ std::optional<EdgeProfile> profile_of(const EdgePixels& edge, int towards_bright
     bins[static_cast<std::size_t>(bin + half)].add(towards - static_cast<double>(bin), light[pixel.value[c]],
                                                    pixel.value[c] / 255.0);
   }
-  EdgeProfile profile;
+  BoardEdgeProfile profile;
   profile.blur_px = blur_px;
   const Eigen::Vector2d along = edge.path.along.cwiseAbs();
   profile.angle_rad = std::atan2(along.minCoeff(), along.maxCoeff());
@@ -500,7 +500,7 @@ std::optional<EdgeProfile> profile_of(const EdgePixels& edge, int towards_bright
   return profile;
 }
 
-std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles, const Response& start,
+std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& profiles, const Response& start,
                                         bool try_named) {
   constexpr std::size_t least_profiles = 50;
   if (profiles.size() < least_profiles) return std::nullopt;
@@ -512,7 +512,7 @@ std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles
   fit.sharpening = fitted.sharpened() ? fitted.shared()[strength] : 0;
   fit.sharpening_px = std::exp(fitted.shared()[strength + 1]);
   std::vector<double> darks, brights;
-  for (const EdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
+  for (const BoardEdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
   fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);
   fit.table = fit.response = table_of(fitted.shared());
   fit.sigma = curve_sigma_of(fitted.problem(), fitted.shared(), std::max(1.0, fit.misfit[1]), fit.low, fit.high);

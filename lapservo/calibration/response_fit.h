@@ -12,7 +12,7 @@ namespace lapservo::internal {
 
 /// A channel's encoded values (0 to 1) across an edge, from dark to bright, at distances of `profile_step_px` about the
 /// edge; NaN where there is none. Means of light, encoded again: noise comes before the response.
-struct EdgeProfile {
+struct BoardEdgeProfile {
   std::vector<double> value, sigma;
   double dark = 0, bright = 0;  ///< values of the squares beside it
   double blur_px = 1;
@@ -21,8 +21,8 @@ struct EdgeProfile {
 constexpr double profile_step_px = 0.5;
 
 /// nullopt where the edge shows no two levels.
-std::optional<EdgeProfile> profile_of(const EdgePixels& edge, int towards_bright, int channel, double blur_px,
-                                      const Response& response);
+std::optional<BoardEdgeProfile> profile_of(const EdgePixels& edge, int towards_bright, int channel, double blur_px,
+                                           const Response& response);
 
 struct ResponseFit {
   Response response;          ///< a named one where it fits as well, else a table
@@ -39,7 +39,7 @@ struct ResponseFit {
 /// wide in light, a blurred edge is symmetric in light, and the squares' reflectances are the same wherever the board
 /// is and however much light falls on it. With `try_named` a named response is taken where it explains
 /// the edges as well. nullopt when edges are too few or too alike to tell.
-std::optional<ResponseFit> fit_response(const std::vector<EdgeProfile>& profiles, const Response& start,
+std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& profiles, const Response& start,
                                         bool try_named);
 
 }  // namespace lapservo::internal

@@ -219,7 +219,10 @@ class Advisor {
     if (f_.work_space && f_.work_space->good < rig_limits.work_space)
       add(true,
           fmt::format("psi's sigma stays below {:.0f} mrad in {:.0f} % of the work space; up to {:.0f} mrad",
-                      1e3 * rig_limits.sigma_rad, 100 * f_.work_space->good, 1e3 * f_.work_space->worst_rad),
+                      1e3 * rig_limits.sigma_rad, 100 * f_.work_space->good, 1e3 * f_.work_space->worst_rad) +
+              (f_.work_space->lost ? fmt::format(", and in {} of {} places the marker is not found",
+                                                 f_.work_space->lost, f_.work_space->places)
+                                   : ""),
           "come nearer, more light, a longer marker (lapservo marker design)", "psi where it is weakest");
   }
 

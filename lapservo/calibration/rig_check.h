@@ -53,7 +53,7 @@ RcmCheck check_rcm(const Instrument& instrument, const std::vector<TimedPose>& p
 /// Sigma of psi that the rig has over its work space.
 struct WorkSpace {
   double good = 1, worst_rad = 0;  ///< fraction with at most RigLimits::sigma_rad
-  int places = 0;                  ///< looked at
+  int places = 0, lost = 0;        ///< looked at; of them, not good, those where the marker is not found
 };
 
 /// Everything that was found out of one instrument of a rig.

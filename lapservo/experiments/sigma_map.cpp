@@ -64,8 +64,8 @@ std::optional<Rigid3> shaft_at(const Judge& judge, const Eigen::Vector3d& place,
   return *camera_from_rcm * rcm_from_unrolled(*q);
 }
 
-std::optional<double> sigma_at(Judge& judge, const Eigen::Vector3d& middle, const MeasuredSigma& like, double scale) {
-  constexpr int turns = 3;
+// A shaft whose marker's middle lies there, where the marker is wholly in view.
+std::optional<Rigid3> shaft_in_view(const Judge& judge, const Eigen::Vector3d& middle, const MeasuredSigma& like) {
   const Marker& marker = judge.instrument().marker;
   auto shaft = shaft_at(judge, middle, like);
   if (!shaft) return std::nullopt;
@@ -73,12 +73,18 @@ std::optional<double> sigma_at(Judge& judge, const Eigen::Vector3d& middle, cons
   shaft = shaft_at(judge, middle - marker.length_m() / 2 * axis, like);
   if (!shaft || !marker_in_view(judge.camera(), marker, *shaft, {.steepest_rad = 1.2, .border_px = 2}))
     return std::nullopt;
+  return shaft;
+}
+
+// Rms over rotations; nullopt where it is not found at most of them.
+std::optional<double> sigma_at(Judge& judge, const Rigid3& shaft) {
+  constexpr int turns = 3;
   double squares = 0;
   int found = 0;
   for (int i = 0; i < turns; ++i)
-    if (const auto sigma_rad = judge.sigma_rad(*shaft, two_pi * i / turns)) squares += *sigma_rad * *sigma_rad, ++found;
+    if (const auto sigma_rad = judge.sigma_rad(shaft, two_pi * i / turns)) squares += *sigma_rad * *sigma_rad, ++found;
   if (2 * found < turns) return std::nullopt;
-  return scale * std::sqrt(squares / found);
+  return std::sqrt(squares / found);
 }
 
 }  // namespace
@@ -89,15 +95,21 @@ std::vector<SigmaMap> sigma_maps(const Rig& rig, std::size_t instrument, const s
   const double scale = real_over_rendered(judge, measured);
   std::vector<SigmaMap> maps;
   for (const double depth_m : depths_m) {
-    SigmaMap map{depth_m, {}};
+    SigmaMap map;
+    map.depth_m = depth_m;
     for (int row = 0; row < SigmaMap::rows; ++row)
       for (int column = 0; column < SigmaMap::columns; ++column) {
         const Eigen::Vector2d raw_px((column + 0.5) / SigmaMap::columns * rig.camera.width_px,
                                      (row + 0.5) / SigmaMap::rows * rig.camera.height_px);
         const auto ideal_px = rig.camera.ideal_from_raw(raw_px);
         if (!ideal_px) continue;
-        map.sigma_rad[static_cast<std::size_t>(row * SigmaMap::columns + column)] =
-            sigma_at(judge, depth_m * rig.camera.ray_from_ideal(*ideal_px), measured[measured.size() / 2], scale);
+        const auto shaft =
+            shaft_in_view(judge, depth_m * rig.camera.ray_from_ideal(*ideal_px), measured[measured.size() / 2]);
+        if (!shaft) continue;
+        const auto cell = static_cast<std::size_t>(row * SigmaMap::columns + column);
+        const auto sigma_rad = sigma_at(judge, *shaft);
+        map.lost[cell] = !sigma_rad;
+        if (sigma_rad) map.sigma_rad[cell] = scale * *sigma_rad;
       }
     maps.push_back(map);
   }

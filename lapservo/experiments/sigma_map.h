@@ -13,8 +13,11 @@ namespace lapservo::internal {
 struct SigmaMap {
   static constexpr int columns = 7, rows = 5;
   double depth_m = 0;  ///< of the marker's middle
-  /// By row, rms over rotations; empty where the marker is not wholly in view or was not measured.
-  std::array<std::optional<double>, static_cast<std::size_t>(columns* rows)> sigma_rad{};
+  static constexpr std::size_t cells = static_cast<std::size_t>(columns) * rows;
+  /// By row, rms over rotations; empty where the marker is not wholly in view or is not found.
+  std::array<std::optional<double>, cells> sigma_rad{};
+  /// Where it is in view, but at most of the rotations not found.
+  std::array<bool, cells> lost{};
 };
 
 /// What a rig is to be judged by at a place: its marker there, and what the camera really said of it.

@@ -1,6 +1,6 @@
 #include "lapservo/experiments/sigma_map.h"
 
-#include <numeric>
+#include <algorithm>
 
 #include <gtest/gtest.h>
 
@@ -34,6 +34,20 @@ TEST(SigmaMaps, GrowWithDepthAndWithWhatTheCameraAdds) {
   EXPECT_FALSE(maps[0].sigma_rad.front() && maps[0].sigma_rad.back());
   measured.sigma_rad *= 3;
   EXPECT_NEAR(mean_of(sigma_maps(rig, 0, {0.08}, {measured})[0]), 3 * near_rad, 1e-6);
+}
+
+// So far away that the bands are a few pixels long.
+TEST(SigmaMaps, TellWhereTheMarkerIsInViewButLost) {
+  const Rig rig = lapservo::testing::small_test_rig();
+  const Rigid3& camera_from_rcm = *rig.instruments[0].camera_from_rcm;
+  const auto q = configuration_through(camera_from_rcm, {-0.01, 0, 0.1});
+  ASSERT_TRUE(q);
+  const auto maps = sigma_maps(rig, 0, {0.1, 1.0}, {{camera_from_rcm * rcm_from_unrolled(*q), 0.5, 1e-3}});
+  const auto lost = [](const SigmaMap& map) { return std::count(map.lost.begin(), map.lost.end(), true); };
+  EXPECT_EQ(lost(maps[0]), 0);
+  EXPECT_GT(lost(maps[1]), 0);
+  for (const SigmaMap& map : maps)
+    for (std::size_t i = 0; i < SigmaMap::cells; ++i) EXPECT_FALSE(map.lost[i] && map.sigma_rad[i]);
 }
 
 }  // namespace

@@ -40,8 +40,10 @@ const CalibrationStep* CalibrationRecord::find(const std::string& name) const {
 }
 
 void CalibrationRecord::add(const CalibrationStep& step) {
-  steps.erase(std::find_if(steps.begin(), steps.end(), [&](const auto& s) { return s.name == step.name; }),
-              steps.end());
+  const auto place = [](const std::string& name) {
+    return std::find(calibration_order.begin(), calibration_order.end(), name);
+  };
+  std::erase_if(steps, [&](const auto& s) { return place(s.name) >= place(step.name); });
   steps.push_back(step);
 }
 

@@ -1,10 +1,16 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace lapservo::internal {
+
+/// The order of the steps: each is measured with what those before it changed.
+inline constexpr std::array<std::string_view, 5> calibration_order{"camera", "colour", "marker", "registration",
+                                                                   "check"};
 
 /// One step of a rig's calibration that was done.
 struct CalibrationStep {
@@ -22,7 +28,8 @@ struct CalibrationRecord {
 
   /// Nullptr when it was not done.
   const CalibrationStep* find(const std::string& name) const;
-  /// In the place of one of that name, whose successors go with it: they were measured with what it changes.
+  /// In the place of one of that name, and of all that come after it in calibration_order, whether it was done before
+  /// or is done for the first time: they were measured with what it changes.
   void add(const CalibrationStep& step);
 };
 

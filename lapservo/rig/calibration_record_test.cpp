@@ -44,6 +44,15 @@ TEST(CalibrationRecord, AStepThatIsDoneAgainTakesItsSuccessorsAlong) {
   EXPECT_EQ(record.find("marker"), nullptr);
 }
 
+TEST(CalibrationRecord, AnEarlierStepThatIsDoneForTheFirstTimeTakesTheLaterOnesAlong) {
+  CalibrationRecord record;
+  for (const char* name : {"camera", "marker", "check"}) record.add({name, "a", "", "b"});
+  record.add({"colour", "c", "", "d"});
+  ASSERT_EQ(record.steps.size(), 2U);
+  EXPECT_EQ(record.steps[0].name, "camera");
+  EXPECT_EQ(record.steps[1].name, "colour");
+}
+
 TEST(CalibrationRecord, StatesTellWhetherFilesAreTheSame) {
   const lapservo::testing::TemporaryFolder folder;
   const auto file = folder / "a.csv";

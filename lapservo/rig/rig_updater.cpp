@@ -25,6 +25,12 @@ std::string text_of(const YAML::Node& root) {
   return std::string(out.c_str()) + "\n";
 }
 
+// Wherever it stands.
+YAML::Node camera_of(const YAML::Node& root, const fs::path& path) {
+  const YAML::Node camera = root["camera"];
+  return camera.IsScalar() ? YAML::LoadFile((path.parent_path() / camera.Scalar()).string()) : camera;
+}
+
 // A file's content with one instrument's entry edited.
 template <typename Edit>
 std::string edited(YAML::Node root, const fs::path& path, const fs::path& destination, std::size_t instrument,
@@ -104,8 +110,8 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
                              const MeasuredColour& colour) {
   YAML::Node root = YAML::LoadFile(path.string());
   if (colour.response) {
-    YAML::Node camera = root["camera"];
-    if (camera.IsScalar()) root["camera"] = camera = YAML::LoadFile((path.parent_path() / camera.Scalar()).string());
+    YAML::Node camera = camera_of(root, path);
+    root["camera"] = camera;
     camera["response"] = YAML::Load(response_yaml(*colour.response));
     camera.remove("sigma_response");
   }
@@ -115,6 +121,10 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
     marker["sigma_hues_deg"] = list_of(colour.sigma_hues_deg, rounded);
   };
   return edited(root, path, destination, instrument, with_colour);
+}
+
+bool is_response_measured(const fs::path& path) {
+  return camera_of(YAML::LoadFile(path.string()), path)["sigma_response"].IsDefined();
 }
 
 std::string updated_rig_yaml(const fs::path& path, const Camera& camera, const CameraSigmas& sigmas) {

@@ -33,8 +33,8 @@ struct MeasuredRegistration {
 std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
                              std::size_t instrument, const MeasuredRegistration& registration);
 
-/// How a camera shows the bands of a marker, with one standard deviation of each hue; `response` without a value: as the
-/// file has it.
+/// How a camera shows the bands of a marker, with one standard deviation of each hue; `response` without a value: as
+/// the file has it.
 struct MeasuredColour {
   std::array<double, 3> hues_deg{}, sigma_hues_deg{};
   std::optional<Response> response;
@@ -47,5 +47,9 @@ std::string updated_rig_yaml(const std::filesystem::path& path, const std::files
 
 /// The same with another camera, which stands in the rig itself whatever file the old one came from.
 std::string updated_rig_yaml(const std::filesystem::path& path, const Camera& camera, const CameraSigmas& sigmas);
+
+/// Whether a rig's camera has a response that was measured: sigma_response stands beside it. The rig must have been
+/// read without complaint.
+bool is_response_measured(const std::filesystem::path& path);
 
 }  // namespace lapservo::internal

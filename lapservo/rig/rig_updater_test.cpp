@@ -140,7 +140,9 @@ TEST(UpdatedRig, HoldsAnotherCamera) {
   EXPECT_NE(text.find("sigma_response: 0.003"), std::string::npos) << text;
   EXPECT_NE(text.find("sigma_camera_matrix: {rows: 3, cols: 3, data: [0.125,"), std::string::npos) << text;
   EXPECT_NE(text.find("sigma_translation_m: [0.0001, 0.0001, 0.0002]"), std::string::npos) << text;
+  EXPECT_FALSE(is_response_measured(path));
   testing::write_file(path, text);
+  EXPECT_TRUE(is_response_measured(path));
   const Rig updated = load_rig(path);
   EXPECT_TRUE(updated.camera_file.empty());
   EXPECT_EQ(updated.camera.fx_px, measured.fx_px);

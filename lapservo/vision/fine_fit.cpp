@@ -11,7 +11,6 @@
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
 #include "lapservo/vision/picture_processing.h"
-#include "lapservo/vision/pooled_edges.h"
 
 namespace lapservo::internal {
 namespace {
@@ -51,9 +50,10 @@ double median_sigma_px(std::span<const Measurement> measurements) {
   return sigmas_px.empty() ? 0 : median(sigmas_px);
 }
 
-// What each boundary and side as a whole may be off, and the noise as it is.
+// What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
+// processing may have moved each boundary; of those that `processed` tells, it is corrected.
 CommonErrors common_errors(std::span<const Measurement> measurements, const ResidualLines& lines, const EdgeBlur& blur,
-                           const std::optional<ProcessedEdges>& processed) {
+                           const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px) {
   const FineFitLimits& limits = fine_fit_limits;
   const double motion_blur_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
   const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - limits.usual_blur_px);
@@ -67,27 +67,16 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   CommonErrors errors;
   double bias_squares_px2 = 0;
   for (std::size_t k = 0; k < 4; ++k) {
-    const double bias_px = processed ? processed->bias_px[k] : 0;
-    errors.px[k] = std::hypot(boundary_px, limits.fraction_of_processing * bias_px, unexplained_px);
-    bias_squares_px2 += bias_px * bias_px / 4;
+    const bool corrected = processed && processed->bias_px[k];
+    const double left_px = (corrected ? limits.fraction_of_processing : 1) * bias_px[k];
+    errors.px[k] = std::hypot(boundary_px, left_px, unexplained_px);
+    bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
   }
   errors.px[4] = errors.px[5] = side_px;
   errors.noise_scale = std::max(1.0, scatter_sigmas(measurements, lines));
   errors.doubt_scale = std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px +
                        std::sqrt(bias_squares_px2) / limits.doubted_processing_px;
   return errors;
-}
-
-// What the camera made of the boundaries, where it did more to the picture than its response says.
-std::optional<ProcessedEdges> processed_edges(const LightImage& light, std::span<const Measurement> measurements,
-                                              double blur_px) {
-  constexpr int glance = 12, look = EdgeMeasurements::max_lines;  // places of a boundary
-  if (blur_px > processing_limits.max_blur_px) return std::nullopt;
-  const auto& light_of_value = light.light_of_value();
-  const auto guess = first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px);
-  if (!guess || !is_processed(*guess)) return std::nullopt;
-  const auto explained = explain(light_of_value, pool_edges(light, measurements, look), blur_px);
-  return explained && is_believed(*explained) ? explained : std::nullopt;
 }
 
 // What a pass changed.
@@ -117,7 +106,7 @@ double FineFit::located_fraction() const {
 }
 
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
-                   AskProcessing ask_processing) {
+                   const ExpectedProcessing& expected) {
   constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
   FineFit fit;
   fit.unknowns = start;
@@ -125,6 +114,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const int unknowns = start.size();
   double film_m = film_mean_m;
   EdgeMeasurements pass;
+  EdgeBlur located_with = blur;
   // To where the measurements are; how far the farthest of them moved [px].
   const auto move = [&] {
     const double film_prior = (film_mean_m - film_m) / film_sigma_m;
@@ -142,7 +132,8 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   };
   // Nullopt when too little was seen.
   const auto refine = [&](const Effort& effort) -> std::optional<Change> {
-    pass = measure_edges(scene, light, fit.unknowns, film_m, effort, fit.blur);
+    located_with = fit.blur;
+    pass = measure_edges(scene, light, fit.unknowns, film_m, effort, located_with);
     if (static_cast<int>(pass.all.size()) < 2 * fit.unknowns.size()) return std::nullopt;
     Change change{move()};
     const EdgeBlur improved{pass.boundary_blur.improved(fit.blur.boundaries_px),
@@ -162,12 +153,14 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
     if (change->settled()) break;
   }
   if (!change->settled()) return fit;
-  std::optional<ProcessedEdges> processed;
-  if (ask_processing == AskProcessing::yes) processed = processed_edges(light, pass.all, fit.blur.boundaries_px);
-  if (processed) {
-    fit.processed = true;
+  ProcessingEvidence evidence;
+  if (expected.ask) evidence = find_processing(light, pass.all, located_with.boundaries_px);
+  fit.processing = evidence.processing;
+  if (fit.processing == Processing::unknown) fit.bias_px = expected.bias_px;
+  if (evidence.edges) {
+    fit.bias_px = bias_magnitudes_px(*evidence.edges);
     for (Measurement& m : pass.all)
-      if (m.group < 4) m.residual_px -= processed->bias_px[m.group];
+      if (m.group < 4) m.residual_px -= evidence.edges->bias_px[m.group].value_or(0);
     move();
   }
   fit.lines = pass.lines;
@@ -176,7 +169,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
   const ResidualLines lines = residual_lines(pass.all);
   const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker.tolerance_m,
-                               common_errors(pass.all, lines, fit.blur, processed));
+                               common_errors(pass.all, lines, fit.blur, evidence.edges, fit.bias_px));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;

@@ -4,6 +4,7 @@
 
 #include "lapservo/vision/edge_measurements.h"
 #include "lapservo/vision/light_image.h"
+#include "lapservo/vision/picture_processing.h"
 #include "lapservo/vision/print_fit.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
@@ -24,19 +25,24 @@ struct FineFit {
   double print_off_probability = 0;      ///< that the print is off by more than the rig's tolerance
   double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
   double psi_variance_by_print = 0;      ///< and what the print adds beyond that
-  bool processed = false;                ///< the camera did more to the picture than its response says, as far as asked
+  Processing processing = Processing::unknown;  ///< as far as asked
+  std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
 
   /// Of the boundary points that the image could show, the fraction that was located.
   double located_fraction() const;
 };
 
 /// Whether to ask what the camera did to the picture beyond its response (picture_processing.h), which costs a tenth of
-/// a tracked frame's time where it did nothing. It does the same in all frames.
-enum class AskProcessing { yes, no };
+/// a tracked frame's time where it did nothing. It does the same in all frames: bias_px, an earlier frame's, is what a
+/// frame that can't tell is in doubt by.
+struct ExpectedProcessing {
+  bool ask = true;
+  std::array<double, 4> bias_px{};
+};
 
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
 /// pixel in linear light, with a robust loss. `start` must be good to some pixels.
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
-                   AskProcessing ask_processing = AskProcessing::yes);
+                   const ExpectedProcessing& expected = {});
 
 }  // namespace lapservo::internal

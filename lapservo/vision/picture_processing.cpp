@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -480,6 +481,28 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
     out.bias_px[k] = fitted_offset_px(light_of_value, values_of(predicted(filters, encoded.value)), blur_px);
   }
   return out;
+}
+
+std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges) {
+  double largest_px = 0;
+  for (const auto& bias_px : edges.bias_px) largest_px = std::max(largest_px, std::abs(bias_px.value_or(0)));
+  std::array<double, 4> magnitudes_px{};
+  for (std::size_t k = 0; k < 4; ++k) magnitudes_px[k] = std::abs(edges.bias_px[k].value_or(largest_px));
+  return magnitudes_px;
+}
+
+ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px) {
+  constexpr int glance = 12, look = EdgeMeasurements::max_lines;  // places of a boundary
+  if (blur_px > processing_limits.max_blur_px) return {};
+  const auto& light_of_value = light.light_of_value();
+  const auto guess = first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px);
+  if (!guess) return {};
+  if (!is_processed(*guess)) return {Processing::none, std::nullopt};
+  auto explained = explain(light_of_value, pool_edges(light, measurements, look), blur_px);
+  if (!explained) return {};
+  if (is_believed(*explained)) return {Processing::found, std::move(explained)};
+  if (explained->misfit_without < processing_limits.max_misfit_of_none) return {Processing::none, std::nullopt};
+  return {};
 }
 
 }  // namespace lapservo::internal

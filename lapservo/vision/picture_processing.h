@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 
 #include "lapservo/vision/pooled_edges.h"
 
@@ -29,9 +30,9 @@ EdgeValues processed_edge(const std::array<float, 256>& light_of_value, const Pi
 /// What is to be known of a frame's processing for its boundaries' sake.
 struct ProcessedEdges {
   PictureProcessing processing;
-  std::array<double, 4> bias_px{};  ///< by which fit_step mislocates each boundary
-  double misfit = 0;                ///< rms of what the model leaves of the values
-  double misfit_without = 0;        ///< and of what one without any processing does
+  std::array<std::optional<double>, 4> bias_px;  ///< by which fit_step mislocates each boundary that was seen well
+  double misfit = 0;                             ///< rms of what the model leaves of the values
+  double misfit_without = 0;                     ///< and of what one without any processing does
 };
 
 /// Whether a first guess is more than nothing seen through noise.
@@ -48,5 +49,19 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
 
 /// Whether the frame looks like that rather than like none.
 bool is_believed(const ProcessedEdges& edges);
+
+/// How much each boundary may be mislocated: one that was not seen well by as much as the worst of the others.
+std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges);
+
+/// Whether the camera did more to a picture than its response says. Unknown where the picture can't tell: blurred
+/// widely, too little seen, or unlike any processing that is known here.
+enum class Processing { unknown, none, found };
+struct ProcessingEvidence {
+  Processing processing = Processing::unknown;
+  std::optional<ProcessedEdges> edges;  ///< when found
+};
+
+/// Of the boundaries among `measurements`, which fit_step located with `blur_px`.
+ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px);
 
 }  // namespace lapservo::internal

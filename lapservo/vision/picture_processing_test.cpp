@@ -1,6 +1,8 @@
 #include "lapservo/vision/picture_processing.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -33,7 +35,7 @@ TEST(PictureProcessing, AStepOfLightIsLocatedWhereItIs) {
   const auto explained = explain(srgb(), edges_of({.blur_px = 1}, 0.2), 1);
   ASSERT_TRUE(explained);
   EXPECT_FALSE(is_believed(*explained));
-  for (const double bias_px : explained->bias_px) EXPECT_NEAR(bias_px, 0, 0.01);
+  for (const auto& bias_px : explained->bias_px) EXPECT_NEAR(bias_px.value(), 0, 0.01);
 }
 
 TEST(PictureProcessing, IsToldFromTheBoundaries) {
@@ -64,20 +66,43 @@ TEST(PictureProcessing, TooLittleTellsNothing) {
   EXPECT_FALSE(explain(srgb(), edges, 1));
 }
 
-constexpr std::uint64_t shots = 6;
-
-FineFit fit_through(const effects::CameraEffects& effects, std::uint64_t seed, AskProcessing ask = AskProcessing::yes) {
-  const scenes::Shot& shot = scenes::usual_shot(seed);
-  const scenes::Sight sight(shot.rig, effects::seen_through(effects, shot.bgr, shot.rig.camera));
-  return fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, ask);
+TEST(PictureProcessing, ABoundaryThatWasNotSeenIsInDoubtByAsMuchAsTheWorst) {
+  PooledEdges edges = edges_of({.blur_px = 1, .sharpening = 0.7}, 0);
+  edges[2].places = 2;
+  const auto explained = explain(srgb(), edges, 1);
+  ASSERT_TRUE(explained);
+  EXPECT_FALSE(explained->bias_px[2]);
+  const auto magnitudes_px = bias_magnitudes_px(*explained);
+  EXPECT_GT(magnitudes_px[2], 0.02);
+  for (const std::size_t k : {0U, 1U, 3U}) EXPECT_LE(magnitudes_px[k], magnitudes_px[2]);
 }
 
-double mean_error_rad(const effects::CameraEffects& effects, AskProcessing ask) {
+// Whatever the number of places located: as many as asked for, or all.
+TEST(PooledEdges, TakesAsManyPlacesAsAskedFor) {
+  const scenes::Shot& shot = scenes::usual_shot(1);
+  constexpr int most = 12;
+  for (const int located : {5, 12, 13, 14, 25, 60}) {
+    Measurement m{};
+    m.group = 1, m.expected_px = {100, 100}, m.normal = {1, 0}, m.clear_px = 6;
+    const std::vector<Measurement> measurements(static_cast<std::size_t>(located), m);
+    EXPECT_EQ(pool_edges(shot.sight.light(), measurements, most)[1].places, std::min(located, most)) << located;
+  }
+}
+
+constexpr std::uint64_t shots = 6;
+
+FineFit fit_through(const effects::CameraEffects& effects, std::uint64_t seed, bool ask = true) {
+  const scenes::Shot& shot = scenes::usual_shot(seed);
+  const scenes::Sight sight(shot.rig, effects::seen_through(effects, shot.bgr, shot.rig.camera));
+  return fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, {.ask = ask});
+}
+
+double mean_error_rad(const effects::CameraEffects& effects, bool ask) {
   double sum_rad = 0;
   for (std::uint64_t seed = 1; seed <= shots; ++seed) {
     const FineFit fit = fit_through(effects, seed, ask);
     EXPECT_TRUE(fit.converged);
-    EXPECT_EQ(fit.processed, ask == AskProcessing::yes);
+    EXPECT_EQ(fit.processing, ask ? Processing::found : Processing::unknown);
     sum_rad += fit.unknowns.q()->psi_rad - scenes::usual_shot(seed).q.psi_rad;
   }
   return sum_rad / static_cast<double>(shots);
@@ -86,18 +111,18 @@ double mean_error_rad(const effects::CameraEffects& effects, AskProcessing ask) 
 TEST(PictureProcessing, SharpeningDoesNotMoveTheRotation) {
   effects::CameraEffects sharpened;
   sharpened.sharpening = 0.9, sharpened.sharpening_px = 1.3;
-  EXPECT_GT(std::abs(mean_error_rad(sharpened, AskProcessing::no)), 3e-3);
-  EXPECT_LT(std::abs(mean_error_rad(sharpened, AskProcessing::yes)), 1.5e-3);
+  EXPECT_GT(std::abs(mean_error_rad(sharpened, false)), 3e-3);
+  EXPECT_LT(std::abs(mean_error_rad(sharpened, true)), 1.5e-3);
 }
 
 TEST(PictureProcessing, SubsampledChromaIsTold) {
   effects::CameraEffects subsampled;
   subsampled.subsampled = true;
-  EXPECT_LT(std::abs(mean_error_rad(subsampled, AskProcessing::yes)), 3e-3);
+  EXPECT_LT(std::abs(mean_error_rad(subsampled, true)), 3e-3);
 }
 
 TEST(PictureProcessing, IsNotSeenWhereThereIsNone) {
-  for (std::uint64_t seed = 1; seed <= shots; ++seed) EXPECT_FALSE(fit_through({}, seed).processed);
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) EXPECT_EQ(fit_through({}, seed).processing, Processing::none);
 }
 
 }  // namespace

@@ -40,8 +40,8 @@ PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> mea
     if (m.group < 4) ++located[m.group];
   for (const Measurement& m : measurements) {
     if (m.group >= 4) continue;
-    const int step = (located[m.group] + most - 1) / most;
-    if (seen[m.group]++ % step != 0) continue;
+    // Spread evenly over all that were located.
+    if (seen[m.group]++ * most % std::max(located[m.group], most) >= most) continue;
     const Eigen::Vector2f reach = static_cast<float>(PooledEdge::reach) * m.normal;
     const Eigen::Vector2f first = m.expected_px - reach, last = m.expected_px + reach;
     if (!light.contains(first.cast<double>()) || !light.contains(last.cast<double>())) continue;

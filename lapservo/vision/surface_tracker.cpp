@@ -19,8 +19,15 @@
 namespace lapservo::internal {
 namespace {
 
-// A camera that did nothing to its pictures is asked again after so many frames; one that does, in every frame.
+// A camera that did nothing to its pictures is asked again after so many frames; one that does, in every frame. A frame
+// that can't tell changes neither.
 constexpr int ask_every = 16;
+
+int unasked_after(Processing processing, int before) {
+  if (processing == Processing::found) return ask_every;
+  if (processing == Processing::none) return 1;
+  return std::min(before + 1, ask_every);
+}
 
 bool contradicts_registration(const FineFit& free) {
   const Eigen::Index psi = free.unknowns.size() - 1;
@@ -139,13 +146,12 @@ void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
   UnknownVector velocity = UnknownVector::Zero(fit.unknowns.size());
   if (memory_[i] && memory_[i]->last.q() && fit.unknowns.q())
     velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
-  const bool asked = !memory_[i] || memory_[i]->ask() == AskProcessing::yes;
-  const int unasked = fit.processed ? ask_every : asked ? 1 : memory_[i]->unasked + 1;
-  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked};
+  const int unasked = unasked_after(fit.processing, memory_[i] ? memory_[i]->unasked : ask_every);
+  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px};
 }
 
-AskProcessing SurfaceTracker::Memory::ask() const {
-  return unasked >= ask_every ? AskProcessing::yes : AskProcessing::no;
+ExpectedProcessing SurfaceTracker::Memory::expected() const {
+  return {unasked >= ask_every, bias_px};
 }
 
 SurfaceTracker::Found SurfaceTracker::refusal(Status status, const PoseUnknowns& unknowns) {
@@ -157,11 +163,11 @@ SurfaceTracker::Found SurfaceTracker::refusal(Status status, const PoseUnknowns&
 
 SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImage& light, const Memory& memory) const {
   const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
-  const FineFit near = fit_finely(scene, light, expected, memory.blur, memory.ask());
+  const FineFit near = fit_finely(scene, light, expected, memory.blur, memory.expected());
   if (validate(scene, near) == Status::ok) return {Status::ok, near, {}};
   const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
   if (!coarse.found) return {};
-  const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur, memory.ask());
+  const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur, memory.expected());
   const Status status = validate(scene, fit);
   return status == Status::ok ? Found{status, fit, {}} : refusal(status, fit.unknowns);
 }

@@ -33,7 +33,8 @@ class SurfaceTracker {
     UnknownVector velocity;  // per frame
     EdgeBlur blur;
     int unasked = 0;  // frames since the camera was found to do nothing to its pictures
-    AskProcessing ask() const;
+    std::array<double, 4> bias_px{};
+    ExpectedProcessing expected() const;
   };
   struct Found {
     Status status = Status::no_marker;

@@ -13,6 +13,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
 
@@ -119,6 +120,32 @@ TEST(SurfaceTracker, FollowingTellsTheSameAsLookingAnew) {
     expect_right(followed, motion[i]);
     expect_right(found, motion[i]);
     EXPECT_LT(normalised_square(q_error(followed.rcm->q, found.rcm->q), found.rcm->covariance), 0.05);
+  }
+}
+
+// A defocused picture can't tell that the camera sharpens, and the next one may start from its blur: they are less sure
+// then, and those that follow are corrected again.
+TEST(SurfaceTracker, RemembersThatTheCameraSharpens) {
+  const Rig rig = scenes::usual_rig();
+  effects::CameraEffects sharpened;
+  sharpened.sharpening = 0.9, sharpened.sharpening_px = 1.3;
+  SurfaceTracker following(rig, false), anew(rig, true);
+  const auto motion = slow_motion(rig, 4, 5);
+  for (std::size_t i = 0; i < motion.size(); ++i) {
+    SCOPED_TRACE("frame " + std::to_string(i));
+    const bool can_not_tell = i == 2;
+    RenderOptions options;
+    if (can_not_tell) options.sensor.blur_px = 2.5;
+    const cv::Mat image = effects::seen_through(sharpened, scenes::render(rig, {motion[i]}, i, options), rig.camera);
+    const Observation followed = following.track(image)[0], found = anew.track(image)[0];
+    ASSERT_EQ(followed.status, Status::ok);
+    ASSERT_EQ(found.status, Status::ok);
+    if (can_not_tell) {
+      EXPECT_GT(followed.sigma_tau_rad, 1.2 * found.sigma_tau_rad);
+    } else if (i != 3) {
+      EXPECT_LT(normalised_square(q_error(followed.rcm->q, found.rcm->q), found.rcm->covariance), 0.05);
+      EXPECT_NEAR(followed.sigma_tau_rad, found.sigma_tau_rad, 0.1 * found.sigma_tau_rad);
+    }
   }
 }
 
