@@ -13,10 +13,10 @@ namespace {
 constexpr double print_tolerance_m = 0.1e-3;
 
 // Without a registration that bends poses.
-Rig free_rig(Rig rig, double print_tolerance_m, double focal_change) {
+Rig free_rig(Rig rig, double tolerance_m, double focal_change) {
   for (Instrument& instrument : rig.instruments) {
     instrument.camera_from_rcm.reset();
-    instrument.marker.tolerance_m = std::max(instrument.marker.tolerance_m, print_tolerance_m);
+    instrument.marker.tolerance_m = std::max(instrument.marker.tolerance_m, tolerance_m);
   }
   rig.camera.fx_px *= 1 + focal_change, rig.camera.fy_px *= 1 + focal_change;
   return rig;

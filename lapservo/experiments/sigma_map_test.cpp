@@ -38,8 +38,9 @@ TEST(SigmaMaps, GrowWithDepthAndWithWhatTheCameraAdds) {
 
 // So far away that the bands are a few pixels long.
 TEST(SigmaMaps, TellWhereTheMarkerIsInViewButLost) {
-  const Rig rig = lapservo::testing::small_test_rig();
-  const Rigid3& camera_from_rcm = *rig.instruments[0].camera_from_rcm;
+  Rig rig = lapservo::testing::small_test_rig();
+  const Rigid3 camera_from_rcm = *rig.instruments[0].camera_from_rcm;
+  rig.instruments[0].camera_from_rcm.reset();  // else no far shaft that passes the RCM is in view
   const auto q = configuration_through(camera_from_rcm, {-0.01, 0, 0.1});
   ASSERT_TRUE(q);
   const auto maps = sigma_maps(rig, 0, {0.1, 1.0}, {{camera_from_rcm * rcm_from_unrolled(*q), 0.5, 1e-3}});
