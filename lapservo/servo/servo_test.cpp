@@ -89,7 +89,7 @@ TEST(Servo, SaysThatImagesContradictTheRegistration) {
 TEST(RegistrationWatch, SaysOnceThatShaftsMissTheRcmWhichTheyPassed) {
   Observation passes, misses, lost;
   passes.status = misses.status = Status::ok;
-  passes.rcm.emplace();
+  passes.rcm = Observation::Rcm{};
   const auto frames = [](RegistrationWatch& watch, const std::vector<Observation>& observations, int count) {
     int said = 0;
     for (int i = 0; i < count; ++i) said += watch.add(observations);
