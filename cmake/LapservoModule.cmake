@@ -97,6 +97,7 @@ function(lapservo_fuzzed target)
   endif()
   if(LAPSERVO_BUILD_FUZZERS)
     target_compile_options(${target} PRIVATE -fsanitize-coverage=inline-8bit-counters,indirect-calls,trace-cmp,pc-table)
+    set_target_properties(${target} PROPERTIES LAPSERVO_FUZZED ON)
   endif()
 endfunction()
 
