@@ -27,6 +27,7 @@
 #include "lapservo/robot/clock.h"
 #include "lapservo/robot/joint_path.h"
 #include "lapservo/robot/operating_state.h"
+#include "lapservo/robot/reading_buffer.h"
 #include "lapservo/robot/robot.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/stream/image_stream.h"

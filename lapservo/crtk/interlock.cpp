@@ -86,19 +86,8 @@ void Interlock::on_measured(const JointMessage& message, double arrival_s) {
   ++counts_.joint_states;
   finite_ = all_finite(message.positions);
   if (finite_) measured_ = Reading{*time_s, arrival_s, message.positions, q_of(message, *places)};
-  if (finite_) keep_reading({*time_s, JointVector::from_vector(measured_->q)});
+  if (finite_) readings_.add({*time_s, JointVector::from_vector(measured_->q)});
   watch(arrival_s);
-}
-
-void Interlock::keep_reading(const JointReading& reading) {
-  constexpr std::size_t max_readings = 1000;  // where nobody takes them
-  if (readings_.size() == max_readings) readings_.pop_front();
-  readings_.push_back(reading);
-}
-
-std::vector<JointReading> Interlock::take_readings() {
-  const std::deque<JointReading> taken = std::exchange(readings_, {});
-  return {taken.begin(), taken.end()};
 }
 
 void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {

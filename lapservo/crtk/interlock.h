@@ -15,6 +15,7 @@
 #include "lapservo/crtk/messages.h"
 #include "lapservo/crtk/stamp_clock.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/robot/reading_buffer.h"
 #include "lapservo/robot/robot.h"
 
 namespace lapservo::internal {
@@ -83,7 +84,7 @@ class Interlock {
   /// Robot::state. An arm that must not be moved now is not enabled, whatever it says itself.
   JointState state(double now_s);
   /// Robot::readings.
-  std::vector<JointReading> take_readings();
+  std::vector<JointReading> take_readings() { return readings_.take(); }
   /// To be called every period: the set-point of all the arm's joints to be sent now, if any.
   std::optional<std::vector<double>> tick(double now_s);
 
@@ -111,7 +112,6 @@ class Interlock {
   std::optional<Places> places_in(const JointMessage& message);
   std::optional<double> stamped(StampClock& clock, const JointMessage& message, double arrival_s);
   Eigen::Vector4d q_of(const JointMessage& message, const Places& places) const;
-  void keep_reading(const JointReading& reading);
   void watch(double now_s);
   void forget_path();
   void start(double now_s);
@@ -123,7 +123,7 @@ class Interlock {
   InterlockCounts counts_;
   StampClock measured_clock_, setpoint_clock_;
   std::optional<Reading> measured_, setpoint_;
-  std::deque<JointReading> readings_;  ///< since they were taken
+  ReadingBuffer readings_;
   bool finite_ = true;
   OperatingStateMessage operating_state_;
   bool operating_state_known_ = false, held_ = false, foreign_ = false, stopped_ = false;

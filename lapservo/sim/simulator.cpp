@@ -88,15 +88,8 @@ void Simulator::sleep_until(double time_s) {
     const double next_s = path_ ? std::min(time_s, time_s_ + arm_period_s_) : time_s;
     if (path_) arm_->servo_jp(path_->at(next_s).position);
     step(next_s - time_s_);
-    constexpr std::size_t max_readings = 1000;  // where nobody takes them
-    if (readings_.size() == max_readings) readings_.pop_front();
-    readings_.push_back({time_s_, JointVector::from_vector(arm_->measured_jp())});
+    readings_.add({time_s_, JointVector::from_vector(arm_->measured_jp())});
   }
-}
-
-std::vector<JointReading> Simulator::readings() {
-  const std::deque<JointReading> taken = std::exchange(readings_, {});
-  return {taken.begin(), taken.end()};
 }
 
 ShaftPlacement Simulator::placement() const {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/clock.h"
+#include "lapservo/robot/reading_buffer.h"
 #include "lapservo/robot/robot.h"
 #include "lapservo/sim/arm.h"
 #include "lapservo/sim/endoscope.h"
@@ -67,7 +67,7 @@ class Simulator : public Robot, public ImageStream, public Clock {
 
   JointState state() override;
   /// As often as the arm samples its path.
-  std::vector<JointReading> readings() override;
+  std::vector<JointReading> readings() override { return readings_.take(); }
   void send(const JointPath& path) override;
   std::optional<StampedImage> newest() override;
   double now_s() const override { return time_s_; }
@@ -108,7 +108,7 @@ class Simulator : public Robot, public ImageStream, public Clock {
   Endoscope endoscope_;
   double arm_period_s_;
   std::optional<JointPath> path_;
-  std::deque<JointReading> readings_;
+  ReadingBuffer readings_;
   std::vector<Interval> covered_;
   struct LightChange {
     Interval when;
