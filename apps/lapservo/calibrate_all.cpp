@@ -12,7 +12,6 @@
 #include <fmt/ranges.h>
 
 #include "apps/lapservo/interrupt.h"
-#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/calibration_record.h"
@@ -33,9 +32,9 @@ struct AllOptions {
 struct Step {
   std::string name, what_to_record;
   std::string* input;
-  const char* flag;  // of the input
-  std::vector<std::string> inputs;
-  std::vector<std::string> arguments;  // beyond the subcommand, the input and the rig
+  const char* flag;                    // of the input
+  std::string joints;                  // of the arm meanwhile, where they are given
+  std::vector<std::string> arguments;  // beyond the subcommand, the input, the rig and the joints
 };
 
 std::string quoted(const std::string& word) {
@@ -53,19 +52,12 @@ std::string command_line(const std::vector<std::string>& arguments) {
   return text;
 }
 
-// As if the user had typed it.
-int run_command(std::vector<std::string> arguments) {
-  CLI::App app{"", "lapservo"};
-  app.require_subcommand(1);
+int run_command(const std::vector<std::string>& arguments) {
   Run run;
-  add_calibrate(app, run);
-  add_check(app, run);
-  std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
-  try {
-    app.parse(reversed);
-  } catch (const CLI::ParseError& error) {
-    throw InputError("calibrate all", error.what());
-  }
+  parse_arguments("calibrate all", arguments, [&](Command program) {
+    add_calibrate(program, run);
+    add_check(program, run);
+  });
   return run();
 }
 
@@ -128,34 +120,19 @@ class Guide {
     AllOptions& o = options_;
     std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm)};
     if (!o.aruco.empty()) board.insert(board.end(), {"--aruco", o.aruco});
-    const auto joints = [](const std::string& file) {
-      return file.empty() ? std::vector<std::string>{} : std::vector<std::string>{"--joints", file};
-    };
-    return {{"camera",
-             "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
-             &o.boards,
-             "--boards",
-             {o.boards},
-             board},
-            {"colour", "the mounted marker moved through the picture, 10 s", &o.motion, "--motion", {o.motion}, {}},
-            {"marker",
-             "a slow full turn about the shaft's axis, 20 s or more, near and sharp",
-             &o.turn,
-             "--turn",
-             {o.turn},
-             {}},
-            {"registration",
-             "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
-             &o.swing,
-             "--swing",
-             {o.swing, o.joints},
-             joints(o.joints)},
-            {"check",
-             "another swing, or the same, with a full turn",
-             &o.judged,
-             "--check",
-             {o.judged, o.judged_joints},
-             joints(o.judged_joints)}};
+    return {
+        {"camera",
+         "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
+         &o.boards, "--boards", "", board},
+        {"colour", "the mounted marker moved through the picture, 10 s", &o.motion, "--motion", "", {}},
+        {"marker", "a slow full turn about the shaft's axis, 20 s or more, near and sharp", &o.turn, "--turn", "", {}},
+        {"registration",
+         "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
+         &o.swing,
+         "--swing",
+         o.joints,
+         {}},
+        {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}}};
   }
 
   std::vector<std::string> arguments_of(const Step& step) const {
@@ -164,6 +141,7 @@ class Guide {
     if (!check) all.push_back("calibrate");
     all.insert(all.end(), {step.name, *step.input, "--rig", options_.rig});
     if (!check && !camera) all.insert(all.end(), {"--out", options_.rig});
+    if (!step.joints.empty()) all.insert(all.end(), {"--joints", step.joints});
     all.insert(all.end(), step.arguments.begin(), step.arguments.end());
     if (camera) return all;
     if (!options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
@@ -181,10 +159,12 @@ class Guide {
   }
 
   static std::string state_of(const Step& step) {
-    std::string state = input_state(*step.input);
-    for (std::size_t i = 1; i < step.inputs.size(); ++i)
-      if (!step.inputs[i].empty()) state += "; " + input_state(step.inputs[i]);
-    return state;
+    return input_state(*step.input) + (step.joints.empty() ? "" : "; " + input_state(step.joints));
+  }
+
+  static int tell_done(const CalibrationStep& done) {
+    std::printf("%s: done on %s by %s\n", done.name.c_str(), done.when.c_str(), done.command.c_str());
+    return 0;
   }
 
   int take(Step& step) {
@@ -192,10 +172,8 @@ class Guide {
     expect_redone(step);
     const CalibrationStep* done = record_.find(step.name);
     if (step.input->empty()) {
-      if (done)
-        std::printf("%s: done on %s by %s\n", step.name.c_str(), done->when.c_str(), done->command.c_str());
-      else
-        std::printf("%s: left out; %s names %s\n", step.name.c_str(), step.flag, step.what_to_record.c_str());
+      if (done) return tell_done(*done);
+      std::printf("%s: left out; %s names %s\n", step.name.c_str(), step.flag, step.what_to_record.c_str());
       return 0;
     }
     expect_recording(step);
@@ -203,10 +181,8 @@ class Guide {
       throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
     const std::vector<std::string> arguments = arguments_of(step);
     const CalibrationStep now{step.name, command_line(arguments), state_of(step), now_utc()};
-    if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs) {
-      std::printf("%s: done on %s by %s\n", step.name.c_str(), done->when.c_str(), done->command.c_str());
-      return 0;
-    }
+    if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs)
+      return tell_done(*done);
     std::printf("\n%s: %s\n", step.name.c_str(), now.command.c_str());
     std::fflush(stdout);
     const int code = run_command(with_report(arguments, step));
@@ -236,39 +212,39 @@ int run_all(AllOptions options) {
 
 }  // namespace
 
-void add_calibrate_all(CLI::App* parent, Run& run_later) {
+void add_calibrate_all(Command parent, Run& run_later) {
   auto options = std::make_shared<AllOptions>();
-  CLI::App* command = parent->add_subcommand(
+  Command command = parent.add_subcommand(
       "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.");
-  command->add_option("--rig", options->rig, "The rig as it is known so far; each step replaces it")->required();
-  command->add_option("--boards", options->boards, "For the camera: pictures of a chessboard");
-  command->add_option("--board", options->board, "Its inner corners, COLUMNSxROWS, for example 9x6");
-  command->add_option("--square-mm", options->square_mm, "Width of its squares")->check(number_between(0.1, 1000.0));
-  command->add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
-  command->add_option("--motion", options->motion, "For the colours: the marker in motion; else --swing, else --turn");
-  command->add_option("--turn", options->turn, "For the marker: a slow full turn about the shaft's axis");
-  command->add_option("--swing", options->swing, "For the registration: a smooth swing");
-  command->add_option("--joints", options->joints, "CSV of the joints meanwhile");
-  command->add_option("--check", options->judged, "For the check: a recording; else --swing");
-  command->add_option("--check-joints", options->judged_joints, "CSV of the joints meanwhile; else --joints");
-  command->add_option("--reports", options->reports, "Folder for a page a step");
-  command->add_option("--instrument", options->instrument, "Its name, where the rig has several");
-  command->add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
-  command->add_option("--fps", options->fps, "Frames per second of folders of pictures")
-      ->capture_default_str()
-      ->check(number_between(0.001, 1000.0));
-  command->add_option("--redo", options->redo, "A step that is done again though it was done, with those after it")
-      ->check(CLI::IsMember({"camera", "colour", "marker", "registration", "check"}));
-  command->add_flag("--no-questions", options->no_questions,
-                    "Leave out what no option names; on a terminal it is asked for");
-  command->footer(
+  command.add_option("--rig", options->rig, "The rig as it is known so far; each step replaces it").required();
+  command.add_option("--boards", options->boards, "For the camera: pictures of a chessboard");
+  command.add_option("--board", options->board, "Its inner corners, COLUMNSxROWS, for example 9x6");
+  command.add_option("--square-mm", options->square_mm, "Width of its squares").number_between(0.1, 1000.0);
+  command.add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
+  command.add_option("--motion", options->motion, "For the colours: the marker in motion; else --swing, else --turn");
+  command.add_option("--turn", options->turn, "For the marker: a slow full turn about the shaft's axis");
+  command.add_option("--swing", options->swing, "For the registration: a smooth swing");
+  command.add_option("--joints", options->joints, "CSV of the joints meanwhile");
+  command.add_option("--check", options->judged, "For the check: a recording; else --swing");
+  command.add_option("--check-joints", options->judged_joints, "CSV of the joints meanwhile; else --joints");
+  command.add_option("--reports", options->reports, "Folder for a page a step");
+  command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
+  command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
+  command.add_option("--fps", options->fps, "Frames per second of folders of pictures")
+      .shows_default()
+      .number_between(0.001, 1000.0);
+  command.add_option("--redo", options->redo, "A step that is done again though it was done, with those after it")
+      .one_of({"camera", "colour", "marker", "registration", "check"});
+  command.add_flag("--no-questions", options->no_questions,
+                   "Leave out what no option names; on a terminal it is asked for");
+  command.footer(
       "What was done, by which command and when stands beside the rig (RIG.calibration.yaml): a second run goes on "
       "where\n"
       "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
       "changed.\n"
       "Example:\n  lapservo calibrate all --rig rig.yaml --boards boards/ --board 9x6 --square-mm 5 --turn turn.mp4 "
       "--swing swing.mp4 --joints joints.csv --reports pages");
-  command->callback([options, &run_later] { run_later = [options] { return run_all(*options); }; });
+  command.runs(run_later, [options] { return run_all(*options); });
 }
 
 }  // namespace lapservo::app

@@ -135,25 +135,25 @@ int run_colour(const ColourOptions& options) {
 
 }  // namespace
 
-void add_calibrate_colour(CLI::App* parent, Run& run_later) {
+void add_calibrate_colour(Command parent, Run& run_later) {
   auto options = std::make_shared<ColourOptions>();
-  CLI::App* command = parent->add_subcommand(
+  Command command = parent.add_subcommand(
       "colour", "Measure the hues of a mounted marker's bands as the camera has them, and how it encodes light.");
   command
-      ->add_option("input", options->input,
-                   "The marker in motion: pictures, a folder, a video, or a camera until Ctrl-C")
-      ->required();
+      .add_option("input", options->input,
+                  "The marker in motion: pictures, a folder, a video, or a camera until Ctrl-C")
+      .required();
   add_calibrate_options(command, *options);
-  command->add_option("--report", options->report, "HTML page with the segmentation before and after");
-  command->add_flag("--replace-response", options->replace_response,
-                    "Also a response that calibrate camera measured (sigma_response), which stays else");
-  command->add_flag("--view", options->view, "Show the segmentation before and after in a window");
-  command->footer(
+  command.add_option("--report", options->report, "HTML page with the segmentation before and after");
+  command.add_flag("--replace-response", options->replace_response,
+                   "Also a response that calibrate camera measured (sigma_response), which stays else");
+  command.add_flag("--view", options->view, "Show the segmentation before and after in a window");
+  command.footer(
       "Move the instrument through the picture and turn it, 10 s or more, wholly in view and not overexposed. The "
       "rig's\n"
       "hues may be up to 60 degrees off; the response is written where the frames tell another than the rig's.\n"
       "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml --report colour.html");
-  command->callback([options, &run_later] { run_later = [options] { return run_colour(*options); }; });
+  command.runs(run_later, [options] { return run_colour(*options); });
 }
 
 }  // namespace lapservo::app

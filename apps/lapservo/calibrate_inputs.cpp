@@ -11,7 +11,6 @@
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
-#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/instrument_index.h"
@@ -21,16 +20,20 @@ namespace lapservo::app {
 using namespace internal;
 namespace fs = std::filesystem;
 
-void add_calibrate_options(CLI::App* command, CalibrateOptions& options) {
-  command->add_option("--rig", options.rig, "The rig as it is known so far")->required();
-  command->add_option("--out", options.out, "The rig to write or replace, with what was measured; may be --rig's")
-      ->required();
-  command->add_option("--instrument", options.instrument, "Its name, where the rig has several");
-  command->add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
+void add_calibrate_options(Command command, CalibrateOptions& options) {
+  command.add_option("--rig", options.rig, "The rig as it is known so far").required();
+  command.add_option("--out", options.out, "The rig to write or replace, with what was measured; may be --rig's")
+      .required();
+  add_recording_options(command, options);
+}
+
+void add_recording_options(Command command, CalibrateOptions& options) {
+  command.add_option("--instrument", options.instrument, "Its name, where the rig has several");
+  command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
   add_image_topic_option(command, options.image_topic);
-  command->add_option("--fps", options.fps, "Frames per second of a folder of pictures")
-      ->capture_default_str()
-      ->check(number_between(0.001, 1000.0));
+  command.add_option("--fps", options.fps, "Frames per second of a folder of pictures")
+      .shows_default()
+      .number_between(0.001, 1000.0);
 }
 
 std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options) {

@@ -17,7 +17,10 @@ struct CalibrateOptions {
 };
 
 /// All but the input, the joints and the report, which each subcommand describes itself.
-void add_calibrate_options(CLI::App* command, CalibrateOptions& options);
+void add_calibrate_options(Command command, CalibrateOptions& options);
+
+/// Of these, those that say how the recording is read and which instrument is meant.
+void add_recording_options(Command command, CalibrateOptions& options);
 
 /// Place in the rig of the instrument that is meant. Throws InputError where that is open or unknown.
 std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options);

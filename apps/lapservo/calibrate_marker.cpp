@@ -120,28 +120,27 @@ int run_marker(const CalibrateOptions& options) {
 
 }  // namespace
 
-void add_calibrate_marker(CLI::App* parent, Run& run_later) {
+void add_calibrate_marker(Command parent, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App* command = parent->add_subcommand(
+  Command command = parent.add_subcommand(
       "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.");
   command
-      ->add_option(
-          "input", options->input,
-          "Pictures of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
-      ->required();
+      .add_option("input", options->input,
+                  "Pictures of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
+      .required();
   add_calibrate_options(command, *options);
   add_joint_options(
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
       "bag, the input itself for example: seam_rad too, which pictures alone can't tell");
-  command->add_option("--report", options->report,
-                      "HTML page with what the boundaries miss the print by, before and after");
-  command->footer(
+  command.add_option("--report", options->report,
+                     "HTML page with what the boundaries miss the print by, before and after");
+  command.footer(
       "Turn the instrument about its axis once, or a little more, in 20 to 60 s, near and sharp, the whole marker in "
       "view;\n"
       "it may move otherwise too. All numbers are written with one standard deviation each (sigma_...).\n"
       "Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml --report marker.html");
-  command->callback([options, &run_later] { run_later = [options] { return run_marker(*options); }; });
+  command.runs(run_later, [options] { return run_marker(*options); });
 }
 
 }  // namespace lapservo::app

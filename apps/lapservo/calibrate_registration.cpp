@@ -155,25 +155,25 @@ int run_registration(const CalibrateOptions& options) {
 
 }  // namespace
 
-void add_calibrate_registration(CLI::App* parent, Run& run_later) {
+void add_calibrate_registration(Command parent, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App* command = parent->add_subcommand(
+  Command command = parent.add_subcommand(
       "registration",
       "Measure where the arm stands before the camera, its joints' signs and offsets, and the video's delay.");
   command
-      ->add_option(
+      .add_option(
           "input", options->input,
           "The marker in motion: a folder, a video, a bag (which brings its joints along), a camera, a stream, or "
           "a CSV of observations that were tracked without camera_from_rcm")
-      ->required();
+      .required();
   add_calibrate_options(command, *options);
   add_joint_options(
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
       "bag; without it those in the input, where it is a bag. Without any only the RCM's position can be "
       "told");
-  command->add_option("--report", options->report, "HTML page with what is left at each frame");
-  command->footer(
+  command.add_option("--report", options->report, "HTML page with what is left at each frame");
+  command.footer(
       "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "
       "it\n"
       "smoothly for 10 to 60 s, the marker in view. Clocks of joints and video may differ by up to 3 s. theta's "
@@ -182,7 +182,7 @@ void add_calibrate_registration(CLI::App* parent, Run& run_later) {
       "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml "
       "--report "
       "registration.html");
-  command->callback([options, &run_later] { run_later = [options] { return run_registration(*options); }; });
+  command.runs(run_later, [options] { return run_registration(*options); });
 }
 
 }  // namespace lapservo::app

@@ -12,7 +12,6 @@
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/joint_input.h"
-#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/calibration/rig_check.h"
@@ -124,29 +123,24 @@ int run_check(const CalibrateOptions& options) {
 
 }  // namespace
 
-void add_check(CLI::App& app, Run& run_later) {
+void add_check(Command app, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App* command = app.add_subcommand("check", "Tell whether a rig is good enough, and what to improve first.");
-  command->add_option("input", options->input, "A short recording of the marker in motion: a folder, a video or a bag")
-      ->required();
-  command->add_option("--rig", options->rig, "The rig that is judged")->required();
+  Command command = app.add_subcommand("check", "Tell whether a rig is good enough, and what to improve first.");
+  command.add_option("input", options->input, "A short recording of the marker in motion: a folder, a video or a bag")
+      .required();
+  command.add_option("--rig", options->rig, "The rig that is judged").required();
   add_joint_options(
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
       "bag; without it those in the input, where it is a bag: registration, delay, focal length and "
       "drift too");
-  add_image_topic_option(command, options->image_topic);
-  command->add_option("--out", options->report, "HTML page with figures");
-  command->add_option("--instrument", options->instrument, "Its name, where the rig has several");
-  command->add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
-  command->add_option("--fps", options->fps, "Frames per second of a folder of pictures")
-      ->capture_default_str()
-      ->check(number_between(0.001, 1000.0));
-  command->footer(
+  add_recording_options(command, *options);
+  command.add_option("--out", options->report, "HTML page with figures");
+  command.footer(
       "Swing, insert and withdraw the instrument, and turn it about its axis once, in 10 to 60 s, the marker in view.\n"
       "Exit code 0: good enough, 1: not good enough.\n"
       "Example:\n  lapservo check swing.mp4 --joints joints.csv --rig rig.yaml --out check.html");
-  command->callback([options, &run_later] { run_later = [options] { return run_check(*options); }; });
+  command.runs(run_later, [options] { return run_check(*options); });
 }
 
 }  // namespace lapservo::app

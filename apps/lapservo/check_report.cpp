@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "apps/lapservo/print_residual_plot.h"
 #include "lapservo/experiments/html_report.h"
 
 namespace lapservo::app {
@@ -64,32 +65,6 @@ Plot frame_plot(const std::vector<FrameEvidence>& frames, const std::string& tit
   for (const FrameEvidence& frame : frames)
     if (const std::optional<double> y = value(frame)) series.x.push_back(frame.time_s), series.y.push_back(*y);
   plot.series.push_back(std::move(series));
-  return plot;
-}
-
-// Means over so many parts of the turn, as the report of calibrate marker has them.
-Plot print_plot(const PrintCheck& print) {
-  constexpr std::size_t parts = 60;
-  constexpr double degrees = 360, rad_turn = 6.283185307179586;
-  Plot plot;
-  plot.title = "Boundaries about the rig's print";
-  plot.x = {.label = "tau", .unit = "deg", .low = 0, .high = degrees};
-  plot.y = {.label = "along the shaft", .unit = "mm", .low = {}, .high = {}};
-  plot.references = {{"the rig's print", 0}};
-  for (std::size_t k = 0; k < 4; ++k) {
-    std::array<double, parts> sums{}, counts{};
-    for (const PrintResidual& r : print.residuals) {
-      if (r.boundary != k) continue;
-      const auto part = static_cast<std::size_t>(std::clamp(r.tau_rad / rad_turn * parts, 0.0, parts - 1.0));
-      sums[part] += r.residual_m, counts[part] += 1;
-    }
-    Series series = points(fmt::format("e{}", k), static_cast<int>(k));
-    for (std::size_t part = 0; part < parts; ++part)
-      if (counts[part] >= 3)
-        series.x.push_back(degrees * (static_cast<double>(part) + 0.5) / parts),
-            series.y.push_back(1e3 * sums[part] / counts[part]);
-    plot.series.push_back(std::move(series));
-  }
   return plot;
 }
 
@@ -193,7 +168,9 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
                                 }),
                      "Median over the marker. Near 255 boundaries are lost."});
   if (f.print && f.print->refusal.empty())
-    figures.push_back({print_plot(*f.print), "Means over 6 degrees. Straight lines off 0 are the print's errors."});
+    figures.push_back({print_residual_plot("Boundaries about the rig's print", f.print->residuals,
+                                           {"e0", "e1", "e2", "e3"}, "the rig's print", 60),
+                       "Means over 6 degrees. Straight lines off 0 are the print's errors."});
   return figures;
 }
 

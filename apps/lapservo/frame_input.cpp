@@ -9,13 +9,16 @@ using namespace internal;
 
 std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic) {
   if (is_bag(input)) return std::make_unique<BagFrames>(open_bag(input), image_topic);
-  if (!image_topic.empty())
-    throw InputError("--image-topic", "is " + image_topic + ", which is for bags, and " + input + " is none");
+  refuse_topic_outside_bags("--image-topic", image_topic, input);
   return open_frame_source(input, folder_fps);
 }
 
-void add_image_topic_option(CLI::App* command, std::string& image_topic) {
-  command->add_option("--image-topic", image_topic, "Of a bag with several: the topic whose images are meant");
+void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input) {
+  if (!topic.empty()) throw InputError(option, "is " + topic + ", which is for bags, and " + input + " is none");
+}
+
+void add_image_topic_option(Command command, std::string& image_topic) {
+  command.add_option("--image-topic", image_topic, "Of a bag with several: the topic whose images are meant");
 }
 
 }  // namespace lapservo::app

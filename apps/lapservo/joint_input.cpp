@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "apps/lapservo/frame_input.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "recordings/bag_joints.h"
@@ -37,9 +38,7 @@ std::vector<std::string> columns_of(const std::string& path) {
 }
 
 JointInput read_table(const CalibrateOptions& options, const Instrument& instrument) {
-  if (!options.joint_topic.empty())
-    throw InputError("--joint-topic",
-                     "is " + options.joint_topic + ", which is for bags, and " + options.joints + " is none");
+  refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.joints);
   const Joints joints = joints_of(
       options, instrument, instrument.joints ? std::vector<std::string>() : columns_of(options.joints), options.joints);
   return {joints, read_joint_recording(options.joints, joints), options.joints};
@@ -57,11 +56,11 @@ JointInput read_topic(const CalibrateOptions& options, const Instrument& instrum
 
 }  // namespace
 
-void add_joint_options(CLI::App* command, CalibrateOptions& options, const std::string& help) {
-  command->add_option("--joints", options.joints, help);
-  command->add_option("--joint-topic", options.joint_topic,
-                      "Of a bag with several: the topic of the arm's measured joints; else .../INSTRUMENT/measured_js, "
-                      "or the only measured_js");
+void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {
+  command.add_option("--joints", options.joints, help);
+  command.add_option("--joint-topic", options.joint_topic,
+                     "Of a bag with several: the topic of the arm's measured joints; else .../INSTRUMENT/measured_js, "
+                     "or the only measured_js");
 }
 
 JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames) {
@@ -76,15 +75,14 @@ JointInput read_joint_input(const CalibrateOptions& options, const Instrument& i
 std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource* frames) {
   if (!options.joints.empty()) return read_joint_input(options, instrument, frames);
-  if (is_bag(options.input)) {
-    const auto bag = open_bag(options.input);
-    const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
-    if (topic) return read_topic(options, instrument, frames, *bag, *topic);
-  } else if (!options.joint_topic.empty()) {
-    throw InputError("--joint-topic",
-                     "is " + options.joint_topic + ", which is for bags, and " + options.input + " is none");
+  if (!is_bag(options.input)) {
+    refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.input);
+    return std::nullopt;
   }
-  return std::nullopt;
+  const auto bag = open_bag(options.input);
+  const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
+  if (!topic) return std::nullopt;
+  return read_topic(options, instrument, frames, *bag, *topic);
 }
 
 }  // namespace lapservo::app

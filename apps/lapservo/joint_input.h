@@ -15,7 +15,7 @@ struct JointInput {
   std::string source;  ///< for complaints
 };
 
-void add_joint_options(CLI::App* command, CalibrateOptions& options, const std::string& help);
+void add_joint_options(Command command, CalibrateOptions& options, const std::string& help);
 
 /// Of --joints, a CSV or a bag. The instrument's joints are meant; where it has none, the recording's own four in the
 /// order theta, phi, rho, psi. A bag's stamps go with those of `frames`, which may be nullptr. Throws InputError for

@@ -1,6 +1,5 @@
 #include "apps/lapservo/marker_report.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
@@ -8,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/print_residual_plot.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/experiments/html_report.h"
 
@@ -16,39 +16,6 @@ using namespace internal;
 namespace {
 
 const std::array<std::string, 4> names{"e0 (proximal end)", "e1", "e2", "e3 (distal end)"};
-
-// Means over so many parts of the turn: thousands of points, a page that opens.
-Series binned(const std::vector<PrintResidual>& residuals, std::size_t boundary) {
-  constexpr std::size_t parts = 120;
-  std::array<double, parts> sums{}, counts{};
-  for (const PrintResidual& r : residuals) {
-    if (r.boundary != boundary) continue;
-    const auto part = static_cast<std::size_t>(std::clamp(r.tau_rad / two_pi * parts, 0.0, parts - 1.0));
-    sums[part] += r.residual_m, counts[part] += 1;
-  }
-  Series series{.name = names[boundary],
-                .x = {},
-                .y = {},
-                .sigma = {},
-                .draw = Draw::points,
-                .color = static_cast<int>(boundary)};
-  for (std::size_t part = 0; part < parts; ++part) {
-    if (counts[part] < 3) continue;
-    series.x.push_back(360 * (static_cast<double>(part) + 0.5) / parts);
-    series.y.push_back(1e3 * sums[part] / counts[part]);
-  }
-  return series;
-}
-
-Plot residual_plot(const std::string& title, const std::vector<PrintResidual>& residuals) {
-  Plot plot;
-  plot.title = title;
-  plot.x = {.label = "tau", .unit = "deg", .low = 0, .high = 360};
-  plot.y = {.label = "along the shaft", .unit = "mm", .low = {}, .high = {}};
-  for (std::size_t k = 0; k < 4; ++k) plot.series.push_back(binned(residuals, k));
-  plot.references = {{"the print", 0}};
-  return plot;
-}
 
 void add_print(Plot& plot, const Marker& marker, const std::string& name, Draw draw) {
   constexpr int steps = 24;
@@ -108,7 +75,7 @@ std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Mar
 }
 
 void write_marker_report(const std::filesystem::path& path, const Instrument& instrument,
-                              const MarkerCalibration& calibration) {
+                         const MarkerCalibration& calibration) {
   ReportSection section;
   section.id = "marker";
   section.title = "The marker of " + instrument.name;
@@ -116,6 +83,9 @@ void write_marker_report(const std::filesystem::path& path, const Instrument& in
       fmt::format("{} frames from all sides, {} of them with the seam. Boundaries miss the rig's print by "
                   "{:.3f} px rms and the calibrated one by {:.3f} px, each with the poses that fit it best.",
                   calibration.frames, calibration.seam_views, calibration.before_px, calibration.after_px)};
+  const auto residual_plot = [](const std::string& title, const std::vector<PrintResidual>& residuals) {
+    return print_residual_plot(title, residuals, names, "the print", 120);
+  };
   section.figures = {{residual_plot("Before: the rig's print", calibration.before),
                       "Where boundaries were found, beyond where the rig's print has them; means over 3 degrees."},
                      {residual_plot("After: the calibrated print", calibration.after),

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/interrupt.h"
-#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/servo_arm.h"
 #include "apps/lapservo/servo_options.h"
@@ -149,86 +148,82 @@ int run(const ServoOptions& options) {
 
 }  // namespace
 
-void add_servo(CLI::App& app, Run& run_later) {
+void add_servo(Command app, Run& run_later) {
   auto options = std::make_shared<ServoOptions>();
-  CLI::App* command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
-  command->add_option("--rig", options->rig, "Camera, marker and camera_from_rcm");
-  command->add_option(
+  Command command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
+  command.add_option("--rig", options->rig, "Camera, marker and camera_from_rcm");
+  command.add_option(
       "--robot", options->robot,
       "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/robots.md");
-  command->add_option(
+  command.add_option(
       "--camera", options->camera,
       "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
       "/dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
-  command->add_flag("--enable-motion", options->enable_motion,
-                    "Move a real arm; without it nothing is sent, and what would be is said");
-  command->add_option("--joint-limits", options->joint_limits,
-                      "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
+  command.add_flag("--enable-motion", options->enable_motion,
+                   "Move a real arm; without it nothing is sent, and what would be is said");
+  command.add_option("--joint-limits", options->joint_limits,
+                     "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
   command
-      ->add_option("--trajectory", options->trajectory,
-                   "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
-      ->capture_default_str();
-  command->add_option("--set-point", options->set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(4);
+      .add_option("--trajectory", options->trajectory,
+                  "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
+      .shows_default();
+  command.add_option("--set-point", options->set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
+      .finite_number()
+      .delimiter(',')
+      .expected(4);
   command
-      ->add_option("--via", options->via,
-                   "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
-      ->check(finite_number())
-      ->delimiter(',');
-  command->add_option("--duration", options->duration_s, "Seconds")
-      ->capture_default_str()
-      ->check(number_between(0.1, 36000.0));
+      .add_option("--via", options->via,
+                  "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
+      .finite_number()
+      .delimiter(',');
+  command.add_option("--duration", options->duration_s, "Seconds").shows_default().number_between(0.1, 36000.0);
   command
-      ->add_option("--method", options->method,
-                   "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
-                   "uncalibrated: learns "
-                   "the Jacobian")
-      ->capture_default_str();
+      .add_option("--method", options->method,
+                  "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
+                  "uncalibrated: learns "
+                  "the Jacobian")
+      .shows_default();
   command
-      ->add_option("--tracker", options->tracker,
-                   "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
-                   "--method paper, else surface")
-      ->check(CLI::IsMember({"surface", "centerline"}));
-  command->add_option("--controller", options->controller, "YAML: gains_per_s, limits, window, delay_s ...");
-  command->add_option("--delay-ms", options->delay, "The images' age, or `estimate`")->capture_default_str();
+      .add_option("--tracker", options->tracker,
+                  "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
+                  "--method paper, else surface")
+      .one_of({"surface", "centerline"});
+  command.add_option("--controller", options->controller, "YAML: gains_per_s, limits, window, delay_s ...");
+  command.add_option("--delay-ms", options->delay, "The images' age, or `estimate`").shows_default();
   command
-      ->add_option("--endoscope-attempts", options->endoscope_attempts,
-                   "How often the arm may move a little by itself to measure where an endoscope that moved now stands, "
-                   "else 3; 0: it holds instead")
-      ->check(CLI::Range(0, 100));
-  command->add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(2);
-  command->add_option("--out", options->out,
-                      std::string("Folder for log.csv, rig.yaml and controller.yaml") + OutputFolder::help);
-  command->add_flag("--force", options->force, OutputFolder::force_help);
-  command->add_flag("--strict", options->strict,
-                    "End with exit code 1 when the images contradict the rig's camera_from_rcm or lens");
-  command->add_flag("--view", options->view, "Show it live");
-  command->add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
-  command->add_option("--start", options->start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(4);
-  command->add_option("--seed", options->seed, "sim: of start, tissue, noise, jitter")
-      ->capture_default_str()
-      ->check(seed_number());
-  command->add_option("--latency-ms", options->latency_ms, "sim: from exposure to arrival")
-      ->capture_default_str()
-      ->check(number_between(0.0, 1000.0));
+      .add_option("--endoscope-attempts", options->endoscope_attempts,
+                  "How often the arm may move a little by itself to measure where an endoscope that moved now stands, "
+                  "else 3; 0: it holds instead")
+      .whole_number_between(0, 100);
+  command.add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
+      .finite_number()
+      .delimiter(',')
+      .expected(2);
+  command.add_option("--out", options->out,
+                     std::string("Folder for log.csv, rig.yaml and controller.yaml") + OutputFolder::help);
+  command.add_flag("--force", options->force, OutputFolder::force_help);
+  command.add_flag("--strict", options->strict,
+                   "End with exit code 1 when the images contradict the rig's camera_from_rcm or lens");
+  command.add_flag("--view", options->view, "Show it live");
+  command.add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
+  command.add_option("--start", options->start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
+      .finite_number()
+      .delimiter(',')
+      .expected(4);
+  command.add_option("--seed", options->seed, "sim: of start, tissue, noise, jitter").shows_default().seed_number();
+  command.add_option("--latency-ms", options->latency_ms, "sim: from exposure to arrival")
+      .shows_default()
+      .number_between(0.0, 1000.0);
   command
-      ->add_option("--fps", options->fps,
-                   "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
-      ->check(number_between(6.0, 500.0));
-  add_simulation_options(*command, options->simulation, "sim: ");
-  command->add_option("--hide", options->hide, "sim: cover the marker from,to seconds")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(2);
-  command->footer(
+      .add_option("--fps", options->fps,
+                  "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
+      .number_between(6.0, 500.0);
+  add_simulation_options(command, options->simulation, "sim: ");
+  command.add_option("--hide", options->hide, "sim: cover the marker from,to seconds")
+      .finite_number()
+      .delimiter(',')
+      .expected(2);
+  command.footer(
       "The paper's gains K = 0.032, 0.008, 0.0008, 0.01 (s, r, l, d) and omega = 0.5 have no unit of time in it. Here "
       "K\n"
       "is read per control period (gains_per_s = K times --fps) and omega per second.\n"
@@ -236,7 +231,7 @@ void add_servo(CLI::App& app, Run& run_later) {
       "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,5 --view\n"
       "  lapservo servo --replay run/log.csv");
-  command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
+  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "apps/lapservo/numbers.h"
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"

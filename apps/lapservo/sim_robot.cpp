@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "apps/lapservo/interrupt.h"
-#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/simulation.h"
 #include "apps/lapservo/subcommands.h"
 #include "apps/lapservo/transports.h"
@@ -81,36 +80,32 @@ int run(const Options& options) {
 
 }  // namespace
 
-void add_sim_robot(CLI::App& app, Run& run_later) {
+void add_sim_robot(Command app, Run& run_later) {
   auto options = std::make_shared<Options>();
-  CLI::App* command =
+  Command command =
       app.add_subcommand("sim-robot", "Be an arm and its camera, simulated, for another process to steer.");
-  command->add_option("--rig", options->rig, "What stands before the camera");
-  command->add_option("--transport", options->transport, "ros2 or ros1")->capture_default_str();
-  command->add_option("--arm", options->arm, "Namespace of its CRTK topics")->capture_default_str();
-  command->add_option("--camera", options->camera, "Namespace of image_raw and camera_info")->capture_default_str();
-  command->add_option("--start", options->start, "Measured joints to start from, theta,phi,rho,psi; else random")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(4);
-  command->add_option("--seed", options->seed, "Of start, tissue, noise, jitter")
-      ->capture_default_str()
-      ->check(seed_number());
-  command->add_option("--latency-ms", options->latency_ms, "From exposure to publication")
-      ->capture_default_str()
-      ->check(number_between(0.0, 1000.0));
-  command->add_option("--fps", options->fps, "Frames a second")
-      ->capture_default_str()
-      ->check(number_between(6.0, 120.0));
-  add_simulation_options(*command, options->simulation, "");
-  command->add_option("--duration", options->duration_s, "Seconds; 0: until interrupted")
-      ->capture_default_str()
-      ->check(number_between(0.0, 1e6));
-  command->footer(
+  command.add_option("--rig", options->rig, "What stands before the camera");
+  command.add_option("--transport", options->transport, "ros2 or ros1").shows_default();
+  command.add_option("--arm", options->arm, "Namespace of its CRTK topics").shows_default();
+  command.add_option("--camera", options->camera, "Namespace of image_raw and camera_info").shows_default();
+  command.add_option("--start", options->start, "Measured joints to start from, theta,phi,rho,psi; else random")
+      .finite_number()
+      .delimiter(',')
+      .expected(4);
+  command.add_option("--seed", options->seed, "Of start, tissue, noise, jitter").shows_default().seed_number();
+  command.add_option("--latency-ms", options->latency_ms, "From exposure to publication")
+      .shows_default()
+      .number_between(0.0, 1000.0);
+  command.add_option("--fps", options->fps, "Frames a second").shows_default().number_between(6.0, 120.0);
+  add_simulation_options(command, options->simulation, "");
+  command.add_option("--duration", options->duration_s, "Seconds; 0: until interrupted")
+      .shows_default()
+      .number_between(0.0, 1e6);
+  command.footer(
       "Example, in two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
       "  lapservo sim-robot --rig configs/paper.yaml\n"
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera ros2:/endoscope/image_raw --enable-motion");
-  command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
+  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "apps/lapservo/numbers.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
@@ -45,46 +44,46 @@ std::unique_ptr<Simulator> with_arm(const SimulationOptions& options, const Rig&
 
 }  // namespace
 
-void add_simulation_options(CLI::App& command, SimulationOptions& options, const std::string& only) {
+void add_simulation_options(Command command, SimulationOptions& options, const std::string& only) {
   command
       .add_option("--dynamics", options.dynamics,
                   only + "first-order, or mujoco: motors with PD servos, friction, gravity, elastic transmissions")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"first-order", "mujoco"}));
+      .shows_default()
+      .one_of({"first-order", "mujoco"});
   command
       .add_option("--endoscope-motion", options.endoscope_motion,
                   only +
                       "at,duration,x,y,z,rx,ry,rz: then (s) and for so long (s; 0: at once) the camera moves in its "
                       "own frame by so many mm, and turns about that vector by its length in degrees")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(8);
+      .finite_number()
+      .delimiter(',')
+      .expected(8);
   command.add_option("--exposure-ms", options.exposure_ms, only + "the shutter is open for so long: motion blur")
-      ->capture_default_str()
-      ->check(number_between(0.0, 200.0));
+      .shows_default()
+      .number_between(0.0, 200.0);
   command.add_option("--smoke", options.smoke, only + "fraction of grey veil in front of everything")
-      ->capture_default_str()
-      ->check(number_between(0.0, 1.0));
+      .shows_default()
+      .number_between(0.0, 1.0);
   command.add_option("--blood", options.blood, only + "so many blotches on the marker")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 100));
+      .shows_default()
+      .whole_number_between(0, 100);
   command
       .add_option("--light", options.light,
                   only + "at,duration,times: then (s) and for so long (s) so many times as much light")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(3);
+      .finite_number()
+      .delimiter(',')
+      .expected(3);
   command
       .add_option("--registration-error", options.registration_error,
                   only + "x,y,z: the true RCM lies by so many mm, in the camera's frame, beside the rig's")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(3);
+      .finite_number()
+      .delimiter(',')
+      .expected(3);
   command
       .add_option("--lens-error", options.lens_error,
                   only + "the true focal length is by this fraction longer than the rig's")
-      ->capture_default_str()
-      ->check(number_between(-0.5, 0.5));
+      .shows_default()
+      .number_between(-0.5, 0.5);
 }
 
 Rig true_rig_of(const SimulationOptions& options, const Rig& rig) {

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "apps/lapservo/command.h"
 #include "lapservo/sim/simulator.h"
 
 namespace lapservo::app {
@@ -22,7 +21,7 @@ struct SimulationOptions {
 };
 
 /// `only`: precedes what the options say, for a command that does other things too.
-void add_simulation_options(CLI::App& command, SimulationOptions& options, const std::string& only);
+void add_simulation_options(Command command, SimulationOptions& options, const std::string& only);
 
 /// As things are in the simulation, where `rig` is what is believed of them.
 Rig true_rig_of(const SimulationOptions& options, const Rig& rig);

@@ -16,7 +16,6 @@
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_frames.h"
 #include "apps/lapservo/live_view.h"
-#include "apps/lapservo/numbers.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
@@ -218,46 +217,44 @@ int run(const Options& options) {
 
 }  // namespace
 
-void add_track(CLI::App& app, Run& run_later) {
+void add_track(Command app, Run& run_later) {
   auto options = std::make_shared<Options>();
-  CLI::App* command =
+  Command command =
       app.add_subcommand("track", "Measure the instruments in pictures, a video, a bag or a camera's frames.");
   command
-      ->add_option(
+      .add_option(
           "input", options->input,
           "Picture, folder of pictures, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
           "topic "
           "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
-      ->required();
+      .required();
   add_image_topic_option(command, options->image_topic);
-  command->add_option("--rig", options->rig,
-                      "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
+  command.add_option("--rig", options->rig,
+                     "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
   command
-      ->add_option(
-          "--out", options->out,
-          "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
-          "killed, the rows are in NAME.part, which the next run of that name writes over")
-      ->capture_default_str();
-  command->add_option("--method", options->method, "surface: all visible lines; centerline: the paper's Algorithm 1")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"surface", "centerline"}));
-  command->add_flag("--single", options->single,
-                    "Treat every frame on its own, without tracking from the frame before");
-  command->add_flag("--deinterlace", options->deinterlace,
-                    "For interlaced video (status: interlaced): track the field of the even rows; the same as "
-                    "deinterlace: true in the rig's camera");
-  command->add_option("--overlay", options->overlay,
-                      "Write pictures (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
-                      "same name");
-  command->add_flag("--view", options->view, "Show a live window");
-  command->add_option("--fps", options->fps, "Frames per second of a folder's pictures")
-      ->capture_default_str()
-      ->check(number_between(0.001, 100000.0));
-  command->add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 1000000000));
-  command->footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
-  command->callback([options, &run_later] { run_later = [options] { return run(*options); }; });
+      .add_option("--out", options->out,
+                  "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
+                  "killed, the rows are in NAME.part, which the next run of that name writes over")
+      .shows_default();
+  command.add_option("--method", options->method, "surface: all visible lines; centerline: the paper's Algorithm 1")
+      .shows_default()
+      .one_of({"surface", "centerline"});
+  command.add_flag("--single", options->single, "Treat every frame on its own, without tracking from the frame before");
+  command.add_flag("--deinterlace", options->deinterlace,
+                   "For interlaced video (status: interlaced): track the field of the even rows; the same as "
+                   "deinterlace: true in the rig's camera");
+  command.add_option("--overlay", options->overlay,
+                     "Write pictures (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
+                     "same name");
+  command.add_flag("--view", options->view, "Show a live window");
+  command.add_option("--fps", options->fps, "Frames per second of a folder's pictures")
+      .shows_default()
+      .number_between(0.001, 100000.0);
+  command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
+      .shows_default()
+      .whole_number_between(0, 1000000000);
+  command.footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
+  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

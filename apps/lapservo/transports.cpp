@@ -50,8 +50,9 @@ std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_
 #ifdef LAPSERVO_ROS1
     return std::make_unique<Ros1Transport>(node_name);
 #else
-    refuse_missing(option, transport, "libroscpp-dev, libsensor-msgs-dev, libdiagnostic-msgs-dev, libtrajectory-msgs-dev and "
-                               "python3-gencpp");
+    refuse_missing(option, transport,
+                   "libroscpp-dev, libsensor-msgs-dev, libdiagnostic-msgs-dev, libtrajectory-msgs-dev and "
+                   "python3-gencpp");
 #endif
   }
   throw InputError(option, "is " + transport + ", expected ros2 or ros1");

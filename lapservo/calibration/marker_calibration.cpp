@@ -308,8 +308,8 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   calibration.marker.sigmas = sigmas_of(*last->covariance, nominal.sigmas);
   if (no_gap_sigma_rad) calibration.marker.sigmas.gap_rad = no_gap_sigma_rad;
   calibration.marker.tolerance_m = tolerance_of(PrintShape::of(fit.marker()), *last->covariance, fit.marker());
-  if (const std::string problem = marker_problem(calibration.marker); !problem.empty())
-    return refused("what was found is no marker: " + problem);
+  if (const auto problem = marker_problem(calibration.marker))
+    return refused("what was found is no marker: " + problem->text());
   if (const std::string problem = decoding_problem(calibration.marker); !problem.empty())
     return refused("what was found can't be decoded: " + problem);
   calibration.key_frames = fit.take_frames();

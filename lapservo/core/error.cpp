@@ -24,12 +24,23 @@ std::string shortened(std::string_view text) {
 std::string message(std::string_view source, std::string_view field, std::string_view value,
                     std::string_view expected) {
   std::string text(source);
-  if (!field.empty()) text.append(": ").append(field);
-  text.append(": is ").append(value.empty() ? "empty" : shortened(value)).append(", expected ").append(expected);
+  if (!source.empty() && !field.empty()) text.append(": ");
+  text.append(field)
+      .append(": is ")
+      .append(value.empty() ? "empty" : shortened(value))
+      .append(", expected ")
+      .append(expected);
   return text;
 }
 
 }  // namespace
+
+std::string FieldProblem::text() const {
+  return printable(message("", field, value, expectation));
+}
+
+InputError::InputError(std::string_view source, const FieldProblem& problem)
+    : InputError(source, problem.field, problem.value, problem.expectation) {}
 
 InputError::InputError(std::string_view source, std::string_view field, std::string_view value,
                        std::string_view expected)

@@ -99,8 +99,8 @@ void YamlField::fail(std::string_view value, std::string_view expected) const {
   throw InputError(source_, path_.empty() ? "file" : path_, value, expected);
 }
 
-void YamlField::fail_within(const std::string& problem) const {
-  throw InputError(source_, path_ + "." + problem);
+void YamlField::fail_within(const FieldProblem& problem) const {
+  throw InputError(source_, path_ + "." + problem.field, problem.value, problem.expectation);
 }
 
 std::string YamlField::value_text() const {

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "lapservo/core/error.h"
+
 namespace YAML {
 class Node;
 }
@@ -27,8 +29,8 @@ class YamlField {
   static YamlField parse(std::string_view yaml, const std::string& source, std::string_view kind);
 
   [[noreturn]] void fail(std::string_view value, std::string_view expected) const;
-  /// For complaints that name value and expectation themselves, as "field: is value, expected ...".
-  [[noreturn]] void fail_within(const std::string& problem) const;
+  /// The same of one of its own fields.
+  [[noreturn]] void fail_within(const FieldProblem& problem) const;
   /// The value as complaints show it.
   std::string value_text() const;
 

@@ -119,7 +119,7 @@ Marker design_marker(const DesignSpec& spec) {
   if (!marker)
     throw InputError("length", "no marker: three bands of at least " + millimetres(min_m) +
                                    " that change over the turn do not fit into " + millimetres(length_m));
-  if (const std::string problem = marker_problem(*marker); !problem.empty()) throw InputError("marker", problem);
+  if (const auto problem = marker_problem(*marker)) throw InputError("marker", *problem);
   const std::string problem = by_cross_ratio ? decoding_problem(*marker) : length_decoding_problem(*marker, 0);
   if (!problem.empty()) throw InputError("marker", "not decodable: " + problem);
   return *marker;

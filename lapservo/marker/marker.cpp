@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <sstream>
 
 #include <fmt/format.h>
 
@@ -21,11 +20,8 @@ double hue_gap_deg(double a_deg, double b_deg) {
   return std::abs(std::remainder(a_deg - b_deg, 360.0));
 }
 
-template <typename Value>
-std::string problem(const std::string& field, const Value& value, const std::string& expected) {
-  std::ostringstream text;
-  text << field << ": is " << value << ", expected " << expected;
-  return text.str();
+FieldProblem problem(const std::string& field, double value, const std::string& expected) {
+  return {field, fmt::format("{:g}", value), expected};
 }
 
 }  // namespace
@@ -71,7 +67,7 @@ bool is_printed(const Marker& marker, double tau_rad) {
   return marker.gap_rad == 0 || wrap_two_pi(tau_rad) < marker.covered_rad();
 }
 
-std::string marker_problem(const Marker& marker) {
+std::optional<FieldProblem> marker_problem(const Marker& marker) {
   const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
   if (!within(marker.diameter_m, min_diameter_m, max_diameter_m))
     return problem("diameter_m", marker.diameter_m, "0.0005 to 0.1 (metres)");
@@ -94,13 +90,13 @@ std::string marker_problem(const Marker& marker) {
     return problem("skew_m", marker.skew_m, "-0.02 to 0.02 (metres)");
   if (!within(marker.gap_rad, 0, max_gap_rad)) return problem("gap_rad", marker.gap_rad, "0 to 1.5 (radians)");
   if (!(std::abs(lower_sum - marker.length_m() - marker.skew_m) <= 1e-6))
-    return problem("bands_lower_m", "a sum of " + std::to_string(lower_sum),
-                   marker.skew_m == 0 ? "the same sum as bands_upper_m (" + std::to_string(marker.length_m()) +
-                                            "): both ends of the marker are circles"
-                                      : "that of bands_upper_m and skew_m (" +
-                                            std::to_string(marker.length_m() + marker.skew_m) + ")");
+    return FieldProblem{"bands_lower_m", "a sum of " + std::to_string(lower_sum),
+                        marker.skew_m == 0 ? "the same sum as bands_upper_m (" + std::to_string(marker.length_m()) +
+                                                 "): both ends of the marker are circles"
+                                           : "that of bands_upper_m and skew_m (" +
+                                                 std::to_string(marker.length_m() + marker.skew_m) + ")"};
   if (!(std::abs(marker.seam_rad) <= 100)) return problem("seam_rad", marker.seam_rad, "an angle in radians");
-  return {};
+  return std::nullopt;
 }
 
 bool same_colour_order(const Marker& a, const Marker& b) {

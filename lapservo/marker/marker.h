@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "lapservo/core/error.h"
+
 namespace lapservo {
 
 /// One standard deviation of each number of a marker that was measured.
@@ -58,9 +60,9 @@ double distance_to_seam_rad(const Marker& marker, double tau_rad);
 /// Whether the print is there at all.
 bool is_printed(const Marker& marker, double tau_rad);
 
-/// Empty when lengths, hues and sums make a marker; else "field: is value, expected ..." for the first that doesn't.
-/// Does not ask whether the cross-ratio can be decoded: see CrossRatioDecoder.
-std::string marker_problem(const Marker& marker);
+/// nullopt when lengths, hues and sums make a marker; else what is wrong with the first field that doesn't. Does not ask
+/// whether the cross-ratio can be decoded: see CrossRatioDecoder.
+std::optional<FieldProblem> marker_problem(const Marker& marker);
 
 /// Two markers whose bands have the same hues in the same places can't be told apart by colour.
 bool same_colour_order(const Marker& a, const Marker& b);

@@ -158,7 +158,7 @@ Marker parse_marker(const YamlField& field) {
   if (const YamlField skew = field["skew_m"]; skew.present()) marker.skew_m = skew.number("a length in metres");
   if (const YamlField gap = field["gap_rad"]; gap.present()) marker.gap_rad = gap.number("an angle in radians");
   marker.sigmas = parse_sigmas(field);
-  if (const std::string problem = marker_problem(marker); !problem.empty()) field.fail_within(problem);
+  if (const auto problem = marker_problem(marker)) field.fail_within(*problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
     field.fail("not decodable", "bands whose cross-ratio is monotonic over the rotation: " + problem);
   return marker;

@@ -16,7 +16,7 @@ namespace {
 using namespace internal;
 
 Marker checked(const Marker& marker) {
-  if (const std::string problem = marker_problem(marker); !problem.empty()) throw InputError("Marker", problem);
+  if (const auto problem = marker_problem(marker)) throw InputError("Marker", *problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
     throw InputError("Marker", "not decodable: " + problem);
   return marker;

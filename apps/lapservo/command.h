@@ -1,0 +1,70 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace lapservo::app {
+
+/// What a parsed command line asks for; returns the exit code: 0, or 1 when nothing was found or nothing converged.
+/// Throws InputError for bad input, which main() prints in one line and ends with 2.
+using Run = std::function<int()>;
+
+// CLI11 reads the command line; its headers, which take seconds to compile, stay in command.cpp and main.cpp.
+
+/// An option of a subcommand.
+class Option {
+ public:
+  explicit Option(CLI::Option* option) : option_(option) {}
+
+  Option& required();
+  /// --help shows what it is without being given.
+  Option& shows_default();
+  /// Takes so many values.
+  Option& expected(int count);
+  Option& delimiter(char between_values);
+  Option& one_of(const std::vector<std::string>& words);
+
+  // For numbers: the whole text is one finite number within [low, high], whole where the option's is. CLI11 alone takes
+  // nan through every range, -1 as an enormous unsigned and blanks as nothing.
+  Option& number_between(double low, double high);
+  Option& whole_number_between(double low, double high);
+  Option& finite_number();
+  /// Any whole number of 53 bits.
+  Option& seed_number();
+
+ private:
+  CLI::Option* option_;
+};
+
+/// The program, or a subcommand of it.
+class Command {
+ public:
+  explicit Command(CLI::App* app) : app_(app) {}
+
+  Command add_subcommand(const std::string& name, const std::string& about);
+  void require_subcommand();
+  /// Value: double, int, std::uint64_t, std::string, and optionals and vectors as command.cpp has them. It must live
+  /// until the command line is parsed.
+  template <typename Value>
+  Option add_option(const std::string& names, Value& value, const std::string& help);
+  void add_flag(const std::string& names, bool& value, const std::string& help);
+  /// What --help ends with: an example.
+  void footer(const std::string& text);
+  /// Sets `run_later` when the command line names this subcommand.
+  void runs(Run& run_later, Run run);
+
+ private:
+  CLI::App* app_;
+};
+
+/// As if the user had typed these: `add` adds the subcommands that there are. Throws InputError naming `source`.
+void parse_arguments(const std::string& source, const std::vector<std::string>& arguments,
+                     const std::function<void(Command)>& add);
+
+}  // namespace lapservo::app
