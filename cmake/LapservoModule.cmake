@@ -3,9 +3,10 @@
 # which stand beside the sources (LONG_TESTS: those with something that is too slow under sanitizers), and the headers that
 # are installed (PUBLIC_HEADERS); all other headers are internal. The linker and the test `boundaries`
 # (LapservoBoundaries.cmake) enforce the direction of dependencies.
-# What has no public header is nobody's library: it goes into the tool.
+# What has no public header is nobody's library: it goes into the tool. GLUE: it computes little itself, and where sanitized
+# is compiled without optimisation.
 function(lapservo_module name)
-  cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;LONG_TESTS;TEST_USES" ${ARGN})
+  cmake_parse_arguments(M "GLUE" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;LONG_TESTS;TEST_USES" ${ARGN})
   set(target lapservo_${name})
   set(scope PUBLIC)
   if(NOT M_SOURCES)
@@ -26,7 +27,10 @@ function(lapservo_module name)
   if(M_SOURCES)
     target_link_libraries(${target} PRIVATE ${M_PRIVATE} $<BUILD_INTERFACE:lapservo_flags>)
   endif()
-  if(M_SOURCES AND LAPSERVO_PRECOMPILE)
+  if(M_GLUE AND LAPSERVO_SANITIZE)
+    set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE OFF)  # as the header that it shares
+    lapservo_compile_quickly(${target})
+  elseif(M_SOURCES AND LAPSERVO_PRECOMPILE)
     target_precompile_headers(${target} REUSE_FROM lapservo_precompiled)
   endif()
   if(M_PUBLIC_HEADERS)
@@ -54,6 +58,21 @@ function(lapservo_install target)
   endif()
   target_sources(${target} ${scope} FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${ARGN})
   install(TARGETS ${target} EXPORT lapservoTargets FILE_SET HEADERS)
+endfunction()
+
+# What stands between lapservo/ and the world outside: lapservo_adapter(NAME SOURCES ... USES ... PRIVATE ...) is nobody's
+# library either.
+function(lapservo_adapter name)
+  cmake_parse_arguments(A "" "" "SOURCES;USES;PRIVATE" ${ARGN})
+  set(target lapservo_${name})
+  add_library(${target} STATIC ${A_SOURCES})
+  add_library(lapservo::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_include_directories(${target} PUBLIC ${PROJECT_SOURCE_DIR})
+  target_link_libraries(${target} PUBLIC ${A_USES} PRIVATE ${A_PRIVATE} lapservo_flags)
+  if(LAPSERVO_PRECOMPILE)
+    target_precompile_headers(${target} REUSE_FROM lapservo_precompiled)
+  endif()
 endfunction()
 
 # For tests and the tool: they are compiled more often than they run. (Clang's sanitizers cost optimisation most of all; GCC
