@@ -371,6 +371,40 @@ TEST_P(FirstWireLoop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
   loop->wait();
 }
 
+TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
+  const auto room = arm();
+  const std::vector<std::string> recording{"record",
+                                           "--rig",
+                                           file("rig.yaml"),
+                                           "--camera",
+                                           GetParam() + ":/endoscope/image_raw",
+                                           "--robot",
+                                           GetParam() + ":PSM1",
+                                           "--out",
+                                           file("swing"),
+                                           "--fps",
+                                           "15",
+                                           "--move",
+                                           "swing",
+                                           "--scale",
+                                           "0.5",
+                                           "--duration",
+                                           "10"};
+  Process refused(recording, file("refused.txt"));
+  EXPECT_EQ(refused.wait(), 2);
+  EXPECT_NE(said("refused.txt").find("--enable-motion"), std::string::npos) << said("refused.txt");
+  auto moving = recording;
+  moving.push_back("--enable-motion");
+  Process record(moving, file("record.txt"));
+  ASSERT_EQ(record.wait(), 0) << said("record.txt");
+  Process calibrate({"calibrate", "registration", file("swing"), "--rig", file("rig.yaml"), "--out", file("new.yaml")},
+                    file("calibrate.txt"));
+  ASSERT_EQ(calibrate.wait(), 0) << said("calibrate.txt");
+  const Rigid3 moved =
+      rig_.instruments[0].camera_from_rcm->inverse() * *load_rig(file("new.yaml")).instruments[0].camera_from_rcm;
+  EXPECT_LT(moved.translation.norm(), 0.5e-3) << said("calibrate.txt");
+}
+
 TEST_P(WireLoop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
   Arm room(GetParam(), rig_);
   const auto ears = named_transport(GetParam(), "ears"), foreign = named_transport(GetParam(), "foreign");

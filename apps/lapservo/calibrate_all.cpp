@@ -12,6 +12,7 @@
 #include <fmt/ranges.h>
 
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/record.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/calibration_record.h"
@@ -24,8 +25,9 @@ namespace fs = std::filesystem;
 
 struct AllOptions {
   std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, reports, instrument, redo;
+  std::string camera, robot, joint_limits;  // of a live system
   double square_mm = 0, fps = 30;
-  bool deinterlace = false, no_questions = false;
+  bool deinterlace = false, no_questions = false, enable_motion = false;
 };
 
 // One step: what the user is to record for it, and the command that measures it.
@@ -36,6 +38,10 @@ struct Step {
   std::string joints;                  // of the arm meanwhile, where they are given
   std::vector<std::string> arguments;  // beyond the subcommand, the input, the rig and the joints
 };
+
+constexpr const char* to_record_turn = "a slow full turn about the shaft's axis, 20 s or more, near and sharp";
+constexpr const char* to_record_swing =
+    "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s";
 
 std::string quoted(const std::string& word) {
   const bool plain = word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./:,=") ==
@@ -79,6 +85,10 @@ std::string asked(const Step& step) {
   return answer;
 }
 
+bool asks(const AllOptions& options) {
+  return !options.no_questions && ::isatty(STDIN_FILENO);
+}
+
 class Guide {
  public:
   explicit Guide(AllOptions& options)
@@ -91,7 +101,7 @@ class Guide {
   int run() {
     watch_for_interrupts();
     std::vector<Step> all = steps();
-    if (!asks())
+    if (!asks(options_))
       for (const Step& step : all) expect_redone(step);
     for (Step& step : all) {
       const int code = take(step);
@@ -101,8 +111,6 @@ class Guide {
   }
 
  private:
-  bool asks() const { return !options_.no_questions && ::isatty(STDIN_FILENO); }
-
   void expect_redone(const Step& step) const {
     if (step.input->empty() && options_.redo == step.name)
       throw InputError("--redo", fmt::format("{} needs {}: {}", step.name, step.flag, step.what_to_record));
@@ -120,19 +128,18 @@ class Guide {
     AllOptions& o = options_;
     std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm)};
     if (!o.aruco.empty()) board.insert(board.end(), {"--aruco", o.aruco});
-    return {
-        {"camera",
-         "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
-         &o.boards, "--boards", "", board},
-        {"colour", "the mounted marker moved through the picture, 10 s", &o.motion, "--motion", "", {}},
-        {"marker", "a slow full turn about the shaft's axis, 20 s or more, near and sharp", &o.turn, "--turn", "", {}},
-        {"registration",
-         "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
-         &o.swing,
-         "--swing",
-         o.joints,
-         {}},
-        {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}}};
+    return {{"camera",
+             "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
+             &o.boards, "--boards", "", board},
+            {"colour", "the mounted marker moved through the picture, 10 s", &o.motion, "--motion", "", {}},
+            {"marker", to_record_turn, &o.turn, "--turn", "", {}},
+            {"registration",
+             "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
+             &o.swing,
+             "--swing",
+             o.joints,
+             {}},
+            {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}}};
   }
 
   std::vector<std::string> arguments_of(const Step& step) const {
@@ -168,7 +175,7 @@ class Guide {
   }
 
   int take(Step& step) {
-    if (step.input->empty() && asks()) *step.input = asked(step);
+    if (step.input->empty() && asks(options_)) *step.input = asked(step);
     expect_redone(step);
     const CalibrationStep* done = record_.find(step.name);
     if (step.input->empty()) {
@@ -201,8 +208,46 @@ class Guide {
   CalibrationRecord record_;
 };
 
+#ifdef LAPSERVO_ROS2_BAGS
+// The recording of this name beside the rig, made now where it isn't there. Empty: it could not be made.
+std::string recorded(const AllOptions& options, const std::string& name, const char* what) {
+  const fs::path folder = fs::path(options.rig + ".recordings") / name;
+  if (fs::exists(folder / "metadata.yaml")) return folder.string();
+  RecordOptions recording;
+  recording.camera = options.camera, recording.robot = options.robot, recording.rig = options.rig;
+  recording.joint_limits = options.joint_limits, recording.out = folder.string();
+  recording.enable_motion = options.enable_motion, recording.until_enter = !options.enable_motion;
+  if (options.enable_motion) {
+    recording.move = name;
+  } else {
+    if (!asks(options))
+      throw InputError("--camera", "needs a terminal where it is asked when to record, or --enable-motion");
+    std::fprintf(stderr, "\n%s: %s\n  Enter begins, and ends it: ", name.c_str(), what);
+    std::string line;
+    std::getline(std::cin, line);
+  }
+  std::printf("\nrecording %s: %s\n", name.c_str(), folder.c_str());
+  std::fflush(stdout);
+  const int code = record(recording);
+  if (code == 0 && !interrupted()) return folder.string();
+  fs::remove_all(folder);
+  std::fprintf(stderr, "lapservo: stopped at recording %s: the same command goes on from there\n", name.c_str());
+  return {};
+}
+#endif
+
 int run_all(AllOptions options) {
   load_rig(options.rig);
+  if (!options.camera.empty()) {
+#ifdef LAPSERVO_ROS2_BAGS
+    if (options.turn.empty()) options.turn = recorded(options, "turn", to_record_turn);
+    if (options.turn.empty()) return 1;
+    if (options.swing.empty()) options.swing = recorded(options, "swing", to_record_swing);
+    if (options.swing.empty()) return 1;
+#else
+    throw InputError("--camera", "can't be recorded by this build, which lacks libsqlite3-dev");
+#endif
+  }
   if (options.motion.empty()) options.motion = options.swing.empty() ? options.turn : options.swing;
   if (options.judged.empty()) options.judged = options.swing;
   if (options.judged_joints.empty() && options.judged == options.swing) options.judged_joints = options.joints;
@@ -227,6 +272,14 @@ void add_calibrate_all(Command parent, Run& run_later) {
   command.add_option("--joints", options->joints, "CSV of the joints meanwhile");
   command.add_option("--check", options->judged, "For the check: a recording; else --swing");
   command.add_option("--check-joints", options->judged_joints, "CSV of the joints meanwhile; else --joints");
+  command.add_option(
+      "--camera", options->camera,
+      "A live system's images, as `lapservo record` takes them: what is missing of --turn and --swing is "
+      "recorded into RIG.recordings; delete it to have it recorded anew");
+  command.add_option("--robot", options->robot, "and its arm: ros2:PSM1 or ros1:PSM1");
+  command.add_flag("--enable-motion", options->enable_motion,
+                   "Move the arm for these recordings, see `lapservo record --move`; else a person does, and is asked");
+  command.add_option("--joint-limits", options->joint_limits, "For --enable-motion: YAML of the arm's joints");
   command.add_option("--reports", options->reports, "Folder for a page a step");
   command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
   command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
@@ -243,7 +296,8 @@ void add_calibrate_all(Command parent, Run& run_later) {
       "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
       "changed.\n"
       "Example:\n  lapservo calibrate all --rig rig.yaml --boards boards/ --board 9x6 --square-mm 5 --turn turn.mp4 "
-      "--swing swing.mp4 --joints joints.csv --reports pages");
+      "--swing swing.mp4 --joints joints.csv --reports pages\n"
+      "  lapservo calibrate all --rig rig.yaml --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --enable-motion");
   command.runs(run_later, [options] { return run_all(*options); });
 }
 

@@ -170,7 +170,7 @@ void add_experiment(Command app, Run& run_later) {
   command.add_option("name", options->name, "Which: " + names()).required().one_of(choices);
   command
       .add_option("--out", options->out,
-                  std::string("Folder for report.html, the CSVs behind it and rig.yaml") + OutputFolder::help)
+                  fmt::format("Folder for report.html, the CSVs behind it and rig.yaml{}", OutputFolder::help))
       .required();
   command.add_flag("--force", options->force, OutputFolder::force_help);
   command.add_option("--rig", options->rig,

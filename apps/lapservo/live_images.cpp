@@ -38,21 +38,26 @@ bool names_live_images(const std::string& text) {
   return false;
 }
 
+std::unique_ptr<LiveCamera> open_local_camera(const std::string& text, const std::string& option, const cv::Size& size,
+                                              ImageSink sink) {
+  if (text.starts_with(gst)) return open_pipeline(text, option, std::move(sink));
+  if (!text.starts_with(device))
+    throw InputError(option, (text.empty() ? "is missing" : "is " + text) +
+                                 ", expected ros2:/topic, ros1:/topic, /dev/videoN or gst:PIPELINE");
+  if (size.empty()) throw InputError(option, "is " + text + ", which needs --rig: it is asked for its camera's size");
+  return open_v4l2_camera(text, size.width, size.height, std::move(sink));
+}
+
 LiveImages::LiveImages(const std::string& text, const std::string& option, const Camera& camera, const Clock& clock,
                        Transports& transports)
     : clock_(clock),
       receiver_(camera.width_px, camera.height_px, text.starts_with("ros") ? StampsBy::sender : StampsBy::loop) {
-  if (!names_live_images(text))
-    throw InputError(option, (text.empty() ? "is missing" : "is " + text) +
-                                 ", expected ros2:/topic, ros1:/topic, /dev/videoN or gst:PIPELINE");
-  if (text.starts_with(device)) {
-    camera_ = open_v4l2_camera(text, camera.width_px, camera.height_px, sink());
-  } else if (text.starts_with(gst)) {
-    camera_ = open_pipeline(text, option, sink());
-  } else {
-    const Address address = address_of(text, option);
-    subscribe(transports.get(address.transport, option), address.name);
+  if (!text.starts_with("ros1:") && !text.starts_with("ros2:")) {
+    camera_ = open_local_camera(text, option, {camera.width_px, camera.height_px}, sink());
+    return;
   }
+  const Address address = address_of(text, option);
+  subscribe(transports.get(address.transport, option), address.name);
 }
 
 ImageSink LiveImages::sink() {

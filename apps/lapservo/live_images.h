@@ -28,6 +28,11 @@ class Transports {
 /// Whether a text names images that come by themselves: ros2:/topic, ros1:/topic, gst:PIPELINE, /dev/videoN.
 bool names_live_images(const std::string& text);
 
+/// A camera of this computer: /dev/videoN, which must have this size, or gst:PIPELINE. Throws InputError, naming
+/// `option`, for what is none of them or can't be opened.
+std::unique_ptr<internal::LiveCamera> open_local_camera(const std::string& text, const std::string& option,
+                                                        const cv::Size& size, internal::ImageSink sink);
+
 /// Those images, received; see internal::ImageReceiver.
 class LiveImages : public ImageStream {
  public:

@@ -60,6 +60,9 @@ int parse_and_run(int argc, char** argv) {
   lapservo::app::add_calibrate(program, run);
   lapservo::app::add_check(program, run);
   lapservo::app::add_experiment(program, run);
+#ifdef LAPSERVO_ROS2_BAGS
+  lapservo::app::add_record(program, run);
+#endif
   lapservo::app::add_render(program, run);
   lapservo::app::add_servo(program, run);
   lapservo::app::add_sim_robot(program, run);

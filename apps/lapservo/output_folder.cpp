@@ -133,7 +133,7 @@ OutputFolder::Unfinished::~Unfinished() {
 OutputFolder::OutputFolder(const fs::path& path, const Rig& rig, const InputFiles& inputs, bool force,
                            std::uintmax_t needed_bytes)
     : folder_(path), unfinished_(checked(folder_.path(), inputs, force, needed_bytes)) {
-  write_file(*this / "rig.yaml", std::string(heading) + "\n" + rig_yaml(rig));
+  write_file(*this / "rig.yaml", fmt::format("{}\n{}", heading, rig_yaml(rig)));
 }
 
 void OutputFolder::commit() {

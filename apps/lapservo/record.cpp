@@ -1,0 +1,300 @@
+#include "apps/lapservo/record.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <poll.h>
+#include <string>
+#include <thread>
+#include <unistd.h>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/live_images.h"
+#include "apps/lapservo/progress.h"
+#include "apps/lapservo/subcommands.h"
+#include "apps/lapservo/transports.h"
+#include "lapservo/control/calibration_motion.h"
+#include "lapservo/core/error.h"
+#include "lapservo/crtk/arm_limits.h"
+#include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/robot/steady_clock.h"
+#include "recordings/bag_recorder.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+constexpr double patience_s = 15;  // for the first image, the arm's first joint states
+
+using SystemClock = std::chrono::system_clock;
+
+double since_1970_s() {
+  return std::chrono::duration<double>(SystemClock::now().time_since_epoch()).count();
+}
+
+// Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
+double stamp_since_1970_s(double stamp_s, const Clock& clock) {
+  return since_1970_s() - (std::isfinite(stamp_s) ? clock.now_s() - stamp_s : 0);
+}
+
+// What comes, into the bag.
+class Recording {
+ public:
+  Recording(const RecordOptions& options, const std::optional<Rig>& rig, Transports& transports, const Clock& clock)
+      : fps_(options.fps), recorder_(options.out) {
+    if (!options.robot.empty()) subscribe_joints(transports, address_of(options.robot, "--robot"));
+    if (options.camera.starts_with("ros1:") || options.camera.starts_with("ros2:")) {
+      const Address address = address_of(options.camera, "--camera");
+      subscribe_images(transports.get(address.transport, "--camera"), address.name);
+    } else {
+      const cv::Size size = rig ? cv::Size(rig->camera.width_px, rig->camera.height_px) : cv::Size();
+      camera_ = open_local_camera(options.camera, "--camera", size, sink(clock));
+    }
+  }
+
+  RecordedCounts counts() const { return recorder_.counts(); }
+  void check() const { recorder_.check(); }
+  void finish() {
+    camera_.reset(), subscriptions_.clear();
+    recorder_.finish();
+  }
+  std::optional<std::string> ended() const { return camera_ ? camera_->ended() : std::nullopt; }
+
+ private:
+  template <typename Message>
+  auto into(const std::string& topic) {
+    return [this, topic](Message&& message) { add(topic, std::move(message)); };
+  }
+  void add(const std::string& topic, JointMessage&& message) { recorder_.add(topic, std::move(message)); }
+  template <typename Image>
+  void add(const std::string& topic, Image&& message) {
+    // Of a stream that is a little faster all are kept.
+    if (message.stamp_s < next_image_s_ && message.stamp_s > next_image_s_ - 2 / fps_) return;
+    next_image_s_ = message.stamp_s + 0.75 / fps_;
+    recorder_.add(topic, std::forward<Image>(message));
+  }
+  void subscribe_joints(Transports& transports, const Address& arm) {
+    const std::string topic = topic_of(arm.name, "measured_js");
+    subscriptions_.push_back(
+        transports.get(arm.transport, "--robot").subscribe_joints(topic, into<JointMessage>(topic)));
+  }
+  void subscribe_images(Transport& transport, const std::string& topic) {
+    subscriptions_.push_back(topic.ends_with("/compressed")
+                                 ? transport.subscribe_compressed_images(topic, into<CompressedImageMessage>(topic))
+                                 : transport.subscribe_images(topic, into<ImageMessage>(topic)));
+  }
+  ImageSink sink(const Clock& clock) {
+    const auto add = [this, &clock](const std::string& topic, auto&& message) {
+      message.stamp_s = stamp_since_1970_s(message.stamp_s, clock);
+      this->add(topic, std::move(message));
+    };
+    return {[add](ImageMessage&& message) { add("/camera/image_raw", std::move(message)); },
+            [add](CompressedImageMessage&& message) { add("/camera/image_raw/compressed", std::move(message)); }};
+  }
+
+  double fps_, next_image_s_ = 0;
+  BagRecorder recorder_;
+  std::vector<Transport::Subscription> subscriptions_;  // these last: they use the recorder
+  std::unique_ptr<LiveCamera> camera_;
+};
+
+// The arm on its way along a motion.
+class MovingArm {
+ public:
+  MovingArm(const RecordOptions& options, const Rig& rig, Transports& transports, const Clock& clock)
+      : options_(options), clock_(clock), config_(config_of(options, rig)) {
+    const Address arm = address_of(options.robot, "--robot");
+    robot_ = std::make_unique<CrtkRobot>(transports.get(arm.transport, "--robot"), arm.name, config_, clock);
+  }
+
+  // Nothing while it is on its way or about to begin, then why it has ended: empty when the motion is done.
+  std::optional<std::string> advance() {
+    const double now_s = clock_.now_s();
+    if (!begun_s_) begun_s_ = now_s;
+    const JointState measured = robot_->state();
+    if (!motion_) return begin(now_s, measured.q.vector());
+    if (const Blocked blocked = robot_->blocked(); blocked != Blocked::none) return wait(now_s, blocked);
+    if (blocked_s_) go_on(now_s, measured.q.vector());
+    const double t = now_s - started_s_;
+    if (t > motion_->duration_s + period_s) return "";
+    const Eigen::Vector4d on_path = path_->at(now_s).position;
+    if (((on_path - measured.q.vector()).cwiseAbs().array() > config_.max_distance.array()).any()) {
+      path_->reset(now_s, measured.q.vector());  // let go of what it runs against
+      robot_->send(*path_);
+      return "the arm does not follow";
+    }
+    const Eigen::Vector4d wanted = motion_->at(t), rate = (motion_->at(t + period_s) - wanted) / period_s;
+    path_->ramp_to(now_s, rate + (wanted - on_path) / follow_s, period_s);
+    robot_->send(*path_);
+    return std::nullopt;
+  }
+  static constexpr double period_s = 0.01;
+
+ private:
+  static constexpr double follow_s = 0.5, max_blocked_s = 3;
+
+  static InterlockConfig config_of(const RecordOptions& options, const Rig& rig) {
+    const Instrument& instrument = rig.instruments.front();
+    if (!instrument.joints)
+      throw InputError(options.rig, "instruments[0].joints is missing, expected the arm's joints: names, sign, offset");
+    InterlockConfig config;
+    config.joints = *instrument.joints;
+    config.motion_enabled = options.enable_motion;
+    if (!options.joint_limits.empty())
+      config.limits = limits_of_q(config.joints, load_arm_limits(options.joint_limits));
+    return config;
+  }
+  // The interlock keeps the arm still meanwhile.
+  std::optional<std::string> wait(double now_s, Blocked blocked) {
+    if (!blocked_s_) blocked_s_ = now_s;
+    if (blocked != Blocked::foreign_command && now_s < *blocked_s_ + max_blocked_s) return std::nullopt;
+    return std::string(to_string(blocked)) + " (the arm is " + robot_->operating_state() + ")";
+  }
+  // From where the arm is now towards where the motion was interrupted.
+  void go_on(double now_s, const Eigen::Vector4d& from) {
+    started_s_ += now_s - *std::exchange(blocked_s_, std::nullopt);
+    path_->reset(now_s, from);
+  }
+  std::optional<std::string> begin(double now_s, const Eigen::Vector4d& start) {
+    if (robot_->blocked() != Blocked::none) {
+      if (now_s < *begun_s_ + patience_s) return std::nullopt;
+      return std::string(to_string(robot_->blocked())) + ": the arm can't be moved";
+    }
+    const std::string source = options_.joint_limits.empty() ? "--joint-limits" : options_.joint_limits;
+    motion_ = options_.move == "turn" ? turn_motion(start, config_.limits, source)
+                                      : swing_motion(start, config_.limits, options_.scale, options_.duration_s);
+    started_s_ = now_s;
+    path_.emplace(config_.limits.acceleration);
+    path_->reset(now_s, start);
+    robot_->send(*path_);
+    return std::nullopt;
+  }
+
+  const RecordOptions& options_;
+  const Clock& clock_;
+  InterlockConfig config_;
+  std::unique_ptr<CrtkRobot> robot_;
+  std::optional<JointMotion> motion_;
+  std::optional<JointPath> path_;
+  std::optional<double> begun_s_, blocked_s_;
+  double started_s_ = 0;
+};
+
+// Before anything is opened or made.
+void expect_possible(const RecordOptions& options) {
+  if (options.move.empty()) return;
+  if (options.robot.empty()) throw InputError("--move", "needs --robot, for example --robot ros2:PSM1");
+  if (options.rig.empty()) throw InputError("--move", "needs --rig, whose joints entry names the arm's joints");
+  if (!options.enable_motion)
+    throw InputError("--move", "moves the arm: give --enable-motion too, once nothing is in its way");
+}
+
+bool line_was_entered() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  if (::poll(&input, 1, 0) <= 0) return false;
+  std::string line;
+  std::getline(std::cin, line);
+  return true;
+}
+
+std::string told(const RecordedCounts& counts) {
+  std::string text = fmt::format("{} images, {} joint readings", counts.images, counts.joints);
+  if (counts.dropped > 0)
+    text += fmt::format(", {} images dropped: the disk or the processor is too slow", counts.dropped);
+  if (counts.unstamped > 0) text += fmt::format(", {} messages without a stamp left out", counts.unstamped);
+  return text;
+}
+
+// Why the recording ends; empty: as it should.
+std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recording& recording, MovingArm* arm) {
+  Progress progress(std::nullopt);
+  std::optional<double> first_s;
+  const double begin_s = clock.now_s();
+  while (!interrupted()) {
+    recording.check();
+    const RecordedCounts counts = recording.counts();
+    const double now_s = clock.now_s();
+    if (!first_s && counts.images > 0) first_s = now_s;
+    progress.show(static_cast<int>(counts.images), fmt::format(" images, {} joint readings", counts.joints));
+    if (!first_s && now_s > begin_s + patience_s) return fmt::format("no image came within {:.0f} s", patience_s);
+    if (const auto ended = recording.ended()) return *ended;
+    if (first_s && arm) {
+      if (const auto ended = arm->advance()) return *ended;
+    } else if (first_s && (options.until_enter ? line_was_entered() : now_s > *first_s + options.duration_s)) {
+      return "";
+    }
+    std::this_thread::sleep_for(std::chrono::duration<double>(MovingArm::period_s));
+  }
+  return "";
+}
+
+}  // namespace
+
+int record(const RecordOptions& options) {
+  expect_possible(options);
+  const std::optional<Rig> rig = options.rig.empty() ? std::nullopt : std::optional(load_rig(options.rig));
+  Transports transports("lapservo_record");
+  SteadyClock clock;
+  std::optional<MovingArm> arm;
+  if (!options.move.empty()) arm.emplace(options, *rig, transports, clock);
+  Recording recording(options, rig, transports, clock);
+  watch_for_interrupts();
+  const std::string why = wait_for_end(options, clock, recording, arm ? &*arm : nullptr);
+  recording.finish();
+  const RecordedCounts counts = recording.counts();
+  std::printf("%s: %s\n", options.out.c_str(), told(counts).c_str());
+  if (!why.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", options.out.c_str(), why.c_str());
+  if (!options.robot.empty() && counts.joints == 0)
+    std::fprintf(stderr, "lapservo: %s: no measured_js came\n", options.robot.c_str());
+  return why.empty() && counts.images > 0 && (options.robot.empty() || counts.joints > 0) ? 0 : 1;
+}
+
+void add_record(Command app, Run& run_later) {
+  auto options = std::make_shared<RecordOptions>();
+  Command command =
+      app.add_subcommand("record", "Record a camera and an arm's joints into a bag, for calibrate, check and track.");
+  command
+      .add_option("--camera", options->camera,
+                  "Images: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
+                  "/dev/videoN; gst:PIPELINE")
+      .required();
+  command.add_option("--robot", options->robot, "The arm whose measured_js is recorded too: ros2:PSM1 or ros1:PSM1");
+  command.add_option("--out", options->out, "Folder to make: a ROS 2 bag; a second of raw 720p takes 80 MB").required();
+  command.add_option("--rig", options->rig, "For /dev/videoN, which is asked for its camera's size, and for --move");
+  command.add_option("--duration", options->duration_s, "Seconds, from the first image on")
+      .shows_default()
+      .number_between(1, 3600);
+  command.add_option("--fps", options->fps, "Keep no more images a second than about so many")
+      .shows_default()
+      .number_between(1, 1000);
+  command
+      .add_option(
+          "--move", options->move,
+          "Move the arm meanwhile, from where it is, as the calibrations want it: swing (registration, check: all "
+          "joints, for --duration), turn (marker: a full turn about its axis)")
+      .one_of({"swing", "turn"});
+  command
+      .add_option("--scale", options->scale, "Of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
+      .shows_default()
+      .number_between(0.05, 4);
+  command.add_option("--joint-limits", options->joint_limits,
+                     "For --move: YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
+  command.add_flag("--enable-motion", options->enable_motion, "For --move: do move the arm");
+  command.footer(
+      "An arm that is moved starts from rest and ends at rest; whatever is amiss with it ends the motion, and it stays "
+      "where it is.\n"
+      "Example:\n  lapservo record --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --out swing\n"
+      "  lapservo calibrate registration swing --rig rig.yaml --out rig.yaml");
+  command.runs(run_later, [options] { return record(*options); });
+}
+
+}  // namespace lapservo::app

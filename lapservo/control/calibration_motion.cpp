@@ -1,0 +1,65 @@
+#include "lapservo/control/calibration_motion.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int psi = 3;
+
+// From 0 to 1, at rest at both ends, its rate 1.875 / duration at most.
+double eased(double part) {
+  const double t = std::clamp(part, 0.0, 1.0);
+  return t * t * t * (10 - 15 * t + 6 * t * t);
+}
+
+// From 0 to `distance` at a constant rate but for `ramp_s` at both ends, where it grows linearly.
+double travelled(double time_s, double distance, double rate, double ramp_s) {
+  const double duration_s = distance / rate + ramp_s, t = std::clamp(time_s, 0.0, duration_s);
+  if (t < ramp_s) return rate * t * t / (2 * ramp_s);
+  if (t > duration_s - ramp_s) return distance - rate * (duration_s - t) * (duration_s - t) / (2 * ramp_s);
+  return rate * (t - ramp_s / 2);
+}
+
+}  // namespace
+
+JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s) {
+  // Of the rates: what growing and fading take, and what the swings take.
+  constexpr double share_of_easing = 0.25, share_of_swinging = 0.55, eased_rate = 1.875;
+  const double ease_s = duration_s / 4;
+  const Eigen::Array4d wanted = scale * Eigen::Array4d(0.25, 0.2, 0.01, 1);
+  const Eigen::Array4d room = (limits.upper - start).cwiseMin(start - limits.lower).cwiseMax(0);
+  const Eigen::Array4d amplitude = wanted.min(room).min(share_of_easing * ease_s / eased_rate * limits.rate.array());
+  const Eigen::Array4d fastest = share_of_swinging * limits.rate.array() / amplitude.max(1e-9);
+  const Eigen::Array4d omega = fastest.min(2 * std::numbers::pi / duration_s * Eigen::Array4d(3, 4, 5, 2));
+  return {duration_s, [=](double time_s) -> Eigen::Vector4d {
+            const double t = std::clamp(time_s, 0.0, duration_s);
+            const double share = eased(t / ease_s) * eased((duration_s - t) / ease_s);
+            return start + (share * amplitude * (t * omega).sin()).matrix();
+          }};
+}
+
+JointMotion turn_motion(const Eigen::Vector4d& start, const JointLimits& limits, const std::string& source) {
+  constexpr double margin_rad = 0.15, ramp_s = 0.5, max_rate = 0.3;
+  const double half_rad = std::numbers::pi + margin_rad;
+  const double lowest = limits.lower[psi] + half_rad, highest = limits.upper[psi] - half_rad;
+  if (lowest > highest)
+    throw InputError(source, "psi", std::to_string(limits.lower[psi]) + " to " + std::to_string(limits.upper[psi]),
+                     "room for a turn of " + std::to_string(2 * half_rad) + " rad");
+  const double begin_rad = std::clamp(start[psi], lowest, highest) - half_rad;
+  const double rate = std::min(max_rate, 0.5 * limits.rate[psi]), back_rate = 0.5 * limits.rate[psi];
+  const double back_s = std::max(1.0, 1.875 * std::abs(start[psi] - begin_rad) / back_rate);
+  return {back_s + 2 * half_rad / rate + ramp_s, [=](double time_s) -> Eigen::Vector4d {
+            Eigen::Vector4d q = start;
+            q[psi] += (begin_rad - start[psi]) * eased(time_s / back_s);
+            q[psi] += travelled(time_s - back_s, 2 * half_rad, rate, ramp_s);
+            return q;
+          }};
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,70 @@
+#include "lapservo/control/calibration_motion.h"
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int seed = 20261122;
+constexpr double step_s = 0.01;
+
+void expect_gentle(const JointMotion& motion, const Eigen::Vector4d& start, const JointLimits& limits) {
+  EXPECT_LT((motion.at(0) - start).norm(), 1e-12);
+  Eigen::Vector4d before = motion.at(0), rate_before = Eigen::Vector4d::Zero();
+  for (double t = step_s; t <= motion.duration_s + step_s; t += step_s) {
+    const Eigen::Vector4d q = motion.at(t), rate = (q - before) / step_s;
+    EXPECT_TRUE((q.array() >= limits.lower.array() - 1e-12).all() && (q.array() <= limits.upper.array() + 1e-12).all())
+        << t << ": " << q.transpose();
+    EXPECT_TRUE((rate.cwiseAbs().array() <= 0.8001 * limits.rate.array()).all()) << t << ": " << rate.transpose();
+    EXPECT_TRUE(((rate - rate_before).cwiseAbs().array() <= step_s * limits.acceleration.array()).all()) << t;
+    before = q, rate_before = rate;
+  }
+  EXPECT_LT((motion.at(motion.duration_s) - motion.at(motion.duration_s - step_s)).norm(), 1e-3);
+}
+
+Eigen::Vector4d anywhere(const JointLimits& limits, Random& random) {
+  Eigen::Vector4d q;
+  for (int i = 0; i < 4; ++i) q[i] = random.uniform(limits.lower[i], limits.upper[i]);
+  return q;
+}
+
+TEST(CalibrationMotion, StaysWithinTheLimitsFromAnywhere) {
+  Random random(seed);
+  const JointLimits limits;
+  for (int i = 0; i < 50; ++i) {
+    const Eigen::Vector4d start = anywhere(limits, random);
+    expect_gentle(swing_motion(start, limits, random.uniform(0.1, 3.0), random.uniform(10.0, 60.0)), start, limits);
+    expect_gentle(turn_motion(start, limits, "limits"), start, limits);
+  }
+}
+
+TEST(CalibrationMotion, SwingsAllJointsAndReturns) {
+  const JointLimits limits;
+  const Eigen::Vector4d start(0, 1.5, 0.1, 0);
+  const JointMotion motion = swing_motion(start, limits, 1, 20);
+  EXPECT_LT((motion.at(20) - start).norm(), 1e-12);
+  Eigen::Vector4d reach = Eigen::Vector4d::Zero();
+  for (double t = 0; t < 20; t += step_s) reach = reach.cwiseMax((motion.at(t) - start).cwiseAbs());
+  EXPECT_TRUE((reach.array() > 0.8 * Eigen::Array4d(0.25, 0.2, 0.01, 1)).all()) << reach.transpose();
+}
+
+TEST(CalibrationMotion, TurnsOnceAndALittleMore) {
+  const JointLimits limits;
+  const JointMotion motion = turn_motion({0, 1.5, 0.1, 3.5}, limits, "limits");
+  double low = 10, high = -10;
+  for (double t = 0; t < motion.duration_s; t += step_s)
+    low = std::min(low, motion.at(t)[3]), high = std::max(high, motion.at(t)[3]);
+  EXPECT_GT(high - low, 6.5);
+}
+
+TEST(CalibrationMotion, RefusesATurnWhereThereIsNoRoom) {
+  JointLimits limits;
+  limits.lower[3] = -2;
+  EXPECT_THROW(turn_motion({0, 1.5, 0.1, 0}, limits, "limits.yaml"), InputError);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,110 @@
+#include "recordings/bag_recorder.h"
+
+#include <chrono>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+namespace lapservo::internal {
+namespace {
+
+constexpr std::size_t max_waiting_bytes = std::size_t{512} << 20;
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+std::size_t bytes_of(const JointMessage& message) {
+  return 64 * message.names.size();
+}
+template <typename Image>
+std::size_t bytes_of(const Image& message) {
+  return message.data.size();
+}
+
+}  // namespace
+
+BagRecorder::BagRecorder(const std::filesystem::path& folder) : writer_(folder), thread_([this] { write_all(); }) {}
+
+BagRecorder::~BagRecorder() {
+  end();
+}
+
+void BagRecorder::add(const std::string& topic, JointMessage&& message) {
+  enqueue(topic, std::move(message));
+}
+void BagRecorder::add(const std::string& topic, ImageMessage&& message) {
+  enqueue(topic, std::move(message));
+}
+void BagRecorder::add(const std::string& topic, CompressedImageMessage&& message) {
+  enqueue(topic, std::move(message));
+}
+
+void BagRecorder::enqueue(const std::string& topic, Message&& message) {
+  const std::size_t bytes = std::visit([](const auto& m) { return bytes_of(m); }, message);
+  const double stamp_s = std::visit([](const auto& m) { return m.stamp_s; }, message);
+  const std::lock_guard lock(mutex_);
+  if (!(stamp_s > 0 && stamp_s < std::numeric_limits<std::int32_t>::max())) {
+    ++counts_.unstamped;
+    return;
+  }
+  if (!std::holds_alternative<JointMessage>(message) && waiting_bytes_ + bytes > max_waiting_bytes) {
+    ++counts_.dropped;
+    return;
+  }
+  waiting_bytes_ += bytes;
+  waiting_.push_back({topic, now_s(), std::move(message)});
+  changed_.notify_all();
+}
+
+void BagRecorder::write(const Entry& entry) {
+  std::visit([&](const auto& message) { writer_.write(entry.topic, entry.time_s, message); }, entry.message);
+  const std::lock_guard lock(mutex_);
+  ++(std::holds_alternative<JointMessage>(entry.message) ? counts_.joints : counts_.images);
+}
+
+std::optional<BagRecorder::Entry> BagRecorder::take() {
+  std::unique_lock lock(mutex_);
+  changed_.wait(lock, [this] { return ending_ || !waiting_.empty(); });
+  if (waiting_.empty()) return std::nullopt;
+  Entry entry = std::move(waiting_.front());
+  waiting_.pop_front();
+  waiting_bytes_ -= std::visit([](const auto& message) { return bytes_of(message); }, entry.message);
+  return entry;
+}
+
+void BagRecorder::write_all() {
+  try {
+    while (auto entry = take()) write(*entry);
+  } catch (...) {
+    const std::lock_guard lock(mutex_);
+    failure_ = std::current_exception();
+  }
+}
+
+RecordedCounts BagRecorder::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+void BagRecorder::check() const {
+  const std::lock_guard lock(mutex_);
+  if (failure_) std::rethrow_exception(failure_);
+}
+
+void BagRecorder::end() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  changed_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void BagRecorder::finish() {
+  end();
+  check();
+  writer_.finish();
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <deque>
+#include <exception>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <variant>
+
+#include "lapservo/crtk/messages.h"
+#include "recordings/ros2_bag_writer.h"
+
+namespace lapservo::internal {
+
+/// What became of the messages of a recording.
+struct RecordedCounts {
+  long images = 0, joints = 0;
+  long dropped = 0;  ///< images that came faster than they could be written
+  long unstamped = 0;
+};
+
+/// Records messages into a ROS 2 bag, in a thread of its own: raw images as PNG, which loses nothing, compressed ones
+/// as they are. Messages may come from any thread.
+class BagRecorder {
+ public:
+  /// See Ros2BagWriter.
+  explicit BagRecorder(const std::filesystem::path& folder);
+  ~BagRecorder();
+  BagRecorder(const BagRecorder&) = delete;
+  BagRecorder& operator=(const BagRecorder&) = delete;
+
+  void add(const std::string& topic, JointMessage&& message);
+  void add(const std::string& topic, ImageMessage&& message);
+  void add(const std::string& topic, CompressedImageMessage&& message);
+
+  RecordedCounts counts() const;
+  /// Throws what writing has thrown.
+  void check() const;
+  /// Writes what is left, and ends.
+  void finish();
+
+ private:
+  using Message = std::variant<JointMessage, ImageMessage, CompressedImageMessage>;
+  struct Entry {
+    std::string topic;
+    double time_s = 0;
+    Message message;
+  };
+
+  void enqueue(const std::string& topic, Message&& message);
+  std::optional<Entry> take();
+  void write_all();
+  void end();
+  void write(const Entry& entry);
+
+  Ros2BagWriter writer_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Entry> waiting_;
+  std::size_t waiting_bytes_ = 0;
+  RecordedCounts counts_;
+  std::exception_ptr failure_;
+  bool ending_ = false;
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,133 @@
+#include "recordings/bag_recorder.h"
+
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
+#include <limits>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+#include "recordings/open_bag.h"
+#include "recordings/ros2_bag_writer.h"
+#include "transports/ros2/cdr_encoder.h"
+
+namespace lapservo::internal {
+namespace {
+using eprosima::fastcdr::Cdr;
+using lapservo::testing::input_error;
+
+constexpr double begin_s = 1700000000;
+
+JointMessage joints_at(double time_s) {
+  return {time_s, {"yaw", "pitch", "insertion"}, {0.5, -1.5, time_s - begin_s}};
+}
+ImageMessage image_at(double time_s) {
+  return {time_s, 2, 1, 6, "rgb8", false, {1, 2, 3, 4, 5, 6}};
+}
+
+std::vector<BagMessage> all(const Bag& bag, const std::string& name) {
+  std::vector<BagMessage> messages;
+  for (const BagTopic& topic : bag.topics())
+    if (topic.name == name)
+      for (const auto from = bag.messages(topic); auto message = from->next();) messages.push_back(std::move(*message));
+  return messages;
+}
+
+TEST(CdrEncoder, IsReadByFastCdr) {
+  std::vector<std::uint8_t> bytes = encode_cdr(joints_at(begin_s + 0.25));
+  eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
+  Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
+  cdr.read_encapsulation();
+  std::int32_t sec = 0;
+  std::uint32_t nanosec = 0;
+  std::string frame = "?";
+  std::vector<std::string> names;
+  std::vector<double> positions, velocities{1}, efforts{1};
+  cdr >> sec >> nanosec >> frame >> names >> positions >> velocities >> efforts;
+  EXPECT_EQ(sec, 1700000000);
+  EXPECT_EQ(nanosec, 250000000u);
+  EXPECT_EQ(frame, "");
+  EXPECT_EQ(names, joints_at(0).names);
+  EXPECT_EQ(positions, (std::vector<double>{0.5, -1.5, 0.25}));
+  EXPECT_TRUE(velocities.empty() && efforts.empty());
+  EXPECT_EQ(cdr.getSerializedDataLength(), bytes.size());
+}
+
+TEST(CdrEncoder, RoundsStampsUpToTheNextSecond) {
+  const auto bytes = encode_cdr(joints_at(2 - 1e-10));
+  EXPECT_EQ((std::vector<std::uint8_t>(bytes.begin() + 4, bytes.begin() + 12)),
+            (std::vector<std::uint8_t>{2, 0, 0, 0, 0, 0, 0, 0}));
+}
+
+TEST(Ros2BagWriter, WritesWhatIsReadAgain) {
+  const lapservo::testing::TemporaryFolder folder;
+  {
+    Ros2BagWriter writer(folder / "bag");
+    for (int i = 0; i < 5; ++i) writer.write("/PSM1/measured_js", begin_s + i, joints_at(begin_s + i));
+    writer.write("/image", begin_s + 1, image_at(begin_s + 0.5));
+    writer.write("/image/compressed", begin_s + 2, CompressedImageMessage{begin_s, "jpeg", {7, 8}});
+    writer.finish();
+  }
+  const auto bag = open_bag((folder / "bag").string());
+  ASSERT_EQ(bag->topics().size(), 3u);
+  const auto joints = all(*bag, "/PSM1/measured_js");
+  ASSERT_EQ(joints.size(), 5u);
+  EXPECT_EQ(std::get<JointMessage>(joints[4]).positions, joints_at(begin_s + 4).positions);
+  const auto images = all(*bag, "/image");
+  ASSERT_EQ(images.size(), 1u);
+  const auto& image = std::get<ImageMessage>(images[0]);
+  EXPECT_EQ(image.stamp_s, begin_s + 0.5);
+  EXPECT_EQ(image.encoding, "rgb8");
+  EXPECT_EQ(image.step, 6u);
+  EXPECT_EQ(image.data, image_at(0).data);
+  EXPECT_EQ(std::get<CompressedImageMessage>(all(*bag, "/image/compressed").at(0)).data,
+            (std::vector<std::uint8_t>{7, 8}));
+  EXPECT_FALSE(std::filesystem::exists(folder / "bag/bag_0.db3-wal"));
+}
+
+TEST(Ros2BagWriter, WhatWasWrittenStaysWithoutAnEnd) {
+  const lapservo::testing::TemporaryFolder folder;
+  {
+    Ros2BagWriter writer(folder / "bag");
+    for (int i = 0; i < 5; ++i) writer.write("/PSM1/measured_js", begin_s + i, joints_at(begin_s + i));
+  }
+  const auto bag = open_bag((folder / "bag/bag_0.db3").string());
+  EXPECT_GE(all(*bag, "/PSM1/measured_js").size(), 4u);
+}
+
+TEST(Ros2BagWriter, NeverGoesOverSomething) {
+  const lapservo::testing::TemporaryFolder folder;
+  lapservo::testing::write_file(folder / "mine.txt", "mine");
+  const std::string path = folder.path().string();
+  EXPECT_EQ(input_error([&] { Ros2BagWriter{path}; }), path + ": exists, expected the name of a new folder");
+  EXPECT_TRUE(std::filesystem::exists(folder / "mine.txt"));
+}
+
+TEST(BagRecorder, RecordsFromSeveralThreads) {
+  const lapservo::testing::TemporaryFolder folder;
+  constexpr int count = 200;
+  BagRecorder recorder(folder / "bag");
+  std::thread arm([&] {
+    for (int i = 0; i < count; ++i) recorder.add("/PSM1/measured_js", joints_at(begin_s + i));
+  });
+  for (int i = 0; i < count; ++i) recorder.add("/image", image_at(begin_s + i));
+  arm.join();
+  recorder.add("/image", image_at(std::numeric_limits<double>::quiet_NaN()));
+  recorder.add("/image", image_at(0));
+  recorder.finish();
+  EXPECT_EQ(recorder.counts().images, count);
+  EXPECT_EQ(recorder.counts().joints, count);
+  EXPECT_EQ(recorder.counts().unstamped, 2);
+  const auto bag = open_bag((folder / "bag").string());
+  EXPECT_EQ(all(*bag, "/PSM1/measured_js").size(), static_cast<std::size_t>(count));
+  const auto images = all(*bag, "/image");
+  ASSERT_EQ(images.size(), static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) EXPECT_EQ(std::get<ImageMessage>(images[i]).stamp_s, begin_s + i);
+}
+
+}  // namespace
+}  // namespace lapservo::internal
