@@ -513,7 +513,7 @@ TEST_F(CommandLine, ExperimentsWriteAReport) {
 
 TEST_F(CommandLine, HelpShowsExamples) {
   for (const char* command : {"track", "render", "marker", "marker design", "marker print", "marker show", "servo",
-                              "experiment", "estimate-rcm", "sim-robot", "check", "calibrate", "calibrate all",
+                              "experiment", "estimate-rcm", "sim-robot", "record", "check", "calibrate", "calibrate all",
                               "calibrate camera", "calibrate colour", "calibrate marker", "calibrate registration"}) {
     EXPECT_EQ(run(std::string(command) + " --help"), 0);
     EXPECT_NE(output().find("Example"), std::string::npos) << command;
