@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fcntl.h>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -395,6 +396,8 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   EXPECT_NE(said("refused.txt").find("--enable-motion"), std::string::npos) << said("refused.txt");
   auto moving = recording;
   moving.push_back("--enable-motion");
+  const auto ears = named_transport(GetParam(), "ears");
+  Spy spy(*ears);
   Process record(moving, file("record.txt"));
   ASSERT_EQ(record.wait(), 0) << said("record.txt");
   Process calibrate({"calibrate", "registration", file("swing"), "--rig", file("rig.yaml"), "--out", file("new.yaml")},
@@ -403,6 +406,19 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   const Rigid3 moved =
       rig_.instruments[0].camera_from_rcm->inverse() * *load_rig(file("new.yaml")).instruments[0].camera_from_rcm;
   EXPECT_LT(moved.translation.norm(), 0.5e-3) << said("calibrate.txt");
+
+  // Interrupted on its way it brakes, and keeps what it has.
+  std::replace(moving.begin(), moving.end(), file("swing"), file("part"));
+  Process interrupted(moving, file("interrupted.txt"));
+  const double begun_s = now_s();
+  ASSERT_TRUE(wait_for([&] { return spy.moves_after(begun_s); })) << said("interrupted.txt");
+  sleep(3);
+  interrupted.signal(SIGINT);
+  EXPECT_EQ(interrupted.wait(), 0) << said("interrupted.txt");
+  EXPECT_TRUE(std::filesystem::exists(file("part") + "/metadata.yaml"));
+  const auto heard = spy.heard();
+  EXPECT_LT((heard.back().q - heard[heard.size() - 20].q).cwiseAbs().maxCoeff(), 1e-6);
+  spy.expect_no_jump();
 }
 
 TEST_P(WireLoop, ASecondPublisherEndsTheRunWithin100Milliseconds) {

@@ -21,6 +21,7 @@
 #include "apps/lapservo/subcommands.h"
 #include "apps/lapservo/transports.h"
 #include "lapservo/control/calibration_motion.h"
+#include "lapservo/control/motion_limits.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/arm_limits.h"
 #include "lapservo/crtk/crtk_robot.h"
@@ -115,6 +116,13 @@ class MovingArm {
     const Address arm = address_of(options.robot, "--robot");
     robot_ = std::make_unique<CrtkRobot>(transports.get(arm.transport, "--robot"), arm.name, config_, clock);
   }
+
+  // However it ends: without new velocities the path brakes by itself.
+  ~MovingArm() {
+    std::this_thread::sleep_for(std::chrono::duration<double>(stopping_time_s(config_.limits) + period_s));
+  }
+  MovingArm(const MovingArm&) = delete;
+  MovingArm& operator=(const MovingArm&) = delete;
 
   // Nothing while it is on its way or about to begin, then why it has ended: empty when the motion is done.
   std::optional<std::string> advance() {
