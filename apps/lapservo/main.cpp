@@ -63,6 +63,7 @@ int parse_and_run(int argc, char** argv) {
   lapservo::app::add_sim_robot(app, run);
   lapservo::app::add_marker(app, run);
   lapservo::app::add_estimate_rcm(app, run);
+  lapservo::app::add_reference(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {

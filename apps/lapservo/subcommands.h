@@ -21,6 +21,7 @@ void add_check(CLI::App& app, Run& run);
 void add_estimate_rcm(CLI::App& app, Run& run);
 void add_experiment(CLI::App& app, Run& run);
 void add_marker(CLI::App& app, Run& run);
+void add_reference(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);
 void add_servo(CLI::App& app, Run& run);
 void add_sim_robot(CLI::App& app, Run& run);
