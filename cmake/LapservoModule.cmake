@@ -3,8 +3,9 @@
 # which stand beside the sources (LONG_TESTS: those with something that is too slow under sanitizers), and the headers that
 # are installed (PUBLIC_HEADERS); all other headers are internal. The linker and the test `boundaries`
 # (LapservoBoundaries.cmake) enforce the direction of dependencies.
-# What has no public header is nobody's library: it goes into the tool. GLUE: it computes little itself, and where sanitized
-# is compiled without optimisation.
+# What has no public header is nobody's library: it goes into the tool. All libraries are static; LapservoShared.cmake makes
+# one shared library of those with public headers. GLUE: it computes little itself, and where sanitized is compiled without
+# optimisation.
 function(lapservo_module name)
   cmake_parse_arguments(M "GLUE" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;LONG_TESTS;TEST_USES" ${ARGN})
   set(target lapservo_${name})
@@ -12,14 +13,11 @@ function(lapservo_module name)
   if(NOT M_SOURCES)
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
-  elseif(M_PUBLIC_HEADERS)
-    add_library(${target} ${M_SOURCES})  # static or shared: BUILD_SHARED_LIBS
   else()
     add_library(${target} STATIC ${M_SOURCES})
   endif()
   add_library(lapservo::${name} ALIAS ${target})
-  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON DEFINE_SYMBOL ""
-    VERSION ${PROJECT_VERSION} SOVERSION ${LAPSERVO_SOVERSION})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
   target_compile_features(${target} ${scope} cxx_std_20)
   target_include_directories(${target} ${scope}
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
@@ -35,6 +33,7 @@ function(lapservo_module name)
   endif()
   if(M_PUBLIC_HEADERS)
     lapservo_install(${target} ${M_PUBLIC_HEADERS})
+    set_property(GLOBAL APPEND PROPERTY LAPSERVO_PUBLIC_MODULES ${name})
   endif()
   lapservo_remember_module(${name} ${ARGN})
   set(tests ${M_LONG_TESTS})

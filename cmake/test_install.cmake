@@ -1,5 +1,6 @@
 # Installs BUILD into a fresh prefix, compiles every installed header on its own, builds the projects in EXAMPLES against
-# the prefix, and runs them: on a picture that the installed tool renders, and around a robot of their own.
+# the prefix, by CMake with the shared library and with static ones and by pkg-config, and runs them: on pictures that the
+# installed tool renders, and around a robot of their own.
 cmake_minimum_required(VERSION 3.25)
 set(folder ${BUILD}/install-test)
 set(prefix ${folder}/prefix)
@@ -45,13 +46,14 @@ target_link_libraries(each_header PRIVATE lapservo::lapservo)
   build_project(${folder}/each_header each_header.build)
 endfunction()
 
-# Who controls and sees nothing needs no package for pictures.
+# Who controls and sees nothing needs no package for pictures, with static libraries.
 function(check_control_alone)
   file(WRITE ${folder}/control_alone/main.cpp "#include <lapservo/control/hold_reason.h>
 int main() { return lapservo::to_string(lapservo::HoldReason::outlier) == \"outlier\" ? 0 : 1; }
 ")
   file(WRITE ${folder}/control_alone/CMakeLists.txt "cmake_minimum_required(VERSION 3.25)
 project(control_alone LANGUAGES CXX)
+set(lapservo_USE_STATIC_LIBS ON)
 find_package(lapservo REQUIRED COMPONENTS control)
 add_executable(control_alone main.cpp)
 target_link_libraries(control_alone PRIVATE lapservo::control)
@@ -61,12 +63,36 @@ target_link_libraries(control_alone PRIVATE lapservo::control)
   run(${folder}/control_alone.build/control_alone)
 endfunction()
 
+# A program may as well be built by pkg-config, and finds the library where it was linked.
+function(build_by_pkg_config source program)
+  file(GLOB_RECURSE pc ${prefix}/lapservo.pc)
+  get_filename_component(pc_folder ${pc} DIRECTORY)
+  get_filename_component(libraries ${pc_folder} DIRECTORY)
+  execute_process(COMMAND ${CMAKE_COMMAND} -E env PKG_CONFIG_PATH=${pc_folder} pkg-config --cflags --libs "lapservo < 0.2"
+                  OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+  separate_arguments(flags)
+  run(${LAUNCHER} ${COMPILER} -std=c++20 ${source} -o ${program} ${flags} -Wl,-rpath,${libraries})
+endfunction()
+
+# The examples of some twenty lines, each run.
+function(run_examples)
+  set(frames ${folder}/swing)
+  run(${prefix}/bin/lapservo render --rig ${prefix}/share/lapservo/configs/paper.yaml --out ${frames} --count 12 --moving)
+  run(${folder}/cpp/track_video ${frames} ${frames}/rig.yaml)
+  run(${folder}/cpp/rcm_image ${frames} ${frames}/rig.yaml)
+  run(${folder}/cpp/marker_5mm ${folder}/sheet.pdf)
+endfunction()
+
 file(REMOVE_RECURSE ${folder})
 run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${prefix})
 check_headers()
 check_control_alone()
-build_project(${EXAMPLES}/find_package find_package)
+build_project(${EXAMPLES}/find_package find_package -Dlapservo_USE_STATIC_LIBS=ON)
+build_project(${EXAMPLES}/cpp cpp)
 build_project(${EXAMPLES}/own_robot own_robot)
-run(${prefix}/bin/lapservo render --rig ${prefix}/share/lapservo/configs/example.yaml --out ${folder}/frames --count 1)
-run(${folder}/find_package/rotation ${folder}/frames/rig.yaml ${folder}/frames/0000.png)
+build_by_pkg_config(${EXAMPLES}/find_package/rotation.cpp ${folder}/rotation)
+run_examples()
+set(example ${prefix}/share/lapservo/example)
+run(${folder}/rotation ${example}/rig.yaml ${example}/0000.png)
+run(${folder}/find_package/rotation ${example}/rig.yaml ${example}/0000.png)
 run(${folder}/own_robot/own_robot ${prefix}/share/lapservo/configs/paper.yaml)

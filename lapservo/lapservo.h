@@ -16,12 +16,22 @@
 #include "lapservo/marker/marker.h"
 #include "lapservo/rig/rig.h"
 
+// A marker for a shaft, what to expect of it, a sheet to print.
+#include "lapservo/marker/design.h"
+#include "lapservo/marker/drawing.h"
+#include "lapservo/marker/sensitivity.h"
+
 // Seeing: Tracker makes Observations of pictures, which come from files, videos and cameras.
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/vision/observation.h"
 #include "lapservo/vision/tracker.h"
+
+// Where the RCM appears in the image, from the lines on which an instrument was seen.
+#include "lapservo/rcm/distinct_lines.h"
+#include "lapservo/rcm/line_observation.h"
+#include "lapservo/rcm/projected_rcm.h"
 
 // The ports, to be implemented for an arm and a camera: Robot, ImageStream, Clock.
 #include "lapservo/robot/clock.h"

@@ -12,7 +12,8 @@
 #include "lapservo/marker/decoder.h"
 #include "lapservo/marker/length_code.h"
 
-namespace lapservo::internal {
+namespace lapservo {
+using namespace internal;
 namespace {
 
 constexpr double rounding_m = 1e-4;
@@ -125,4 +126,4 @@ Marker design_marker(const DesignSpec& spec) {
   return *marker;
 }
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

@@ -6,7 +6,7 @@
 #include "lapservo/marker/marker.h"
 #include "lapservo/marker/sensitivity.h"
 
-namespace lapservo::internal {
+namespace lapservo {
 
 enum class MarkerCode {
   cross_ratio,  ///< of all three bands, eq. (17) and (18): what trackers read
@@ -38,4 +38,4 @@ double worst_sigma_centre_line_rad(const Marker& marker, const Viewing& viewing,
 /// Whether l1 : l2 is the same at both edges: then eq. (18) is exact.
 bool in_linear_family(const Marker& marker);
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

@@ -10,7 +10,8 @@
 #include "lapservo/core/error.h"
 #include "lapservo/marker/canvas.h"
 
-namespace lapservo::internal {
+namespace lapservo {
+using namespace internal;
 namespace {
 
 using Anchor = Canvas::Anchor;
@@ -195,4 +196,4 @@ void write_marker_picture(const std::filesystem::path& path, const std::string& 
   canvas.finish();
 }
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

@@ -6,7 +6,7 @@
 #include "lapservo/marker/marker.h"
 #include "lapservo/marker/sensitivity.h"
 
-namespace lapservo::internal {
+namespace lapservo {
 
 /// Printed colour of a hue, sRGB values in [0, 1].
 struct PrintColor {
@@ -29,4 +29,4 @@ void write_print_sheet(const std::filesystem::path& path, const std::string& ins
 void write_marker_picture(const std::filesystem::path& path, const std::string& instrument, const Marker& marker,
                           const Viewing& viewing);
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

@@ -6,7 +6,8 @@
 
 #include "lapservo/core/angles.h"
 
-namespace lapservo::internal {
+namespace lapservo {
+using namespace internal;
 namespace {
 
 // d(ln r)/d(e0..e3) of r = (e2 - e0)(e3 - e1) / ((e2 - e1)(e3 - e0)).
@@ -74,4 +75,4 @@ double predicted_sigma_surface_rad(const Marker& marker, double tau_rad, const V
   return sigma_m / std::sqrt(tau_tau - tau_rho * tau_rho / rho_rho);
 }
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

@@ -4,7 +4,7 @@
 
 #include "lapservo/marker/marker.h"
 
-namespace lapservo::internal {
+namespace lapservo {
 
 /// How a camera sees a marker head on.
 struct Viewing {
@@ -33,4 +33,4 @@ double predicted_sigma_centre_line_rad(const Marker& marker, double tau_rad, con
 /// count.
 double predicted_sigma_surface_rad(const Marker& marker, double tau_rad, const Viewing& viewing);
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

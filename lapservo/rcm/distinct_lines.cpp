@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <unordered_map>
 
-namespace lapservo::internal {
+namespace lapservo {
 namespace {
 
 using Ends = Eigen::Vector4d;  // from u, v, to u, v
@@ -89,4 +89,4 @@ std::vector<LineObservation> distinct_lines(std::span<const LineObservation> lin
   return distinct;
 }
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

@@ -6,7 +6,7 @@
 
 #include "lapservo/rcm/line_observation.h"
 
-namespace lapservo::internal {
+namespace lapservo {
 
 /// One line a position: those whose ends lie within `apart_px` of another's become their mean, with the covariance of
 /// one of them, as frames of a shaft at rest share their errors. Of more than `most` positions nearer and nearer ones
@@ -14,4 +14,4 @@ namespace lapservo::internal {
 std::vector<LineObservation> distinct_lines(std::span<const LineObservation> lines, double apart_px = 2,
                                             std::size_t most = 1000);
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

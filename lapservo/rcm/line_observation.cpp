@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace lapservo::internal {
+namespace lapservo {
 
 LineObservation line_between(const Eigen::Vector2d& from_px, const Eigen::Vector2d& to_px, double sigma_px) {
   return {from_px, to_px, sigma_px * sigma_px * Eigen::Matrix4d::Identity()};
@@ -23,4 +23,4 @@ std::optional<Eigen::Vector2d> intersection_px(const LineObservation& a, const L
   return Eigen::Vector2d(a.from_px + cross(b.from_px - a.from_px, along_b) / sine * along_a);
 }
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

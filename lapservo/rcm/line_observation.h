@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace lapservo::internal {
+namespace lapservo {
 
 /// One image of an instrument's centre line: two points on it, ideal pixels, for example e0 and e3.
 ///
@@ -26,4 +26,4 @@ bool is_usable(const LineObservation& line);
 /// Where the extended lines meet; nullopt when they are parallel to rounding.
 std::optional<Eigen::Vector2d> intersection_px(const LineObservation& a, const LineObservation& b);
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

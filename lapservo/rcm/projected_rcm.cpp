@@ -12,7 +12,8 @@
 #include "lapservo/core/random.h"
 #include "lapservo/core/words.h"
 
-namespace lapservo::internal {
+namespace lapservo {
+using namespace internal;
 namespace {
 
 constexpr std::size_t min_for_outliers = 6;
@@ -251,4 +252,4 @@ RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const
   return estimate;
 }
 
-}  // namespace lapservo::internal
+}  // namespace lapservo

@@ -10,7 +10,7 @@
 
 #include "lapservo/rcm/line_observation.h"
 
-namespace lapservo::internal {
+namespace lapservo {
 
 /// Whether the lines' covariances are to be believed, or only their proportions.
 enum class NoiseScale {
@@ -71,4 +71,4 @@ inline constexpr double near_parallel_fraction = 0.05;
 /// at rest are one line.
 RcmEstimate estimate_projected_rcm(std::span<const LineObservation> lines, const RcmOptions& options = {});
 
-}  // namespace lapservo::internal
+}  // namespace lapservo
