@@ -19,7 +19,7 @@ add_library(lapservo_shared SHARED ${objects})
 set_target_properties(lapservo_shared PROPERTIES OUTPUT_NAME lapservo EXPORT_NAME lapservo LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}
   LINKER_LANGUAGE CXX VERSION ${PROJECT_VERSION} SOVERSION ${LAPSERVO_SOVERSION} LINK_DEPENDS ${PROJECT_BINARY_DIR}/exported_symbols.map)
 target_compile_features(lapservo_shared INTERFACE cxx_std_20)
-target_link_libraries(lapservo_shared PRIVATE ${archives} INTERFACE Eigen3::Eigen opencv_core)  # archives: for what they link
+target_link_libraries(lapservo_shared PRIVATE ${archives} INTERFACE Eigen3::Eigen)  # archives: for what they link
 target_link_options(lapservo_shared PRIVATE
   -Wl,--version-script=${PROJECT_BINARY_DIR}/exported_symbols.map -Wl,-z,defs -Wl,--as-needed)
 
