@@ -81,5 +81,41 @@ TEST(ArmResponse, LearnsNothingFromABlockedJoint) {
   EXPECT_TRUE(response.drive().friction.isZero());
 }
 
+// Nor what its motor winds up of the transmission, an eighth of the way and 20 ms late, until the set-point comes to
+// rest at the end of its leash.
+TEST(ArmResponse, AWoundTransmissionIsNoLoad) {
+  ArmResponse response{Scales{}};
+  Eigen::Vector4d motor = Eigen::Vector4d::Zero();
+  for (int k = 0; k < 300; ++k) {
+    constexpr double comes_to_rest_s = 0.04, lag_s = 0.02, wound = 0.125;
+    const double left = std::exp(-k * period_s / comes_to_rest_s);
+    const Eigen::Vector4d lead = 0.1 * Scales{}.joints;
+    const MotionState setpoint{lead * (1 - left), lead * left / comes_to_rest_s};
+    motor += -std::expm1(-period_s / lag_s) * (wound * setpoint.position - motor);
+    response.add(setpoint, motor, period_s);
+  }
+  EXPECT_TRUE(response.drive().load.isZero()) << response.drive().load.transpose();
+  EXPECT_FALSE(response.drive().load_known[0]);
+}
+
+TEST(ArmResponse, KnowsTheLoadOfAJointThatHasGoneBothWays) {
+  ArmResponse response{Scales{}};
+  StickingArm arm;
+  const auto move = [&](double from, double to) {
+    for (int k = 0; k < 60; ++k) {
+      const Eigen::Vector4d rate = (to - from) * Scales{}.joints;
+      const MotionState setpoint{from * Scales{}.joints + rate * (k * period_s), rate};
+      arm.follow(setpoint.position);
+      response.add(setpoint, arm.q, period_s);
+    }
+    return response.drive().load_known[0];
+  };
+  EXPECT_FALSE(move(0, 1));
+  EXPECT_TRUE(move(1, 0));
+  response.restart();
+  EXPECT_FALSE(response.drive().load_known[0]);
+  EXPECT_TRUE(move(0, 1));
+}
+
 }  // namespace
 }  // namespace lapservo::internal
