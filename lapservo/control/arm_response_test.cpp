@@ -81,16 +81,17 @@ TEST(ArmResponse, LearnsNothingFromABlockedJoint) {
   EXPECT_TRUE(response.drive().friction.isZero());
 }
 
-// Nor what its motor winds up of the transmission, an eighth of the way and 20 ms late, until the set-point comes to
-// rest at the end of its leash.
+// Nor what its motor winds up of the transmission, an eighth of the way and 40 ms late, when the set-point slows down at
+// the end of its leash.
 TEST(ArmResponse, AWoundTransmissionIsNoLoad) {
+  constexpr double lag_s = 0.04, wound = 0.125;
   ArmResponse response{Scales{}};
+  MotionState setpoint{Eigen::Vector4d::Zero(), Scales{}.joints};
   Eigen::Vector4d motor = Eigen::Vector4d::Zero();
   for (int k = 0; k < 300; ++k) {
-    constexpr double comes_to_rest_s = 0.04, lag_s = 0.02, wound = 0.125;
-    const double left = std::exp(-k * period_s / comes_to_rest_s);
-    const Eigen::Vector4d lead = 0.1 * Scales{}.joints;
-    const MotionState setpoint{lead * (1 - left), lead * left / comes_to_rest_s};
+    const Eigen::Vector4d slower = setpoint.velocity - 10 * period_s * Scales{}.joints;
+    setpoint.velocity = slower.cwiseMax(0.01 * Scales{}.joints);
+    setpoint.position += period_s * setpoint.velocity;
     motor += -std::expm1(-period_s / lag_s) * (wound * setpoint.position - motor);
     response.add(setpoint, motor, period_s);
   }
