@@ -57,6 +57,22 @@ TEST(DynamicLoop, IsNotFastWhenABlockedJointIsReleased) {
   }
 }
 
+// At any time of the trajectory: where its joints are fast, and where they turn and stand still on their friction.
+TEST(DynamicLoop, HoldsWithin100MsOfAPictureThatFreezes) {
+  for (int k = 0; k < 20; ++k) {
+    DynamicLoop loop;
+    const double begin_s = 6 + 0.37 * k, end_s = begin_s + 1;
+    loop.frozen = Interval{begin_s, end_s};
+    const auto ticks = loop.run(papers, end_s + 3);
+    for (const DynamicTick& tick : ticks) {
+      if (tick.time_s > begin_s + 0.1 && tick.time_s < end_s - 1e-9) {
+        EXPECT_EQ(tick.decision.control.reason, HoldReason::frozen_image) << begin_s << ' ' << tick.time_s;
+      }
+    }
+    EXPECT_LT(ticks.back().error.tail<3>().cwiseAbs().maxCoeff(), 1);
+  }
+}
+
 TEST(DynamicLoop, SaysThatAJointDoesNotFollow) {
   DynamicLoop loop;
   loop.meddle = [](double time_s, MujocoArm& arm) {

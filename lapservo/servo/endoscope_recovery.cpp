@@ -60,16 +60,21 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
     return;
   }
   if (!follow_joints(*image, controller) || phase_ != Phase::watching || !image->found) return;
+  // An endoscope that moved would show another picture.
+  if (image->repetition != Repetition::none) return;
   // Without a marker there would be nothing to measure with.
   const bool contradicts = image->marker && (!image->q || jumped(*image->q));
   contradicting_ = contradicts ? contradicting_ + 1 : 0;
   if (agreeing_ >= agreed_after && contradicting_ >= moved_after) notice(controller);
 }
 
-void EndoscopeRecovery::doubt(HoldReason reason) {
+void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
   if (reason != HoldReason::wild_joints && reason != HoldReason::frozen_image) return;
   agreeing_ = contradicting_ = 0;
-  if (reason == HoldReason::frozen_image) return;
+  if (reason == HoldReason::frozen_image) {
+    if (phase_ == Phase::resting || phase_ == Phase::exploring) rest_again(controller);
+    return;
+  }
   offsets_.clear();
   refine_at_s_.clear();  // its sightings go by the joints of before
 }

@@ -33,8 +33,9 @@ class EndoscopeRecovery {
   bool counts(int registration) const { return registration >= oldest_counted_ && registration <= registration_; }
   /// Before a step: an image that came, if it counts. Tells the controller what to do.
   void see(const ServoInput& input, VisualController& controller);
-  /// In it, with the controller's own reason: a picture that repeats and joints that jump are no moved endoscope.
-  void doubt(HoldReason reason);
+  /// In it, with the controller's own reason: a picture that repeats and joints that jump are no moved endoscope,
+  /// nor anything to measure one by.
+  void doubt(HoldReason reason, VisualController& controller);
   /// After it.
   void follow(const ServoInput& input, const ControlStep& step, VisualController& controller);
 

@@ -281,6 +281,7 @@ class MovedEndoscope {
     ImageMeasurement image;
     image.time_s = time_s_ - period_s_;
     image.registration = last_.registration;
+    if (frozen) image.repetition = Repetition::possible_at_rest;
     if (!visible) return image;
     const auto& believed = steps_ > 1 ? last_.camera_from_rcm : rig_.instruments[0].camera_from_rcm;
     const Marker& marker = rig_.instruments[0].marker;
@@ -400,6 +401,36 @@ TEST(MovedEndoscope, IsNoFrozenPictureOfAFastArm) {
   EXPECT_EQ(world.steps(60).control.reason, HoldReason::frozen_image);
   world.frozen = false;
   EXPECT_EQ(world.steps(60).registration, 0);
+}
+
+// A camera without noise might show an arm at rest for the longest delay that an image may have.
+TEST(MovedEndoscope, IsNoPictureThatFreezesWhenTheArmStarts) {
+  for (const int after : {2, 8, 15}) {
+    MovedEndoscope world;
+    world.aim(Eigen::Vector4d::Zero());
+    world.steps(60);
+    world.aim({0.35, 0, 0, 0});
+    world.steps(after);
+    world.frozen = true;
+    EXPECT_EQ(world.steps(60).control.reason, HoldReason::frozen_image);
+    world.frozen = false;
+    EXPECT_EQ(world.steps(60).registration, 0) << after;
+  }
+}
+
+// What is shown of before the endoscope moved tells nothing of where it is.
+TEST(MovedEndoscope, IsNotMeasuredByAPictureThatFreezesMeanwhile) {
+  ControllerConfig config = PerfectWorld::config();
+  config.endoscope_attempts = 1;
+  MovedEndoscope world(config);
+  world.steps(60);
+  world.move();
+  ASSERT_TRUE(world.until_probing());
+  world.steps(20);
+  world.frozen = true;
+  EXPECT_EQ(world.steps(90).control.reason, HoldReason::frozen_image);
+  world.frozen = false;
+  EXPECT_TRUE(world.until_registration(2));
 }
 
 TEST(MovedEndoscope, IsNoEncoderThatIsSetWhileTheArmIsNotEnabled) {
