@@ -420,6 +420,32 @@ TEST(MovedEndoscope, IsNoPictureThatFreezesWhenTheArmStarts) {
   }
 }
 
+// As a ramp of 20 degrees in 0.6 s looks, of which each image shows a little.
+TEST(MovedEndoscope, IsHeldFromTheFirstImageThatMovesUntilItIsCertain) {
+  MovedEndoscope world;
+  world.steps(60);
+  for (int k = 0; world.steps(0).registration == 0; ++k) {
+    ASSERT_LT(k, 10);
+    world.seen_off[0] += 0.005;
+    EXPECT_EQ(world.step().control.reason, HoldReason::endoscope_moved);
+  }
+}
+
+TEST(MovedEndoscope, IsNotOneImageThatIsOffOrLost) {
+  MovedEndoscope world;
+  world.steps(60);
+  for (const bool lost_then : {false, true}) {
+    world.seen_off[0] = 0.005;
+    EXPECT_EQ(world.step().control.action, ControlAction::hold);
+    world.seen_off[0] = 0;
+    world.visible = !lost_then;
+    world.step();
+    world.visible = true;
+    EXPECT_EQ(world.steps(20).control.action, ControlAction::track);
+  }
+  EXPECT_EQ(world.steps(60).registration, 0);
+}
+
 // However it is read.
 TEST(MovedEndoscope, IsNoPictureThatRepeats) {
   MovedEndoscope world;
