@@ -18,6 +18,7 @@ constexpr double min_friction = 1e-3, max_friction = 0.1, max_load = 1;  // join
 void ArmResponse::restart() {
   started_ = asked_ = false;
   drive_.load.setZero();
+  drive_.load_known.fill(false);
   standing_load_.setZero();
   // What was seen of lag and friction stays, as if the load had been known then.
   normal_.middleRows<4>(1).setZero();
@@ -25,10 +26,14 @@ void ArmResponse::restart() {
   cross_ = normal_ * (Unknowns() << lag_s_, drive_.load, drive_.friction.cwiseQuotient(scales_.joints)).finished();
 }
 
+// A blocked joint's motor winds up its transmission: it goes a small part of the way, and still goes a little when the
+// set-point has come to rest.
 bool ArmResponse::follows(int joint, double setpoint_velocity) const {
   constexpr double nearly = 0.7;
   const double slowest = 0.02 * scales_.joints[joint];  // per second
-  const double side = setpoint_velocity > 0 ? 1 : -1, enough = std::max(slowest, nearly * side * setpoint_velocity);
+  const double side = setpoint_velocity > 0 ? 1 : -1;
+  const double enough =
+      std::max({slowest, nearly * side * setpoint_velocity, nearly * side * smooth_setpoint_velocity_[joint]});
   return side * smooth_velocity_[joint] > enough && side * drive_.velocity[joint] > enough;
 }
 
@@ -36,10 +41,13 @@ void ArmResponse::add(const MotionState& setpoint, const Eigen::Vector4d& q_join
   constexpr double smoothing_s = 0.05;
   if (started_ && interval_s > 0) {
     drive_.velocity = (q_joint - q_before_) / interval_s;
-    smooth_velocity_ += -std::expm1(-interval_s / smoothing_s) * (drive_.velocity - smooth_velocity_);
+    const double weight = -std::expm1(-interval_s / smoothing_s);
+    smooth_velocity_ += weight * (drive_.velocity - smooth_velocity_);
+    smooth_setpoint_velocity_ += weight * (setpoint.velocity - smooth_setpoint_velocity_);
   } else {
     drive_.velocity.setZero();
     smooth_velocity_.setZero();
+    smooth_setpoint_velocity_.setZero();
   }
   q_before_ = q_joint;
   started_ = true;
@@ -82,6 +90,7 @@ void ArmResponse::solve() {
   lag_s_ = std::clamp(found[0], 0.0, max_lag_s);
   for (int i = 0; i < 4; ++i) {
     const bool both_ways = std::min(rising_s_[i], falling_s_[i]) > enough_s;
+    drive_.load_known[static_cast<std::size_t>(i)] = both_ways && normal_(1 + i, 1 + i) > enough_s;
     if (has_moved(i)) drive_.load[i] = scales_.joints[i] * std::clamp(found[1 + i], -max_load, max_load);
     const bool plain = both_ways && found[5 + i] > min_friction;
     drive_.friction[i] = plain ? scales_.joints[i] * std::min(found[5 + i], max_friction) : 0;

@@ -16,6 +16,9 @@ struct DriveState {
   Eigen::Vector4d friction = Eigen::Vector4d::Zero();
   /// Set-point less measured joint in the middle of that: what the arm sags by under its weight.
   Eigen::Vector4d load = Eigen::Vector4d::Zero();
+  /// The joint has gone both ways, and some way since set-points began anew. Before, it may hang on its friction, and
+  /// `load` be off by as much.
+  std::array<bool, 4> load_known{};
   /// Of the measured joints, between the last two.
   Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
   /// The joint goes where its set-point goes, nearly as fast.
@@ -48,7 +51,7 @@ class ArmResponse {
 
   Scales scales_;
   Eigen::Vector4d q_before_ = Eigen::Vector4d::Zero(), velocity_ = Eigen::Vector4d::Zero(),
-                  smooth_velocity_ = velocity_;
+                  smooth_velocity_ = velocity_, smooth_setpoint_velocity_ = velocity_;
   Eigen::Vector4d standing_load_ = Eigen::Vector4d::Zero();
   bool started_ = false, asked_ = false;
   // In joint scales.

@@ -81,5 +81,42 @@ TEST(ArmResponse, LearnsNothingFromABlockedJoint) {
   EXPECT_TRUE(response.drive().friction.isZero());
 }
 
+// Nor what its motor winds up of the transmission, an eighth of the way and 40 ms late, when the set-point slows down at
+// the end of its leash.
+TEST(ArmResponse, AWoundTransmissionIsNoLoad) {
+  constexpr double lag_s = 0.04, wound = 0.125;
+  ArmResponse response{Scales{}};
+  MotionState setpoint{Eigen::Vector4d::Zero(), Scales{}.joints};
+  Eigen::Vector4d motor = Eigen::Vector4d::Zero();
+  for (int k = 0; k < 300; ++k) {
+    const Eigen::Vector4d slower = setpoint.velocity - 10 * period_s * Scales{}.joints;
+    setpoint.velocity = slower.cwiseMax(0.01 * Scales{}.joints);
+    setpoint.position += period_s * setpoint.velocity;
+    motor += -std::expm1(-period_s / lag_s) * (wound * setpoint.position - motor);
+    response.add(setpoint, motor, period_s);
+  }
+  EXPECT_TRUE(response.drive().load.isZero()) << response.drive().load.transpose();
+  EXPECT_FALSE(response.drive().load_known[0]);
+}
+
+TEST(ArmResponse, KnowsTheLoadOfAJointThatHasGoneBothWays) {
+  ArmResponse response{Scales{}};
+  StickingArm arm;
+  const auto move = [&](double from, double to) {
+    for (int k = 0; k < 60; ++k) {
+      const Eigen::Vector4d rate = (to - from) * Scales{}.joints;
+      const MotionState setpoint{from * Scales{}.joints + rate * (k * period_s), rate};
+      arm.follow(setpoint.position);
+      response.add(setpoint, arm.q, period_s);
+    }
+    return response.drive().load_known[0];
+  };
+  EXPECT_FALSE(move(0, 1));
+  EXPECT_TRUE(move(1, 0));
+  response.restart();
+  EXPECT_FALSE(response.drive().load_known[0]);
+  EXPECT_TRUE(move(0, 1));
+}
+
 }  // namespace
 }  // namespace lapservo::internal

@@ -1,6 +1,6 @@
 #include "lapservo/control/frozen_image.h"
 
-#include <cmath>
+#include <algorithm>
 
 #include "lapservo/control/tracking_law.h"
 
@@ -8,8 +8,10 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double same = 0.02;  // of the feature scales: 0.1 mrad, 0.02 px
-// Theta and phi have no backlash worth its name; rho and psi count beyond the widest that is looked for.
-const Eigen::Vector4d moved(5e-4, 5e-4, 6e-4, 0.12);
+// Theta and phi have no backlash worth its name; rho and psi count beyond the widest that is looked for. A tenth of a
+// pixel changes some of a picture's.
+const Eigen::Vector4d moved(5e-4, 5e-4, 6e-4, 0.12), moved_by_pixels(1e-4, 1e-4, 6e-4, 0.12);
+constexpr double doubled_s = 0.045;
 
 }  // namespace
 
@@ -18,16 +20,29 @@ bool FrozenImage::same_features(const Eigen::Vector4d& features) const {
   return (change.abs() < same).all();
 }
 
-bool FrozenImage::add(const ImageMeasurement& image, const JointHistory& history) {
-  if (!first_ || !same_features(image.features)) {
+FrozenImage::Verdict FrozenImage::add(const ImageMeasurement& image, const JointHistory& history) {
+  const bool same_pixels = image.repetition != Repetition::none;
+  if (!first_ || !(same_pixels || same_features(image.features))) {
     first_ = image;
+    same_pixels_ = true;
     joints_then_ = joints_at(image, history);
-    return false;
+    return Verdict::fresh;
   }
+  same_pixels_ = same_pixels_ && same_pixels;
+  // Of a picture from before the first readings nobody can tell where the joints were.
+  if (!std::all_of(joints_then_.begin(), joints_then_.end(), [](const auto& q) { return q.has_value(); }))
+    joints_then_ = joints_at(image, history);
+  const bool known = image.repetition == Repetition::of_a_noisy_camera;
+  if (!known && !joints_moved(image, history)) return Verdict::fresh;
+  return image.time_s - first_->time_s < doubled_s ? Verdict::again : Verdict::frozen;
+}
+
+bool FrozenImage::joints_moved(const ImageMeasurement& image, const JointHistory& history) const {
   const Joints joints_now = joints_at(image, history);
+  const Eigen::Array4d enough = same_pixels_ ? moved_by_pixels : moved;
   for (std::size_t i = 0; i < delays; ++i) {
     if (!joints_then_[i] || !joints_now[i]) return false;
-    if (((*joints_now[i] - *joints_then_[i]).array().abs() <= moved.array()).all()) return false;
+    if (((*joints_now[i] - *joints_then_[i]).array().abs() <= enough).all()) return false;
   }
   return true;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -16,6 +17,16 @@ struct SeenMarker {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
 };
 
+/// Whether a picture is the one before in every pixel.
+enum class Repetition {
+  none,               ///< it differs
+  possible_at_rest,   ///< the same, and it is not known that the camera's noise forbids that
+  of_a_noisy_camera,  ///< the same, which noise never lets a new exposure be
+};
+/// "none", "possible_at_rest", "of_a_noisy_camera"; nullopt for anything else.
+std::string_view to_string(Repetition repetition);
+std::optional<Repetition> repetition_from_string(std::string_view word);
+
 /// What one frame tells the controller. The image stamped `time_s` shows the scene at time_s - delay: stamp it when it
 /// arrives and the delay is the whole chain's, or when it was exposed and the delay is zero.
 struct ImageMeasurement {
@@ -27,6 +38,7 @@ struct ImageMeasurement {
   std::optional<Eigen::Vector4d> q;                          ///< a start for the first frame, when known
   std::optional<SeenMarker> marker{};  ///< also where `found` is false because nobody knows where the RCM is
   int registration = 0;                ///< which camera_from_rcm it was seen with: ServoDecision::registration
+  Repetition repetition = Repetition::none;
 };
 
 /// Covariance of features from that of q.

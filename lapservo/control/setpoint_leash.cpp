@@ -12,9 +12,13 @@ namespace lapservo::internal {
 void SetpointLeash::update(const MotionState& setpoint, const Eigen::Vector4d& q_joint, const DriveState& drive,
                            double lag_s, double interval_s) {
   constexpr double nearly = 0.9;
-  constexpr double faster = 1.1, least_lag_s = 0.02;  // an arm lags at least by about this, whatever is known of it
+  constexpr double known = 0.9, unknown = 0.7, least_lag_s = 0.02;  // an arm lags at least by about this
   drive_ = drive;
-  allowed_ = faster * std::max(lag_s, least_lag_s) * limits_.rate + drive.friction;
+  const double lag_or_least_s = std::max(lag_s, least_lag_s);
+  for (int i = 0; i < 4; ++i) {
+    const double times = drive.load_known[static_cast<std::size_t>(i)] ? known : unknown;
+    allowed_[i] = times * lag_or_least_s * limits_.rate[i] + drive.friction[i];
+  }
   const Eigen::Vector4d lead = setpoint.position - q_joint - drive.load;
   if (std::exchange(restarted_, false)) beyond_ = lead;
   for (int i = 0; i < 4; ++i) {
@@ -42,6 +46,7 @@ Eigen::Vector4d SetpointLeash::limit(const Eigen::Vector4d& setpoint_velocity, c
                                      double period_s) const {
   Eigen::Vector4d velocity = wanted;
   for (int i = 0; i < 4; ++i) {
+    if (drive_.follows[static_cast<std::size_t>(i)]) continue;
     const double side = ahead_[i] > 0 ? 1 : -1, left = allowed_[i] - side * ahead_[i];
     const double closing = std::copysign(closing_speed(std::abs(left), limits_.acceleration[i]), left);
     const double fastest = std::max(0.0, side * drive_.velocity[i]) + closing;

@@ -10,9 +10,10 @@ namespace lapservo::internal {
 
 /// Keeps set-points from running ahead of a joint that does not come along. What drives a joint is how far its
 /// set-point is ahead of it, so that a joint that something has blocked moves about as fast when it is released as
-/// ahead / lag. Allowed is a lead of 1.1 x the rate limit x the lag, beside friction and load. A joint that is farther
-/// from its set-point and goes along with it all the same is not blocked: the arm hangs lower, or its encoder was set,
-/// and the lead is counted from there.
+/// ahead / lag, and a little faster by what its transmission has wound up. Allowed is a lead of 0.9 x the rate limit x
+/// the lag, beside friction and load; 0.7 x until the load is known. A joint that is farther from its set-point and
+/// goes along with it all the same is not blocked: the arm hangs lower, or its encoder was set, and the lead is counted
+/// from there.
 class SetpointLeash {
  public:
   explicit SetpointLeash(const JointLimits& limits) : limits_(limits) {}

@@ -20,6 +20,7 @@ TEST(SetpointLeash, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
   MotionState setpoint{q, Eigen::Vector4d::Zero()};
   DriveState drive;
   drive.load << 0.001, -0.001, 0.0005, 0.01;
+  drive.load_known.fill(true);
   Eigen::Vector4d joint = q, farthest = Eigen::Vector4d::Zero();
   for (int k = 0; k < 240; ++k) {
     const bool stands = k >= 60;
@@ -49,8 +50,26 @@ TEST(SetpointLeash, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
   const Eigen::Vector4d stopping = limits.rate.cwiseAbs2().cwiseQuotient(2 * limits.acceleration);
   EXPECT_LE((farthest - stopping - limits.rate * (lag_s + 2 * period_s)).maxCoeff(), 0);
   const Eigen::Vector4d ahead = setpoint.position - drive.load - joint;
-  EXPECT_LE((ahead - 1.1 * lag_s * limits.rate).maxCoeff(), 1e-3 * lag_s);
+  EXPECT_LE((ahead - 0.9 * lag_s * limits.rate).maxCoeff(), 1e-3 * lag_s);
   EXPECT_GE((ahead - 0.8 * lag_s * limits.rate).minCoeff(), 0);
+}
+
+// Its load may be off by its friction, in whose direction nobody knows.
+TEST(SetpointLeash, IsShorterForAJointThatHasNotGoneBothWays) {
+  SetpointLeash leash(limits);
+  MotionState setpoint{q, Eigen::Vector4d::Zero()};
+  DriveState drive;
+  drive.load_known = {true, false, true, false};
+  for (int k = 0; k < 240; ++k) {
+    leash.update(setpoint, q, drive, lag_s, period_s);
+    const Eigen::Vector4d change = limits.acceleration * period_s;
+    const Eigen::Vector4d velocity =
+        leash.limit(setpoint.velocity, (setpoint.velocity + change).cwiseMin(limits.rate), period_s);
+    setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
+    setpoint.velocity = velocity;
+  }
+  const Eigen::Vector4d lead = (setpoint.position - q).cwiseQuotient(lag_s * limits.rate);
+  EXPECT_TRUE(lead.isApprox(Eigen::Vector4d(0.9, 0.7, 0.9, 0.7), 0.01)) << lead.transpose();
 }
 
 // An arm that hangs far below its set-points follows them nevertheless: it is not pulled down and down.
@@ -58,7 +77,7 @@ TEST(SetpointLeash, DoesNotTakeALoadForABlockedJoint) {
   SetpointLeash leash(limits);
   MotionState setpoint{q, Eigen::Vector4d::Zero()};
   DriveState drive;
-  const Eigen::Vector4d sag = 5 * 1.1 * lag_s * limits.rate;
+  const Eigen::Vector4d sag = 5 * lag_s * limits.rate;
   Eigen::Vector4d joint = q - sag;
   for (int k = 0; k < 240; ++k) {
     const Eigen::Vector4d before = joint;

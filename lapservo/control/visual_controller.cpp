@@ -152,7 +152,9 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   // The same stamp again, or an older one, tells nothing: the age of what was told before goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
   image_s_ = image.time_s;
-  if (frozen_image_.add(image, history_)) return HoldReason::frozen_image;
+  const FrozenImage::Verdict verdict = frozen_image_.add(image, history_);
+  if (verdict == FrozenImage::Verdict::frozen) return HoldReason::frozen_image;
+  if (verdict == FrozenImage::Verdict::again) return image_reason_;
   const HoldReason reason = recovery_ ? HoldReason::none : estimator_->update(image, history_);
   if (reason == HoldReason::none) usable_s_ = now_s_;
   return reason;

@@ -47,7 +47,9 @@ class VisualController {
     std::optional<Eigen::Vector4d> velocity;
   };
   void recover(const Recovery& recovery) { recovery_ = recovery; }
-  /// And on again, with the model that was found.
+  /// And on again with the model that was there: it was nothing.
+  void believe() { recovery_.reset(); }
+  /// Or with the one that was found.
   void recovered(const FeatureModel& model);
   /// A slightly better model while all goes on.
   void refine(const FeatureModel& model) { estimator_->set_model(model, false); }

@@ -33,11 +33,11 @@ TEST(DynamicLoop, CrossesFrictionAtReversals) {
   }
 }
 
-// However long, at speed and when it has settled.
+// However long; before it has ever moved, before it has gone both ways, at speed and when it has settled.
 TEST(DynamicLoop, IsNotFastWhenABlockedJointIsReleased) {
   for (int joint = 0; joint < 4; ++joint) {
-    for (const double begin_s : {0.6, 1.0, 4.0}) {
-      for (const double duration_s : {0.2, 1.0, 3.0}) {
+    for (const double begin_s : {0.0, 0.3, 1.3, 4.0}) {
+      for (const double duration_s : {0.2, 0.7, 3.0}) {
         SCOPED_TRACE(::testing::Message() << joint << " blocked from " << begin_s << " for " << duration_s);
         DynamicLoop loop;
         bool blocked = false;
@@ -54,6 +54,22 @@ TEST(DynamicLoop, IsNotFastWhenABlockedJointIsReleased) {
         EXPECT_LT(ticks.back().error.tail<3>().cwiseAbs().maxCoeff(), 1);
       }
     }
+  }
+}
+
+// At any time of the trajectory: where its joints are fast, and where they turn and stand still on their friction.
+TEST(DynamicLoop, HoldsWithin100MsOfAPictureThatFreezes) {
+  for (int k = 0; k < 20; ++k) {
+    DynamicLoop loop;
+    const double begin_s = 6 + 0.37 * k, end_s = begin_s + 1;
+    loop.frozen = Interval{begin_s, end_s};
+    const auto ticks = loop.run(papers, end_s + 3);
+    for (const DynamicTick& tick : ticks) {
+      if (tick.time_s > begin_s + 0.1 && tick.time_s < end_s - 1e-9) {
+        EXPECT_EQ(tick.decision.control.reason, HoldReason::frozen_image) << begin_s << ' ' << tick.time_s;
+      }
+    }
+    EXPECT_LT(ticks.back().error.tail<3>().cwiseAbs().maxCoeff(), 1);
   }
 }
 

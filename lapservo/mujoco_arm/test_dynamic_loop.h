@@ -12,6 +12,7 @@
 #include "lapservo/mujoco_arm/mujoco_arm.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/servo.h"
+#include "lapservo/sim/simulator.h"
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo::testing {
@@ -41,6 +42,8 @@ class DynamicLoop {
     return Eigen::Vector4d(Eigen::Vector4d::Zero());
   };
   std::function<void(double time_s, MujocoArm& arm)> meddle = [](double, MujocoArm&) {};
+  /// The image from its beginning arrives again and again, from a camera whose noise is known.
+  std::optional<Interval> frozen{};
   /// What of the configuration an image tells, as where a registration fits.
   bool images_know_q = true;
 
@@ -61,6 +64,7 @@ class DynamicLoop {
       const DesiredFeatures desired = trajectory.at(tick.time_s);
       tick.error = feature_error(seen.features, desired.features);
       if (k % 2 == 0) on_the_way.push_back(exposed(seen, arm.true_jp(), tick.time_s + latency_s, random));
+      if (k % 2 == 0) freeze(on_the_way.back());
       ServoInput input;
       input.time_s = tick.time_s;
       input.joints = {tick.time_s, JointVector::from_vector(arm.measured_jp() + misread(tick.time_s)),
@@ -90,6 +94,14 @@ class DynamicLoop {
     if (images_know_q) image.q = q;
     return image;
   }
+  void freeze(ImageMeasurement& image) {
+    const bool repeats = frozen && frozen->contains(image.time_s) && shown_;
+    const double stamp_s = image.time_s;
+    if (!repeats) shown_ = image;
+    image = *shown_;
+    image.time_s = stamp_s;
+    if (repeats) image.repetition = Repetition::of_a_noisy_camera;
+  }
   static void move(MujocoArm& arm, const std::optional<JointPath>& path, DynamicTick& tick, double period_s) {
     constexpr int parts = 16;
     for (int i = 1; i <= parts; ++i) {
@@ -99,6 +111,8 @@ class DynamicLoop {
     }
     tick.setpoint_ahead = arm.setpoint() - arm.measured_jp();
   }
+
+  std::optional<ImageMeasurement> shown_{};
 };
 
 /// Root mean square of the errors from `from_s` on.

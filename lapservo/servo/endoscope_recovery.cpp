@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "lapservo/servo/image_features.h"
 
@@ -12,6 +13,11 @@ constexpr int agreed_after = 10, moved_after = 2;
 
 // Of theta, phi (rad), rho (m) against the joints, from one image to the next: more than these tell.
 const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
+
+// From one image to the next the offset does not change by more than these, many times what it usually does, half of
+// what the joints moved, and what a delay that is off makes of their acceleration.
+const Eigen::Array3d min_step(1.5e-3, 1.5e-3, 3e-4);
+constexpr double unusual = 8, of_motion = 0.5, wrong_delay_s = 0.15, max_apart_s = 0.1;
 
 // Offsets from so long ago are those of before the endoscope began to move.
 constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
@@ -55,21 +61,62 @@ EndoscopeRecovery::EndoscopeRecovery(const Rig& rig, const ControllerConfig& con
 void EndoscopeRecovery::see(const ServoInput& input, VisualController& controller) {
   const auto& image = input.image;
   if (!image) return;
-  if (!image->found && !image->marker) {
-    contradicting_ = 0;
-    return;
-  }
+  if (!image->found && !image->marker) return drop_suspicion(controller);
   if (!follow_joints(*image, controller) || phase_ != Phase::watching || !image->found) return;
+  // An endoscope that moved would show another picture.
+  if (image->repetition != Repetition::none) return;
   // Without a marker there would be nothing to measure with.
+  const bool moves = stepped(*image);
   const bool contradicts = image->marker && (!image->q || jumped(*image->q));
   contradicting_ = contradicts ? contradicting_ + 1 : 0;
-  if (agreeing_ >= agreed_after && contradicting_ >= moved_after) notice(controller);
+  if (!contradicts && !(moves && image->marker)) return drop_suspicion(controller);
+  if (agreeing_ < agreed_after) return;
+  if (contradicting_ >= moved_after) return notice(controller);
+  suspected_ = true;
+  controller.recover({});
 }
 
-void EndoscopeRecovery::doubt(HoldReason reason) {
+void EndoscopeRecovery::drop_suspicion(VisualController& controller) {
+  if (suspected_ && phase_ == Phase::watching) controller.believe();
+  suspected_ = false;
+  contradicting_ = 0;
+}
+
+// What moves with the endoscope slowly jumps nowhere, but goes away from where it was a moment ago: enough to wait for
+// what the next images show.
+bool EndoscopeRecovery::stepped(const ImageMeasurement& image) {
+  constexpr double weight = 0.05;
+  if (!image.q) {
+    step_.reset();
+    return false;
+  }
+  const Step now{image.registration, *measured_, (*image.q - measured_->q).head<3>()};
+  const auto before = std::exchange(step_, now);
+  const double apart_s =
+      before && before->registration == now.registration ? now.measured.stamp_s - before->measured.stamp_s : 0;
+  if (!(apart_s > 0 && apart_s < max_apart_s)) return false;
+  const Eigen::Array3d step = (now.offset - before->offset).array().abs();
+  const Eigen::Array3d moved = (now.measured.q - before->measured.q).head<3>().array().abs();
+  const Eigen::Array3d faster = (now.measured.rate - before->measured.rate).head<3>().array().abs();
+  Eigen::Array3d by_motion = of_motion * moved + wrong_delay_s * faster;
+  by_motion.head<2>() = by_motion.head<2>().maxCoeff();  // theta's and phi's, where the frame is off
+  const bool unusually = (step > min_step + unusual * usual_step_squared_.sqrt() + by_motion).any();
+  if (unusually) {
+    step_ = before;
+  } else {
+    usual_step_squared_ += weight * (step.square() - usual_step_squared_);
+  }
+  return unusually;
+}
+
+void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
   if (reason != HoldReason::wild_joints && reason != HoldReason::frozen_image) return;
-  agreeing_ = contradicting_ = 0;
-  if (reason == HoldReason::frozen_image) return;
+  agreeing_ = 0;
+  drop_suspicion(controller);
+  if (reason == HoldReason::frozen_image) {
+    if (phase_ == Phase::resting || phase_ == Phase::exploring) rest_again(controller);
+    return;
+  }
   offsets_.clear();
   refine_at_s_.clear();  // its sightings go by the joints of before
 }
@@ -127,6 +174,7 @@ void EndoscopeRecovery::trust(const ServoInput& input, const ControlStep& step) 
 }
 
 void EndoscopeRecovery::notice(VisualController& controller) {
+  suspected_ = false;
   // Where none was trusted since the last time, that time's still holds.
   if (!offsets_.empty()) trust_before();
   camera_from_rcm_.reset();

@@ -15,12 +15,12 @@
 namespace lapservo::internal {
 
 /// Notices that the endoscope moved, and measures camera_from_rcm anew. Noticed is that images which told q, in
-/// agreement with the joints, show the marker as well as before but nowhere where its shaft passes the RCM: not what
-/// hides a marker, freezes a picture, sets an encoder or blocks a joint does. The arm holds until the marker's place in
-/// the image rests; moves its joints a little, one after the other; and what images and joints say of these motions
-/// gives camera_from_rcm. If they disagree, the endoscope has moved again and all begins anew;
-/// ControllerConfig::endoscope_attempts times, then the arm holds for good. What the images show in the next seconds,
-/// with the larger motions of the task, makes it finer twice.
+/// agreement with the joints, show the marker as well as before but nowhere where its shaft passes the RCM, or where
+/// the joints are not: not what hides a marker, freezes a picture, sets an encoder or blocks a joint does. The arm
+/// holds until the marker's place in the image rests; moves its joints a little, one after the other; and what images
+/// and joints say of these motions gives camera_from_rcm. If they disagree, the endoscope has moved again and all
+/// begins anew; ControllerConfig::endoscope_attempts times, then the arm holds for good. What the images show in the
+/// next seconds, with the larger motions of the task, makes it finer twice.
 class EndoscopeRecovery {
  public:
   EndoscopeRecovery(const Rig& rig, const ControllerConfig& config);
@@ -33,8 +33,9 @@ class EndoscopeRecovery {
   bool counts(int registration) const { return registration >= oldest_counted_ && registration <= registration_; }
   /// Before a step: an image that came, if it counts. Tells the controller what to do.
   void see(const ServoInput& input, VisualController& controller);
-  /// In it, with the controller's own reason: a picture that repeats and joints that jump are no moved endoscope.
-  void doubt(HoldReason reason);
+  /// In it, with the controller's own reason: a picture that repeats and joints that jump are no moved endoscope,
+  /// nor anything to measure one by.
+  void doubt(HoldReason reason, VisualController& controller);
   /// After it.
   void follow(const ServoInput& input, const ControlStep& step, VisualController& controller);
 
@@ -42,7 +43,9 @@ class EndoscopeRecovery {
   enum class Phase { watching, resting, exploring, failed };
 
   bool jumped(const Eigen::Vector4d& q_seen) const;
+  bool stepped(const ImageMeasurement& image);
   void notice(VisualController& controller);
+  void drop_suspicion(VisualController& controller);
   void trust_before();
   bool collects() const;
   void add_sighting(const MarkerSighting& sighting, double min_apart_s);
@@ -72,13 +75,21 @@ class EndoscopeRecovery {
   int registration_ = 0, oldest_counted_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
   Phase phase_ = Phase::watching;
-  int agreeing_ = 0;                                   ///< images so far, at most 10
-  int contradicting_ = 0;                              ///< images in a row
-  int failed_ = 0;                                     ///< attempts
-  std::deque<Offset> offsets_;                         ///< while images agreed, in order of time
-  std::optional<Measured> measured_;                   ///< at the latest image
-  GapPath path_;                                       ///< since the offset that is trusted
-  Eigen::Vector4d trusted_ = Eigen::Vector4d::Zero();  ///< offset, of before the endoscope moved
+  int agreeing_ = 0;                  ///< images so far, at most 10
+  int contradicting_ = 0;             ///< images in a row
+  int failed_ = 0;                    ///< attempts
+  std::deque<Offset> offsets_;        ///< while images agreed, in order of time
+  std::optional<Measured> measured_;  ///< at the latest image
+  struct Step {
+    int registration = 0;
+    Measured measured;
+    Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< of what was seen: theta, phi, rho
+  };
+  bool suspected_ = false;                                      ///< held until the next image
+  std::optional<Step> step_;                                    ///< of the latest image that told q and had not moved
+  Eigen::Array3d usual_step_squared_ = Eigen::Array3d::Zero();  ///< from image to image
+  GapPath path_;                                                ///< since the offset that is trusted
+  Eigen::Vector4d trusted_ = Eigen::Vector4d::Zero();           ///< offset, of before the endoscope moved
   std::vector<MarkerSighting> sightings_;
   double sighted_s_ = 0;  ///< stamp of the latest of them
   double rests_since_s_ = 0, explored_s_ = 0;

@@ -45,7 +45,7 @@ ServoDecision Servo::decide(const ServoInput& input) {
   ServoDecision decision;
   decision.camera_from_rcm = camera_from_rcm_;
   decision.control = controller_.step(input.time_s, q, input.image, input.desired, input.readings);
-  if (recovery_) recovery_->doubt(decision.control.reason);
+  if (recovery_) recovery_->doubt(decision.control.reason, controller_);
   watch_registration(input);
   decision.registration_contradicted = images_contradicting_ >= contradicted_after;
   decision.send = orderly(decision.control);

@@ -48,7 +48,7 @@ std::vector<std::string> make_input_columns() {
   std::vector<std::string> columns{"time_s", "arm_state"};
   name(columns, "joint_", joints);
   columns.emplace_back("readings");
-  columns.insert(columns.end(), {"image", "image_time_s", "image_registration"});
+  columns.insert(columns.end(), {"image", "image_time_s", "image_registration", "image_repetition"});
   name(columns, "seen_", features);
   for (int i = 0; i < 4; ++i)
     for (int j = i; j < 4; ++j) columns.push_back(covariance_column(i, j));
@@ -89,9 +89,10 @@ void write(std::vector<std::string>& fields, const Rigid3& pose) {
 void write_image(std::vector<std::string>& fields, const std::optional<ImageMeasurement>& image) {
   constexpr int numbers = 4 + 10 + 4 + 4, of_marker = 4 + 7;
   fields.emplace_back(!image ? "none" : image->found ? "found" : image->marker ? "marker" : "lost");
-  if (!image) return leave_empty(fields, 2 + numbers + of_marker);
+  if (!image) return leave_empty(fields, 3 + numbers + of_marker);
   write(fields, image->time_s);
   fields.push_back(fmt::format("{}", image->registration));
+  fields.emplace_back(to_string(image->repetition));
   if (!image->found && !image->marker) return leave_empty(fields, numbers + of_marker);
   write(fields, image->features);
   for (int i = 0; i < 4; ++i)
@@ -181,6 +182,9 @@ std::optional<ImageMeasurement> read_image(const Row& row) {
   image.found = word == "found";
   image.time_s = row.number("image_time_s");
   image.registration = static_cast<int>(row.number("image_registration"));
+  const auto repetition = repetition_from_string(row.text("image_repetition"));
+  if (!repetition) row.complain("image_repetition", "none, possible_at_rest or of_a_noisy_camera");
+  image.repetition = *repetition;
   if (word == "lost") return image;
   image.features = row.numbers("seen_", features);
   for (int i = 0; i < 4; ++i)

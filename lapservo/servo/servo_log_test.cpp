@@ -40,6 +40,7 @@ Record any_record(Random& random, int kind) {
     image.found = kind % 3 == 1;
     image.time_s = random.uniform();
     image.registration = kind % 4;
+    image.repetition = static_cast<Repetition>(kind % 3);
     if (kind % 4 == 3) {
       const Eigen::Vector4d position = any(random);
       image.marker = SeenMarker{any(random), position.head<3>(), Eigen::Quaterniond(any(random))};
@@ -79,6 +80,7 @@ void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   EXPECT_EQ(a.image->found, b.image->found);
   EXPECT_EQ(a.image->time_s, b.image->time_s);
   EXPECT_EQ(a.image->registration, b.image->registration);
+  EXPECT_EQ(a.image->repetition, b.image->repetition);
   ASSERT_EQ(a.image->marker.has_value(), b.image->marker.has_value());
   if (a.image->marker) {
     EXPECT_EQ(a.image->marker->inner_px, b.image->marker->inner_px);

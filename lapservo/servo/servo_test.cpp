@@ -281,6 +281,7 @@ class MovedEndoscope {
     ImageMeasurement image;
     image.time_s = time_s_ - period_s_;
     image.registration = last_.registration;
+    if (frozen) image.repetition = Repetition::possible_at_rest;
     if (!visible) return image;
     const auto& believed = steps_ > 1 ? last_.camera_from_rcm : rig_.instruments[0].camera_from_rcm;
     const Marker& marker = rig_.instruments[0].marker;
@@ -400,6 +401,75 @@ TEST(MovedEndoscope, IsNoFrozenPictureOfAFastArm) {
   EXPECT_EQ(world.steps(60).control.reason, HoldReason::frozen_image);
   world.frozen = false;
   EXPECT_EQ(world.steps(60).registration, 0);
+}
+
+// A camera without noise might show an arm at rest for the longest delay that an image may have.
+TEST(MovedEndoscope, IsNoPictureThatFreezesWhenTheArmStarts) {
+  ControllerConfig config = PerfectWorld::config();
+  config.limits.rate *= 4, config.limits.acceleration *= 4;
+  for (const int after : {2, 8, 15}) {
+    MovedEndoscope world(config);
+    world.aim(Eigen::Vector4d::Zero());
+    world.steps(60);
+    world.aim({0.35, 0, 0, 0});
+    world.steps(after);
+    world.frozen = true;
+    EXPECT_EQ(world.steps(60).control.reason, HoldReason::frozen_image);
+    world.frozen = false;
+    EXPECT_EQ(world.steps(60).registration, 0) << after;
+  }
+}
+
+// As a ramp of 20 degrees in 0.6 s looks, of which each image shows a little.
+TEST(MovedEndoscope, IsHeldFromTheFirstImageThatMovesUntilItIsCertain) {
+  MovedEndoscope world;
+  world.steps(60);
+  for (int k = 0; world.steps(0).registration == 0; ++k) {
+    ASSERT_LT(k, 10);
+    world.seen_off[0] += 0.005;
+    EXPECT_EQ(world.step().control.reason, HoldReason::endoscope_moved);
+  }
+}
+
+TEST(MovedEndoscope, IsNotOneImageThatIsOffOrLost) {
+  MovedEndoscope world;
+  world.steps(60);
+  for (const bool lost_then : {false, true}) {
+    world.seen_off[0] = 0.005;
+    EXPECT_EQ(world.step().control.action, ControlAction::hold);
+    world.seen_off[0] = 0;
+    world.visible = !lost_then;
+    world.step();
+    world.visible = true;
+    EXPECT_EQ(world.steps(20).control.action, ControlAction::track);
+  }
+  EXPECT_EQ(world.steps(60).registration, 0);
+}
+
+// However it is read.
+TEST(MovedEndoscope, IsNoPictureThatRepeats) {
+  MovedEndoscope world;
+  world.aim(Eigen::Vector4d::Zero());
+  world.steps(60);
+  world.frozen = true;
+  world.seen_off[0] = 0.1;
+  EXPECT_EQ(world.steps(10).registration, 0);
+}
+
+// What was seen before may be of another place than what is seen afterwards.
+TEST(MovedEndoscope, IsNotMeasuredByAPictureThatFreezesMeanwhile) {
+  ControllerConfig config = PerfectWorld::config();
+  config.endoscope_attempts = 1;
+  MovedEndoscope world(config);
+  world.steps(60);
+  world.move();
+  ASSERT_TRUE(world.until_probing());
+  world.steps(20);
+  world.frozen = true;
+  EXPECT_EQ(world.steps(90).control.reason, HoldReason::frozen_image);
+  world.move();
+  world.frozen = false;
+  EXPECT_TRUE(world.until_registration(2));
 }
 
 TEST(MovedEndoscope, IsNoEncoderThatIsSetWhileTheArmIsNotEnabled) {

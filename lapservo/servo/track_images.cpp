@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "lapservo/servo/image_features.h"
+#include "lapservo/servo/picture_repeats.h"
 
 namespace lapservo::internal {
 namespace {
@@ -25,6 +26,7 @@ class CallersTracking : public TrackedImageStream {
     tracked.observations = tracker_.track(tracked.image.bgr);
     tracked.measurement = measurement_of(tracked.observations[0], tracked.image.time_s, rcm_px_);
     tracked.measurement.registration = registration_;
+    tracked.measurement.repetition = repeats_.add(tracked.image.bgr);
     return tracked;
   }
   void use(int registration, const std::optional<Rigid3>& camera_from_rcm) override {
@@ -43,6 +45,7 @@ class CallersTracking : public TrackedImageStream {
   Tracker tracker_;
   std::optional<Eigen::Vector2d> rcm_px_;
   int registration_ = 0;
+  PictureRepeats repeats_;
 };
 
 class OwnThreadTracking : public TrackedImageStream {
