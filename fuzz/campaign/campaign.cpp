@@ -174,6 +174,7 @@ std::string track_file(const fs::path& path, const Rig& rig, const Sample& sampl
         fuzz::require_sound(seen);
         if (seen.status != Status::ok) continue;
         if (worst == "nothing found") worst = "measured";
+        if (!seen.rcm) continue;  // a shaft that misses the RCM, rows being shifted, has no q
         const double error_rad = min_error_rad(seen.rcm->q.psi_rad, sample.psi_rad);
         if (error_rad > largest_error_rad)
           counts.broken(seed, sample.extension + ": ok with psi off by " + std::to_string(error_rad) + " rad");
