@@ -1,7 +1,6 @@
 // marker_5mm SHEET.pdf: a marker for a 5 mm instrument, as a sheet to print, and what to expect of it.
 #include <algorithm>
 #include <cstdio>
-
 #include <lapservo/marker/design.h>
 #include <lapservo/marker/drawing.h>
 

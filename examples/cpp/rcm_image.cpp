@@ -1,13 +1,13 @@
 // rcm_image INPUT RIG.yaml: where the incision's image is, from an instrument that swings about it.
 #include <cstdio>
-#include <vector>
-
 #include <lapservo/lapservo.h>
+#include <vector>
 
 int main(int argc, char** argv) {
   if (argc != 3) return 2;
   lapservo::Rig rig = lapservo::load_rig(argv[2]);
-  for (lapservo::Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();  // tells where the RCM is
+  for (lapservo::Instrument& instrument : rig.instruments)
+    instrument.camera_from_rcm.reset();  // tells where the RCM is
   lapservo::Tracker tracker(rig);
   std::vector<lapservo::LineObservation> lines;
   const auto frames = lapservo::open_frame_source(argv[1], 30);

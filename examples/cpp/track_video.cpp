@@ -1,6 +1,5 @@
 // track_video INPUT RIG.yaml: prints where the instruments are in a video, a folder of pictures or a camera.
 #include <cstdio>
-
 #include <lapservo/io/frame_source.h>
 #include <lapservo/vision/tracker.h>
 
