@@ -271,9 +271,9 @@ std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& eviden
     gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
   const double best = *std::max_element(gains.begin(), gains.end());
   std::array<double, print_sigmas_mm.size() + 1> weights{};
-  const auto& off = print_limits.fractions;
-  weights[0] = (1 - std::accumulate(off.begin(), off.end(), 0.0)) * std::exp(gains[0] - best);
-  for (std::size_t i = 0; i < off.size(); ++i) weights[i + 1] = off[i] * std::exp(gains[i + 1] - best);
+  weights[0] = (1 - print_limits.off_fraction) * std::exp(gains[0] - best);
+  double fraction = print_limits.off_fraction / 2;
+  for (std::size_t i = 1; i < gains.size(); ++i, fraction /= 2) weights[i] = fraction * std::exp(gains[i] - best);
   return weights;
 }
 

@@ -40,7 +40,7 @@ struct PrintFit {
 };
 
 /// Tells the print's errors from the settled measurements' residuals. How large they usually are is not known, so the
-/// pose is a mean over the rig's print and prints that are off by 10 um to 0.6 mm, each weighted by how likely it
+/// pose is a mean over the rig's print and prints that are off by 5 um to 0.6 mm, each weighted by how likely it
 /// makes the residuals. On return the residuals are those that the step and the print's likeliest errors leave.
 /// `lines` are those of these residuals, `film_prior` as the fit has it. Nullopt when a direction is not seen at all.
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
