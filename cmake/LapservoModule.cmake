@@ -95,11 +95,11 @@ function(lapservo_optimise)
   endif()
 endfunction()
 
-# -Wno-restrict: GCC 12 reports it falsely inside std::string (GCC bug 105651).
+# -Wno-restrict, -Wno-array-bounds: GCC 12 reports them falsely inside std::string (GCC bug 105651).
 # Warnings and sanitizers for our own code only; never part of what users of the package inherit.
 add_library(lapservo_flags INTERFACE)
 target_compile_options(lapservo_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
-  $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond -Wlogical-op -Wno-restrict>)
+  $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond -Wlogical-op -Wno-restrict -Wno-array-bounds>)
 if(LAPSERVO_SANITIZE)
   # Not those checks of UBSan that AddressSanitizer makes as well: they take a quarter of the time to compile Eigen.
   add_compile_options(-fsanitize=address,undefined -fno-sanitize=null,object-size,pointer-overflow,vptr,alignment

@@ -26,6 +26,6 @@ target_link_options(lapservo_shared PRIVATE
 if(LAPSERVO_BUILD_TESTS)
   list(TRANSFORM archives REPLACE "(.+)" "$<TARGET_FILE:\\1>" OUTPUT_VARIABLE archive_files)
   add_test(NAME install.exported_symbols
-           COMMAND ${CMAKE_COMMAND} -DNM=${CMAKE_NM} -DSHARED=$<TARGET_FILE:lapservo_shared> "-DARCHIVES=${archive_files}"
+           COMMAND ${CMAKE_COMMAND} -DNM=${CMAKE_NM} -DSOVERSION=${LAPSERVO_SOVERSION} -DSHARED=$<TARGET_FILE:lapservo_shared> "-DARCHIVES=${archive_files}"
                    -P ${CMAKE_CURRENT_LIST_DIR}/test_exports.cmake)
 endif()

@@ -23,7 +23,7 @@ defined_symbols(expected --extern-only ${strong} ${ARCHIVES})
 list(FILTER expected INCLUDE REGEX "${public}")
 list(FILTER expected EXCLUDE REGEX "^([a-zA-Z -]+ (for|to) )?${not_public}")
 defined_symbols(exported --dynamic ${strong_or_weak} ${SHARED})
-list(REMOVE_ITEM exported LAPSERVO_0.1)
+list(REMOVE_ITEM exported LAPSERVO_${SOVERSION})
 
 list(LENGTH expected count)
 if(count LESS 100)

@@ -23,8 +23,7 @@ struct RecordedCounts {
   long unstamped = 0;
 };
 
-/// Records messages into a ROS 2 bag, in a thread of its own: raw images as PNG, which loses nothing, compressed ones
-/// as they are. Messages may come from any thread.
+/// Records messages into a ROS 2 bag as they are, in a thread of its own. Messages may come from any thread.
 class BagRecorder {
  public:
   /// See Ros2BagWriter.

@@ -107,6 +107,14 @@ TEST(Ros2BagWriter, NeverGoesOverSomething) {
   EXPECT_TRUE(std::filesystem::exists(folder / "mine.txt"));
 }
 
+TEST(BagRecorder, LeavesNothingOfNothing) {
+  const lapservo::testing::TemporaryFolder folder;
+  { const BagRecorder ended_early(folder / "bag"); }
+  EXPECT_FALSE(std::filesystem::exists(folder / "bag"));
+  BagRecorder recorder(folder / "bag");
+  recorder.finish();
+}
+
 TEST(BagRecorder, RecordsFromSeveralThreads) {
   const lapservo::testing::TemporaryFolder folder;
   constexpr int count = 200;

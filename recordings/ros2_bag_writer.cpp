@@ -65,6 +65,16 @@ struct Ros2BagWriter::File {
     run("BEGIN");
   }
 
+  // A bag in which nothing came to stand is none.
+  ~File() {
+    add_topic.reset(), add_message.reset(), database.reset();
+    std::error_code error;
+    if (topics.empty())
+      for (const char* end : {"", "-wal", "-shm"}) fs::remove(folder.path() / (name + end), error);
+  }
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
   [[noreturn]] void fail() const {
     throw InputError((folder.path() / name).string(),
                      std::string("can't be written (") + sqlite3_errmsg(database.get()) + ")");
@@ -165,7 +175,7 @@ void Ros2BagWriter::finish() {
   file_->run("COMMIT; PRAGMA wal_checkpoint(TRUNCATE)");
   file_->add_topic.reset(), file_->add_message.reset();
   file_->run("PRAGMA journal_mode = DELETE");
-  write_file(file_->folder.path() / "metadata.yaml", file_->metadata());
+  if (!file_->topics.empty()) write_file(file_->folder.path() / "metadata.yaml", file_->metadata());
 }
 
 }  // namespace lapservo::internal

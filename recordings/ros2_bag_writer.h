@@ -24,7 +24,7 @@ class Ros2BagWriter {
   void write(const std::string& topic, double time_s, const ImageMessage& message);
   void write(const std::string& topic, double time_s, const CompressedImageMessage& message);
 
-  /// Writes metadata.yaml; then the bag is whole.
+  /// Writes metadata.yaml; then the bag is whole. Of nothing no bag is made.
   void finish();
 
  private:

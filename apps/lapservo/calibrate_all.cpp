@@ -212,10 +212,14 @@ class Guide {
 // The recording of this name beside the rig, made now where it isn't there. Empty: it could not be made.
 std::string recorded(const AllOptions& options, const std::string& name, const char* what) {
   const fs::path folder = fs::path(options.rig + ".recordings") / name;
-  if (fs::exists(folder / "metadata.yaml")) return folder.string();
+  if (fs::exists(folder / "metadata.yaml")) {
+    std::printf("%s: as recorded in %s\n", name.c_str(), folder.c_str());
+    return folder.string();
+  }
   RecordOptions recording;
   recording.camera = options.camera, recording.robot = options.robot, recording.rig = options.rig;
   recording.joint_limits = options.joint_limits, recording.out = folder.string();
+  recording.instrument = options.instrument;
   recording.enable_motion = options.enable_motion, recording.until_enter = !options.enable_motion;
   if (options.enable_motion) {
     recording.move = name;
@@ -228,8 +232,12 @@ std::string recorded(const AllOptions& options, const std::string& name, const c
   }
   std::printf("\nrecording %s: %s\n", name.c_str(), folder.c_str());
   std::fflush(stdout);
-  const int code = record(recording);
-  if (code == 0 && !interrupted()) return folder.string();
+  try {
+    if (record(recording) == 0 && !interrupted()) return folder.string();
+  } catch (...) {
+    fs::remove_all(folder);
+    throw;
+  }
   fs::remove_all(folder);
   std::fprintf(stderr, "lapservo: stopped at recording %s: the same command goes on from there\n", name.c_str());
   return {};
@@ -238,6 +246,8 @@ std::string recorded(const AllOptions& options, const std::string& name, const c
 
 int run_all(AllOptions options) {
   load_rig(options.rig);
+  if (options.camera.empty() && (options.enable_motion || !options.robot.empty()))
+    throw InputError(options.robot.empty() ? "--enable-motion" : "--robot", "needs --camera: both are to be recorded");
   if (!options.camera.empty()) {
 #ifdef LAPSERVO_ROS2_BAGS
     if (options.turn.empty()) options.turn = recorded(options, "turn", to_record_turn);

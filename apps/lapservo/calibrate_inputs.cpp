@@ -36,14 +36,13 @@ void add_recording_options(Command command, CalibrateOptions& options) {
       .number_between(0.001, 1000.0);
 }
 
-std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options) {
-  if (options.instrument.empty()) {
-    if (rig.instruments.size() > 1)
-      throw InputError(options.rig, "has several instruments: name one with --instrument");
+std::size_t named_instrument(const Rig& rig, const std::string& name, const std::string& rig_file) {
+  if (name.empty()) {
+    if (rig.instruments.size() > 1) throw InputError(rig_file, "has several instruments: name one with --instrument");
     return 0;
   }
-  const auto index = instrument_index(rig, options.instrument);
-  if (!index) throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
+  const auto index = instrument_index(rig, name);
+  if (!index) throw InputError("--instrument", "name", name, "an instrument of " + rig_file);
   return *index;
 }
 

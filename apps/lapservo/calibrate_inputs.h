@@ -22,8 +22,12 @@ void add_calibrate_options(Command command, CalibrateOptions& options);
 /// Of these, those that say how the recording is read and which instrument is meant.
 void add_recording_options(Command command, CalibrateOptions& options);
 
-/// Place in the rig of the instrument that is meant. Throws InputError where that is open or unknown.
-std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options);
+/// Place in the rig of the instrument of that name, or of the only one where none is given. Throws InputError where
+/// that is open or unknown.
+std::size_t named_instrument(const Rig& rig, const std::string& name, const std::string& rig_file);
+inline std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options) {
+  return named_instrument(rig, options.instrument, options.rig);
+}
 
 /// Throws InputError when a result would go over an input or over the other result.
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);

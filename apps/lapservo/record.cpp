@@ -15,12 +15,14 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/calibrate_inputs.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_images.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "apps/lapservo/transports.h"
 #include "lapservo/control/calibration_motion.h"
+#include "lapservo/control/motion_follower.h"
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/arm_limits.h"
@@ -34,7 +36,8 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-constexpr double patience_s = 15;  // for the first image, the arm's first joint states
+constexpr double patience_s = 15;    // for the first image, the arm's first joint states
+constexpr double max_silence_s = 1;  // of the camera while the arm moves
 
 using SystemClock = std::chrono::system_clock;
 
@@ -111,15 +114,15 @@ class Recording {
 // The arm on its way along a motion.
 class MovingArm {
  public:
-  MovingArm(const RecordOptions& options, const Rig& rig, Transports& transports, const Clock& clock)
-      : options_(options), clock_(clock), config_(config_of(options, rig)) {
+  MovingArm(const RecordOptions& options, const Instrument& instrument, Transports& transports, const Clock& clock)
+      : options_(options), clock_(clock), config_(config_of(options, instrument)) {
     const Address arm = address_of(options.robot, "--robot");
     robot_ = std::make_unique<CrtkRobot>(transports.get(arm.transport, "--robot"), arm.name, config_, clock);
   }
-
   // However it ends: without new velocities the path brakes by itself.
   ~MovingArm() {
-    std::this_thread::sleep_for(std::chrono::duration<double>(stopping_time_s(config_.limits) + period_s));
+    std::this_thread::sleep_for(
+        std::chrono::duration<double>(stopping_time_s(config_.limits) + MotionFollower::period_s));
   }
   MovingArm(const MovingArm&) = delete;
   MovingArm& operator=(const MovingArm&) = delete;
@@ -127,74 +130,69 @@ class MovingArm {
   // Nothing while it is on its way or about to begin, then why it has ended: empty when the motion is done.
   std::optional<std::string> advance() {
     const double now_s = clock_.now_s();
-    if (!begun_s_) begun_s_ = now_s;
     const JointState measured = robot_->state();
-    if (!motion_) return begin(now_s, measured.q.vector());
-    if (const Blocked blocked = robot_->blocked(); blocked != Blocked::none) return wait(now_s, blocked);
-    if (blocked_s_) go_on(now_s, measured.q.vector());
-    const double t = now_s - started_s_;
-    if (t > motion_->duration_s + period_s) return "";
-    const Eigen::Vector4d on_path = path_->at(now_s).position;
-    if (((on_path - measured.q.vector()).cwiseAbs().array() > config_.max_distance.array()).any()) {
-      path_->reset(now_s, measured.q.vector());  // let go of what it runs against
-      robot_->send(*path_);
-      return "the arm does not follow";
-    }
-    const Eigen::Vector4d wanted = motion_->at(t), rate = (motion_->at(t + period_s) - wanted) / period_s;
-    path_->ramp_to(now_s, rate + (wanted - on_path) / follow_s, period_s);
-    robot_->send(*path_);
-    return std::nullopt;
+    const Blocked blocked = robot_->blocked();
+    if (blocked == Blocked::foreign_command) return std::string("somebody else sends set-points to the arm");
+    if (!follower_) return begin(now_s, measured, blocked);
+    const MotionFollower::Step step = follower_->step(now_s, measured);
+    if (step.path) robot_->send(*step.path);
+    if (blocked != Blocked::none) last_blocked_ = blocked;
+    return end_of(step.progress);
   }
-  static constexpr double period_s = 0.01;
 
  private:
-  static constexpr double follow_s = 0.5, max_blocked_s = 3;
-
-  static InterlockConfig config_of(const RecordOptions& options, const Rig& rig) {
-    const Instrument& instrument = rig.instruments.front();
+  static InterlockConfig config_of(const RecordOptions& options, const Instrument& instrument) {
     if (!instrument.joints)
-      throw InputError(options.rig, "instruments[0].joints is missing, expected the arm's joints: names, sign, offset");
+      throw InputError(options.rig,
+                       "joints of " + instrument.name + " is missing, expected the arm's joints: names, sign, offset");
     InterlockConfig config;
     config.joints = *instrument.joints;
     config.motion_enabled = options.enable_motion;
     if (!options.joint_limits.empty())
       config.limits = limits_of_q(config.joints, load_arm_limits(options.joint_limits));
+    if (options.move == "turn") turn_motion(Eigen::Vector4d::Zero(), config.limits, limits_source(options));
     return config;
   }
-  // The interlock keeps the arm still meanwhile.
-  std::optional<std::string> wait(double now_s, Blocked blocked) {
-    if (!blocked_s_) blocked_s_ = now_s;
-    if (blocked != Blocked::foreign_command && now_s < *blocked_s_ + max_blocked_s) return std::nullopt;
-    return std::string(to_string(blocked)) + " (the arm is " + robot_->operating_state() + ")";
+  static std::string limits_source(const RecordOptions& options) {
+    return options.joint_limits.empty() ? "--joint-limits" : options.joint_limits;
   }
-  // From where the arm is now towards where the motion was interrupted.
-  void go_on(double now_s, const Eigen::Vector4d& from) {
-    started_s_ += now_s - *std::exchange(blocked_s_, std::nullopt);
-    path_->reset(now_s, from);
-  }
-  std::optional<std::string> begin(double now_s, const Eigen::Vector4d& start) {
-    if (robot_->blocked() != Blocked::none) {
-      if (now_s < *begun_s_ + patience_s) return std::nullopt;
-      return std::string(to_string(robot_->blocked())) + ": the arm can't be moved";
+  std::optional<std::string> begin(double now_s, const JointState& measured, Blocked blocked) {
+    if (!asked_s_) asked_s_ = now_s;
+    if (blocked != Blocked::none || measured.operating_state != OperatingState::enabled) {
+      if (now_s < *asked_s_ + patience_s) return std::nullopt;
+      return std::string(to_string(blocked)) + ": the arm can't be moved";
     }
-    const std::string source = options_.joint_limits.empty() ? "--joint-limits" : options_.joint_limits;
-    motion_ = options_.move == "turn" ? turn_motion(start, config_.limits, source)
-                                      : swing_motion(start, config_.limits, options_.scale, options_.duration_s);
-    started_s_ = now_s;
-    path_.emplace(config_.limits.acceleration);
-    path_->reset(now_s, start);
-    robot_->send(*path_);
+    const Eigen::Vector4d start = measured.q.vector();
+    follower_.emplace(options_.move == "turn"
+                          ? turn_motion(start, config_.limits, limits_source(options_))
+                          : swing_motion(start, config_.limits, options_.scale, options_.duration_s),
+                      config_.limits, config_.max_distance, now_s);
     return std::nullopt;
+  }
+  std::optional<std::string> end_of(MotionFollower::Progress progress) const {
+    switch (progress) {
+      case MotionFollower::Progress::moving:
+      case MotionFollower::Progress::waiting:
+        return std::nullopt;
+      case MotionFollower::Progress::done:
+        return "";
+      case MotionFollower::Progress::blocked:
+        return std::string(to_string(last_blocked_)) + " (the arm is " + robot_->operating_state() + ")";
+      case MotionFollower::Progress::moved_meanwhile:
+        return "the arm was moved while it was not enabled";
+      case MotionFollower::Progress::does_not_follow:
+        break;
+    }
+    return "the arm does not follow";
   }
 
   const RecordOptions& options_;
   const Clock& clock_;
   InterlockConfig config_;
   std::unique_ptr<CrtkRobot> robot_;
-  std::optional<JointMotion> motion_;
-  std::optional<JointPath> path_;
-  std::optional<double> begun_s_, blocked_s_;
-  double started_s_ = 0;
+  std::optional<MotionFollower> follower_;
+  std::optional<double> asked_s_;
+  Blocked last_blocked_ = Blocked::none;
 };
 
 // Before anything is opened or made.
@@ -227,20 +225,24 @@ std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recor
   Progress progress(std::nullopt);
   std::optional<double> first_s;
   const double begin_s = clock.now_s();
+  double last_image_s = begin_s;
+  long images = 0;
   while (!interrupted()) {
     recording.check();
     const RecordedCounts counts = recording.counts();
     const double now_s = clock.now_s();
+    if (std::exchange(images, counts.images + counts.dropped) != counts.images + counts.dropped) last_image_s = now_s;
     if (!first_s && counts.images > 0) first_s = now_s;
     progress.show(static_cast<int>(counts.images), fmt::format(" images, {} joint readings", counts.joints));
     if (!first_s && now_s > begin_s + patience_s) return fmt::format("no image came within {:.0f} s", patience_s);
     if (const auto ended = recording.ended()) return *ended;
+    if (first_s && arm && now_s > last_image_s + max_silence_s) return "its images have stopped";
     if (first_s && arm) {
       if (const auto ended = arm->advance()) return *ended;
     } else if (first_s && (options.until_enter ? line_was_entered() : now_s > *first_s + options.duration_s)) {
       return "";
     }
-    std::this_thread::sleep_for(std::chrono::duration<double>(MovingArm::period_s));
+    std::this_thread::sleep_for(std::chrono::duration<double>(MotionFollower::period_s));
   }
   return "";
 }
@@ -253,7 +255,8 @@ int record(const RecordOptions& options) {
   Transports transports("lapservo_record");
   SteadyClock clock;
   std::optional<MovingArm> arm;
-  if (!options.move.empty()) arm.emplace(options, *rig, transports, clock);
+  if (!options.move.empty())
+    arm.emplace(options, rig->instruments[named_instrument(*rig, options.instrument, options.rig)], transports, clock);
   Recording recording(options, rig, transports, clock);
   watch_for_interrupts();
   const std::string why = wait_for_end(options, clock, recording, arm ? &*arm : nullptr);

@@ -6,7 +6,7 @@ namespace lapservo::app {
 
 /// What `lapservo record` was asked for.
 struct RecordOptions {
-  std::string camera, robot, rig, out, move, joint_limits;
+  std::string camera, robot, rig, out, move, joint_limits, instrument;
   double duration_s = 20, scale = 1, fps = 30;
   bool until_enter = false, enable_motion = false;
 };

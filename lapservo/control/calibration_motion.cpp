@@ -12,7 +12,8 @@ namespace {
 
 constexpr int psi = 3;
 
-// From 0 to 1, at rest at both ends, its rate 1.875 / duration at most.
+// From 0 to 1, at rest at both ends; per duration, and its square, at most so fast.
+constexpr double eased_rate = 1.875, eased_acceleration = 5.774;
 double eased(double part) {
   const double t = std::clamp(part, 0.0, 1.0);
   return t * t * t * (10 - 15 * t + 6 * t * t);
@@ -30,12 +31,17 @@ double travelled(double time_s, double distance, double rate, double ramp_s) {
 
 JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s) {
   // Of the rates: what growing and fading take, and what the swings take.
-  constexpr double share_of_easing = 0.25, share_of_swinging = 0.55, eased_rate = 1.875;
+  constexpr double share_of_easing = 0.25, share_of_swinging = 0.55;
   const double ease_s = duration_s / 4;
   const Eigen::Array4d wanted = scale * Eigen::Array4d(0.25, 0.2, 0.01, 1);
   const Eigen::Array4d room = (limits.upper - start).cwiseMin(start - limits.lower).cwiseMax(0);
-  const Eigen::Array4d amplitude = wanted.min(room).min(share_of_easing * ease_s / eased_rate * limits.rate.array());
-  const Eigen::Array4d fastest = share_of_swinging * limits.rate.array() / amplitude.max(1e-9);
+  const Eigen::Array4d rate = limits.rate, acceleration = limits.acceleration;
+  const Eigen::Array4d amplitude = wanted.min(room)
+                                       .min(share_of_easing * ease_s / eased_rate * rate)
+                                       .min(0.15 * ease_s * ease_s / eased_acceleration * acceleration)
+                                       .max(1e-9);
+  // Of the accelerations 0.3 for the swings, 0.15 for easing, and 0.33 at most for what both make together.
+  const Eigen::Array4d fastest = (share_of_swinging * rate / amplitude).min((0.3 * acceleration / amplitude).sqrt());
   const Eigen::Array4d omega = fastest.min(2 * std::numbers::pi / duration_s * Eigen::Array4d(3, 4, 5, 2));
   return {duration_s, [=](double time_s) -> Eigen::Vector4d {
             const double t = std::clamp(time_s, 0.0, duration_s);
@@ -45,7 +51,7 @@ JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits
 }
 
 JointMotion turn_motion(const Eigen::Vector4d& start, const JointLimits& limits, const std::string& source) {
-  constexpr double margin_rad = 0.15, ramp_s = 0.5, max_rate = 0.3;
+  constexpr double margin_rad = 0.15, max_rate = 0.3;
   const double half_rad = std::numbers::pi + margin_rad;
   const double lowest = limits.lower[psi] + half_rad, highest = limits.upper[psi] - half_rad;
   if (lowest > highest)
@@ -53,7 +59,10 @@ JointMotion turn_motion(const Eigen::Vector4d& start, const JointLimits& limits,
                      "room for a turn of " + std::to_string(2 * half_rad) + " rad");
   const double begin_rad = std::clamp(start[psi], lowest, highest) - half_rad;
   const double rate = std::min(max_rate, 0.5 * limits.rate[psi]), back_rate = 0.5 * limits.rate[psi];
-  const double back_s = std::max(1.0, 1.875 * std::abs(start[psi] - begin_rad) / back_rate);
+  const double acceleration = 0.8 * limits.acceleration[psi], ramp_s = std::max(0.5, rate / acceleration);
+  const double back_rad = std::abs(start[psi] - begin_rad);
+  const double back_s =
+      std::max({1.0, eased_rate * back_rad / back_rate, std::sqrt(eased_acceleration * back_rad / acceleration)});
   return {back_s + 2 * half_rad / rate + ramp_s, [=](double time_s) -> Eigen::Vector4d {
             Eigen::Vector4d q = start;
             q[psi] += (begin_rad - start[psi]) * eased(time_s / back_s);

@@ -239,7 +239,8 @@ void EndoscopeRecovery::explore(const ServoInput& input, const ControlStep& step
   if (moves) explored_s_ += controller.config().period_s;
   const auto seen = input.image ? sighting_of(*input.image) : std::nullopt;
   if (seen) seen_s_ = input.time_s;
-  if (seen && moves && sightings_.size() < max_images) add_sighting(*seen, apart_s);
+  const bool fresh = input.image && input.image->repetition == Repetition::none;
+  if (seen && fresh && moves && sightings_.size() < max_images) add_sighting(*seen, apart_s);
   if (input.time_s - seen_s_ > max_lost_s) {
     ++failed_;
     return rest_again(controller);
@@ -277,7 +278,7 @@ void EndoscopeRecovery::conclude(const ServoInput& input, VisualController& cont
 // Of the images that were seen from here to there, few are enough.
 void EndoscopeRecovery::refine(const ServoInput& input, VisualController& controller) {
   if (refine_at_s_.empty()) return;
-  if (input.image)
+  if (input.image && input.image->repetition == Repetition::none)
     if (const auto seen = sighting_of(*input.image)) add_sighting(*seen, refining_apart_s);
   if (input.time_s < refine_at_s_.front()) return;
   refine_at_s_.pop_front();

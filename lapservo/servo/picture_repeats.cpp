@@ -1,5 +1,6 @@
 #include "lapservo/servo/picture_repeats.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 
@@ -9,7 +10,7 @@ namespace {
 // A picture in so many parts each way. A shaft in motion does not change three quarters of them, nor does the black
 // around a round picture take a quarter.
 constexpr int parts = 4, most_parts = 12;
-constexpr int noisy_after = 10;
+constexpr int noisy_after = 10, noiseless_after = 3;
 
 bool comparable(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() && a.data != b.data;
@@ -48,9 +49,10 @@ Repetition PictureRepeats::add(const cv::Mat& bgr) {
   before_ = bgr;
   if (!comparable(before, bgr)) return Repetition::none;
   if (same(before, bgr))
-    return !noiseless_ && noisy_ >= noisy_after ? Repetition::of_a_noisy_camera : Repetition::possible_at_rest;
+    return noiseless_ < noiseless_after && noisy_ >= noisy_after ? Repetition::of_a_noisy_camera
+                                                                 : Repetition::possible_at_rest;
   if (!differs_in_most_places(before, bgr)) {
-    noiseless_ = true;
+    noiseless_ = std::min(noiseless_ + 1, noiseless_after);
   } else if (noisy_ < noisy_after) {
     ++noisy_;
   }

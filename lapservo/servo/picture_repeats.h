@@ -16,8 +16,8 @@ class PictureRepeats {
 
  private:
   cv::Mat before_;
-  int noisy_ = 0;  ///< pictures that differed from the one before in most places, at most 10
-  bool noiseless_ = false;
+  int noisy_ = 0;      ///< pictures that differed from the one before in most places, at most 10
+  int noiseless_ = 0;  ///< that did not, at most 3: one may have been covered, or black
 };
 
 }  // namespace lapservo::internal

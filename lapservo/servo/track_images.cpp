@@ -81,6 +81,9 @@ class OwnThreadTracking : public TrackedImageStream {
           continue;
         }
         const std::lock_guard lock(mutex_);
+        // The loop is not told of the picture that it repeats.
+        if (latest_ && latest_->measurement.repetition == Repetition::none)
+          tracked->measurement.repetition = Repetition::none;
         latest_ = std::move(tracked);
       }
     } catch (...) {

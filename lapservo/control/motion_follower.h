@@ -1,0 +1,56 @@
+#pragma once
+
+#include <optional>
+
+#include "lapservo/control/calibration_motion.h"
+#include "lapservo/robot/joint_path.h"
+#include "lapservo/robot/robot.h"
+
+namespace lapservo::internal {
+
+/// Leads an arm along a motion, within the rate, acceleration and position limits. While the arm is not enabled the
+/// motion waits, and goes on from rest. Where it ends nothing more is to be sent: the last path brakes by itself.
+class MotionFollower {
+ public:
+  enum class Progress {
+    moving,
+    waiting,          ///< the arm is not enabled
+    done,             ///< from here on the motion has ended
+    blocked,          ///< the arm was not enabled for 3 s
+    moved_meanwhile,  ///< while it was not, it went farther from the motion than max_lead
+    does_not_follow,  ///< its joints stayed farther than max_lead from the set-points, which have gone back to them
+  };
+
+  /// At rest where the motion begins. `max_lead`: of each joint, rad and m.
+  MotionFollower(JointMotion motion, const JointLimits& limits, const Eigen::Vector4d& max_lead, double now_s);
+
+  /// To be asked every `period_s` or so. Where `path` is there it is to be sent.
+  struct Step {
+    Progress progress = Progress::moving;
+    std::optional<JointPath> path{};
+  };
+  Step step(double now_s, const JointState& measured);
+
+  static constexpr double period_s = 0.01;
+
+ private:
+  Step wait(double now_s);
+  Step retreat(double now_s);
+  bool is_far(const Eigen::Vector4d& a, const Eigen::Vector4d& b) const;
+  Step send(double now_s, const Eigen::Vector4d& wanted_velocity);
+
+  JointMotion motion_;
+  JointLimits limits_;
+  Eigen::Vector4d max_lead_;
+  JointPath path_;
+  double started_s_;  // what was waited for left out
+  int far_ = 0;       // readings at a stretch
+  std::optional<double> waiting_s_;
+  struct Retreat {
+    Eigen::Vector4d to;
+    double until_s;
+  };
+  std::optional<Retreat> retreat_;
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,149 @@
+#include "lapservo/control/motion_follower.h"
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace lapservo::internal {
+namespace {
+
+using Progress = MotionFollower::Progress;
+constexpr double tick_s = 0.002;
+const Eigen::Vector4d start(0, 1.5, 0.1, 0), max_lead(0.05, 0.05, 0.005, 0.2);
+
+// An arm that follows its set-points with a lag, and forgets its path when it is not enabled, as an interlock does.
+struct SimulatedRun {
+  double now_s = 0;
+  Eigen::Vector4d q = start, set_point = start, velocity = Eigen::Vector4d::Zero();
+  std::optional<JointPath> path;
+  Eigen::Array4d max_rate = Eigen::Array4d::Zero(), max_acceleration = Eigen::Array4d::Zero();
+  std::vector<Eigen::Vector4d> set_points;
+
+  void tick(const std::function<void(SimulatedRun&)>& disturb) {
+    now_s += tick_s;
+    const Eigen::Vector4d next = path ? path->at(now_s).position : set_point;
+    const Eigen::Vector4d v = (next - set_point) / tick_s;
+    max_rate = max_rate.max(v.array().abs());
+    max_acceleration = max_acceleration.max((v - velocity).array().abs() / tick_s);
+    set_point = next, velocity = v;
+    set_points.push_back(next);
+    q += tick_s / 0.03 * (set_point - q);
+    disturb(*this);
+  }
+};
+
+// Until it ends; `state` says what the loop is told.
+Progress follow(MotionFollower& follower, SimulatedRun& run, const std::function<void(SimulatedRun&)>& disturb,
+                const std::function<void(const SimulatedRun&, JointState&)>& state) {
+  for (int i = 0; i < 100000; ++i) {
+    for (int k = 0; k < 5; ++k) run.tick(disturb);
+    JointState measured{run.now_s, JointVector::from_vector(run.q), OperatingState::enabled};
+    state(run, measured);
+    if (measured.operating_state != OperatingState::enabled) {
+      run.path.reset();
+      run.velocity.setZero();
+    }
+    const auto step = follower.step(run.now_s, measured);
+    if (step.path) run.path = step.path;
+    if (step.progress != Progress::moving && step.progress != Progress::waiting) {
+      for (int k = 0; k < 500; ++k) run.tick(disturb);  // it brakes
+      return step.progress;
+    }
+  }
+  ADD_FAILURE() << "it never ends";
+  return Progress::waiting;
+}
+const auto undisturbed = [](SimulatedRun&) {};
+const auto as_it_is = [](const SimulatedRun&, JointState&) {};
+
+void expect_within(const SimulatedRun& run, const JointLimits& limits) {
+  EXPECT_TRUE((run.max_rate <= 1.001 * limits.rate.array()).all()) << run.max_rate.transpose();
+  EXPECT_TRUE((run.max_acceleration <= 1.05 * limits.acceleration.array()).all()) << run.max_acceleration.transpose();
+}
+
+TEST(MotionFollower, LeadsAnArmToTheEnd) {
+  const JointLimits limits;
+  const JointMotion motion = swing_motion(start, limits, 1, 10);
+  MotionFollower follower(motion, limits, max_lead, 0);
+  SimulatedRun run;
+  EXPECT_EQ(follow(follower, run, undisturbed, as_it_is), Progress::done);
+  EXPECT_LT((run.q - start).cwiseAbs().maxCoeff(), 2e-3);
+  Eigen::Vector4d reach = Eigen::Vector4d::Zero();
+  for (const Eigen::Vector4d& q : run.set_points) reach = reach.cwiseMax((q - start).cwiseAbs());
+  EXPECT_GT(reach[0], 0.1);
+  expect_within(run, limits);
+}
+
+TEST(MotionFollower, WaitsWhileTheArmIsNotEnabledAndGoesOnFromRest) {
+  const JointLimits limits;
+  for (const double begin_s : {1.0, 2.2, 3.7, 5.1}) {
+    MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+    SimulatedRun run;
+    const auto paused = [&](const SimulatedRun& r, JointState& state) {
+      if (r.now_s > begin_s && r.now_s < begin_s + 1) state.operating_state = OperatingState::paused;
+    };
+    EXPECT_EQ(follow(follower, run, undisturbed, paused), Progress::done) << begin_s;
+    EXPECT_GT(run.now_s, 11);
+    EXPECT_TRUE((run.max_rate <= 1.001 * limits.rate.array()).all()) << run.max_rate.transpose();
+  }
+}
+
+TEST(MotionFollower, GivesUpWhenTheArmIsNotEnabledForLong) {
+  const JointLimits limits;
+  MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+  SimulatedRun run;
+  const auto faulted = [](const SimulatedRun& r, JointState& state) {
+    if (r.now_s > 2) state.operating_state = OperatingState::fault;
+  };
+  EXPECT_EQ(follow(follower, run, undisturbed, faulted), Progress::blocked);
+}
+
+TEST(MotionFollower, EndsWhenSomebodyMovedTheArmMeanwhile) {
+  const JointLimits limits;
+  MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+  SimulatedRun run;
+  const auto paused = [](const SimulatedRun& r, JointState& state) {
+    if (r.now_s > 2 && r.now_s < 3) state.operating_state = OperatingState::paused;
+  };
+  const auto pushed = [](SimulatedRun& r) {
+    if (r.now_s > 2.4 && r.now_s < 2.6) r.q[0] += 0.3 * tick_s / 0.2, r.set_point = r.q;
+  };
+  EXPECT_EQ(follow(follower, run, pushed, paused), Progress::moved_meanwhile);
+}
+
+TEST(MotionFollower, LetsGoOfWhatItRunsAgainst) {
+  const JointLimits limits;
+  MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+  SimulatedRun run;
+  std::optional<double> stuck;
+  const auto blocked = [&](SimulatedRun& r) {
+    if (r.now_s < 3) return;
+    if (!stuck) stuck = r.q[0];
+    r.q[0] = *stuck;
+  };
+  EXPECT_EQ(follow(follower, run, blocked, as_it_is), Progress::does_not_follow);
+  EXPECT_LT(std::abs(run.set_point[0] - *stuck), 0.02);
+  expect_within(run, limits);
+}
+
+TEST(MotionFollower, OneWildReadingMovesNothing) {
+  const JointLimits limits;
+  MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0),
+      undisturbed_follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+  SimulatedRun run, other;
+  bool was_wild = false;
+  const auto wild = [&](const SimulatedRun& r, JointState& state) {
+    if (r.now_s < 2 || was_wild) return;
+    state.q.theta_rad += 0.5, was_wild = true;
+  };
+  EXPECT_EQ(follow(follower, run, undisturbed, wild), Progress::done);
+  EXPECT_EQ(follow(undisturbed_follower, other, undisturbed, as_it_is), Progress::done);
+  ASSERT_EQ(run.set_points.size(), other.set_points.size());
+  for (std::size_t i = 0; i < run.set_points.size(); ++i) EXPECT_EQ(run.set_points[i], other.set_points[i]) << i;
+}
+
+}  // namespace
+}  // namespace lapservo::internal
