@@ -1,18 +1,15 @@
 #include "recordings/bag_recorder.h"
 
-#include <chrono>
 #include <cstdint>
 #include <limits>
 #include <utility>
+
+#include "lapservo/core/wall_clock.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t max_waiting_bytes = std::size_t{512} << 20;
-
-double now_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 std::size_t bytes_of(const JointMessage& message) {
   return 64 * message.names.size();
@@ -30,17 +27,7 @@ BagRecorder::~BagRecorder() {
   end();
 }
 
-void BagRecorder::add(const std::string& topic, JointMessage&& message) {
-  enqueue(topic, std::move(message));
-}
-void BagRecorder::add(const std::string& topic, ImageMessage&& message) {
-  enqueue(topic, std::move(message));
-}
-void BagRecorder::add(const std::string& topic, CompressedImageMessage&& message) {
-  enqueue(topic, std::move(message));
-}
-
-void BagRecorder::enqueue(const std::string& topic, Message&& message) {
+void BagRecorder::add(const std::string& topic, Message message) {
   const std::size_t bytes = std::visit([](const auto& m) { return bytes_of(m); }, message);
   const double stamp_s = std::visit([](const auto& m) { return m.stamp_s; }, message);
   const std::lock_guard lock(mutex_);
@@ -53,7 +40,7 @@ void BagRecorder::enqueue(const std::string& topic, Message&& message) {
     return;
   }
   waiting_bytes_ += bytes;
-  waiting_.push_back({topic, now_s(), std::move(message)});
+  waiting_.push_back({topic, since_1970_s(), std::move(message)});
   changed_.notify_all();
 }
 

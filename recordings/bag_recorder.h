@@ -32,9 +32,8 @@ class BagRecorder {
   BagRecorder(const BagRecorder&) = delete;
   BagRecorder& operator=(const BagRecorder&) = delete;
 
-  void add(const std::string& topic, JointMessage&& message);
-  void add(const std::string& topic, ImageMessage&& message);
-  void add(const std::string& topic, CompressedImageMessage&& message);
+  using Message = std::variant<JointMessage, ImageMessage, CompressedImageMessage>;
+  void add(const std::string& topic, Message message);
 
   RecordedCounts counts() const;
   /// Throws what writing has thrown.
@@ -43,14 +42,12 @@ class BagRecorder {
   void finish();
 
  private:
-  using Message = std::variant<JointMessage, ImageMessage, CompressedImageMessage>;
   struct Entry {
     std::string topic;
     double time_s = 0;
     Message message;
   };
 
-  void enqueue(const std::string& topic, Message&& message);
   std::optional<Entry> take();
   void write_all();
   void end();

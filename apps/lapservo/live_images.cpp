@@ -24,6 +24,11 @@ std::unique_ptr<LiveCamera> open_pipeline(const std::string& text, const std::st
 #endif
 }
 
+Transport::Subscription subscribe(Transport& transport, const std::string& topic, const ImageSink& sink) {
+  return topic.ends_with("/compressed") ? transport.subscribe_compressed_images(topic, sink.compressed)
+                                        : transport.subscribe_images(topic, sink.image);
+}
+
 }  // namespace
 
 Transport& Transports::get(const std::string& transport, const std::string& option) {
@@ -33,42 +38,36 @@ Transport& Transports::get(const std::string& transport, const std::string& opti
 }
 
 bool names_live_images(const std::string& text) {
-  for (const std::string_view beginning : {std::string_view("ros1:"), std::string_view("ros2:"), gst, device})
-    if (text.starts_with(beginning)) return true;
-  return false;
+  return names_topic(text) || text.starts_with(gst) || text.starts_with(device);
 }
 
-std::unique_ptr<LiveCamera> open_local_camera(const std::string& text, const std::string& option, const cv::Size& size,
-                                              ImageSink sink) {
-  if (text.starts_with(gst)) return open_pipeline(text, option, std::move(sink));
+bool names_topic(const std::string& text) {
+  return text.starts_with("ros1:") || text.starts_with("ros2:");
+}
+
+ImageInput open_images(const std::string& text, const std::string& option, const cv::Size& size, Transports& transports,
+                       ImageSink sink) {
+  if (names_topic(text)) {
+    const Address address = address_of(text, option);
+    return {subscribe(transports.get(address.transport, option), address.name, sink), nullptr};
+  }
+  if (text.starts_with(gst)) return {nullptr, open_pipeline(text, option, std::move(sink))};
   if (!text.starts_with(device))
     throw InputError(option, (text.empty() ? "is missing" : "is " + text) +
                                  ", expected ros2:/topic, ros1:/topic, /dev/videoN or gst:PIPELINE");
   if (size.empty()) throw InputError(option, "is " + text + ", which needs --rig: it is asked for its camera's size");
-  return open_v4l2_camera(text, size.width, size.height, std::move(sink));
+  return {nullptr, open_v4l2_camera(text, size.width, size.height, std::move(sink))};
 }
 
 LiveImages::LiveImages(const std::string& text, const std::string& option, const Camera& camera, const Clock& clock,
                        Transports& transports)
     : clock_(clock),
-      receiver_(camera.width_px, camera.height_px, text.starts_with("ros") ? StampsBy::sender : StampsBy::loop) {
-  if (!text.starts_with("ros1:") && !text.starts_with("ros2:")) {
-    camera_ = open_local_camera(text, option, {camera.width_px, camera.height_px}, sink());
-    return;
-  }
-  const Address address = address_of(text, option);
-  subscribe(transports.get(address.transport, option), address.name);
-}
+      receiver_(camera.width_px, camera.height_px, names_topic(text) ? StampsBy::sender : StampsBy::loop),
+      input_(open_images(text, option, {camera.width_px, camera.height_px}, transports, sink())) {}
 
 ImageSink LiveImages::sink() {
   return {[this](ImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); },
           [this](CompressedImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); }};
-}
-
-void LiveImages::subscribe(Transport& transport, const std::string& topic) {
-  ImageSink to = sink();
-  subscription_ = topic.ends_with("/compressed") ? transport.subscribe_compressed_images(topic, to.compressed)
-                                                 : transport.subscribe_images(topic, to.image);
 }
 
 }  // namespace lapservo::app

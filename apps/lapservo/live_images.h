@@ -28,10 +28,21 @@ class Transports {
 /// Whether a text names images that come by themselves: ros2:/topic, ros1:/topic, gst:PIPELINE, /dev/videoN.
 bool names_live_images(const std::string& text);
 
-/// A camera of this computer: /dev/videoN, which must have this size, or gst:PIPELINE. Throws InputError, naming
-/// `option`, for what is none of them or can't be opened.
-std::unique_ptr<internal::LiveCamera> open_local_camera(const std::string& text, const std::string& option,
-                                                        const cv::Size& size, internal::ImageSink sink);
+/// Whether it names a topic: its stamps are the sender's then.
+bool names_topic(const std::string& text);
+
+/// Where such images come from, until it is destroyed.
+struct ImageInput {
+  internal::Transport::Subscription subscription;
+  std::unique_ptr<internal::LiveCamera> camera;
+
+  /// See internal::LiveCamera; topics never end.
+  std::optional<std::string> ended() const { return camera ? camera->ended() : std::nullopt; }
+};
+/// Those images, into the sink. /dev/videoN must have this size. Throws InputError, naming `option`, for what is none
+/// of them or can't be opened. The transports must outlive it.
+ImageInput open_images(const std::string& text, const std::string& option, const cv::Size& size, Transports& transports,
+                       internal::ImageSink sink);
 
 /// Those images, received; see internal::ImageReceiver.
 class LiveImages : public ImageStream {
@@ -44,17 +55,14 @@ class LiveImages : public ImageStream {
   std::optional<StampedImage> newest() override { return receiver_.newest(); }
   internal::ImageCounts counts() const { return receiver_.counts(); }
   std::string complaint() const { return receiver_.complaint(); }
-  /// See internal::LiveCamera; topics never end.
-  std::optional<std::string> ended() const { return camera_ ? camera_->ended() : std::nullopt; }
+  std::optional<std::string> ended() const { return input_.ended(); }
 
  private:
-  void subscribe(internal::Transport& transport, const std::string& topic);
   internal::ImageSink sink();
 
   const Clock& clock_;
   internal::ImageReceiver receiver_;
-  internal::Transport::Subscription subscription_;  // these last: they use the others
-  std::unique_ptr<internal::LiveCamera> camera_;
+  ImageInput input_;  // last: it uses the others
 };
 
 }  // namespace lapservo::app

@@ -11,7 +11,6 @@
 #include <thread>
 #include <unistd.h>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -25,6 +24,7 @@
 #include "lapservo/control/motion_follower.h"
 #include "lapservo/control/motion_limits.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/wall_clock.h"
 #include "lapservo/crtk/arm_limits.h"
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/joint_map.h"
@@ -39,12 +39,6 @@ namespace {
 constexpr double patience_s = 15;    // for the first image, the arm's first joint states
 constexpr double max_silence_s = 1;  // of the camera while the arm moves
 
-using SystemClock = std::chrono::system_clock;
-
-double since_1970_s() {
-  return std::chrono::duration<double>(SystemClock::now().time_since_epoch()).count();
-}
-
 // Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
 double stamp_since_1970_s(double stamp_s, const Clock& clock) {
   return since_1970_s() - (std::isfinite(stamp_s) ? clock.now_s() - stamp_s : 0);
@@ -56,29 +50,21 @@ class Recording {
   Recording(const RecordOptions& options, const std::optional<Rig>& rig, Transports& transports, const Clock& clock)
       : fps_(options.fps), recorder_(options.out) {
     if (!options.robot.empty()) subscribe_joints(transports, address_of(options.robot, "--robot"));
-    if (options.camera.starts_with("ros1:") || options.camera.starts_with("ros2:")) {
-      const Address address = address_of(options.camera, "--camera");
-      subscribe_images(transports.get(address.transport, "--camera"), address.name);
-    } else {
-      const cv::Size size = rig ? cv::Size(rig->camera.width_px, rig->camera.height_px) : cv::Size();
-      camera_ = open_local_camera(options.camera, "--camera", size, sink(clock));
-    }
+    const cv::Size size = rig ? cv::Size(rig->camera.width_px, rig->camera.height_px) : cv::Size();
+    input_ = open_images(options.camera, "--camera", size, transports,
+                         names_topic(options.camera) ? sink_of_topic(address_of(options.camera, "--camera").name)
+                                                     : sink_of_camera(clock));
   }
 
   RecordedCounts counts() const { return recorder_.counts(); }
   void check() const { recorder_.check(); }
   void finish() {
-    camera_.reset(), subscriptions_.clear();
+    input_ = {}, joints_.reset();
     recorder_.finish();
   }
-  std::optional<std::string> ended() const { return camera_ ? camera_->ended() : std::nullopt; }
+  std::optional<std::string> ended() const { return input_.ended(); }
 
  private:
-  template <typename Message>
-  auto into(const std::string& topic) {
-    return [this, topic](Message&& message) { add(topic, std::move(message)); };
-  }
-  void add(const std::string& topic, JointMessage&& message) { recorder_.add(topic, std::move(message)); }
   template <typename Image>
   void add(const std::string& topic, Image&& message) {
     // Of a stream that is a little faster all are kept.
@@ -88,27 +74,29 @@ class Recording {
   }
   void subscribe_joints(Transports& transports, const Address& arm) {
     const std::string topic = topic_of(arm.name, "measured_js");
-    subscriptions_.push_back(
-        transports.get(arm.transport, "--robot").subscribe_joints(topic, into<JointMessage>(topic)));
+    joints_ = transports.get(arm.transport, "--robot").subscribe_joints(topic, [this, topic](JointMessage&& message) {
+      recorder_.add(topic, std::move(message));
+    });
   }
-  void subscribe_images(Transport& transport, const std::string& topic) {
-    subscriptions_.push_back(topic.ends_with("/compressed")
-                                 ? transport.subscribe_compressed_images(topic, into<CompressedImageMessage>(topic))
-                                 : transport.subscribe_images(topic, into<ImageMessage>(topic)));
+  ImageSink sink_of_topic(const std::string& topic) {
+    return {[this, topic](ImageMessage&& message) { add(topic, std::move(message)); },
+            [this, topic](CompressedImageMessage&& message) { add(topic, std::move(message)); }};
   }
-  ImageSink sink(const Clock& clock) {
-    const auto add = [this, &clock](const std::string& topic, auto&& message) {
+  ImageSink sink_of_camera(const Clock& clock) {
+    const auto add_stamped = [this, &clock](const std::string& topic, auto&& message) {
       message.stamp_s = stamp_since_1970_s(message.stamp_s, clock);
-      this->add(topic, std::move(message));
+      add(topic, std::move(message));
     };
-    return {[add](ImageMessage&& message) { add("/camera/image_raw", std::move(message)); },
-            [add](CompressedImageMessage&& message) { add("/camera/image_raw/compressed", std::move(message)); }};
+    return {[add_stamped](ImageMessage&& message) { add_stamped("/camera/image_raw", std::move(message)); },
+            [add_stamped](CompressedImageMessage&& message) {
+              add_stamped("/camera/image_raw/compressed", std::move(message));
+            }};
   }
 
   double fps_, next_image_s_ = 0;
   BagRecorder recorder_;
-  std::vector<Transport::Subscription> subscriptions_;  // these last: they use the recorder
-  std::unique_ptr<LiveCamera> camera_;
+  Transport::Subscription joints_;  // these last: they use the recorder
+  ImageInput input_;
 };
 
 // The arm on its way along a motion.
@@ -150,6 +138,7 @@ class MovingArm {
     config.motion_enabled = options.enable_motion;
     if (!options.joint_limits.empty())
       config.limits = limits_of_q(config.joints, load_arm_limits(options.joint_limits));
+    // Refused now where there is no room for it, wherever the arm is.
     if (options.move == "turn") turn_motion(Eigen::Vector4d::Zero(), config.limits, limits_source(options));
     return config;
   }
@@ -293,6 +282,8 @@ void add_record(Command app, Run& run_later) {
           "Move the arm meanwhile, from where it is, as the calibrations want it: swing (registration, check: all "
           "joints, for --duration), turn (marker: a full turn about its axis)")
       .one_of({"swing", "turn"});
+  command.add_option("--instrument", options->instrument,
+                     "For --move: the arm's name in the rig, where it has several");
   command
       .add_option("--scale", options->scale, "Of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
       .shows_default()

@@ -1,10 +1,10 @@
 #include "transports/ros1/ros1_transport.h"
 
-#include <chrono>
 #include <cstdint>
 #include <stdexcept>
 #include <utility>
 
+#include "lapservo/core/wall_clock.h"
 #include "transports/ros1/ros1_names.h"
 #include "transports/ros1/ros1_node.h"
 #include "transports/ros1/ros1_subscription.h"
@@ -56,7 +56,7 @@ Ros1Transport::Ros1Transport(const std::string& node_name) : node_(Ros1Node::get
 Ros1Transport::~Ros1Transport() = default;
 
 double Ros1Transport::stamp_now_s() const {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return since_1970_s();
 }
 
 Transport::Publisher<JointMessage> Ros1Transport::joint_publisher(const std::string& topic) {

@@ -1,7 +1,6 @@
 #include "transports/ros2/ros2_transport.h"
 
 #include <array>
-#include <chrono>
 #include <cstdlib>
 #include <functional>
 #include <map>
@@ -9,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "lapservo/core/wall_clock.h"
 #include "transports/ros2/dds_node.h"
 #include "transports/ros2/ros2_names.h"
 #include "transports/ros2/wire.h"
@@ -120,7 +120,7 @@ Ros2Transport::Ros2Transport(const std::string& node_name)
 Ros2Transport::~Ros2Transport() = default;
 
 double Ros2Transport::stamp_now_s() const {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+  return since_1970_s();
 }
 
 Transport::Publisher<JointMessage> Ros2Transport::joint_publisher(const std::string& topic) {
