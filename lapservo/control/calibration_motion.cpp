@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo::internal {
@@ -42,7 +43,7 @@ JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits
                                        .max(1e-9);
   // Of the accelerations 0.3 for the swings, 0.15 for easing, and 0.33 at most for what both make together.
   const Eigen::Array4d fastest = (share_of_swinging * rate / amplitude).min((0.3 * acceleration / amplitude).sqrt());
-  const Eigen::Array4d omega = fastest.min(2 * std::numbers::pi / duration_s * Eigen::Array4d(3, 4, 5, 2));
+  const Eigen::Array4d omega = fastest.min(two_pi / duration_s * Eigen::Array4d(3, 4, 5, 2));
   return {duration_s, [=](double time_s) -> Eigen::Vector4d {
             const double t = std::clamp(time_s, 0.0, duration_s);
             const double share = eased(t / ease_s) * eased((duration_s - t) / ease_s);

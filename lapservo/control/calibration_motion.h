@@ -10,8 +10,7 @@
 namespace lapservo::internal {
 
 /// Where the joints theta, phi, rho, psi (rad, m) are to be, by the time from its beginning. At rest at both ends,
-/// within the limits' positions, within their accelerations, and
-/// slower than 0.8 of their rates.
+/// within the limits' positions and accelerations, and slower than 0.8 of their rates.
 struct JointMotion {
   double duration_s = 0;
   std::function<Eigen::Vector4d(double)> at;
