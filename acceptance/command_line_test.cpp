@@ -206,7 +206,8 @@ TEST_F(CommandLine, BagsThatCannotBeRead) {
                                             {"run.db3", "SQLite format 3", "ROS 2 bag"}}) {
     expect_refused(track(in(name, content)), {name, what});
   }
-  expect_refused("servo --replay " + in("run.bag"), {"run.bag", "lapservo track"});
+  expect_refused("servo --replay " + in("run.bag"), {"--rig", "is missing"});
+  expect_refused("servo --replay " + in("run.bag") + " --rig " + rig_, {"run.bag", "ROS 1 bag"});
   expect_refused("calibrate registration " + in("run.db3") + " --rig " + rig_ + " --out " + out("rig.yaml"),
                  {"run.db3", "ROS 2 bag"});
   expect_refused("track " + in("picture.png", "?") + " --image-topic /image --out " + out("obs.csv"),
@@ -607,6 +608,17 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
         << errors();
     expect_same_numbers(written, read(out("bag.yaml")));
   }
+  // The loop over the same recording; what it decided is a run's log like any other.
+  const std::string decide = "servo --replay " + in("run.bag") + " --rig ";
+  ASSERT_EQ(run(decide + out("rig.yaml") + " --out " + out("decided")), 0) << errors() << output();
+  EXPECT_NE(output().find("72 images and the joints; nothing was sent"), std::string::npos) << output();
+  EXPECT_EQ(output().find("not_following"), std::string::npos) << output();
+  EXPECT_EQ(run("servo --replay " + out("decided/log.csv")), 0) << errors();
+  EXPECT_EQ(run(decide + out("rig.yaml") + " --out " + out("decided")), 2);
+  EXPECT_EQ(run(decide + rig_), 2);
+  EXPECT_NE(errors().find("joints is missing"), std::string::npos) << errors();
+  EXPECT_EQ(run(decide + out("rig.yaml") + " --joint-topic /PSM2/measured_js"), 2);
+  EXPECT_NE(errors().find("/PSM1/measured_js"), std::string::npos) << errors();
 #endif
 }
 

@@ -58,7 +58,11 @@ JointInput read_topic(const CalibrateOptions& options, const Instrument& instrum
 
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {
   command.add_option("--joints", options.joints, help);
-  command.add_option("--joint-topic", options.joint_topic,
+  add_joint_topic_option(command, options.joint_topic);
+}
+
+void add_joint_topic_option(Command command, std::string& joint_topic) {
+  command.add_option("--joint-topic", joint_topic,
                      "Of a bag with several: the topic of the arm's measured joints; else .../INSTRUMENT/measured_js, "
                      "or the only measured_js");
 }

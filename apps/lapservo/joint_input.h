@@ -16,6 +16,7 @@ struct JointInput {
 };
 
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help);
+void add_joint_topic_option(Command command, std::string& joint_topic);
 
 /// Of --joints, a CSV or a bag. The instrument's joints are meant; where it has none, the recording's own four in the
 /// order theta, phi, rho, psi. A bag's stamps go with those of `frames`, which may be nullptr. Throws InputError for

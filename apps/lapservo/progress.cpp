@@ -10,7 +10,12 @@ namespace lapservo::app {
 Progress::Progress(std::optional<int> total) : total_(total), terminal_(::isatty(STDERR_FILENO) != 0) {}
 
 Progress::~Progress() {
+  clear();
+}
+
+void Progress::clear() {
   if (shown_) std::fputs("\r\033[K", stderr);
+  shown_ = false;
 }
 
 void Progress::show(int done, const std::string& remark) {

@@ -12,6 +12,8 @@ class Progress {
   explicit Progress(std::optional<int> total);
   ~Progress();
   void show(int done, const std::string& remark);
+  /// Before another line is printed.
+  void clear();
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -7,11 +7,14 @@
 
 #include <fmt/format.h>
 
+#include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
+#include "apps/lapservo/joint_input.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/servo_arm.h"
 #include "apps/lapservo/servo_options.h"
 #include "apps/lapservo/servo_output.h"
+#include "apps/lapservo/servo_recording.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/control/random_start.h"
 #include "lapservo/control/trajectory_check.h"
@@ -36,10 +39,10 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
   const std::string source = trajectory_name(options);
   if (options.start.empty()) {
     Random random(options.seed);
-    return random_start(trajectory, options.duration_s, true_model, run.controller, joint_offset, random, source);
+    return random_start(trajectory, duration_s(options), true_model, run.controller, joint_offset, random, source);
   }
   const JointVector start = JointVector::from_vector(four(options.start));
-  refuse_infeasible(trajectory, options.duration_s, true_model, run.controller, start, source);
+  refuse_infeasible(trajectory, duration_s(options), true_model, run.controller, start, source);
   return start;
 }
 
@@ -101,12 +104,12 @@ int simulate(const ServoOptions& options) {
   Simulator& simulator = *made;
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<RunFolder> folder;
-  if (!options.out.empty()) folder.emplace(options, true_rig, config.controller);
+  if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
   watch_for_interrupts();
 
   Watcher watcher(config.rig, true_rig, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
-                  static_cast<int>(std::lround(options.duration_s / config.controller.period_s)), options.strict);
-  lapservo::run(simulator, simulator, simulator, config, trajectory, options.duration_s, watcher);
+                  static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict);
+  lapservo::run(simulator, simulator, simulator, config, trajectory, duration_s(options), watcher);
   const Summary& summary = watcher.finish();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
@@ -119,9 +122,8 @@ int simulate(const ServoOptions& options) {
 }
 
 int replay_log(const ServoOptions& options) {
-  if (is_bag(options.replay))
-    throw InputError(options.replay,
-                     "is a bag, which holds no decisions, expected a run's log.csv: `lapservo track` measures a bag");
+  if (!options.rig.empty())
+    throw InputError("--rig", "is " + options.rig + ", expected none: the rig beside the log counts");
   const fs::path log = options.replay, folder = log.parent_path();
   const Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
@@ -137,9 +139,11 @@ int replay_log(const ServoOptions& options) {
 }
 
 int run(const ServoOptions& options) {
-  if (!options.replay.empty()) return replay_log(options);
+  const bool recorded = !options.replay.empty() && is_bag(options.replay);
+  if (!options.replay.empty() && !recorded) return replay_log(options);
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
+  if (recorded) return decide_on_recording(options);
   if (options.robot == "sim") return simulate(options);
   if (options.robot.find(':') != std::string::npos) return steer_arm(options);
   constexpr auto expected = ", expected sim, ros2:NAMESPACE or ros1:NAMESPACE";
@@ -176,7 +180,8 @@ void add_servo(Command app, Run& run_later) {
                   "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
       .finite_number()
       .delimiter(',');
-  command.add_option("--duration", options->duration_s, "Seconds").shows_default().number_between(0.1, 36000.0);
+  command.add_option("--duration", options->duration, "Seconds, else 20, or all of a recording")
+      .number_between(0.1, 36000.0);
   command
       .add_option("--method", options->method,
                   "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
@@ -205,7 +210,12 @@ void add_servo(Command app, Run& run_later) {
   command.add_flag("--strict", options->strict,
                    "End with exit code 1 when the images contradict the rig's camera_from_rcm or lens");
   command.add_flag("--view", options->view, "Show it live");
-  command.add_option("--replay", options->replay, "A run's log.csv: decide everything again and compare every bit");
+  command.add_option(
+      "--replay", options->replay,
+      "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2: decide on the "
+      "recorded images and joints as without --enable-motion");
+  add_image_topic_option(command, options->image_topic);
+  add_joint_topic_option(command, options->joint_topic);
   command.add_option("--start", options->start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
       .finite_number()
       .delimiter(',')
@@ -230,7 +240,8 @@ void add_servo(Command app, Run& run_later) {
       "Examples:\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,5 --view\n"
-      "  lapservo servo --replay run/log.csv");
+      "  lapservo servo --replay run/log.csv\n"
+      "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");
   command.runs(run_later, [options] { return run(*options); });
 }
 

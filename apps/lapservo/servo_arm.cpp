@@ -29,11 +29,6 @@ namespace {
 
 constexpr double wait_s = 15;  // for the arm and the camera to be heard
 
-void say(double time_s, const std::string& what) {
-  std::printf("%.2f s  %s\n", time_s, what.c_str());
-  std::fflush(stdout);
-}
-
 std::string list_of(const Joints& joints, const Eigen::Vector4d& q) {
   const Eigen::Vector4d positions = joints_from_q(joints, q);
   std::string text;
@@ -91,15 +86,13 @@ class ArmWatcher : public RunObserver {
 
  private:
   void say_state(double time_s, const ControlStep& control, Blocked blocked) {
-    std::string state(to_string(control.action));
+    std::string state = state_text(control);
     if (blocked == Blocked::not_enabled) {
       state = "hold: the arm is " + robot_.operating_state();
     } else if (blocked == Blocked::foreign_command) {
       state = "end: somebody else sends set-points to the arm (foreign_command)";
     } else if (blocked != Blocked::none) {
       state = "hold: " + std::string(to_string(blocked));
-    } else if (control.reason != HoldReason::none) {
-      state += ": " + std::string(to_string(control.reason));
     }
     if (state == state_) return;
     state_ = state;
@@ -216,6 +209,7 @@ int steer_arm(const ServoOptions& options) {
   const Address arm = address_of(options.robot, "--robot");
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
+  if (!options.enable_motion) nothing_is_sent(config.controller);
   const InterlockConfig interlock = interlock_of(options, config);
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   config.tracking_thread = TrackingThread::own;
@@ -236,16 +230,16 @@ int steer_arm(const ServoOptions& options) {
     return 1;
   }
   if (config.rig.instruments.front().camera_from_rcm)
-    refuse_infeasible(trajectory, options.duration_s, feature_model(config.rig), config.controller, *start,
+    refuse_infeasible(trajectory, duration_s(options), feature_model(config.rig), config.controller, *start,
                       trajectory_name(options));
   std::optional<RunFolder> folder;
-  if (!options.out.empty()) folder.emplace(options, rig, config.controller);
+  if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
 
   LoopTopics topics(transport, rig, "endoscope");
   Goal goal(trajectory);
   ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr,
                      view ? &*view : nullptr);
-  lapservo::run(robot, images, clock, config, goal.trajectory(), options.duration_s, watcher);
+  lapservo::run(robot, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
   if (folder) folder->commit();

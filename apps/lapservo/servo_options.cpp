@@ -67,6 +67,10 @@ double periods_per_s(const ServoOptions& options) {
   return options.fps.value_or(options.robot == "sim" ? 60 : 120);
 }
 
+double duration_s(const ServoOptions& options) {
+  return options.duration.value_or(20);
+}
+
 Eigen::Vector4d four(const std::vector<double>& values) {
   return Eigen::Vector4d(values.data());
 }
@@ -101,6 +105,11 @@ void forget_registration(RunConfig& run, const ServoOptions& options) {
     throw InputError("--rcm-px", "is missing and " + options.rig +
                                      " has no camera_from_rcm, expected the RCM's image: see lapservo estimate-rcm");
   instrument.camera_from_rcm.reset();
+}
+
+void nothing_is_sent(ControllerConfig& config) {
+  config.arm_follows = false;
+  config.endoscope_attempts = 0;
 }
 
 RunConfig run_config_of(const ServoOptions& options) {

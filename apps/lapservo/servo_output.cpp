@@ -1,6 +1,7 @@
 #include "apps/lapservo/servo_output.h"
 
 #include <cstdint>
+#include <cstdio>
 #include <limits>
 
 #include <fmt/format.h>
@@ -16,9 +17,9 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-std::uintmax_t needed_bytes(const ServoOptions& options) {
+std::uintmax_t needed_bytes(double duration_s, const ControllerConfig& controller) {
   constexpr std::uintmax_t bytes_a_tick = 4000;
-  return bytes_a_tick * static_cast<std::uintmax_t>(options.duration_s * periods_per_s(options)) + (1 << 20);
+  return bytes_a_tick * static_cast<std::uintmax_t>(duration_s / controller.period_s) + (1 << 20);
 }
 
 InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
@@ -27,13 +28,25 @@ InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
   inputs.add(options.controller);
   inputs.add(options.trajectory);
   inputs.add(options.joint_limits);
+  inputs.add(options.replay);
+  if (!options.replay.empty()) inputs.add_pictures_in(options.replay);
   return inputs;
 }
 
 }  // namespace
 
-RunFolder::RunFolder(const ServoOptions& options, const Rig& rig, const ControllerConfig& controller)
-    : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(options)),
+void say(double time_s, const std::string& what) {
+  std::printf("%.2f s  %s\n", time_s, what.c_str());
+  std::fflush(stdout);
+}
+
+std::string state_text(const ControlStep& control) {
+  const std::string action(to_string(control.action));
+  return control.reason == HoldReason::none ? action : action + ": " + std::string(to_string(control.reason));
+}
+
+RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller)
+    : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(duration_s, controller)),
       log_(folder_ / "log.csv") {
   write_file(folder_ / "controller.yaml", controller_yaml(controller));
 }
@@ -81,14 +94,17 @@ void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>&
   convergence_.add(tick.input.time_s - *start_s_, error);
 }
 
-std::string Summary::text() const {
-  std::string text = "not within 1 px and 5 mrad for a second";
-  if (const auto reached_s = convergence_.reached_s()) {
-    const Eigen::Vector4d rms = convergence_.rms_since();
-    text = fmt::format(
-        "within 1 px and 5 mrad from {:.2f} s on; rms since: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px",
-        *reached_s, 1000 * rms[0], rms[1], rms[2], rms[3]);
-  }
+std::string Summary::convergence_text() const {
+  const auto reached_s = convergence_.reached_s();
+  if (!reached_s) return "not within 1 px and 5 mrad for a second";
+  const Eigen::Vector4d rms = convergence_.rms_since();
+  return fmt::format(
+      "within 1 px and 5 mrad from {:.2f} s on; rms since: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px", *reached_s,
+      1000 * rms[0], rms[1], rms[2], rms[3]);
+}
+
+std::string Summary::holds_text() const {
+  std::string text;
   for (const auto& [reason, count] : held_) text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
   for (const std::string& motion : endoscope_motions_) text += "\n" + motion;
   if (held_at_end_) text += fmt::format("\nended in a hold: {}", to_string(*held_at_end_));
@@ -102,12 +118,10 @@ std::string Summary::text() const {
 
 bool show(LiveView& view, const ControlTick& tick, const Rig& rig) {
   if (!tick.seen) return true;
-  const ControlStep& control = tick.decision.control;
   Rig now = rig;
   now.instruments.front().camera_from_rcm = tick.decision.camera_from_rcm;
   cv::Mat picture = draw_overlay(tick.seen->image.bgr, now, tick.seen->observations);
-  const std::string label = fmt::format("{:.2f} s  {} {}", tick.input.time_s, to_string(control.action),
-                                        control.reason == HoldReason::none ? "" : to_string(control.reason));
+  const std::string label = fmt::format("{:.2f} s  {}", tick.input.time_s, state_text(tick.decision.control));
   cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
   return view.show(picture);
 }

@@ -13,11 +13,16 @@
 
 namespace lapservo::app {
 
+/// A line of a run's, at once.
+void say(double time_s, const std::string& what);
+/// "track", "hold: marker_lost".
+std::string state_text(const ControlStep& control);
+
 /// A run's log.csv, rig.yaml and controller.yaml.
 class RunFolder {
  public:
   /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
-  RunFolder(const ServoOptions& options, const Rig& rig, const ControllerConfig& controller);
+  RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller);
   ServoLog& log() { return log_; }
   void commit();
 
@@ -37,9 +42,12 @@ class Summary {
   bool registration_contradicted() const { return contradicted_ > 0; }
   /// One line for each time that camera_from_rcm was measured anew.
   const std::vector<std::string>& endoscope_motions() const { return endoscope_motions_; }
-  std::string text() const;
+  std::string text() const { return convergence_text() + holds_text(); }
+  /// How long it held and why, how often the endoscope moved ...: a line each, each after a line's end.
+  std::string holds_text() const;
 
  private:
+  std::string convergence_text() const;
   void follow_registration(const ControlTick& tick);
 
   std::optional<double> start_s_, moved_s_;  ///< moved_s_: the endoscope, and not measured anew yet

@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -627,6 +628,41 @@ TEST_P(Holding, AnImageOfAnOldStampIsNotFresh) {
   }
   EXPECT_EQ(fresh, HoldReason::none);
   EXPECT_EQ(reason, HoldReason::stale_image);
+}
+
+// Somebody else leads it, faster and farther than its own set-points would: 0.4 rad to and fro.
+TEST_P(Holding, NotForAnArmThatIsOnlyObserved) {
+  const Flaws flaws;
+  ControllerConfig config = config_for(flaws);
+  const TestRig rig;
+  const auto led = [&](bool follows, std::set<HoldReason>& reasons) {
+    config.arm_follows = follows;
+    VisualController controller(config, testing::model_of(rig));
+    double most_ahead = 0;
+    for (int k = 0; k < 240; ++k) {
+      const double t = k * config.period_s;
+      const Eigen::Vector4d q(0.2 * std::sin(1.5 * t), 1.57, 0.064, 1);
+      const FeatureState state = exact_map(rig, q).value();
+      ImageMeasurement image;
+      image.found = true;
+      image.time_s = t;
+      image.features = state.features;
+      image.ends_px = state.ends_px;
+      image.covariance = Eigen::Vector4d(1e-7, 0.02, 0.02, 0.02).asDiagonal();
+      const DesiredFeatures desired{exact_map(rig, {0.1, 1.57, 0.064, 1}).value().features, Eigen::Vector4d::Zero(),
+                                    Eigen::Vector4d::Zero()};
+      const ControlStep step = controller.step(t, q, image, desired);
+      if (k > 30) reasons.insert(step.reason);
+      most_ahead =
+          std::max(most_ahead, (step.setpoint.position - q).cwiseQuotient(config.limits.rate).cwiseAbs().maxCoeff());
+    }
+    return most_ahead;
+  };
+  std::set<HoldReason> reasons;
+  EXPECT_LE(led(false, reasons), config.period_s) << "no farther than a period's motion";
+  EXPECT_EQ(reasons, std::set{HoldReason::none});
+  led(true, reasons);
+  EXPECT_TRUE(reasons.contains(HoldReason::not_following));
 }
 
 INSTANTIATE_TEST_SUITE_P(Modes, Holding, ::testing::Values(ControlMode::fused, ControlMode::paper),

@@ -155,6 +155,13 @@ double YamlField::number(std::string_view expected) const {
   return *value;
 }
 
+bool YamlField::boolean() const {
+  constexpr auto expected = "true or false";
+  const std::string word = text(expected);
+  if (word != "true" && word != "false") fail(word, expected);
+  return word == "true";
+}
+
 double YamlField::number_between(double low, double high, std::string_view expected) const {
   const double value = number(expected);
   if (!(value >= low && value <= high)) fail(value_text(), expected);

@@ -45,6 +45,8 @@ class YamlField {
   std::vector<YamlField> list(std::string_view expected) const;
   /// Not empty.
   std::string text(std::string_view expected) const;
+  /// `true` or `false`.
+  bool boolean() const;
   /// Finite.
   double number(std::string_view expected) const;
   double number_between(double low, double high, std::string_view expected) const;

@@ -83,13 +83,6 @@ ChromaticAberration parse_chromatic_aberration(const YamlField& field) {
   return aberration;
 }
 
-bool parse_switch(const YamlField& field) {
-  constexpr auto expected = "true or false";
-  const std::string word = field.text(expected);
-  if (word != "true" && word != "false") field.fail(word, expected);
-  return word == "true";
-}
-
 Camera parse_camera_fields(const YamlField& field) {
   expect_keys(field, {{"header", "camera_name", "distortion_model", "rectification_matrix", "projection_matrix",
                        "binning_x", "binning_y", "roi", "deinterlace"},
@@ -116,7 +109,7 @@ Camera parse_camera_fields(const YamlField& field) {
   camera.response = parse_response(field["response"]);
   camera.chromatic_aberration = parse_chromatic_aberration(field["lateral_chromatic_aberration"]);
   if (const YamlField deinterlace = field["deinterlace"]; deinterlace.present())
-    camera.deinterlace = parse_switch(deinterlace);
+    camera.deinterlace = deinterlace.boolean();
   check_unused(field);
   return camera;
 }

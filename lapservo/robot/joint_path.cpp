@@ -19,6 +19,13 @@ void JointPath::reset(double time_s, const Eigen::Vector4d& position) {
   period_s_ = 0;
 }
 
+void JointPath::move_to(double time_s, const Eigen::Vector4d& position) {
+  end_velocity_ = at(time_s).velocity;
+  start_ = {position, end_velocity_};
+  start_s_ = time_s;
+  period_s_ = 0;
+}
+
 void JointPath::ramp_to(double time_s, const Eigen::Vector4d& velocity, double period_s) {
   start_ = at(time_s);
   start_s_ = time_s;

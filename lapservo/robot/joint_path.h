@@ -23,6 +23,9 @@ class JointPath {
   /// At rest there, from `time_s` on.
   void reset(double time_s, const Eigen::Vector4d& position);
 
+  /// There from `time_s` on, with the velocity that it has then.
+  void move_to(double time_s, const Eigen::Vector4d& position);
+
   /// From the path's state at `time_s` to `velocity` after `period_s`.
   void ramp_to(double time_s, const Eigen::Vector4d& velocity, double period_s);
 

@@ -51,6 +51,16 @@ TEST(JointPath, CoversTheMeanVelocityTimesThePeriod) {
   EXPECT_NEAR(path.end().position[0], 0.1, 1e-12);
 }
 
+TEST(JointPath, GoesOnFromAnotherPlaceAsFastAsItWas) {
+  JointPath path(acceleration);
+  path.reset(0, Eigen::Vector4d::Zero());
+  path.ramp_to(0, rate, 0.3);
+  const Eigen::Vector4d velocity = path.at(0.2).velocity;
+  path.move_to(0.2, Eigen::Vector4d::Ones());
+  EXPECT_EQ(path.at(0.2).position, Eigen::Vector4d::Ones());
+  EXPECT_EQ(path.at(0.2).velocity, velocity);
+}
+
 TEST(JointPath, BrakesWhenTheControllerIsLate) {
   JointPath path(acceleration);
   path.reset(0, Eigen::Vector4d::Zero());
