@@ -38,7 +38,6 @@ foreach(i RANGE ${last})
     endif()
   endforeach()
 endforeach()
-list(REMOVE_ITEM left_out "^wire_loop.*$")  # ./dev test runs these by themselves
 foreach(test IN LISTS left_out)
   check_built_elsewhere("${test}")
   if(NOT test IN_LIST run_elsewhere)
