@@ -1,9 +1,15 @@
 import os
 import pathlib
 import re
+import shutil
+import socket
 import subprocess
 import sys
+import time
 
+import lapservo
+import numpy as np
+import pytest
 from conftest import SOURCE
 
 EXAMPLES = SOURCE / "examples" / "python"
@@ -25,6 +31,48 @@ def test_examples_run(tmp_path):
     assert "mrad" in run("marker_5mm.py", tmp_path / "sheet.pdf")
     assert (tmp_path / "sheet.pdf").is_file()
     assert "largest errors" in run("own_robot.py", RIG)
+
+
+@pytest.fixture
+def ros(tmp_path):
+    """A rosmaster of its own on loopback, and this process a node of it."""
+    rospy = pytest.importorskip("rospy")
+    master = shutil.which("rosmaster") or pytest.skip("python3-rosmaster is not installed")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1", ROS_LOG_DIR=str(tmp_path))
+    running = subprocess.Popen([master, "--core", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    rospy.init_node("test", disable_signals=True, disable_rosout=True)
+    yield rospy
+    rospy.signal_shutdown("the test is over")
+    running.kill()
+    running.wait()
+
+
+def test_the_ros_node_publishes_what_it_sees(ros, tmp_path):
+    from sensor_msgs.msg import Image, JointState
+
+    q = np.array([0.05, 1.57, 0.064, 1.2])
+    picture = lapservo.Renderer(lapservo.Rig.load(RIG)).render(q, seed=1)
+    image = Image(height=picture.shape[0], width=picture.shape[1], encoding="bgr8", step=3 * picture.shape[1])
+    image.data = picture.tobytes()
+    images = ros.Publisher("/endoscope/image_raw", Image, queue_size=1)
+    heard = []
+    ros.Subscriber("/lapservo/PSM1/q", JointState, heard.append)
+    node = subprocess.Popen([sys.executable, EXAMPLES / "ros_node.py", RIG])
+    try:
+        for _ in range(150):
+            image.header.stamp = ros.Time.now()
+            images.publish(image)
+            time.sleep(0.2)
+            if heard or node.poll() is not None:
+                break
+    finally:
+        node.kill()
+        node.wait()
+    assert heard, "nothing came within 30 s"
+    assert np.abs(np.array(heard[0].position) - q).max() < 0.005
 
 
 def test_each_example_runs_here():
