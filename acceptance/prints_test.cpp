@@ -71,8 +71,9 @@ struct Tally {
 
 class Prints : public ::testing::Test {
  protected:
-  const int prints = from_environment("LAPSERVO_PRINTS", 20), poses = from_environment("LAPSERVO_PRINT_POSES", 3);
-  const int seed = from_environment("LAPSERVO_PRINT_SEED", 7);
+  const int prints = from_environment("LAPSERVO_PRINTS", 20);
+  int poses = from_environment("LAPSERVO_PRINT_POSES", 3);
+  int seed = from_environment("LAPSERVO_PRINT_SEED", 7);
   const Rig rig = example_rig();
   const Marker& nominal = rig.instruments[0].marker;
   Random random{static_cast<std::uint64_t>(seed)};
@@ -120,6 +121,21 @@ TEST_F(Prints, ThatAreOffAreNotTrusted) {
   EXPECT_EQ(all.wrong, 0);
   EXPECT_LE(rms(all.errors_sigmas), 2);
   EXPECT_GE(all.fraction("marker_mismatch"), 0.8);
+}
+
+// Nearly all that are ok are off by less than 0.05 mm: a few happen to be off as a turn would move them, and the
+// picture shows little of it. Sigma was too small for them by 2.19 in this draw.
+TEST_F(Prints, ThatLookLikeATurnHaveASigmaThatHolds) {
+  constexpr int drawn = 200;
+  constexpr double most_m = 0.05 * mm;
+  seed = 21, poses = 10, random = Random(21);
+  Tally all;
+  for (int i = 0; i < drawn; ++i)
+    if (const Print print = random_print(nominal, random_error_m(), false, random); print.error_m < most_m)
+      all.add(seen(print, rig, i, false));
+  all.show("off by less than 0.05 mm");
+  EXPECT_EQ(all.wrong, 0);
+  EXPECT_LE(rms(all.errors_sigmas), 2);
 }
 
 TEST_F(Prints, ThatAreTrackedOrAskewAreNotTrustedEither) {

@@ -265,15 +265,21 @@ class Mixture {
 };
 
 // How likely the tolerated print and those that are off by print_sigmas_mm are, the likeliest of them 1 at most.
-std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& evidence, double tolerance_mm) {
+std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& evidence, double tolerance_mm,
+                                                          double doubt_scale) {
   std::array<double, print_sigmas_mm.size() + 1> gains{evidence.gain(tolerance_mm)};
   for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i)
     gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
   const double best = *std::max_element(gains.begin(), gains.end());
   std::array<double, print_sigmas_mm.size() + 1> weights{};
-  weights[0] = (1 - print_limits.off_fraction) * std::exp(gains[0] - best);
-  double fraction = print_limits.off_fraction / 2;
-  for (std::size_t i = 1; i < gains.size(); ++i, fraction /= 2) weights[i] = fraction * std::exp(gains[i] - best);
+  const double sure = 1 / (doubt_scale * doubt_scale);
+  double off = 0;
+  for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i) {
+    const double fraction = std::lerp(print_limits.fractions_in_doubt[i], print_limits.fractions[i], sure);
+    weights[i + 1] = fraction * std::exp(gains[i + 1] - best);
+    off += fraction;
+  }
+  weights[0] = (1 - off) * std::exp(gains[0] - best);
   return weights;
 }
 
@@ -309,7 +315,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   if (!exact || !tolerated) return std::nullopt;
   // The exact print's pose is where the measurements were taken.
   if (tolerance_m == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
-  const auto weights = weights_of(Evidence(sums, errors.doubt_scale), tolerance_mm);
+  const auto weights = weights_of(Evidence(sums, errors.doubt_scale), tolerance_mm, errors.doubt_scale);
   Mixture mixture(pose_unknowns + 1);
   mixture.add(*tolerated, weights[0]);
   for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i) {

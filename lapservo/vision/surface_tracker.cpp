@@ -30,9 +30,8 @@ int unasked_after(Processing processing, int before) {
 }
 
 bool contradicts_registration(const FineFit& free) {
-  const Eigen::Index psi = free.unknowns.size() - 1;
   return free.located_fraction() > registration_limits.well_seen_fraction &&
-         free.psi_variance_by_print <= registration_limits.max_print_fraction * free.covariance(psi, psi);
+         free.print_off_probability < registration_limits.max_print_off_probability;
 }
 
 // How sure the fit is of what the centre line shows.
