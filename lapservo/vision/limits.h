@@ -44,6 +44,19 @@ struct DetectionLimits {
 };
 inline constexpr DetectionLimits detection_limits;
 
+/// What the steps of a search cost, in units of work (work_budget.h): about a microsecond of a core of 2.3 GHz each.
+struct SearchCosts {
+  double coarse_fit = 250, fine_fit = 500, initial_poses = 100;
+  double agreement = 15;  ///< of one pose with the frame's colours
+  double consider_hidden = 3000;
+  double blobs_per_px = 8e-5;
+  double try_start() const { return 2 * (coarse_fit + fine_fit); }
+
+  /// Of what a frame may cost, to look for what shows plainly while a long search goes on.
+  double plain_fraction = 0.5;
+};
+inline constexpr SearchCosts search_costs;
+
 /// When a free fit overrules camera_from_rcm, and what is said of q then (surface_tracker.cpp).
 struct RegistrationLimits {
   double well_seen_fraction = 0.7;   ///< of the boundary points: hidden ones leave free fits that are wrong

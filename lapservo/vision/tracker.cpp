@@ -57,7 +57,7 @@ struct Tracker::State {
         method(options.method),
         deinterlace(options.deinterlace || rig.camera.deinterlace),
         even_field(rig.camera.response),
-        surface(rig, options.single),
+        surface(rig, options.single, options.frame_budget),
         centerline(rig) {}
 
   void observe(const cv::Mat& image_bgr) {
@@ -106,6 +106,7 @@ const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr) & {
 }
 
 std::vector<Observation> Tracker::track(const cv::Mat& image_bgr) && {
+  state_->surface.set_frame_budget(std::nullopt);
   return track(image_bgr);  // the overload above: *this is an lvalue here
 }
 
