@@ -105,9 +105,9 @@ bool AgreementSearch::move(const Scene& scene, Climb& climb, WorkBudget& budget)
 }
 
 // Moves, and halves the steps when nothing is better, until the steps are small. False when the budget ends first.
-bool AgreementSearch::finish(const Scene& scene, Climb& climb, WorkBudget& budget, bool whole) {
+bool AgreementSearch::finish(const Scene& scene, Climb& climb, WorkBudget& budget) {
   while (climb.halvings < halvings) {
-    if (!whole && !budget.allows(2 * directions * search_costs.agreement)) return false;
+    if (!budget.allows(2 * directions * search_costs.agreement)) return false;
     const bool moved = move(scene, climb, budget);
     if (moved && ++climb.moves < max_moves) continue;
     ++climb.halvings, climb.moves = 0, climb.steps /= 2;
@@ -124,7 +124,7 @@ bool AgreementSearch::advance(const Scene& scene, WorkBudget& budget) {
       climb_->terms.values[3] = two_pi * rotation_ / rotations;
       climb_->score = score_at(scene, climb_->terms, climb_->terms.values, budget);
     }
-    if (!finish(scene, *climb_, budget, false)) return false;
+    if (!finish(scene, *climb_, budget)) return false;
     if (const auto unknowns = climb_->terms.unknowns(climb_->terms.values))
       results_.push_back({climb_->score, *unknowns});
     climb_.reset();
@@ -132,27 +132,30 @@ bool AgreementSearch::advance(const Scene& scene, WorkBudget& budget) {
   return true;
 }
 
-std::vector<PoseUnknowns> AgreementSearch::best(const Scene& scene, WorkBudget& budget) {
-  std::sort(results_.begin(), results_.end(), [](const Result& a, const Result& b) { return a.score > b.score; });
+std::vector<PoseUnknowns> AgreementSearch::results() const {
+  std::vector<Result> sorted = results_;
+  std::sort(sorted.begin(), sorted.end(), [](const Result& a, const Result& b) { return a.score > b.score; });
   std::vector<PoseUnknowns> best;
-  for (const Result& result : results_) {
+  for (const Result& result : sorted) {
     constexpr double same_rad = 0.2;
     const bool known = std::any_of(best.begin(), best.end(), [&](const PoseUnknowns& other) {
       return std::abs(wrap_pi(other.pose().psi_rad - result.unknowns.pose().psi_rad)) < same_rad;
     });
     if (!known && best.size() < 2) best.push_back(result.unknowns);
   }
-  if (frames_ == 1) return best;
-  // They were good in a frame before.
-  for (PoseUnknowns& unknowns : best) {
-    constexpr int begun = 2;
-    Climb climb{ImageTerms::of(camera_from_rcm_, unknowns), first_steps / (1 << begun)};
-    climb.halvings = begun;
-    climb.score = score_at(scene, climb.terms, climb.terms.values, budget);
-    finish(scene, climb, budget, true);
-    if (const auto climbed = climb.terms.unknowns(climb.terms.values)) unknowns = *climbed;
-  }
+  std::reverse(best.begin(), best.end());
   return best;
+}
+
+PoseUnknowns AgreementSearch::in_this_frame(const Scene& scene, const PoseUnknowns& result, WorkBudget& budget) {
+  if (frames_ == 1) return result;
+  constexpr int halved = 3;
+  Climb climb{ImageTerms::of(camera_from_rcm_, result), first_steps / (1 << halved)};
+  climb.halvings = halved;
+  climb.score = score_at(scene, climb.terms, climb.terms.values, budget);
+  WorkBudget whole(std::nullopt);
+  finish(scene, climb, whole);
+  return climb.terms.unknowns(climb.terms.values).value_or(result);
 }
 
 }  // namespace lapservo::internal

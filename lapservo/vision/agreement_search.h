@@ -21,9 +21,11 @@ class AgreementSearch {
   /// Goes on in this frame. Whether it came to its end; false when the budget did first.
   bool advance(const Scene& scene, WorkBudget& budget);
 
-  /// Of a search that came to its end: up to two results (of different rotations), best first, good to a few pixels in
-  /// this frame.
-  std::vector<PoseUnknowns> best(const Scene& scene, WorkBudget& budget);
+  /// Of a search that came to its end: up to two results (of different rotations), the best last.
+  std::vector<PoseUnknowns> results() const;
+
+  /// One of them, good to a few pixels in this frame.
+  PoseUnknowns in_this_frame(const Scene& scene, const PoseUnknowns& result, WorkBudget& budget);
 
  private:
   // A configuration in the terms of the image: the shaft's direction turned across and along the line of sight.
@@ -47,7 +49,7 @@ class AgreementSearch {
   };
   double score_at(const Scene& scene, const ImageTerms& terms, const Eigen::Vector4d& at, WorkBudget& budget) const;
   bool move(const Scene& scene, Climb& climb, WorkBudget& budget);
-  bool finish(const Scene& scene, Climb& climb, WorkBudget& budget, bool whole);
+  bool finish(const Scene& scene, Climb& climb, WorkBudget& budget);
 
   Rigid3 camera_from_rcm_;
   PoseUnknowns start_;

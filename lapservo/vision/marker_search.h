@@ -20,6 +20,7 @@ struct Found {
   Status status = Status::no_marker;
   std::optional<FineFit> fit;        ///< when ok
   std::optional<ShaftPose> refused;  ///< to draw, when there was something
+  bool settled = false;              ///< that was the marker: no reason to look for it elsewhere
 };
 
 /// A frame in which one marker is looked for. Borrows everything.
@@ -59,14 +60,16 @@ class MarkerSearch {
   Found without_rivals(const SearchFrame& frame, WorkBudget& budget);
   Found despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget);
   Found hidden(const SearchFrame& frame, const Rigid3& camera_from_rcm, WorkBudget& budget);
-  void consider_hidden(const SearchFrame& frame, WorkBudget& budget);
+  bool fit_to_results(const SearchFrame& frame, WorkBudget& budget);
   void carry_candidate(const SearchFrame& frame, WorkBudget& budget);
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
   Walk plain_, rivals_, free_, hidden_;
   bool searches_long_ = false;  // what shows plainly was not found
+  bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;
-  std::optional<FineFit> candidate_;  // the best so far, while others are looked for
+  std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last
+  std::optional<FineFit> candidate_;                  // the best so far, while others are looked for
 };
 
 }  // namespace lapservo::internal

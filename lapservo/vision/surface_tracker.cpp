@@ -9,6 +9,7 @@
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/blob_search.h"
+#include "lapservo/vision/blurred_edges.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/marker_pose.h"
@@ -24,6 +25,11 @@ int unasked_after(Processing processing, int before) {
   if (processing == Processing::found) return ask_every;
   if (processing == Processing::none) return 1;
   return std::min(before + 1, ask_every);
+}
+
+// It was followed, but turned too far while the shutter was open.
+bool turned(const Found& found) {
+  return found.settled && found.status == Status::uncertain;
 }
 
 // How sure the fit is of what the centre line shows.
@@ -126,7 +132,9 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       memory_(rig.instruments.size()),
       searches_(rig.instruments.size()),
       found_(rig.instruments.size()),
-      observations_(rig.instruments.size()) {}
+      observations_(rig.instruments.size()) {
+  BlurredEdges::instance();  // takes milliseconds, which no frame should
+}
 
 void SurfaceTracker::reset() {
   std::fill(memory_.begin(), memory_.end(), std::nullopt);
@@ -161,15 +169,15 @@ void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkB
     }
     if (found_[i].fit) continue;
     memory_[i].reset();
-    ++lost;
+    lost += !turned(found_[i]);
   }
   if (lost == 0) return;
   budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);
   const std::vector<Blob> blobs = largest_blobs(image, classes_);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
-    if (found_[i].fit) continue;
+    if (found_[i].fit || turned(found_[i])) continue;
     const Scene scene = scene_of(image, i);
-    found_[i] = budget.share(1.0 / static_cast<double>(lost--), [&](WorkBudget& part) {
+    found_[i] = budget.share(budget.left() / static_cast<double>(lost--), true, [&](WorkBudget& part) {
       return searches_[i].look({scene, light, blobs, rig_.instruments[i].camera_from_rcm}, part);
     });
   }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <optional>
+#include <utility>
 
 namespace lapservo::internal {
 
@@ -13,20 +14,20 @@ class WorkBudget {
   /// nullopt: without a bound.
   explicit WorkBudget(std::optional<double> units) : left_(units.value_or(std::numeric_limits<double>::infinity())) {}
 
+  double left() const { return left_; }
   void spend(double units) { left_ -= units; }
 
-  /// Whether enough is left for a step of so many units. A search's first step is always allowed, else one might never
-  /// get anywhere.
-  bool allows(double units) {
-    const bool enough = !stepped_ || left_ >= units;
-    stepped_ = true;
-    return enough;
-  }
+  /// Whether enough is left for a step of so many units, or this is the one that is allowed whatever is left.
+  bool allows(double units) { return left_ >= units || std::exchange(free_step_, false); }
 
-  /// Lets `work` spend from this budget, but at most a fraction of what is left; returns what it returns.
+  /// One step is allowed whatever is left: without, a search that gets too little would never get anywhere.
+  void set_free_step(bool free_step) { free_step_ = free_step; }
+
+  /// Lets `work` spend from this budget, at most so many units; returns what it returns.
   template <class Work>
-  auto share(double fraction, Work&& work) {
-    WorkBudget part(std::max(0.0, fraction * left_));
+  auto share(double units, bool free_step, Work&& work) {
+    WorkBudget part(std::clamp(units, 0.0, std::max(0.0, left_)));
+    part.free_step_ = free_step;
     const double before = part.left_;
     auto result = work(part);
     if (before < std::numeric_limits<double>::infinity()) spend(before - part.left_);
@@ -35,7 +36,7 @@ class WorkBudget {
 
  private:
   double left_;
-  bool stepped_ = false;
+  bool free_step_ = false;
 };
 
 }  // namespace lapservo::internal
