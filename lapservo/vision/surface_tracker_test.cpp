@@ -12,7 +12,10 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/tissue.h"
 #include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/tracker.h"
@@ -291,6 +294,179 @@ TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
     EXPECT_EQ(to_string(Tracker(one).track(scenes::render(both, configurations, seed))[0].status), "ambiguous");
     EXPECT_EQ(to_string(Tracker(one).track(usual_shot(seed).bgr)[0].status), "ok");
   }
+}
+
+// Blood over about a fraction of the first instrument's print, while it moves by pixels from frame to frame.
+struct BloodyMotion {
+  std::vector<JointVector> q;
+  std::vector<cv::Mat> frames;
+
+  BloodyMotion(const Rig& rig, double fraction, std::uint64_t seed, int count) {
+    Random random(seed);
+    const JointVector start = scenes::random_configuration(rig, 0, random);
+    ShaftModel shaft = shaft_of(rig.instruments[0]);
+    const Marker& marker = shaft.marker;
+    for (double covered = 0; covered < fraction;) {
+      const double radius_m = random.uniform(0.08, 0.25) * marker.diameter_m, azimuth_rad = random.uniform(0, two_pi);
+      shaft.blotches.push_back({azimuth_rad, random.uniform(0, marker.length_m()), radius_m});
+      covered += 0.8 * radius_m * radius_m / (marker.diameter_m * marker.length_m());
+    }
+    Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
+    for (int i = 0; i < count; ++i) {
+      q.push_back(start);
+      q.back().theta_rad += 1e-3 * i, q.back().psi_rad += 2e-3 * i;
+      frames.push_back(renderer.render({placement_of(rig.instruments[0], q.back())}, seed));
+    }
+  }
+};
+
+// What one frame's long search finds, frames with a budget find together, and in the same frames each time.
+TEST(SurfaceTracker, SpreadsALongSearchOverFrames) {
+  const Rig rig = scenes::usual_rig();
+  constexpr double frame_budget = 6000;
+  constexpr int frames = 40;
+  int found = 0, later = 0;
+  for (std::uint64_t seed = 5; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const BloodyMotion motion(rig, 0.6, seed, frames);
+    if (SurfaceTracker(rig, true).track(motion.frames[0])[0].status != Status::ok) continue;
+    ++found;
+    SurfaceTracker tracker(rig, false, frame_budget), again(rig, false, frame_budget);
+    int first = -1;
+    for (int i = 0; i < frames && (first < 0 || i <= first + 1); ++i) {
+      const auto frame = static_cast<std::size_t>(i);
+      const Observation o = tracker.track(motion.frames[frame])[0], same = again.track(motion.frames[frame])[0];
+      EXPECT_EQ(o.status, same.status);
+      if (first < 0 && o.status == Status::ok) first = i;
+      if (o.status != Status::ok) continue;
+      EXPECT_EQ(o.rcm.value().q.vector(), same.rcm.value().q.vector());
+      expect_right(o, motion.q[frame]);
+    }
+    EXPECT_GE(first, 0);
+    later += first > 0;
+  }
+  EXPECT_EQ(found, 2);
+  EXPECT_GE(later, 1) << "the test's own power";
+}
+
+// Whatever else is searched for, what shows plainly is found in the frame in which it appears.
+TEST(SurfaceTracker, FindsWhatShowsPlainlyDuringALongSearch) {
+  const Rig rig = scenes::usual_rig();
+  int searched = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const BloodyMotion hidden(rig, 1.3, seed, 3);
+    SurfaceTracker tracker(rig, false, 6000);
+    for (const cv::Mat& frame : hidden.frames) searched += tracker.track(frame)[0].status != Status::ok;
+    expect_right(tracker.track(usual_shot(seed).bgr)[0], usual_shot(seed).q);
+  }
+  EXPECT_GE(searched, 6);
+}
+
+// A temporary has no frames to come.
+TEST(Tracker, SearchesTheOnlyFrameOfATemporaryWhole) {
+  const Rig rig = scenes::usual_rig();
+  int found = 0;
+  for (std::uint64_t seed = 5; seed <= 6; ++seed) {
+    const BloodyMotion motion(rig, 0.6, seed, 1);
+    const cv::Mat& frame = motion.frames[0];
+    const Status whole = SurfaceTracker(rig, true).track(frame)[0].status;
+    EXPECT_EQ(Tracker(rig, {.frame_budget = 1}).track(frame)[0].status, whole) << "seed " << seed;
+    found += whole == Status::ok;
+  }
+  EXPECT_EQ(found, 2);
+}
+
+// A frame of a turn while the shutter was open, with psi in its middle; by `power` even or beginning in the exposure.
+cv::Mat render_turning(const Shot& shot, double turn_rad, double power, std::uint64_t seed) {
+  constexpr int moments = 9;
+  Exposure exposure;
+  for (int i = 0; i < moments; ++i) {
+    JointVector q = shot.q;
+    q.psi_rad += turn_rad * (std::pow((i + 0.5) / moments, power) - std::pow(0.5, power));
+    exposure.push_back({placement_of(shot.rig.instruments[0], q)});
+  }
+  const cv::Mat tissue = make_tissue(shot.rig.camera.width_px, shot.rig.camera.height_px, 5);
+  return Renderer(shot.rig.camera, {shaft_of(shot.rig.instruments[0])}, tissue).render_exposure(exposure, seed);
+}
+
+TEST(SurfaceTracker, TellsATurnWithinTheExposure) {
+  double squares = 0;
+  int found = 0, told = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed)
+    for (const double power : {1.0, 2.0})
+      for (const double turn_rad : {0.0, 0.1, -0.25, 0.4}) {
+        SCOPED_TRACE("seed " + std::to_string(seed) + ", turn " + std::to_string(turn_rad));
+        const Shot& shot = usual_shot(seed);
+        const Observation o = Tracker(shot.rig).track(render_turning(shot, turn_rad, power, seed))[0];
+        if (std::abs(turn_rad) > 0.2) {
+          EXPECT_EQ(to_string(o.status), "uncertain");
+          ++told;
+          continue;
+        }
+        ASSERT_EQ(to_string(o.status), "ok");
+        const double sigma_rad = std::sqrt(o.rcm.value().covariance(3, 3));
+        const double error_rad = wrap_pi(o.rcm->q.psi_rad - shot.q.psi_rad);
+        if (turn_rad == 0) {
+          EXPECT_LT(sigma_rad, 0.002);
+        }
+        EXPECT_LT(std::abs(error_rad), 0.02);
+        squares += error_rad * error_rad / (sigma_rad * sigma_rad), ++found;
+      }
+  EXPECT_EQ(told, 12);
+  EXPECT_LT(std::sqrt(squares / found), 1.5);
+}
+
+// A rig whose instrument comes along the image's lower or right border, and the planes through the camera and it.
+struct BesideBorder {
+  Rig rig = scenes::usual_rig();
+  Eigen::Vector3d border;   // of the image in the camera's frame, at depth 1
+  Eigen::Vector3d outside;  // across it
+
+  explicit BesideBorder(bool right) {
+    const Camera& camera = rig.camera;
+    if (right)
+      border = {(camera.width_px - camera.cx_px) / camera.fx_px, 0, 1}, outside = Eigen::Vector3d::UnitX();
+    else
+      border = {0, (camera.height_px - camera.cy_px) / camera.fy_px, 1}, outside = Eigen::Vector3d::UnitY();
+    const Eigen::Vector3d rcm = 0.09 * border + Eigen::Vector3d(right ? 0 : -0.1, right ? -0.09 : 0, 0);
+    rig.instruments[0].camera_from_rcm = Rigid3{rotation_between(Eigen::Vector3d::UnitX(), 0.1 * border - rcm), rcm};
+  }
+  // The proximal end, so far along the border, the axis so far outside of it.
+  JointVector at(double depth_m, double along_m, double outside_m) const {
+    const Eigen::Vector3d along = Eigen::Vector3d::UnitZ().cross(outside).cwiseAbs();
+    return configuration_through(*rig.instruments[0].camera_from_rcm,
+                                 depth_m * border + along_m * along + outside_m * outside)
+        .value();
+  }
+};
+
+// One occluding contour and parts of all boundaries show.
+TEST(SurfaceTracker, FindsAShaftThatIsHalfOutOfTheFrame) {
+  int found = 0, all = 0;
+  double sum = 0, squares = 0, normalised = 0;
+  for (const bool right : {false, true}) {
+    const BesideBorder place(right);
+    Renderer renderer(place.rig.camera, {shaft_of(place.rig.instruments[0])},
+                      make_tissue(place.rig.camera.width_px, place.rig.camera.height_px, 5));
+    Random random(right ? 7 : 8);
+    for (int i = 0; i < 20; ++i, ++all) {
+      SCOPED_TRACE((right ? "right " : "lower ") + std::to_string(i));
+      const double depth_m = random.uniform(0.085, 0.115), along_m = random.uniform(-0.028, 0);
+      JointVector q = place.at(depth_m, along_m, random.uniform(-1.5e-3, 1e-3));
+      q.psi_rad = random.uniform(-pi, pi);
+      const Observation o = Tracker(place.rig).track(
+          renderer.render({placement_of(place.rig.instruments[0], q)}, static_cast<std::uint64_t>(i)))[0];
+      if (o.status != Status::ok) continue;
+      const double error_rad = wrap_pi(o.rcm.value().q.psi_rad - q.psi_rad);
+      EXPECT_LT(std::abs(error_rad), 0.05);
+      ++found, sum += error_rad, squares += error_rad * error_rad;
+      normalised += error_rad * error_rad / o.rcm->covariance(3, 3);
+    }
+  }
+  EXPECT_GE(found, 0.95 * all);
+  EXPECT_LT(std::sqrt(squares / found - sum * sum / found / found), 0.006);
+  EXPECT_LT(std::sqrt(normalised / found), 1.5);
 }
 
 TEST(SurfaceTracker, LateralChromaticAberrationOfTheRigIsUndone) {
