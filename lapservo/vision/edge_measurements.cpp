@@ -196,7 +196,6 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
                                      edge_limits.single_floor_px * edge_limits.single_floor_px);
     out.all.push_back(measurement);
     out.boundary_blur.add(*edge, variance);
-    out.blur_of_boundary[measurement.group].add(*edge, variance);
   }
 }
 

@@ -64,7 +64,6 @@ struct EdgeMeasurements {
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at
   BlurEvidence boundary_blur, side_blur;
-  std::array<BlurEvidence, 4> blur_of_boundary;
 };
 
 /// Looks around `unknowns` in linear light, to a fraction of a pixel. Nothing when the pose shows no shaft.

@@ -8,7 +8,6 @@
 
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/core/median.h"
-#include "lapservo/vision/exposure_turn.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
 #include "lapservo/vision/picture_processing.h"
@@ -78,14 +77,6 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   errors.doubt_scale = std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px +
                        std::sqrt(bias_squares_px2) / limits.doubted_processing_px;
   return errors;
-}
-
-// Of psi in the middle of the exposure, of which the picture shows the mean.
-double variance_by_turn(double turn_rad, double blur_px) {
-  const ExposureLimits& limits = exposure_limits;
-  const double least_rad = limits.least_told_rad * std::max(1.0, blur_px);
-  const double told_rad2 = turn_rad * turn_rad - least_rad * least_rad;
-  return limits.uneven_fraction * limits.uneven_fraction * std::max(0.0, told_rad2) / 12;
 }
 
 // What a pass changed.
@@ -193,8 +184,6 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const double doubt =
       1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit.located_fraction());
   fit.covariance = doubt * doubt * print->covariance;
-  fit.exposure_turn_rad = exposure_turn_rad(scene.marker, pass, located_with);
-  fit.covariance(unknowns - 1, unknowns - 1) += variance_by_turn(fit.exposure_turn_rad, located_with.boundaries_px);
   fit.print_off_probability = print->off_probability;
   fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;
   fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;

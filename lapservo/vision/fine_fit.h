@@ -25,7 +25,6 @@ struct FineFit {
   double print_off_probability = 0;      ///< that the print is off by more than the rig's tolerance
   double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
   double psi_variance_by_print = 0;      ///< and what the print adds beyond that
-  double exposure_turn_rad = 0;          ///< by how much the marker turned while the shutter was open
   Processing processing = Processing::unknown;  ///< as far as asked
   std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
 

@@ -44,10 +44,12 @@ struct DetectionLimits {
 };
 inline constexpr DetectionLimits detection_limits;
 
-/// What the steps of a search cost, in units of work (work_budget.h): by the instructions that they take (callgrind),
-/// and more than most, so that 8000 units take less than 8 ms.
+/// What the steps of a search cost, in units of work (work_budget.h): a unit is about a microsecond of a core of 2.3
+/// GHz, by the instructions that a step takes (callgrind's inclusive counts of bench/hard_frames at 1080p, at 3
+/// instructions a nanosecond), and more than most, so that 8000 units take less than 8 ms.
 struct SearchCosts {
-  double coarse_fit = 350, fine_fit = 700, initial_poses = 200;
+  double coarse_fit = 350, fine_fit = 700;
+  double initial_poses = 200;   ///< of one blob
   double agreement = 20;        ///< of one pose with the frame's colours
   double fit_to_result = 2200;  ///< some 70 of these and a fine fit
   double blobs_per_px = 1.2e-4;
@@ -139,21 +141,6 @@ struct ProcessingLimits {
   int min_boundaries = 3;
 };
 inline constexpr ProcessingLimits processing_limits;
-
-/// A marker that turns about its axis while the shutter is open (exposure_turn.cpp).
-struct ExposureLimits {
-  int min_points = 8;          ///< of a boundary, for its blur
-  double max_motion_px = 0.5;  ///< more blur of the sides than of the ends is motion across the axis, which blurs inner
-                               ///< boundaries as a turn does
-  double max_slow = 0.6;       ///< of the inner boundaries' squared slopes in the image, the lesser by the larger
-  double least_told_rad = 0.07;  ///< times the blur in px where that is more than one
-  /// The picture shows the mean over the exposure. An even turn's mean is psi in its middle; of one that begins or ends
-  /// evenly in the exposure it is off by 0.28 of psi's standard deviation over it.
-  double uneven_fraction = 0.3;
-  double max_turn_rad =
-      0.15;  ///< beyond, psi is off by 0.1 rad for a part of the exposure, which may be the one asked for
-};
-inline constexpr ExposureLimits exposure_limits;
 
 /// What is assumed of prints that are not the rig's (print_fit.cpp).
 struct PrintLimits {

@@ -6,6 +6,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/vision/coarse_fit.h"
+#include "lapservo/vision/cut_shaft.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/verification.h"
@@ -15,23 +16,11 @@ namespace {
 
 constexpr const SearchCosts& costs = search_costs;
 
-bool turned_too_far(const FineFit& fit) {
-  return fit.converged && fit.exposure_turn_rad > exposure_limits.max_turn_rad;
-}
-
 Found refusal(Status status, const PoseUnknowns& unknowns) {
   const ShaftPose& pose = unknowns.pose();
   const bool finite = pose.camera_from_unrolled.translation.allFinite() &&
                       pose.camera_from_unrolled.rotation.coeffs().allFinite() && std::isfinite(pose.psi_rad);
   return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
-}
-
-// A print that is off is no reason to look for it elsewhere, with a boundary less, nor is one that turned too far, with
-// its blur taken for another.
-Found refusal(Status status, const FineFit& fit) {
-  Found found = refusal(status, fit.unknowns);
-  found.settled = status == Status::marker_mismatch || (status == Status::uncertain && turned_too_far(fit));
-  return found;
 }
 
 bool contradicts_registration(const FineFit& free) {
@@ -40,38 +29,33 @@ bool contradicts_registration(const FineFit& free) {
          free.psi_variance_by_print <= registration_limits.max_print_fraction * free.covariance(psi, psi);
 }
 
-// The image's border hides one of the shaft's sides and a part of every boundary.
-bool cut_along(const FineFit& fit) {
-  constexpr double whole = 0.85;
-  return *std::max_element(fit.in_image.begin(), fit.in_image.end()) < whole * fit.lines;
-}
-
 // What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.
 Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
   constexpr double doubt = 1.5;
   fit.covariance *= doubt * doubt;
   const Status status = validate(scene, fit);
-  return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit);
+  return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
 
 // A fit that is ok. One side alone holds the place of a shaft that is cut along, and where the robust loss takes that
 // for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on until psi rests and the side agrees.
-Found accepted(const Scene& scene, const LightImage& light, FineFit fit, WorkBudget& budget) {
-  if (!cut_along(fit)) return {Status::ok, std::move(fit), {}};
+Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
+               WorkBudget& budget) {
+  if (!cut_along(scene, fit.unknowns.pose())) return {Status::ok, std::move(fit), {}};
   constexpr int most = 4;
   constexpr double rest_sigmas = 0.2, least_sides = 0.8;
   for (int i = 0; i < most; ++i) {
     const double before_rad = fit.unknowns.pose().psi_rad;
     budget.spend(costs.fine_fit);
-    fit = fit_finely(scene, light, fit.unknowns, fit.blur);
-    if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit);
+    fit = fit_finely(scene, light, fit.unknowns, fit.blur, processing);
+    if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit.unknowns);
     const Eigen::Index psi = fit.unknowns.size() - 1;
     const double moved_rad = std::abs(wrap_pi(fit.unknowns.pose().psi_rad - before_rad));
     if (moved_rad < rest_sigmas * std::sqrt(fit.covariance(psi, psi)) &&
         fit.sides_used >= least_sides * fit.sides_in_image)
       return with_doubt_of_one_side(scene, fit);
   }
-  return refusal(Status::uncertain, fit);
+  return refusal(Status::uncertain, fit.unknowns);
 }
 
 Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
@@ -83,15 +67,21 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
   budget.spend(costs.fine_fit);
   const FineFit first = fit_finely(scene, light, coarse.unknowns, {});
   const Status validated = validate(scene, first);
-  if (validated == Status::ok) return accepted(scene, light, first, budget);
-  if (Found refused = refusal(validated, first); refused.settled) return refused;
+  if (validated == Status::ok) return accepted(scene, light, first, {}, budget);
+  if (validated == Status::marker_mismatch) return refusal(validated, first.unknowns);
   budget.spend(costs.coarse_fit);
   const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, detection_limits.near_by);
   if (!nearer.found) return {};
   budget.spend(costs.fine_fit);
   const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
   const Status status = validate(scene, fit);
-  return status == Status::ok ? accepted(scene, light, fit, budget) : refusal(status, fit);
+  return status == Status::ok ? accepted(scene, light, fit, {}, budget) : refusal(status, fit.unknowns);
+}
+
+// No marker moves farther from frame to frame.
+double reach_px(const SearchFrame& frame) {
+  constexpr double of_width = 0.05;
+  return of_width * frame.scene.image.width_px;
 }
 
 std::vector<PoseUnknowns> starts_in(const SearchFrame& frame, const Blob& blob,
@@ -107,55 +97,59 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
   budget.spend(costs.fine_fit);
   const FineFit near = fit_finely(scene, light, expected, blur, processing);
   const Status nearby = validate(scene, near);
-  if (nearby == Status::ok) return accepted(scene, light, near, budget);
-  if (nearby == Status::uncertain && turned_too_far(near)) return refusal(nearby, near);
+  if (nearby == Status::ok) return accepted(scene, light, near, processing, budget);
   budget.spend(costs.coarse_fit);
   const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
   if (!coarse.found) return {};
   budget.spend(costs.fine_fit);
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, blur, processing);
   const Status status = validate(scene, fit);
-  return status == Status::ok ? accepted(scene, light, fit, budget) : refusal(status, fit);
+  return status == Status::ok ? accepted(scene, light, fit, processing, budget) : refusal(status, fit.unknowns);
 }
 
 // The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
-Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
-                                   WorkBudget& budget) {
+Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm,
+                                   const Blob& blob, Walk& walk, WorkBudget& budget) {
   Found best;
-  const auto starts = starts_in(frame, frame.blobs[walk.blob], camera_from_rcm, budget);
-  for (; walk.start < starts.size(); ++walk.start) {
-    if (!best.fit && !budget.allows(costs.try_start())) return best;
-    Found found = try_start(frame.scene, frame.light, starts[walk.start], budget);
+  const auto starts = starts_in(frame, blob, camera_from_rcm, budget);
+  for (std::size_t i = walk.blobs.start(); i < starts.size(); ++i) {
+    if ((camera_from_rcm || i == 0) && !budget.allows(costs.try_start())) {
+      walk.blobs.stop(blob, i);
+      return best;
+    }
+    Found found = try_start(frame.scene, frame.light, starts[i], budget);
     if (!found.fit) {
-      if (found.settled) return found;
+      // A print that is off is no reason to look for it elsewhere, with a boundary less.
+      if (found.status == Status::marker_mismatch) return found;
       if (!best.fit && found.status != Status::no_marker) best = found;
       continue;
     }
     if (!best.fit || found.fit->inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = std::move(found);
     if (camera_from_rcm) break;  // the starts are ways to one solution
   }
-  ++walk.blob, walk.start = 0;
+  walk.blobs.finish(blob);
   return best;
 }
 
 Found MarkerSearch::detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
                            WorkBudget& budget) {
   Found best;
-  while (walk.blob < frame.blobs.size()) {
-    const std::size_t blob = walk.blob;
-    Found found = detect_in_blob(frame, camera_from_rcm, walk, budget);
-    if (found.fit || found.settled) return found;
+  for (const Blob* blob : walk.blobs.rest(frame.blobs, reach_px(frame))) {
+    Found found = detect_in_blob(frame, camera_from_rcm, *blob, walk, budget);
+    if (found.fit || found.status == Status::marker_mismatch) {
+      walk.done = true;
+      return found;
+    }
     if (found.status != Status::no_marker) best = std::move(found);
-    if (walk.blob == blob) return best;
+    if (walk.blobs.stopped()) return best;
   }
   walk.done = true;
   return best;
 }
 
 // Whether the marker shows in another place as well: a second print, a reflection, a picture of tiles. The RCM would
-// tell which is ours.
-MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const FineFit& fit, Walk& walk,
-                                                 WorkBudget& budget) {
+// tell which is ours. All in one frame: in another one a rival may be where none was.
+MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
   const Scene& scene = frame.scene;
   const auto middle = [&](const PoseUnknowns& unknowns) {
     const Eigen::Vector3d along(0, 0, scene.marker.length_m() / 2);
@@ -163,48 +157,59 @@ MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const
   };
   const double apart_px = detection_limits.rival_apart_radii * scene.marker.radius_m() /
                           fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
-  for (; walk.blob < frame.blobs.size(); ++walk.blob, walk.start = 0) {
-    const auto starts = starts_in(frame, frame.blobs[walk.blob], std::nullopt, budget);
-    for (; walk.start < starts.size(); ++walk.start) {
-      const PoseUnknowns& start = starts[walk.start];
+  for (const Blob& blob : frame.blobs)
+    for (const PoseUnknowns& start : starts_in(frame, blob, std::nullopt, budget)) {
       if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
       if (!budget.allows(costs.try_start())) return Rival::not_known_yet;
       const Found other = try_start(scene, frame.light, start, budget);
-      if (other.settled) return Rival::found;
+      if (other.status == Status::marker_mismatch) return Rival::found;
       if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return Rival::found;
     }
-  }
   return Rival::none;
 }
 
-Found MarkerSearch::without_rivals(const SearchFrame& frame, WorkBudget& budget) {
-  const Rival rival = look_for_rival(frame, *candidate_, rivals_, budget);
-  Found found{Status::ambiguous, std::nullopt, std::nullopt};
-  if (rival == Rival::not_known_yet) return found;
-  if (rival == Rival::none) found = {Status::ok, *candidate_, {}};
-  *this = MarkerSearch();
-  return found;
-}
-
-// The candidate as it shows in this frame, if it does.
-void MarkerSearch::carry_candidate(const SearchFrame& frame, WorkBudget& budget) {
-  if (!candidate_) return;
+// The candidate as it shows in this frame; whether it doesn't.
+bool MarkerSearch::lost_candidate(const SearchFrame& frame, WorkBudget& budget) {
   const FineFit before = *candidate_;
   candidate_ = follow(frame.scene, frame.light, before.unknowns, before.blur, {}, budget).fit;
+  return !candidate_;
+}
+
+void MarkerSearch::begin_anew(Status status) {
+  *this = MarkerSearch();
+  status_ = status;
+}
+
+// A candidate whose rivals the budget leaves no time for waits for the next frame, in which they take what they take.
+Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budget) {
+  const bool waited = candidate_.has_value();
+  if (waited && lost_candidate(frame, budget)) begin_anew(status_);
+  if (!candidate_) {
+    Found plain = detect(frame, std::nullopt, plain_, budget);
+    if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
+    plain.status = status_;
+    if (plain_.done) plain_ = {};
+    if (!plain.fit) return plain;
+    candidate_ = plain.fit;
+  }
+  if (waited) budget.allow(WorkBudget::Beyond::all);
+  const Rival rival = look_for_rival(frame, *candidate_, budget);
+  Found found{Status::ambiguous, std::nullopt, std::nullopt};
+  if (rival == Rival::none) found = {Status::ok, std::move(candidate_), {}};
+  if (rival != Rival::not_known_yet) begin_anew(found.status);
+  return found;
 }
 
 // What shows plainly, but elsewhere than the RCM allows.
 Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
   Found free = detect(frame, std::nullopt, free_, budget);
-  free_.done |= free.fit || free.settled;
   if (!free.fit || !contradicts_registration(*free.fit)) return {};
   if (plain_is_known) return free;
   // In this frame a fit through the RCM may be possible where none was before.
-  Walk again{free_.blob - 1};
-  WorkBudget whole(std::nullopt);
-  budget.spend(2 * costs.try_start());
-  Found through_rcm = detect_in_blob(frame, frame.camera_from_rcm, again, whole);
-  return through_rcm.fit || through_rcm.settled ? through_rcm : free;
+  Walk again;
+  budget.allow(WorkBudget::Beyond::all);
+  Found through_rcm = detect(frame, frame.camera_from_rcm, again, budget);
+  return through_rcm.fit ? through_rcm : free;
 }
 
 // False when the budget ends first.
@@ -216,7 +221,7 @@ bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) 
     const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
     const FineFit first = fit_finely(frame.scene, frame.light, start, {});
     if (validate(frame.scene, first) != Status::ok) continue;
-    const Found found = accepted(frame.scene, frame.light, first, budget);
+    const Found found = accepted(frame.scene, frame.light, first, {}, budget);
     if (!found.fit) continue;
     if (!candidate_ || found.fit->inlier_rms_sigmas < candidate_->inlier_rms_sigmas) candidate_ = found.fit;
   }
@@ -224,51 +229,65 @@ bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) 
   return true;
 }
 
-Found MarkerSearch::hidden(const SearchFrame& frame, const Rigid3& camera_from_rcm, WorkBudget& budget) {
-  for (; hidden_.blob < frame.blobs.size(); ++hidden_.blob, hidden_.start = 0) {
-    const auto starts = starts_in(frame, frame.blobs[hidden_.blob], camera_from_rcm, budget);
-    for (; agreement_ || hidden_.start < starts.size(); ++hidden_.start) {
-      if (!agreement_) agreement_ = AgreementSearch(starts[hidden_.start], camera_from_rcm);
-      if (!agreement_->advance(frame.scene, budget) || !fit_to_results(frame, budget)) return {};
-      agreement_.reset();
-    }
-  }
-  hidden_.done = true;
-  return candidate_ ? Found{Status::ok, *candidate_, {}} : Found{};
+bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget) {
+  if (!agreement_->advance(frame.scene, budget) || !fit_to_results(frame, budget)) return false;
+  agreement_.reset();
+  return true;
 }
 
-Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {
-  carry_candidate(frame, budget);
-  if (candidate_ && !frame.camera_from_rcm) return without_rivals(frame, budget);
-  const bool from_the_first = plain_.blob == 0 && plain_.start == 0;
+// The best of all that the blobs' starts lead to.
+Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
+  const auto rest = hidden_.blobs.rest(frame.blobs, reach_px(frame));
+  if (agreement_ && !finish_agreement(frame, budget)) return {};
+  for (const Blob* blob : rest) {
+    const auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget);
+    for (std::size_t i = hidden_.blobs.start(); i < starts.size(); ++i) {
+      agreement_ = AgreementSearch(starts[i], *frame.camera_from_rcm);
+      hidden_.blobs.stop(*blob, i + 1);
+      if (!finish_agreement(frame, budget)) return {};
+    }
+    hidden_.blobs.finish(*blob);
+  }
+  hidden_.done = true;
+  return candidate_ ? Found{Status::ok, std::move(candidate_), {}} : Found{};
+}
+
+Found MarkerSearch::look_long(const SearchFrame& frame, const Found& plain, bool plain_is_known, WorkBudget& budget) {
+  if (!free_.done)
+    if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
+  if (!free_.done) return {};
+  // Such a print is not hidden: this is what the search came to.
+  if (plain.status == Status::marker_mismatch) hidden_.done = true;
+  return hidden_.done ? Found{} : hidden(frame, budget);
+}
+
+Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
+  // What other blobs gave was worse than it, and is gone with it.
+  if (candidate_ && lost_candidate(frame, budget)) hidden_ = {}, agreement_.reset(), results_.reset();
+  const bool from_the_first = !plain_.blobs.begun();
   // Half the budget, or by turns what a start takes, is for what shows plainly.
   longs_turn_ = searches_long_ && !longs_turn_;
   const double half = budget.left() / 2, one_start = costs.initial_poses + costs.try_start();
   const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
-  Found plain = budget.share(share, !longs_turn_,
+  Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::one,
                              [&](WorkBudget& part) { return detect(frame, frame.camera_from_rcm, plain_, part); });
-  budget.set_free_step(longs_turn_);
-  if (plain.settled || (plain.fit && frame.camera_from_rcm)) {
-    *this = MarkerSearch();
+  if (plain.fit) {
+    begin_anew(Status::ok);
     return plain;
   }
-  if (plain.fit) {
-    candidate_ = plain.fit;
-    return without_rivals(frame, budget);
-  }
-  const bool plain_is_known = plain_.done && from_the_first;
+  const bool plain_is_known = plain_.done && (from_the_first || plain.status == Status::marker_mismatch);
   if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
   plain.status = status_;
-  if (plain_.done) plain_ = {}, searches_long_ = frame.camera_from_rcm.has_value();
+  if (plain_.done) plain_ = {}, searches_long_ = true;
   if (!searches_long_) return plain;
-  Found found;
-  if (!free_.done) found = despite_registration(frame, plain_is_known, budget);
-  if (!found.fit && free_.done && !found.settled) found = hidden(frame, *frame.camera_from_rcm, budget);
-  if (found.fit || hidden_.done || found.settled) {
-    *this = MarkerSearch();
-    status_ = plain.status;
-  }
-  return found.fit || found.settled ? found : plain;
+  budget.allow(longs_turn_ ? WorkBudget::Beyond::one : WorkBudget::Beyond::none);
+  Found found = look_long(frame, plain, plain_is_known, budget);
+  if (found.fit || hidden_.done) begin_anew(status_);
+  return found.fit ? found : plain;
+}
+
+Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {
+  return frame.camera_from_rcm ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
 }
 
 }  // namespace lapservo::internal

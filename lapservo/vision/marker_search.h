@@ -1,12 +1,12 @@
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <vector>
 
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/vision/agreement_search.h"
 #include "lapservo/vision/blob_search.h"
+#include "lapservo/vision/blob_walk.h"
 #include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/observation.h"
@@ -20,7 +20,6 @@ struct Found {
   Status status = Status::no_marker;
   std::optional<FineFit> fit;        ///< when ok
   std::optional<ShaftPose> refused;  ///< to draw, when there was something
-  bool settled = false;              ///< that was the marker: no reason to look for it elsewhere
 };
 
 /// A frame in which one marker is looked for. Borrows everything.
@@ -45,26 +44,30 @@ class MarkerSearch {
   Found look(const SearchFrame& frame, WorkBudget& budget);
 
  private:
-  // Which start of which blob is next.
+  // A search from blob to blob; done when none is left.
   struct Walk {
-    std::size_t blob = 0, start = 0;
+    BlobWalk blobs;
     bool done = false;
   };
   enum class Rival { none, found, not_known_yet };
 
-  static Found detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
-                              WorkBudget& budget);
+  static Found detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, const Blob& blob,
+                              Walk& walk, WorkBudget& budget);
   static Found detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
                       WorkBudget& budget);
-  static Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, Walk& walk, WorkBudget& budget);
-  Found without_rivals(const SearchFrame& frame, WorkBudget& budget);
+  static Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget);
+  Found look_without_rcm(const SearchFrame& frame, WorkBudget& budget);
+  Found look_with_rcm(const SearchFrame& frame, WorkBudget& budget);
+  Found look_long(const SearchFrame& frame, const Found& plain, bool plain_is_known, WorkBudget& budget);
   Found despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget);
-  Found hidden(const SearchFrame& frame, const Rigid3& camera_from_rcm, WorkBudget& budget);
+  Found hidden(const SearchFrame& frame, WorkBudget& budget);
+  bool finish_agreement(const SearchFrame& frame, WorkBudget& budget);
   bool fit_to_results(const SearchFrame& frame, WorkBudget& budget);
-  void carry_candidate(const SearchFrame& frame, WorkBudget& budget);
+  bool lost_candidate(const SearchFrame& frame, WorkBudget& budget);
+  void begin_anew(Status status);
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
-  Walk plain_, rivals_, free_, hidden_;
+  Walk plain_, free_, hidden_;
   bool searches_long_ = false;  // what shows plainly was not found
   bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;

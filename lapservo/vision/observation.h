@@ -20,8 +20,7 @@ enum class Status {
   occluded,         ///< too few of its boundaries are visible
   ambiguous,        ///< two explanations fit about as well
   poor_fit,         ///< something was found that does not look like the marker on closer sight
-  uncertain,        ///< found, but the rotation's standard deviation is too large to be of use, or it turned too far
-                    ///< while the shutter was open
+  uncertain,        ///< found, but the rotation's standard deviation is too large to be of use
   marker_mismatch,  ///< the print is not as the rig says: calibrate the marker, or set its tolerance_m
   damaged,          ///< the decoder of the picture or video complained: its pixels are not the camera's
   few_colors,       ///< the picture has no more colours than a palette: its pixels are not the camera's

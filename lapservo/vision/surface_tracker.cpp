@@ -27,11 +27,6 @@ int unasked_after(Processing processing, int before) {
   return std::min(before + 1, ask_every);
 }
 
-// It was followed, but turned too far while the shutter was open.
-bool turned(const Found& found) {
-  return found.settled && found.status == Status::uncertain;
-}
-
 // How sure the fit is of what the centre line shows.
 struct LineSigma {
   double tau_rad = 0;
@@ -169,17 +164,18 @@ void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkB
     }
     if (found_[i].fit) continue;
     memory_[i].reset();
-    lost += !turned(found_[i]);
+    ++lost;
   }
   if (lost == 0) return;
   budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);
   const std::vector<Blob> blobs = largest_blobs(image, classes_);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
-    if (found_[i].fit || turned(found_[i])) continue;
+    if (found_[i].fit) continue;
     const Scene scene = scene_of(image, i);
-    found_[i] = budget.share(budget.left() / static_cast<double>(lost--), true, [&](WorkBudget& part) {
-      return searches_[i].look({scene, light, blobs, rig_.instruments[i].camera_from_rcm}, part);
-    });
+    found_[i] =
+        budget.share(budget.left() / static_cast<double>(lost--), WorkBudget::Beyond::one, [&](WorkBudget& part) {
+          return searches_[i].look({scene, light, blobs, rig_.instruments[i].camera_from_rcm}, part);
+        });
   }
 }
 

@@ -26,9 +26,10 @@ struct TrackerOptions {
   bool deinterlace = false;  ///< track the field of the even rows; also when the rig's camera says so
   /// Method::surface: what looking at a frame may cost, in units of work; nullopt: as much as it takes. A unit is about
   /// a microsecond of one core of 2.3 GHz, but counted, not measured by a clock: the same frames give the same
-  /// results whatever else the machine does. Instruments that show plainly cost less than 1000 each; a search for one
+  /// results whatever else the machine does. Instruments that are followed cost less than 1000 each; a search for one
   /// that is hidden, a hundred times that, goes on in the frames to come where it stopped. Until it comes to its end
-  /// the status is what is known so far. Frames of `single` are always searched whole.
+  /// the status is what is known so far. Pictures that don't follow one another need nullopt. Frames of `single` are
+  /// always searched whole.
   std::optional<double> frame_budget = 8000;
 };
 

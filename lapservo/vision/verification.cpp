@@ -146,7 +146,6 @@ Status validate(const Scene& scene, const FineFit& fit) {
   const int min_used = *std::min_element(fit.used.begin(), fit.used.end());
   if (blurred && limits.motion_blurred_end_of * min_used < limits.motion_blurred_end_parts * fit.lines)
     return Status::uncertain;
-  if (fit.exposure_turn_rad > exposure_limits.max_turn_rad) return Status::uncertain;
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
   return validate_sigma(fit, agreement);

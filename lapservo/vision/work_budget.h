@@ -17,17 +17,22 @@ class WorkBudget {
   double left() const { return left_; }
   void spend(double units) { left_ -= units; }
 
-  /// Whether enough is left for a step of so many units, or this is the one that is allowed whatever is left.
-  bool allows(double units) { return left_ >= units || std::exchange(free_step_, false); }
+  /// Whatever is left: no step, one (without, a search that gets too little would never get anywhere), or all, where
+  /// what is begun must end in this frame.
+  enum class Beyond { none, one, all };
+  void allow(Beyond steps) { beyond_ = steps; }
 
-  /// One step is allowed whatever is left: without, a search that gets too little would never get anywhere.
-  void set_free_step(bool free_step) { free_step_ = free_step; }
+  /// Whether enough is left for a step of so many units, or it is allowed whatever is left.
+  bool allows(double units) {
+    if (left_ >= units || beyond_ == Beyond::all) return true;
+    return std::exchange(beyond_, Beyond::none) == Beyond::one;
+  }
 
   /// Lets `work` spend from this budget, at most so many units; returns what it returns.
   template <class Work>
-  auto share(double units, bool free_step, Work&& work) {
+  auto share(double units, Beyond beyond, Work&& work) {
     WorkBudget part(std::clamp(units, 0.0, std::max(0.0, left_)));
-    part.free_step_ = free_step;
+    part.allow(beyond);
     const double before = part.left_;
     auto result = work(part);
     if (before < std::numeric_limits<double>::infinity()) spend(before - part.left_);
@@ -36,7 +41,7 @@ class WorkBudget {
 
  private:
   double left_;
-  bool free_step_ = false;
+  Beyond beyond_ = Beyond::none;
 };
 
 }  // namespace lapservo::internal
