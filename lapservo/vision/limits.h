@@ -44,14 +44,14 @@ struct DetectionLimits {
 };
 inline constexpr DetectionLimits detection_limits;
 
-/// What the steps of a search cost, in units of work (work_budget.h): a unit is about a microsecond of a core of 2.3
-/// GHz, by the instructions that a step takes (callgrind's inclusive counts of bench/hard_frames at 1080p, at 3
-/// instructions a nanosecond), and more than most, so that 8000 units take less than 8 ms.
+/// What the steps of a search cost, in units of work (work_budget.h). A unit is a microsecond of a core that copies a
+/// frame of 1920x1080 in 0.26 ms; these are about the 99th percentiles of a step's CPU time in the sequences of
+/// bench/hard_frames at that size (a coarse fit's median is 150, a fine fit's 410), so 8000 units take less than 8 ms.
 struct SearchCosts {
   double coarse_fit = 350, fine_fit = 700;
   double initial_poses = 200;   ///< of one blob
-  double agreement = 20;        ///< of one pose with the frame's colours
-  double fit_to_result = 2200;  ///< some 70 of these and a fine fit
+  double agreement = 20;        ///< of one pose with the frame's colours (median: 13)
+  double fit_to_result = 2200;  ///< some 70 of these and a fine fit (median: 1400)
   double blobs_per_px = 1.2e-4;
   double try_start() const { return 2 * (coarse_fit + fine_fit); }
 };

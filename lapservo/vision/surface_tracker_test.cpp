@@ -381,12 +381,7 @@ struct BloodyMotion {
     Random random(seed);
     const JointVector start = scenes::random_configuration(rig, 0, random);
     ShaftModel shaft = shaft_of(rig.instruments[0]);
-    const Marker& marker = shaft.marker;
-    for (double covered = 0; covered < fraction;) {
-      const double radius_m = random.uniform(0.08, 0.25) * marker.diameter_m, azimuth_rad = random.uniform(0, two_pi);
-      shaft.blotches.push_back({azimuth_rad, random.uniform(0, marker.length_m()), radius_m});
-      covered += 0.8 * radius_m * radius_m / (marker.diameter_m * marker.length_m());
-    }
+    shaft.blotches = scenes::blood(shaft.marker, fraction, random);
     Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
     for (int i = 0; i < count; ++i) {
       q.push_back(start);
