@@ -42,7 +42,7 @@ std::vector<Blotch> blood(const Marker& marker, double fraction, Random& random)
 struct Condition {
   double blood = 0, smoke = 0;
   std::vector<bool> covered{};  // by instrument; not covered when absent
-  int instruments = 2;        // that are there
+  int instruments = 2;          // that are there
   bool mirrored = false;
 };
 
