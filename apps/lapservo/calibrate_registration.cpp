@@ -55,7 +55,7 @@ Poses poses_in_table(const CalibrateOptions& options, const Instrument& instrume
 Poses poses_in_frames(const CalibrateOptions& options, Rig rig, std::size_t index, FrameSource& source) {
   constexpr int enough = 3600;
   for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
-  Tracker tracker(rig);
+  Tracker tracker(rig, {.frame_budget = std::nullopt});
   Poses poses;
   const FramesRead read = read_frames(options, rig, source, std::max(1, source.frame_count().value_or(0) / enough),
                                       [&](const cv::Mat& bgr, double time_s) {

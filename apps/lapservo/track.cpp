@@ -62,7 +62,11 @@ void refuse_outputs(const Options& options, const InputFiles& inputs) {
 // in its folder. The tracker begins anew when the rig changes.
 class RigByFrame {
  public:
-  explicit RigByFrame(const Options& options) : options_(options) {
+  explicit RigByFrame(const Options& options)
+      : options_(options),
+        tracking_{.method = method_from_string(options.method).value(),
+                  .single = options.single,
+                  .deinterlace = options.deinterlace} {
     if (!options.rig.empty()) use(options.rig);
   }
 
@@ -81,8 +85,11 @@ class RigByFrame {
                    frame.file.filename().c_str());
       warned_ = true;
     }
+    if (!tracker_) tracker_.emplace(rig_, tracking_);
     return *tracker_;
   }
+  /// What comes are pictures that may have nothing to do with one another: each is searched whole.
+  void expect_pictures() { tracking_.frame_budget.reset(); }
   const Rig& rig() const { return rig_; }
   const fs::path& path() const { return path_; }
 
@@ -98,11 +105,11 @@ class RigByFrame {
     inputs.add_rig(path, rig_);
     refuse_outputs(options_, inputs);
     path_ = path;
-    const Method method = method_from_string(options_.method).value();
-    tracker_.emplace(rig_, TrackerOptions{method, options_.single, options_.deinterlace});
+    tracker_.reset();
   }
 
   const Options& options_;
+  TrackerOptions tracking_;
   fs::path path_;
   Rig rig_;
   std::optional<Tracker> tracker_;
@@ -159,6 +166,7 @@ int run(const Options& options) {
   const auto live = open_live(options);
   const auto file = live ? nullptr : open_frames(options.input, options.fps, options.image_topic);
   FrameSource* const source = live ? live.get() : file.get();
+  if (source->kind() == FrameSource::Kind::image || source->kind() == FrameSource::Kind::folder) rigs.expect_pictures();
   std::optional<LiveView> view;
   if (options.view) view.emplace("track", "use --overlay to write pictures instead");
   ObservationCsv csv(options.out);

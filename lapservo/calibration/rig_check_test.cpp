@@ -95,6 +95,19 @@ class CheckRig : public ::testing::Test {
   const JointRecording joints = joints_meanwhile();
 };
 
+// What blood hides is found in the one picture that there is, however long that takes.
+TEST(RigEvidence, SearchesEachPictureWhole) {
+  const Rig& rig = true_rig();
+  Random random(5);
+  const JointVector q = scenes::random_configuration(rig, 0, random);
+  ShaftModel shaft = shaft_of(rig.instruments[0]);
+  shaft.blotches = scenes::blood(shaft.marker, 0.6, random);
+  Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
+  RigEvidence evidence(rig, 0);
+  evidence.add(renderer.render({placement_of(rig.instruments[0], q)}, 5), 0);
+  EXPECT_EQ(evidence.count(Status::ok), 1);
+}
+
 TEST_F(CheckRig, AGoodRigIsGoodEnough) {
   const RigFindings findings = found_out(rig, pictures(), joints, true);
   EXPECT_EQ(needed(findings), std::vector<std::string>{});

@@ -1,6 +1,7 @@
 #include "lapservo/calibration/rig_evidence.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "lapservo/core/median.h"
 #include "lapservo/geometry/rotation.h"
@@ -22,6 +23,11 @@ Rig free_rig(Rig rig, double tolerance_m, double focal_change) {
   return rig;
 }
 
+// The pictures may have nothing to do with one another, and no robot waits for them.
+Tracker whole_search(const Rig& rig) {
+  return Tracker(rig, {.frame_budget = std::nullopt});
+}
+
 TimedPose::ByFocal slope_of(const Rigid3& before, const Rigid3& after, double focal_change) {
   return {(after.translation - before.translation) / focal_change,
           rotation_vector_of(after.rotation * before.rotation.conjugate()) / focal_change};
@@ -32,9 +38,10 @@ TimedPose::ByFocal slope_of(const Rigid3& before, const Rigid3& after, double fo
 RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument)
     : rig_(rig),
       instrument_(instrument),
-      as_it_is_(rig),
-      exact_{Tracker(free_rig(rig, 0, 0)), Tracker(free_rig(rig, 0, focal_step))},
-      tolerant_{Tracker(free_rig(rig, print_tolerance_m, 0)), Tracker(free_rig(rig, print_tolerance_m, focal_step))},
+      as_it_is_(whole_search(rig)),
+      exact_{whole_search(free_rig(rig, 0, 0)), whole_search(free_rig(rig, 0, focal_step))},
+      tolerant_{whole_search(free_rig(rig, print_tolerance_m, 0)),
+                whole_search(free_rig(rig, print_tolerance_m, focal_step))},
       key_frames_(rig, instrument),
       response_(rig.camera) {}
 

@@ -30,6 +30,9 @@ ShaftPose pose_of(const Rig& rig, std::size_t instrument, const JointVector& q);
 cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,
                const RenderOptions& options = {});
 
+/// Discs of blood over about a fraction of what shows of a print.
+std::vector<Blotch> blood(const Marker& marker, double fraction, Random& random);
+
 /// Tissue alone.
 cv::Mat render_nothing(const Rig& rig, std::uint64_t seed);
 

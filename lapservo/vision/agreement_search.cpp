@@ -6,9 +6,9 @@
 #include <cstddef>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
 namespace {
@@ -55,21 +55,19 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
   return score;
 }
 
-// A configuration in the terms of the image: the shaft's direction turned across and along the line of sight.
-struct ImageTerms {
-  Rigid3 camera_from_rcm;
-  Eigen::Vector3d axis, across, away;  // in the camera
-  Eigen::Vector4d values;              // turns across and away [rad], rho [m], psi [rad]
+constexpr int rotations = 6, halvings = 5, directions = 14, max_moves = 8;
+const Eigen::Vector4d first_steps(0.03, 0.12, 0.006, 0.5);
 
-  std::optional<PoseUnknowns> unknowns(const Eigen::Vector4d& at) const {
-    const Eigen::Vector3d direction = (axis + at[0] * across + at[1] * away).normalized();
-    const auto q = configuration_through(camera_from_rcm, camera_from_rcm.translation + at[2] * direction);
-    if (!q) return std::nullopt;
-    return PoseUnknowns::rcm(camera_from_rcm, {q->theta_rad, q->phi_rad, q->rho_m, at[3]});
-  }
-};
+}  // namespace
 
-ImageTerms terms_of(const Rigid3& camera_from_rcm, const PoseUnknowns& start) {
+std::optional<PoseUnknowns> AgreementSearch::ImageTerms::unknowns(const Eigen::Vector4d& at) const {
+  const Eigen::Vector3d direction = (axis + at[0] * across + at[1] * away).normalized();
+  const auto q = configuration_through(camera_from_rcm, camera_from_rcm.translation + at[2] * direction);
+  if (!q) return std::nullopt;
+  return PoseUnknowns::rcm(camera_from_rcm, {q->theta_rad, q->phi_rad, q->rho_m, at[3]});
+}
+
+AgreementSearch::ImageTerms AgreementSearch::ImageTerms::of(const Rigid3& camera_from_rcm, const PoseUnknowns& start) {
   const Eigen::Vector3d place = start.pose().camera_from_unrolled.translation;
   ImageTerms terms{camera_from_rcm, (place - camera_from_rcm.translation).normalized(), {}, {}, {}};
   terms.across = place.cross(terms.axis).normalized();
@@ -78,62 +76,86 @@ ImageTerms terms_of(const Rigid3& camera_from_rcm, const PoseUnknowns& start) {
   return terms;
 }
 
-// Tries the axes and random directions both ways, keeps what is better, and halves the steps when nothing is.
-double climb(const Scene& scene, ImageTerms& terms, Eigen::Vector4d steps, Random& random) {
-  constexpr int halvings = 5, directions = 14, max_moves = 8;
-  const auto score_at = [&](const Eigen::Vector4d& at) {
-    const auto unknowns = terms.unknowns(at);
-    return unknowns ? agreement(scene, unknowns->pose()) : -1e9;
-  };
-  double best = score_at(terms.values);
-  for (int halving = 0; halving < halvings; ++halving, steps /= 2) {
-    bool moved = true;
-    for (int move = 0; moved && move < max_moves; ++move) {
-      moved = false;
-      for (int i = 0; i < directions; ++i) {
-        Eigen::Vector4d direction = Eigen::Vector4d::Unit(i % 4);
-        if (i >= 4)
-          for (double& part : direction) part = random.normal();
-        for (const double sign : {1.0, -1.0}) {
-          const Eigen::Vector4d trial = terms.values + sign * steps.cwiseProduct(direction);
-          const double score = score_at(trial);
-          if (score <= best) continue;
-          best = score, terms.values = trial, moved = true;
-          break;
-        }
-      }
-    }
-  }
-  return best;
+AgreementSearch::AgreementSearch(const PoseUnknowns& start, const Rigid3& camera_from_rcm)
+    : camera_from_rcm_(camera_from_rcm), start_(start) {}
+
+double AgreementSearch::score_at(const Scene& scene, const ImageTerms& terms, const Eigen::Vector4d& at,
+                                 WorkBudget& budget) const {
+  budget.spend(search_costs.agreement);
+  const auto unknowns = terms.unknowns(at);
+  return unknowns ? agreement(scene, unknowns->pose()) : -1e9;
 }
 
-}  // namespace
-
-std::vector<PoseUnknowns> search_agreement(const Scene& scene, const PoseUnknowns& start,
-                                           const Rigid3& camera_from_rcm) {
-  constexpr int rotations = 6;
-  struct Result {
-    double score;
-    PoseUnknowns unknowns;
-  };
-  std::vector<Result> results;
-  Random random(1);
-  for (int i = 0; i < rotations; ++i) {
-    ImageTerms terms = terms_of(camera_from_rcm, start);
-    terms.values[3] = two_pi * i / rotations;
-    const double score = climb(scene, terms, {0.03, 0.12, 0.006, 0.5}, random);
-    if (const auto unknowns = terms.unknowns(terms.values)) results.push_back({score, *unknowns});
+// Tries the axes and random directions both ways and keeps what is better; whether anything was.
+bool AgreementSearch::move(const Scene& scene, Climb& climb, WorkBudget& budget) {
+  bool moved = false;
+  for (int i = 0; i < directions; ++i) {
+    Eigen::Vector4d direction = Eigen::Vector4d::Unit(i % 4);
+    if (i >= 4)
+      for (double& part : direction) part = random_.normal();
+    for (const double sign : {1.0, -1.0}) {
+      const Eigen::Vector4d trial = climb.terms.values + sign * climb.steps.cwiseProduct(direction);
+      const double score = score_at(scene, climb.terms, trial, budget);
+      if (score <= climb.score) continue;
+      climb.score = score, climb.terms.values = trial, moved = true;
+      break;
+    }
   }
-  std::sort(results.begin(), results.end(), [](const Result& a, const Result& b) { return a.score > b.score; });
+  return moved;
+}
+
+// Moves, and halves the steps when nothing is better, until the steps are small. False when the budget ends first.
+bool AgreementSearch::finish(const Scene& scene, Climb& climb, WorkBudget& budget) {
+  while (climb.halvings < halvings) {
+    if (!budget.allows(2 * directions * search_costs.agreement)) return false;
+    const bool moved = move(scene, climb, budget);
+    if (moved && ++climb.moves < max_moves) continue;
+    ++climb.halvings, climb.moves = 0, climb.steps /= 2;
+  }
+  return true;
+}
+
+bool AgreementSearch::advance(const Scene& scene, WorkBudget& budget) {
+  ++frames_;
+  if (climb_) climb_->score = score_at(scene, climb_->terms, climb_->terms.values, budget);
+  for (; rotation_ < rotations; ++rotation_) {
+    if (!climb_) {
+      climb_ = Climb{ImageTerms::of(camera_from_rcm_, start_), first_steps};
+      climb_->terms.values[3] = two_pi * rotation_ / rotations;
+      climb_->score = score_at(scene, climb_->terms, climb_->terms.values, budget);
+    }
+    if (!finish(scene, *climb_, budget)) return false;
+    if (const auto unknowns = climb_->terms.unknowns(climb_->terms.values))
+      results_.push_back({climb_->score, *unknowns});
+    climb_.reset();
+  }
+  return true;
+}
+
+std::vector<PoseUnknowns> AgreementSearch::results() const {
+  std::vector<Result> sorted = results_;
+  std::sort(sorted.begin(), sorted.end(), [](const Result& a, const Result& b) { return a.score > b.score; });
   std::vector<PoseUnknowns> best;
-  for (const Result& result : results) {
+  for (const Result& result : sorted) {
     constexpr double same_rad = 0.2;
     const bool known = std::any_of(best.begin(), best.end(), [&](const PoseUnknowns& other) {
       return std::abs(wrap_pi(other.pose().psi_rad - result.unknowns.pose().psi_rad)) < same_rad;
     });
     if (!known && best.size() < 2) best.push_back(result.unknowns);
   }
+  std::reverse(best.begin(), best.end());
   return best;
+}
+
+PoseUnknowns AgreementSearch::in_this_frame(const Scene& scene, const PoseUnknowns& result, WorkBudget& budget) {
+  if (frames_ == 1) return result;
+  constexpr int halved = 3;
+  Climb climb{ImageTerms::of(camera_from_rcm_, result), first_steps / (1 << halved)};
+  climb.halvings = halved;
+  climb.score = score_at(scene, climb.terms, climb.terms.values, budget);
+  WorkBudget whole(std::nullopt);
+  finish(scene, climb, whole);
+  return climb.terms.unknowns(climb.terms.values).value_or(result);
 }
 
 }  // namespace lapservo::internal

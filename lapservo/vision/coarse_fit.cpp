@@ -21,7 +21,8 @@ namespace lapservo::internal {
 namespace {
 
 constexpr int line_count = 13, station_count = 15, samples_along = 128;
-constexpr int max_reach = 200;  // samples on each side of a section's middle
+constexpr int max_reach = 200;      // samples on each side of a section's middle
+constexpr double max_hidden = 0.8;  // of a section of the shaft: what the image's border leaves must have a side
 
 // Measured image points that lie on the marker's outline or boundaries, attached to where they belong on its surface.
 struct SidePoint {
@@ -67,10 +68,16 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     const double step_px = std::max(1.0, half_px / 40);
     const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), max_reach);
     classes.clear();
-    for (int i = -reach; i <= reach; ++i) classes.push_back(scene.class_at(middle + i * step_px * across));
+    double hidden_px = 0;  // of the shaft, beyond the image
+    for (int i = -reach; i <= reach; ++i) {
+      const std::uint8_t color = scene.class_at(middle + i * step_px * across);
+      classes.push_back(color);
+      if (color == Scene::outside && std::abs(i) * step_px < half_px) hidden_px += step_px;
+    }
     const Stretch<float> stretch = most_colorful_stretch(classes, scene);
     const double width_px = (stretch.last - stretch.first + 1) * step_px;
-    if (width_px < detection_limits.narrowest_section * 2 * half_px ||
+    if (hidden_px > max_hidden * 2 * half_px ||
+        width_px < detection_limits.narrowest_section * (2 * half_px - hidden_px) ||
         width_px > detection_limits.widest_section * 2 * half_px)
       continue;
     const auto add = [&](int inner, int outer, double side) {

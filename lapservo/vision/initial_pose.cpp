@@ -34,6 +34,8 @@ struct Outline {
   ImageFrame frame;
   SideLine low, high;      // the sides, low.at(x) < high.at(x)
   double first_x, last_x;  // extent of the blob
+  // Where one side alone lies in the image, the other one's line is where the image ends: low's or high's sign.
+  double only_side = 0;
 };
 
 struct BlobShape {
@@ -107,9 +109,10 @@ SideLine fit_side(const std::vector<Eigen::Vector2d>& points, double outwards) {
   return line;
 }
 
-// Where the marker's colours begin and end on a section at x.
+// Where the marker's colours begin and end on a section at x, and whether that is where the image does.
 struct Section {
   double low, high;
+  bool low_outside, high_outside;
 };
 std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, double x, double reach_px,
                                   double step_px) {
@@ -117,41 +120,64 @@ std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, d
   const auto color_at = [&](int i) { return scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px))); };
   const Stretch<double> colored =
       heaviest_stretch(-reach, reach + 1, [&](int i) { return scene.is_ours(color_at(i)) ? 1 : -0.8; });
-  const bool outside = color_at(colored.first - 1) == Scene::outside || color_at(colored.last + 1) == Scene::outside;
-  if (colored.sum * step_px < 4 || outside) return std::nullopt;
+  if (colored.sum * step_px < 4) return std::nullopt;
   return Section{(colored.first - 0.5) * step_px - detection_limits.contour_inset_px,
-                 (colored.last + 0.5) * step_px + detection_limits.contour_inset_px};
+                 (colored.last + 0.5) * step_px + detection_limits.contour_inset_px,
+                 color_at(colored.first - 1) == Scene::outside, color_at(colored.last + 1) == Scene::outside};
+}
+
+// Points on the sides, in the outline's frame.
+struct SidePoints {
+  std::vector<Eigen::Vector2d> low, high;
+};
+
+// The blob's extent along the shaft, and sections across it: of the shaft as wide as it is, or where that gives too
+// few, with what the image's border leaves of it. Round 0 and 1 only turn and shift the frame.
+std::optional<SidePoints> find_sides(const Scene& scene, const BlobShape& shape, Outline& outline, bool last_round) {
+  constexpr int sections = 13;
+  constexpr std::size_t enough = 4;
+  double widest = 0;
+  outline.first_x = outline.last_x = 0;
+  for (const Eigen::Vector2d& p : shape.ideal_px) {
+    const Eigen::Vector2d offset = p - outline.frame.origin;
+    outline.first_x = std::min(outline.first_x, offset.dot(outline.frame.along));
+    outline.last_x = std::max(outline.last_x, offset.dot(outline.frame.along));
+    widest = std::max(widest, std::abs(offset.dot(outline.frame.across())));
+  }
+  const double reach_px = widest * 1.3 + 12, finest_px = std::max(1.0, reach_px / 150);
+  const double step_px = last_round ? finest_px : std::max(finest_px, reach_px / 40);
+  SidePoints whole, cut;
+  int low_cut = 0, high_cut = 0;
+  for (int i = 0; i < sections; ++i) {
+    const double x = outline.first_x + (outline.last_x - outline.first_x) * (i + 0.5) / sections;
+    const auto section = section_at(scene, outline.frame, x, reach_px, step_px);
+    if (!section || (section->low_outside && section->high_outside)) continue;
+    cut.low.emplace_back(x, section->low), cut.high.emplace_back(x, section->high);
+    low_cut += section->low_outside, high_cut += section->high_outside;
+    if (section->low_outside || section->high_outside) continue;
+    whole.low.emplace_back(x, section->low), whole.high.emplace_back(x, section->high);
+  }
+  outline.only_side = 0;
+  if (whole.low.size() >= enough) return whole;
+  // The same side everywhere.
+  if (cut.low.size() < enough || (low_cut > 0) == (high_cut > 0)) return std::nullopt;
+  outline.only_side = low_cut > 0 ? 1 : -1;
+  return cut;
 }
 
 std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, Eigen::Vector2d along) {
   Outline outline;
   outline.frame = {shape.centre, along};
-  constexpr int rounds = 3, sections = 13;
+  constexpr int rounds = 3;
   for (int round = 0; round < rounds; ++round) {
-    double widest = 0;
-    outline.first_x = outline.last_x = 0;
-    for (const Eigen::Vector2d& p : shape.ideal_px) {
-      const Eigen::Vector2d offset = p - outline.frame.origin;
-      outline.first_x = std::min(outline.first_x, offset.dot(outline.frame.along));
-      outline.last_x = std::max(outline.last_x, offset.dot(outline.frame.along));
-      widest = std::max(widest, std::abs(offset.dot(outline.frame.across())));
-    }
-    // The first rounds only turn and shift the frame.
-    const double reach_px = widest * 1.3 + 12, finest_px = std::max(1.0, reach_px / 150);
-    const double step_px = round + 1 < rounds ? std::max(finest_px, reach_px / 40) : finest_px;
-    std::vector<Eigen::Vector2d> low, high;
-    for (int i = 0; i < sections; ++i) {
-      const double x = outline.first_x + (outline.last_x - outline.first_x) * (i + 0.5) / sections;
-      if (const auto section = section_at(scene, outline.frame, x, reach_px, step_px)) {
-        low.emplace_back(x, section->low);
-        high.emplace_back(x, section->high);
-      }
-    }
-    if (low.size() < 4) return std::nullopt;
-    outline.low = fit_side(low, -1), outline.high = fit_side(high, 1);
-    const double turn = std::atan((outline.low.slope + outline.high.slope) / 2);
-    const double shift = (outline.low.at(0) + outline.high.at(0)) / 2;
+    const auto sides = find_sides(scene, shape, outline, round + 1 == rounds);
+    if (!sides) return std::nullopt;
+    outline.low = fit_side(sides->low, -1), outline.high = fit_side(sides->high, 1);
     if (round + 1 == rounds) break;
+    const double slope = outline.only_side < 0   ? outline.low.slope
+                         : outline.only_side > 0 ? outline.high.slope
+                                                 : (outline.low.slope + outline.high.slope) / 2;
+    const double turn = std::atan(slope), shift = (outline.low.at(0) + outline.high.at(0)) / 2;
     outline.frame.origin += shift * outline.frame.across();
     outline.frame.along = (std::cos(turn) * outline.frame.along + std::sin(turn) * outline.frame.across()).normalized();
   }
@@ -217,6 +243,49 @@ double depth_from_length(const Scene& scene, const Rigid3& camera_from_rcm, cons
   return best_m;
 }
 
+// Of a shaft of which one side shows: points of the axis whose side is seen at x, as the shaft is nearer or farther.
+class AxisBesideContour {
+ public:
+  AxisBesideContour(const Scene& scene, const Outline& outline, double x) : radius_m_(scene.marker.radius_m()) {
+    const SideLine& side = outline.only_side < 0 ? outline.low : outline.high;
+    const auto ray = [&](double y) { return scene.camera.ray_from_ideal(outline.frame.at(x, y)).normalized(); };
+    contour_ = ray(side.at(x));
+    inwards_ = ray(side.at(x) - outline.only_side) - contour_;
+    inwards_ = (inwards_ - inwards_.dot(contour_) * contour_).normalized();
+  }
+  Eigen::Vector3d at(double distance_m) const {
+    const double sine = std::min(0.9, radius_m_ / distance_m);
+    return distance_m * (std::sqrt(1 - sine * sine) * contour_ + sine * inwards_);
+  }
+
+ private:
+  double radius_m_;
+  Eigen::Vector3d contour_, inwards_;
+};
+
+// The proximal end, by one side, both ends of the colours and the RCM: at the depth at which the marker is as long as
+// it looks.
+std::optional<Eigen::Vector3d> proximal_end_beside_contour(const Scene& scene, const Outline& outline, const Ends& ends,
+                                                           const Rigid3& camera_from_rcm) {
+  if (!ends.first_x || !ends.last_x) return std::nullopt;
+  const AxisBesideContour proximal(scene, outline, *ends.first_x), distal(scene, outline, *ends.last_x);
+  constexpr int steps = 120;
+  constexpr double nearest_m = 0.03, farthest_m = 0.4;
+  double least_miss_px = 1e9;
+  std::optional<Eigen::Vector3d> best;
+  for (int i = 0; i <= steps; ++i) {
+    const Eigen::Vector3d start = proximal.at(nearest_m * std::pow(farthest_m / nearest_m, 1.0 * i / steps));
+    const Eigen::Vector3d axis = (start - camera_from_rcm.translation).normalized();
+    const Eigen::Vector3d end = start + scene.marker.length_m() * axis;
+    if (!(start.z() > 1e-3) || !(end.z() > 1e-3)) continue;
+    const Eigen::Vector3d seen = distal.at(end.norm());
+    if (!(seen.z() > 1e-3)) continue;
+    const double miss_px = (scene.camera.ideal_from_point(end) - scene.camera.ideal_from_point(seen)).norm();
+    if (miss_px < least_miss_px) least_miss_px = miss_px, best = start;
+  }
+  return best;
+}
+
 }  // namespace
 
 std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
@@ -232,6 +301,12 @@ std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
   const auto outline = find_outline(scene, *shape, *along);
   if (!outline) return {};
   const Ends ends = find_ends(scene, *outline);
+  if (outline->only_side != 0) {
+    if (!camera_from_rcm) return {};
+    const auto end = proximal_end_beside_contour(scene, *outline, ends, *camera_from_rcm);
+    const auto q = end ? configuration_through(*camera_from_rcm, *end) : std::nullopt;
+    return q ? std::vector{PoseUnknowns::rcm(*camera_from_rcm, *q)} : std::vector<PoseUnknowns>{};
+  }
   const double middle_x = (outline->first_x + outline->last_x) / 2;
   const auto middle = axis_point(scene, *outline, middle_x);
   if (!middle) return {};

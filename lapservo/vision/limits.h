@@ -44,6 +44,19 @@ struct DetectionLimits {
 };
 inline constexpr DetectionLimits detection_limits;
 
+/// What the steps of a search cost, in units of work (work_budget.h). A unit is a microsecond of a core that copies a
+/// frame of 1920x1080 in 0.26 ms; these are about the 99th percentiles of a step's CPU time in the sequences of
+/// bench/hard_frames at that size (a coarse fit's median is 150, a fine fit's 410), so 8000 units take less than 8 ms.
+struct SearchCosts {
+  double coarse_fit = 350, fine_fit = 700;
+  double initial_poses = 200;   ///< of one blob
+  double agreement = 20;        ///< of one pose with the frame's colours (median: 13)
+  double fit_to_result = 2200;  ///< some 70 of these and a fine fit (median: 1400)
+  double blobs_per_px = 1.2e-4;
+  double try_start() const { return 2 * (coarse_fit + fine_fit); }
+};
+inline constexpr SearchCosts search_costs;
+
 /// When a free fit overrules camera_from_rcm, and what is said of q then (surface_tracker.cpp).
 struct RegistrationLimits {
   double well_seen_fraction = 0.7;  ///< of the boundary points: hidden ones leave free fits that are wrong

@@ -8,13 +8,11 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/marker/azimuths.h"
-#include "lapservo/vision/agreement_search.h"
-#include "lapservo/vision/coarse_fit.h"
-#include "lapservo/vision/initial_pose.h"
+#include "lapservo/vision/blob_search.h"
+#include "lapservo/vision/blurred_edges.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/marker_pose.h"
-#include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
 namespace {
@@ -27,11 +25,6 @@ int unasked_after(Processing processing, int before) {
   if (processing == Processing::found) return ask_every;
   if (processing == Processing::none) return 1;
   return std::min(before + 1, ask_every);
-}
-
-bool contradicts_registration(const FineFit& free) {
-  return free.located_fraction() > registration_limits.well_seen_fraction &&
-         free.print_off_probability < registration_limits.max_print_off_probability;
 }
 
 // How sure the fit is of what the centre line shows.
@@ -124,17 +117,23 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
 
 }  // namespace
 
-SurfaceTracker::SurfaceTracker(const Rig& rig, bool single)
+SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget)
     : rig_(rig),
       single_(single),
+      frame_budget_(frame_budget),
       classes_(rig.instruments),
       light_(rig.camera.response.table()),
       channels_(rig.camera),
       memory_(rig.instruments.size()),
-      observations_(rig.instruments.size()) {}
+      searches_(rig.instruments.size()),
+      found_(rig.instruments.size()),
+      observations_(rig.instruments.size()) {
+  BlurredEdges::instance();  // takes milliseconds, which no frame should
+}
 
 void SurfaceTracker::reset() {
   std::fill(memory_.begin(), memory_.end(), std::nullopt);
+  std::fill(searches_.begin(), searches_.end(), MarkerSearch());
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
@@ -153,119 +152,41 @@ ExpectedProcessing SurfaceTracker::Memory::expected() const {
   return {unasked >= ask_every, bias_px};
 }
 
-SurfaceTracker::Found SurfaceTracker::refusal(Status status, const PoseUnknowns& unknowns) {
-  const ShaftPose& pose = unknowns.pose();
-  const bool finite = pose.camera_from_unrolled.translation.allFinite() &&
-                      pose.camera_from_unrolled.rotation.coeffs().allFinite() && std::isfinite(pose.psi_rad);
-  return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
-}
-
-SurfaceTracker::Found SurfaceTracker::follow(const Scene& scene, const LightImage& light, const Memory& memory) const {
-  const PoseUnknowns expected = memory.last.changed_by(memory.velocity);
-  const FineFit near = fit_finely(scene, light, expected, memory.blur, memory.expected());
-  if (validate(scene, near) == Status::ok) return {Status::ok, near, {}};
-  const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
-  if (!coarse.found) return {};
-  const FineFit fit = fit_finely(scene, light, coarse.unknowns, memory.blur, memory.expected());
-  const Status status = validate(scene, fit);
-  return status == Status::ok ? Found{status, fit, {}} : refusal(status, fit.unknowns);
-}
-
-SurfaceTracker::Found SurfaceTracker::try_start(const Scene& scene, const LightImage& light,
-                                                const PoseUnknowns& start) const {
-  const CoarseFit coarse = fit_coarsely(scene, start, {});
-  if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score) return {};
-  if (coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
-    return refusal(Status::ambiguous, coarse.unknowns);
-  const FineFit first = fit_finely(scene, light, coarse.unknowns, {});
-  const Status validated = validate(scene, first);
-  if (validated == Status::ok) return {validated, first, {}};
-  if (validated == Status::marker_mismatch) return refusal(validated, first.unknowns);
-  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, detection_limits.near_by);
-  if (!nearer.found) return {};
-  const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
-  const Status status = validate(scene, fit);
-  return status == Status::ok ? Found{status, fit, {}} : refusal(status, fit.unknowns);
-}
-
-SurfaceTracker::Found SurfaceTracker::detect(const Scene& scene, const LightImage& light,
-                                             const std::vector<Blob>& blobs,
-                                             const std::optional<Rigid3>& camera_from_rcm) const {
-  Found best;
-  for (const Blob& blob : blobs) {
-    for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm)) {
-      Found found = try_start(scene, light, start);
-      if (!found.fit) {
-        // A print that is off is no reason to look for it elsewhere, with a boundary less.
-        if (found.status == Status::marker_mismatch) return found;
-        if (!best.fit && found.status != Status::no_marker) best = found;
-        continue;
-      }
-      if (!best.fit || found.fit->inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = std::move(found);
-      if (camera_from_rcm) break;  // the starts are ways to one solution; without the RCM they are rivals
+// Those that are followed first: the others share what is left of the budget.
+void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
+  std::size_t lost = 0;
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
+    found_[i] = {};
+    if (memory_[i]) {
+      const Memory& memory = *memory_[i];
+      found_[i] = follow(scene_of(image, i), light, memory.last.changed_by(memory.velocity), memory.blur,
+                         memory.expected(), budget);
     }
-    if (best.fit) break;
+    if (found_[i].fit) continue;
+    memory_[i].reset();
+    ++lost;
   }
-  return best;
-}
-
-// Whether the marker shows in another place as well: a second print, a reflection, a picture of tiles. The RCM would
-// tell which is ours.
-bool SurfaceTracker::has_rival(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
-                               const FineFit& fit) const {
-  const auto middle = [&](const PoseUnknowns& unknowns) {
-    const Eigen::Vector3d along(0, 0, scene.marker.length_m() / 2);
-    return scene.camera.raw_from_point(unknowns.pose().camera_from_unrolled * along);
-  };
-  const double apart_px = detection_limits.rival_apart_radii * scene.marker.radius_m() /
-                          fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
-  for (const Blob& blob : blobs)
-    for (const PoseUnknowns& start : initial_poses(scene, blob, std::nullopt)) {
-      if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
-      const Found other = try_start(scene, light, start);
-      if (other.status == Status::marker_mismatch) return true;
-      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return true;
-    }
-  return false;
-}
-
-SurfaceTracker::Found SurfaceTracker::detect_occluded(const Scene& scene, const LightImage& light,
-                                                      const std::vector<Blob>& blobs,
-                                                      const Rigid3& camera_from_rcm) const {
-  Found best;
-  for (const Blob& blob : blobs)
-    for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm))
-      for (const PoseUnknowns& candidate : search_agreement(scene, start, camera_from_rcm)) {
-        const FineFit fit = fit_finely(scene, light, candidate, {});
-        if (validate(scene, fit) != Status::ok) continue;
-        if (!best.fit || fit.inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = {Status::ok, fit, {}};
-      }
-  return best;
+  if (lost == 0) return;
+  budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);
+  const std::vector<Blob> blobs = largest_blobs(image, classes_);
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
+    if (found_[i].fit) continue;
+    const Scene scene = scene_of(image, i);
+    found_[i] =
+        budget.share(budget.left() / static_cast<double>(lost--), WorkBudget::Beyond::one, [&](WorkBudget& part) {
+          return searches_[i].look({scene, light, blobs, rig_.instruments[i].camera_from_rcm}, part);
+        });
+  }
 }
 
 const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) {
   const ImageView image(image_bgr);
   const LightImage light(image, light_, channels_);
   if (single_) reset();
-  std::optional<std::vector<Blob>> blobs;
+  WorkBudget budget(single_ ? std::nullopt : frame_budget_);
+  find(image, light, budget);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
-    const Scene scene = scene_of(image, i);
-    const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
-    Found found;
-    if (memory_[i]) found = follow(scene, light, *memory_[i]);
-    if (!found.fit) {
-      memory_[i].reset();
-      if (!blobs) blobs = largest_blobs(image, classes_);
-      found = detect(scene, light, *blobs, camera_from_rcm);
-      if (found.fit && !camera_from_rcm && has_rival(scene, light, *blobs, *found.fit))
-        found = {Status::ambiguous, std::nullopt, std::nullopt};
-      if (!found.fit && camera_from_rcm)
-        if (Found free = detect(scene, light, *blobs, std::nullopt); free.fit && contradicts_registration(*free.fit))
-          found = std::move(free);
-      if (!found.fit && camera_from_rcm && found.status != Status::marker_mismatch)
-        if (Found occluded = detect_occluded(scene, light, *blobs, *camera_from_rcm); occluded.fit)
-          found = std::move(occluded);
-    }
+    const Found& found = found_[i];
     observations_[i] = {};
     observations_[i].status = found.status;
     if (found.refused) {
@@ -274,7 +195,7 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
       observations_[i].refused.psi_rad = found.refused->psi_rad;
     }
     if (!found.fit) continue;
-    observations_[i] = observation_of(scene, *found.fit, camera_from_rcm);
+    observations_[i] = observation_of(scene_of(image, i), *found.fit, rig_.instruments[i].camera_from_rcm);
     remember(i, *found.fit);
   }
   return observations_;

@@ -7,9 +7,9 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/rig/rig.h"
-#include "lapservo/vision/blob_search.h"
 #include "lapservo/vision/color_classes.h"
 #include "lapservo/vision/fine_fit.h"
+#include "lapservo/vision/marker_search.h"
 #include "lapservo/vision/observation.h"
 
 namespace lapservo::internal {
@@ -20,12 +20,13 @@ namespace lapservo::internal {
 /// is fitted freely: the image features are right then, and q is given only as far as the mismatch lets it be known.
 class SurfaceTracker {
  public:
-  /// `single`: every frame on its own.
-  SurfaceTracker(const Rig& rig, bool single);
+  /// `single`: every frame on its own. `frame_budget`: TrackerOptions::frame_budget.
+  SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget = std::nullopt);
 
   /// `image_bgr` is 8-bit BGR of the rig's size. One observation per instrument.
   const std::vector<Observation>& track(const cv::Mat& image_bgr);
   void reset();
+  void set_frame_budget(std::optional<double> units) { frame_budget_ = units; }
 
  private:
   struct Memory {
@@ -36,28 +37,19 @@ class SurfaceTracker {
     std::array<double, 4> bias_px{};
     ExpectedProcessing expected() const;
   };
-  struct Found {
-    Status status = Status::no_marker;
-    std::optional<FineFit> fit;        // when ok
-    std::optional<ShaftPose> refused;  // to draw, when there was something
-  };
-  static Found refusal(Status status, const PoseUnknowns& unknowns);
-  Found follow(const Scene& scene, const LightImage& light, const Memory& memory) const;
-  Found detect(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
-               const std::optional<Rigid3>& camera_from_rcm) const;
-  Found detect_occluded(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs,
-                        const Rigid3& camera_from_rcm) const;
-  Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start) const;
-  bool has_rival(const Scene& scene, const LightImage& light, const std::vector<Blob>& blobs, const FineFit& fit) const;
+  void find(const ImageView& image, const LightImage& light, WorkBudget& budget);
   void remember(std::size_t instrument, const FineFit& fit);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;
 
   Rig rig_;
   bool single_;
+  std::optional<double> frame_budget_;
   ColorClasses classes_;
   std::array<float, 256> light_;
   ChannelGeometry channels_;
   std::vector<std::optional<Memory>> memory_;
+  std::vector<MarkerSearch> searches_;
+  std::vector<Found> found_;
   std::vector<Observation> observations_;
 };
 

@@ -12,9 +12,13 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/tissue.h"
 #include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/scenes.h"
+#include "lapservo/vision/blob_search.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
@@ -291,6 +295,244 @@ TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
     EXPECT_EQ(to_string(Tracker(one).track(scenes::render(both, configurations, seed))[0].status), "ambiguous");
     EXPECT_EQ(to_string(Tracker(one).track(usual_shot(seed).bgr)[0].status), "ok");
   }
+}
+
+// Two equal prints of which now one, now the other is the larger blob.
+std::vector<cv::Mat> rivals_that_change_places(const Rig& both, Random& random, std::uint64_t seed) {
+  for (;;) {
+    const auto configurations = apart(both, random);
+    cv::Mat frame = scenes::render(both, configurations, seed);
+    const ColorClasses classes(both.instruments);
+    std::vector<cv::Mat> frames;
+    std::vector<std::size_t> largest;
+    for (std::size_t hidden = 0; hidden < 2; ++hidden) {
+      const ShaftPose pose = scenes::pose_of(both, hidden, configurations[hidden]);
+      const double end_m = both.instruments[0].marker.length_m();
+      const Eigen::Vector2d end_px =
+          both.camera.raw_from_point(pose.camera_from_unrolled * Eigen::Vector3d(0, 0, end_m));
+      frames.push_back(frame.clone());
+      constexpr int half_px = 20;
+      frames
+          .back()(cv::Rect(cvRound(end_px.x()) - half_px, cvRound(end_px.y()) - half_px, 2 * half_px, 2 * half_px) &
+                  cv::Rect({}, frame.size()))
+          .setTo(cv::Scalar(60, 70, 160));
+      const Blob blob = largest_blobs(ImageView(frames.back()), classes).at(0);
+      const Eigen::Vector2d at_px(blob.samples[0].u, blob.samples[0].v);
+      const auto away_px = [&](std::size_t i) {
+        return (both.camera.raw_from_point(
+                    scenes::pose_of(both, i, configurations[i]).camera_from_unrolled.translation) -
+                at_px)
+            .norm();
+      };
+      largest.push_back(away_px(0) < away_px(1) ? 0 : 1);
+    }
+    if (largest[0] != largest[1]) return frames;
+  }
+}
+
+// Nor does it when the budget ends before both are looked at, and the next frame has them in another order.
+TEST(SurfaceTracker, TwoOfTheSamePrintStayAmbiguousWithinAnyBudget) {
+  Rig both = scenes::usual_rig(2);
+  both.instruments[1].marker = both.instruments[0].marker;
+  Rig one = scenes::usual_rig();
+  one.instruments[0].camera_from_rcm.reset();
+  Random random(5);
+  int candidates = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const auto frames = rivals_that_change_places(both, random, seed);
+    for (const double frame_budget : {1, 1500, 3000, 5000}) {
+      Tracker tracker(one, {.frame_budget = frame_budget});
+      for (std::size_t i = 0; i < 6; ++i) {
+        const Status status = tracker.track(frames[i % 2])[0].status;
+        EXPECT_NE(status, Status::ok) << seed << ", " << frame_budget << ", frame " << i;
+        candidates += status == Status::ambiguous;
+      }
+    }
+  }
+  EXPECT_GE(candidates, 30) << "the test's own power";
+}
+
+// A rig a few millimetres off looks like a print that is: what needs no registration is told all the same.
+TEST(SurfaceTracker, AContradictedRegistrationIsNoMismatchedMarkerWithinABudget) {
+  int contradicted = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    Random random(seed);
+    Rig moved = shot.rig;
+    const Eigen::Vector3d away = Eigen::Vector3d(random.normal(), random.normal(), random.normal()).normalized();
+    moved.instruments[0].camera_from_rcm->translation += 3e-3 * away;
+    const Status whole = Tracker(moved, {.single = true}).track(shot.bgr)[0].status;
+    Tracker tracker(moved);
+    Status status = tracker.track(shot.bgr)[0].status;
+    for (int more = 0; more < 2 && status != whole; ++more) status = tracker.track(shot.bgr)[0].status;
+    EXPECT_EQ(to_string(status), to_string(whole));
+    contradicted += whole == Status::ok;
+  }
+  EXPECT_GE(contradicted, 4) << "the test's own power";
+}
+
+// Blood over about a fraction of the first instrument's print, while it moves by pixels from frame to frame.
+struct BloodyMotion {
+  std::vector<JointVector> q;
+  std::vector<cv::Mat> frames;
+
+  BloodyMotion(const Rig& rig, double fraction, std::uint64_t seed, int count) {
+    Random random(seed);
+    const JointVector start = scenes::random_configuration(rig, 0, random);
+    ShaftModel shaft = shaft_of(rig.instruments[0]);
+    shaft.blotches = scenes::blood(shaft.marker, fraction, random);
+    Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
+    for (int i = 0; i < count; ++i) {
+      q.push_back(start);
+      q.back().theta_rad += 1e-3 * i, q.back().psi_rad += 2e-3 * i;
+      frames.push_back(renderer.render({placement_of(rig.instruments[0], q.back())}, seed));
+    }
+  }
+};
+
+// What one frame's long search finds, frames with a budget find together, and in the same frames each time.
+TEST(SurfaceTracker, SpreadsALongSearchOverFrames) {
+  const Rig rig = scenes::usual_rig();
+  constexpr double frame_budget = 6000;
+  constexpr int frames = 40;
+  int found = 0, later = 0;
+  for (std::uint64_t seed = 5; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const BloodyMotion motion(rig, 0.6, seed, frames);
+    if (SurfaceTracker(rig, true).track(motion.frames[0])[0].status != Status::ok) continue;
+    ++found;
+    SurfaceTracker tracker(rig, false, frame_budget), again(rig, false, frame_budget);
+    int first = -1;
+    for (int i = 0; i < frames && (first < 0 || i <= first + 1); ++i) {
+      const auto frame = static_cast<std::size_t>(i);
+      const Observation o = tracker.track(motion.frames[frame])[0], same = again.track(motion.frames[frame])[0];
+      EXPECT_EQ(o.status, same.status);
+      if (first < 0 && o.status == Status::ok) first = i;
+      if (o.status != Status::ok) continue;
+      EXPECT_EQ(o.rcm.value().q.vector(), same.rcm.value().q.vector());
+      expect_right(o, motion.q[frame]);
+    }
+    EXPECT_GE(first, 0);
+    later += first > 0;
+  }
+  EXPECT_EQ(found, 2);
+  EXPECT_GE(later, 1) << "the test's own power";
+}
+
+// Whatever else is searched for, what shows plainly is found in the frame in which it appears.
+TEST(SurfaceTracker, FindsWhatShowsPlainlyDuringALongSearch) {
+  const Rig rig = scenes::usual_rig();
+  int searched = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const BloodyMotion hidden(rig, 1.3, seed, 3);
+    SurfaceTracker tracker(rig, false, 6000);
+    for (const cv::Mat& frame : hidden.frames) searched += tracker.track(frame)[0].status != Status::ok;
+    expect_right(tracker.track(usual_shot(seed).bgr)[0], usual_shot(seed).q);
+  }
+  EXPECT_GE(searched, 6);
+}
+
+// A temporary has no frames to come.
+TEST(Tracker, SearchesTheOnlyFrameOfATemporaryWhole) {
+  const Rig rig = scenes::usual_rig();
+  int found = 0;
+  for (std::uint64_t seed = 5; seed <= 6; ++seed) {
+    const BloodyMotion motion(rig, 0.6, seed, 1);
+    const cv::Mat& frame = motion.frames[0];
+    const Status whole = SurfaceTracker(rig, true).track(frame)[0].status;
+    EXPECT_EQ(Tracker(rig, {.frame_budget = 1}).track(frame)[0].status, whole) << "seed " << seed;
+    found += whole == Status::ok;
+  }
+  EXPECT_EQ(found, 2);
+}
+
+// A frame of a turn while the shutter was open, with psi in its middle; even, or with a constant acceleration from
+// rest.
+cv::Mat render_turning(const Shot& shot, double turn_rad, bool even) {
+  constexpr int moments = 9;
+  const auto part = [&](double time) { return even ? time : time * time; };
+  Exposure exposure;
+  for (int i = 0; i < moments; ++i) {
+    JointVector q = shot.q;
+    q.psi_rad += turn_rad * (part((i + 0.5) / moments) - part(0.5));
+    exposure.push_back({placement_of(shot.rig.instruments[0], q)});
+  }
+  const cv::Mat tissue = make_tissue(shot.rig.camera.width_px, shot.rig.camera.height_px, 5);
+  return Renderer(shot.rig.camera, {shaft_of(shot.rig.instruments[0])}, tissue).render_exposure(exposure, 1);
+}
+
+// The picture shows psi's mean over the exposure.
+TEST(SurfaceTracker, ATurnWithinTheExposureGivesPsiOfItsMiddle) {
+  double squares = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed)
+    for (const double turn_rad : {0.1, -0.25, 0.4}) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + ", turn " + std::to_string(turn_rad));
+      const Shot& shot = usual_shot(seed);
+      const Observation even = Tracker(shot.rig).track(render_turning(shot, turn_rad, true))[0];
+      expect_right(even, shot.q);
+      const double error_rad = wrap_pi(even.rcm.value().q.psi_rad - shot.q.psi_rad);
+      squares += error_rad * error_rad / even.rcm->covariance(3, 3) / 9;
+      // Its mean is a twelfth of the turn from its middle, and what an edge fit makes of it no farther.
+      const Observation from_rest = Tracker(shot.rig).track(render_turning(shot, turn_rad, false))[0];
+      ASSERT_EQ(to_string(from_rest.status), "ok");
+      const double from_rest_rad = wrap_pi(from_rest.rcm.value().q.psi_rad - shot.q.psi_rad);
+      EXPECT_LT(std::abs(from_rest_rad), std::abs(turn_rad) / 12 + 0.002);
+    }
+  EXPECT_LT(std::sqrt(squares), 1.5);
+}
+
+// A rig whose instrument comes along the image's lower or right border, and the planes through the camera and it.
+struct BesideBorder {
+  Rig rig = scenes::usual_rig();
+  Eigen::Vector3d border;   // of the image in the camera's frame, at depth 1
+  Eigen::Vector3d outside;  // across it
+
+  explicit BesideBorder(bool right) {
+    const Camera& camera = rig.camera;
+    if (right)
+      border = {(camera.width_px - camera.cx_px) / camera.fx_px, 0, 1}, outside = Eigen::Vector3d::UnitX();
+    else
+      border = {0, (camera.height_px - camera.cy_px) / camera.fy_px, 1}, outside = Eigen::Vector3d::UnitY();
+    const Eigen::Vector3d rcm = 0.09 * border + Eigen::Vector3d(right ? 0 : -0.1, right ? -0.09 : 0, 0);
+    rig.instruments[0].camera_from_rcm = Rigid3{rotation_between(Eigen::Vector3d::UnitX(), 0.1 * border - rcm), rcm};
+  }
+  // The proximal end, so far along the border, the axis so far outside of it.
+  JointVector at(double depth_m, double along_m, double outside_m) const {
+    const Eigen::Vector3d along = Eigen::Vector3d::UnitZ().cross(outside).cwiseAbs();
+    return configuration_through(*rig.instruments[0].camera_from_rcm,
+                                 depth_m * border + along_m * along + outside_m * outside)
+        .value();
+  }
+};
+
+// One occluding contour and parts of all boundaries show.
+TEST(SurfaceTracker, FindsAShaftThatIsHalfOutOfTheFrame) {
+  int found = 0, all = 0;
+  double sum = 0, squares = 0, normalised = 0;
+  for (const bool right : {false, true}) {
+    const BesideBorder place(right);
+    Renderer renderer(place.rig.camera, {shaft_of(place.rig.instruments[0])},
+                      make_tissue(place.rig.camera.width_px, place.rig.camera.height_px, 5));
+    Random random(right ? 7 : 8);
+    for (int i = 0; i < 20; ++i, ++all) {
+      SCOPED_TRACE((right ? "right " : "lower ") + std::to_string(i));
+      const double depth_m = random.uniform(0.085, 0.115), along_m = random.uniform(-0.028, 0);
+      JointVector q = place.at(depth_m, along_m, random.uniform(-1.5e-3, 1e-3));
+      q.psi_rad = random.uniform(-pi, pi);
+      const Observation o = Tracker(place.rig).track(
+          renderer.render({placement_of(place.rig.instruments[0], q)}, static_cast<std::uint64_t>(i)))[0];
+      if (o.status != Status::ok) continue;
+      const double error_rad = wrap_pi(o.rcm.value().q.psi_rad - q.psi_rad);
+      EXPECT_LT(std::abs(error_rad), 0.05);
+      ++found, sum += error_rad, squares += error_rad * error_rad;
+      normalised += error_rad * error_rad / o.rcm->covariance(3, 3);
+    }
+  }
+  EXPECT_GE(found, 0.95 * all);
+  EXPECT_LT(std::sqrt(squares / found - sum * sum / found / found), 0.006);
+  EXPECT_LT(std::sqrt(normalised / found), 1.5);
 }
 
 TEST(SurfaceTracker, LateralChromaticAberrationOfTheRigIsUndone) {

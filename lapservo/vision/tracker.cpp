@@ -28,6 +28,12 @@ void check_image(const cv::Mat& image, const Camera& camera) {
                      size_text(camera.width_px, camera.height_px) + " as in the rig");
 }
 
+TrackerOptions checked(TrackerOptions options) {
+  if (options.frame_budget && !(*options.frame_budget > 0))
+    throw InputError("tracker", "frame_budget", std::to_string(*options.frame_budget), "above 0, or none");
+  return options;
+}
+
 Observation refused_as_interlaced(const Observation& observation, Method method) {
   using What = Observation::Refused::What;
   Observation refused;
@@ -57,7 +63,7 @@ struct Tracker::State {
         method(options.method),
         deinterlace(options.deinterlace || rig.camera.deinterlace),
         even_field(rig.camera.response),
-        surface(rig, options.single),
+        surface(rig, options.single, options.frame_budget),
         centerline(rig) {}
 
   void observe(const cv::Mat& image_bgr) {
@@ -88,7 +94,7 @@ struct Tracker::State {
   std::vector<Observation> observations;
 };
 
-Tracker::Tracker(const Rig& rig, TrackerOptions options) : state_(std::make_unique<State>(rig, options)) {}
+Tracker::Tracker(const Rig& rig, TrackerOptions options) : state_(std::make_unique<State>(rig, checked(options))) {}
 Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
@@ -106,6 +112,7 @@ const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr) & {
 }
 
 std::vector<Observation> Tracker::track(const cv::Mat& image_bgr) && {
+  state_->surface.set_frame_budget(std::nullopt);
   return track(image_bgr);  // the overload above: *this is an lvalue here
 }
 

@@ -24,6 +24,13 @@ struct TrackerOptions {
   Method method = Method::surface;
   bool single = false;       ///< treat every frame on its own instead of starting from the frame before
   bool deinterlace = false;  ///< track the field of the even rows; also when the rig's camera says so
+  /// Method::surface: what looking at a frame may cost, in units of work; nullopt: as much as it takes. A unit is about
+  /// a microsecond of one core of 2.3 GHz, but counted, not measured by a clock: the same frames give the same
+  /// results whatever else the machine does. Instruments that are followed cost less than 1000 each; a search for one
+  /// that is hidden, a hundred times that, goes on in the frames to come where it stopped. Until it comes to its end
+  /// the status is what is known so far. Pictures that don't follow one another need nullopt. Frames of `single` are
+  /// always searched whole.
+  std::optional<double> frame_budget = 8000;
 };
 
 /// Finds all instruments of a rig in the frames of one camera. Holds what it learnt from the frame before.
@@ -37,7 +44,8 @@ class Tracker {
   /// `image_bgr`: 8-bit, 3 channels, of the rig's size, else InputError. One observation per instrument of the rig, in
   /// its order.
   const std::vector<Observation>& track(const cv::Mat& image_bgr) &;
-  /// Of a tracker that is gone after the expression, as in `Tracker(rig).track(image)`: by value.
+  /// Of a tracker that is gone after the expression, as in `Tracker(rig).track(image)`: by value. There is no frame to
+  /// come, so this one is searched whole.
   std::vector<Observation> track(const cv::Mat& image_bgr) &&;
 
   /// Of a frame whose pixels are not the camera's, as a damaged one's: one observation per instrument, of this status.

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/error.h"
 #include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
@@ -41,6 +42,11 @@ TEST(Tracker, NamesTheInstrumentWhateverBecomesOfIt) {
   EXPECT_EQ(tracker.track(cv::Mat::zeros(shot.bgr.size(), CV_8UC3))[0].instrument, name);
   EXPECT_EQ(tracker.refuse(Status::damaged)[0].instrument, name);
   EXPECT_EQ(tracker.refuse(Status::damaged)[0].status, Status::damaged);
+}
+
+TEST(Tracker, RefusesABudgetOfNothing) {
+  for (const double nothing : {0.0, -1.0, std::nan("")})
+    EXPECT_THROW(Tracker(scenes::usual_rig(), {.frame_budget = nothing}), InputError) << nothing;
 }
 
 }  // namespace

@@ -191,7 +191,15 @@ class FrameSource:
     def __next__(self) -> Frame: ...
 
 class Tracker:
-    def __init__(self, rig: Rig, *, method: str = ..., single: bool = ..., deinterlace: bool = ...) -> None: ...
+    def __init__(
+        self,
+        rig: Rig,
+        *,
+        method: str = ...,
+        single: bool = ...,
+        deinterlace: bool = ...,
+        frame_budget: Optional[float] = ...,
+    ) -> None: ...
     @overload
     def track(self, image: _Image, stamp_s: Optional[float] = ...) -> list[Observation]: ...
     @overload

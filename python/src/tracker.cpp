@@ -298,14 +298,17 @@ void bind_tracker(py::module_& m) {
   py::class_<SafeTracker>(m, "Tracker", R"(Finds all instruments of a rig in the frames of one camera.
 
 Holds what it learnt from the frame before. Threads may share it; frames are then tracked one after another.)")
-      .def(py::init([](std::shared_ptr<Rig> rig, const std::string& method, bool single, bool deinterlace) {
+      .def(py::init([](std::shared_ptr<Rig> rig, const std::string& method, bool single, bool deinterlace,
+                       std::optional<double> frame_budget) {
              return std::make_unique<SafeTracker>(std::move(rig),
-                                                  TrackerOptions{method_of(method), single, deinterlace});
+                                                  TrackerOptions{method_of(method), single, deinterlace, frame_budget});
            }),
            py::arg("rig"), py::kw_only(), py::arg("method") = "surface", py::arg("single") = false,
-           py::arg("deinterlace") = false,
-           "method: 'surface', or the paper's 'centerline'; single: every frame on its own; deinterlace: track the "
-           "field of the even rows.")
+           py::arg("deinterlace") = false, py::arg("frame_budget") = TrackerOptions().frame_budget,
+           "method: 'surface', or the paper's 'centerline'; single: every frame on its own, searched whole; "
+           "deinterlace: track the field of the even rows; frame_budget: what a frame may cost, in counted units of "
+           "about a microsecond (a longer search goes on in the next frame), or None: as much as it takes, which "
+           "pictures that don't follow one another need.")
       .def("track", &SafeTracker::track, py::arg("image").noconvert(), py::arg("stamp_s") = py::none(),
            R"(list[Observation], one per instrument, of uint8[H, W, 3] in blue green red, of the rig's size.
 

@@ -1,0 +1,172 @@
+// hard_frames [FRAMES] [WIDTH HEIGHT]: what frames cost in which a marker is searched for long: a table of CPU time a
+// frame over moving sequences of two instruments whose markers are clean, bloody, in smoke, hidden, mirrored or not
+// there.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "bench/frames.h"
+#include "lapservo/core/random.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::bench {
+using namespace internal;
+namespace {
+
+double cpu_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+// Discs of blood over about a fraction of the print.
+std::vector<Blotch> blood(const Marker& marker, double fraction, Random& random) {
+  std::vector<Blotch> discs;
+  for (double covered = 0; covered < fraction;) {
+    const double radius_m = random.uniform(0.08, 0.25) * marker.diameter_m;
+    const double azimuth_rad = random.uniform(0, two_pi);
+    discs.push_back({azimuth_rad, random.uniform(0, marker.length_m()), radius_m});
+    covered += 0.8 * radius_m * radius_m / (marker.diameter_m * marker.length_m());
+  }
+  return discs;
+}
+
+// A part of a sequence: what lies on the markers and before them.
+struct Condition {
+  double blood = 0, smoke = 0;
+  std::vector<bool> covered{};  // by instrument; not covered when absent
+  int instruments = 2;          // that are there
+  bool mirrored = false;
+};
+
+struct Sequence {
+  const char* name;
+  std::vector<Condition> parts;
+};
+
+const std::vector<Sequence>& sequences() {
+  static const std::vector<Sequence> all{
+      {"clean", {{}}},
+      {"blood", {{.blood = 0.3}, {.blood = 0.5}, {.blood = 0.7}, {.blood = 0.9}, {.blood = 1.3}}},
+      {"smoke", {{.smoke = 0.5}, {.smoke = 0.65}, {.smoke = 0.75}, {.smoke = 0.85}}},
+      {"blood, smoke", {{.blood = 0.3, .smoke = 0.4}, {.blood = 0.6, .smoke = 0.5}}},
+      {"hidden", {{.covered = {true, false}}, {.blood = 0.6, .covered = {false, true}}, {.covered = {true, true}}}},
+      {"mirrored", {{.mirrored = true}, {.blood = 0.4, .mirrored = true}}},
+      {"another's", {{.covered = {true, true}, .instruments = 3}}},
+      {"none", {{.instruments = 0}}}};
+  return all;
+}
+
+Renderer renderer_of(const Rig& rig, const Condition& condition, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<ShaftModel> shafts;
+  for (const Instrument& instrument : rig.instruments) {
+    shafts.push_back(shaft_of(instrument));
+    shafts.back().blotches = blood(instrument.marker, condition.blood, random);
+  }
+  RenderOptions options;
+  options.smoke = static_cast<float>(condition.smoke);
+  return Renderer(rig.camera, std::move(shafts), make_tissue(rig.camera.width_px, rig.camera.height_px, seed), options);
+}
+
+// The camera's picture the other way round.
+cv::Mat mirrored(const cv::Mat& picture) {
+  cv::Mat out(picture.size(), picture.type());
+  for (int v = 0; v < picture.rows; ++v)
+    for (int u = 0; u < picture.cols; ++u) out.at<cv::Vec3b>(v, picture.cols - 1 - u) = picture.at<cv::Vec3b>(v, u);
+  return out;
+}
+
+void for_each_frame(cv::Size size_px, const Sequence& sequence, int frames,
+                    const std::function<void(const cv::Mat&)>& look) {
+  constexpr int at_most = 25;  // frames of a drawing of blood
+  const int runs = std::max(static_cast<int>(sequence.parts.size()), (frames + at_most - 1) / at_most);
+  for (int run = 0; run < runs; ++run) {
+    const Condition& condition = sequence.parts[static_cast<std::size_t>(run) % sequence.parts.size()];
+    const Rig rig = scaled_rig(size_px, condition.instruments);
+    Renderer renderer = renderer_of(rig, condition, static_cast<std::uint64_t>(run) + 1);
+    for (int i = 0; i < frames / runs; ++i) {
+      std::vector<ShaftPlacement> placed = placements(rig, 31 * run + i);
+      for (std::size_t k = 0; k < std::min(placed.size(), condition.covered.size()); ++k)
+        placed[k].covered = condition.covered[k];
+      const cv::Mat frame = renderer.render(placed, static_cast<std::uint64_t>(i));
+      look(condition.mirrored ? mirrored(frame) : frame);
+    }
+  }
+}
+
+double quantile(const std::vector<double>& sorted, double fraction) {
+  return sorted[static_cast<std::size_t>(fraction * static_cast<double>(sorted.size() - 1) + 0.5)];
+}
+
+struct Times {
+  std::vector<double> ms;
+  int found = 0, looked_for = 0;
+
+  void print(const std::string& name, double memcpy_ms) {
+    std::sort(ms.begin(), ms.end());
+    const double worst = quantile(ms, 0.999);
+    std::printf("| %s | %zu | %.0f %% | %.2f | %.2f | %.2f | %.2f | %.1f |\n", name.c_str(), ms.size(),
+                100.0 * found / std::max(1, looked_for), quantile(ms, 0.5), quantile(ms, 0.99), worst, ms.back(),
+                worst / memcpy_ms);
+  }
+};
+
+double memcpy_ms(cv::Size size_px) {
+  const cv::Mat from(size_px, CV_8UC3, cv::Scalar(1, 2, 3));
+  cv::Mat to(size_px, CV_8UC3);
+  std::vector<double> ms;
+  for (int i = 0; i < 51; ++i) {
+    const double before = cpu_ms();
+    std::memcpy(to.data, from.data, from.total() * from.elemSize());
+    ms.push_back(cpu_ms() - before);
+  }
+  std::sort(ms.begin(), ms.end());
+  return quantile(ms, 0.5);
+}
+
+void measure(cv::Size size_px, int frames) {
+  const double copied_ms = memcpy_ms(size_px);
+  std::printf("memcpy of a frame of %dx%d: %.2f ms\n\n", size_px.width, size_px.height, copied_ms);
+  std::printf("| sequence | frames | found | median [ms] | p99 | p99.9 | largest | p99.9 / memcpy |\n");
+  std::printf("| --- | --- | --- | --- | --- | --- | --- | --- |\n");
+  Times all;
+  for (const bool registered : {true, false})
+    for (const Sequence& sequence : sequences()) {
+      Rig rig = scaled_rig(size_px, 2);
+      if (!registered)
+        for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
+      Tracker tracker(rig);
+      Times times;
+      for_each_frame(size_px, sequence, frames, [&](const cv::Mat& frame) {
+        const double before = cpu_ms();
+        const std::vector<Observation>& seen = tracker.track(frame);
+        times.ms.push_back(cpu_ms() - before);
+        for (const Observation& o : seen) times.found += o.status == Status::ok;
+        times.looked_for += static_cast<int>(seen.size());
+      });
+      times.print(sequence.name + std::string(registered ? "" : ", RCM unknown"), copied_ms);
+      std::fflush(stdout);
+      all.ms.insert(all.ms.end(), times.ms.begin(), times.ms.end());
+      all.found += times.found, all.looked_for += times.looked_for;
+    }
+  all.print("all", copied_ms);
+}
+
+}  // namespace
+}  // namespace lapservo::bench
+
+int main(int argc, char** argv) {
+  const int frames = argc > 1 ? std::atoi(argv[1]) : 200;
+  const cv::Size size_px = argc > 3 ? cv::Size(std::atoi(argv[2]), std::atoi(argv[3])) : cv::Size(1920, 1080);
+  if (frames < 1 || size_px.width < 1 || size_px.height < 1)
+    return std::fputs("hard_frames [FRAMES] [WIDTH HEIGHT]\n", stderr), 2;
+  lapservo::bench::measure(size_px, frames);
+}

@@ -1,0 +1,292 @@
+#include "lapservo/vision/marker_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/vision/coarse_fit.h"
+#include "lapservo/vision/cut_shaft.h"
+#include "lapservo/vision/initial_pose.h"
+#include "lapservo/vision/limits.h"
+#include "lapservo/vision/verification.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr const SearchCosts& costs = search_costs;
+
+Found refusal(Status status, const PoseUnknowns& unknowns) {
+  const ShaftPose& pose = unknowns.pose();
+  const bool finite = pose.camera_from_unrolled.translation.allFinite() &&
+                      pose.camera_from_unrolled.rotation.coeffs().allFinite() && std::isfinite(pose.psi_rad);
+  return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
+}
+
+bool contradicts_registration(const FineFit& free) {
+  return free.located_fraction() > registration_limits.well_seen_fraction &&
+         free.print_off_probability < registration_limits.max_print_off_probability;
+}
+
+// What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.
+Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
+  constexpr double doubt = 1.5;
+  fit.covariance *= doubt * doubt;
+  const Status status = validate(scene, fit);
+  return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
+}
+
+// A fit that is ok. One side alone holds the place of a shaft that is cut along, and where the robust loss takes that
+// for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on until psi rests and the side agrees.
+Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
+               WorkBudget& budget) {
+  if (!cut_along(scene, fit.unknowns.pose())) return {Status::ok, std::move(fit), {}};
+  constexpr int most = 4;
+  constexpr double rest_sigmas = 0.2, least_sides = 0.8;
+  for (int i = 0; i < most; ++i) {
+    const double before_rad = fit.unknowns.pose().psi_rad;
+    budget.spend(costs.fine_fit);
+    fit = fit_finely(scene, light, fit.unknowns, fit.blur, processing);
+    if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit.unknowns);
+    const Eigen::Index psi = fit.unknowns.size() - 1;
+    const double moved_rad = std::abs(wrap_pi(fit.unknowns.pose().psi_rad - before_rad));
+    if (moved_rad < rest_sigmas * std::sqrt(fit.covariance(psi, psi)) &&
+        fit.sides_used >= least_sides * fit.sides_in_image)
+      return with_doubt_of_one_side(scene, fit);
+  }
+  return refusal(Status::uncertain, fit.unknowns);
+}
+
+Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
+  budget.spend(costs.coarse_fit);
+  const CoarseFit coarse = fit_coarsely(scene, start, {});
+  if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score) return {};
+  if (coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
+    return refusal(Status::ambiguous, coarse.unknowns);
+  budget.spend(costs.fine_fit);
+  const FineFit first = fit_finely(scene, light, coarse.unknowns, {});
+  const Status validated = validate(scene, first);
+  if (validated == Status::ok) return accepted(scene, light, first, {}, budget);
+  if (validated == Status::marker_mismatch) return refusal(validated, first.unknowns);
+  budget.spend(costs.coarse_fit);
+  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, detection_limits.near_by);
+  if (!nearer.found) return {};
+  budget.spend(costs.fine_fit);
+  const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
+  const Status status = validate(scene, fit);
+  return status == Status::ok ? accepted(scene, light, fit, {}, budget) : refusal(status, fit.unknowns);
+}
+
+// No marker moves farther from frame to frame.
+double reach_px(const SearchFrame& frame) {
+  constexpr double of_width = 0.05;
+  return of_width * frame.scene.image.width_px;
+}
+
+std::vector<PoseUnknowns> starts_in(const SearchFrame& frame, const Blob& blob,
+                                    const std::optional<Rigid3>& camera_from_rcm, WorkBudget& budget) {
+  budget.spend(costs.initial_poses);
+  return initial_poses(frame.scene, blob, camera_from_rcm);
+}
+
+}  // namespace
+
+Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
+             const ExpectedProcessing& processing, WorkBudget& budget) {
+  budget.spend(costs.fine_fit);
+  const FineFit near = fit_finely(scene, light, expected, blur, processing);
+  const Status nearby = validate(scene, near);
+  if (nearby == Status::ok) return accepted(scene, light, near, processing, budget);
+  budget.spend(costs.coarse_fit);
+  const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
+  if (!coarse.found) return {};
+  budget.spend(costs.fine_fit);
+  const FineFit fit = fit_finely(scene, light, coarse.unknowns, blur, processing);
+  const Status status = validate(scene, fit);
+  return status == Status::ok ? accepted(scene, light, fit, processing, budget) : refusal(status, fit.unknowns);
+}
+
+// The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
+Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm,
+                                   const Blob& blob, Walk& walk, WorkBudget& budget) {
+  Found best;
+  const auto starts = starts_in(frame, blob, camera_from_rcm, budget);
+  for (std::size_t i = walk.blobs.start(); i < starts.size(); ++i) {
+    if ((camera_from_rcm || i == 0) && !budget.allows(costs.try_start())) {
+      walk.blobs.stop(blob, i);
+      return best;
+    }
+    Found found = try_start(frame.scene, frame.light, starts[i], budget);
+    if (!found.fit) {
+      // A print that is off is no reason to look for it elsewhere, with a boundary less.
+      if (found.status == Status::marker_mismatch) return found;
+      if (!best.fit && found.status != Status::no_marker) best = found;
+      continue;
+    }
+    if (!best.fit || found.fit->inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = std::move(found);
+    if (camera_from_rcm) break;  // the starts are ways to one solution
+  }
+  walk.blobs.finish(blob);
+  return best;
+}
+
+Found MarkerSearch::detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
+                           WorkBudget& budget) {
+  Found best;
+  for (const Blob* blob : walk.blobs.rest(frame.blobs, reach_px(frame))) {
+    Found found = detect_in_blob(frame, camera_from_rcm, *blob, walk, budget);
+    if (found.fit || found.status == Status::marker_mismatch) {
+      walk.done = true;
+      return found;
+    }
+    if (found.status != Status::no_marker) best = std::move(found);
+    if (walk.blobs.stopped()) return best;
+  }
+  walk.done = true;
+  return best;
+}
+
+// Whether the marker shows in another place as well: a second print, a reflection, a picture of tiles. The RCM would
+// tell which is ours. All in one frame: in another one a rival may be where none was.
+MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
+  const Scene& scene = frame.scene;
+  const auto middle = [&](const PoseUnknowns& unknowns) {
+    const Eigen::Vector3d along(0, 0, scene.marker.length_m() / 2);
+    return scene.camera.raw_from_point(unknowns.pose().camera_from_unrolled * along);
+  };
+  const double apart_px = detection_limits.rival_apart_radii * scene.marker.radius_m() /
+                          fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
+  for (const Blob& blob : frame.blobs)
+    for (const PoseUnknowns& start : starts_in(frame, blob, std::nullopt, budget)) {
+      if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
+      if (!budget.allows(costs.try_start())) return Rival::not_known_yet;
+      const Found other = try_start(scene, frame.light, start, budget);
+      if (other.status == Status::marker_mismatch) return Rival::found;
+      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return Rival::found;
+    }
+  return Rival::none;
+}
+
+// The candidate as it shows in this frame; whether it doesn't.
+bool MarkerSearch::lost_candidate(const SearchFrame& frame, WorkBudget& budget) {
+  const FineFit before = *candidate_;
+  candidate_ = follow(frame.scene, frame.light, before.unknowns, before.blur, {}, budget).fit;
+  return !candidate_;
+}
+
+void MarkerSearch::begin_anew(Status status) {
+  *this = MarkerSearch();
+  status_ = status;
+}
+
+// A candidate whose rivals the budget leaves no time for waits for the next frame, in which they take what they take.
+Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budget) {
+  const bool waited = candidate_.has_value();
+  if (waited && lost_candidate(frame, budget)) begin_anew(status_);
+  if (!candidate_) {
+    Found plain = detect(frame, std::nullopt, plain_, budget);
+    if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
+    plain.status = status_;
+    if (plain_.done) plain_ = {};
+    if (!plain.fit) return plain;
+    candidate_ = plain.fit;
+  }
+  if (waited) budget.allow(WorkBudget::Beyond::all);
+  const Rival rival = look_for_rival(frame, *candidate_, budget);
+  Found found{Status::ambiguous, std::nullopt, std::nullopt};
+  if (rival == Rival::none) found = {Status::ok, std::move(candidate_), {}};
+  if (rival != Rival::not_known_yet) begin_anew(found.status);
+  return found;
+}
+
+// What shows plainly, but elsewhere than the RCM allows.
+Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
+  Found free = detect(frame, std::nullopt, free_, budget);
+  if (!free.fit || !contradicts_registration(*free.fit)) return {};
+  if (plain_is_known) return free;
+  // In this frame a fit through the RCM may be possible where none was before.
+  Walk again;
+  budget.allow(WorkBudget::Beyond::all);
+  Found through_rcm = detect(frame, frame.camera_from_rcm, again, budget);
+  return through_rcm.fit ? through_rcm : free;
+}
+
+// False when the budget ends first.
+bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) {
+  if (!results_) results_ = agreement_->results();
+  for (; !results_->empty(); results_->pop_back()) {
+    if (!budget.allows(costs.fit_to_result)) return false;
+    budget.spend(costs.fit_to_result);
+    const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
+    const FineFit first = fit_finely(frame.scene, frame.light, start, {});
+    if (validate(frame.scene, first) != Status::ok) continue;
+    const Found found = accepted(frame.scene, frame.light, first, {}, budget);
+    if (!found.fit) continue;
+    if (!candidate_ || found.fit->inlier_rms_sigmas < candidate_->inlier_rms_sigmas) candidate_ = found.fit;
+  }
+  results_.reset();
+  return true;
+}
+
+bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget) {
+  if (!agreement_->advance(frame.scene, budget) || !fit_to_results(frame, budget)) return false;
+  agreement_.reset();
+  return true;
+}
+
+// The best of all that the blobs' starts lead to.
+Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
+  const auto rest = hidden_.blobs.rest(frame.blobs, reach_px(frame));
+  if (agreement_ && !finish_agreement(frame, budget)) return {};
+  for (const Blob* blob : rest) {
+    const auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget);
+    for (std::size_t i = hidden_.blobs.start(); i < starts.size(); ++i) {
+      agreement_ = AgreementSearch(starts[i], *frame.camera_from_rcm);
+      hidden_.blobs.stop(*blob, i + 1);
+      if (!finish_agreement(frame, budget)) return {};
+    }
+    hidden_.blobs.finish(*blob);
+  }
+  hidden_.done = true;
+  return candidate_ ? Found{Status::ok, std::move(candidate_), {}} : Found{};
+}
+
+Found MarkerSearch::look_long(const SearchFrame& frame, const Found& plain, bool plain_is_known, WorkBudget& budget) {
+  if (!free_.done)
+    if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
+  if (!free_.done) return {};
+  // Such a print is not hidden: this is what the search came to.
+  if (plain.status == Status::marker_mismatch) hidden_.done = true;
+  return hidden_.done ? Found{} : hidden(frame, budget);
+}
+
+Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
+  // What other blobs gave was worse than it, and is gone with it.
+  if (candidate_ && lost_candidate(frame, budget)) hidden_ = {}, agreement_.reset(), results_.reset();
+  const bool from_the_first = !plain_.blobs.begun();
+  // Half the budget, or by turns what a start takes, is for what shows plainly.
+  longs_turn_ = searches_long_ && !longs_turn_;
+  const double half = budget.left() / 2, one_start = costs.initial_poses + costs.try_start();
+  const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
+  Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::one,
+                             [&](WorkBudget& part) { return detect(frame, frame.camera_from_rcm, plain_, part); });
+  if (plain.fit) {
+    begin_anew(Status::ok);
+    return plain;
+  }
+  const bool plain_is_known = plain_.done && (from_the_first || plain.status == Status::marker_mismatch);
+  if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
+  plain.status = status_;
+  if (plain_.done) plain_ = {}, searches_long_ = true;
+  if (!searches_long_) return plain;
+  budget.allow(longs_turn_ ? WorkBudget::Beyond::one : WorkBudget::Beyond::none);
+  Found found = look_long(frame, plain, plain_is_known, budget);
+  if (found.fit || hidden_.done) begin_anew(status_);
+  return found.fit ? found : plain;
+}
+
+Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {
+  return frame.camera_from_rcm ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
+}
+
+}  // namespace lapservo::internal
