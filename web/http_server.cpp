@@ -18,15 +18,15 @@ namespace lapservo::internal {
 namespace {
 
 // What no page needs is forbidden to it, and nothing is kept by anybody between.
-constexpr std::pair<const char*, const char*> always[] = {
-    {"Content-Security-Policy",
-     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; base-uri "
-     "'none'; form-action 'none'; frame-ancestors 'none'"},
-    {"X-Content-Type-Options", "nosniff"},
-    {"X-Frame-Options", "DENY"},
-    {"Referrer-Policy", "no-referrer"},
-    {"Cross-Origin-Resource-Policy", "same-origin"},
-    {"Cache-Control", "no-store"}};
+constexpr std::pair<const char*, const char*> always[] = {{"Content-Security-Policy",
+                                                           "default-src 'none'; script-src 'self'; style-src 'self'; "
+                                                           "img-src 'self' blob: data:; connect-src 'self'; base-uri "
+                                                           "'none'; form-action 'none'; frame-ancestors 'none'"},
+                                                          {"X-Content-Type-Options", "nosniff"},
+                                                          {"X-Frame-Options", "DENY"},
+                                                          {"Referrer-Policy", "no-referrer"},
+                                                          {"Cross-Origin-Resource-Policy", "same-origin"},
+                                                          {"Cache-Control", "no-store"}};
 
 HttpResponse failed() {
   return {500, "text/plain; charset=utf-8", "the server failed\n"};

@@ -155,18 +155,21 @@ HttpResponse LivePage::command(const std::string& path) {
 }
 
 HttpResponse LivePage::state() {
-  nlohmann::json state{{"title", config_.title}, {"has_loop", config_.has_loop}, {"may_start", config_.may_start}};
+  nlohmann::ordered_json state{{"title", config_.title},
+                               {"has_loop", config_.has_loop},
+                               {"may_start", config_.may_start},
+                               {"live", config_.live}};
   const auto now = std::chrono::steady_clock::now();
   state["now_s"] = seconds(now.time_since_epoch());
   std::vector<Observation> observations;
   {
     const std::lock_guard lock(mutex_);
     observations = newest_.image.observations;
-    state["image_age_s"] = number_ > 0 ? nlohmann::json(seconds(now - newest_.came)) : nlohmann::json();
+    state["image_age_s"] = number_ > 0 ? nlohmann::ordered_json(seconds(now - newest_.came)) : nlohmann::ordered_json();
     state["images"] = number_;
-    state["loop"] = loop_ ? json_of(*loop_) : nlohmann::json();
+    state["loop"] = loop_ ? json_of(*loop_) : nlohmann::ordered_json();
     state["loop_age_s"] = seconds(now - told_);
-    state["events"] = nlohmann::json::array();
+    state["events"] = nlohmann::ordered_json::array();
     for (const Event& event : events_) state["events"].push_back({{"time_s", event.time_s}, {"state", event.state}});
   }
   state["instruments"] = json_of(observations);

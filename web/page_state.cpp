@@ -10,7 +10,7 @@
 namespace lapservo::internal {
 namespace {
 
-using nlohmann::json;
+using json = nlohmann::ordered_json;
 
 json number(double value, double sigma) {
   return {{"value", value}, {"sigma", sigma}};

@@ -12,9 +12,9 @@ struct PageLoop;
 
 // As the page reads them; what is not known is null.
 
-nlohmann::json json_of(const std::vector<Observation>& observations);
-nlohmann::json json_of(const PageLoop& loop);
+nlohmann::ordered_json json_of(const std::vector<Observation>& observations);
+nlohmann::ordered_json json_of(const PageLoop& loop);
 /// Never throws for its text: what is no UTF-8 is replaced.
-std::string text_of(const nlohmann::json& json);
+std::string text_of(const nlohmann::ordered_json& json);
 
 }  // namespace lapservo::internal

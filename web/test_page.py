@@ -70,7 +70,7 @@ class Browser:
 
     def wait_for(self, expression):
         end = time.monotonic() + PATIENCE_S
-        while not self.value(expression):
+        while not self.value(f"(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()"):  # while it loads
             assert time.monotonic() < end, f"{expression} did not become true: {self.value('document.body.innerText')}"
             time.sleep(0.05)
 
@@ -154,6 +154,8 @@ def see_a_picture(browser, tool, rig, picture, folder):
         assert browser.value("document.getElementById('start').hidden"), "nothing here can be started"
         assert not browser.complaints, browser.complaints
         look(browser, folder, "view")
+        time.sleep(1)
+        assert not browser.value("document.getElementById('picture').classList.contains('old')"), "a file's picture does not get old"
     finally:
         lapservo.terminate()
         assert lapservo.wait(PATIENCE_S) in (0, 1)

@@ -20,6 +20,9 @@ function shown(name, value) {
   if (name.endsWith("_px")) return value.toFixed(1);
   return (1000 * value).toFixed(name.endsWith("_m") ? 2 : 1);
 }
+function sigmaShown(name, sigma) {
+  return Number((name.endsWith("_px") ? sigma : 1000 * sigma).toPrecision(2)).toString();
+}
 function label(name) {
   const cut = name.lastIndexOf("_");
   return name.slice(0, cut) + " [" + { rad: "mrad", m: "mm", px: "px" }[name.slice(cut + 1)] + "]";
@@ -41,7 +44,7 @@ function instrumentTable(seen) {
   table.createCaption().textContent = `${seen.name}: ${seen.status}`;
   const body = table.createTBody();
   for (const [name, one] of Object.entries({ ...(seen.q || {}), ...(seen.tau_rad ? { tau_rad: seen.tau_rad } : {}) }))
-    body.append(row([label(name), shown(name, one.value), "± " + shown(name, one.sigma)]));
+    body.append(row([label(name), shown(name, one.value), "± " + sigmaShown(name, one.sigma)]));
   for (const [name, value] of Object.entries(last.loop ? {} : seen.features || {}))
     body.append(row([label(name), shown(name, value), ""]));
   return table;
@@ -86,8 +89,9 @@ function showAges() {
   at("alert").hidden = !lost || heardMs === null;
   if (!at("alert").hidden) text(at("alert"), `No answer for ${Math.round(silentS)} s: lapservo has ended, or the network is gone. What you see is old.`);
   const ageS = pictureCameMs === null ? null : (now - pictureCameMs) / 1000;
-  at("picture").classList.toggle("old", lost || ageS === null || ageS > oldS);
-  const parts = [ageS === null ? "no picture yet" : `picture ${ageS > oldS ? "OLD: " + ageS.toFixed(1) + " s" : (1000 * ageS).toFixed(0) + " ms"}`];
+  const old = ageS !== null && ageS > oldS && last && last.live;
+  at("picture").classList.toggle("old", lost || ageS === null || old);
+  const parts = [ageS === null ? "no picture yet" : last && !last.live ? "a recording" : `picture ${old ? "OLD: " + ageS.toFixed(1) + " s" : (1000 * ageS).toFixed(0) + " ms"}`];
   if (last && last.loop) parts.push(`loop's delay ${(1000 * last.loop.delay_s).toFixed(0)} ms`);
   if (last && last.loop && last.loop.limited) parts.push("at a limit");
   text(at("ages"), parts.join(" · "));
