@@ -17,7 +17,9 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr auto between_drawings = std::chrono::milliseconds(25), recent = std::chrono::milliseconds(100);
+constexpr auto between_drawings = std::chrono::milliseconds(25), recent = std::chrono::milliseconds(100),
+               between_looks = std::chrono::milliseconds(2);
+constexpr auto watched = std::chrono::seconds(2);
 constexpr int jpeg_quality = 80;
 constexpr std::size_t most_events = 8;
 
@@ -56,8 +58,7 @@ std::string jpeg_of(const PageImage& image) {
 LivePage::LivePage(const PageConfig& config)
     : config_(config),
       token_(is_loopback(config.address, "--listen") ? "" : random_token()),
-      access_(token_.empty(), token_),
-      told_(std::chrono::steady_clock::now()) {
+      access_(token_.empty(), token_) {
   server_ =
       std::make_unique<HttpServer>(config.address, config.port, config.option, config.limits,
                                    [this](const HttpRequest& request, bool last) { return answer(request, last); });
@@ -81,26 +82,24 @@ std::string LivePage::url() const {
 }
 
 void LivePage::show(PageImage image) {
-  const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock) return;
   const auto age = std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(image.age_s));
-  newest_.came = std::chrono::steady_clock::now() - age;
-  std::swap(newest_.image, image);  // the one before ends after the lock
-  ++number_;
-  if (watched_) changed_.notify_one();
+  images_.put({std::move(image), ++shown_, std::chrono::steady_clock::now() - age});
 }
 
 void LivePage::tell(const PageLoop& loop, const std::string& state) {
-  if (untold_.empty() ? state != state_ : state != untold_.back().state) untold_.push_back({loop.time_s, state});
-  const std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock) return;
-  loop_ = loop;
-  told_ = std::chrono::steady_clock::now();
-  if (untold_.empty()) return;
-  state_ = untold_.back().state;
-  events_.insert(events_.begin(), untold_.rbegin(), untold_.rend());
-  events_.resize(std::min(events_.size(), most_events));
-  untold_.clear();
+  if (events_->empty() || events_->front().state != state) {
+    Events events{{loop.time_s, state}};
+    events.insert(events.end(), events_->begin(),
+                  events_->begin() + static_cast<long>(std::min(events_->size(), most_events - 1)));
+    events_ = std::make_shared<const Events>(std::move(events));
+  }
+  loops_.put({loop, events_, std::chrono::steady_clock::now()});
+}
+
+// With the mutex held.
+void LivePage::fetch() {
+  if (auto image = images_.take()) newest_ = std::move(*image);
+  if (auto told = loops_.take()) told_ = std::move(*told);
 }
 
 PageWishes LivePage::take_wishes() {
@@ -125,11 +124,12 @@ std::optional<HttpResponse> LivePage::answer(const HttpRequest& request, bool la
 std::optional<HttpResponse> LivePage::picture(const HttpRequest& request, bool last) {
   const long after = after_of(request);
   std::unique_lock lock(mutex_);
+  fetch();
   const auto drawn = drawn_;
   const auto now = std::chrono::steady_clock::now();
-  const bool current = drawn && (drawn->number == number_ || now < drawn->done + recent);
+  const bool current = drawn && (drawn->number == newest_.number || now < drawn->done + recent);
   if (!current || drawn->number == after) {
-    watched_ = true;
+    watched_until_ = now + watched;
     lock.unlock();
     changed_.notify_one();
     return last ? std::optional(HttpResponse{204, "text/plain; charset=utf-8", ""}) : std::nullopt;
@@ -150,7 +150,12 @@ HttpResponse LivePage::command(const std::string& path) {
   if (path != "/hold" && path != "/start") return plain(404, "there is no such command");
   if (!config_.has_loop) return plain(403, "nothing here moves");
   if (path == "/start" && !config_.may_start) return plain(403, "lapservo runs without --enable-motion");
-  wish_ = path == "/hold" ? Wish::hold : Wish::start;
+  if (path == "/hold") {
+    wish_ = Wish::hold;
+  } else {  // of two between ticks, the one that holds
+    Wish none = Wish::none;
+    wish_.compare_exchange_strong(none, Wish::start);
+  }
   return plain(202, "asked for");
 }
 
@@ -164,13 +169,15 @@ HttpResponse LivePage::state() {
   std::vector<Observation> observations;
   {
     const std::lock_guard lock(mutex_);
+    fetch();
     observations = newest_.image.observations;
-    state["image_age_s"] = number_ > 0 ? nlohmann::ordered_json(seconds(now - newest_.came)) : nlohmann::ordered_json();
-    state["images"] = number_;
-    state["loop"] = loop_ ? json_of(*loop_) : nlohmann::ordered_json();
-    state["loop_age_s"] = seconds(now - told_);
+    state["images"] = newest_.number;
+    state["loop"] = told_ ? json_of(told_->loop) : nlohmann::ordered_json();
+    state["loop_age_s"] = told_ ? nlohmann::ordered_json(seconds(now - told_->when)) : nlohmann::ordered_json();
     state["events"] = nlohmann::ordered_json::array();
-    for (const Event& event : events_) state["events"].push_back({{"time_s", event.time_s}, {"state", event.state}});
+    if (told_)
+      for (const Event& event : *told_->events)
+        state["events"].push_back({{"time_s", event.time_s}, {"state", event.state}});
   }
   state["instruments"] = json_of(observations);
   state["asked"] = wish_ == Wish::none ? "" : wish_ == Wish::hold ? "hold" : "start";
@@ -180,17 +187,23 @@ HttpResponse LivePage::state() {
 void LivePage::draw() {
   lower_priority();
   std::unique_lock lock(mutex_);
-  while (true) {
-    changed_.wait(lock,
-                  [this] { return ended_ || (watched_ && number_ > 0 && (!drawn_ || number_ > drawn_->number)); });
-    if (ended_) return;
-    watched_ = false;
-    const Waiting waiting = newest_;
-    auto drawn = std::make_shared<Drawn>(Drawn{number_, waiting.came, {}, {}});
+  while (!ended_) {
+    fetch();
+    if (std::chrono::steady_clock::now() >= watched_until_) {
+      changed_.wait(lock);
+      continue;
+    }
+    if (newest_.number == 0 || (drawn_ && drawn_->number == newest_.number)) {
+      changed_.wait_for(lock, between_looks);  // so that the loop need not tell
+      continue;
+    }
+    watched_until_ = {};
+    const Shown shown = newest_;
+    auto drawn = std::make_shared<Drawn>(Drawn{shown.number, shown.came, {}, {}});
     lock.unlock();
     const auto begin = std::chrono::steady_clock::now();
     try {
-      drawn->jpeg = jpeg_of(waiting.image);
+      drawn->jpeg = jpeg_of(shown.image);
       drawn->done = std::chrono::steady_clock::now();
     } catch (const std::exception&) {
       drawn.reset();  // the next one, perhaps

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <deque>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -19,6 +17,7 @@
 #include "lapservo/vision/observation.h"
 #include "web/access.h"
 #include "web/http_server.h"
+#include "web/mailbox.h"
 
 namespace lapservo::internal {
 
@@ -68,7 +67,7 @@ class LivePage {
   /// To be opened in a browser, with the token.
   std::string url() const;
 
-  // By the loop's thread. What comes while the page reads is dropped.
+  // By the loop's thread.
   void show(PageImage image);
   /// `state`: the loop's, in words.
   void tell(const PageLoop& loop, const std::string& state);
@@ -76,9 +75,10 @@ class LivePage {
 
  private:
   using Time = std::chrono::steady_clock::time_point;
-  struct Waiting {
+  struct Shown {
     PageImage image;
-    Time came;  // the image, to this computer
+    long number = 0;  ///< from 1
+    Time came;        ///< to this computer
   };
   struct Drawn {
     long number = 0;
@@ -89,6 +89,12 @@ class LivePage {
     double time_s = 0;
     std::string state;
   };
+  using Events = std::vector<Event>;  ///< the newest first
+  struct Told {
+    PageLoop loop;
+    std::shared_ptr<const Events> events;
+    Time when;
+  };
   enum class Wish { none, hold, start };
 
   std::optional<HttpResponse> answer(const HttpRequest& request, bool last);
@@ -96,25 +102,29 @@ class LivePage {
   HttpResponse command(const std::string& path);
   HttpResponse state();
   void draw();
+  void fetch();
 
   PageConfig config_;
   std::string token_;
   Access access_;
 
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  Waiting newest_;
-  long number_ = 0;  // of images that were shown
-  bool ended_ = false;
-  std::shared_ptr<const Drawn> drawn_;
-  std::optional<PageLoop> loop_;
-  std::deque<Event> events_;  // the newest first
-  Time told_;
-  std::vector<Event> untold_;  // this and state_: the loop's thread's only
-  std::string state_;
-  std::atomic<bool> watched_ = false;  // somebody waits for a newer image than drawn_
+  // The loop's thread's only.
+  long shown_ = 0;
+  std::shared_ptr<const Events> events_ = std::make_shared<const Events>();
+
+  Mailbox<Shown> images_;
+  Mailbox<Told> loops_;
   std::atomic<Wish> wish_ = Wish::none;
   std::atomic<bool> stop_ = false;
+
+  // The page's threads' only.
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool ended_ = false;
+  Time watched_until_;  // somebody waits for a newer image than drawn_
+  Shown newest_;
+  std::optional<Told> told_;
+  std::shared_ptr<const Drawn> drawn_;
   std::unique_ptr<HttpServer> server_;
   std::thread thread_;  // last: it uses the others
 };
