@@ -156,6 +156,7 @@ int replay_log(const ServoOptions& options) {
 }
 
 int run(const ServoOptions& options) {
+  options.web.check();
   if (!options.replay.empty()) return replay_log(options);
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");

@@ -174,6 +174,7 @@ void wait_on_page(WebView& web, std::optional<double> until_s) {
 }
 
 int run(const Options& options) {
+  options.web.check();
   refuse_outputs(options, inputs_of(options));
   RigByFrame rigs(options);
   const auto live = open_live(options);
@@ -181,10 +182,10 @@ int run(const Options& options) {
   FrameSource* const source = live ? live.get() : file.get();
   std::optional<LiveView> view;
   if (options.view) view.emplace("track", "use --overlay to write pictures instead");
-  std::optional<ObservationCsv> csv;
-  if (!options.page_only) csv.emplace(options.out);
   std::optional<WebView> web;
   if (options.web.port) web.emplace(options.web, page_config_of(options, *source));
+  std::optional<ObservationCsv> csv;
+  if (!options.page_only) csv.emplace(options.out);
   const auto overlay = options.overlay.empty() ? nullptr : open_overlay_writer(options.overlay, *source);
   watch_for_interrupts();
 

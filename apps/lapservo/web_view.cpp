@@ -21,6 +21,11 @@ void add_listen_option(Command command, WebOptions& options) {
 
 }  // namespace
 
+void WebOptions::check() const {
+  if (!port && listen != WebOptions{}.listen)
+    throw InputError("--listen", "is " + listen + " and there is no page, expected --web with it");
+}
+
 void add_web_options(Command command, WebOptions& options) {
   command
       .add_option("--web", options.port,

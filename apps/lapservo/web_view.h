@@ -13,6 +13,9 @@ namespace lapservo::app {
 struct WebOptions {
   std::optional<int> port;
   std::string listen = "127.0.0.1";
+
+  /// Throws InputError for --listen without --web.
+  void check() const;
 };
 /// --web and --listen.
 void add_web_options(Command command, WebOptions& options);
