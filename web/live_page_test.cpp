@@ -56,9 +56,10 @@ std::string newer_picture(int port, int after) {
 
 TEST(LivePage, ShowsTheNewestImageToWhoeverWaits) {
   const Rig rig = testing::small_test_rig();
+  const LivePage empty(config_of_test());
+  EXPECT_EQ(http_status(http(port_of(empty), "GET", "/picture")), 204);
   LivePage page(config_of_test());
   const int port = port_of(page);
-  EXPECT_EQ(http_status(http(port, "GET", "/picture")), 204);  // none has come
   for (const double brightness : {10, 90, 200}) page.show(image_of(rig, brightness));
   const std::string answer = newer_picture(port, 0);
   ASSERT_EQ(http_status(answer), 200);
