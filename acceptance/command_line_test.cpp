@@ -225,6 +225,19 @@ TEST_F(CommandLine, CamerasThatAreNone) {
   expect_refused(servo + "''", {"--camera", "is missing", "ros2:/topic"});
 }
 
+#ifdef LAPSERVO_WEB
+TEST_F(CommandLine, PagesThatCanNotBeServed) {
+  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
+  const std::string picture = in("grey.png") + " --rig " + rig_ + " ";
+  const std::string track = "track " + picture + "--out " + out("obs.csv") + " ";
+  expect_refused(track + "--listen 0.0.0.0", {"--listen", "expected --web"});
+  expect_refused("servo --robot sim --rig " + rig_ + " --listen 0.0.0.0", {"--listen", "expected --web"});
+  expect_refused(track + "--web 65536", {"--web", "65536"});
+  expect_refused(track + "--web 0 --listen robot.example", {"--listen", "robot.example", "an address"});
+  expect_refused("view " + picture + "--port 0 --listen 192.0.2.1", {"--port", "192.0.2.1"});  // nobody's
+}
+#endif
+
 TEST_F(CommandLine, NothingFoundIsOne) {
   cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
   EXPECT_EQ(run("track " + in("grey.png") + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
@@ -513,9 +526,10 @@ TEST_F(CommandLine, ExperimentsWriteAReport) {
 }
 
 TEST_F(CommandLine, HelpShowsExamples) {
-  for (const char* command : {"track", "render", "marker", "marker design", "marker print", "marker show", "servo",
-                              "experiment", "estimate-rcm", "sim-robot", "record", "check", "calibrate", "calibrate all",
-                              "calibrate camera", "calibrate colour", "calibrate marker", "calibrate registration"}) {
+  for (const char* command :
+       {"track", "view", "render", "marker", "marker design", "marker print", "marker show", "servo", "experiment",
+        "estimate-rcm", "sim-robot", "record", "check", "calibrate", "calibrate all", "calibrate camera",
+        "calibrate colour", "calibrate marker", "calibrate registration"}) {
     EXPECT_EQ(run(std::string(command) + " --help"), 0);
     EXPECT_NE(output().find("Example"), std::string::npos) << command;
   }

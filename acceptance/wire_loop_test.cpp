@@ -33,6 +33,9 @@
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "transports/named_transport.h"
+#ifdef LAPSERVO_WEB
+#include "web/test_http.h"
+#endif
 #ifdef LAPSERVO_ROS1
 #include "transports/ros1/test_ros_master.h"
 #endif
@@ -186,7 +189,8 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
     return testing::read_file(folder_ / name);
   }
 
-  std::unique_ptr<Process> servo(double duration_s, const std::string& output = "servo.txt", bool motion = true) const {
+  std::unique_ptr<Process> servo(double duration_s, const std::string& output = "servo.txt", bool motion = true,
+                                 const std::vector<std::string>& more = {}) const {
     std::vector<std::string> arguments{"servo",
                                        "--rig",
                                        file("rig.yaml"),
@@ -201,12 +205,20 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
                                        "--duration",
                                        fmt::format("{}", duration_s)};
     if (motion) arguments.push_back("--enable-motion");
+    arguments.insert(arguments.end(), more.begin(), more.end());
     return std::make_unique<Process>(arguments, file(output));
   }
   std::unique_ptr<Process> arm() const {
     return std::make_unique<Process>(std::vector<std::string>{"sim-robot", "--rig", file("rig.yaml"), "--start",
                                                               "0.05,1.57,0.064,1.2", "--transport", GetParam()},
                                      file("arm.txt"));
+  }
+  // Where servo says that its page is; 0 when it does not say it.
+  int page_port(const std::string& output = "servo.txt") const {
+    const std::string before = "page: http://127.0.0.1:";
+    std::size_t at = std::string::npos;
+    wait_for([&] { return (at = said(output).find(before)) != std::string::npos; });
+    return at == std::string::npos ? 0 : std::stoi(said(output).substr(at + before.size()));
   }
   // From what servo says in its last lines.
   void expect_steady(const std::string& output) const {
@@ -478,6 +490,43 @@ TEST_P(WireLoop, ASecondPublisherEndsTheRunWithin100Milliseconds) {
   EXPECT_GT(last_s, 0);
   EXPECT_LE(last_s, first_s + allowed_s);
 }
+
+#ifdef LAPSERVO_WEB
+TEST_P(FirstWireLoop, ThePageHoldsStartsAndEnds) {
+  Arm room(GetParam(), rig_);
+  const auto ears = named_transport(GetParam(), "ears");
+  Spy spy(*ears);
+  const auto loop = servo(600, "servo.txt", true, {"--web", "0"});
+  const int port = page_port();
+  ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+  EXPECT_EQ(testing::http_status(testing::http_post(port, "/hold")), 202);
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("hold: held") != std::string::npos; })) << said("servo.txt");
+  sleep(rest_s + 0.2);
+  const double rested_s = now_s();
+  sleep(0.5);
+  EXPECT_FALSE(spy.moves_after(rested_s));
+  EXPECT_NE(testing::http(port, "GET", "/state").find(R"("state":"hold: held")"), std::string::npos);
+  EXPECT_EQ(testing::http_status(testing::http(port, "GET", "/picture")), 200);
+  EXPECT_EQ(testing::http_status(testing::http_post(port, "/start")), 202);
+  ASSERT_TRUE(wait_for([&] { return spy.moves_after(rested_s); })) << said("servo.txt");
+  EXPECT_EQ(testing::http_status(testing::http_post(port, "/stop")), 202);
+  loop->wait();
+  EXPECT_NE(said("servo.txt").find("end: asked for on the page"), std::string::npos) << said("servo.txt");
+}
+
+TEST_P(FirstWireLoop, ThePageStartsNothingWithoutEnableMotion) {
+  Arm room(GetParam(), rig_);
+  const auto ears = named_transport(GetParam(), "ears");
+  Spy spy(*ears);
+  const auto loop = servo(600, "servo.txt", false, {"--web", "0"});
+  const int port = page_port();
+  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("would send ") != std::string::npos; }))
+      << said("servo.txt");
+  EXPECT_EQ(testing::http_status(testing::http_post(port, "/start")), 403);
+  sleep(0.3);
+  EXPECT_EQ(spy.count(), 0u);
+}
+#endif
 
 TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
   Arm room(GetParam(), rig_);

@@ -46,6 +46,11 @@ Option& Option::expected(int count) {
   return *this;
 }
 
+Option& Option::without_value(const std::string& meant) {
+  option_->expected(0, 1)->default_str(meant);
+  return *this;
+}
+
 Option& Option::delimiter(char between_values) {
   option_->delimiter(between_values);
   return *this;

@@ -28,6 +28,8 @@ class Option {
   /// Takes so many values.
   Option& expected(int count);
   Option& delimiter(char between_values);
+  /// The option alone means this.
+  Option& without_value(const std::string& meant);
   Option& one_of(const std::vector<std::string>& words);
 
   // For numbers: the whole text is one finite number within [low, high], whole where the option's is. CLI11 alone takes

@@ -33,6 +33,7 @@ OptionDescription describe_option(const CLI::Option& option) {
   }
   result.required = option.get_required();
   result.takes_value = option.get_items_expected_max() > 0;
+  result.value_optional = result.takes_value && option.get_items_expected_min() == 0;
   if (result.takes_value) {
     result.choices = choices_in(option.get_type_name());
     result.type = result.choices.empty() ? without_repetition(option.get_type_name()) : "TEXT";

@@ -9,8 +9,10 @@ namespace lapservo::app {
 
 struct OptionDescription {
   std::vector<std::string> names;  ///< "--rig"; a positional's one name
-  bool positional = false, required = false, takes_value = false;
+  bool positional = false, required = false, takes_value = false, value_optional = false;
   std::string type;  ///< "TEXT", "FLOAT:0.1 to 10"; empty without a value
+  /// As a page says it: "[INT]" where it may be left out.
+  std::string type_shown() const { return value_optional ? "[" + type + "]" : type; }
   std::vector<std::string> choices;
   std::string default_value;  ///< empty: none
   std::string description;

@@ -17,6 +17,7 @@ std::optional<Frame> LiveFrames::next() {
     const auto ended = images_.ended();  // before the last image, which may have come since
     if (auto image = images_.newest()) {
       if (!first_s_) first_s_ = image->time_s;
+      last_s_ = image->time_s;
       return Frame{std::move(image->bgr), index_++, image->time_s - *first_s_, {}, {}};
     }
     if (ended) {

@@ -20,6 +20,8 @@ class LiveFrames : public FrameSource {
   std::optional<int> frame_count() const override { return std::nullopt; }
   double frames_per_second() const override { return 30; }
   std::string complaint() const override { return complaint_; }
+  /// Of the frame given last, since it came.
+  double age_s() const { return clock_.now_s() - last_s_; }
   /// What became of those that are no frames, in words; empty when there were none.
   std::string dropped() const { return images_.counts().text(); }
 
@@ -29,6 +31,7 @@ class LiveFrames : public FrameSource {
   Transports transports_;
   LiveImages images_;
   std::optional<double> first_s_;
+  double last_s_ = 0;
   int index_ = 0;
 };
 

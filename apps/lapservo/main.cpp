@@ -57,6 +57,7 @@ int parse_and_run(int argc, char** argv) {
   lapservo::app::Run run;
   const lapservo::app::Command program(&app);
   lapservo::app::add_track(program, run);
+  lapservo::app::add_view(program, run);
   lapservo::app::add_calibrate(program, run);
   lapservo::app::add_check(program, run);
   lapservo::app::add_experiment(program, run);

@@ -43,7 +43,7 @@ std::string option_entry(const OptionDescription& option) {
   std::string names;
   for (const std::string& name : option.names)
     names += (names.empty() ? "" : ", ") + (option.positional ? "\\fI" + plain(name) + "\\fR" : bold(name));
-  if (!option.positional && option.takes_value) names += " \\fI" + plain(option.type) + "\\fR";
+  if (!option.positional && option.takes_value) names += " \\fI" + plain(option.type_shown()) + "\\fR";
   std::string notes;
   for (const std::string& choice : option.choices) notes += (notes.empty() ? "One of " : ", ") + bold(choice);
   if (!notes.empty()) notes += ". ";

@@ -20,7 +20,8 @@ std::string plain(const std::string& text) {
 std::string option_entry(const OptionDescription& option) {
   std::string entry;
   for (const std::string& name : option.names) entry += (entry.empty() ? "`" : ", `") + name + "`";
-  if (!option.positional && option.takes_value && option.choices.empty()) entry += " *" + plain(option.type) + "*";
+  if (!option.positional && option.takes_value && option.choices.empty())
+    entry += " *" + plain(option.type_shown()) + "*";
   if (option.required) entry += ", required";
   entry += "\n: " + plain(option.description);
   std::string notes;

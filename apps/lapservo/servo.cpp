@@ -8,12 +8,14 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/frame_input.h"
+#include "apps/lapservo/holdable_robot.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/joint_input.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/servo_arm.h"
 #include "apps/lapservo/servo_options.h"
 #include "apps/lapservo/servo_output.h"
+#include "apps/lapservo/servo_page.h"
 #include "apps/lapservo/servo_recording.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/control/random_start.h"
@@ -51,14 +53,16 @@ class Watcher : public RunObserver {
  public:
   /// `true_rig`: as things are until the endoscope moves.
   Watcher(const Rig& rig, const Rig& true_rig, const Simulator& simulator, RunFolder* folder, LiveView* view, int ticks,
-          bool strict)
+          bool strict, ServoPage* page, HoldableRobot& robot)
       : rig_(rig),
         true_rig_(true_rig),
         simulator_(simulator),
         folder_(folder),
         view_(view),
         progress_(std::make_unique<Progress>(ticks)),
-        strict_(strict) {}
+        strict_(strict),
+        page_(page),
+        robot_(robot) {}
 
   bool on_tick(const ControlTick& tick) override {
     const Rigid3 camera_from_rcm =
@@ -68,6 +72,7 @@ class Watcher : public RunObserver {
     if (folder_) folder_->log().add(tick.input, tick.decision, truth);
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
     if (strict_ && summary_.registration_contradicted()) return false;
+    if (page_ && !obey_page(tick)) return false;
     return !interrupted() && (!view_ || show(*view_, tick, rig_));
   }
   const Summary& finish() {
@@ -76,6 +81,14 @@ class Watcher : public RunObserver {
   }
 
  private:
+  // False when it ends the run.
+  bool obey_page(const ControlTick& tick) {
+    page_->tell(tick, tick.input.time_s, robot_.held() ? "hold: held" : state_text(tick.decision.control));
+    const PageWishes wishes = page_->wishes();
+    if (wishes.hold) robot_.hold(*wishes.hold);
+    return !wishes.stop;
+  }
+
   Rig rig_;
   Rig true_rig_;
   const Simulator& simulator_;
@@ -83,6 +96,8 @@ class Watcher : public RunObserver {
   LiveView* view_;
   std::unique_ptr<Progress> progress_;
   bool strict_;
+  ServoPage* page_;
+  HoldableRobot& robot_;
   Summary summary_;
   int done_ = 0;
 };
@@ -103,13 +118,17 @@ int simulate(const ServoOptions& options) {
   const auto made = make_simulator(options.simulation, true_rig, simulated, start);
   Simulator& simulator = *made;
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
+  std::optional<ServoPage> page;
+  if (options.web.port) page.emplace(options.web, config.rig, "servo, simulated", true);
+  HoldableRobot robot(simulator);
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
   watch_for_interrupts();
 
   Watcher watcher(config.rig, true_rig, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
-                  static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict);
-  lapservo::run(simulator, simulator, simulator, config, trajectory, duration_s(options), watcher);
+                  static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict,
+                  page ? &*page : nullptr, robot);
+  lapservo::run(robot, simulator, simulator, config, trajectory, duration_s(options), watcher);
   const Summary& summary = watcher.finish();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
@@ -139,6 +158,7 @@ int replay_log(const ServoOptions& options) {
 }
 
 int run(const ServoOptions& options) {
+  options.web.check();
   const bool recorded = !options.replay.empty() && is_bag(options.replay);
   if (!options.replay.empty() && !recorded) return replay_log(options);
   if (options.rig.empty())
@@ -210,6 +230,7 @@ void add_servo(Command app, Run& run_later) {
   command.add_flag("--strict", options->strict,
                    "End with exit code 1 when the images contradict the rig's camera_from_rcm or lens");
   command.add_flag("--view", options->view, "Show it live");
+  add_web_options(command, options->web);
   command.add_option(
       "--replay", options->replay,
       "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2: decide on the "
@@ -240,6 +261,7 @@ void add_servo(Command app, Run& run_later) {
       "Examples:\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,5 --view\n"
+      "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
       "  lapservo servo --replay run/log.csv\n"
       "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");
   command.runs(run_later, [options] { return run(*options); });

@@ -14,6 +14,7 @@
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_images.h"
 #include "apps/lapservo/servo_output.h"
+#include "apps/lapservo/servo_page.h"
 #include "apps/lapservo/transports.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
@@ -53,7 +54,7 @@ class Goal {
 class ArmWatcher : public RunObserver {
  public:
   ArmWatcher(const ServoOptions& options, const RunConfig& run, CrtkRobot& robot, const LiveImages& images,
-             LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view)
+             LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view, ServoPage* page)
       : options_(options),
         run_(run),
         robot_(robot),
@@ -61,7 +62,8 @@ class ArmWatcher : public RunObserver {
         topics_(topics),
         goal_(goal),
         folder_(folder),
-        view_(view) {}
+        view_(view),
+        page_(page) {}
 
   bool on_tick(const ControlTick& tick) override {
     if (!start_s_) start_s_ = tick.input.time_s;
@@ -76,15 +78,25 @@ class ArmWatcher : public RunObserver {
     say_state(time_s, tick.decision.control, blocked);
     say_images(time_s);
     topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
-    grant(topics_.wishes(), tick, time_s);
+    LoopWishes wishes = topics_.wishes();
+    const bool stopped = page_ && add_page_wishes(wishes, tick, time_s);
+    grant(wishes, tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
-    if (blocked == Blocked::foreign_command) return false;
+    if (blocked == Blocked::foreign_command || stopped) return false;
     if (options_.strict && summary_.registration_contradicted()) return false;
     return !interrupted() && (!view_ || show(*view_, tick, run_.rig));
   }
   const Summary& summary() const { return summary_; }
 
  private:
+  // Of two who want different things in a tick, the one that holds. True when the page ends the run.
+  bool add_page_wishes(LoopWishes& wishes, const ControlTick& tick, double time_s) {
+    page_->tell(tick, time_s, state_);
+    const PageWishes of_page = page_->wishes();
+    if (of_page.hold) wishes.hold = wishes.hold.value_or(false) || *of_page.hold;
+    if (of_page.stop) say(time_s, "end: asked for on the page");
+    return of_page.stop;
+  }
   void say_state(double time_s, const ControlStep& control, Blocked blocked) {
     std::string state = state_text(control);
     if (blocked == Blocked::not_enabled) {
@@ -160,6 +172,7 @@ class ArmWatcher : public RunObserver {
   Goal& goal_;
   RunFolder* folder_;
   LiveView* view_;
+  ServoPage* page_;
   struct Wanted {
     std::string name;
     double duration_s = 0;
@@ -217,6 +230,9 @@ int steer_arm(const ServoOptions& options) {
   std::optional<LiveView> view;
   if (options.view) view.emplace("servo", "use --out to write a log instead");
 
+  std::optional<ServoPage> page;
+  if (options.web.port) page.emplace(options.web, rig, "servo " + options.robot, options.enable_motion);
+
   Transports transports("lapservo");
   SteadyClock clock;
   LiveImages images(options.camera, "--camera", rig.camera, clock, transports);
@@ -237,8 +253,9 @@ int steer_arm(const ServoOptions& options) {
 
   LoopTopics topics(transport, rig, "endoscope");
   Goal goal(trajectory);
-  ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr,
-                     view ? &*view : nullptr);
+  ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr, view ? &*view : nullptr,
+                     page ? &*page : nullptr);
+  if (page && page->wishes().hold.value_or(false)) robot.hold(true);
   lapservo::run(robot, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());

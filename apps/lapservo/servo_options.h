@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "apps/lapservo/simulation.h"
+#include "apps/lapservo/web_view.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/servo/run.h"
 
@@ -25,6 +26,7 @@ struct ServoOptions {
   std::uint64_t seed = 1;
   bool view = false, force = false, enable_motion = false, strict = false;
   SimulationOptions simulation;
+  WebOptions web;
 };
 
 Eigen::Vector4d four(const std::vector<double>& values);

@@ -22,5 +22,6 @@ void add_render(Command app, Run& run);
 void add_servo(Command app, Run& run);
 void add_sim_robot(Command app, Run& run);
 void add_track(Command app, Run& run);
+void add_view(Command app, Run& run);
 
 }  // namespace lapservo::app

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -18,11 +19,13 @@
 #include "apps/lapservo/live_view.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
+#include "apps/lapservo/web_view.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/observation_csv.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/overlay_writer.h"
+#include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/registration_watch.h"
 #include "lapservo/vision/tracker.h"
 
@@ -35,6 +38,8 @@ struct Options {
   std::string input, rig, out = "obs.csv", overlay, image_topic;
   std::string method = "surface";
   bool single = false, deinterlace = false, view = false;
+  WebOptions web;
+  bool page_only = false;  ///< `lapservo view`: at the input's own pace, and without --out
   double fps = 30;
   int frames = 0;
 };
@@ -85,12 +90,12 @@ class RigByFrame {
                    frame.file.filename().c_str());
       warned_ = true;
     }
-    if (!tracker_) tracker_.emplace(rig_, tracking_);
+    if (!tracker_) tracker_.emplace(*rig_, tracking_);
     return *tracker_;
   }
   /// What comes are pictures that may have nothing to do with one another: each is searched whole.
   void expect_pictures() { tracking_.frame_budget.reset(); }
-  const Rig& rig() const { return rig_; }
+  const std::shared_ptr<const Rig>& rig() const { return rig_; }
   const fs::path& path() const { return path_; }
 
  private:
@@ -100,9 +105,9 @@ class RigByFrame {
   }
   static fs::path sidecar(const fs::path& file) { return fs::path(file).replace_extension(".rig.yaml"); }
   void use(const fs::path& path) {
-    rig_ = load_rig(path);
+    rig_ = std::make_shared<const Rig>(load_rig(path));
     InputFiles inputs;
-    inputs.add_rig(path, rig_);
+    inputs.add_rig(path, *rig_);
     refuse_outputs(options_, inputs);
     path_ = path;
     tracker_.reset();
@@ -111,7 +116,7 @@ class RigByFrame {
   const Options& options_;
   TrackerOptions tracking_;
   fs::path path_;
-  Rig rig_;
+  std::shared_ptr<const Rig> rig_;
   std::optional<Tracker> tracker_;
   bool warned_ = false;
 };
@@ -160,7 +165,23 @@ std::unique_ptr<LiveFrames> open_live(const Options& options) {
   return std::make_unique<LiveFrames>(options.input, load_rig(options.rig).camera);
 }
 
+PageConfig page_config_of(const Options& options, const FrameSource& source) {
+  PageConfig config;
+  config.title = (options.page_only ? "view " : "track ") + options.input;
+  if (options.page_only) config.option = "--port";
+  config.live = source.kind() == FrameSource::Kind::live;
+  return config;
+}
+
+// Until then, or until somebody wants the end.
+void wait_on_page(WebView& web, std::optional<double> until_s) {
+  SteadyClock clock;
+  while (!interrupted() && !web.wishes().stop && !(until_s && clock.now_s() >= *until_s))
+    clock.sleep_until(std::min(until_s.value_or(INFINITY), clock.now_s() + 0.05));
+}
+
 int run(const Options& options) {
+  options.web.check();
   refuse_outputs(options, inputs_of(options));
   RigByFrame rigs(options);
   const auto live = open_live(options);
@@ -169,10 +190,15 @@ int run(const Options& options) {
   if (source->kind() == FrameSource::Kind::image || source->kind() == FrameSource::Kind::folder) rigs.expect_pictures();
   std::optional<LiveView> view;
   if (options.view) view.emplace("track", "use --overlay to write pictures instead");
-  ObservationCsv csv(options.out);
+  std::optional<WebView> web;
+  if (options.web.port) web.emplace(options.web, page_config_of(options, *source));
+  std::optional<ObservationCsv> csv;
+  if (!options.page_only) csv.emplace(options.out);
   const auto overlay = options.overlay.empty() ? nullptr : open_overlay_writer(options.overlay, *source);
   watch_for_interrupts();
 
+  SteadyClock clock;
+  const double begin_s = clock.now_s();
   Tally tally;
   RegistrationWatch registration;
   bool stopped = false;
@@ -184,31 +210,42 @@ int run(const Options& options) {
         stopped = interrupted();
         break;
       }
+      const double came_s = clock.now_s() - (live ? live->age_s() : 0);
       Tracker& tracker = rigs.tracker_for(*frame);
       try {
         const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
         tally.add(observations);
         if (registration.add(observations)) say_moved(options, *frame);
         for (const Observation& observation : observations)
-          csv.add(frame->index, frame->time_s, frame->file.filename().string(), observation);
+          if (csv) csv->add(frame->index, frame->time_s, frame->file.filename().string(), observation);
         if (overlay || view) {
-          const cv::Mat picture = draw_overlay(frame->bgr, rigs.rig(), observations);
+          const cv::Mat picture = draw_overlay(frame->bgr, *rigs.rig(), observations);
           if (overlay) overlay->add(*frame, picture);
           if (view && !view->show(picture)) {
             stopped = true;
             break;
           }
         }
+        if (web) {
+          web->show({frame->bgr, rigs.rig(), observations, clock.now_s() - came_s});
+          if ((stopped = web->wishes().stop)) break;
+        }
       } catch (const InputError& error) {
         rethrow_with_frame(error, options, *frame);
       }
       progress.show(tally.frames, tally.text());
+      if (options.page_only && source->kind() != FrameSource::Kind::live)
+        wait_on_page(*web, begin_s + frame->time_s + 1 / source->frames_per_second());
     }
   }
-  csv.commit();
+  if (options.page_only && !stopped && source->kind() != FrameSource::Kind::live) {
+    std::fprintf(stderr, "lapservo: %s has ended; the page stays until Ctrl-C\n", options.input.c_str());
+    wait_on_page(*web, std::nullopt);
+  }
+  if (csv) csv->commit();
   if (overlay) overlay->commit();
-  std::printf("%s%d frames%s\nobservations: %s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str(),
-              options.out.c_str());
+  std::printf("%s%d frames%s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str());
+  if (csv) std::printf("observations: %s\n", options.out.c_str());
   if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
   if (live && !live->dropped().empty()) std::printf("no frames: %s\n", live->dropped().c_str());
   if (const std::string complaint = source->complaint(); !stopped && !complaint.empty()) {
@@ -223,45 +260,67 @@ int run(const Options& options) {
   return 1;
 }
 
+// What both commands take.
+void add_input_options(Command command, Options& options) {
+  command
+      .add_option(
+          "input", options.input,
+          "Picture, folder of pictures, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
+          "topic "
+          "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
+      .required();
+  add_image_topic_option(command, options.image_topic);
+  command.add_option("--rig", options.rig,
+                     "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
+  command.add_option("--method", options.method, "surface: all visible lines; centerline: the paper's Algorithm 1")
+      .shows_default()
+      .one_of({"surface", "centerline"});
+  command.add_flag("--single", options.single, "Treat every frame on its own, without tracking from the frame before");
+  command.add_flag("--deinterlace", options.deinterlace,
+                   "For interlaced video (status: interlaced): track the field of the even rows; the same as "
+                   "deinterlace: true in the rig's camera");
+  command.add_option("--fps", options.fps, "Frames per second of a folder's pictures")
+      .shows_default()
+      .number_between(0.001, 100000.0);
+}
+
 }  // namespace
 
 void add_track(Command app, Run& run_later) {
   auto options = std::make_shared<Options>();
   Command command =
       app.add_subcommand("track", "Measure the instruments in pictures, a video, a bag or a camera's frames.");
-  command
-      .add_option(
-          "input", options->input,
-          "Picture, folder of pictures, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
-          "topic "
-          "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
-      .required();
-  add_image_topic_option(command, options->image_topic);
-  command.add_option("--rig", options->rig,
-                     "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
+  add_input_options(command, *options);
   command
       .add_option("--out", options->out,
                   "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
                   "killed, the rows are in NAME.part, which the next run of that name writes over")
       .shows_default();
-  command.add_option("--method", options->method, "surface: all visible lines; centerline: the paper's Algorithm 1")
-      .shows_default()
-      .one_of({"surface", "centerline"});
-  command.add_flag("--single", options->single, "Treat every frame on its own, without tracking from the frame before");
-  command.add_flag("--deinterlace", options->deinterlace,
-                   "For interlaced video (status: interlaced): track the field of the even rows; the same as "
-                   "deinterlace: true in the rig's camera");
   command.add_option("--overlay", options->overlay,
                      "Write pictures (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
                      "same name");
   command.add_flag("--view", options->view, "Show a live window");
-  command.add_option("--fps", options->fps, "Frames per second of a folder's pictures")
-      .shows_default()
-      .number_between(0.001, 100000.0);
+  add_web_options(command, options->web);
   command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
       .shows_default()
       .whole_number_between(0, 1000000000);
   command.footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
+  command.runs(run_later, [options] { return run(*options); });
+}
+
+void add_view(Command app, Run& run_later) {
+  auto options = std::make_shared<Options>();
+  options->page_only = true;
+  options->out.clear();
+  Command command =
+      app.add_subcommand("view", "Show what is measured in pictures, a video or a camera's frames on a page.");
+  add_input_options(command, *options);
+  add_page_options(command, options->web);
+  command.footer(
+      "Files are shown at their own pace, once. A browser on another computer reaches the page by\n"
+      "ssh -L 8080:localhost:8080 THIS_COMPUTER, or with --listen by the address that is printed.\n"
+      "Example:\n"
+      "  lapservo view ros2:/endoscope/image_raw --rig rig.yaml");
   command.runs(run_later, [options] { return run(*options); });
 }
 

@@ -1,0 +1,119 @@
+"""What the live page costs the loop, and how old its pictures are: web_view.py LAPSERVO RIG [SECONDS].
+
+`lapservo sim-robot` and `lapservo servo` over ROS 2 on this computer, at the rig's size and 30 frames/s: without the page, with
+one viewer, and with a crowd of a thousand connections as well. Printed: how late the loop's ticks begin (of log.csv), and the
+age of each picture, from when the image came to the loop to when a viewer on this computer has it whole.
+"""
+
+import csv
+import http.client
+import os
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+PERIODS_PER_S = 120
+SETTLING_S = 2
+
+
+def quantile(values, fraction):
+    values = sorted(values)
+    return values[min(len(values) - 1, int(fraction * len(values)))] if values else float("nan")
+
+
+def lateness_ms(log):
+    """Of the loop's ticks: where each lies in its period, from the earliest place of a second's ticks on."""
+    with open(log, newline="") as file:
+        times = [float(row["time_s"]) for row in csv.DictReader(file)]
+    begin = times[0]
+    return [1000 * ((t - begin) - round((t - begin) * PERIODS_PER_S) / PERIODS_PER_S) for t in times if t > begin + SETTLING_S]
+
+
+class Viewer(threading.Thread):
+    """Asks for the next picture as soon as it has one, as the page does."""
+
+    def __init__(self, port):
+        super().__init__(daemon=True)
+        self.port, self.ages_ms = port, []
+
+    def run(self):
+        number, connection = 0, http.client.HTTPConnection("127.0.0.1", self.port, timeout=5)
+        begin = time.monotonic()
+        while True:
+            try:
+                connection.request("GET", f"/picture?after={number}")
+                answer = connection.getresponse()
+                answer.read()
+            except OSError:
+                return
+            if answer.status == 200:
+                number = int(answer.headers["X-Number"])
+                if time.monotonic() > begin + SETTLING_S:
+                    self.ages_ms.append(1000 * (time.monotonic() - float(answer.headers["X-Came-S"])))
+
+
+class Crowd(threading.Thread):
+    """A thousand connections that say nothing, again and again."""
+
+    def __init__(self, port):
+        super().__init__(daemon=True)
+        self.port, self.ended = port, False
+
+    def run(self):
+        while not self.ended:
+            crowd = []
+            for _ in range(1000):
+                one = socket.socket()
+                one.setblocking(False)
+                one.connect_ex(("127.0.0.1", self.port))
+                crowd.append(one)
+            time.sleep(1)
+            for one in crowd:
+                one.close()
+
+
+def run(tool, rig, duration_s, web, crowded):
+    environment = dict(os.environ, ROS_LOCALHOST_ONLY="1", ROS_DOMAIN_ID=os.environ.get("ROS_DOMAIN_ID", "87"))
+    with tempfile.TemporaryDirectory() as folder:
+        arm = subprocess.Popen([tool, "sim-robot", "--rig", rig, "--fps", "30"], env=environment, stdout=subprocess.DEVNULL)
+        try:
+            loop = subprocess.Popen(
+                [tool, "servo", "--rig", rig, "--robot", "ros2:PSM1", "--camera", "ros2:/endoscope/image_raw", "--enable-motion", "--duration",
+                 str(duration_s), "--fps", str(PERIODS_PER_S), "--out", folder + "/run", *(["--web", "0"] if web else [])],
+                env=environment, stdout=subprocess.PIPE, text=True)
+            viewer = crowd = None
+            for line in loop.stdout:
+                if found := re.match(r"page: http://127.0.0.1:(\d+)/", line):
+                    viewer = Viewer(int(found[1]))
+                    viewer.start()
+                    if crowded:
+                        crowd = Crowd(int(found[1]))
+                        time.sleep(0.5)
+                        crowd.start()
+            loop.wait()
+            if crowd:
+                crowd.ended = True
+            return lateness_ms(folder + "/run/log.csv"), viewer.ages_ms if viewer else []
+        finally:
+            arm.terminate()
+            arm.wait()
+
+
+def main():
+    tool, rig = sys.argv[1:3]
+    duration_s = float(sys.argv[3]) if len(sys.argv) > 3 else 12
+    for name, web, crowded in (("without the page", False, False), ("one viewer", True, False), ("and a thousand connections", True, True)):
+        late_ms, ages_ms = run(tool, rig, duration_s, web, crowded)
+        print(f"{name:28} tick late p50 {quantile(late_ms, 0.5):.2f}, p99 {quantile(late_ms, 0.99):.2f} ms", end="")
+        if ages_ms:
+            seen_s = duration_s - SETTLING_S
+            print(f"; picture age p50 {quantile(ages_ms, 0.5):.0f}, p95 {quantile(ages_ms, 0.95):.0f} ms, {len(ages_ms) / seen_s:.1f} pictures/s", end="")
+        print(flush=True)
+
+
+if __name__ == "__main__":
+    main()

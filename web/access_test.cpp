@@ -1,0 +1,89 @@
+#include "web/access.h"
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::internal {
+namespace {
+
+HttpRequest request(const std::string& method, const std::string& path,
+                    std::multimap<std::string, std::string> headers) {
+  return {method, path, std::move(headers), {}, ""};
+}
+
+int status(const Access& access, const HttpRequest& asked) {
+  const auto refusal = access.refuse(asked);
+  return refusal ? refusal->status : 200;
+}
+
+TEST(Access, TakesThisComputersNamesOnly) {
+  const Access access(true, "");
+  for (const char* host : {"localhost", "LOCALHOST:8080", "127.0.0.1:8080", "127.8.0.1", "[::1]:9000", "[::1]"})
+    EXPECT_EQ(status(access, request("GET", "/", {{"host", host}})), 200) << host;
+  for (const char* host : {"", "evil.example", "evil.example:8080", "localhost.evil.example", "192.168.1.2:8080",
+                           "localhost:", "localhost:x", "localhost:123456", "[::1", "::1", "[::1]x", "a@localhost",
+                           "localhost:80:80", "127.0.0.1.", "[fe80::1]:80"})
+    EXPECT_EQ(status(access, request("GET", "/", {{"host", host}})), 403) << host;
+  EXPECT_EQ(status(access, request("GET", "/", {})), 403);
+  EXPECT_EQ(status(access, request("GET", "/", {{"host", "localhost"}, {"host", "localhost"}})), 403);
+}
+
+TEST(Access, RefusesPagesOfOtherSites) {
+  const Access access(true, "");
+  const std::string host = "127.0.0.1:8080";
+  EXPECT_EQ(status(access, request("POST", "/hold", {{"host", host}, {"origin", "http://" + host}})), 200);
+  for (const char* origin : {"http://evil.example", "null", "https://127.0.0.1:8080", "http://127.0.0.1:8081",
+                             "http://localhost:8080", "", "http://127.0.0.1:8080.evil.example"})
+    for (const char* method : {"GET", "POST"})
+      EXPECT_EQ(status(access, request(method, "/hold", {{"host", host}, {"origin", origin}})), 403) << origin;
+  EXPECT_EQ(status(access, request("POST", "/hold", {{"host", host}})), 403);
+  EXPECT_EQ(status(access, request("GET", "/picture", {{"host", host}, {"sec-fetch-site", "cross-site"}})), 403);
+  EXPECT_EQ(status(access, request("GET", "/picture", {{"host", host}, {"sec-fetch-site", "same-origin"}})), 200);
+}
+
+TEST(Access, AsksStrangersForTheToken) {
+  const std::string token = random_token();
+  EXPECT_EQ(token.size(), 64u);
+  EXPECT_NE(token, random_token());
+  const Access access(false, token);
+  HttpRequest asked = request("GET", "/state", {{"host", "192.168.1.2:8080"}});
+  EXPECT_EQ(status(access, asked), 401);
+  for (const std::string& wrong : {std::string("x"), token.substr(1), token + "0", "0" + token.substr(1) + "0"}) {
+    asked.token = wrong;
+    EXPECT_EQ(status(access, asked), 401);
+  }
+  asked.token = token;
+  EXPECT_EQ(status(access, asked), 200);
+
+  HttpRequest first = request("GET", "/", {{"host", "192.168.1.2:8080"}});
+  EXPECT_EQ(status(access, first), 401);
+  first.query = {{"token", "wrong"}};
+  EXPECT_EQ(status(access, first), 401);
+  first.query = {{"token", token}};
+  const auto welcome = access.refuse(first);
+  ASSERT_TRUE(welcome);
+  EXPECT_EQ(welcome->status, 303);
+  EXPECT_NE(welcome->headers.back().second.find(token + "; HttpOnly; SameSite=Strict"), std::string::npos);
+  // A name may be rebound, whoever has the token.
+  first.headers = {{"host", "evil.example:8080"}};
+  EXPECT_EQ(status(access, first), 403);
+}
+
+TEST(Access, KnowsWhatIsThisComputer) {
+  EXPECT_TRUE(is_loopback("127.0.0.1", "--listen"));
+  EXPECT_TRUE(is_loopback("::1", "--listen"));
+  EXPECT_FALSE(is_loopback("0.0.0.0", "--listen"));
+  EXPECT_FALSE(is_loopback("::", "--listen"));
+  EXPECT_FALSE(is_loopback("::ffff:127.0.0.1", "--listen"));
+  for (const char* none : {"", "localhost", "1.2.3", "1.2.3.4:80"})
+    EXPECT_THROW(is_loopback(none, "--listen"), InputError) << none;
+}
+
+TEST(Access, ComparesTokens) {
+  EXPECT_TRUE(equal_in_constant_time("abc", "abc"));
+  for (const char* other : {"", "ab", "abd", "Abc", "abcd"}) EXPECT_FALSE(equal_in_constant_time("abc", other));
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "web/http_message.h"
+
+struct MHD_Connection;
+struct MHD_Daemon;
+
+namespace lapservo::internal {
+
+/// What others can cost at most.
+struct HttpLimits {
+  unsigned connections = 48, connections_per_address = 24;
+  std::size_t request_bytes = 16384;  ///< request line and headers; a body is refused
+  double head_s = 5;                  ///< for a request's head to come, from the connection or the answer before on
+  double answer_s = 20;               ///< for an answer to be fetched
+  double patience_s = 1;              ///< a request that waits is asked again for the last time
+};
+
+/// HTTP/1.1 by libmicrohttpd, in one thread at low priority, and another that watches the time.
+class HttpServer {
+ public:
+  /// The answer, or nullopt: not yet, which is asked again at the next wake(), and once with `last` when its patience
+  /// has ended. Called in the server's thread.
+  using Handler = std::function<std::optional<HttpResponse>(const HttpRequest&, bool last)>;
+  /// Whose value is HttpRequest::token.
+  static constexpr const char* cookie = "lapservo_token";
+
+  /// At an address of this computer; port 0: any that is free. Throws InputError, naming `option`, where it can't.
+  HttpServer(const std::string& address, int port, const std::string& option, const HttpLimits& limits,
+             Handler handler);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  int port() const { return port_; }
+  /// Asks for those that wait again. From any thread.
+  void wake();
+
+ private:
+  using Time = std::chrono::steady_clock::time_point;
+  struct Peer {
+    int descriptor = -1;
+    Time deadline;
+  };
+  struct Exchange;
+  struct Callbacks;
+
+  void open(const std::string& address, int port, const std::string& option);
+  int answer(MHD_Connection* connection, Exchange& exchange);
+  void set_deadline(Peer& peer, double from_now_s);
+  void resume(const std::function<bool(const Exchange&)>& which);
+  void watch_time();
+
+  HttpLimits limits_;
+  Handler handler_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::set<Peer*> peers_;
+  std::vector<Exchange*> waiting_;  // their connections are suspended
+  long wakes_ = 0;
+  bool ended_ = false;
+  int port_ = 0;
+  MHD_Daemon* daemon_ = nullptr;
+  std::thread time_;  // last: it uses the others
+};
+
+/// The calling thread yields to the loop: a nice value of 10.
+void lower_priority();
+
+}  // namespace lapservo::internal

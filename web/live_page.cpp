@@ -1,0 +1,220 @@
+#include "web/live_page.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "lapservo/core/csv.h"
+#include "lapservo/io/overlay.h"
+#include "web/page_files.h"
+#include "web/page_state.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr auto between_drawings = std::chrono::milliseconds(25), recent = std::chrono::milliseconds(100),
+               between_looks = std::chrono::milliseconds(2);
+constexpr auto watched = std::chrono::seconds(2);
+constexpr int jpeg_quality = 80;
+constexpr std::size_t most_events = 8;
+
+double seconds(std::chrono::steady_clock::duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+HttpResponse plain(int status, const std::string& text) {
+  return {status, "text/plain; charset=utf-8", text + "\n"};
+}
+
+std::optional<HttpResponse> file_at(const std::string& path) {
+  if (path == "/") return HttpResponse{200, "text/html; charset=utf-8", page_html};
+  if (path == "/page.css") return HttpResponse{200, "text/css; charset=utf-8", page_css};
+  if (path == "/page.js") return HttpResponse{200, "text/javascript; charset=utf-8", page_js};
+  return std::nullopt;
+}
+
+// The number in ?after=; an image's numbers begin with 1.
+long after_of(const HttpRequest& request) {
+  const auto after = request.query.find("after");
+  if (after == request.query.end()) return 0;
+  const auto number = parse_finite(after->second);
+  return number && *number >= 0 && *number < 1e15 ? std::lround(*number) : 0;
+}
+
+std::string jpeg_of(const PageImage& image) {
+  std::vector<unsigned char> bytes;
+  cv::imencode(".jpg", draw_overlay(image.bgr, *image.rig, image.observations), bytes,
+               {cv::IMWRITE_JPEG_QUALITY, jpeg_quality});
+  return {bytes.begin(), bytes.end()};
+}
+
+}  // namespace
+
+LivePage::LivePage(const PageConfig& config)
+    : config_(config),
+      token_(is_loopback(config.address, "--listen") ? "" : random_token()),
+      access_(token_.empty(), token_) {
+  server_ =
+      std::make_unique<HttpServer>(config.address, config.port, config.option, config.limits,
+                                   [this](const HttpRequest& request, bool last) { return answer(request, last); });
+  thread_ = std::thread([this] { draw(); });
+}
+
+LivePage::~LivePage() {
+  {
+    const std::lock_guard lock(mutex_);
+    ended_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+  server_.reset();
+}
+
+std::string LivePage::url() const {
+  const bool v6 = config_.address.find(':') != std::string::npos;
+  return fmt::format("http://{}:{}/{}", v6 ? "[" + config_.address + "]" : config_.address, server_->port(),
+                     token_.empty() ? "" : "?token=" + token_);
+}
+
+void LivePage::show(PageImage image) {
+  const auto age = std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(image.age_s));
+  images_.put({std::move(image), ++shown_, std::chrono::steady_clock::now() - age});
+}
+
+void LivePage::tell(const PageLoop& loop, const std::string& state) {
+  if (events_->empty() || events_->front().state != state) {
+    Events events{{loop.time_s, state}};
+    events.insert(events.end(), events_->begin(),
+                  events_->begin() + static_cast<long>(std::min(events_->size(), most_events - 1)));
+    events_ = std::make_shared<const Events>(std::move(events));
+  }
+  loops_.put({loop, events_, std::chrono::steady_clock::now()});
+}
+
+// With the mutex held.
+void LivePage::fetch() {
+  if (auto image = images_.take()) newest_ = std::move(*image);
+  if (auto told = loops_.take()) told_ = std::move(*told);
+}
+
+PageWishes LivePage::take_wishes() {
+  const Wish wish = wish_.exchange(Wish::none);
+  PageWishes wishes;
+  if (wish != Wish::none) wishes.hold = wish == Wish::hold;
+  wishes.stop = stop_;
+  return wishes;
+}
+
+std::optional<HttpResponse> LivePage::answer(const HttpRequest& request, bool last) {
+  if (auto refusal = access_.refuse(request)) return refusal;
+  if (request.method == "POST") return command(request.path);
+  if (request.method != "GET") return plain(405, "GET and POST only");
+  if (request.path == "/picture") return picture(request, last);
+  if (request.path == "/state") return state();
+  if (auto file = file_at(request.path)) return file;
+  return plain(404, "there is no such page");
+}
+
+// Whoever has one asks for the next: none waits in a socket where the way is slow.
+std::optional<HttpResponse> LivePage::picture(const HttpRequest& request, bool last) {
+  const long after = after_of(request);
+  std::unique_lock lock(mutex_);
+  fetch();
+  const auto drawn = drawn_;
+  const auto now = std::chrono::steady_clock::now();
+  const bool current = drawn && (drawn->number == newest_.number || now < drawn->done + recent);
+  if (!current || drawn->number == after) {
+    watched_until_ = now + watched;
+    lock.unlock();
+    changed_.notify_one();
+    return last ? std::optional(HttpResponse{204, "text/plain; charset=utf-8", ""}) : std::nullopt;
+  }
+  lock.unlock();
+  return HttpResponse{200,
+                      "image/jpeg",
+                      drawn->jpeg,
+                      {{"X-Number", std::to_string(drawn->number)},
+                       {"X-Came-S", fmt::format("{:.4f}", seconds(drawn->came.time_since_epoch()))}}};
+}
+
+HttpResponse LivePage::command(const std::string& path) {
+  if (path == "/stop") {
+    stop_ = true;
+    return plain(202, "the run ends");
+  }
+  if (path != "/hold" && path != "/start") return plain(404, "there is no such command");
+  if (!config_.has_loop) return plain(403, "nothing here moves");
+  if (path == "/start" && !config_.may_start) return plain(403, "lapservo runs without --enable-motion");
+  if (path == "/hold") {
+    wish_ = Wish::hold;
+  } else {  // of two between ticks, the one that holds
+    Wish none = Wish::none;
+    wish_.compare_exchange_strong(none, Wish::start);
+  }
+  return plain(202, "asked for");
+}
+
+HttpResponse LivePage::state() {
+  nlohmann::ordered_json state{{"title", config_.title},
+                               {"has_loop", config_.has_loop},
+                               {"may_start", config_.may_start},
+                               {"live", config_.live}};
+  const auto now = std::chrono::steady_clock::now();
+  state["now_s"] = seconds(now.time_since_epoch());
+  std::vector<Observation> observations;
+  {
+    const std::lock_guard lock(mutex_);
+    fetch();
+    observations = newest_.image.observations;
+    state["images"] = newest_.number;
+    state["loop"] = told_ ? json_of(told_->loop) : nlohmann::ordered_json();
+    state["loop_age_s"] = told_ ? nlohmann::ordered_json(seconds(now - told_->when)) : nlohmann::ordered_json();
+    state["events"] = nlohmann::ordered_json::array();
+    if (told_)
+      for (const Event& event : *told_->events)
+        state["events"].push_back({{"time_s", event.time_s}, {"state", event.state}});
+  }
+  state["instruments"] = json_of(observations);
+  state["asked"] = wish_ == Wish::none ? "" : wish_ == Wish::hold ? "hold" : "start";
+  return {200, "application/json", text_of(state)};
+}
+
+void LivePage::draw() {
+  lower_priority();
+  std::unique_lock lock(mutex_);
+  while (!ended_) {
+    fetch();
+    if (std::chrono::steady_clock::now() >= watched_until_) {
+      changed_.wait(lock);
+      continue;
+    }
+    if (newest_.number == 0 || (drawn_ && drawn_->number == newest_.number)) {
+      changed_.wait_for(lock, between_looks);  // so that the loop need not tell
+      continue;
+    }
+    watched_until_ = {};
+    const Shown shown = newest_;
+    auto drawn = std::make_shared<Drawn>(Drawn{shown.number, shown.came, {}, {}});
+    lock.unlock();
+    const auto begin = std::chrono::steady_clock::now();
+    try {
+      drawn->jpeg = jpeg_of(shown.image);
+      drawn->done = std::chrono::steady_clock::now();
+    } catch (const std::exception&) {
+      drawn.reset();  // the next one, perhaps
+    }
+    lock.lock();
+    if (drawn) drawn_ = std::move(drawn);
+    lock.unlock();
+    server_->wake();
+    std::this_thread::sleep_until(begin + between_drawings);
+    lock.lock();
+  }
+}
+
+}  // namespace lapservo::internal

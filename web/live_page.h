@@ -1,0 +1,132 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/observation.h"
+#include "web/access.h"
+#include "web/http_server.h"
+#include "web/mailbox.h"
+
+namespace lapservo::internal {
+
+struct PageConfig {
+  std::string title;                  ///< what runs, in a few words
+  std::string address = "127.0.0.1";  ///< to listen at; beyond this computer's own a token is asked for
+  int port = 8080;                    ///< 0: any that is free
+  std::string option = "--web";       ///< in complaints of the port
+  bool live = true;                   ///< what is old is no longer so; else a file's
+  bool has_loop = false;              ///< a loop that can be held and started
+  bool may_start = false;
+  HttpLimits limits{};
+};
+
+/// An image and what was seen in it.
+struct PageImage {
+  cv::Mat bgr;                     ///< not changed by anybody afterwards
+  std::shared_ptr<const Rig> rig;  ///< to draw with
+  std::vector<Observation> observations;
+  double age_s = 0;  ///< since the image came
+};
+
+/// What the loop does: s_rad, r_px, l_px, d_px.
+struct PageLoop {
+  double time_s = 0;  ///< since it began
+  std::optional<Eigen::Vector4d> desired, features, error;
+  double delay_s = 0;  ///< of its images
+  bool limited = false;
+};
+
+/// What those before the page want.
+struct PageWishes {
+  std::optional<bool> hold;  ///< true: hold; false: start; the last one
+  bool stop = false;         ///< end the run
+};
+
+/// The page for those without a screen on this computer. Those who tell it something never wait: of images it keeps the
+/// newest, and draws and encodes it in a thread of its own at low priority, while somebody watches.
+class LivePage {
+ public:
+  /// Throws InputError when it can't listen there.
+  explicit LivePage(const PageConfig& config);
+  ~LivePage();
+  LivePage(const LivePage&) = delete;
+  LivePage& operator=(const LivePage&) = delete;
+
+  /// To be opened in a browser, with the token.
+  std::string url() const;
+
+  // By the loop's thread.
+  void show(PageImage image);
+  /// `state`: the loop's, in words.
+  void tell(const PageLoop& loop, const std::string& state);
+  PageWishes take_wishes();
+
+ private:
+  using Time = std::chrono::steady_clock::time_point;
+  struct Shown {
+    PageImage image;
+    long number = 0;  ///< from 1
+    Time came;        ///< to this computer
+  };
+  struct Drawn {
+    long number = 0;
+    Time came, done;
+    std::string jpeg;
+  };
+  struct Event {
+    double time_s = 0;
+    std::string state;
+  };
+  using Events = std::vector<Event>;  ///< the newest first
+  struct Told {
+    PageLoop loop;
+    std::shared_ptr<const Events> events;
+    Time when;
+  };
+  enum class Wish { none, hold, start };
+
+  std::optional<HttpResponse> answer(const HttpRequest& request, bool last);
+  std::optional<HttpResponse> picture(const HttpRequest& request, bool last);
+  HttpResponse command(const std::string& path);
+  HttpResponse state();
+  void draw();
+  void fetch();
+
+  PageConfig config_;
+  std::string token_;
+  Access access_;
+
+  // The loop's thread's only.
+  long shown_ = 0;
+  std::shared_ptr<const Events> events_ = std::make_shared<const Events>();
+
+  Mailbox<Shown> images_;
+  Mailbox<Told> loops_;
+  std::atomic<Wish> wish_ = Wish::none;
+  std::atomic<bool> stop_ = false;
+
+  // The page's threads' only.
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool ended_ = false;
+  Time watched_until_;  // somebody waits for a newer image than drawn_
+  Shown newest_;
+  std::optional<Told> told_;
+  std::shared_ptr<const Drawn> drawn_;
+  std::unique_ptr<HttpServer> server_;
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,243 @@
+#include "web/live_page.h"
+
+#include <chrono>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "lapservo/core/error.h"
+#include "lapservo/testing/rigs.h"
+#include "web/test_http.h"
+
+namespace lapservo::internal {
+namespace {
+
+using lapservo::testing::http;
+using lapservo::testing::http_post;
+using lapservo::testing::http_status;
+using lapservo::testing::RawConnection;
+
+PageConfig config_of_test() {
+  PageConfig config;
+  config.title = "test";
+  config.port = 0;
+  config.has_loop = true;
+  config.limits.head_s = 0.3;
+  config.limits.patience_s = 0.2;
+  config.limits.connections = config.limits.connections_per_address = 16;
+  return config;
+}
+
+int port_of(const LivePage& page) {
+  const std::string url = page.url();
+  return std::stoi(url.substr(url.rfind(':') + 1));
+}
+
+std::string body_of(const std::string& answer) {
+  return answer.substr(answer.find("\r\n\r\n") + 4);
+}
+
+PageImage image_of(const Rig& rig, double brightness) {
+  const cv::Mat bgr(rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar::all(brightness));
+  Observation seen;
+  seen.instrument = rig.instruments.front().name;
+  return {bgr, std::make_shared<const Rig>(rig), {seen}, 0.01};
+}
+
+// As the page does: asks again where none came in time.
+std::string newer_picture(int port, int after) {
+  std::string answer;
+  for (int i = 0; i < 100 && http_status(answer) != 200; ++i)
+    answer = http(port, "GET", fmt::format("/picture?after={}", after));
+  return answer;
+}
+
+TEST(LivePage, ShowsTheNewestImageToWhoeverWaits) {
+  const Rig rig = testing::small_test_rig();
+  const LivePage empty(config_of_test());
+  EXPECT_EQ(http_status(http(port_of(empty), "GET", "/picture")), 204);
+  LivePage page(config_of_test());
+  const int port = port_of(page);
+  for (const double brightness : {10, 90, 200}) page.show(image_of(rig, brightness));
+  const std::string answer = newer_picture(port, 0);
+  ASSERT_EQ(http_status(answer), 200);
+  EXPECT_NE(answer.find("X-Number: 3\r\n"), std::string::npos) << answer.substr(0, 600);
+  const std::string jpeg = body_of(answer);
+  const cv::Mat shown = cv::imdecode(std::vector<unsigned char>(jpeg.begin(), jpeg.end()), cv::IMREAD_COLOR);
+  ASSERT_EQ(shown.size(), cv::Size(rig.camera.width_px, rig.camera.height_px));
+  EXPECT_NEAR(shown.at<cv::Vec3b>(shown.rows / 2, shown.cols / 2)[1], 200, 3);
+  EXPECT_EQ(http_status(http(port, "GET", "/picture?after=3")), 204);
+  std::thread later([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    page.show(image_of(rig, 40));
+  });
+  EXPECT_NE(newer_picture(port, 3).find("X-Number: 4\r\n"), std::string::npos);
+  later.join();
+}
+
+TEST(LivePage, ServesItsFilesAndNothingElse) {
+  LivePage page(config_of_test());
+  const int port = port_of(page);
+  const std::string html = http(port, "GET", "/");
+  EXPECT_EQ(http_status(html), 200);
+  EXPECT_NE(html.find("<script src=\"page.js\""), std::string::npos);
+  EXPECT_NE(html.find("frame-ancestors 'none'"), std::string::npos);
+  for (const char* path : {"/page.css", "/page.js", "/state"}) EXPECT_EQ(http_status(http(port, "GET", path)), 200);
+  for (const char* path : {"/x", "/../etc/passwd", "//page.js", "/page.js/", "/hold"})
+    EXPECT_EQ(http_status(http(port, "GET", path)), 404) << path;
+  EXPECT_EQ(http_status(http(port, "DELETE", "/state")), 405);
+}
+
+TEST(LivePage, TellsWhatTheLoopDoes) {
+  const Rig rig = testing::small_test_rig();
+  LivePage page(config_of_test());
+  const int port = port_of(page);
+  page.show(image_of(rig, 10));
+  PageLoop loop;
+  loop.desired = Eigen::Vector4d(0.9, 400, 180, 100);
+  loop.error = Eigen::Vector4d(0.001, NAN, 2, 3);
+  page.tell(loop, "track");
+  page.tell(loop, "hold: marker_lost");
+  const std::string state = http(port, "GET", "/state");
+  for (const char* part :
+       {R"("state":"hold: marker_lost")", R"("state":"track")", R"("name":"PSM1","status":"no_marker")",
+        R"("name":"r_px","measured":null,"desired":400.0,"error":null)", R"("may_start":false)"})
+    EXPECT_NE(state.find(part), std::string::npos) << part << " in " << state;
+}
+
+TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
+  PageConfig config = config_of_test();
+  {
+    LivePage page(config);
+    const int port = port_of(page);
+    EXPECT_EQ(http_status(http_post(port, "/start")), 403);
+    EXPECT_FALSE(page.take_wishes().hold);
+    EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
+    EXPECT_EQ(page.take_wishes().hold, true);
+    EXPECT_FALSE(page.take_wishes().hold);  // once
+    EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
+    EXPECT_EQ(http_status(http_post(port, "/start")), 403);
+    EXPECT_EQ(page.take_wishes().hold, true);
+    EXPECT_EQ(http_status(http_post(port, "/stop")), 202);
+    EXPECT_TRUE(page.take_wishes().stop);
+    EXPECT_EQ(http_status(http_post(port, "/explode")), 404);
+  }
+  config.may_start = true;
+  {
+    LivePage page(config);
+    const int port = port_of(page);
+    EXPECT_EQ(http_status(http_post(port, "/start")), 202);
+    EXPECT_EQ(page.take_wishes().hold, false);
+    EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
+    EXPECT_EQ(http_status(http_post(port, "/start")), 202);
+    EXPECT_EQ(page.take_wishes().hold, true);  // of two in a tick
+  }
+  config.has_loop = false;
+  LivePage page(config);
+  EXPECT_EQ(http_status(http_post(port_of(page), "/start")), 403);
+  EXPECT_EQ(http_status(http_post(port_of(page), "/hold")), 403);
+}
+
+TEST(LivePage, RefusesStrangersAndOtherSites) {
+  PageConfig config = config_of_test();
+  config.address = "0.0.0.0";
+  LivePage page(config);
+  const std::string url = page.url();
+  const std::string token = url.substr(url.find("token=") + 6);
+  const int port = std::stoi(url.substr(url.rfind(':') + 1));
+  for (const char* path : {"/", "/page.js", "/state", "/picture", "/?token=", "/?token=abc"})
+    EXPECT_EQ(http_status(http(port, "GET", path)), 401) << path;
+  EXPECT_EQ(http_status(http_post(port, "/stop")), 401);
+  EXPECT_FALSE(page.take_wishes().stop);
+  EXPECT_EQ(http_status(http(port, "GET", "/?token=" + token)), 303);
+  const std::string cookie = "Cookie: lapservo_token=" + token + "\r\n";
+  EXPECT_EQ(http_status(http(port, "GET", "/state", cookie)), 200);
+  EXPECT_EQ(http_status(http(port, "GET", "/state", cookie + "Host: evil.example\r\n")), 403);
+  EXPECT_EQ(http_status(http(port, "POST", "/hold", cookie + "Origin: http://evil.example\r\nContent-Length: 0\r\n")),
+            403);
+  EXPECT_FALSE(page.take_wishes().hold);
+}
+
+TEST(LivePage, RefusesWhatIsMalformedOrTooLarge) {
+  LivePage page(config_of_test());
+  const int port = port_of(page);
+  const std::string host = fmt::format("Host: 127.0.0.1:{0}\r\nOrigin: http://127.0.0.1:{0}\r\n", port);
+  for (const std::string& text :
+       {std::string("\r\n\r\n\r\n"), std::string("hello\r\n\r\n"), std::string(200, '\0'),
+        "GET / HTTP/1.1\r\n" + host + "Host: evil\r\n\r\n", "GET /" + std::string(40000, 'a') + " HTTP/1.1\r\n\r\n",
+        "GET / HTTP/1.1\r\n" + host + "X: " + std::string(40000, 'a') + "\r\n\r\n",
+        "POST /hold HTTP/1.1\r\n" + host + "Content-Length: 99999999\r\n\r\n",
+        "POST /hold HTTP/1.1\r\n" + host + "Content-Length: -1\r\n\r\n",
+        "POST /hold HTTP/1.1\r\n" + host + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n"}) {
+    const RawConnection connection(port);
+    connection.say(text);
+    const int status = http_status(connection.hear());
+    EXPECT_TRUE(status == 0 || (status >= 400 && status < 500)) << status << " to " << text.substr(0, 80);
+  }
+  EXPECT_FALSE(page.take_wishes().hold);
+  EXPECT_EQ(http_status(http(port, "GET", "/state")), 200);
+}
+
+TEST(LivePage, ForgetsWhoDoesNotFinishAsking) {
+  LivePage page(config_of_test());
+  const RawConnection slow(port_of(page));
+  const auto begin = std::chrono::steady_clock::now();
+  while (slow.say("x") && std::chrono::steady_clock::now() < begin + std::chrono::seconds(5))
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+}
+
+TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
+  const Rig rig = testing::small_test_rig();
+  LivePage page(config_of_test());
+  const int port = port_of(page);
+  std::vector<std::unique_ptr<RawConnection>> crowd;
+  try {
+    for (int i = 0; i < 1000; ++i) {
+      crowd.push_back(std::make_unique<RawConnection>(port));
+      if (i % 100 == 0) page.show(image_of(rig, 10));
+    }
+  } catch (const std::runtime_error&) {  // this process may open no more
+  }
+  ASSERT_GT(crowd.size(), 100u);
+  EXPECT_EQ(crowd.front()->hear(), "");  // ended: it asked for nothing in time
+  crowd.clear();
+  // Once they have gone.
+  int status = 0;
+  for (int i = 0; i < 200 && (status = http_status(http(port, "GET", "/state"))) != 200; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_EQ(status, 200);
+}
+
+TEST(LivePage, SaysWhereItCanNotListen) {
+  LivePage page(config_of_test());
+  PageConfig config = config_of_test();
+  config.port = port_of(page);
+  try {
+    const LivePage second(config);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.source(), "--web");
+  }
+  config.port = 0;
+  config.address = "192.0.2.1";  // nobody's
+  EXPECT_THROW(LivePage{config}, InputError);
+}
+
+// Viewers that wait when the run ends keep nobody.
+TEST(LivePage, EndsWhileSomebodyWaits) {
+  PageConfig config = config_of_test();
+  config.limits.patience_s = 60;
+  std::thread viewer;
+  {
+    LivePage page(config);
+    viewer = std::thread([port = port_of(page)] { http(port, "GET", "/picture"); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  viewer.join();
+}
+
+}  // namespace
+}  // namespace lapservo::internal

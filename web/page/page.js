@@ -1,0 +1,174 @@
+"use strict";
+
+const at = (id) => document.getElementById(id);
+const oldS = 1;            // a picture or a loop that is older is said to be old
+const patienceMs = 3000;   // for an answer
+
+let clock = null;  // how far lapservo's is ahead of this page's, by the quickest answer of late
+let number = 0, pictureCameMs = null, heardMs = null, last = null;
+
+const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+const text = (element, value) => { if (element.textContent !== value) element.textContent = value; };
+
+async function ask(path, options = {}) {
+  return fetch(path, { ...options, cache: "no-store", signal: AbortSignal.timeout(patienceMs) });
+}
+
+// Numbers: in milliradians, millimetres and pixels.
+function shown(name, value) {
+  if (value === null || value === undefined) return "–";
+  if (name.endsWith("_px")) return value.toFixed(1);
+  return (1000 * value).toFixed(name.endsWith("_m") ? 2 : 1);
+}
+function sigmaShown(name, sigma) {
+  return Number((name.endsWith("_px") ? sigma : 1000 * sigma).toPrecision(2)).toString();
+}
+function label(name) {
+  const cut = name.lastIndexOf("_");
+  return name.slice(0, cut) + " [" + { rad: "mrad", m: "mm", px: "px" }[name.slice(cut + 1)] + "]";
+}
+
+function row(cells) {
+  const tr = document.createElement("tr");
+  cells.forEach((cell, i) => {
+    const td = document.createElement(i ? "td" : "th");
+    if (!i) td.scope = "row";
+    td.textContent = cell;
+    tr.append(td);
+  });
+  return tr;
+}
+
+function instrumentTable(seen) {
+  const table = document.createElement("table");
+  table.createCaption().textContent = `${seen.name}: ${seen.status}`;
+  const body = table.createTBody();
+  for (const [name, one] of Object.entries({ ...(seen.q || {}), ...(seen.tau_rad ? { tau_rad: seen.tau_rad } : {}) }))
+    body.append(row([label(name), shown(name, one.value), "± " + sigmaShown(name, one.sigma)]));
+  for (const [name, value] of Object.entries(last.loop ? {} : seen.features || {}))
+    body.append(row([label(name), shown(name, value), ""]));
+  return table;
+}
+
+function showLoop(state) {
+  const loop = state.loop;
+  at("features").hidden = at("log").hidden = !loop;
+  if (!loop) return;
+  at("features").tBodies[0].replaceChildren(...loop.features.map((f) =>
+    row([label(f.name), shown(f.name, f.measured), shown(f.name, f.desired), shown(f.name, f.error)])));
+  at("events").replaceChildren(...state.events.map((event) => {
+    const li = document.createElement("li");
+    li.textContent = `${event.time_s.toFixed(2)} s  ${event.state}`;
+    return li;
+  }));
+}
+
+function showState(state) {
+  last = state;
+  text(at("title"), `lapservo ${state.title}`);
+  at("start").disabled = !state.may_start;
+  at("hold").disabled = !state.has_loop;
+  at("hold").hidden = at("start").hidden = !state.has_loop;
+  if (!at("note").dataset.said)
+    text(at("note"), state.has_loop && !state.may_start ? "Start needs lapservo servo --enable-motion." : "");
+  showLoop(state);
+  at("instruments").replaceChildren(...state.instruments.map(instrumentTable));
+}
+
+function compareClocks(nowS, beginMs) {
+  const tookMs = performance.now() - beginMs;
+  if (!clock || tookMs < clock.tookMs || performance.now() > clock.untilMs)
+    clock = { tookMs, aheadMs: 1000 * nowS - (beginMs + tookMs / 2), untilMs: performance.now() + 10000 };
+}
+
+// What is shown goes by this page's clock too: nothing old looks new where the connection is lost.
+function showAges() {
+  const now = performance.now();
+  const silentS = heardMs === null ? null : (now - heardMs) / 1000;
+  const lost = silentS === null || silentS > 2;
+  at("alert").hidden = !lost || heardMs === null;
+  if (!at("alert").hidden) text(at("alert"), `No answer for ${Math.round(silentS)} s: lapservo has ended, or the network is gone. What you see is old.`);
+  const ageS = pictureCameMs === null ? null : (now - pictureCameMs) / 1000;
+  const old = ageS !== null && ageS > oldS && last && last.live;
+  at("picture").classList.toggle("old", lost || ageS === null || old);
+  const parts = [ageS === null ? "no picture yet" : last && !last.live ? "a recording" : `picture ${old ? "OLD: " + ageS.toFixed(1) + " s" : (1000 * ageS).toFixed(0) + " ms"}`];
+  if (last && last.loop) parts.push(`loop's delay ${(1000 * last.loop.delay_s).toFixed(0)} ms`);
+  if (last && last.loop && last.loop.limited) parts.push("at a limit");
+  text(at("ages"), parts.join(" · "));
+  const state = at("state");
+  if (lost) {
+    text(state, heardMs === null ? "connecting" : "not connected");
+    state.className = "";
+  } else if (!last.loop) {
+    const found = last.instruments.filter((one) => one.status === "ok").length;
+    text(state, last.images ? `${found} of ${last.instruments.length} seen` : "no picture yet");
+    state.className = found && found === last.instruments.length ? "track" : "";
+  } else {
+    const current = last.events.length ? last.events[0].state : "";
+    const asleep = last.loop_age_s > oldS;
+    text(state, asleep ? `the loop is silent for ${last.loop_age_s.toFixed(0)} s` : current + (last.asked ? ` (${last.asked} asked)` : ""));
+    state.className = asleep || current.startsWith("hold") || current.startsWith("end") ? "hold" : current === "track" ? "track" : "";
+  }
+}
+
+async function pictures() {
+  for (;;) {
+    try {
+      const answer = await ask(`picture?after=${number}`);
+      if (answer.status === 200) {
+        const got = Number(answer.headers.get("X-Number"));
+        const cameMs = 1000 * Number(answer.headers.get("X-Came-S"));
+        const url = URL.createObjectURL(await answer.blob());
+        const before = at("picture").src;
+        at("picture").src = url;
+        if (before.startsWith("blob:")) URL.revokeObjectURL(before);
+        number = got;
+        pictureCameMs = clock ? cameMs - clock.aheadMs : performance.now();
+        showAges();
+      } else if (answer.status !== 204) {
+        await wait(1000);
+      }
+    } catch {
+      await wait(500);
+    }
+    if (document.hidden) await wait(500);
+  }
+}
+
+async function states() {
+  for (;;) {
+    try {
+      const begin = performance.now();
+      const answer = await ask("state");
+      if (answer.ok) {
+        const state = await answer.json();
+        heardMs = performance.now();
+        compareClocks(state.now_s, begin);
+        showState(state);
+      }
+    } catch { /* showAges() says it */ }
+    await wait(150);
+  }
+}
+
+async function command(name) {
+  const note = at("note");
+  note.dataset.said = "yes";
+  text(note, `${name} …`);
+  try {
+    const answer = await ask(name, { method: "POST" });
+    text(note, `${name}: ${(await answer.text()).trim()}`);
+  } catch {
+    text(note, `${name}: NOT DELIVERED, lapservo did not answer`);
+  }
+}
+
+for (const name of ["hold", "start", "stop"]) at(name).addEventListener("click", () => command(name));
+// One key holds, from anywhere; none starts: a key pressed by mistake moves nothing.
+document.addEventListener("keydown", (event) => {
+  if (event.key.toLowerCase() !== "h" || event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
+  if (!at("hold").disabled) command("hold");
+});
+setInterval(showAges, 100);
+pictures();
+states();

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "lapservo/vision/observation.h"
+
+namespace lapservo::internal {
+
+struct PageLoop;
+
+// As the page reads them; what is not known is null.
+
+nlohmann::ordered_json json_of(const std::vector<Observation>& observations);
+nlohmann::ordered_json json_of(const PageLoop& loop);
+/// Never throws for its text: what is no UTF-8 is replaced.
+std::string text_of(const nlohmann::ordered_json& json);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,182 @@
+"""The page as a person meets it, in headless Chromium: test_page.py LAPSERVO RIG PICTURE ITS_RIG [FOLDER for screenshots].
+
+Ends with 77 and the reason where Chromium is not installed.
+"""
+import base64
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+PATIENCE_S = 60
+
+
+class Browser:
+    """One tab of Chromium, by its debugging protocol over a pipe."""
+
+    def __init__(self, program, folder):
+        ours, theirs = os.pipe(), os.pipe()  # Chromium reads at 3 and writes at 4
+
+        def place():
+            a, b = os.dup(ours[0]), os.dup(theirs[1])
+            os.dup2(a, 3)
+            os.dup2(b, 4)
+
+        self.process = subprocess.Popen(
+            [program, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", f"--user-data-dir={folder}"],
+            preexec_fn=place, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        os.close(ours[0])
+        os.close(theirs[1])
+        self.to, self.of = os.fdopen(ours[1], "wb"), os.fdopen(theirs[0], "rb")
+        self.count, self.session, self.complaints, self.buffer = 0, None, [], b""
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log"):
+            self.call(domain + ".enable")
+
+    def read(self):
+        while b"\0" not in self.buffer:
+            part = os.read(self.of.fileno(), 65536)
+            if not part:
+                raise RuntimeError("Chromium has ended")
+            self.buffer += part
+        message, self.buffer = self.buffer.split(b"\0", 1)
+        return json.loads(message)
+
+    def call(self, method, **params):
+        self.count += 1
+        message = {"id": self.count, "method": method, "params": params}
+        if self.session:
+            message["sessionId"] = self.session
+        self.to.write(json.dumps(message).encode() + b"\0")
+        self.to.flush()
+        while True:
+            answer = self.read()
+            if answer.get("id") == self.count:
+                if "error" in answer:
+                    raise RuntimeError(f"{method}: {answer['error']}")
+                return answer["result"]
+            if answer.get("method") in ("Runtime.exceptionThrown", "Log.entryAdded"):
+                self.complaints.append(json.dumps(answer["params"]))
+
+    def value(self, expression):
+        result = self.call("Runtime.evaluate", expression=expression, returnByValue=True)
+        assert "exceptionDetails" not in result, result
+        return result["result"].get("value")
+
+    def wait_for(self, expression):
+        end = time.monotonic() + PATIENCE_S
+        while not self.value(f"(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()"):  # while it loads
+            assert time.monotonic() < end, f"{expression} did not become true: {self.value('document.body.innerText')}"
+            time.sleep(0.05)
+
+    def resize(self, width, height):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
+
+    def key(self, key):
+        for what in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=what, key=key, code="Key" + key.upper(), text=key if what == "keyDown" else "")
+
+    def screenshot(self, path):
+        with open(path, "wb") as file:
+            file.write(base64.b64decode(self.call("Page.captureScreenshot", captureBeyondViewport=True)["data"]))
+
+    def close(self):
+        self.process.kill()
+        self.process.wait()
+
+
+def start(tool, *arguments):
+    """lapservo and its page's address."""
+    process = subprocess.Popen([tool, *arguments], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    for line in process.stdout:
+        if found := re.match(r"page: (\S+)", line):
+            return process, found[1]
+    raise AssertionError(f"lapservo {' '.join(arguments)} ended without a page")
+
+
+def state(browser, text):
+    browser.wait_for(f"document.getElementById('state').textContent.includes({json.dumps(text)})")
+
+
+def look(browser, folder, name):
+    for width, height in ((1280, 800), (390, 844)):
+        browser.resize(width, height)
+        time.sleep(0.3)
+        assert browser.value("document.documentElement.scrollWidth") <= width, f"{name} is wider than {width} px"
+        small = browser.value("[...document.querySelectorAll('button')].filter(b => !b.hidden && b.offsetHeight < 44).length")
+        assert small == 0, "a button is too small for a finger"
+        if folder:
+            browser.screenshot(os.path.join(folder, f"{name}_{width}.png"))
+
+
+def see_the_loop(browser, tool, rig, folder):
+    # A simulation that is watched for long enough; it ends by the page's button.
+    lapservo, url = start(tool, "servo", "--rig", rig, "--robot", "sim", "--duration", "3600", "--web", "0", "--listen", "0.0.0.0")
+    try:
+        browser.call("Page.navigate", url=url.replace("0.0.0.0", "127.0.0.1").split("?")[0])
+        browser.wait_for("document.body.innerText.includes('token')")  # refused
+        browser.complaints.clear()
+        browser.call("Page.navigate", url=url.replace("0.0.0.0", "127.0.0.1"))
+        browser.wait_for("location.search === '' && document.getElementById('picture').naturalWidth > 0")
+        state(browser, "track")
+        look(browser, folder, "servo")
+        browser.key("h")
+        state(browser, "hold: held")
+        browser.key("s")  # starts nothing
+        state(browser, "hold: held")
+        browser.value("document.getElementById('start').focus()")
+        browser.call("Input.dispatchKeyEvent", type="keyDown", key="Enter", code="Enter", text="\r", windowsVirtualKeyCode=13)
+        browser.call("Input.dispatchKeyEvent", type="keyUp", key="Enter", code="Enter", windowsVirtualKeyCode=13)
+        state(browser, "track")
+        browser.value("document.getElementById('stop').click()")
+        assert lapservo.wait(PATIENCE_S) in (0, 1)
+        state(browser, "not connected")
+        assert browser.value("document.getElementById('picture').classList.contains('old')"), "an old picture looks new"
+        assert browser.value("!document.getElementById('alert').hidden")
+        look(browser, folder, "ended")
+    finally:
+        lapservo.kill()
+        lapservo.wait()
+
+
+def see_a_picture(browser, tool, rig, picture, folder):
+    lapservo, url = start(tool, "view", picture, "--rig", rig, "--port", "0")
+    try:
+        browser.complaints.clear()
+        browser.call("Page.navigate", url=url)
+        browser.wait_for("document.getElementById('picture').naturalWidth > 0")
+        state(browser, "seen")
+        assert browser.value("document.getElementById('start').hidden"), "nothing here can be started"
+        assert not browser.complaints, browser.complaints
+        look(browser, folder, "view")
+        time.sleep(1)
+        assert not browser.value("document.getElementById('picture').classList.contains('old')"), "a file's picture does not get old"
+    finally:
+        lapservo.terminate()
+        assert lapservo.wait(PATIENCE_S) in (0, 1)
+
+
+def main():
+    tool, rig, picture, picture_rig = sys.argv[1:5]
+    folder = sys.argv[5] if len(sys.argv) > 5 else None
+    program = shutil.which("chromium")
+    if not program:
+        print("skipped: chromium is not installed")
+        return 77
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        browser = Browser(program, profile)
+        try:
+            see_a_picture(browser, tool, picture_rig, picture, folder)
+            see_the_loop(browser, tool, rig, folder)
+        finally:
+            browser.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
