@@ -107,11 +107,6 @@ void forget_registration(RunConfig& run, const ServoOptions& options) {
   instrument.camera_from_rcm.reset();
 }
 
-void nothing_is_sent(ControllerConfig& config) {
-  config.arm_follows = false;
-  config.endoscope_attempts = 0;
-}
-
 RunConfig run_config_of(const ServoOptions& options) {
   RunConfig run;
   run.rig = single_instrument(load_rig(options.rig), options.rig);

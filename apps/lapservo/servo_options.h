@@ -35,8 +35,6 @@ Eigen::Vector4d four(const std::vector<double>& values);
 RunConfig run_config_of(const ServoOptions& options);
 /// The uncalibrated mode gets to know no more of the RCM than its image.
 void forget_registration(RunConfig& run, const ServoOptions& options);
-/// The arm moves by itself or not at all.
-void nothing_is_sent(ControllerConfig& config);
 /// The rig's `joints` entry. Throws InputError when there is none.
 const Joints& joints_of(const ServoOptions& options, const Rig& rig);
 

@@ -52,7 +52,7 @@ class RecordedArm : public Robot {
   }
   JointState state() override {
     const JointReading& latest = readings_[std::max<std::size_t>(next_, 1) - 1];
-    return {latest.time_s, latest.q, OperatingState::enabled};
+    return {latest.time_s, latest.q, OperatingState::enabled, false};
   }
   void send(const JointPath&) override {}
 
@@ -138,7 +138,7 @@ JointRecording joints_of_bag(const Bag& bag, const ServoOptions& options, const 
 int decide_on_recording(const ServoOptions& options) {
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
-  nothing_is_sent(config.controller);
+  config.controller.endoscope_attempts = 0;  // nothing moves the arm
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
   std::optional<LiveView> view;

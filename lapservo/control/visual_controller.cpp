@@ -122,9 +122,9 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
     frozen_image_ = FrozenImage(config_.scales);
     image_reason_ = HoldReason::wild_joints;  // until an image tells where the instrument is
   }
-  if (!config_.arm_follows) path_.move_to(time_s, q_joint);
+  if (!follows_) path_.move_to(time_s, q_joint);
   const MotionState setpoint = path_.at(time_s);
-  if (config_.arm_follows) arm_response_.add(setpoint, q_joint, time_s - now_s_);
+  if (follows_) arm_response_.add(setpoint, q_joint, time_s - now_s_);
   leash_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), time_s - now_s_);
   remember(time_s, q_joint, readings);
   now_s_ = time_s;

@@ -63,6 +63,9 @@ class VisualController {
   ControlStep step(double time_s, const Eigen::Vector4d& q_joint, const std::optional<ImageMeasurement>& image,
                    const DesiredFeatures& desired, std::span<const JointReading> readings = {});
 
+  /// Whether the arm goes where it is sent, from the next step on: JointState::follows.
+  void expect_following(bool follows) { follows_ = follows; }
+
   /// The setpoints from the latest step on.
   const JointPath& path() const { return path_; }
   const ControllerConfig& config() const { return config_; }
@@ -104,6 +107,7 @@ class VisualController {
   JointPath path_;
   std::optional<Recovery> recovery_;
   bool started_ = false;
+  bool follows_ = true;
   bool measured_ = false;      ///< the joints of this tick are believed
   bool has_readings_ = false;  ///< between ticks
   double now_s_ = 0;

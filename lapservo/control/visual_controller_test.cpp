@@ -633,11 +633,11 @@ TEST_P(Holding, AnImageOfAnOldStampIsNotFresh) {
 // Somebody else leads it, faster and farther than its own set-points would: 0.4 rad to and fro.
 TEST_P(Holding, NotForAnArmThatIsOnlyObserved) {
   const Flaws flaws;
-  ControllerConfig config = config_for(flaws);
+  const ControllerConfig config = config_for(flaws);
   const TestRig rig;
   const auto led = [&](bool follows, std::set<HoldReason>& reasons) {
-    config.arm_follows = follows;
     VisualController controller(config, testing::model_of(rig));
+    controller.expect_following(follows);
     double most_ahead = 0;
     for (int k = 0; k < 240; ++k) {
       const double t = k * config.period_s;

@@ -179,6 +179,7 @@ void Interlock::forget_path() {
 JointState Interlock::state(double now_s) {
   watch(now_s);
   JointState state;
+  state.follows = config_.motion_enabled;
   if (measured_) state.time_s = measured_->time_s, state.q = JointVector::from_vector(measured_->q);
   const bool well = blocked(now_s) == Blocked::none;
   if (well && told_) must_start_anew_ = false;

@@ -15,6 +15,9 @@ struct JointState {
   double time_s = 0;
   JointVector q;
   OperatingState operating_state = OperatingState::disabled;
+  /// False where nothing that is sent moves the arm: somebody else leads it, and the loop only says what it would do.
+  /// Its set-points start from the joints in each tick then, and it does not hold because the arm does not follow.
+  bool follows = true;
 };
 
 /// The joints at one time, on the loop's clock.

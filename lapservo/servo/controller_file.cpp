@@ -72,9 +72,7 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   ControllerConfig config = base;
   const YamlField file = YamlField::read(path, "controller file");
   if (!file.is_map()) file.fail(file.value_text(), "a map of the controller's keys");
-  expect_keys(
-      file,
-      {{"mode", "period_s", "gains_per_s", "delay_s", "limits", "window", "endoscope_attempts", "arm_follows"}, {}});
+  expect_keys(file, {{"mode", "period_s", "gains_per_s", "delay_s", "limits", "window", "endoscope_attempts"}, {}});
   if (const YamlField mode = file["mode"]; mode.present()) config.mode = read_mode(mode);
   if (const YamlField period = file["period_s"]; period.present()) config.period_s = period.number("a finite number");
   if (const YamlField gains = file["gains_per_s"]; gains.present()) config.gains.per_s = four(gains);
@@ -82,7 +80,6 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   if (const YamlField limits = file["limits"]; limits.present()) config.limits = read_limits(limits, config.limits);
   if (const YamlField window = file["window"]; window.present())
     config.window = read_window(window, config.window.value_or(ImageWindow{}));
-  if (const YamlField follows = file["arm_follows"]; follows.present()) config.arm_follows = follows.boolean();
   if (const YamlField attempts = file["endoscope_attempts"]; attempts.present())
     config.endoscope_attempts = read_attempts(attempts);
   return config;
@@ -95,7 +92,7 @@ std::string controller_yaml(const ControllerConfig& config) {
   text +=
       fmt::format("limits:\n  lower: {}\n  upper: {}\n  rate: {}\n  acceleration: {}\n", list_of(config.limits.lower),
                   list_of(config.limits.upper), list_of(config.limits.rate), list_of(config.limits.acceleration));
-  text += fmt::format("endoscope_attempts: {}\narm_follows: {}\n", config.endoscope_attempts, config.arm_follows);
+  text += fmt::format("endoscope_attempts: {}\n", config.endoscope_attempts);
   if (config.window)
     text += fmt::format("window: {{u_min_px: {}, u_max_px: {}, v_min_px: {}, v_max_px: {}}}\n", config.window->u_min_px,
                         config.window->u_max_px, config.window->v_min_px, config.window->v_max_px);

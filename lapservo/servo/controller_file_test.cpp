@@ -18,7 +18,6 @@ ControllerConfig unusual() {
   config.gains.per_s = {1.0 / 3, 0.1, 0.2, 0.7};
   config.observer.delay_s = 0.123456789012345678;
   config.endoscope_attempts = 1;
-  config.arm_follows = false;
   config.limits.lower = {-0.1, 0.9, 0.04, -3.3};
   config.limits.acceleration = {1, 1.1, 0.3, 7};
   config.window = ImageWindow{1.5, 700.25, 3, 1.0 / 7 + 400};
@@ -44,7 +43,6 @@ TEST(ControllerFile, ReadsBackToTheLastBit) {
   EXPECT_EQ(read.gains.per_s, config.gains.per_s);
   EXPECT_EQ(read.observer.delay_s, config.observer.delay_s);
   EXPECT_EQ(read.endoscope_attempts, config.endoscope_attempts);
-  EXPECT_EQ(read.arm_follows, config.arm_follows);
   EXPECT_EQ(read.limits.lower, config.limits.lower);
   EXPECT_EQ(read.limits.upper, config.limits.upper);
   EXPECT_EQ(read.limits.rate, config.limits.rate);
@@ -66,7 +64,6 @@ TEST(ControllerFile, NamesFileFieldValueAndExpectation) {
                                        {"gains_per_s: [1, 2, 3]\n", "gains_per_s"},
                                        {"endoscope_attempts: 1.5\n", "endoscope_attempts"},
                                        {"endoscope_attempts: -1\n", "endoscope_attempts"},
-                                       {"arm_follows: yes\n", "true or false"},
                                        {"gains_per_s: [1, 2, 3, x]\n", "gains_per_s[3]"},
                                        {"gains_per_s: [1, 2, 3, .nan]\n", "gains_per_s[3]"},
                                        {"mode: fast\n", "default, paper or uncalibrated"},

@@ -44,6 +44,7 @@ ServoDecision Servo::decide(const ServoInput& input) {
   const Eigen::Vector4d q = input.joints.q.vector();
   ServoDecision decision;
   decision.camera_from_rcm = camera_from_rcm_;
+  controller_.expect_following(input.joints.follows);
   decision.control = controller_.step(input.time_s, q, input.image, input.desired, input.readings);
   if (recovery_) recovery_->doubt(decision.control.reason, controller_);
   watch_registration(input);

@@ -45,7 +45,7 @@ std::string covariance_column(int row, int column) {
 }
 
 std::vector<std::string> make_input_columns() {
-  std::vector<std::string> columns{"time_s", "arm_state"};
+  std::vector<std::string> columns{"time_s", "arm_state", "arm_follows"};
   name(columns, "joint_", joints);
   columns.emplace_back("readings");
   columns.insert(columns.end(), {"image", "image_time_s", "image_registration", "image_repetition"});
@@ -117,6 +117,7 @@ std::vector<std::string> input_fields(const ServoInput& input) {
   std::vector<std::string> fields;
   write(fields, input.time_s);
   fields.emplace_back(to_string(input.joints.operating_state));
+  fields.emplace_back(input.joints.follows ? "1" : "0");
   write(fields, input.joints.q.vector());
   fields.push_back(text_of(input.readings));
   write_image(fields, input.image);
@@ -208,6 +209,9 @@ ServoInput read_input(const Row& row) {
   const auto state = operating_state_from_string(row.text("arm_state"));
   if (!state) row.complain("arm_state", "DISABLED, ENABLED, PAUSED or FAULT");
   input.joints.operating_state = *state;
+  const std::string follows = row.text("arm_follows");
+  if (follows != "0" && follows != "1") row.complain("arm_follows", "0 or 1");
+  input.joints.follows = follows == "1";
   input.readings = read_readings(row);
   input.image = read_image(row);
   input.desired.features = row.numbers("desired_", features);

@@ -68,17 +68,20 @@ class PythonImageStream : public ImageStream {
 
 void bind_ports(py::module_& m) {
   py::class_<JointState>(m, "JointState", "What an arm says of itself.")
-      .def(py::init([](double time_s, const Eigen::Vector4d& q, const std::string& operating_state) {
-             return JointState{time_s, JointVector::from_vector(q), operating_state_of(operating_state)};
+      .def(py::init([](double time_s, const Eigen::Vector4d& q, const std::string& operating_state, bool follows) {
+             return JointState{time_s, JointVector::from_vector(q), operating_state_of(operating_state), follows};
            }),
-           py::arg("time_s"), py::arg("q"), py::arg("operating_state") = "ENABLED",
+           py::arg("time_s"), py::arg("q"), py::arg("operating_state") = "ENABLED", py::arg("follows") = true,
            "time_s: when the joints were read, on the loop's clock; q: float[4], theta, phi [rad], rho [m], psi [rad]; "
-           "operating_state: CRTK's word.")
+           "operating_state: CRTK's word; follows: False where nothing that is sent moves the arm, and the loop only "
+           "says "
+           "what it would do.")
       .def_readonly("time_s", &JointState::time_s)
       .def_property_readonly(
           "q", [](const JointState& self) { return self.q.vector(); }, "float[4]")
       .def_property_readonly("operating_state",
-                             [](const JointState& self) { return std::string(to_string(self.operating_state)); });
+                             [](const JointState& self) { return std::string(to_string(self.operating_state)); })
+      .def_readonly("follows", &JointState::follows);
 
   py::class_<JointPath>(m, "JointPath",
                         R"(Set-points over time. Where no newer path comes it brakes to rest by itself.)")
