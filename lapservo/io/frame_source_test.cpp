@@ -112,6 +112,26 @@ TEST(VideoSource, MarksDamagedFrames) {
   }
 }
 
+// FFmpeg's decoder of motion JPEG says nothing of most of them; libjpeg does.
+TEST(VideoSource, MarksFramesOfMotionJpegWithAFlippedBit) {
+  const testing::TemporaryFolder folder;
+  write_video(folder / "a.avi", "MJPG");
+  const std::string whole = bytes_of(folder / "a.avi");
+  constexpr int flips = 40;
+  int marked = 0;
+  Random random(5);
+  for (int i = 0; i < flips; ++i) {
+    std::string bytes = whole;
+    // Within the frames: before them stands the file's header, after them its index.
+    const std::size_t at =
+        whole.size() / 8 + static_cast<std::size_t>(random.uniform(0, 0.75) * static_cast<double>(whole.size()));
+    bytes[at] = static_cast<char>(bytes[at] ^ (1 << random.bits() % 8));
+    testing::write_file(folder / "a.avi", bytes);
+    marked += read(folder / "a.avi").damaged > 0;
+  }
+  EXPECT_GE(marked, flips / 2);
+}
+
 TEST(OpenFrameSource, NamesWhatCanNotBeRead) {
   const testing::TemporaryFolder folder;
   const auto said = [&](const std::string& input) {

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int max_scans = 64;  // of a progressive picture; some files have thousands, to take minutes
 
-// The library leaves by longjmp, so nothing here or in read_rows() may have a destructor.
+// The library leaves by longjmp, so nothing here or in what reads may have a destructor.
 struct Decoder {
   jpeg_decompress_struct info;
   jpeg_error_mgr errors;
@@ -46,12 +46,29 @@ void on_progress(j_common_ptr info) {
 
 void print_nothing(j_common_ptr) {}
 
-void read_rows(Decoder& decoder, std::span<const std::uint8_t> bytes, cv::Mat& image) {
-  if (setjmp(decoder.leave) != 0) return;
+void read_header(Decoder& decoder, std::span<const std::uint8_t> bytes) {
+  decoder.info.client_data = &decoder;
+  decoder.info.err = jpeg_std_error(&decoder.errors);
+  decoder.errors.error_exit = on_error;
+  decoder.errors.emit_message = on_message;
+  decoder.errors.output_message = print_nothing;
+  decoder.progress.progress_monitor = on_progress;
   jpeg_create_decompress(&decoder.info);
   decoder.info.progress = &decoder.progress;
   jpeg_mem_src(&decoder.info, bytes.data(), bytes.size());
   jpeg_read_header(&decoder.info, TRUE);
+}
+
+void read_coefficients(Decoder& decoder, std::span<const std::uint8_t> bytes) {
+  if (setjmp(decoder.leave) != 0) return;
+  read_header(decoder, bytes);
+  jpeg_read_coefficients(&decoder.info);
+  jpeg_finish_decompress(&decoder.info);
+}
+
+void read_rows(Decoder& decoder, std::span<const std::uint8_t> bytes, cv::Mat& image) {
+  if (setjmp(decoder.leave) != 0) return;
+  read_header(decoder, bytes);
   decoder.info.out_color_space = JCS_EXT_BGR;
   jpeg_start_decompress(&decoder.info);
   image.create(static_cast<int>(decoder.info.output_height), static_cast<int>(decoder.info.output_width), CV_8UC3);
@@ -67,17 +84,18 @@ void read_rows(Decoder& decoder, std::span<const std::uint8_t> bytes, cv::Mat& i
 
 DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes) {
   Decoder decoder{};
-  decoder.info.client_data = &decoder;
-  decoder.info.err = jpeg_std_error(&decoder.errors);
-  decoder.errors.error_exit = on_error;
-  decoder.errors.emit_message = on_message;
-  decoder.errors.output_message = print_nothing;
-  decoder.progress.progress_monitor = on_progress;
   DecodedPicture picture;
   read_rows(decoder, bytes, picture.bgr);
   jpeg_destroy_decompress(&decoder.info);
   picture.complaint = decoder.complaint.data();
   return picture;
+}
+
+std::string jpeg_complaint(std::span<const std::uint8_t> bytes) {
+  Decoder decoder{};
+  read_coefficients(decoder, bytes);
+  jpeg_destroy_decompress(&decoder.info);
+  return decoder.complaint.data();
 }
 
 }  // namespace lapservo::internal

@@ -15,6 +15,7 @@ extern "C" {
 }
 
 #include "lapservo/core/error.h"
+#include "lapservo/io/jpeg_picture.h"
 
 namespace lapservo::internal {
 namespace {
@@ -123,12 +124,18 @@ class VideoReader::State {
   bool feed() {
     while (av_read_frame(format_.get(), packet_.get()) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
-      if (ours && (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0) tainted_ = true;
+      if (ours && ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0 || is_damaged_jpeg(*packet_))) tainted_ = true;
       const int sent = ours ? avcodec_send_packet(decoder_.get(), packet_.get()) : 0;
       av_packet_unref(packet_.get());
       if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
     }
     return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
+  }
+
+  // FFmpeg's decoder of motion JPEG says nothing of most flipped bits; a frame would be shifted, or of other colours.
+  bool is_damaged_jpeg(const AVPacket& packet) const {
+    return stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG &&
+           !jpeg_complaint({packet.data, static_cast<std::size_t>(std::max(0, packet.size))}).empty();
   }
 
   // What is predicted from a damaged frame is damaged too, up to the next that stands alone.
