@@ -8,7 +8,7 @@ int main(int argc, char** argv) {
   lapservo::Rig rig = lapservo::load_rig(argv[2]);
   for (lapservo::Instrument& instrument : rig.instruments)
     instrument.camera_from_rcm.reset();  // tells where the RCM is
-  lapservo::Tracker tracker(rig);
+  lapservo::Tracker tracker(rig, {.frame_budget = std::nullopt});
   std::vector<lapservo::LineObservation> lines;
   const auto frames = lapservo::open_frame_source(argv[1], 30);
   while (const auto frame = frames->next()) {

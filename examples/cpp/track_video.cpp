@@ -6,7 +6,7 @@
 int main(int argc, char** argv) {
   if (argc != 3) return 2;
   const lapservo::Rig rig = lapservo::load_rig(argv[2]);
-  lapservo::Tracker tracker(rig);
+  lapservo::Tracker tracker(rig, {.frame_budget = std::nullopt});
   const auto frames = lapservo::open_frame_source(argv[1], 30);
   while (const auto frame = frames->next()) {
     const auto& seen = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);

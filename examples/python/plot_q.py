@@ -10,7 +10,7 @@ import lapservo
 matplotlib.use("Agg")
 from matplotlib import pyplot
 
-tracker = lapservo.Tracker(lapservo.Rig.load(sys.argv[2]))
+tracker = lapservo.Tracker(lapservo.Rig.load(sys.argv[2]), frame_budget=None)
 rows = []
 for frame in lapservo.open_frames(sys.argv[1]):
     seen = tracker.track(frame)[0]

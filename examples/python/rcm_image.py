@@ -6,7 +6,7 @@ import lapservo
 
 rig = lapservo.Rig.load(sys.argv[2])
 free = lapservo.Rig(rig.camera, [lapservo.Instrument(i.name, i.marker) for i in rig.instruments])
-tracker = lapservo.Tracker(free)
+tracker = lapservo.Tracker(free, frame_budget=None)
 seen = [tracker.track(frame)[0] for frame in lapservo.open_frames(sys.argv[1])]
 estimate = lapservo.estimate_rcm(seen)
 if estimate.point_px is None:

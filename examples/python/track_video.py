@@ -5,7 +5,7 @@ import sys
 import lapservo
 
 rig = lapservo.Rig.load(sys.argv[2])
-tracker = lapservo.Tracker(rig)
+tracker = lapservo.Tracker(rig, frame_budget=None)
 for frame in lapservo.open_frames(sys.argv[1]):
     for seen in tracker.track(frame):
         if seen.q is None:

@@ -23,6 +23,7 @@ struct FineFit {
   int sides_used = 0;                    ///< of them, those at which the side was located and agrees with the fit
   double inlier_rms_sigmas = 0;          ///< of the boundaries' residuals, print errors taken out
   double print_off_probability = 0;      ///< that the print is off by more than the rig's tolerance
+  double psi_variance = 0;               ///< by which picture and print are judged (print_fit.h)
   double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
   double psi_variance_by_print = 0;      ///< and what the print adds beyond that
   Processing processing = Processing::unknown;  ///< as far as asked

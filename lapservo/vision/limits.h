@@ -59,11 +59,8 @@ inline constexpr SearchCosts search_costs;
 
 /// When a free fit overrules camera_from_rcm, and what is said of q then (surface_tracker.cpp).
 struct RegistrationLimits {
-  double well_seen_fraction = 0.7;  ///< of the boundary points: hidden ones leave free fits that are wrong
-  /// A print that is off contradicts any registration, so the picture must speak for the rig's: a half of what is
-  /// assumed before it was seen (print_limits). Rendered: at most 0.04 of 97 in 100 exact prints, at least 0.17 of 3874
-  /// that are off.
-  double max_print_off_probability = 0.1;
+  double well_seen_fraction = 0.7;   ///< of the boundary points: hidden ones leave free fits that are wrong
+  double max_print_fraction = 0.25;  ///< of psi's variance: a print that is off contradicts any registration
   /// Between the fitted axis and the line from the RCM, where q is still given, with this angle in its sigma.
   double max_mismatch_rad = 0.03;
 };
@@ -147,14 +144,16 @@ inline constexpr ProcessingLimits processing_limits;
 
 /// What is assumed of prints that are not the rig's (print_fit.cpp).
 struct PrintLimits {
-  /// How far a print is off when it is [mm], and how often that is; all others are the rig's. Nobody prints, cuts and
-  /// wraps to 5 um: with half of them there, an exact print's sigma was as large and lucky prints were taken for exact
-  /// ones. But where the evidence is doubtful (CommonErrors::doubt_scale), what is assumed is most of what is said, and
-  /// a defocused exact print's sigma was 9 mrad: to its square's inverse the first fractions count, the rest of the way
-  /// the second. Large errors must be as likely in doubt: a boundary that lies far away is found as a blurred one.
+  /// How far a print is off when it is [mm], and how often that is; all others are the rig's. What is seen, and whether
+  /// the print is to blame, goes by `fractions`, each about half of the one before: an exact print's sigma grows by a
+  /// tenth, and with all sizes alike frames that tell nothing lost 17 % of what was found.
   std::array<double, 8> sigmas_mm{0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64};
-  std::array<double, 8> fractions{0, 0.045, 0.09, 0.045, 0.006, 0.0016, 0.0008, 0.0004};
-  std::array<double, 8> fractions_in_doubt{0.05, 0.025, 0.0125, 0.00625, 0.006, 0.0016, 0.0008, 0.0004};
+  std::array<double, 8> fractions{0.05, 0.025, 0.0125, 0.00625, 0.006, 0.0016, 0.0008, 0.0004};
+  /// How sure the pose is goes by these, where the evidence is clear (CommonErrors::doubt_scale; to the inverse of its
+  /// square). Nobody prints, cuts and wraps to 5 um: with half of them there, lucky prints were taken for exact ones
+  /// (error / sigma 2.06). Blaming the print by these, a focal length that is off by 3 % was a print that is off; in
+  /// doubt, a defocused exact print's sigma was 9 mrad.
+  std::array<double, 8> fractions_of_clear{0, 0.04, 0.07, 0.03, 0.006, 0.0016, 0.0008, 0.0004};
   double min_weight = 1e-6;  ///< less is too unlikely to count
 };
 inline constexpr PrintLimits print_limits;

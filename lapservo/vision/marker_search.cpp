@@ -25,7 +25,7 @@ Found refusal(Status status, const PoseUnknowns& unknowns) {
 
 bool contradicts_registration(const FineFit& free) {
   return free.located_fraction() > registration_limits.well_seen_fraction &&
-         free.print_off_probability < registration_limits.max_print_off_probability;
+         free.psi_variance_by_print <= registration_limits.max_print_fraction * free.psi_variance;
 }
 
 // What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.
@@ -195,7 +195,8 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
   const Rival rival = look_for_rival(frame, *candidate_, budget);
   Found found{Status::ambiguous, std::nullopt, std::nullopt};
   if (rival == Rival::none) found = {Status::ok, std::move(candidate_), {}};
-  if (rival != Rival::not_known_yet) begin_anew(found.status);
+  // What was found says nothing of a later frame in which it is lost.
+  if (rival != Rival::not_known_yet) begin_anew(rival == Rival::none ? Status::no_marker : found.status);
   return found;
 }
 
@@ -251,12 +252,12 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   return candidate_ ? Found{Status::ok, std::move(candidate_), {}} : Found{};
 }
 
-Found MarkerSearch::look_long(const SearchFrame& frame, const Found& plain, bool plain_is_known, WorkBudget& budget) {
+Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget) {
   if (!free_.done)
     if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
   if (!free_.done) return {};
   // Such a print is not hidden: this is what the search came to.
-  if (plain.status == Status::marker_mismatch) hidden_.done = true;
+  if (is_mismatch) hidden_.done = true;
   return hidden_.done ? Found{} : hidden(frame, budget);
 }
 
@@ -271,16 +272,17 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::one,
                              [&](WorkBudget& part) { return detect(frame, frame.camera_from_rcm, plain_, part); });
   if (plain.fit) {
-    begin_anew(Status::ok);
+    begin_anew(Status::no_marker);
     return plain;
   }
-  const bool plain_is_known = plain_.done && (from_the_first || plain.status == Status::marker_mismatch);
+  const bool plain_is_known = plain_.done && from_the_first;
+  const bool is_mismatch = plain.status == Status::marker_mismatch;
   if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
   plain.status = status_;
   if (plain_.done) plain_ = {}, searches_long_ = true;
   if (!searches_long_) return plain;
   budget.allow(longs_turn_ ? WorkBudget::Beyond::one : WorkBudget::Beyond::none);
-  Found found = look_long(frame, plain, plain_is_known, budget);
+  Found found = look_long(frame, is_mismatch, plain_is_known, budget);
   if (found.fit || hidden_.done) begin_anew(status_);
   return found.fit ? found : plain;
 }

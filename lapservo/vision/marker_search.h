@@ -58,7 +58,7 @@ class MarkerSearch {
   static Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget);
   Found look_without_rcm(const SearchFrame& frame, WorkBudget& budget);
   Found look_with_rcm(const SearchFrame& frame, WorkBudget& budget);
-  Found look_long(const SearchFrame& frame, const Found& plain, bool plain_is_known, WorkBudget& budget);
+  Found look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget);
   Found despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget);
   Found hidden(const SearchFrame& frame, WorkBudget& budget);
   bool finish_agreement(const SearchFrame& frame, WorkBudget& budget);

@@ -254,7 +254,12 @@ class Mixture {
   }
   Solution mean() const {
     const UnknownVector step = step_ / weight_;
-    return {step, print_mm_ / weight_, squares_ / weight_ - step * step.transpose()};
+    return {step, print_mm_ / weight_, about(step)};
+  }
+  // Mean square of what lies beside that step.
+  UnknownMatrix about(const UnknownVector& step) const {
+    const UnknownVector mean = step_ / weight_, beside = mean - step;
+    return squares_ / weight_ - mean * mean.transpose() + beside * beside.transpose();
   }
 
  private:
@@ -264,23 +269,31 @@ class Mixture {
   double weight_ = 0;
 };
 
-// How likely the tolerated print and those that are off by print_sigmas_mm are, the likeliest of them 1 at most.
-std::array<double, print_sigmas_mm.size() + 1> weights_of(const Evidence& evidence, double tolerance_mm,
-                                                          double doubt_scale) {
-  std::array<double, print_sigmas_mm.size() + 1> gains{evidence.gain(tolerance_mm)};
-  for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i)
-    gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
+constexpr std::size_t sizes = print_sigmas_mm.size();
+using Weights = std::array<double, sizes + 1>;  // of the tolerated print, and of those that are off by print_sigmas_mm
+
+// The likelihoods' logarithms, the largest 0.
+Weights gains_of(const Evidence& evidence, double tolerance_mm) {
+  Weights gains{evidence.gain(tolerance_mm)};
+  for (std::size_t i = 0; i < sizes; ++i) gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
   const double best = *std::max_element(gains.begin(), gains.end());
-  std::array<double, print_sigmas_mm.size() + 1> weights{};
-  const double sure = 1 / (doubt_scale * doubt_scale);
-  double off = 0;
-  for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i) {
-    const double fraction = std::lerp(print_limits.fractions_in_doubt[i], print_limits.fractions[i], sure);
-    weights[i + 1] = fraction * std::exp(gains[i + 1] - best);
-    off += fraction;
-  }
-  weights[0] = (1 - off) * std::exp(gains[0] - best);
+  for (double& gain : gains) gain -= best;
+  return gains;
+}
+
+// `fractions`: how often prints are off by print_sigmas_mm.
+Weights weights_of(const Weights& gains, const std::array<double, sizes>& fractions) {
+  Weights weights{(1 - std::accumulate(fractions.begin(), fractions.end(), 0.0)) * std::exp(gains[0])};
+  for (std::size_t i = 0; i < sizes; ++i) weights[i + 1] = fractions[i] * std::exp(gains[i + 1]);
   return weights;
+}
+
+std::array<double, sizes> fractions_to_tell(double doubt_scale) {
+  std::array<double, sizes> fractions{};
+  const double clear = 1 / (doubt_scale * doubt_scale);
+  for (std::size_t i = 0; i < sizes; ++i)
+    fractions[i] = std::lerp(print_limits.fractions[i], print_limits.fractions_of_clear[i], clear);
+  return fractions;
 }
 
 }  // namespace
@@ -315,23 +328,28 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   if (!exact || !tolerated) return std::nullopt;
   // The exact print's pose is where the measurements were taken.
   if (tolerance_m == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
-  const auto weights = weights_of(Evidence(sums, errors.doubt_scale), tolerance_mm, errors.doubt_scale);
-  Mixture mixture(pose_unknowns + 1);
-  mixture.add(*tolerated, weights[0]);
-  for (std::size_t i = 0; i < print_sigmas_mm.size(); ++i) {
-    if (weights[i + 1] < print_limits.min_weight) continue;
+  const Weights gains = gains_of(Evidence(sums, errors.doubt_scale), tolerance_mm);
+  const Weights judged_by = weights_of(gains, print_limits.fractions);
+  const Weights told_by = weights_of(gains, fractions_to_tell(errors.doubt_scale));
+  Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
+  judged.add(*tolerated, judged_by[0]), told.add(*tolerated, told_by[0]);
+  for (std::size_t i = 0; i < sizes; ++i) {
+    if (std::max(judged_by[i + 1], told_by[i + 1]) < print_limits.min_weight) continue;
     const auto off = solved(sums, std::hypot(print_sigmas_mm[i], tolerance_mm));
     if (!off) return std::nullopt;
-    mixture.add(*off, weights[i + 1]);
+    judged.add(*off, judged_by[i + 1]), told.add(*off, told_by[i + 1]);
   }
-  const Solution mean = mixture.mean();
+  const Solution mean = judged.mean();
   for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
   const int psi = pose_unknowns - 1;
   PrintFit fit;
   fit.step = mean.step;
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
-  fit.off_probability = 1 - weights[0] / std::accumulate(weights.begin(), weights.end(), 0.0);
-  fit.psi_variance_by_print = fit.covariance(psi, psi) - tolerated->covariance(psi, psi);
+  const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
+  fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
+  fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
+  fit.psi_variance = mean.covariance(psi, psi);
+  fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);
   fit.psi_variance_by_tolerance = tolerated->covariance(psi, psi) - exact->covariance(psi, psi);
   return fit;
 }

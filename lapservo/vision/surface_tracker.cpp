@@ -131,9 +131,13 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
   BlurredEdges::instance();  // takes milliseconds, which no frame should
 }
 
-void SurfaceTracker::reset() {
-  std::fill(memory_.begin(), memory_.end(), std::nullopt);
-  std::fill(searches_.begin(), searches_.end(), MarkerSearch());
+void SurfaceTracker::forget(std::size_t i) {
+  memory_[i].reset();
+  searches_[i] = MarkerSearch();
+}
+
+void SurfaceTracker::forget() {
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) forget(i);
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
@@ -182,7 +186,7 @@ void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkB
 const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) {
   const ImageView image(image_bgr);
   const LightImage light(image, light_, channels_);
-  if (single_) reset();
+  if (single_) forget();
   WorkBudget budget(single_ ? std::nullopt : frame_budget_);
   find(image, light, budget);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {

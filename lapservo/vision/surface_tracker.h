@@ -25,7 +25,9 @@ class SurfaceTracker {
 
   /// `image_bgr` is 8-bit BGR of the rig's size. One observation per instrument.
   const std::vector<Observation>& track(const cv::Mat& image_bgr);
-  void reset();
+  /// Forgets what is known from the frames before, of one instrument or of all.
+  void forget(std::size_t instrument);
+  void forget();
   void set_frame_budget(std::optional<double> units) { frame_budget_ = units; }
 
  private:

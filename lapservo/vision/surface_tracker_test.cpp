@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
@@ -165,7 +166,7 @@ TEST(SurfaceTracker, FindsTheInstrumentAgainAfterItWasHidden) {
     for (int i = 0; i < 3; ++i) EXPECT_EQ(tracker.track(hidden)[0].status, Status::no_marker);
     expect_seen(after);
     expect_seen(before);  // a jump without a gap
-    tracker.reset();
+    tracker.forget();
     expect_seen(after);
   }
 }
@@ -390,6 +391,48 @@ struct BloodyMotion {
     }
   }
 };
+
+// Strips of two of the marker's colours, as many as it takes for a search to outlast its budget.
+cv::Mat with_strips(cv::Mat image, const Marker& marker) {
+  constexpr int width = 160, height = 26;
+  for (int k = 0; k < 8; ++k) {
+    cv::Mat hsv(height, width, CV_8UC3), strip;
+    for (int x = 0; x < width; ++x)
+      hsv.col(x).setTo(cv::Scalar(marker.hues_deg[static_cast<std::size_t>(2 * x / width + k) % 3] / 2, 200, 180));
+    cv::cvtColor(hsv, strip, cv::COLOR_HSV2BGR);
+    strip.copyTo(image(cv::Rect(60 + (k % 4) * 220, 80 + (k / 4) * 250, width, height)));
+  }
+  return image;
+}
+
+// What was ok is not so in a frame without it, however far the search for it comes.
+TEST(SurfaceTracker, WhatIsLostIsNotOkWhileItIsLookedFor) {
+  int lost = 0;
+  for (const std::size_t instruments : {1U, 2U})
+    for (const bool registered : {true, false}) {
+      Rig rig = scenes::usual_rig(static_cast<int>(instruments));
+      Random random(1);
+      std::vector<JointVector> q;
+      for (std::size_t i = 0; i < instruments; ++i) q.push_back(scenes::random_configuration(rig, i, random));
+      const cv::Mat there = scenes::render(rig, q, 1);
+      const cv::Mat gone = with_strips(scenes::render_nothing(rig, 1), rig.instruments[0].marker);
+      if (!registered)
+        for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
+      for (const double frame_budget : {1, 1500, 4000, 8000}) {
+        Tracker tracker(rig, {.frame_budget = frame_budget});
+        for (int i = 0; i < 3; ++i) tracker.track(there);
+        const std::vector<Observation> before = tracker.track(there);
+        for (int i = 0; i < 3; ++i) {
+          const auto& after = tracker.track(gone);
+          for (std::size_t k = 0; k < instruments; ++k) {
+            EXPECT_TRUE(after[k].status != Status::ok || after[k].marker) << frame_budget << ", frame " << i;
+            lost += before[k].status == Status::ok && after[k].status != Status::ok;
+          }
+        }
+      }
+    }
+  EXPECT_GE(lost, 40) << "the test's own power";
+}
 
 // What one frame's long search finds, frames with a budget find together, and in the same frames each time.
 TEST(SurfaceTracker, SpreadsALongSearchOverFrames) {

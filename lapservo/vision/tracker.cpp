@@ -81,7 +81,7 @@ struct Tracker::State {
     for (std::size_t i = 0; i < observations.size(); ++i) {
       if (!is_combed(image, rig.camera, rig.instruments[i].marker, observations[i])) continue;
       observations[i] = refused_as_interlaced(observations[i], method);
-      surface.reset();
+      surface.forget(i);
     }
   }
 
@@ -126,7 +126,7 @@ const std::vector<Observation>& Tracker::refuse(Status why) & {
 }
 
 void Tracker::reset() {
-  state_->surface.reset();
+  state_->surface.forget();
 }
 
 }  // namespace lapservo

@@ -29,7 +29,8 @@ struct TrackerOptions {
   /// results whatever else the machine does. Instruments that are followed cost less than 1000 each; a search for one
   /// that is hidden, a hundred times that, goes on in the frames to come where it stopped. Until it comes to its end
   /// the status is what is known so far. Pictures that don't follow one another need nullopt. Frames of `single` are
-  /// always searched whole.
+  /// always searched whole. What can't wait for the next frame goes beyond the budget: a second print's place, a
+  /// registration that is contradicted, a shaft that the border cuts.
   std::optional<double> frame_budget = 8000;
 };
 

@@ -38,8 +38,7 @@ Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
   const auto squared = [](double x) { return x * x; };
   const bool off = fit.print_off_probability > limits.certainly_off;
   const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
-  const Eigen::Index psi = fit.unknowns.size() - 1;
-  const double variance = fit.covariance(psi, psi);
+  const double variance = fit.psi_variance;
   if (fit.psi_variance_by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
   if (variance < limit + limits.tolerance_slack * fit.psi_variance_by_tolerance) return Status::ok;
   const bool well_seen = fit.located_fraction() > limits.well_seen_fraction;

@@ -93,7 +93,7 @@ TEST(Verification, AFitWithoutSupportIsNotOk) {
   fit.used[0] = fit.used[3] = 0;
   EXPECT_EQ(validate(scene, fit), Status::occluded);
   fit = right;
-  fit.covariance(3, 3) = 0.01;
+  fit.psi_variance = 0.01;
   EXPECT_EQ(validate(scene, fit), Status::uncertain);
   fit = right;
   fit.inlier_rms_sigmas = 4;
