@@ -69,6 +69,11 @@ MHD_Result add_query(void* request, MHD_ValueKind, const char* key, const char* 
   return MHD_YES;
 }
 
+MHD_Result add_cookie(void* request, MHD_ValueKind, const char* key, const char* value) {
+  static_cast<HttpRequest*>(request)->cookies.emplace(key, value ? value : "");
+  return MHD_YES;
+}
+
 bool has_body(const HttpRequest& request) {
   const auto length = request.header("content-length");
   return request.headers.count("transfer-encoding") > 0 ||
@@ -155,8 +160,7 @@ struct HttpServer::Callbacks {
     request.path = url;
     MHD_get_connection_values(connection, MHD_HEADER_KIND, add_header, &request);
     MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add_query, &request);
-    const char* token = MHD_lookup_connection_value(connection, MHD_COOKIE_KIND, cookie);
-    request.token = token ? token : "";
+    MHD_get_connection_values(connection, MHD_COOKIE_KIND, add_cookie, &request);
     self.set_deadline(*exchange->peer, self.limits_.answer_s);
     return exchange.release();
   }

@@ -33,8 +33,6 @@ class HttpServer {
   /// The answer, or nullopt: not yet, which is asked again at the next wake(), and once with `last` when its patience
   /// has ended. Called in the server's thread.
   using Handler = std::function<std::optional<HttpResponse>(const HttpRequest&, bool last)>;
-  /// Whose value is HttpRequest::token.
-  static constexpr const char* cookie = "lapservo_token";
 
   /// At an address of this computer; port 0: any that is free. Throws InputError, naming `option`, where it can't.
   HttpServer(const std::string& address, int port, const std::string& option, const HttpLimits& limits,

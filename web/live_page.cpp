@@ -34,6 +34,7 @@ HttpResponse plain(int status, const std::string& text) {
 std::optional<HttpResponse> file_at(const std::string& path) {
   if (path == "/") return HttpResponse{200, "text/html; charset=utf-8", page_html};
   if (path == "/page.css") return HttpResponse{200, "text/css; charset=utf-8", page_css};
+  if (path == "/welcome.js") return HttpResponse{200, "text/javascript; charset=utf-8", "location.replace(\"/\");\n"};
   if (path == "/page.js") return HttpResponse{200, "text/javascript; charset=utf-8", page_js};
   return std::nullopt;
 }

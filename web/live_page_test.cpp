@@ -84,7 +84,8 @@ TEST(LivePage, ServesItsFilesAndNothingElse) {
   EXPECT_EQ(http_status(html), 200);
   EXPECT_NE(html.find("<script src=\"page.js\""), std::string::npos);
   EXPECT_NE(html.find("frame-ancestors 'none'"), std::string::npos);
-  for (const char* path : {"/page.css", "/page.js", "/state"}) EXPECT_EQ(http_status(http(port, "GET", path)), 200);
+  for (const char* path : {"/page.css", "/page.js", "/welcome.js", "/state"})
+    EXPECT_EQ(http_status(http(port, "GET", path)), 200) << path;
   for (const char* path : {"/x", "/../etc/passwd", "//page.js", "/page.js/", "/hold"})
     EXPECT_EQ(http_status(http(port, "GET", path)), 404) << path;
   EXPECT_EQ(http_status(http(port, "DELETE", "/state")), 405);
@@ -151,8 +152,10 @@ TEST(LivePage, RefusesStrangersAndOtherSites) {
     EXPECT_EQ(http_status(http(port, "GET", path)), 401) << path;
   EXPECT_EQ(http_status(http_post(port, "/stop")), 401);
   EXPECT_FALSE(page.take_wishes().stop);
-  EXPECT_EQ(http_status(http(port, "GET", "/?token=" + token)), 303);
-  const std::string cookie = "Cookie: lapservo_token=" + token + "\r\n";
+  const std::string welcome = http(port, "GET", "/?token=" + token);
+  EXPECT_EQ(http_status(welcome), 200);
+  EXPECT_NE(welcome.find("<script src=\"welcome.js\">"), std::string::npos);
+  const std::string cookie = fmt::format("Cookie: theme=dark; lapservo_token_{}={}\r\n", port, token);
   EXPECT_EQ(http_status(http(port, "GET", "/state", cookie)), 200);
   EXPECT_EQ(http_status(http(port, "GET", "/state", cookie + "Host: evil.example\r\n")), 403);
   EXPECT_EQ(http_status(http(port, "POST", "/hold", cookie + "Origin: http://evil.example\r\nContent-Length: 0\r\n")),

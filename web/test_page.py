@@ -103,6 +103,13 @@ def state(browser, text):
     browser.wait_for(f"document.getElementById('state').textContent.includes({json.dumps(text)})")
 
 
+def follow(browser, url):
+    """A link on another site's page."""
+    browser.call("Page.navigate", url=f"data:text/html,<a id=link href='{url}'>lapservo</a>")
+    browser.wait_for("document.getElementById('link') !== null")
+    browser.value("document.getElementById('link').click()")
+
+
 def look(browser, folder, name):
     for width, height in ((1280, 800), (390, 844)):
         browser.resize(width, height)
@@ -121,7 +128,7 @@ def see_the_loop(browser, tool, rig, folder):
         browser.call("Page.navigate", url=url.replace("0.0.0.0", "127.0.0.1").split("?")[0])
         browser.wait_for("document.body.innerText.includes('token')")  # refused
         browser.complaints.clear()
-        browser.call("Page.navigate", url=url.replace("0.0.0.0", "127.0.0.1"))
+        follow(browser, url.replace("0.0.0.0", "127.0.0.1"))
         browser.wait_for("location.search === '' && document.getElementById('picture').naturalWidth > 0")
         state(browser, "track")
         look(browser, folder, "servo")
