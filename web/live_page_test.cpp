@@ -18,6 +18,7 @@ using lapservo::testing::http;
 using lapservo::testing::http_post;
 using lapservo::testing::http_status;
 using lapservo::testing::RawConnection;
+using lapservo::testing::start_path;
 
 PageConfig config_of_test() {
   PageConfig config;
@@ -113,13 +114,13 @@ TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
   {
     LivePage page(config);
     const int port = port_of(page);
-    EXPECT_EQ(http_status(http_post(port, "/start")), 403);
+    EXPECT_EQ(http_status(http_post(port, start_path())), 403);
     EXPECT_FALSE(page.take_wishes().hold);
     EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
     EXPECT_EQ(page.take_wishes().hold, true);
     EXPECT_FALSE(page.take_wishes().hold);  // once
     EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
-    EXPECT_EQ(http_status(http_post(port, "/start")), 403);
+    EXPECT_EQ(http_status(http_post(port, start_path())), 403);
     EXPECT_EQ(page.take_wishes().hold, true);
     EXPECT_EQ(http_status(http_post(port, "/stop")), 202);
     EXPECT_TRUE(page.take_wishes().stop);
@@ -129,16 +130,39 @@ TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
   {
     LivePage page(config);
     const int port = port_of(page);
-    EXPECT_EQ(http_status(http_post(port, "/start")), 202);
+    EXPECT_EQ(http_status(http_post(port, start_path())), 202);
     EXPECT_EQ(page.take_wishes().hold, false);
     EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
-    EXPECT_EQ(http_status(http_post(port, "/start")), 202);
+    EXPECT_EQ(http_status(http_post(port, start_path())), 202);
     EXPECT_EQ(page.take_wishes().hold, true);  // of two in a tick
   }
   config.has_loop = false;
   LivePage page(config);
-  EXPECT_EQ(http_status(http_post(port_of(page), "/start")), 403);
+  EXPECT_EQ(http_status(http_post(port_of(page), start_path())), 403);
   EXPECT_EQ(http_status(http_post(port_of(page), "/hold")), 403);
+}
+
+// The network or a stopped process may keep it back: who asked for it has turned to something else by then.
+TEST(LivePage, StartsNothingLate) {
+  PageConfig config = config_of_test();
+  config.may_start = true;
+  LivePage page(config);
+  const int port = port_of(page);
+  for (const std::string& path : {start_path(1.1), start_path(100), start_path(-100)})
+    EXPECT_EQ(http_status(http_post(port, path)), 409) << path;
+  for (const char* path : {"/start", "/start?at=", "/start?at=now", "/start?at=nan", "/start?at=inf"})
+    EXPECT_EQ(http_status(http_post(port, path)), 400) << path;
+  EXPECT_FALSE(page.take_wishes().hold);
+  EXPECT_EQ(http_status(http_post(port, start_path(0.5))), 202);
+  EXPECT_NE(http(port, "GET", "/state").find(R"("asked":"start")"), std::string::npos);
+  std::this_thread::sleep_for(std::chrono::milliseconds(520));
+  EXPECT_NE(http(port, "GET", "/state").find(R"("asked":"")"), std::string::npos);
+  EXPECT_FALSE(page.take_wishes().hold);
+  // What holds comes late too.
+  EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(http_status(http_post(port, start_path(1.1))), 409);
+  EXPECT_EQ(page.take_wishes().hold, true);
 }
 
 TEST(LivePage, RefusesStrangersAndOtherSites) {
