@@ -138,7 +138,7 @@ struct HttpServer::Callbacks {
       (void)lowered;
       const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
       auto made = std::make_unique<Peer>(Peer{info->connect_fd, {}});
-      self.set_deadline(*made, self.limits_.head_s);
+      self.set_deadline(*made, self.limits_.first_s);
       const std::lock_guard lock(self.mutex_);
       self.peers_.insert(made.get());
       *peer = made.release();
@@ -176,16 +176,17 @@ HttpServer::HttpServer(const std::string& address, int port, const std::string& 
 void HttpServer::open(const std::string& address, int port, const std::string& option) {
   const Address where = address_of(address, port, option);
   const unsigned v6 = where.any.sa_family == AF_INET6 ? MHD_USE_IPv6 : 0;
-  daemon_ = MHD_start_daemon(
-      MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | v6, static_cast<std::uint16_t>(port), nullptr, nullptr,
-      &Callbacks::on_request, this, MHD_OPTION_SOCK_ADDR, &where.any,                                    //
-      MHD_OPTION_CONNECTION_LIMIT, limits_.connections,                                                  //
-      MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits_.connections_per_address,                               //
-      MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits_.request_bytes,                                         //
-      MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(std::max(limits_.head_s, limits_.answer_s)),  //
-      MHD_OPTION_STRICT_FOR_CLIENT, 1,                                                                   //
-      MHD_OPTION_NOTIFY_COMPLETED, &Callbacks::on_end, this,                                             //
-      MHD_OPTION_NOTIFY_CONNECTION, &Callbacks::on_connection, this, MHD_OPTION_END);
+  daemon_ =
+      MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | v6, static_cast<std::uint16_t>(port),
+                       nullptr, nullptr, &Callbacks::on_request, this, MHD_OPTION_SOCK_ADDR, &where.any,  //
+                       MHD_OPTION_CONNECTION_LIMIT, limits_.connections,                                  //
+                       MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits_.connections_per_address,               //
+                       MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits_.request_bytes,                         //
+                       MHD_OPTION_CONNECTION_TIMEOUT,
+                       static_cast<unsigned>(std::max({limits_.first_s, limits_.head_s, limits_.answer_s})),  //
+                       MHD_OPTION_STRICT_FOR_CLIENT, 1,                                                       //
+                       MHD_OPTION_NOTIFY_COMPLETED, &Callbacks::on_end, this,                                 //
+                       MHD_OPTION_NOTIFY_CONNECTION, &Callbacks::on_connection, this, MHD_OPTION_END);
   if (!daemon_)
     throw InputError(option, "is " + address + ", where port " + std::to_string(port) + " can't be listened at (" +
                                  std::strerror(errno) + "), expected another port or an address of this computer");

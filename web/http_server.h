@@ -22,7 +22,8 @@ namespace lapservo::internal {
 struct HttpLimits {
   unsigned connections = 48, connections_per_address = 24;
   std::size_t request_bytes = 16384;  ///< request line and headers; a body is refused
-  double head_s = 5;                  ///< for a request's head to come, from the connection or the answer before on
+  double first_s = 1;                 ///< for a connection's first request to come: who is silent keeps others out
+  double head_s = 5;                  ///< for the next one's head, from the answer before on
   double answer_s = 20;               ///< for an answer to be fetched
   double patience_s = 1;              ///< a request that waits is asked again for the last time
 };

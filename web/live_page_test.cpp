@@ -25,7 +25,7 @@ PageConfig config_of_test() {
   config.title = "test";
   config.port = 0;
   config.has_loop = true;
-  config.limits.head_s = 0.3;
+  config.limits.first_s = config.limits.head_s = 0.3;
   config.limits.patience_s = 0.2;
   config.limits.connections = config.limits.connections_per_address = 16;
   return config;
@@ -214,6 +214,26 @@ TEST(LivePage, ForgetsWhoDoesNotFinishAsking) {
   while (slow.say("x") && std::chrono::steady_clock::now() < begin + std::chrono::seconds(5))
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+}
+
+// Silent connections would keep the buttons out.
+TEST(LivePage, WaitsLongerForTheNextRequestThanForTheFirst) {
+  EXPECT_LE(HttpLimits{}.first_s, 1);
+  PageConfig config = config_of_test();
+  config.limits.first_s = 0.1;
+  config.limits.head_s = 60;
+  LivePage page(config);
+  const int port = port_of(page);
+  const RawConnection silent(port), asking(port);
+  const std::string question = fmt::format("GET /state HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n", port);
+  asking.say(question + "\r\n");
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(silent.hear(), "");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  asking.say(question + "Connection: close\r\n\r\n");
+  const std::string answers = asking.hear();
+  EXPECT_NE(answers.find("HTTP/1.1 200", 1), std::string::npos) << answers;
 }
 
 TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
