@@ -7,6 +7,7 @@
 #include <cstring>
 #include <exception>
 #include <microhttpd.h>
+#include <new>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -136,12 +137,16 @@ struct HttpServer::Callbacks {
     if (what == MHD_CONNECTION_NOTIFY_STARTED) {
       thread_local const bool lowered = (lower_priority(), true);
       (void)lowered;
-      const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-      auto made = std::make_unique<Peer>(Peer{info->connect_fd, {}});
-      self.set_deadline(*made, self.limits_.first_s);
-      const std::lock_guard lock(self.mutex_);
-      self.peers_.insert(made.get());
-      *peer = made.release();
+      const int descriptor = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+      try {
+        auto made = std::make_unique<Peer>(Peer{descriptor, {}});
+        self.set_deadline(*made, self.limits_.first_s);
+        const std::lock_guard lock(self.mutex_);
+        self.peers_.insert(made.get());
+        *peer = made.release();
+      } catch (const std::exception&) {  // no memory
+        ::shutdown(descriptor, SHUT_RDWR);
+      }
     } else {
       const std::unique_ptr<Peer> ended(static_cast<Peer*>(*peer));
       const std::lock_guard lock(self.mutex_);
@@ -155,6 +160,7 @@ struct HttpServer::Callbacks {
     exchange->connection = connection;
     exchange->peer =
         static_cast<Peer*>(MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context);
+    if (!exchange->peer) throw std::bad_alloc();  // there was no memory for it
     HttpRequest& request = exchange->request;
     request.method = method;
     request.path = url;
@@ -225,8 +231,8 @@ int HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
     if (!exchange.patience)
       exchange.patience =
           now + std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(limits_.patience_s));
-    MHD_suspend_connection(connection);
     waiting_.push_back(&exchange);
+    MHD_suspend_connection(connection);
     return MHD_YES;
   }
 }
@@ -237,12 +243,11 @@ void HttpServer::set_deadline(Peer& peer, double from_now_s) {
                   std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(from_now_s));
 }
 
-// With the mutex held.
+// With the mutex held. Allocates nothing: those who call it could not say what failed.
 void HttpServer::resume(const std::function<bool(const Exchange&)>& which) {
   const auto end = std::partition(waiting_.begin(), waiting_.end(), [&](const Exchange* one) { return !which(*one); });
-  std::vector<Exchange*> awake(end, waiting_.end());
+  std::for_each(end, waiting_.end(), [](const Exchange* one) { MHD_resume_connection(one->connection); });
   waiting_.erase(end, waiting_.end());
-  for (const Exchange* exchange : awake) MHD_resume_connection(exchange->connection);
 }
 
 void HttpServer::wake() {

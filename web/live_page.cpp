@@ -203,6 +203,20 @@ HttpResponse LivePage::state() {
   return {200, "application/json", text_of(state)};
 }
 
+// Nullptr where it can't be, for want of memory too: the next one, perhaps. With the mutex held, but while it draws.
+std::shared_ptr<const LivePage::Drawn> LivePage::draw_newest(std::unique_lock<std::mutex>& lock) const {
+  std::shared_ptr<Drawn> drawn;
+  try {
+    const Shown shown = newest_;
+    lock.unlock();
+    drawn = std::make_shared<Drawn>(Drawn{shown.number, shown.came, {}, jpeg_of(shown.image)});
+    drawn->done = std::chrono::steady_clock::now();
+  } catch (const std::exception&) {
+  }
+  if (!lock.owns_lock()) lock.lock();
+  return drawn;
+}
+
 void LivePage::draw() {
   lower_priority();
   std::unique_lock lock(mutex_);
@@ -217,18 +231,8 @@ void LivePage::draw() {
       continue;
     }
     watched_until_ = {};
-    const Shown shown = newest_;
-    auto drawn = std::make_shared<Drawn>(Drawn{shown.number, shown.came, {}, {}});
-    lock.unlock();
     const auto begin = std::chrono::steady_clock::now();
-    try {
-      drawn->jpeg = jpeg_of(shown.image);
-      drawn->done = std::chrono::steady_clock::now();
-    } catch (const std::exception&) {
-      drawn.reset();  // the next one, perhaps
-    }
-    lock.lock();
-    if (drawn) drawn_ = std::move(drawn);
+    if (auto drawn = draw_newest(lock)) drawn_ = std::move(drawn);
     lock.unlock();
     server_->wake();
     std::this_thread::sleep_until(begin + between_drawings);

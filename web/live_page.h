@@ -105,6 +105,7 @@ class LivePage {
   HttpResponse start(const HttpRequest& request);
   HttpResponse state();
   void draw();
+  std::shared_ptr<const Drawn> draw_newest(std::unique_lock<std::mutex>& lock) const;
   void fetch();
 
   PageConfig config_;
