@@ -514,6 +514,17 @@ TEST_P(FirstWireLoop, ThePageHoldsStartsAndEnds) {
   EXPECT_NE(said("servo.txt").find("end: asked for on the page"), std::string::npos) << said("servo.txt");
 }
 
+TEST_P(FirstWireLoop, ThePageEndsTheWaitForAnArm) {
+  const auto loop = servo(600, "servo.txt", true, {"--web", "0"});
+  const int port = page_port();
+  sleep(0.5);
+  const double asked_s = now_s();
+  EXPECT_EQ(testing::http_status(testing::http_post(port, "/stop")), 202);
+  EXPECT_EQ(loop->wait(), 1);
+  EXPECT_LT(now_s(), asked_s + 10);
+  EXPECT_NE(said("servo.txt").find("end: asked for on the page"), std::string::npos) << said("servo.txt");
+}
+
 TEST_P(FirstWireLoop, ThePageStartsNothingWithoutEnableMotion) {
   Arm room(GetParam(), rig_);
   const auto ears = named_transport(GetParam(), "ears");
