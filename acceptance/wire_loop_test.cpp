@@ -507,10 +507,21 @@ TEST_P(FirstWireLoop, ThePageHoldsStartsAndEnds) {
   EXPECT_FALSE(spy.moves_after(rested_s));
   EXPECT_NE(testing::http(port, "GET", "/state").find(R"("state":"hold: held")"), std::string::npos);
   EXPECT_EQ(testing::http_status(testing::http(port, "GET", "/picture")), 200);
-  EXPECT_EQ(testing::http_status(testing::http_post(port, "/start")), 202);
+  EXPECT_EQ(testing::http_status(testing::http_post(port, testing::start_path())), 202);
   ASSERT_TRUE(wait_for([&] { return spy.moves_after(rested_s); })) << said("servo.txt");
   EXPECT_EQ(testing::http_status(testing::http_post(port, "/stop")), 202);
   loop->wait();
+  EXPECT_NE(said("servo.txt").find("end: asked for on the page"), std::string::npos) << said("servo.txt");
+}
+
+TEST_P(FirstWireLoop, ThePageEndsTheWaitForAnArm) {
+  const auto loop = servo(600, "servo.txt", true, {"--web", "0"});
+  const int port = page_port();
+  sleep(0.5);
+  const double asked_s = now_s();
+  EXPECT_EQ(testing::http_status(testing::http_post(port, "/stop")), 202);
+  EXPECT_EQ(loop->wait(), 1);
+  EXPECT_LT(now_s(), asked_s + 10);
   EXPECT_NE(said("servo.txt").find("end: asked for on the page"), std::string::npos) << said("servo.txt");
 }
 
@@ -522,7 +533,7 @@ TEST_P(FirstWireLoop, ThePageStartsNothingWithoutEnableMotion) {
   const int port = page_port();
   ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("would send ") != std::string::npos; }))
       << said("servo.txt");
-  EXPECT_EQ(testing::http_status(testing::http_post(port, "/start")), 403);
+  EXPECT_EQ(testing::http_status(testing::http_post(port, testing::start_path())), 403);
   sleep(0.3);
   EXPECT_EQ(spy.count(), 0u);
 }

@@ -10,10 +10,21 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
-#include "web/http_server.h"
 
 namespace lapservo::internal {
 namespace {
+
+// Goes on to / by itself, not by a redirection: of one that began at another site's link, browsers keep a strict cookie
+// back.
+constexpr const char* welcome_html = R"(<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<title>lapservo</title>
+<link rel="icon" href="data:,">
+<script src="welcome.js"></script>
+<p><a href="/">lapservo</a></p>
+</html>
+)";
 
 HttpResponse refusal(int status, const std::string& why) {
   return {status, "text/plain; charset=utf-8", why + "\n"};
@@ -32,6 +43,18 @@ std::string name_in(const std::string& host) {
   std::transform(name.begin(), name.end(), name.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return name;
+}
+
+// Browsers send a host's cookies to all its ports: without the port, another page's token would replace this one's.
+std::string cookie_at(const std::string& host) {
+  const std::size_t colon = host.rfind(':');
+  const bool has_port = colon != std::string::npos && colon + 1 < host.size() && host.back() != ']';
+  return "lapservo_token_" + (has_port ? host.substr(colon + 1) : "80");
+}
+
+// A link on another site or in a mail that was followed: what it shows, that site can't read or frame.
+bool follows_a_link(const HttpRequest& request) {
+  return request.method == "GET" && request.path == "/" && request.header("sec-fetch-mode") == "navigate";
 }
 
 bool is_address(const std::string& text) {
@@ -74,16 +97,18 @@ bool Access::is_own_host(const std::string& host) const {
 }
 
 std::optional<HttpResponse> Access::ask_for_token(const HttpRequest& request) const {
-  if (token_.empty() || equal_in_constant_time(request.token, token_)) return std::nullopt;
+  if (token_.empty()) return std::nullopt;
+  const std::string cookie = cookie_at(request.header("host").value());
+  const auto kept = request.cookies.find(cookie);
+  if (kept != request.cookies.end() && equal_in_constant_time(kept->second, token_)) return std::nullopt;
   const auto given = request.query.find("token");
   if (request.method != "GET" || request.path != "/" || given == request.query.end() ||
       !equal_in_constant_time(given->second, token_))
     return refusal(401, "open the address with the token that lapservo printed");
-  HttpResponse welcome = refusal(303, "welcome");
-  welcome.headers = {
-      {"Location", "/"},
-      {"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", HttpServer::cookie, token_)}};
-  return welcome;
+  return HttpResponse{200,
+                      "text/html; charset=utf-8",
+                      welcome_html,
+                      {{"Set-Cookie", fmt::format("{}={}; HttpOnly; SameSite=Strict; Path=/", cookie, token_)}}};
 }
 
 std::optional<HttpResponse> Access::refuse(const HttpRequest& request) const {
@@ -93,7 +118,8 @@ std::optional<HttpResponse> Access::refuse(const HttpRequest& request) const {
   if (count > 0 && request.header("origin") != "http://" + *host) return refusal(403, "a page of another site asks");
   if (request.method == "POST" && count == 0) return refusal(403, "a POST is to have its Origin");
   const auto site = request.header("sec-fetch-site");
-  if (site && *site != "same-origin" && *site != "none") return refusal(403, "a page of another site asks");
+  if (site && *site != "same-origin" && *site != "none" && !follows_a_link(request))
+    return refusal(403, "a page of another site asks");
   return ask_for_token(request);
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 HttpRequest request(const std::string& method, const std::string& path,
                     std::multimap<std::string, std::string> headers) {
-  return {method, path, std::move(headers), {}, ""};
+  return {method, path, std::move(headers), {}};
 }
 
 int status(const Access& access, const HttpRequest& asked) {
@@ -50,10 +50,10 @@ TEST(Access, AsksStrangersForTheToken) {
   HttpRequest asked = request("GET", "/state", {{"host", "192.168.1.2:8080"}});
   EXPECT_EQ(status(access, asked), 401);
   for (const std::string& wrong : {std::string("x"), token.substr(1), token + "0", "0" + token.substr(1) + "0"}) {
-    asked.token = wrong;
+    asked.cookies = {{"lapservo_token_8080", wrong}};
     EXPECT_EQ(status(access, asked), 401);
   }
-  asked.token = token;
+  asked.cookies = {{"lapservo_token_8080", token}};
   EXPECT_EQ(status(access, asked), 200);
 
   HttpRequest first = request("GET", "/", {{"host", "192.168.1.2:8080"}});
@@ -63,11 +63,44 @@ TEST(Access, AsksStrangersForTheToken) {
   first.query = {{"token", token}};
   const auto welcome = access.refuse(first);
   ASSERT_TRUE(welcome);
-  EXPECT_EQ(welcome->status, 303);
-  EXPECT_NE(welcome->headers.back().second.find(token + "; HttpOnly; SameSite=Strict"), std::string::npos);
+  EXPECT_EQ(welcome->status, 200);
+  EXPECT_EQ(welcome->headers.back().second, "lapservo_token_8080=" + token + "; HttpOnly; SameSite=Strict; Path=/");
   // A name may be rebound, whoever has the token.
   first.headers = {{"host", "evil.example:8080"}};
   EXPECT_EQ(status(access, first), 403);
+}
+
+// A browser has one set of cookies a host, whatever the port.
+TEST(Access, KeepsTheTokensOfTwoPagesApart) {
+  for (const std::string host : {"192.168.1.2", "[fe80::1]", "localhost"}) {
+    const std::string tokens[] = {random_token(), random_token(), random_token()};
+    const Access pages[] = {{false, tokens[0]}, {false, tokens[1]}, {false, tokens[2]}};
+    const std::string hosts[] = {host + ":8080", host + ":8081", host};
+    std::map<std::string, std::string> cookies;
+    for (int i = 0; i < 3; ++i) {
+      HttpRequest first = request("GET", "/", {{"host", hosts[i]}});
+      first.query = {{"token", tokens[i]}};
+      const std::string set = pages[i].refuse(first).value().headers.back().second;
+      cookies[set.substr(0, set.find('='))] = set.substr(set.find('=') + 1, tokens[i].size());
+    }
+    for (int i = 0; i < 3; ++i) {
+      HttpRequest asked = request("GET", "/state", {{"host", hosts[i]}});
+      asked.cookies = cookies;
+      EXPECT_EQ(status(pages[i], asked), 200) << hosts[i];
+    }
+  }
+}
+
+// The address that lapservo prints, followed from a notebook, a terminal in a browser, a wiki.
+TEST(Access, LetsALinkToThePageThrough) {
+  const Access access(true, "");
+  const auto followed = [](const std::string& method, const std::string& path, const std::string& mode) {
+    return request(method, path, {{"host", "localhost"}, {"sec-fetch-site", "cross-site"}, {"sec-fetch-mode", mode}});
+  };
+  EXPECT_EQ(status(access, followed("GET", "/", "navigate")), 200);
+  EXPECT_EQ(status(access, followed("GET", "/", "no-cors")), 403);
+  EXPECT_EQ(status(access, followed("GET", "/state", "navigate")), 403);
+  EXPECT_EQ(status(access, followed("POST", "/", "navigate")), 403);
 }
 
 TEST(Access, KnowsWhatIsThisComputer) {

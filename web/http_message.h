@@ -13,7 +13,7 @@ struct HttpRequest {
   std::string method, path;
   std::multimap<std::string, std::string> headers;  ///< names in lower case
   std::map<std::string, std::string> query;         ///< ?name=value
-  std::string token;                                ///< the cookie's
+  std::map<std::string, std::string> cookies{};
 
   /// Of a header that is there once; nullopt else.
   std::optional<std::string> header(const std::string& name) const {

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <exception>
 #include <microhttpd.h>
+#include <new>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -66,6 +67,11 @@ MHD_Result add_header(void* headers, MHD_ValueKind, const char* key, const char*
 
 MHD_Result add_query(void* request, MHD_ValueKind, const char* key, const char* value) {
   static_cast<HttpRequest*>(request)->query.emplace(key, value ? value : "");
+  return MHD_YES;
+}
+
+MHD_Result add_cookie(void* request, MHD_ValueKind, const char* key, const char* value) {
+  static_cast<HttpRequest*>(request)->cookies.emplace(key, value ? value : "");
   return MHD_YES;
 }
 
@@ -131,12 +137,16 @@ struct HttpServer::Callbacks {
     if (what == MHD_CONNECTION_NOTIFY_STARTED) {
       thread_local const bool lowered = (lower_priority(), true);
       (void)lowered;
-      const auto* info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
-      auto made = std::make_unique<Peer>(Peer{info->connect_fd, {}});
-      self.set_deadline(*made, self.limits_.head_s);
-      const std::lock_guard lock(self.mutex_);
-      self.peers_.insert(made.get());
-      *peer = made.release();
+      const int descriptor = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD)->connect_fd;
+      try {
+        auto made = std::make_unique<Peer>(Peer{descriptor, {}});
+        self.set_deadline(*made, self.limits_.first_s);
+        const std::lock_guard lock(self.mutex_);
+        self.peers_.insert(made.get());
+        *peer = made.release();
+      } catch (const std::exception&) {  // no memory
+        ::shutdown(descriptor, SHUT_RDWR);
+      }
     } else {
       const std::unique_ptr<Peer> ended(static_cast<Peer*>(*peer));
       const std::lock_guard lock(self.mutex_);
@@ -150,13 +160,13 @@ struct HttpServer::Callbacks {
     exchange->connection = connection;
     exchange->peer =
         static_cast<Peer*>(MHD_get_connection_info(connection, MHD_CONNECTION_INFO_SOCKET_CONTEXT)->socket_context);
+    if (!exchange->peer) throw std::bad_alloc();  // there was no memory for it
     HttpRequest& request = exchange->request;
     request.method = method;
     request.path = url;
     MHD_get_connection_values(connection, MHD_HEADER_KIND, add_header, &request);
     MHD_get_connection_values(connection, MHD_GET_ARGUMENT_KIND, add_query, &request);
-    const char* token = MHD_lookup_connection_value(connection, MHD_COOKIE_KIND, cookie);
-    request.token = token ? token : "";
+    MHD_get_connection_values(connection, MHD_COOKIE_KIND, add_cookie, &request);
     self.set_deadline(*exchange->peer, self.limits_.answer_s);
     return exchange.release();
   }
@@ -172,16 +182,17 @@ HttpServer::HttpServer(const std::string& address, int port, const std::string& 
 void HttpServer::open(const std::string& address, int port, const std::string& option) {
   const Address where = address_of(address, port, option);
   const unsigned v6 = where.any.sa_family == AF_INET6 ? MHD_USE_IPv6 : 0;
-  daemon_ = MHD_start_daemon(
-      MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | v6, static_cast<std::uint16_t>(port), nullptr, nullptr,
-      &Callbacks::on_request, this, MHD_OPTION_SOCK_ADDR, &where.any,                                    //
-      MHD_OPTION_CONNECTION_LIMIT, limits_.connections,                                                  //
-      MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits_.connections_per_address,                               //
-      MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits_.request_bytes,                                         //
-      MHD_OPTION_CONNECTION_TIMEOUT, static_cast<unsigned>(std::max(limits_.head_s, limits_.answer_s)),  //
-      MHD_OPTION_STRICT_FOR_CLIENT, 1,                                                                   //
-      MHD_OPTION_NOTIFY_COMPLETED, &Callbacks::on_end, this,                                             //
-      MHD_OPTION_NOTIFY_CONNECTION, &Callbacks::on_connection, this, MHD_OPTION_END);
+  daemon_ =
+      MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME | v6, static_cast<std::uint16_t>(port),
+                       nullptr, nullptr, &Callbacks::on_request, this, MHD_OPTION_SOCK_ADDR, &where.any,  //
+                       MHD_OPTION_CONNECTION_LIMIT, limits_.connections,                                  //
+                       MHD_OPTION_PER_IP_CONNECTION_LIMIT, limits_.connections_per_address,               //
+                       MHD_OPTION_CONNECTION_MEMORY_LIMIT, limits_.request_bytes,                         //
+                       MHD_OPTION_CONNECTION_TIMEOUT,
+                       static_cast<unsigned>(std::max({limits_.first_s, limits_.head_s, limits_.answer_s})),  //
+                       MHD_OPTION_STRICT_FOR_CLIENT, 1,                                                       //
+                       MHD_OPTION_NOTIFY_COMPLETED, &Callbacks::on_end, this,                                 //
+                       MHD_OPTION_NOTIFY_CONNECTION, &Callbacks::on_connection, this, MHD_OPTION_END);
   if (!daemon_)
     throw InputError(option, "is " + address + ", where port " + std::to_string(port) + " can't be listened at (" +
                                  std::strerror(errno) + "), expected another port or an address of this computer");
@@ -220,8 +231,8 @@ int HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
     if (!exchange.patience)
       exchange.patience =
           now + std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(limits_.patience_s));
-    MHD_suspend_connection(connection);
     waiting_.push_back(&exchange);
+    MHD_suspend_connection(connection);
     return MHD_YES;
   }
 }
@@ -232,12 +243,11 @@ void HttpServer::set_deadline(Peer& peer, double from_now_s) {
                   std::chrono::duration_cast<Time::duration>(std::chrono::duration<double>(from_now_s));
 }
 
-// With the mutex held.
+// With the mutex held. Allocates nothing: those who call it could not say what failed.
 void HttpServer::resume(const std::function<bool(const Exchange&)>& which) {
   const auto end = std::partition(waiting_.begin(), waiting_.end(), [&](const Exchange* one) { return !which(*one); });
-  std::vector<Exchange*> awake(end, waiting_.end());
+  std::for_each(end, waiting_.end(), [](const Exchange* one) { MHD_resume_connection(one->connection); });
   waiting_.erase(end, waiting_.end());
-  for (const Exchange* exchange : awake) MHD_resume_connection(exchange->connection);
 }
 
 void HttpServer::wake() {

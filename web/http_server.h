@@ -22,7 +22,8 @@ namespace lapservo::internal {
 struct HttpLimits {
   unsigned connections = 48, connections_per_address = 24;
   std::size_t request_bytes = 16384;  ///< request line and headers; a body is refused
-  double head_s = 5;                  ///< for a request's head to come, from the connection or the answer before on
+  double first_s = 1;                 ///< for a connection's first request to come: who is silent keeps others out
+  double head_s = 5;                  ///< for the next one's head, from the answer before on
   double answer_s = 20;               ///< for an answer to be fetched
   double patience_s = 1;              ///< a request that waits is asked again for the last time
 };
@@ -33,8 +34,6 @@ class HttpServer {
   /// The answer, or nullopt: not yet, which is asked again at the next wake(), and once with `last` when its patience
   /// has ended. Called in the server's thread.
   using Handler = std::function<std::optional<HttpResponse>(const HttpRequest&, bool last)>;
-  /// Whose value is HttpRequest::token.
-  static constexpr const char* cookie = "lapservo_token";
 
   /// At an address of this computer; port 0: any that is free. Throws InputError, naming `option`, where it can't.
   HttpServer(const std::string& address, int port, const std::string& option, const HttpLimits& limits,

@@ -20,11 +20,21 @@ namespace {
 constexpr auto between_drawings = std::chrono::milliseconds(25), recent = std::chrono::milliseconds(100),
                between_looks = std::chrono::milliseconds(2);
 constexpr auto watched = std::chrono::seconds(2);
+constexpr double start_lasts_s = 1;
 constexpr int jpeg_quality = 80;
 constexpr std::size_t most_events = 8;
 
 double seconds(std::chrono::steady_clock::duration duration) {
   return std::chrono::duration<double>(duration).count();
+}
+
+double now_s() {
+  return seconds(std::chrono::steady_clock::now().time_since_epoch());
+}
+
+// Of a clock that is off too: what is not of now can't be trusted to be wanted now.
+bool is_recent_start(double asked_s) {
+  return std::abs(now_s() - asked_s) <= start_lasts_s;
 }
 
 HttpResponse plain(int status, const std::string& text) {
@@ -34,6 +44,7 @@ HttpResponse plain(int status, const std::string& text) {
 std::optional<HttpResponse> file_at(const std::string& path) {
   if (path == "/") return HttpResponse{200, "text/html; charset=utf-8", page_html};
   if (path == "/page.css") return HttpResponse{200, "text/css; charset=utf-8", page_css};
+  if (path == "/welcome.js") return HttpResponse{200, "text/javascript; charset=utf-8", "location.replace(\"/\");\n"};
   if (path == "/page.js") return HttpResponse{200, "text/javascript; charset=utf-8", page_js};
   return std::nullopt;
 }
@@ -103,16 +114,16 @@ void LivePage::fetch() {
 }
 
 PageWishes LivePage::take_wishes() {
-  const Wish wish = wish_.exchange(Wish::none);
   PageWishes wishes;
-  if (wish != Wish::none) wishes.hold = wish == Wish::hold;
+  if (is_recent_start(start_s_.exchange(never))) wishes.hold = false;
+  if (hold_.exchange(false)) wishes.hold = true;  // of two between ticks, the one that holds
   wishes.stop = stop_;
   return wishes;
 }
 
 std::optional<HttpResponse> LivePage::answer(const HttpRequest& request, bool last) {
   if (auto refusal = access_.refuse(request)) return refusal;
-  if (request.method == "POST") return command(request.path);
+  if (request.method == "POST") return command(request);
   if (request.method != "GET") return plain(405, "GET and POST only");
   if (request.path == "/picture") return picture(request, last);
   if (request.path == "/state") return state();
@@ -142,20 +153,28 @@ std::optional<HttpResponse> LivePage::picture(const HttpRequest& request, bool l
                        {"X-Came-S", fmt::format("{:.4f}", seconds(drawn->came.time_since_epoch()))}}};
 }
 
-HttpResponse LivePage::command(const std::string& path) {
+HttpResponse LivePage::command(const HttpRequest& request) {
+  const std::string& path = request.path;
   if (path == "/stop") {
     stop_ = true;
     return plain(202, "the run ends");
   }
   if (path != "/hold" && path != "/start") return plain(404, "there is no such command");
   if (!config_.has_loop) return plain(403, "nothing here moves");
-  if (path == "/start" && !config_.may_start) return plain(403, "lapservo runs without --enable-motion");
-  if (path == "/hold") {
-    wish_ = Wish::hold;
-  } else {  // of two between ticks, the one that holds
-    Wish none = Wish::none;
-    wish_.compare_exchange_strong(none, Wish::start);
-  }
+  if (path == "/start") return start(request);
+  hold_ = true;
+  return plain(202, "asked for");
+}
+
+// The page says when its button was pressed, by this clock: what the network or a stopped process kept back starts
+// nothing.
+HttpResponse LivePage::start(const HttpRequest& request) {
+  if (!config_.may_start) return plain(403, "lapservo runs without --enable-motion");
+  const auto at = request.query.find("at");
+  const auto asked_s = at == request.query.end() ? std::nullopt : parse_finite(at->second);
+  if (!asked_s) return plain(400, "a start is to say when it was asked for, ?at= now_s of /state");
+  if (!is_recent_start(*asked_s)) return plain(409, "it came too late, nothing was started");
+  start_s_ = *asked_s;
   return plain(202, "asked for");
 }
 
@@ -180,8 +199,22 @@ HttpResponse LivePage::state() {
         state["events"].push_back({{"time_s", event.time_s}, {"state", event.state}});
   }
   state["instruments"] = json_of(observations);
-  state["asked"] = wish_ == Wish::none ? "" : wish_ == Wish::hold ? "hold" : "start";
+  state["asked"] = hold_ ? "hold" : is_recent_start(start_s_) ? "start" : "";
   return {200, "application/json", text_of(state)};
+}
+
+// Nullptr where it can't be, for want of memory too: the next one, perhaps. With the mutex held, but while it draws.
+std::shared_ptr<const LivePage::Drawn> LivePage::draw_newest(std::unique_lock<std::mutex>& lock) const {
+  std::shared_ptr<Drawn> drawn;
+  try {
+    const Shown shown = newest_;
+    lock.unlock();
+    drawn = std::make_shared<Drawn>(Drawn{shown.number, shown.came, {}, jpeg_of(shown.image)});
+    drawn->done = std::chrono::steady_clock::now();
+  } catch (const std::exception&) {
+  }
+  if (!lock.owns_lock()) lock.lock();
+  return drawn;
 }
 
 void LivePage::draw() {
@@ -198,18 +231,8 @@ void LivePage::draw() {
       continue;
     }
     watched_until_ = {};
-    const Shown shown = newest_;
-    auto drawn = std::make_shared<Drawn>(Drawn{shown.number, shown.came, {}, {}});
-    lock.unlock();
     const auto begin = std::chrono::steady_clock::now();
-    try {
-      drawn->jpeg = jpeg_of(shown.image);
-      drawn->done = std::chrono::steady_clock::now();
-    } catch (const std::exception&) {
-      drawn.reset();  // the next one, perhaps
-    }
-    lock.lock();
-    if (drawn) drawn_ = std::move(drawn);
+    if (auto drawn = draw_newest(lock)) drawn_ = std::move(drawn);
     lock.unlock();
     server_->wake();
     std::this_thread::sleep_until(begin + between_drawings);

@@ -71,10 +71,13 @@ class LivePage {
   void show(PageImage image);
   /// `state`: the loop's, in words.
   void tell(const PageLoop& loop, const std::string& state);
+  /// What was asked for since the last call. A start that nobody took within a second is none: who asked for it no
+  /// longer expects that the arm moves.
   PageWishes take_wishes();
 
  private:
   using Time = std::chrono::steady_clock::time_point;
+  static constexpr double never = -1e9;
   struct Shown {
     PageImage image;
     long number = 0;  ///< from 1
@@ -95,13 +98,14 @@ class LivePage {
     std::shared_ptr<const Events> events;
     Time when;
   };
-  enum class Wish { none, hold, start };
 
   std::optional<HttpResponse> answer(const HttpRequest& request, bool last);
   std::optional<HttpResponse> picture(const HttpRequest& request, bool last);
-  HttpResponse command(const std::string& path);
+  HttpResponse command(const HttpRequest& request);
+  HttpResponse start(const HttpRequest& request);
   HttpResponse state();
   void draw();
+  std::shared_ptr<const Drawn> draw_newest(std::unique_lock<std::mutex>& lock) const;
   void fetch();
 
   PageConfig config_;
@@ -114,8 +118,8 @@ class LivePage {
 
   Mailbox<Shown> images_;
   Mailbox<Told> loops_;
-  std::atomic<Wish> wish_ = Wish::none;
-  std::atomic<bool> stop_ = false;
+  std::atomic<bool> hold_ = false, stop_ = false;
+  std::atomic<double> start_s_ = never;  ///< when it was asked for
 
   // The page's threads' only.
   std::mutex mutex_;

@@ -1,6 +1,10 @@
 #include "web/live_page.h"
 
+#include <algorithm>
 #include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -18,13 +22,14 @@ using lapservo::testing::http;
 using lapservo::testing::http_post;
 using lapservo::testing::http_status;
 using lapservo::testing::RawConnection;
+using lapservo::testing::start_path;
 
 PageConfig config_of_test() {
   PageConfig config;
   config.title = "test";
   config.port = 0;
   config.has_loop = true;
-  config.limits.head_s = 0.3;
+  config.limits.first_s = config.limits.head_s = 0.3;
   config.limits.patience_s = 0.2;
   config.limits.connections = config.limits.connections_per_address = 16;
   return config;
@@ -84,7 +89,8 @@ TEST(LivePage, ServesItsFilesAndNothingElse) {
   EXPECT_EQ(http_status(html), 200);
   EXPECT_NE(html.find("<script src=\"page.js\""), std::string::npos);
   EXPECT_NE(html.find("frame-ancestors 'none'"), std::string::npos);
-  for (const char* path : {"/page.css", "/page.js", "/state"}) EXPECT_EQ(http_status(http(port, "GET", path)), 200);
+  for (const char* path : {"/page.css", "/page.js", "/welcome.js", "/state"})
+    EXPECT_EQ(http_status(http(port, "GET", path)), 200) << path;
   for (const char* path : {"/x", "/../etc/passwd", "//page.js", "/page.js/", "/hold"})
     EXPECT_EQ(http_status(http(port, "GET", path)), 404) << path;
   EXPECT_EQ(http_status(http(port, "DELETE", "/state")), 405);
@@ -112,13 +118,13 @@ TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
   {
     LivePage page(config);
     const int port = port_of(page);
-    EXPECT_EQ(http_status(http_post(port, "/start")), 403);
+    EXPECT_EQ(http_status(http_post(port, start_path())), 403);
     EXPECT_FALSE(page.take_wishes().hold);
     EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
     EXPECT_EQ(page.take_wishes().hold, true);
     EXPECT_FALSE(page.take_wishes().hold);  // once
     EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
-    EXPECT_EQ(http_status(http_post(port, "/start")), 403);
+    EXPECT_EQ(http_status(http_post(port, start_path())), 403);
     EXPECT_EQ(page.take_wishes().hold, true);
     EXPECT_EQ(http_status(http_post(port, "/stop")), 202);
     EXPECT_TRUE(page.take_wishes().stop);
@@ -128,16 +134,39 @@ TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
   {
     LivePage page(config);
     const int port = port_of(page);
-    EXPECT_EQ(http_status(http_post(port, "/start")), 202);
+    EXPECT_EQ(http_status(http_post(port, start_path())), 202);
     EXPECT_EQ(page.take_wishes().hold, false);
     EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
-    EXPECT_EQ(http_status(http_post(port, "/start")), 202);
+    EXPECT_EQ(http_status(http_post(port, start_path())), 202);
     EXPECT_EQ(page.take_wishes().hold, true);  // of two in a tick
   }
   config.has_loop = false;
   LivePage page(config);
-  EXPECT_EQ(http_status(http_post(port_of(page), "/start")), 403);
+  EXPECT_EQ(http_status(http_post(port_of(page), start_path())), 403);
   EXPECT_EQ(http_status(http_post(port_of(page), "/hold")), 403);
+}
+
+// The network or a stopped process may keep it back: who asked for it has turned to something else by then.
+TEST(LivePage, StartsNothingLate) {
+  PageConfig config = config_of_test();
+  config.may_start = true;
+  LivePage page(config);
+  const int port = port_of(page);
+  for (const std::string& path : {start_path(1.1), start_path(100), start_path(-100)})
+    EXPECT_EQ(http_status(http_post(port, path)), 409) << path;
+  for (const char* path : {"/start", "/start?at=", "/start?at=now", "/start?at=nan", "/start?at=inf"})
+    EXPECT_EQ(http_status(http_post(port, path)), 400) << path;
+  EXPECT_FALSE(page.take_wishes().hold);
+  EXPECT_EQ(http_status(http_post(port, start_path(0.5))), 202);
+  EXPECT_NE(http(port, "GET", "/state").find(R"("asked":"start")"), std::string::npos);
+  std::this_thread::sleep_for(std::chrono::milliseconds(520));
+  EXPECT_NE(http(port, "GET", "/state").find(R"("asked":"")"), std::string::npos);
+  EXPECT_FALSE(page.take_wishes().hold);
+  // What holds comes late too.
+  EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(http_status(http_post(port, start_path(1.1))), 409);
+  EXPECT_EQ(page.take_wishes().hold, true);
 }
 
 TEST(LivePage, RefusesStrangersAndOtherSites) {
@@ -151,8 +180,10 @@ TEST(LivePage, RefusesStrangersAndOtherSites) {
     EXPECT_EQ(http_status(http(port, "GET", path)), 401) << path;
   EXPECT_EQ(http_status(http_post(port, "/stop")), 401);
   EXPECT_FALSE(page.take_wishes().stop);
-  EXPECT_EQ(http_status(http(port, "GET", "/?token=" + token)), 303);
-  const std::string cookie = "Cookie: lapservo_token=" + token + "\r\n";
+  const std::string welcome = http(port, "GET", "/?token=" + token);
+  EXPECT_EQ(http_status(welcome), 200);
+  EXPECT_NE(welcome.find("<script src=\"welcome.js\">"), std::string::npos);
+  const std::string cookie = fmt::format("Cookie: theme=dark; lapservo_token_{}={}\r\n", port, token);
   EXPECT_EQ(http_status(http(port, "GET", "/state", cookie)), 200);
   EXPECT_EQ(http_status(http(port, "GET", "/state", cookie + "Host: evil.example\r\n")), 403);
   EXPECT_EQ(http_status(http(port, "POST", "/hold", cookie + "Origin: http://evil.example\r\nContent-Length: 0\r\n")),
@@ -189,19 +220,50 @@ TEST(LivePage, ForgetsWhoDoesNotFinishAsking) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
 }
 
+// Silent connections would keep the buttons out.
+TEST(LivePage, WaitsLongerForTheNextRequestThanForTheFirst) {
+  EXPECT_LE(HttpLimits{}.first_s, 1);
+  PageConfig config = config_of_test();
+  config.limits.first_s = 0.1;
+  config.limits.head_s = 60;
+  LivePage page(config);
+  const int port = port_of(page);
+  const RawConnection silent(port), asking(port);
+  const std::string question = fmt::format("GET /state HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n", port);
+  asking.say(question + "\r\n");
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(silent.hear(), "");
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  asking.say(question + "Connection: close\r\n\r\n");
+  const std::string answers = asking.hear();
+  EXPECT_NE(answers.find("HTTP/1.1 200", 1), std::string::npos) << answers;
+}
+
 TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
   const Rig rig = testing::small_test_rig();
   LivePage page(config_of_test());
   const int port = port_of(page);
   std::vector<std::unique_ptr<RawConnection>> crowd;
+  std::chrono::steady_clock::duration longest{};
+  const auto take_time = [&longest](const std::function<void()>& call) {
+    const auto begin = std::chrono::steady_clock::now();
+    call();
+    longest = std::max(longest, std::chrono::steady_clock::now() - begin);
+  };
   try {
     for (int i = 0; i < 1000; ++i) {
       crowd.push_back(std::make_unique<RawConnection>(port));
-      if (i % 100 == 0) page.show(image_of(rig, 10));
+      if (i % 20) continue;
+      PageImage image = image_of(rig, 10);
+      take_time([&] { page.show(std::move(image)); });
+      take_time([&] { page.tell({}, std::to_string(i)); });
+      take_time([&] { page.take_wishes(); });
     }
   } catch (const std::runtime_error&) {  // this process may open no more
   }
   ASSERT_GT(crowd.size(), 100u);
+  EXPECT_LT(longest, std::chrono::milliseconds(50));
   EXPECT_EQ(crowd.front()->hear(), "");  // ended: it asked for nothing in time
   crowd.clear();
   // Once they have gone.
@@ -230,13 +292,17 @@ TEST(LivePage, SaysWhereItCanNotListen) {
 TEST(LivePage, EndsWhileSomebodyWaits) {
   PageConfig config = config_of_test();
   config.limits.patience_s = 60;
-  std::thread viewer;
+  std::optional<RawConnection> viewer;
+  std::chrono::steady_clock::time_point begin;
   {
     LivePage page(config);
-    viewer = std::thread([port = port_of(page)] { http(port, "GET", "/picture"); });
+    viewer.emplace(port_of(page));
+    viewer->say(fmt::format("GET /picture HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", port_of(page)));
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    begin = std::chrono::steady_clock::now();
   }
-  viewer.join();
+  viewer->hear();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(10));
 }
 
 }  // namespace

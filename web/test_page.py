@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -77,9 +78,20 @@ class Browser:
     def resize(self, width, height):
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
 
-    def key(self, key):
+    def key(self, key, code=None):
         for what in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=what, key=key, code="Key" + key.upper(), text=key if what == "keyDown" else "")
+            self.call("Input.dispatchKeyEvent", type=what, key=key, code=code or "Key" + key.upper(),
+                      windowsVirtualKeyCode=32 if key == " " else 0, text=key if what == "keyDown" and len(key) == 1 else "")
+
+    def enter(self):
+        for what in ("keyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=what, key="Enter", code="Enter", windowsVirtualKeyCode=13,
+                      text="\r" if what == "keyDown" else "")
+
+    def click(self, name):
+        box = self.value(f"(b => ({{x: b.x + b.width / 2, y: b.y + b.height / 2}}))(document.getElementById('{name}').getBoundingClientRect())")
+        for what in ("mousePressed", "mouseReleased"):
+            self.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, **box)
 
     def screenshot(self, path):
         with open(path, "wb") as file:
@@ -103,6 +115,13 @@ def state(browser, text):
     browser.wait_for(f"document.getElementById('state').textContent.includes({json.dumps(text)})")
 
 
+def follow(browser, url):
+    """A link on another site's page."""
+    browser.call("Page.navigate", url=f"data:text/html,<a id=link href='{url}'>lapservo</a>")
+    browser.wait_for("document.getElementById('link') !== null")
+    browser.value("document.getElementById('link').click()")
+
+
 def look(browser, folder, name):
     for width, height in ((1280, 800), (390, 844)):
         browser.resize(width, height)
@@ -114,6 +133,39 @@ def look(browser, folder, name):
             browser.screenshot(os.path.join(folder, f"{name}_{width}.png"))
 
 
+def see_no_stray_start(browser):
+    browser.resize(1280, 800)
+    for start in (lambda: browser.click("start"), browser.enter):  # by the mouse, by the keyboard
+        browser.key("h")
+        state(browser, "hold: held")
+        if start == browser.enter:
+            browser.value("document.getElementById('start').focus()")
+        start()
+        state(browser, "track")
+        browser.key("h")
+        state(browser, "hold: held")
+        for key, code in (("s", "KeyS"), (" ", "Space")):
+            browser.key(key, code)
+        browser.enter()
+        time.sleep(1)
+        state(browser, "hold: held")
+        browser.click("start")
+        state(browser, "track")
+
+
+def see_no_late_start(browser, lapservo):
+    browser.key("h")
+    state(browser, "hold: held")
+    lapservo.send_signal(signal.SIGSTOP)
+    browser.click("start")
+    browser.wait_for("document.getElementById('note').textContent === 'start: no answer, it may have arrived'")
+    lapservo.send_signal(signal.SIGCONT)
+    time.sleep(1)
+    state(browser, "hold: held")
+    browser.click("start")
+    state(browser, "track")
+
+
 def see_the_loop(browser, tool, rig, folder):
     # A simulation that is watched for long enough; it ends by the page's button.
     lapservo, url = start(tool, "servo", "--rig", rig, "--robot", "sim", "--duration", "3600", "--web", "0", "--listen", "0.0.0.0")
@@ -121,18 +173,19 @@ def see_the_loop(browser, tool, rig, folder):
         browser.call("Page.navigate", url=url.replace("0.0.0.0", "127.0.0.1").split("?")[0])
         browser.wait_for("document.body.innerText.includes('token')")  # refused
         browser.complaints.clear()
-        browser.call("Page.navigate", url=url.replace("0.0.0.0", "127.0.0.1"))
+        follow(browser, url.replace("0.0.0.0", "127.0.0.1"))
         browser.wait_for("location.search === '' && document.getElementById('picture').naturalWidth > 0")
         state(browser, "track")
         look(browser, folder, "servo")
-        browser.key("h")
-        state(browser, "hold: held")
-        browser.key("s")  # starts nothing
-        state(browser, "hold: held")
-        browser.value("document.getElementById('start').focus()")
-        browser.call("Input.dispatchKeyEvent", type="keyDown", key="Enter", code="Enter", text="\r", windowsVirtualKeyCode=13)
-        browser.call("Input.dispatchKeyEvent", type="keyUp", key="Enter", code="Enter", windowsVirtualKeyCode=13)
-        state(browser, "track")
+        for key, code in (("h", "KeyH"), ("h", "KeyD"), ("р", "KeyH"), ("Process", "KeyH")):  # other layouts, an input method
+            browser.key(key, code)
+            state(browser, "hold: held")
+            browser.value("document.getElementById('start').focus()")
+            browser.enter()
+            state(browser, "track")
+        see_no_stray_start(browser)
+        see_no_late_start(browser, lapservo)
+        assert not browser.complaints, browser.complaints
         browser.value("document.getElementById('stop').click()")
         assert lapservo.wait(PATIENCE_S) in (0, 1)
         state(browser, "not connected")

@@ -191,10 +191,23 @@ class ArmWatcher : public RunObserver {
       refusal_;  // of what was asked about, empty when it can be followed; last: it uses the others
 };
 
-// Where the arm is, once it says so.
-std::optional<JointVector> wait_for(CrtkRobot& robot) {
+// What the page asks for before the loop runs. True when it ends the run.
+bool obey(ServoPage* page, CrtkRobot& robot) {
+  if (!page) return false;
+  const PageWishes wishes = page->wishes();
+  if (wishes.hold) robot.hold(*wishes.hold);
+  return wishes.stop;
+}
+
+int end_by_page() {
+  std::printf("end: asked for on the page\n");
+  return 1;
+}
+
+// Where the arm is, once it says so; nullopt when it does not, or somebody ends the run.
+std::optional<JointVector> wait_for(CrtkRobot& robot, ServoPage* page) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
-  while (!interrupted() && std::chrono::steady_clock::now() < end) {
+  while (!interrupted() && !obey(page, robot) && std::chrono::steady_clock::now() < end) {
     if (robot.counts().joint_states > 0 && robot.blocked() != Blocked::no_joint_states) return robot.state().q;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
@@ -239,7 +252,9 @@ int steer_arm(const ServoOptions& options) {
   Transport& transport = transports.get(arm.transport, "--robot");
   CrtkRobot robot(transport, arm.name, interlock, clock);
   watch_for_interrupts();
-  const auto start = wait_for(robot);
+  ServoPage* const its_page = page ? &*page : nullptr;
+  const auto start = wait_for(robot, its_page);
+  if (!start && obey(its_page, robot)) return end_by_page();
   if (!start) {
     std::fprintf(stderr, "lapservo: %s: no measured_js with the rig's joints within %.0f s\n", options.robot.c_str(),
                  wait_s);
@@ -254,8 +269,8 @@ int steer_arm(const ServoOptions& options) {
   LoopTopics topics(transport, rig, "endoscope");
   Goal goal(trajectory);
   ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr, view ? &*view : nullptr,
-                     page ? &*page : nullptr);
-  if (page && page->wishes().hold.value_or(false)) robot.hold(true);
+                     its_page);
+  if (obey(its_page, robot)) return end_by_page();
   lapservo::run(robot, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());

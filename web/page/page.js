@@ -151,22 +151,31 @@ async function states() {
   }
 }
 
+// lapservo's clock, by no way ahead of it: a start seems rather too old than too new.
+function serverNowS() {
+  return ((performance.now() + clock.aheadMs - clock.tookMs / 2) / 1000).toFixed(4);
+}
+
 async function command(name) {
+  at("start").blur();
   const note = at("note");
   note.dataset.said = "yes";
   text(note, `${name} …`);
   try {
-    const answer = await ask(name, { method: "POST" });
+    const answer = await ask(name === "start" ? `start?at=${serverNowS()}` : name, { method: "POST" });
     text(note, `${name}: ${(await answer.text()).trim()}`);
   } catch {
-    text(note, `${name}: NOT DELIVERED, lapservo did not answer`);
+    text(note, `${name}: no answer, it may have arrived`);
   }
 }
 
 for (const name of ["hold", "start", "stop"]) at(name).addEventListener("click", () => command(name));
-// One key holds, from anywhere; none starts: a key pressed by mistake moves nothing.
+// One key holds, from anywhere and under any layout; none starts but Enter or Space on Start, which keeps the focus from
+// Tab to the next command only, and gets none by the mouse: a key pressed by mistake moves nothing.
+at("start").addEventListener("mousedown", (event) => event.preventDefault());
 document.addEventListener("keydown", (event) => {
-  if (event.key.toLowerCase() !== "h" || event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
+  const isH = event.code === "KeyH" || event.key.toLowerCase() === "h";
+  if (!isH || event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
   if (!at("hold").disabled) command("hold");
 });
 setInterval(showAges, 100);
