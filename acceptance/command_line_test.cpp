@@ -629,6 +629,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   EXPECT_EQ(output().find("not_following"), std::string::npos) << output();
   EXPECT_EQ(run("servo --replay " + out("decided/log.csv")), 0) << errors();
   EXPECT_EQ(run(decide + out("rig.yaml") + " --out " + out("decided")), 2);
+  EXPECT_EQ(run(decide + out("rig.yaml") + " --enable-motion"), 2);
   EXPECT_EQ(run(decide + rig_), 2);
   EXPECT_NE(errors().find("joints is missing"), std::string::npos) << errors();
   EXPECT_EQ(run(decide + out("rig.yaml") + " --joint-topic /PSM2/measured_js"), 2);

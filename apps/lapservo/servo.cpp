@@ -160,6 +160,10 @@ int replay_log(const ServoOptions& options) {
 int run(const ServoOptions& options) {
   options.web.check();
   const bool recorded = !options.replay.empty() && is_bag(options.replay);
+  if (!options.replay.empty() && options.web.port)
+    throw InputError("--web", "is for runs, expected none with --replay");
+  if (!options.replay.empty() && options.enable_motion)
+    throw InputError("--enable-motion", "moves nothing that was recorded, expected none with --replay");
   if (!options.replay.empty() && !recorded) return replay_log(options);
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");

@@ -235,7 +235,6 @@ int steer_arm(const ServoOptions& options) {
   const Address arm = address_of(options.robot, "--robot");
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
-  if (!options.enable_motion) config.controller.endoscope_attempts = 0;
   const InterlockConfig interlock = interlock_of(options, config);
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   config.tracking_thread = TrackingThread::own;

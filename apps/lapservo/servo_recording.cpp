@@ -14,6 +14,7 @@
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/servo_output.h"
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/interlock.h"
 #include "lapservo/rig/joint_conversion.h"
 #include "recordings/bag_frames.h"
 #include "recordings/bag_joints.h"
@@ -35,7 +36,7 @@ class RecordedClock : public Clock {
   double now_s_;
 };
 
-// What CRTK says of an arm that somebody else moves: taken for enabled, deaf to what is sent.
+// What CRTK says of an arm that somebody else moves: taken for enabled while it says something, deaf to what is sent.
 class RecordedArm : public Robot {
  public:
   RecordedArm(const JointRecording& recording, const Joints& joints, const Clock& clock) : clock_(clock) {
@@ -52,7 +53,8 @@ class RecordedArm : public Robot {
   }
   JointState state() override {
     const JointReading& latest = readings_[std::max<std::size_t>(next_, 1) - 1];
-    return {latest.time_s, latest.q, OperatingState::enabled, false};
+    const bool known = clock_.now_s() - latest.time_s <= InterlockConfig().max_age_s;  // as the interlock has it
+    return {latest.time_s, latest.q, known ? OperatingState::enabled : OperatingState::disabled, false};
   }
   void send(const JointPath&) override {}
 
@@ -84,14 +86,9 @@ class RecordedImages : public ImageStream {
 
 class RecordingWatcher : public RunObserver {
  public:
-  RecordingWatcher(const RecordedImages& images, const Rig& rig, RunFolder* folder, LiveView* view, std::optional<int> total,
-                   bool strict)
-      : images_(images),
-        rig_(rig),
-        folder_(folder),
-        view_(view),
-        progress_(total),
-        strict_(strict) {}
+  RecordingWatcher(const RecordedImages& images, const Rig& rig, RunFolder* folder, LiveView* view,
+                   std::optional<int> total, bool strict)
+      : images_(images), rig_(rig), folder_(folder), view_(view), progress_(total), strict_(strict) {}
 
   bool on_tick(const ControlTick& tick) override {
     if (!start_s_) start_s_ = tick.input.time_s;
@@ -138,7 +135,6 @@ JointRecording joints_of_bag(const Bag& bag, const ServoOptions& options, const 
 int decide_on_recording(const ServoOptions& options) {
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
-  config.controller.endoscope_attempts = 0;  // nothing moves the arm
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
   std::optional<LiveView> view;
@@ -160,7 +156,8 @@ int decide_on_recording(const ServoOptions& options) {
   if (!options.out.empty()) folder.emplace(options, asked_s, rig, config.controller);
   watch_for_interrupts();
 
-  RecordingWatcher watcher(images, rig, folder ? &*folder : nullptr, view ? &*view : nullptr, frames.frame_count(), options.strict);
+  RecordingWatcher watcher(images, rig, folder ? &*folder : nullptr, view ? &*view : nullptr, frames.frame_count(),
+                           options.strict);
   lapservo::run(arm, images, clock, config, trajectory, asked_s, watcher);
   std::printf("decided on %.1f s of a recording, %d images and the joints; nothing was sent%s\n", watcher.duration_s(),
               images.count(), watcher.summary().holds_text().c_str());

@@ -271,6 +271,10 @@ TEST(Interlock, ObservesOnlyUntilMotionIsEnabled) {
   EXPECT_TRUE((*bench.interlock.set_point() - bench.setpoint).isApprox(slow, 0.1));
   bench.interlock.on_foreign_command();  // others may move what is only observed
   EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+  EXPECT_FALSE(bench.interlock.state(bench.now_s).follows);
+  Bench led(config_of(true));
+  led.control(1, slow);
+  EXPECT_TRUE(led.interlock.state(led.now_s).follows);
 }
 
 TEST(Interlock, NothingIsSentOnceStopped) {

@@ -59,6 +59,7 @@ EndoscopeRecovery::EndoscopeRecovery(const Rig& rig, const ControllerConfig& con
       camera_from_rcm_(rig.instruments.at(0).camera_from_rcm) {}
 
 void EndoscopeRecovery::see(const ServoInput& input, VisualController& controller) {
+  follows_ = input.joints.follows;
   const auto& image = input.image;
   if (!image) return;
   if (!image->found && !image->marker) return drop_suspicion(controller);
@@ -200,7 +201,7 @@ void EndoscopeRecovery::trust_before() {
 }
 
 void EndoscopeRecovery::rest_again(VisualController& controller) {
-  phase_ = failed_ < max_attempts_ ? Phase::resting : Phase::failed;
+  phase_ = follows_ && failed_ < max_attempts_ ? Phase::resting : Phase::failed;
   sightings_.clear();
   controller.recover({});
 }

@@ -72,6 +72,7 @@ class EndoscopeRecovery {
   Rig rig_;
   JointLimits limits_;
   int max_attempts_;
+  bool follows_ = true;  // the arm: else it can't move by itself to measure
   int registration_ = 0, oldest_counted_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
   Phase phase_ = Phase::watching;
