@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import time
+import xmlrpc.client
 
 import lapservo
 import numpy as np
@@ -33,6 +34,15 @@ def test_examples_run(tmp_path):
     assert "largest errors" in run("own_robot.py", RIG)
 
 
+def wait_for_master(uri):
+    for _ in range(300):
+        try:
+            return xmlrpc.client.ServerProxy(uri).getPid("/test")
+        except OSError:
+            time.sleep(0.1)
+    raise TimeoutError("rosmaster does not answer within 30 s")
+
+
 @pytest.fixture
 def ros(tmp_path):
     """A rosmaster of its own on loopback, and this process a node of it."""
@@ -43,6 +53,7 @@ def ros(tmp_path):
         port = free.getsockname()[1]
     os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1", ROS_LOG_DIR=str(tmp_path))
     running = subprocess.Popen([master, "--core", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    wait_for_master(os.environ["ROS_MASTER_URI"])
     rospy.init_node("test", disable_signals=True, disable_rosout=True)
     yield rospy
     rospy.signal_shutdown("the test is over")
