@@ -112,24 +112,25 @@ TEST(VideoSource, MarksDamagedFrames) {
   }
 }
 
-// FFmpeg's decoder of motion JPEG says nothing of most of them; libjpeg does.
-TEST(VideoSource, MarksFramesOfMotionJpegWithAFlippedBit) {
+// A flipped bit may let a picture of motion JPEG end before its data do, with shifted rows or other colours: FFmpeg's
+// decoder says nothing of that, libjpeg does.
+TEST(VideoSource, MarksFramesOfMotionJpegWhoseDataGoOn) {
   const testing::TemporaryFolder folder;
-  write_video(folder / "a.avi", "MJPG");
-  const std::string whole = bytes_of(folder / "a.avi");
-  constexpr int flips = 40;
-  int marked = 0;
-  Random random(5);
-  for (int i = 0; i < flips; ++i) {
-    std::string bytes = whole;
-    // Within the frames: before them stands the file's header, after them its index.
-    const std::size_t at =
-        whole.size() / 8 + static_cast<std::size_t>(random.uniform(0, 0.75) * static_cast<double>(whole.size()));
-    bytes[at] = static_cast<char>(bytes[at] ^ (1 << random.bits() % 8));
-    testing::write_file(folder / "a.avi", bytes);
-    marked += read(folder / "a.avi").damaged > 0;
+  std::string video;
+  for (int i = 0; i < 6; ++i) {
+    cv::Mat image(240, 320, CV_8UC3, cv::Scalar(90, 120, 60));
+    image(cv::Rect(40 * i, 50, 40, 40)).setTo(cv::Scalar(20, 40, 250));
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(".jpg", image, bytes);
+    std::string frame(bytes.begin(), bytes.end());
+    constexpr std::size_t end_marker = 2, more = 40;
+    if (i == 3) frame.insert(frame.size() - end_marker, frame.substr(frame.size() - end_marker - more, more));
+    video += frame;
   }
-  EXPECT_GE(marked, flips / 2);
+  testing::write_file(folder / "a.mjpeg", video);
+  const Read damaged = read(folder / "a.mjpeg");
+  EXPECT_EQ(damaged.frames, 6);
+  EXPECT_EQ(damaged.damaged, 1);
 }
 
 TEST(OpenFrameSource, NamesWhatCanNotBeRead) {

@@ -132,7 +132,7 @@ class VideoReader::State {
     return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
   }
 
-  // FFmpeg's decoder of motion JPEG says nothing of most flipped bits; a frame would be shifted, or of other colours.
+  // FFmpeg's decoder of motion JPEG says nothing where the data go on after the last row: rows are shifted then.
   bool is_damaged_jpeg(const AVPacket& packet) const {
     return stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG &&
            !jpeg_complaint({packet.data, static_cast<std::size_t>(std::max(0, packet.size))}).empty();
