@@ -263,7 +263,7 @@ TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
   } catch (const std::runtime_error&) {  // this process may open no more
   }
   ASSERT_GT(crowd.size(), 100u);
-  EXPECT_LT(longest, std::chrono::milliseconds(50));
+  EXPECT_LT(longest, std::chrono::milliseconds(500));
   EXPECT_EQ(crowd.front()->hear(), "");  // ended: it asked for nothing in time
   crowd.clear();
   // Once they have gone.
