@@ -1,15 +1,14 @@
 #include "web/access.h"
 
-#include <algorithm>
 #include <arpa/inet.h>
 #include <array>
-#include <cctype>
 #include <cstdint>
 #include <sys/random.h>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/lower_case.h"
 
 namespace lapservo::internal {
 namespace {
@@ -39,10 +38,7 @@ std::string name_in(const std::string& host) {
   if (!rest.empty() && (rest.size() < 2 || rest.size() > 6 || rest.front() != ':' ||
                         rest.find_first_not_of("0123456789", 1) != std::string::npos))
     return {};
-  std::string name = bracketed ? host.substr(1, end - 1) : host.substr(0, end);
-  std::transform(name.begin(), name.end(), name.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return name;
+  return lower_case(bracketed ? host.substr(1, end - 1) : host.substr(0, end));
 }
 
 // Browsers send a host's cookies to all its ports: without the port, another page's token would replace this one's.

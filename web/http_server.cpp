@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <arpa/inet.h>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <exception>
@@ -14,6 +13,7 @@
 #include <utility>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/lower_case.h"
 
 namespace lapservo::internal {
 namespace {
@@ -51,13 +51,6 @@ Address address_of(const std::string& text, int port, const std::string& option)
     throw InputError(option, "is " + text + ", expected an address of this computer");
   }
   return address;
-}
-
-std::string lower_case(const char* text) {
-  std::string result = text;
-  std::transform(result.begin(), result.end(), result.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return result;
 }
 
 MHD_Result add_header(void* headers, MHD_ValueKind, const char* key, const char* value) {

@@ -17,10 +17,12 @@ json number(double value, double sigma) {
 }
 
 json joints_of(const Observation::Rcm& rcm) {
-  static constexpr const char* names[] = {"theta_rad", "phi_rad", "rho_m", "psi_rad"};
   const Eigen::Vector4d q = rcm.q.vector();
   json joints = json::object();
-  for (int i = 0; i < 4; ++i) joints[names[i]] = number(q[i], std::sqrt(rcm.covariance(i, i)));
+  for (std::size_t k = 0; k < JointVector::size; ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    joints[std::string(JointVector::names[k])] = number(q[i], std::sqrt(rcm.covariance(i, i)));
+  }
   return joints;
 }
 

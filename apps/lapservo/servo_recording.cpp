@@ -53,13 +53,14 @@ class RecordedArm : public Robot {
   }
   JointState state() override {
     const JointReading& latest = readings_[std::max<std::size_t>(next_, 1) - 1];
-    const bool known = clock_.now_s() - latest.time_s <= InterlockConfig().max_age_s;  // as the interlock has it
+    const bool known = clock_.now_s() - latest.time_s <= max_age_s_;
     return {latest.time_s, latest.q, known ? OperatingState::enabled : OperatingState::disabled, false};
   }
   void send(const JointPath&) override {}
 
  private:
   const Clock& clock_;
+  const double max_age_s_ = InterlockConfig().max_age_s;
   std::vector<JointReading> readings_;
   std::size_t next_ = 0;
 };

@@ -32,6 +32,17 @@ Flaws usual_flaws() {
   return flaws;
 }
 
+/// Of a marker that is seen there.
+ImageMeasurement image_of(const FeatureState& state, double stamp_s) {
+  ImageMeasurement image;
+  image.found = true;
+  image.time_s = stamp_s;
+  image.features = state.features;
+  image.ends_px = state.ends_px;
+  image.covariance = Eigen::Vector4d(1e-7, 0.02, 0.02, 0.02).asDiagonal();
+  return image;
+}
+
 struct Run {
   std::vector<Moment> moments;
   double delay_s = 0;
@@ -539,15 +550,7 @@ TEST_P(Holding, NamesEveryReason) {
   const DesiredFeatures desired{state.features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
   VisualController controller(config, testing::model_of(rig));
   double t = 0;
-  const auto image_at = [&](double stamp_s) {
-    ImageMeasurement image;
-    image.found = true;
-    image.time_s = stamp_s;
-    image.features = state.features;
-    image.ends_px = state.ends_px;
-    image.covariance = Eigen::Vector4d(1e-7, 0.02, 0.02, 0.02).asDiagonal();
-    return image;
-  };
+  const auto image_at = [&](double stamp_s) { return image_of(state, stamp_s); };
   const auto step = [&](const std::optional<ImageMeasurement>& image) {
     t += config.period_s;
     const auto result = controller.step(t, q, image, desired);
@@ -615,11 +618,7 @@ TEST_P(Holding, AnImageOfAnOldStampIsNotFresh) {
   const FeatureState state = exact_map(rig, q).value();
   const DesiredFeatures desired{state.features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
   VisualController controller(config, testing::model_of(rig));
-  ImageMeasurement image;
-  image.found = true;
-  image.features = state.features;
-  image.ends_px = state.ends_px;
-  image.covariance = Eigen::Vector4d(1e-7, 0.02, 0.02, 0.02).asDiagonal();
+  ImageMeasurement image = image_of(state, 0);
   HoldReason reason = HoldReason::none, fresh = reason;
   for (int k = 1; k <= 60; ++k) {
     image.time_s = std::min(k, 40) * config.period_s;
@@ -635,6 +634,8 @@ TEST_P(Holding, NotForAnArmThatIsOnlyObserved) {
   const Flaws flaws;
   const ControllerConfig config = config_for(flaws);
   const TestRig rig;
+  const DesiredFeatures desired{exact_map(rig, {0.1, 1.57, 0.064, 1}).value().features, Eigen::Vector4d::Zero(),
+                                Eigen::Vector4d::Zero()};
   const auto led = [&](bool follows, std::set<HoldReason>& reasons) {
     VisualController controller(config, testing::model_of(rig));
     controller.expect_following(follows);
@@ -642,16 +643,7 @@ TEST_P(Holding, NotForAnArmThatIsOnlyObserved) {
     for (int k = 0; k < 240; ++k) {
       const double t = k * config.period_s;
       const Eigen::Vector4d q(0.2 * std::sin(1.5 * t), 1.57, 0.064, 1);
-      const FeatureState state = exact_map(rig, q).value();
-      ImageMeasurement image;
-      image.found = true;
-      image.time_s = t;
-      image.features = state.features;
-      image.ends_px = state.ends_px;
-      image.covariance = Eigen::Vector4d(1e-7, 0.02, 0.02, 0.02).asDiagonal();
-      const DesiredFeatures desired{exact_map(rig, {0.1, 1.57, 0.064, 1}).value().features, Eigen::Vector4d::Zero(),
-                                    Eigen::Vector4d::Zero()};
-      const ControlStep step = controller.step(t, q, image, desired);
+      const ControlStep step = controller.step(t, q, image_of(exact_map(rig, q).value(), t), desired);
       if (k > 30) reasons.insert(step.reason);
       most_ahead =
           std::max(most_ahead, (step.setpoint.position - q).cwiseQuotient(config.limits.rate).cwiseAbs().maxCoeff());

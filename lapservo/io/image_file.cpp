@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstdint>
 #include <cstring>
 #include <string_view>
@@ -13,6 +12,7 @@
 
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/lower_case.h"
 #include "lapservo/core/input_file.h"
 #include "lapservo/io/exif_orientation.h"
 #include "lapservo/io/image_encoding.h"
@@ -110,9 +110,7 @@ DecodedPicture decode(std::span<const std::uint8_t> bytes) {
 bool has_image_extension(const fs::path& path) {
   static constexpr std::array<std::string_view, 9> known{".png",  ".jpg",  ".jpeg", ".bmp", ".tif",
                                                          ".tiff", ".webp", ".ppm",  ".pgm"};
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const std::string extension = lower_case(path.extension().string());
   return std::find(known.begin(), known.end(), extension) != known.end();
 }
 

@@ -284,12 +284,20 @@ TEST(SurfaceTracker, AToleranceOfThePrintEntersSigma) {
   }
 }
 
+struct TwoOfOnePrint {
+  Rig both = scenes::usual_rig(2);  ///< as things are
+  Rig one = scenes::usual_rig();    ///< as it is believed, without the RCM
+};
+TwoOfOnePrint two_of_one_print() {
+  TwoOfOnePrint rigs;
+  rigs.both.instruments[1].marker = rigs.both.instruments[0].marker;
+  rigs.one.instruments[0].camera_from_rcm.reset();
+  return rigs;
+}
+
 // Without the RCM nothing says which of two prints is the instrument's.
 TEST(SurfaceTracker, TwoOfTheSamePrintAreAmbiguous) {
-  Rig both = scenes::usual_rig(2);
-  both.instruments[1].marker = both.instruments[0].marker;
-  Rig one = scenes::usual_rig();
-  one.instruments[0].camera_from_rcm.reset();
+  const auto [both, one] = two_of_one_print();
   Random random(5);
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     const auto configurations = apart(both, random);
@@ -333,10 +341,7 @@ std::vector<cv::Mat> rivals_that_change_places(const Rig& both, Random& random, 
 
 // Nor does it when the budget ends before both are looked at, and the next frame has them in another order.
 TEST(SurfaceTracker, TwoOfTheSamePrintStayAmbiguousWithinAnyBudget) {
-  Rig both = scenes::usual_rig(2);
-  both.instruments[1].marker = both.instruments[0].marker;
-  Rig one = scenes::usual_rig();
-  one.instruments[0].camera_from_rcm.reset();
+  const auto [both, one] = two_of_one_print();
   Random random(5);
   int candidates = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
