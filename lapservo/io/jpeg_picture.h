@@ -15,10 +15,11 @@ struct DecodedPicture {
   std::string complaint;
 };
 
-/// By libjpeg, whose warnings OpenCV swallows.
+/// By libjpeg, whose warnings OpenCV swallows, and as jpeg_complaint() has it.
 DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes);
 
-/// What it complains of when it reads the coefficients only, in a third of the time.
+/// What it complains of when it reads the coefficients only, in a third of the time; or, where it has no complaint,
+/// what can't come from a camera: colours that are shifted from some block on (jpeg_dc_shift.h).
 std::string jpeg_complaint(std::span<const std::uint8_t> bytes);
 
 }  // namespace lapservo::internal
