@@ -1,6 +1,4 @@
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -17,9 +15,8 @@
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
-#include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
-#include "lapservo/calibration/camera_calibration.h"
+#include "lapservo/calibration/camera_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
@@ -46,31 +43,9 @@ struct CameraOptions {
 };
 
 Board board_of(const CameraOptions& options) {
-  Board board;
-  const char* const end = options.board.data() + options.board.size();
-  const auto [times, first] = std::from_chars(options.board.data(), end, board.columns);
-  bool read = first == std::errc() && times != end && (*times == 'x' || *times == 'X');
-  if (read) {
-    const auto [rest, second] = std::from_chars(times + 1, end, board.rows);
-    read = second == std::errc() && rest == end;
-  }
-  const auto usual = [](int count) { return count >= 3 && count <= 50; };
-  if (!read || !usual(board.columns) || !usual(board.rows))
-    throw InputError("--board", "corners", options.board,
-                     "COLUMNSxROWS of inner corners, 3 to 50 each, for example 9x6");
-  board.square_m = 1e-3 * options.square_mm;
-  board.dictionary = options.dictionary;
-  if (options.dictionary.empty()) {
-    if (options.marker_mm) throw InputError("--marker-mm", "is of a ChArUco board, expected --aruco with it");
-    return board;
-  }
-  constexpr double usual_share = 0.75;
-  board.marker_m = options.marker_mm ? 1e-3 * *options.marker_mm : usual_share * board.square_m;
-  if (board.marker_m >= board.square_m)
-    throw InputError("--marker-mm", "width", fmt::format("{}", *options.marker_mm),
-                     fmt::format("less than a square's {} mm", options.square_mm));
-  if (const std::string problem = board_problem(board); !problem.empty()) throw InputError("--aruco", problem);
-  return board;
+  BoardWords words{options.board, 1e-3 * options.square_mm, options.dictionary};
+  if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
+  return internal::board_of(words);
 }
 
 void check_files(const CameraOptions& options, const std::optional<Rig>& rig) {
@@ -96,45 +71,11 @@ void check_files(const CameraOptions& options, const std::optional<Rig>& rig) {
   files.refuse_as_output(options.camera_info), files.refuse_as_output(options.report);
 }
 
-struct Seen {
-  int looked_at = 0, flawed = 0;
-  std::vector<std::string> without_board;
-  bool stopped = false;
-};
-
-// Every picture of a folder; of videos and cameras those that differ, a few a second.
-void look_at(const std::string& input, const std::string& image_topic, BoardViews& views, std::optional<cv::Size>& size,
-             std::string& whose, Seen& seen) {
+void look_at(const std::string& input, const std::string& image_topic, BoardRecordings& recordings) {
   const auto source = open_frames(input, 30, image_topic);
-  const bool pictures = source->kind() == FrameSource::Kind::image || source->kind() == FrameSource::Kind::folder;
-  const bool live = source->kind() == FrameSource::Kind::live;
-  const int every = pictures || live ? 1 : std::max(1, static_cast<int>(source->frames_per_second() / 4));
-  Progress progress(source->frame_count());
-  std::string said;
-  int read = 0;
-  while (!(seen.stopped = interrupted())) {
-    const auto frame = source->next();
-    if (!frame) break;
-    const std::string name = frame->file.empty() ? fmt::format("frame {}", frame->index) : frame->file.string();
-    if (!size) size = frame->bgr.size(), whose = name;
-    check_size(*frame, input, *size, whose);
-    if (read++ % every != 0) continue;
-    if (frame->flaw) {
-      ++seen.flawed;
-      continue;
-    }
-    ++seen.looked_at;
-    if (!views.add(name, frame->bgr, pictures) && pictures) seen.without_board.push_back(name);
-    progress.show(read, fmt::format(", {} views", views.views().size()));
-    if (!live) continue;
-    const std::string wanted = views.views().empty() ? "show the board" : advice(views.views(), *size);
-    if (wanted != said) std::fprintf(stderr, "lapservo: %zu views: %s\n", views.views().size(), wanted.c_str());
-    said = wanted;
-    if (views.full() || (wanted.empty() && views.views().size() >= 12)) break;
-  }
-  // A camera is stopped when there are enough views: that is how its calibration ends.
-  if (live) seen.stopped = false;
-  say_complaint(input, *source);
+  recordings.look_at(*source, input, watched_job(),
+                     [](const std::string& wanted) { std::fprintf(stderr, "lapservo: %s\n", wanted.c_str()); });
+  if (!recordings.read().stopped) say_complaint(input, recordings.read().complaint);
 }
 
 int refuse(const CameraOptions& options, const std::string& why) {
@@ -144,20 +85,12 @@ int refuse(const CameraOptions& options, const std::string& why) {
 
 void print_result(const std::vector<BoardView>& views, const CameraCalibration& calibration) {
   const Camera& camera = calibration.camera;
-  const CameraSigmas& sigmas = calibration.sigmas;
   std::printf("%zu views; edges miss the fit by %.3f px rms\n", views.size(), calibration.rms_px);
   for (std::size_t i = 0; i < views.size(); ++i)
     std::printf("  %-40s %4zu corners   %.3f px\n", views[i].name.c_str(), views[i].corners.size(),
                 calibration.view_rms_px[i]);
-  const auto row = [](const char* name, double value, double sigma) {
-    std::printf("  %-24s %12.6f   sigma %.6f\n", name, value, sigma);
-  };
-  row("fx [px]", camera.fx_px, sigmas.fx_px), row("fy [px]", camera.fy_px, sigmas.fy_px);
-  row("cx [px]", camera.cx_px, sigmas.cx_px), row("cy [px]", camera.cy_px, sigmas.cy_px);
-  constexpr std::array names{"k1", "k2", "p1", "p2", "k3"};
-  for (std::size_t i = 0; i < names.size(); ++i) row(names[i], camera.distortion[i], sigmas.distortion[i]);
-  row("magnification of blue", camera.chromatic_aberration.blue, sigmas.blue);
-  row("magnification of red", camera.chromatic_aberration.red, sigmas.red);
+  for (const CalibratedNumber& n : calibrated_numbers(Camera{}, calibration))
+    std::printf("  %-24s %12.6f   sigma %.6f\n", n.name.c_str(), n.after, n.sigma);
   if (!calibration.response) {
     std::printf("response: as it was, these pictures don't tell it\n");
     return;
@@ -183,7 +116,7 @@ void write_results(const CameraOptions& options, const CameraCalibration& calibr
     std::printf("camera: %s\n", options.out.c_str());
     return;
   }
-  write_file(options.rig_out(), updated_rig_yaml(options.rig, calibration.camera, calibration.sigmas));
+  write_file(options.rig_out(), updated_rig_yaml(RigText::read(options.rig), calibration.camera, calibration.sigmas));
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 
@@ -194,33 +127,19 @@ int run_camera(const CameraOptions& options) {
   check_files(options, rig);
   watch_for_interrupts();
 
-  BoardViews chosen(board, options.views);
-  Seen seen;
-  std::optional<cv::Size> size;
-  std::string whose = "the rig's camera";
-  if (rig) size = cv::Size(rig->camera.width_px, rig->camera.height_px);
-  for (const std::string& input : options.inputs) {
-    look_at(input, options.image_topic, chosen, size, whose, seen);
-    if (seen.stopped) return refuse(options, "stopped");
-  }
-  const std::vector<BoardView> views = chosen.take();
-  if (views.empty())
-    return refuse(options,
-                  fmt::format("the board is in none of {} pictures{}: look at --board (inner corners), show it "
-                              "wholly, sharp, with a white margin",
-                              seen.looked_at, seen.flawed ? fmt::format(" ({} are damaged)", seen.flawed) : ""));
   const Camera before = rig ? rig->camera : Camera{};
-  CameraCalibration calibration;
-  {
-    Progress progress(std::nullopt);
-    int step = 0;
-    calibration =
-        calibrate_camera(board, views, before, [&](const std::string& what) { progress.show(++step, ", " + what); });
+  BoardRecordings recordings(board, options.views, rig);
+  for (const std::string& input : options.inputs) {
+    look_at(input, options.image_topic, recordings);
+    if (recordings.read().stopped) break;
   }
+  const auto without_board = recordings.without_board();
+  const CameraMeasurement measured = measure_camera(board, std::move(recordings), before, watched_job());
+  const auto& [calibration, views, more] = measured;
   if (!calibration.refusal.empty()) return refuse(options, calibration.refusal);
-  for (const std::string& name : seen.without_board) std::printf("left out, there is no board: %s\n", name.c_str());
+  for (const std::string& name : without_board) std::printf("left out, there is no board: %s\n", name.c_str());
   print_result(views, calibration);
-  if (const std::string more = advice(views, *size); !more.empty()) std::printf("better still: %s\n", more.c_str());
+  if (!more.empty()) std::printf("better still: %s\n", more.c_str());
   if (!options.report.empty()) {
     write_camera_report(options.report, before, views, calibration);
     std::printf("report: %s\n", options.report.c_str());

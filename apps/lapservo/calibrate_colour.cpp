@@ -2,6 +2,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -10,9 +11,8 @@
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_view.h"
-#include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
-#include "lapservo/calibration/colour_calibration.h"
+#include "lapservo/calibration/colour_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/experiments/html_report.h"
 #include "lapservo/rig/rig_updater.h"
@@ -24,12 +24,6 @@ namespace {
 struct ColourOptions : CalibrateOptions {
   bool view = false, replace_response = false;
 };
-
-Rig with_colour(Rig rig, std::size_t index, const ColourCalibration& calibration) {
-  rig.instruments[index].marker.hues_deg = calibration.hues_deg;
-  if (calibration.response) rig.camera.response = *calibration.response;
-  return rig;
-}
 
 cv::Mat halved(const cv::Mat& picture) {
   cv::Mat small;
@@ -56,14 +50,14 @@ void print(const Instrument& instrument, const ColourCalibration& calibration, s
 }
 
 void write_colour_report(const std::string& path, const Instrument& instrument, const ColourCalibration& calibration,
-                         const SpreadFrames& kept, const Rig& before, const Rig& after) {
+                         const std::vector<cv::Mat>& kept, const Rig& before, const Rig& after) {
   ReportSection section;
   section.id = "colour";
   section.title = "The colours of " + instrument.name;
-  section.text = {fmt::format("Found in {} of {} frames before, in {} after.", calibration.found_before,
-                              kept.frames().size(), calibration.found)};
-  for (const std::size_t at : {kept.frames().size() / 4, 3 * kept.frames().size() / 4}) {
-    const cv::Mat& frame = kept.frames()[at];
+  section.text = {fmt::format("Found in {} of {} frames before, in {} after.", calibration.found_before, kept.size(),
+                              calibration.found)};
+  for (const std::size_t at : {kept.size() / 4, 3 * kept.size() / 4}) {
+    const cv::Mat& frame = kept[at];
     section.figures.push_back({Picture{"Before", segmentation_picture(frame, before)}, "With the rig's hues."});
     section.figures.push_back({Picture{"After", segmentation_picture(frame, after)}, "With the calibrated hues."});
   }
@@ -81,9 +75,9 @@ void write_colour_report(const std::string& path, const Instrument& instrument, 
 }
 
 // Until the user has seen them. It was Ctrl-C that ended live frames: it does not end this.
-void show(LiveView& view, const SpreadFrames& kept, const Rig& before, const Rig& after, bool live) {
-  for (std::size_t i = 0; i < kept.frames().size() && (live || !interrupted()); ++i)
-    if (!view.show(before_and_after(kept.frames()[i], before, after))) return;
+void show(LiveView& view, const std::vector<cv::Mat>& kept, const Rig& before, const Rig& after, bool live) {
+  for (std::size_t i = 0; i < kept.size() && (live || !interrupted()); ++i)
+    if (!view.show(before_and_after(kept[i], before, after))) return;
 }
 
 int run_colour(const ColourOptions& options) {
@@ -97,36 +91,24 @@ int run_colour(const ColourOptions& options) {
   AtomicFile out(options.out);
   watch_for_interrupts();
 
-  constexpr std::size_t most = 48;
-  SpreadFrames kept(most);
   const bool live = source->kind() == FrameSource::Kind::live;
-  FramesRead read;
-  read = read_frames(options, rig, *source, live ? 10 : 1, [&](const cv::Mat& bgr, double) {
-    kept.add(bgr);
-    // A camera goes on for ever: the user ends what is enough.
-    if (view && live) view->show(segmentation_picture(bgr, rig));
-    return fmt::format(", {} kept", kept.frames().size());
-  });
-  if (read.stopped && !live) return refuse_calibration(options, "stopped");
-  say_complaint(options.input, *source);
-  ColourCalibration calibration;
-  {
-    Progress progress(std::nullopt);
-    int step = 0;
-    const bool keep_response = !options.replace_response && is_response_measured(options.rig);
-    calibration = calibrate_colour(rig, index, kept.frames(), keep_response,
-                                   [&](const std::string& what) { progress.show(++step, ": " + what); });
-  }
+  const bool keep_response = !options.replace_response && is_response_measured(RigText::read(options.rig));
+  const ColourMeasurement measured = measure_colour(rig, index, {*source, options.input, options.deinterlace},
+                                                    keep_response, watched_job(), [&](const cv::Mat& bgr) {
+                                                      if (view && live) view->show(segmentation_picture(bgr, rig));
+                                                    });
+  const ColourCalibration& calibration = measured.calibration;
+  if (live || !measured.read.stopped) say_complaint(options.input, measured.read.complaint);
   if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
-  print(instrument, calibration, kept.frames().size());
+  print(instrument, calibration, measured.frames.size());
   const Rig after = with_colour(rig, index, calibration);
-  if (view) show(*view, kept, rig, after, live);
+  if (view) show(*view, measured.frames, rig, after, live);
   if (!options.report.empty()) {
-    write_colour_report(options.report, instrument, calibration, kept, rig, after);
+    write_colour_report(options.report, instrument, calibration, measured.frames, rig, after);
     std::printf("report: %s\n", options.report.c_str());
   }
   out.stream() << updated_rig_yaml(
-      options.rig, options.out, index,
+      RigText::read(options.rig), options.out, index,
       MeasuredColour{calibration.hues_deg, calibration.sigma_hues_deg, calibration.response});
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <system_error>
 #include <vector>
 
@@ -14,7 +16,6 @@
 #include "apps/lapservo/progress.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/instrument_index.h"
-#include "lapservo/vision/interlacing.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -60,38 +61,24 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
   inputs.refuse_as_output(options.report);
 }
 
-void check_size(const Frame& frame, const std::string& input, const cv::Size& expected, const std::string& whose) {
-  if (frame.bgr.size() != expected)
-    throw InputError(frame.file.empty() ? input : frame.file.string(), "size",
-                     fmt::format("{} x {}", frame.bgr.cols, frame.bgr.rows),
-                     fmt::format("{} x {}, as {} has it", expected.width, expected.height, whose));
-}
-
-void say_complaint(const std::string& input, const FrameSource& source) {
-  if (const std::string complaint = source.complaint(); !complaint.empty())
+void say_complaint(const std::string& input, const std::string& complaint) {
+  if (!complaint.empty())
     std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", input.c_str(), complaint.c_str());
 }
 
-FramesRead read_frames(const CalibrateOptions& options, const Rig& rig, FrameSource& source, int every,
-                       const std::function<std::string(const cv::Mat&, double)>& look) {
-  const bool deinterlace = options.deinterlace || rig.camera.deinterlace;
-  EvenField field(rig.camera.response);
-  FramesRead frames;
-  Progress progress(source.frame_count());
-  int read = 0;
-  while (!(frames.stopped = interrupted())) {
-    const auto frame = source.next();
-    if (!frame) break;
-    check_size(*frame, options.input, {rig.camera.width_px, rig.camera.height_px}, "the rig's camera");
-    if (read++ % every != 0) continue;
-    if (frame->flaw) {
-      ++frames.flawed;
-      continue;
-    }
-    ++frames.looked_at;
-    progress.show(read, look(deinterlace ? field.of(frame->bgr) : frame->bgr, frame->time_s));
-  }
-  return frames;
+JobWatch watched_job() {
+  struct Stage {
+    std::optional<Progress> progress;
+    std::optional<int> total;
+    int done = 0;
+  };
+  const auto stage = std::make_shared<Stage>();
+  return {interrupted, [stage](std::optional<int> total, int done, const std::string& remark) {
+            // Another one has begun: its time counts anew.
+            if (!stage->progress || total != stage->total || done < stage->done) stage->progress.emplace(total);
+            stage->total = total, stage->done = done;
+            stage->progress->show(done, remark);
+          }};
 }
 
 int refuse_calibration(const CalibrateOptions& options, const std::string& why) {

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <functional>
 #include <string>
 
 #include "apps/lapservo/subcommands.h"
-#include "lapservo/io/frame_source.h"
+#include "lapservo/calibration/frame_recording.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
@@ -32,22 +31,11 @@ inline std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& opti
 /// Throws InputError when a result would go over an input or over the other result.
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
 
-/// Throws InputError, naming the frame's file or else `input`, at a frame of another size than `whose`.
-void check_size(const Frame& frame, const std::string& input, const cv::Size& expected, const std::string& whose);
-
 /// What a source could not read, on stderr, when there is such.
-void say_complaint(const std::string& input, const FrameSource& source);
+void say_complaint(const std::string& input, const std::string& complaint);
 
-/// What became of a recording's frames.
-struct FramesRead {
-  int looked_at = 0, flawed = 0;
-  bool stopped = false;  ///< by the user
-};
-
-/// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` returns what is told
-/// beside the progress. Throws InputError at a frame that is not of the rig's size.
-FramesRead read_frames(const CalibrateOptions& options, const Rig& rig, FrameSource& source, int every,
-                       const std::function<std::string(const cv::Mat&, double)>& look);
+/// Ends a job at Ctrl-C and tells how far it is (progress.h), until it is destroyed.
+internal::JobWatch watched_job();
 
 /// Says on stderr why nothing was written; returns the exit code.
 int refuse_calibration(const CalibrateOptions& options, const std::string& why);

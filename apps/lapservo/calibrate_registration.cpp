@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -17,78 +15,17 @@
 #include "apps/lapservo/joint_input.h"
 #include "apps/lapservo/registration_report.h"
 #include "apps/lapservo/subcommands.h"
-#include "lapservo/calibration/pose_table.h"
-#include "lapservo/calibration/registration.h"
+#include "lapservo/calibration/registration_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/rig_updater.h"
-#include "lapservo/vision/tracker.h"
 
 namespace lapservo::app {
 using namespace internal;
 namespace {
 
-struct Poses {
-  std::vector<TimedPose> all;
-  std::string none;  ///< why there are none
-  bool stopped = false;
-};
-
 bool is_table(const std::string& input) {
   return std::filesystem::path(input).extension() == ".csv";
-}
-
-Poses poses_in_table(const CalibrateOptions& options, const Instrument& instrument) {
-  PoseTable table = read_poses(options.input, instrument.name);
-  Poses poses{std::move(table.poses), "", false};
-  if (table.with_rcm > 0 && poses.all.empty())
-    poses.none = fmt::format(
-        "its {} rows were measured with a camera_from_rcm, through which their axes pass whether it is right or not: "
-        "give the pictures, or track them with a rig without it",
-        table.with_rcm);
-  else if (table.rows == 0)
-    poses.none = fmt::format("has no row of {}", instrument.name);
-  return poses;
-}
-
-// Without what is to be measured: poses by the image alone.
-Poses poses_in_frames(const CalibrateOptions& options, Rig rig, std::size_t index, FrameSource& source) {
-  constexpr int enough = 3600;
-  for (Instrument& instrument : rig.instruments) instrument.camera_from_rcm.reset();
-  Tracker tracker(rig, {.frame_budget = std::nullopt});
-  Poses poses;
-  const FramesRead read = read_frames(options, rig, source, std::max(1, source.frame_count().value_or(0) / enough),
-                                      [&](const cv::Mat& bgr, double time_s) {
-                                        const Observation& seen = tracker.track(bgr)[index];
-                                        if (seen.status == Status::ok && seen.marker)
-                                          poses.all.push_back({time_s, *seen.marker});
-                                        return fmt::format(", {} in {}", rig.instruments[index].name, poses.all.size());
-                                      });
-  poses.stopped = read.stopped;
-  say_complaint(options.input, source);
-  if (poses.all.empty())
-    poses.none = fmt::format("{} is in none of {} frames{}", rig.instruments[index].name, read.looked_at,
-                             read.flawed ? fmt::format(" ({} are damaged)", read.flawed) : "");
-  return poses;
-}
-
-MeasuredRegistration measured(const Registration& registration) {
-  MeasuredRegistration result;
-  result.camera_from_rcm = registration.camera_from_rcm;
-  for (std::size_t i = 0; i < 3; ++i)
-    result.sigma_translation_m[i] = registration.sigma_translation_m[static_cast<Eigen::Index>(i)];
-  if (registration.sigma_quaternion) {
-    result.sigma_quaternion_xyzw.emplace();
-    for (std::size_t i = 0; i < 4; ++i)
-      (*result.sigma_quaternion_xyzw)[i] = (*registration.sigma_quaternion)[static_cast<Eigen::Index>(i)];
-  }
-  if (registration.arm) {
-    result.joints = registration.arm->joints;
-    result.sigma_offset = registration.arm->sigma_offset;
-    result.image_delay_s = registration.arm->image_delay_s;
-    result.sigma_image_delay_s = registration.arm->sigma_image_delay_s;
-  }
-  return result;
 }
 
 void print_numbers(const Instrument& before, const Registration& registration) {
@@ -102,12 +39,6 @@ void print_numbers(const Instrument& before, const Registration& registration) {
               joints.sign[3]);
   std::printf("  backlash behind the readings (not written): theta %.1f, phi %.1f mrad, rho %.2f mm, psi %.1f mrad\n",
               1e3 * backlash[0], 1e3 * backlash[1], 1e3 * backlash[2], 1e3 * backlash[3]);
-}
-
-double rms(const Registration& registration, double RegistrationResidual::*what) {
-  double squares = 0;
-  for (const RegistrationResidual& r : registration.residuals) squares += r.*what * (r.*what);
-  return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, registration.residuals.size())));
 }
 
 void print_residuals(const Registration& registration) {
@@ -134,8 +65,11 @@ int run_registration(const CalibrateOptions& options) {
   AtomicFile out(options.out);
   watch_for_interrupts();
 
-  const Poses poses = frames ? poses_in_frames(options, rig, index, *frames) : poses_in_table(options, instrument);
-  if (poses.stopped) return refuse_calibration(options, "stopped");
+  const MeasuredPoses poses =
+      frames ? poses_in_frames(rig, index, {*frames, options.input, options.deinterlace}, watched_job())
+             : poses_in_table(options.input, instrument.name);
+  if (poses.read.stopped) return refuse_calibration(options, "stopped");
+  say_complaint(options.input, poses.read.complaint);
   if (!poses.none.empty()) return refuse_calibration(options, poses.none);
   const Registration registration = joints ? register_arm(instrument, poses.all, joints->recording, joints->source)
                                            : register_rcm(instrument, poses.all);
@@ -147,7 +81,7 @@ int run_registration(const CalibrateOptions& options) {
     write_registration_report(options.report, instrument, registration);
     std::printf("report: %s\n", options.report.c_str());
   }
-  out.stream() << updated_rig_yaml(options.rig, options.out, index, measured(registration));
+  out.stream() << updated_rig_yaml(RigText::read(options.rig), options.out, index, measured(registration));
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
   return 0;

@@ -85,8 +85,8 @@ int run_check(const CalibrateOptions& options) {
 
   constexpr int enough = 1800;
   RigEvidence evidence(rig, index);
-  const FramesRead read = read_frames(options, rig, *source, std::max(1, source->frame_count().value_or(0) / enough),
-                                      [&](const cv::Mat& bgr, double time_s) {
+  const FramesRead read = read_frames({*source, options.input, options.deinterlace}, rig, every_of(*source, enough),
+                                      watched_job(), [&](const cv::Mat& bgr, double time_s) {
                                         evidence.add(bgr, time_s);
                                         return fmt::format(", {} in {}", instrument.name, evidence.poses().size());
                                       });
@@ -94,7 +94,7 @@ int run_check(const CalibrateOptions& options) {
     std::fprintf(stderr, "lapservo: %s: stopped\n", options.input.c_str());
     return 1;
   }
-  say_complaint(options.input, *source);
+  say_complaint(options.input, read.complaint);
   CheckedRig checked;
   {
     Progress progress(std::nullopt);

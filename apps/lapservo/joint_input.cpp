@@ -1,12 +1,8 @@
 #include "apps/lapservo/joint_input.h"
 
-#include <algorithm>
 #include <memory>
 #include <utility>
 #include <vector>
-
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "apps/lapservo/frame_input.h"
 #include "lapservo/core/csv.h"
@@ -19,18 +15,6 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-Joints joints_of(const CalibrateOptions& options, const Instrument& instrument,
-                 const std::vector<std::string>& recorded, const std::string& source) {
-  if (instrument.joints) return *instrument.joints;
-  Joints joints;
-  if (recorded.size() != joints.names.size())
-    throw InputError(source, "columns", fmt::format("{}", fmt::join(recorded, ", ")),
-                     "time_s and four joints (theta's, phi's, rho's, psi's), since " + instrument.name +
-                         " has no joints entry in " + options.rig + " that would name them");
-  std::copy(recorded.begin(), recorded.end(), joints.names.begin());
-  return joints;
-}
-
 std::vector<std::string> columns_of(const std::string& path) {
   std::vector<std::string> names = CsvTable::read(path).columns();
   std::erase(names, "time_s");
@@ -39,8 +23,9 @@ std::vector<std::string> columns_of(const std::string& path) {
 
 JointInput read_table(const CalibrateOptions& options, const Instrument& instrument) {
   refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.joints);
-  const Joints joints = joints_of(
-      options, instrument, instrument.joints ? std::vector<std::string>() : columns_of(options.joints), options.joints);
+  const Joints joints =
+      joints_of(instrument, instrument.joints ? std::vector<std::string>() : columns_of(options.joints), options.joints,
+                options.rig);
   return {joints, read_joint_recording(options.joints, joints), options.joints};
 }
 
@@ -50,7 +35,8 @@ JointInput read_topic(const CalibrateOptions& options, const Instrument& instrum
   if (!begin_s)
     throw InputError("--joints", "is the bag " + bag.path() + ", expected a CSV: " + options.input +
                                      " is no bag, and so has no stamps that would go with a bag's");
-  const Joints joints = joints_of(options, instrument, joint_names_in_bag(bag, topic), bag.path() + ": " + topic.name);
+  const Joints joints =
+      joints_of(instrument, joint_names_in_bag(bag, topic), bag.path() + ": " + topic.name, options.rig);
   return {joints, joints_in_bag(bag, topic, joints, *begin_s), bag.path()};
 }
 

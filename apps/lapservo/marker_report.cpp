@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/print_residual_plot.h"
+#include "lapservo/calibration/marker_measurement.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/experiments/html_report.h"
 
@@ -54,25 +55,6 @@ Table table_of(const std::vector<CalibratedNumber>& numbers) {
 }
 
 }  // namespace
-
-std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Marker& after, bool with_seam) {
-  std::vector<CalibratedNumber> numbers;
-  const auto add = [&](const std::string& name, double was, double is, double sigma) {
-    numbers.push_back({name, 1e3 * was, 1e3 * is, 1e3 * sigma});
-  };
-  const MarkerSigmas& sigmas = after.sigmas;
-  for (std::size_t i = 0; i < 3; ++i)
-    add(fmt::format("bands_upper_m[{}] [mm]", i), before.bands_upper_m[i], after.bands_upper_m[i],
-        (*sigmas.bands_upper_m)[i]);
-  for (std::size_t i = 0; i < 3; ++i)
-    add(fmt::format("bands_lower_m[{}] [mm]", i), before.bands_lower_m[i], after.bands_lower_m[i],
-        (*sigmas.bands_lower_m)[i]);
-  add("wrap_m [mm]", before.wrap_m, after.wrap_m, sigmas.wrap_m.value());
-  add("skew_m [mm]", before.skew_m, after.skew_m, sigmas.skew_m.value());
-  add("gap_rad [mrad]", before.gap_rad, after.gap_rad, sigmas.gap_rad.value());
-  if (with_seam) add("seam_rad [mrad]", before.seam_rad, after.seam_rad, sigmas.seam_rad.value());
-  return numbers;
-}
 
 void write_marker_report(const std::filesystem::path& path, const Instrument& instrument,
                          const MarkerCalibration& calibration) {

@@ -1,15 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <vector>
 
-#include "apps/lapservo/calibrated_number.h"
 #include "lapservo/calibration/marker_calibration.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
-
-std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Marker& after, bool with_seam);
 
 /// One HTML page: what each boundary misses the print by over the turn, for the rig's print and for the calibrated one,
 /// and both prints unrolled. Throws InputError when it can't be written.

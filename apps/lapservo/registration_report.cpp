@@ -1,18 +1,15 @@
 #include "apps/lapservo/registration_report.h"
 
-#include <array>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/registration_measurement.h"
 #include "lapservo/experiments/html_report.h"
 
 namespace lapservo::app {
 using namespace internal;
 namespace {
-
-constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 Plot plot_of(const Registration& registration, const std::string& title, const std::string& label,
              const std::string& unit, double RegistrationResidual::*what) {
@@ -32,28 +29,6 @@ std::string number(double value) {
 }
 
 }  // namespace
-
-std::vector<CalibratedNumber> registered_numbers(const Instrument& before, const Registration& registration) {
-  std::vector<CalibratedNumber> numbers;
-  const auto add = [&](const std::string& name, double was, double is, double sigma) {
-    numbers.push_back({name, 1e3 * was, 1e3 * is, 1e3 * sigma});
-  };
-  constexpr std::array<const char*, 3> axes{"x", "y", "z"};
-  const auto& was = before.camera_from_rcm;
-  for (Eigen::Index i = 0; i < 3; ++i)
-    add(fmt::format("camera_from_rcm {} [mm]", axes[static_cast<std::size_t>(i)]), was ? was->translation[i] : unknown,
-        registration.camera_from_rcm.translation[i], registration.sigma_translation_m[i]);
-  if (registration.sigma_quaternion)
-    add("its rotation [mrad]", was ? was->rotation.angularDistance(registration.camera_from_rcm.rotation) : unknown, 0,
-        registration.sigma_rotation_rad);
-  if (!registration.arm) return numbers;
-  const Registration::Arm& arm = *registration.arm;
-  constexpr std::array<const char*, 4> units{"theta [mrad]", "phi [mrad]", "rho [mm]", "psi [mrad]"};
-  for (std::size_t i = 1; i < 4; ++i)
-    add(fmt::format("offset of {}", units[i]), before.joints->offset[i], arm.joints.offset[i], arm.sigma_offset[i]);
-  add("image_delay_s [ms]", before.image_delay_s.value_or(unknown), arm.image_delay_s, arm.sigma_image_delay_s);
-  return numbers;
-}
 
 void write_registration_report(const std::filesystem::path& path, const Instrument& instrument,
                                const Registration& registration) {

@@ -119,11 +119,12 @@ std::vector<EdgePixels> edges_of(const Board& board, const std::vector<BoardCorn
   return edges;
 }
 
-std::optional<EdgeFit> fit_edge(const EdgePixels& edge, int channel, const std::array<float, 256>& light_of_value) {
+std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel,
+                                     const std::array<float, 256>& light_of_value) {
   const auto c = static_cast<std::size_t>(channel);
   const auto levels = levels_of(edge, c, light_of_value);
   if (!levels) return std::nullopt;
-  EdgeFit fit;
+  BoardEdgeFit fit;
   double sum = 0, squares = 0;
   for (const EdgePixel& pixel : edge.pixels) {
     if (pixel.value[c] >= saturated_value) return std::nullopt;

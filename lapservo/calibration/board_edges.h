@@ -46,7 +46,7 @@ std::vector<EdgePixels> edges_of(const Board& board, const std::vector<BoardCorn
                                  const Rigid3& camera_from_board, const cv::Mat& bgr);
 
 /// A straight blurred edge fitted to a channel's light.
-struct EdgeFit {
+struct BoardEdgeFit {
   double offset_px = 0, slope = 0;  ///< distance to the path at mean_fraction, and its change along the edge
   double mean_fraction = 0, spread_fraction = 0;
   double dark = 0, bright = 0;  ///< light
@@ -56,6 +56,6 @@ struct EdgeFit {
 };
 
 /// nullopt where there is no such edge: too little contrast, saturated, or a fit that leaves it.
-std::optional<EdgeFit> fit_edge(const EdgePixels& edge, int channel, const std::array<float, 256>& light_of_value);
+std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel, const std::array<float, 256>& light_of_value);
 
 }  // namespace lapservo::internal

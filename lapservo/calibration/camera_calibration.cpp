@@ -80,7 +80,7 @@ std::optional<Fit> first_fit(const Board& board, const std::vector<BoardView>& v
   return fit;
 }
 
-void add_points(const EdgePixels& edge, const EdgeFit& fit, int channel, std::vector<EdgePoint>& points) {
+void add_points(const EdgePixels& edge, const BoardEdgeFit& fit, int channel, std::vector<EdgePoint>& points) {
   const EdgePath& path = edge.path;
   for (const double side : {-1.0, 1.0}) {
     const double beyond = side * fit.spread_fraction, fraction = fit.mean_fraction + beyond;

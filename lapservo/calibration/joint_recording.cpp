@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
-#include "lapservo/core/csv.h"
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "lapservo/core/error.h"
 
 namespace lapservo::internal {
@@ -45,19 +46,34 @@ std::optional<std::array<double, 4>> JointRecording::at(double at_s) const {
 }
 
 JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints) {
-  const CsvTable table = CsvTable::read(path);
+  return joint_recording_of(CsvTable::read(path), path.string(), joints);
+}
+
+JointRecording joint_recording_of(const CsvTable& table, const std::string& source, const Joints& joints) {
   JointRecording recording;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const double time_s = table.number(row, "time_s");
     if (!recording.time_s.empty() && !(time_s > recording.time_s.back()))
-      throw InputError(path.string(), "row " + std::to_string(row + 1) + ": time_s", table.text(row, "time_s"),
+      throw InputError(source, "row " + std::to_string(row + 1) + ": time_s", table.text(row, "time_s"),
                        "later than the row before: the clock jumps");
     recording.time_s.push_back(time_s);
     auto& at = recording.joints.emplace_back();
     for (std::size_t i = 0; i < at.size(); ++i) at[i] = table.number(row, joints.names[i]);
   }
-  if (recording.time_s.size() < 2) throw InputError(path.string(), "has fewer than two rows");
+  if (recording.time_s.size() < 2) throw InputError(source, "has fewer than two rows");
   return recording;
+}
+
+Joints joints_of(const Instrument& instrument, const std::vector<std::string>& recorded, const std::string& source,
+                 const std::string& rig) {
+  if (instrument.joints) return *instrument.joints;
+  Joints joints;
+  if (recorded.size() != joints.names.size())
+    throw InputError(source, "columns", fmt::format("{}", fmt::join(recorded, ", ")),
+                     "time_s and four joints (theta's, phi's, rho's, psi's), since " + instrument.name +
+                         " has no joints entry in " + rig + " that would name them");
+  std::copy(recorded.begin(), recorded.end(), joints.names.begin());
+  return joints;
 }
 
 JointRecording refined(const JointRecording& r, double step_s) {

@@ -3,8 +3,10 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "lapservo/core/csv.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
@@ -21,6 +23,14 @@ struct JointRecording {
 /// A CSV of `time_s` and a column a joint (docs/conventions.md). Throws InputError for columns that are missing,
 /// numbers that are none, fewer than two rows and times that do not rise.
 JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints);
+
+/// The same of a table that was read already; `source` is named in complaints.
+JointRecording joint_recording_of(const CsvTable& table, const std::string& source, const Joints& joints);
+
+/// The instrument's joints; where it has none, the recording's own four in the order theta, phi, rho, psi. Throws
+/// InputError naming `source` when there are not four, and the rig that would name them.
+Joints joints_of(const Instrument& instrument, const std::vector<std::string>& recorded, const std::string& source,
+                 const std::string& rig);
 
 /// The same motion in steps of at most `step_s`, smooth through the rows (Catmull and Rom's cubic); pauses stay.
 JointRecording refined(const JointRecording& recording, double step_s);

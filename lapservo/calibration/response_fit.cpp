@@ -240,6 +240,7 @@ Response table_of(const Shared& shared) {
     table.table_light.push_back(light);
     table.table_value.push_back(std::max(value, table.table_value.back() + 1e-5));
   }
+  table.table_value.back() = 1;  // where those before it went beyond
   for (int i = steps - 1; i > 0 && table.table_value[static_cast<std::size_t>(i)] >= 1 - 1e-5 * (steps - i); --i)
     table.table_value[static_cast<std::size_t>(i)] = 1 - 1e-5 * (steps - i);
   return table;
@@ -346,7 +347,7 @@ class ProfileFit {
     solver_.linear_solver_type = ceres::SPARSE_SCHUR;
     solver_.max_num_iterations = 40;
     solver_.function_tolerance = 1e-6;
-    solver_.num_threads = 2;
+    solver_.num_threads = 1;  // the same to the last bit, every time
   }
 
   /// Of values over their sigmas.

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include "lapservo/core/input_file.h"
+
 namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
@@ -42,8 +44,8 @@ std::string edited(YAML::Node root, const fs::path& path, const fs::path& destin
 }
 
 template <typename Edit>
-std::string with_instrument(const fs::path& path, const fs::path& destination, std::size_t instrument, Edit edit) {
-  return edited(YAML::LoadFile(path.string()), path, destination, instrument, edit);
+std::string with_instrument(const RigText& rig, const fs::path& destination, std::size_t instrument, Edit edit) {
+  return edited(YAML::Load(rig.yaml), rig.path, destination, instrument, edit);
 }
 
 // As short as reads back to the same bits.
@@ -69,9 +71,24 @@ YAML::Node list_of(const Numbers& numbers, Text text) {
 
 }  // namespace
 
-std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, std::size_t instrument,
+RigText RigText::read(const fs::path& path) {
+  constexpr std::size_t max_bytes = std::size_t{16} << 20;
+  return {read_input(path, max_bytes, "a rig"), path};
+}
+
+std::string moved_rig_yaml(const RigText& rig, const fs::path& destination) {
+  YAML::Node root = YAML::Load(rig.yaml);
+  YAML::Node camera = root["camera"];
+  if (!camera.IsScalar()) return rig.yaml;
+  const std::string moved = camera_path_from(camera.Scalar(), rig.path, destination);
+  if (moved == camera.Scalar()) return rig.yaml;
+  root["camera"] = moved;
+  return text_of(root);
+}
+
+std::string updated_rig_yaml(const RigText& rig, const fs::path& destination, std::size_t instrument,
                              const Marker& marker) {
-  return with_instrument(path, destination, instrument, [&](YAML::Node entry) {
+  return with_instrument(rig, destination, instrument, [&](YAML::Node entry) {
     YAML::Node old = entry["marker"];
     const YAML::Node numbers = YAML::Load(marker_yaml(marker, 0));
     for (const auto& number : numbers) old[number.first.Scalar()] = number.second;
@@ -80,9 +97,9 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
   });
 }
 
-std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, std::size_t instrument,
+std::string updated_rig_yaml(const RigText& rig, const fs::path& destination, std::size_t instrument,
                              const MeasuredRegistration& measured) {
-  return with_instrument(path, destination, instrument, [&](YAML::Node entry) {
+  return with_instrument(rig, destination, instrument, [&](YAML::Node entry) {
     YAML::Node transform;
     transform["translation_m"] = list_of(measured.camera_from_rcm.translation, exact);
     transform["sigma_translation_m"] = list_of(measured.sigma_translation_m, rounded);
@@ -106,11 +123,11 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
   });
 }
 
-std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, std::size_t instrument,
+std::string updated_rig_yaml(const RigText& rig, const fs::path& destination, std::size_t instrument,
                              const MeasuredColour& colour) {
-  YAML::Node root = YAML::LoadFile(path.string());
+  YAML::Node root = YAML::Load(rig.yaml);
   if (colour.response) {
-    YAML::Node camera = camera_of(root, path);
+    YAML::Node camera = camera_of(root, rig.path);
     root["camera"] = camera;
     camera["response"] = YAML::Load(response_yaml(*colour.response));
     camera.remove("sigma_response");
@@ -120,15 +137,15 @@ std::string updated_rig_yaml(const fs::path& path, const fs::path& destination, 
     marker["hues_deg"] = list_of(colour.hues_deg, rounded_hue);
     marker["sigma_hues_deg"] = list_of(colour.sigma_hues_deg, rounded);
   };
-  return edited(root, path, destination, instrument, with_colour);
+  return edited(root, rig.path, destination, instrument, with_colour);
 }
 
-bool is_response_measured(const fs::path& path) {
-  return camera_of(YAML::LoadFile(path.string()), path)["sigma_response"].IsDefined();
+bool is_response_measured(const RigText& rig) {
+  return camera_of(YAML::Load(rig.yaml), rig.path)["sigma_response"].IsDefined();
 }
 
-std::string updated_rig_yaml(const fs::path& path, const Camera& camera, const CameraSigmas& sigmas) {
-  YAML::Node root = YAML::LoadFile(path.string());
+std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas) {
+  YAML::Node root = YAML::Load(rig.yaml);
   root["camera"] = YAML::Load(measured_camera_yaml(camera, sigmas));
   return text_of(root);
 }

@@ -11,11 +11,20 @@
 
 namespace lapservo::internal {
 
-/// The rig file `path` as YAML with another marker for one instrument, for a file at `destination`: every other entry
-/// stays as it is written there, sigmas included; comments do not. A camera file is named so that it is found from
+/// A rig as it is written: a file's content, or what stands for one.
+struct RigText {
+  std::string yaml;
+  std::filesystem::path path;  ///< where a camera file is looked for, and found
+
+  /// Throws InputError as load_rig() does for what is no file.
+  static RigText read(const std::filesystem::path& path);
+};
+
+/// The rig as YAML with another marker for one instrument, for a file at `destination`: every other entry stays as it
+/// is written there, sigmas included; comments do not. A camera file is named so that it is found from
 /// there. The rig must have been read without complaint (load_rig).
-std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
-                             std::size_t instrument, const Marker& marker);
+std::string updated_rig_yaml(const RigText& rig, const std::filesystem::path& destination, std::size_t instrument,
+                             const Marker& marker);
 
 /// Where an instrument stands before its camera, with one standard deviation each; without a value, what the file says
 /// of it stays.
@@ -30,8 +39,8 @@ struct MeasuredRegistration {
 };
 
 /// The same, with another registration.
-std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
-                             std::size_t instrument, const MeasuredRegistration& registration);
+std::string updated_rig_yaml(const RigText& rig, const std::filesystem::path& destination, std::size_t instrument,
+                             const MeasuredRegistration& registration);
 
 /// How a camera shows the bands of a marker, with one standard deviation of each hue; `response` without a value: as
 /// the file has it.
@@ -42,14 +51,17 @@ struct MeasuredColour {
 
 /// The same, with other colours. A response that is another goes into the rig itself, with what stands beside it,
 /// whatever file the camera came from.
-std::string updated_rig_yaml(const std::filesystem::path& path, const std::filesystem::path& destination,
-                             std::size_t instrument, const MeasuredColour& colour);
+std::string updated_rig_yaml(const RigText& rig, const std::filesystem::path& destination, std::size_t instrument,
+                             const MeasuredColour& colour);
 
 /// The same with another camera, which stands in the rig itself whatever file the old one came from.
-std::string updated_rig_yaml(const std::filesystem::path& path, const Camera& camera, const CameraSigmas& sigmas);
+std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas);
 
 /// Whether a rig's camera has a response that was measured: sigma_response stands beside it. The rig must have been
 /// read without complaint.
-bool is_response_measured(const std::filesystem::path& path);
+bool is_response_measured(const RigText& rig);
+
+/// What one of these made for a file at `rig.path`, for one at `destination`: a camera file is found from there.
+std::string moved_rig_yaml(const RigText& rig, const std::filesystem::path& destination);
 
 }  // namespace lapservo::internal

@@ -56,7 +56,7 @@ TEST(UpdatedRig, ChangesOneMarkerAndNothingElse) {
   marker.sigmas.wrap_m = 1e-6, marker.sigmas.bands_upper_m = {1e-6, 2e-6, 3e-6};
   for (const char* place : {"new.yaml", "elsewhere/new.yaml", "rig.yaml"}) {
     const auto path = files.folder / place;
-    const std::string text = updated_rig_yaml(files.folder / "rig.yaml", path, 0, marker);
+    const std::string text = updated_rig_yaml(RigText::read(files.folder / "rig.yaml"), path, 0, marker);
     EXPECT_NE(text.find("sigma_translation_m: [0.0001, 0.0001, 0.0002]"), std::string::npos);
     EXPECT_NE(text.find("sigma_image_delay_s: 0.002"), std::string::npos);
     testing::write_file(path, text);
@@ -83,7 +83,7 @@ TEST(UpdatedRig, ChangesOneRegistrationAndNothingElse) {
   measured.sigma_translation_m = {1e-5, 2e-5, 3e-5};
   const auto path = files.folder / "new.yaml";
   const auto updated = [&](std::size_t instrument) {
-    const std::string text = updated_rig_yaml(files.folder / "rig.yaml", path, instrument, measured);
+    const std::string text = updated_rig_yaml(RigText::read(files.folder / "rig.yaml"), path, instrument, measured);
     testing::write_file(path, text);
     return std::pair{load_rig(path), text};
   };
@@ -112,7 +112,7 @@ TEST(UpdatedRig, HoldsOtherColours) {
   const Files files;
   MeasuredColour colour{{181, 97.123456, 269.5}, {0.5, 0.512345, 1}, {}};
   const auto place = files.folder / "elsewhere/new.yaml";
-  testing::write_file(place, updated_rig_yaml(files.folder / "rig.yaml", place, 1, colour));
+  testing::write_file(place, updated_rig_yaml(RigText::read(files.folder / "rig.yaml"), place, 1, colour));
   Rig updated = load_rig(place);
   EXPECT_EQ(updated.instruments[1].marker.hues_deg, (std::array<double, 3>{181, 97.12, 269.5}));
   EXPECT_EQ((*updated.instruments[1].marker.sigmas.hues_deg)[1], 0.512);
@@ -120,12 +120,25 @@ TEST(UpdatedRig, HoldsOtherColours) {
 
   // Another response can't go into a file that other rigs may name.
   colour.hues_deg = {90, 181, 270}, colour.response = Response{Response::Kind::power, 1.8};
-  testing::write_file(place, updated_rig_yaml(files.folder / "rig.yaml", place, 0, colour));
+  testing::write_file(place, updated_rig_yaml(RigText::read(files.folder / "rig.yaml"), place, 0, colour));
   updated = load_rig(place);
   EXPECT_TRUE(updated.camera_file.empty());
   EXPECT_EQ(updated.camera.response.gamma, 1.8);
   EXPECT_EQ(updated.camera.fx_px, 500);
   EXPECT_NE(testing::read_file(place).find("sigma_camera_matrix"), std::string::npos);
+}
+
+TEST(UpdatedRig, MayMoveAsIfMadeForThere) {
+  const Files files;
+  const RigText rig = RigText::read(files.folder / "rig.yaml");
+  const MeasuredColour colour{{181, 97, 269.5}, {0.5, 0.5, 1}, {}};
+  const RigText updated{updated_rig_yaml(rig, rig.path, 1, colour), rig.path};
+  for (const char* place : {"rig.yaml", "new.yaml", "elsewhere/new.yaml"}) {
+    const auto path = files.folder / place;
+    const std::string moved = moved_rig_yaml(updated, path);
+    EXPECT_EQ(moved, updated_rig_yaml(rig, path, 1, colour)) << place;
+    EXPECT_EQ(parse_rig(moved, place, path.parent_path()).camera.fx_px, 500) << place;
+  }
 }
 
 TEST(UpdatedRig, HoldsAnotherCamera) {
@@ -136,13 +149,13 @@ TEST(UpdatedRig, HoldsAnotherCamera) {
   measured.response = {Response::Kind::table, 1, {0, 0.2, 1}, {0, 0.5, 1}};
   CameraSigmas sigmas;
   sigmas.fx_px = 0.125, sigmas.red = 1e-5, sigmas.response = 0.003;
-  const std::string text = updated_rig_yaml(path, measured, sigmas);
+  const std::string text = updated_rig_yaml(RigText::read(path), measured, sigmas);
   EXPECT_NE(text.find("sigma_response: 0.003"), std::string::npos) << text;
   EXPECT_NE(text.find("sigma_camera_matrix: {rows: 3, cols: 3, data: [0.125,"), std::string::npos) << text;
   EXPECT_NE(text.find("sigma_translation_m: [0.0001, 0.0001, 0.0002]"), std::string::npos) << text;
-  EXPECT_FALSE(is_response_measured(path));
+  EXPECT_FALSE(is_response_measured(RigText::read(path)));
   testing::write_file(path, text);
-  EXPECT_TRUE(is_response_measured(path));
+  EXPECT_TRUE(is_response_measured(RigText::read(path)));
   const Rig updated = load_rig(path);
   EXPECT_TRUE(updated.camera_file.empty());
   EXPECT_EQ(updated.camera.fx_px, measured.fx_px);

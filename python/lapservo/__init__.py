@@ -4,6 +4,19 @@ Arrays are numpy's; lengths are metres, angles radians, pictures uint8[H, W, 3] 
 Configurations q are theta, phi, rho, psi; features are s, r, l, d (docs/conventions.md).
 """
 
+from ._calibration import (
+    CalibratedNumber,
+    Calibration,
+    CameraCalibration,
+    ColourCalibration,
+    MarkerCalibration,
+    RegistrationCalibration,
+    calibrate_camera,
+    calibrate_colour,
+    calibrate_marker,
+    calibrate_registration,
+)
+from ._display import Picture
 from ._errors import InputError
 from ._lapservo import (
     Camera,
@@ -15,6 +28,7 @@ from ._lapservo import (
     ImageStream,
     Instrument,
     JointPath,
+    Joints,
     JointState,
     Kinematics,
     Marker,

@@ -5,6 +5,19 @@ from typing import Optional, Union, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._calibration import (
+    CalibratedNumber as CalibratedNumber,
+    Calibration as Calibration,
+    CameraCalibration as CameraCalibration,
+    ColourCalibration as ColourCalibration,
+    MarkerCalibration as MarkerCalibration,
+    RegistrationCalibration as RegistrationCalibration,
+    calibrate_camera as calibrate_camera,
+    calibrate_colour as calibrate_colour,
+    calibrate_marker as calibrate_marker,
+    calibrate_registration as calibrate_registration,
+)
+from ._display import Picture as Picture
 from ._status import Status as Status
 
 _Array = NDArray[np.float64]
@@ -92,6 +105,8 @@ class Marker:
     @property
     def gap_rad(self) -> float: ...
     @property
+    def sigmas(self) -> dict[str, Union[float, list[float]]]: ...
+    @property
     def length_m(self) -> float: ...
     def boundaries_m(self, tau_rad: float) -> list[float]: ...
     def cross_ratio(self, tau_rad: float) -> float: ...
@@ -100,8 +115,27 @@ class Marker:
         self, tau_rad: float, focal_px: float = ..., distance_m: float = ..., sigma_edge_px: float = ...
     ) -> float: ...
 
+class Joints:
+    def __init__(self, names: Sequence[str], *, sign: Sequence[float] = ..., offset: Sequence[float] = ...) -> None: ...
+    @property
+    def names(self) -> list[str]: ...
+    @property
+    def sign(self) -> list[float]: ...
+    @property
+    def offset(self) -> list[float]: ...
+
 class Instrument:
-    def __init__(self, name: str, marker: Marker, *, camera_from_rcm: Optional[ArrayLike] = ...) -> None: ...
+    def __init__(
+        self,
+        name: str,
+        marker: Marker,
+        *,
+        camera_from_rcm: Optional[ArrayLike] = ...,
+        joints: Optional[Joints] = ...,
+        image_delay_s: Optional[float] = ...,
+    ) -> None: ...
+    @property
+    def joints(self) -> Optional[Joints]: ...
     @property
     def name(self) -> str: ...
     @property
@@ -121,6 +155,7 @@ class Rig:
     def camera(self) -> Camera: ...
     @property
     def instruments(self) -> list[Instrument]: ...
+    def save(self, path: _Path) -> None: ...
     def to_yaml(self) -> str: ...
 
 class MarkerPose:
@@ -167,6 +202,7 @@ class Observation:
     @property
     def marker_pose(self) -> Optional[MarkerPose]: ...
     def overlay(self, image: _Image) -> _Image: ...
+    def show(self, image: _Image) -> Picture: ...
 
 class Frame:
     @property

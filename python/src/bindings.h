@@ -9,4 +9,5 @@ void bind_marker(pybind11::module_& m);
 void bind_kinematics(pybind11::module_& m);
 void bind_servo(pybind11::module_& m);
 void bind_simulation(pybind11::module_& m);
+void bind_calibration(pybind11::module_& m);
 }  // namespace lapservo::python

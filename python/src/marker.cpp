@@ -41,6 +41,18 @@ Paper paper_of(const std::string& word) {
   throw InputError("print_marker", "paper", word, "a4 or letter");
 }
 
+py::dict sigmas_of(const Marker& marker) {
+  py::dict sigmas;
+  const auto add = [&](const char* name, const auto& sigma) {
+    if (sigma) sigmas[name] = py::cast(*sigma);
+  };
+  const MarkerSigmas& s = marker.sigmas;
+  add("diameter_m", s.diameter_m), add("hues_deg", s.hues_deg);
+  add("bands_upper_m", s.bands_upper_m), add("bands_lower_m", s.bands_lower_m);
+  add("seam_rad", s.seam_rad), add("wrap_m", s.wrap_m), add("skew_m", s.skew_m), add("gap_rad", s.gap_rad);
+  return sigmas;
+}
+
 }  // namespace
 
 void bind_marker(py::module_& m) {
@@ -61,6 +73,8 @@ void bind_marker(py::module_& m) {
       .def_readonly("wrap_m", &Marker::wrap_m)
       .def_readonly("skew_m", &Marker::skew_m)
       .def_readonly("gap_rad", &Marker::gap_rad)
+      .def_property_readonly("sigmas", &sigmas_of,
+                             "dict of one standard deviation each, of those of its numbers that were measured")
       .def_property_readonly("length_m", &Marker::length_m)
       .def("boundaries_m", &boundaries_m, py::arg("tau_rad"),
            "e0 to e3 along the axis from the proximal end at tau = 0")
@@ -80,6 +94,9 @@ void bind_marker(py::module_& m) {
         return "<lapservo.Marker of " + std::to_string(1e3 * self.diameter_m).substr(0, 5) + " mm, " +
                std::to_string(1e3 * self.length_m()).substr(0, 5) + " mm long>";
       });
+  m.def("_marker_picture", [](const std::filesystem::path& path, const Marker& marker) {
+    write_marker_picture(path, "marker", marker, Viewing{});
+  });
   m.def(
       "design_marker",
       [](double diameter_m, std::optional<double> length_m, std::optional<double> min_band_m,

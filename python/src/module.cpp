@@ -24,4 +24,5 @@ PYBIND11_MODULE(_lapservo, m) {
   bind_kinematics(m);
   bind_servo(m);
   bind_simulation(m);
+  bind_calibration(m);
 }

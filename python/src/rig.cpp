@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/rig_writer.h"
 #include "python/src/bindings.h"
@@ -102,14 +103,28 @@ matrix.)")
           "raw_from_ideal",
           [](const Camera& camera, const Eigen::Vector2d& ideal_px) { return camera.raw_from_ideal(ideal_px); },
           py::arg("ideal_px"), "float[2] to float[2]")
+      .def(py::pickle(
+          [](const Camera& camera) {
+            const auto& [blue, red] = camera.chromatic_aberration;
+            return py::make_tuple(camera.width_px, camera.height_px, matrix_of_camera(camera), camera.distortion,
+                                  response_to_python(camera.response), py::make_tuple(blue, red), camera.deinterlace);
+          },
+          [](const py::tuple& state) {
+            return make_camera(state[0].cast<int>(), state[1].cast<int>(), state[2].cast<Eigen::Matrix3d>(),
+                               state[3].cast<std::array<double, 5>>(), state[4],
+                               state[5].cast<std::pair<double, double>>(), state[6].cast<bool>());
+          }))
       .def("__repr__", [](const Camera& camera) {
         return "<lapservo.Camera " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) + ">";
       });
 }
 
 Instrument make_instrument(const std::string& name, const Marker& marker,
-                           const std::optional<Eigen::Matrix4d>& camera_from_rcm) {
+                           const std::optional<Eigen::Matrix4d>& camera_from_rcm, const std::optional<Joints>& joints,
+                           std::optional<double> image_delay_s) {
   Instrument instrument;
+  instrument.joints = joints;
+  instrument.image_delay_s = image_delay_s;
   instrument.name = name;
   instrument.marker = marker;
   if (camera_from_rcm) instrument.camera_from_rcm = rigid_of(*camera_from_rcm, "camera_from_rcm");
@@ -117,9 +132,26 @@ Instrument make_instrument(const std::string& name, const Marker& marker,
 }
 
 void bind_instrument(py::module_& m) {
+  py::class_<Joints>(m, "Joints", R"(The arm's joints behind theta, phi, rho, psi, in this order.
+
+q = sign * joints + offset, rad and m.)")
+      .def(py::init([](const std::array<std::string, 4>& names, const std::array<double, 4>& sign,
+                       const std::array<double, 4>& offset) {
+             for (const double s : sign)
+               if (s != 1 && s != -1)
+                 throw InputError("Joints", "sign", std::string(py::str(py::float_(s))), "1 or -1");
+             return Joints{names, sign, offset};
+           }),
+           py::arg("names"), py::kw_only(), py::arg("sign") = Joints{}.sign, py::arg("offset") = Joints{}.offset,
+           "names: of the four columns of a recording; sign: 1 or -1 each; offset: rad, rad, m, rad.")
+      .def_readonly("names", &Joints::names)
+      .def_readonly("sign", &Joints::sign)
+      .def_readonly("offset", &Joints::offset, "rad, rad, m, rad");
   py::class_<Instrument>(m, "Instrument", "What wears a marker, and where it enters the body.")
       .def(py::init(&make_instrument), py::arg("name"), py::arg("marker"), py::kw_only(),
-           py::arg("camera_from_rcm") = py::none(), "camera_from_rcm: float[4, 4] in metres, or None.")
+           py::arg("camera_from_rcm") = py::none(), py::arg("joints") = py::none(),
+           py::arg("image_delay_s") = py::none(), "camera_from_rcm: float[4, 4] in metres, or None.")
+      .def_readonly("joints", &Instrument::joints, "Joints; None where the rig doesn't say")
       .def_readonly("name", &Instrument::name)
       .def_readonly("marker", &Instrument::marker)
       .def_property_readonly(
@@ -159,6 +191,12 @@ with the field, its value and what was expected.)")
           "The same from text; `folder` is where a camera file is looked for.")
       .def_readonly("camera", &Rig::camera)
       .def_readonly("instruments", &Rig::instruments)
+      .def(
+          "save",
+          [](const Rig& rig, const std::filesystem::path& path) {
+            internal::write_file(path, internal::rig_yaml(rig));
+          },
+          py::arg("path"), "Writes to_yaml(), whole or not at all. Sigmas of what a file said are not in it.")
       .def("to_yaml", &internal::rig_yaml, "Text that Rig.parse reads back to the last bit.")
       .def(py::pickle([](const Rig& rig) { return internal::rig_yaml(rig); },
                       [](const std::string& yaml) { return parse_rig(yaml, "pickled rig"); }))

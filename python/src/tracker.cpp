@@ -7,6 +7,8 @@
 #include <variant>
 #include <vector>
 
+#include <opencv2/imgcodecs.hpp>
+
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
@@ -277,6 +279,14 @@ void bind_frames(py::module_& m) {
       [](const std::filesystem::path& input, double fps) { return open_frame_source(input.string(), fps); },
       py::arg("input"), py::arg("fps") = 30.0,
       "A picture, a folder of pictures (with `fps`), a video, '/dev/video0' or 'rtsp://...': a FrameSource.");
+  m.def(
+      "_png",
+      [](const Image& image) {
+        std::vector<unsigned char> bytes;
+        cv::imencode(".png", view_of(image), bytes);
+        return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+      },
+      py::arg("image"));
   m.def(
       "read_image", [](const std::filesystem::path& path) { return array_of(read_image(path)); }, py::arg("path"),
       "uint8[H, W, 3] of a picture file; InputError for what is damaged, has a palette or is to be turned.");

@@ -91,8 +91,9 @@ def test_each_example_runs_here():
     assert all(f'"{path.name}"' in here for path in EXAMPLES.glob("*.py"))
 
 
-def test_what_the_page_shows_runs(monkeypatch):
-    monkeypatch.chdir(SOURCE)
+def test_what_the_page_shows_runs(monkeypatch, tmp_path):
+    (tmp_path / "configs").symlink_to(SOURCE / "configs")
+    monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", (SOURCE / "docs" / "python.md").read_text(), re.DOTALL)
     assert blocks
     for block in blocks:

@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace lapservo::app {
+namespace lapservo::internal {
 
 /// A number of the rig that was measured, in the unit that its name ends in; sigma: one standard deviation.
 struct CalibratedNumber {
@@ -10,4 +10,4 @@ struct CalibratedNumber {
   double before, after, sigma;
 };
 
-}  // namespace lapservo::app
+}  // namespace lapservo::internal

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/io/frame_source.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// Frames from which something of a rig is measured.
+struct FrameRecording {
+  FrameSource& source;
+  std::string name;          ///< for complaints: a path
+  bool deinterlace = false;  ///< the field of the even rows, whatever the rig says
+};
+
+/// What a job of seconds to minutes is asked and tells; either may be empty.
+struct JobWatch {
+  std::function<bool()> is_stopped;
+  /// Of how many, where that is known; done; a remark.
+  std::function<void(std::optional<int>, int, const std::string&)> progress;
+
+  bool stopped() const { return is_stopped && is_stopped(); }
+  void tell(std::optional<int> total, int done, const std::string& remark) const {
+    if (progress) progress(total, done, remark);
+  }
+};
+
+/// What became of a recording's frames.
+struct FramesRead {
+  int looked_at = 0, flawed = 0;
+  bool stopped = false;   ///< by the user
+  std::string complaint;  ///< what could not be read; empty when all was
+
+  /// " (3 are damaged)", or nothing.
+  std::string damaged() const;
+};
+
+/// Throws InputError, naming the frame's file or else `recording`, at a frame of another size than `whose`.
+void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
+                      const std::string& whose);
+
+/// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` returns what is told
+/// beside the progress. Throws InputError at a frame that is not of the rig's size.
+FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int every, const JobWatch& watch,
+                       const std::function<std::string(const cv::Mat&, double)>& look);
+
+/// Which frames to look at so that of a long recording about so many are.
+int every_of(const FrameSource& source, int enough);
+
+}  // namespace lapservo::internal

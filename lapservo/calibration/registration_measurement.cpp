@@ -1,0 +1,101 @@
+#include "lapservo/calibration/registration_measurement.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lapservo/calibration/pose_table.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int enough = 3600;
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+                              const JobWatch& watch) {
+  Rig free = rig;
+  for (Instrument& each : free.instruments) each.camera_from_rcm.reset();
+  Tracker tracker(free, {.frame_budget = std::nullopt});
+  const std::string& name = rig.instruments[instrument].name;
+  MeasuredPoses poses;
+  poses.read =
+      read_frames(recording, free, every_of(recording.source, enough), watch, [&](const cv::Mat& bgr, double time_s) {
+        const Observation& seen = tracker.track(bgr)[instrument];
+        if (seen.status == Status::ok && seen.marker) poses.all.push_back({time_s, *seen.marker});
+        return fmt::format(", {} in {}", name, poses.all.size());
+      });
+  if (poses.all.empty())
+    poses.none = fmt::format("{} is in none of {} frames{}", name, poses.read.looked_at, poses.read.damaged());
+  return poses;
+}
+
+MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::string& instrument) {
+  PoseTable table = read_poses(path, instrument);
+  MeasuredPoses poses;
+  poses.all = std::move(table.poses);
+  if (table.with_rcm > 0 && poses.all.empty())
+    poses.none = fmt::format(
+        "its {} rows were measured with a camera_from_rcm, through which their axes pass whether it is right or not: "
+        "give the pictures, or track them with a rig without it",
+        table.with_rcm);
+  else if (table.rows == 0)
+    poses.none = fmt::format("has no row of {}", instrument);
+  return poses;
+}
+
+MeasuredRegistration measured(const Registration& registration) {
+  MeasuredRegistration result;
+  result.camera_from_rcm = registration.camera_from_rcm;
+  for (std::size_t i = 0; i < 3; ++i)
+    result.sigma_translation_m[i] = registration.sigma_translation_m[static_cast<Eigen::Index>(i)];
+  if (registration.sigma_quaternion) {
+    result.sigma_quaternion_xyzw.emplace();
+    for (std::size_t i = 0; i < 4; ++i)
+      (*result.sigma_quaternion_xyzw)[i] = (*registration.sigma_quaternion)[static_cast<Eigen::Index>(i)];
+  }
+  if (registration.arm) {
+    result.joints = registration.arm->joints;
+    result.sigma_offset = registration.arm->sigma_offset;
+    result.image_delay_s = registration.arm->image_delay_s;
+    result.sigma_image_delay_s = registration.arm->sigma_image_delay_s;
+  }
+  return result;
+}
+
+std::vector<CalibratedNumber> registered_numbers(const Instrument& before, const Registration& registration) {
+  std::vector<CalibratedNumber> numbers;
+  const auto add = [&](const std::string& name, double was, double is, double sigma) {
+    numbers.push_back({name, 1e3 * was, 1e3 * is, 1e3 * sigma});
+  };
+  constexpr std::array<const char*, 3> axes{"x", "y", "z"};
+  const auto& was = before.camera_from_rcm;
+  for (Eigen::Index i = 0; i < 3; ++i)
+    add(fmt::format("camera_from_rcm {} [mm]", axes[static_cast<std::size_t>(i)]), was ? was->translation[i] : unknown,
+        registration.camera_from_rcm.translation[i], registration.sigma_translation_m[i]);
+  if (registration.sigma_quaternion)
+    add("its rotation [mrad]", was ? was->rotation.angularDistance(registration.camera_from_rcm.rotation) : unknown, 0,
+        registration.sigma_rotation_rad);
+  if (!registration.arm) return numbers;
+  const Registration::Arm& arm = *registration.arm;
+  constexpr std::array<const char*, 4> units{"theta [mrad]", "phi [mrad]", "rho [mm]", "psi [mrad]"};
+  for (std::size_t i = 1; i < 4; ++i)
+    add(fmt::format("offset of {}", units[i]), before.joints->offset[i], arm.joints.offset[i], arm.sigma_offset[i]);
+  add("image_delay_s [ms]", before.image_delay_s.value_or(unknown), arm.image_delay_s, arm.sigma_image_delay_s);
+  return numbers;
+}
+
+double rms(const Registration& registration, double RegistrationResidual::*what) {
+  double squares = 0;
+  for (const RegistrationResidual& r : registration.residuals) squares += r.*what * (r.*what);
+  return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, registration.residuals.size())));
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,296 @@
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "lapservo/calibration/camera_measurement.h"
+#include "lapservo/calibration/colour_measurement.h"
+#include "lapservo/calibration/marker_measurement.h"
+#include "lapservo/calibration/registration_measurement.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/error.h"
+#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/rig_updater.h"
+#include "lapservo/rig/rig_writer.h"
+#include "python/src/bindings.h"
+#include "python/src/conversions.h"
+#include "python/src/python_frames.h"
+
+// What python/lapservo/_calibration.py makes its results of.
+namespace lapservo::python {
+namespace {
+using namespace internal;
+namespace fs = std::filesystem;
+using namespace py::literals;
+
+// A rig that Python has, or that stands in a file: then what else is written there stays.
+struct GivenRig {
+  RigText text;
+  Rig rig;
+
+  std::string name() const { return text.path.empty() ? "Rig" : text.path.string(); }
+};
+
+GivenRig rig_of(const py::object& given) {
+  if (py::isinstance<Rig>(given)) {
+    const Rig rig = given.cast<Rig>();
+    return {{rig_yaml(rig), {}}, rig};
+  }
+  const auto path = given.cast<fs::path>();
+  return {RigText::read(path), load_rig(path)};
+}
+
+std::size_t index_of(const GivenRig& given, const std::optional<std::string>& name) {
+  if (!name) {
+    if (given.rig.instruments.size() > 1)
+      throw InputError(given.name(), "has several instruments: name one with instrument");
+    return 0;
+  }
+  const auto index = instrument_index(given.rig, *name);
+  if (!index) throw InputError("instrument", "name", *name, "an instrument of " + given.name());
+  return *index;
+}
+
+// Ctrl-C ends it as an exception of Python's.
+JobWatch watch_of(const py::object& progress) {
+  JobWatch watch;
+  watch.is_stopped = [] {
+    const py::gil_scoped_acquire mine;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    return false;
+  };
+  if (!progress.is_none())
+    watch.progress = [&progress](std::optional<int> total, int done, const std::string& remark) {
+      const py::gil_scoped_acquire mine;
+      progress(done, total, remark);
+    };
+  return watch;
+}
+
+void expect_result(const std::string& refusal, const std::string& source) {
+  if (!refusal.empty()) throw InputError(source, refusal);
+}
+
+// What every result has.
+py::dict result_of(const std::string& yaml, const GivenRig* given, const std::vector<CalibratedNumber>& numbers,
+                   const std::string& complaint) {
+  py::list rows;
+  for (const CalibratedNumber& n : numbers) rows.append(py::make_tuple(n.name, n.before, n.after, n.sigma));
+  py::dict result("yaml"_a = yaml, "origin"_a = given ? given->text.path.string() : "", "numbers"_a = rows,
+                  "complaint"_a = complaint, "rig"_a = py::none());
+  if (given) result["rig"] = py::cast(parse_rig(yaml, given->name(), given->text.path.parent_path()));
+  return result;
+}
+
+py::dict calibrate_camera(const py::list& pictures, const std::string& corners, double square_m, const py::object& rig,
+                          const std::string& dictionary, std::optional<double> marker_m, std::size_t most_views,
+                          const py::object& progress) {
+  const BoardWords::Names names{"board", "marker_m", "dictionary"};
+  if (!(square_m >= 1e-4 && square_m <= 1))
+    throw InputError("square_m", "width", fmt::format("{}", square_m), "0.0001 to 1 m");
+  if (most_views < 4 || most_views > 200)
+    throw InputError("views", "number", fmt::format("{}", most_views), "4 to 200");
+  const Board board = board_of({corners, square_m, dictionary, marker_m}, names);
+  std::optional<GivenRig> given;
+  if (!rig.is_none()) given = rig_of(rig);
+  const Camera before = given ? given->rig.camera : Camera{};
+  const JobWatch watch = watch_of(progress);
+  BoardRecordings recordings(board, most_views, given ? std::optional(given->rig) : std::nullopt);
+  std::string name;
+  for (const py::handle each : pictures) {
+    constexpr double fps = 30;
+    const GivenFrames frames(py::reinterpret_borrow<py::object>(each), fps);
+    name = name.empty() || name == frames.name ? frames.name : name + " and others";
+    const py::gil_scoped_release others_run;
+    recordings.look_at(*frames.source, frames.name, watch);
+  }
+  const std::vector<std::string> without_board = recordings.without_board();
+  const std::string complaint = recordings.read().complaint;
+  CameraMeasurement measured;
+  {
+    const py::gil_scoped_release others_run;
+    measured = measure_camera(board, std::move(recordings), before, watch);
+  }
+  const CameraCalibration& calibration = measured.calibration;
+  expect_result(calibration.refusal, name);
+  const std::string yaml = given ? updated_rig_yaml(given->text, calibration.camera, calibration.sigmas)
+                                 : measured_camera_yaml(calibration.camera, calibration.sigmas);
+  py::dict result = result_of(yaml, given ? &*given : nullptr, calibrated_numbers(before, calibration), complaint);
+  py::list views;
+  for (std::size_t i = 0; i < measured.views.size(); ++i)
+    views.append(py::make_tuple(measured.views[i].name, measured.views[i].corners.size(), calibration.view_rms_px[i]));
+  result["camera"] = py::cast(calibration.camera);
+  result["rms_px"] = calibration.rms_px;
+  result["views"] = views;
+  result["without_board"] = without_board;
+  result["advice"] = measured.advice;
+  result["response_measured"] = calibration.response.has_value();
+  result["sigma_response"] = calibration.response ? py::cast(calibration.response->sigma) : py::none();
+  result["sharpening"] = calibration.response ? calibration.response->sharpening : 0.0;
+  return result;
+}
+
+py::dict calibrate_colour(const py::object& frames, const py::object& rig, const std::optional<std::string>& instrument,
+                          bool replace_response, bool deinterlace, double fps, const py::object& progress) {
+  const GivenRig given = rig_of(rig);
+  const std::size_t index = index_of(given, instrument);
+  const GivenFrames source(frames, fps);
+  const bool keep_response = !replace_response && is_response_measured(given.text);
+  ColourMeasurement measured;
+  {
+    const py::gil_scoped_release others_run;
+    measured =
+        measure_colour(given.rig, index, {*source.source, source.name, deinterlace}, keep_response, watch_of(progress));
+  }
+  const ColourCalibration& calibration = measured.calibration;
+  expect_result(calibration.refusal, source.name);
+  const std::string yaml =
+      updated_rig_yaml(given.text, given.text.path, index,
+                       MeasuredColour{calibration.hues_deg, calibration.sigma_hues_deg, calibration.response});
+  const Instrument& before = given.rig.instruments[index];
+  py::dict result = result_of(yaml, &given, calibrated_numbers(before.marker, calibration), measured.read.complaint);
+  result["instrument"] = before.name;
+  result["hues_deg"] = calibration.hues_deg;
+  result["sigma_hues_deg"] = calibration.sigma_hues_deg;
+  result["response"] = calibration.response_found;
+  result["found_before"] = calibration.found_before;
+  result["found"] = calibration.found;
+  result["frames"] = measured.frames.size();
+  return result;
+}
+
+struct GivenJoints {
+  Joints joints;
+  JointRecording recording;
+  std::string source;
+};
+
+// A CSV's path, or columns by name: through the same table, by as many digits as reads back to the last bit.
+std::optional<GivenJoints> joints_of(const py::object& given, const Instrument& instrument, const std::string& rig) {
+  if (given.is_none()) return std::nullopt;
+  std::string source = "joints";
+  CsvTable table = [&] {
+    if (!py::isinstance<py::dict>(given)) {
+      const auto path = given.cast<fs::path>();
+      return source = path.string(), CsvTable::read(path);
+    }
+    std::vector<std::pair<std::string, std::vector<double>>> columns;
+    for (const auto& [name, values] : given.cast<py::dict>())
+      columns.emplace_back(name.cast<std::string>(), values.cast<std::vector<double>>());
+    std::string text;
+    for (const auto& [name, values] : columns) text += (text.empty() ? "" : ",") + csv_field(name);
+    text += "\n";
+    for (std::size_t row = 0; !columns.empty() && row < columns.front().second.size(); ++row)
+      for (std::size_t i = 0; i < columns.size(); ++i) {
+        if (columns[i].second.size() != columns.front().second.size())
+          throw InputError(source, columns[i].first, fmt::format("of {} rows", columns[i].second.size()),
+                           fmt::format("{}, as {} has", columns.front().second.size(), columns.front().first));
+        text += fmt::format("{}{}", columns[i].second[row], i + 1 == columns.size() ? "\n" : ",");
+      }
+    return CsvTable::parse(text, source);
+  }();
+  std::vector<std::string> names = table.columns();
+  std::erase(names, "time_s");
+  const Joints joints = internal::joints_of(instrument, names, source, rig);
+  return GivenJoints{joints, joint_recording_of(table, source, joints), source};
+}
+
+py::dict calibrate_marker(const py::object& frames, const py::object& rig, const py::object& joints,
+                          const std::optional<std::string>& instrument, bool deinterlace, double fps,
+                          const py::object& progress) {
+  const GivenRig given = rig_of(rig);
+  const std::size_t index = index_of(given, instrument);
+  const Instrument& before = given.rig.instruments[index];
+  if (!joints.is_none()) expect_registration(before, given.name(), "joints");
+  std::optional<JointsOfTurn> turn;
+  if (auto read = joints_of(joints, before, given.name())) turn = {std::move(read->recording), read->source};
+  const GivenFrames source(frames, fps);
+  MarkerMeasurement measured;
+  {
+    const py::gil_scoped_release others_run;
+    measured = measure_marker(given.rig, index, {*source.source, source.name, deinterlace}, turn, watch_of(progress));
+  }
+  const MarkerCalibration& calibration = measured.calibration;
+  expect_result(calibration.refusal, source.name);
+  py::dict result =
+      result_of(updated_rig_yaml(given.text, given.text.path, index, calibration.marker), &given,
+                calibrated_numbers(before.marker, calibration.marker, turn.has_value()), measured.read.complaint);
+  result["instrument"] = before.name;
+  result["looked_at"] = measured.read.looked_at;
+  result["found"] = measured.found;
+  result["frames"] = calibration.frames;
+  result["seam_views"] = calibration.seam_views;
+  result["before_px"] = calibration.before_px;
+  result["after_px"] = calibration.after_px;
+  return result;
+}
+
+Eigen::Matrix<double, Eigen::Dynamic, 4> residuals_of(const Registration& registration) {
+  Eigen::Matrix<double, Eigen::Dynamic, 4> rows(static_cast<Eigen::Index>(registration.residuals.size()), 4);
+  for (std::size_t i = 0; i < registration.residuals.size(); ++i) {
+    const RegistrationResidual& r = registration.residuals[i];
+    rows.row(static_cast<Eigen::Index>(i)) << r.time_s, r.position_m, r.axis_rad, r.roll_rad;
+  }
+  return rows;
+}
+
+py::dict calibrate_registration(const py::object& frames, const py::object& rig, const py::object& joints,
+                                const std::optional<std::string>& instrument_name, bool deinterlace, double fps,
+                                const py::object& progress) {
+  const GivenRig given = rig_of(rig);
+  const std::size_t index = index_of(given, instrument_name);
+  Instrument instrument = given.rig.instruments[index];
+  const bool table = py::isinstance<py::str>(frames) || py::hasattr(frames, "__fspath__")
+                         ? frames.cast<fs::path>().extension() == ".csv"
+                         : false;
+  std::optional<GivenFrames> source;
+  if (!table) source.emplace(frames, fps);
+  const std::string name = table ? frames.cast<fs::path>().string() : source->name;
+  const auto read = joints_of(joints, instrument, given.name());
+  if (read) instrument.joints = read->joints;
+  MeasuredPoses poses;
+  Registration registration;
+  {
+    const py::gil_scoped_release others_run;
+    poses = table ? poses_in_table(name, instrument.name)
+                  : poses_in_frames(given.rig, index, {*source->source, name, deinterlace}, watch_of(progress));
+    expect_result(poses.none, name);
+    registration =
+        read ? register_arm(instrument, poses.all, read->recording, read->source) : register_rcm(instrument, poses.all);
+  }
+  expect_result(registration.refusal, name);
+  py::dict result = result_of(updated_rig_yaml(given.text, given.text.path, index, measured(registration)), &given,
+                              registered_numbers(instrument, registration), poses.read.complaint);
+  result["instrument"] = instrument.name;
+  result["camera_from_rcm"] = matrix_of(registration.camera_from_rcm);
+  result["sigma_translation_m"] = registration.sigma_translation_m;
+  result["sigma_quaternion_xyzw"] = registration.sigma_quaternion;
+  result["sigma_rotation_rad"] =
+      registration.sigma_quaternion ? std::optional(registration.sigma_rotation_rad) : std::nullopt;
+  const auto& arm = registration.arm;
+  result["sigma_offset"] = arm ? std::optional(arm->sigma_offset) : std::nullopt;
+  result["image_delay_s"] = arm ? std::optional(arm->image_delay_s) : std::nullopt;
+  result["sigma_image_delay_s"] = arm ? std::optional(arm->sigma_image_delay_s) : std::nullopt;
+  result["backlash"] = arm ? std::optional(arm->backlash) : std::nullopt;
+  result["residuals"] = residuals_of(registration);
+  result["unknown"] = registration.unknown;
+  return result;
+}
+
+}  // namespace
+
+void bind_calibration(py::module_& m) {
+  m.def("_calibrate_camera", &calibrate_camera);
+  m.def("_calibrate_colour", &calibrate_colour);
+  m.def("_calibrate_marker", &calibrate_marker);
+  m.def("_calibrate_registration", &calibrate_registration);
+  m.def("_write_calibrated", [](const std::string& yaml, const fs::path& origin, const fs::path& path) {
+    write_file(path, origin.empty() ? yaml : moved_rig_yaml({yaml, origin}, path));
+  });
+}
+
+}  // namespace lapservo::python

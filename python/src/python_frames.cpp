@@ -1,0 +1,75 @@
+#include "python/src/python_frames.h"
+
+#include <utility>
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::python {
+namespace {
+
+constexpr const char* named = "frames";
+
+// One after another, copied: they are kept longer than Python may.
+class IteratedFrames : public FrameSource {
+ public:
+  IteratedFrames(const py::object& given, double fps) : iterator_(py::iter(given)), fps_(fps) {
+    if (py::hasattr(given, "__len__")) count_ = static_cast<int>(py::len(given));
+  }
+
+  std::optional<Frame> next() override {
+    const py::gil_scoped_acquire mine;
+    const auto item = py::reinterpret_steal<py::object>(PyIter_Next(iterator_.ptr()));
+    if (!item && PyErr_Occurred()) throw py::error_already_set();
+    if (!item) return std::nullopt;
+    Frame frame = frame_of(item);
+    frame.index = index_++;
+    return frame;
+  }
+  Kind kind() const override { return Kind::folder; }
+  std::optional<int> frame_count() const override { return count_; }
+  double frames_per_second() const override { return fps_; }
+
+ private:
+  Frame frame_of(const py::object& item) const {
+    if (py::isinstance<Frame>(item)) return item.cast<Frame>();
+    Frame frame;
+    frame.time_s = index_ / fps_;
+    if (!py::isinstance<py::tuple>(item)) return frame.bgr = picture_of(item), frame;
+    const auto pair = item.cast<py::tuple>();
+    if (pair.size() != 2) throw InputError(named, "item", std::string(py::repr(item)), "(time_s, uint8[H, W, 3])");
+    frame.time_s = pair[0].cast<double>();
+    frame.bgr = picture_of(pair[1]);
+    return frame;
+  }
+  static cv::Mat picture_of(const py::object& item) {
+    if (!py::isinstance<Image>(item))
+      throw InputError(named, "item", std::string(py::str(py::type::of(item))),
+                       "uint8[H, W, 3], (time_s, uint8[H, W, 3]) or lapservo.Frame");
+    return view_of(item.cast<Image>(), named).clone();
+  }
+
+  py::iterator iterator_;
+  double fps_;
+  std::optional<int> count_;
+  int index_ = 0;
+};
+
+bool is_path(const py::object& given) {
+  return py::isinstance<py::str>(given) || py::hasattr(given, "__fspath__");
+}
+
+}  // namespace
+
+GivenFrames::GivenFrames(const py::object& given, double fps) : kept(given), name(named) {
+  if (!(fps >= 0.001 && fps <= 1000))
+    throw InputError("fps", "number", std::string(py::str(py::float_(fps))), "0.001 to 1000 frames per second");
+  if (is_path(given)) {
+    name = given.cast<std::filesystem::path>().string();
+    owned = open_frame_source(name, fps);
+  } else if (!py::isinstance<FrameSource>(given)) {
+    owned = std::make_unique<IteratedFrames>(given, fps);
+  }
+  source = owned ? owned.get() : given.cast<FrameSource*>();
+}
+
+}  // namespace lapservo::python

@@ -1,0 +1,24 @@
+#pragma once
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "lapservo/io/frame_source.h"
+#include "python/src/conversions.h"
+
+namespace lapservo::python {
+
+/// Frames that Python gives, by one of: a path (a picture, a folder, a video, a camera), a FrameSource, or anything
+/// that is iterated over: uint8[H, W, 3], (time_s, uint8[H, W, 3]) or Frame. Created and destroyed with Python's lock,
+/// used without.
+struct GivenFrames {
+  /// `fps` gives times to the pictures of a folder and to those without. Throws InputError as open_frame_source().
+  GivenFrames(const py::object& given, double fps);
+
+  py::object kept;  ///< what `source` is of
+  std::unique_ptr<FrameSource> owned;
+  FrameSource* source = nullptr;
+  std::string name;  ///< for complaints: the path, or "frames"
+};
+
+}  // namespace lapservo::python

@@ -1,0 +1,129 @@
+"""Calibrations: the same rig, byte for byte, as the command line writes, by paths and by arrays."""
+
+import pickle
+import subprocess
+
+import numpy as np
+import pytest
+from recordings import DELAY_S, FPS, TOOL, Recordings, board_pictures, scaled_rig, swinging, turning
+
+import lapservo
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory):
+    return Recordings(tmp_path_factory.mktemp("recordings"))
+
+
+@pytest.fixture(scope="module")
+def swing(recordings):
+    return recordings.record("swing", swinging, 72)
+
+
+def expect_whole(result, rig):
+    """What all results have: a rig to go on with, numbers, what a notebook shows, a pickle."""
+    assert lapservo.Rig.parse(result.yaml).to_yaml() == result.rig.to_yaml()
+    assert result.numbers and all(np.isfinite([n.after, n.sigma]).all() for n in result.numbers)
+    assert result._repr_html_().count("<tr>") == len(result.numbers) + 1
+    again = pickle.loads(pickle.dumps(result))
+    assert again.yaml == result.yaml and repr(again.numbers) == repr(result.numbers) and type(again) is type(result)
+    assert lapservo.Tracker(result.rig) and [i.name for i in result.rig.instruments] == [i.name for i in rig.instruments]
+
+
+def test_a_registration_is_the_command_lines(recordings, swing):
+    images, joints = swing
+    text = (recordings.folder / "rig.yaml").read_text()
+    path = recordings.folder / "unregistered.yaml"
+    path.write_text(text[:text.index("    camera_from_rcm")] + text[text.index("    joints"):text.index("    image_delay_s")])
+    commanded = recordings.commanded("registration", "swing", "--fps", str(FPS), "--joints", "swing_joints.csv", "--rig",
+                                     path.name)
+    told = []
+    result = lapservo.calibrate_registration(images, path, joints=joints, fps=FPS, progress=lambda *a: told.append(a))
+    assert recordings.saved(result) == commanded
+    assert told[71] == (72, 72, ", PSM1 in 72")
+    expect_whole(result, recordings.rig)
+    assert np.allclose(result.camera_from_rcm[:3, 3], recordings.rig.instruments[0].camera_from_rcm[:3, 3], atol=5e-4)
+    assert result.image_delay_s == pytest.approx(DELAY_S, abs=5e-3) and result.residuals.shape == (72, 4)
+    assert result.joints.names == ["yaw", "pitch", "insertion", "roll"] and set(result.joints.sign) == {1}
+
+
+def test_colours_are_the_command_lines(recordings, swing):
+    images, _ = swing
+    text = (recordings.folder / "rig.yaml").read_text()
+    path = recordings.folder / "pale.yaml"
+    hues = recordings.rig.instruments[0].marker.hues_deg
+    path.write_text(text.replace("hues_deg: [{:g}, {:g}, {:g}]".format(*hues), "hues_deg: [{:g}, {:g}, {:g}]".format(
+        *(hue + 15 for hue in hues))))
+    assert path.read_text() != text
+    commanded = recordings.commanded("colour", "swing", "--fps", str(FPS), "--rig", path.name)
+    result = lapservo.calibrate_colour(recordings.folder / "swing", path, fps=FPS)
+    assert recordings.saved(result) == commanded
+    expect_whole(result, recordings.rig)
+    of_arrays = lapservo.calibrate_colour((image for image in images), lapservo.Rig.load(path), fps=FPS)
+    assert of_arrays.numbers == result.numbers and of_arrays.rig.to_yaml() == result.rig.to_yaml()
+    assert np.allclose(result.hues_deg, hues, atol=4) and result.found >= result.found_before
+
+
+def test_a_print_is_the_command_lines(recordings):
+    images, joints = recordings.record("turn", turning, 48)
+    path = recordings.folder / "rig.yaml"
+    commanded = recordings.commanded("marker", "turn", "--fps", str(FPS), "--joints", "turn_joints.csv", "--rig", path.name)
+    result = lapservo.calibrate_marker([(i / FPS, image) for i, image in enumerate(images)], path, joints=joints)
+    assert recordings.saved(result) == commanded
+    expect_whole(result, recordings.rig)
+    assert result.found == 48 and np.allclose(result.marker.bands_upper_m, recordings.rig.instruments[0].marker.bands_upper_m,
+                                              atol=5e-5)
+    assert set(result.marker.sigmas) >= {"bands_upper_m", "wrap_m", "gap_rad", "seam_rad"}
+
+
+def test_a_camera_is_the_command_lines(recordings, tmp_path):
+    camera = scaled_rig(0.5).camera
+    folder = tmp_path / "boards"
+    folder.mkdir()
+    pictures = board_pictures(camera)
+    for i, picture in enumerate(pictures):
+        (folder / f"{i}.png").write_bytes(lapservo.Picture(picture)._repr_png_())
+    small = scaled_rig(0.5)
+    (tmp_path / "rig.yaml").write_text(small.to_yaml())
+    subprocess.run([TOOL, "calibrate", "camera", folder, "--board", "9x6", "--square-mm", "5", "--rig", tmp_path / "rig.yaml",
+                    "--out", tmp_path / "commanded.yaml"], check=True, capture_output=True)
+    result = lapservo.calibrate_camera(pictures, "9x6", 0.005, rig=tmp_path / "rig.yaml")
+    result.save(tmp_path / "saved.yaml")
+    assert (tmp_path / "saved.yaml").read_bytes() == (tmp_path / "commanded.yaml").read_bytes()
+    expect_whole(result, small)
+    assert result.camera.matrix[0, 0] == pytest.approx(camera.matrix[0, 0], rel=5e-3) and len(result.views) == 6
+    assert np.array_equal(pickle.loads(pickle.dumps(result)).camera.matrix, result.camera.matrix)
+
+
+def refused(call, *arguments, **keywords):
+    with pytest.raises(lapservo.InputError) as caught:
+        call(*arguments, **keywords)
+    return caught.value
+
+
+def test_what_does_not_tell_is_refused(recordings, rig):
+    grey = np.full((rig.camera.height_px, rig.camera.width_px, 3), 90, np.uint8)
+    error = refused(lapservo.calibrate_marker, [grey] * 2, rig)
+    assert error.source == "frames" and error.problem.startswith("PSM1 is in none of 2 frames")
+    assert "PSM1 is in none" in refused(lapservo.calibrate_registration, [grey], rig).problem
+    assert "at least" in refused(lapservo.calibrate_colour, [grey], rig).problem
+    assert "the board is in none of 1 pictures" in refused(lapservo.calibrate_camera, [grey], "9x6", 0.005).problem
+    # As the command line has it, with its own words for the options.
+    assert refused(lapservo.calibrate_camera, [grey], "9", 0.005).field == "corners"
+    assert refused(lapservo.calibrate_marker, [grey], rig, instrument="PSM9").value == "PSM9"
+    small = refused(lapservo.calibrate_colour, [grey[:100]], rig)
+    assert (small.field, small.value, small.expectation[:10]) == ("size", "1280 x 100", "1280 x 720")
+    free = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM1", rig.instruments[0].marker)])
+    assert "joints needs camera_from_rcm of PSM1" in refused(lapservo.calibrate_marker, [grey], free, joints={}).problem
+    backwards = {"time_s": [1.0, 0.5], "a": [0, 0], "b": [0, 0], "c": [0, 0], "d": [0, 0]}
+    assert refused(lapservo.calibrate_registration, [grey], free, joints=backwards).value == "0.5"
+    assert "item" == refused(lapservo.calibrate_registration, [None], rig).field
+
+
+def test_what_frames_raise_leaves_the_calibration(rig):
+    def broken():
+        yield np.full((rig.camera.height_px, rig.camera.width_px, 3), 90, np.uint8)
+        raise ZeroDivisionError("the camera's driver")
+
+    with pytest.raises(ZeroDivisionError, match="the camera's driver"):
+        lapservo.calibrate_marker(broken(), rig)
