@@ -44,7 +44,7 @@ function(lapservo_module name)
     add_executable(${name}_test ${tests})
     target_link_libraries(${name}_test PRIVATE lapservo::${name} ${M_TEST_USES} lapservo_testing lapservo_flags GTest::gtest_main)
     lapservo_compile_quickly(${name}_test)
-    gtest_discover_tests(${name}_test TEST_PREFIX ${name}. DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 900)
+    lapservo_module_tests(${name})
   endif()
 endfunction()
 
