@@ -34,9 +34,10 @@ constexpr double min_gap_m = 0.04e-3, min_gap_sigmas = 3;
 // How far boundaries and the seam may lie from where a round believes them, and how much an outlier counts.
 struct Round {
   double reach_m, seam_reach_m, loss_scale_sigmas;
+  bool ask_processing = false;  // which wants edges that are located
 };
-constexpr std::array rounds{Round{0.6e-3, 2.0e-3, 60}, Round{0.4e-3, 1.2e-3, 20}, Round{0.2e-3, 0.6e-3, 6},
-                            Round{0.1e-3, 0.4e-3, 2.5}};
+constexpr std::array rounds{Round{0.6e-3, 2.0e-3, 60}, Round{0.4e-3, 1.2e-3, 20}, Round{0.2e-3, 0.6e-3, 6, true},
+                            Round{0.1e-3, 0.4e-3, 2.5, true}};
 
 std::size_t sector_of(double tau_rad) {
   return static_cast<std::size_t>(std::min(sectors - 1.0, wrap_two_pi(tau_rad) / two_pi * sectors));
@@ -69,12 +70,14 @@ class Fit {
       const Eigen::Vector3d place = frame.sighting.unknowns.pose().camera_from_unrolled.translation;
       const double px_per_m = frame.view.camera.fx_px / std::max(place.z(), 1e-3);
       const double extra_px = std::clamp(how.reach_m * px_per_m, 2.0, 15.0);
-      auto measured = measurer_.measure(frame.view, marker_, frame.sighting, {extra_px, how.seam_reach_m, free_gap_});
+      auto measured = measurer_.measure(frame.view, marker_, frame.sighting,
+                                        {extra_px, how.seam_reach_m, free_gap_, how.ask_processing});
       if (measured.edges.all.size() < min_edges) return true;  // too few for a pose
       measured_.push_back(std::move(measured));
       return false;
     });
     if (frames_.empty()) return std::nullopt;
+    take_processing_off(measured_);
     auto adjustment =
         adjust(measured_, marker_, {how.loss_scale_sigmas, free_print, free_gap_ && free_print, with_covariance});
     if (!adjustment) return std::nullopt;

@@ -124,10 +124,12 @@ struct FrameBlocks {
   std::vector<std::size_t> edge_groups;
 };
 
-double common_sigma_px(std::size_t group, double blur_px) {
+double common_sigma_px(std::size_t group, const ViewMeasurements& frame) {
   const double more_px =
-      fine_fit_limits.common_fraction_of_blur * std::max(0.0, blur_px - fine_fit_limits.usual_blur_px);
-  if (group < 4) return fine_fit_limits.common_boundary_px + more_px;
+      fine_fit_limits.common_fraction_of_blur * std::max(0.0, frame.blur_px - fine_fit_limits.usual_blur_px);
+  if (group < 4)
+    return std::hypot(fine_fit_limits.common_boundary_px + more_px,
+                      fine_fit_limits.fraction_of_processing * frame.bias_px[group]);
   return group < measurement_groups ? fine_fit_limits.common_side_px + more_px : common_seam_px + more_px;
 }
 
@@ -154,8 +156,7 @@ void add_frame(ceres::Problem& problem, const ViewMeasurements& frame, const Pri
   if (frame.seam) add_seam(frame.seam->upper, upper_group), add_seam(frame.seam->lower, upper_group + 1);
   for (std::size_t group = 0; group < groups; ++group)
     if (used[group])
-      problem.AddResidualBlock(new Prior(1, 0, 0, common_sigma_px(group, frame.blur_px)), nullptr,
-                               &blocks.common[group]);
+      problem.AddResidualBlock(new Prior(1, 0, 0, common_sigma_px(group, frame)), nullptr, &blocks.common[group]);
 }
 
 void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& shared) {
@@ -170,15 +171,17 @@ void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& sha
 
 // As the tracker has it (fine_fit.cpp): compression and motion blur move edges, in all frames alike.
 double doubt_scale(const std::vector<ViewMeasurements>& frames) {
-  std::vector<double> sigmas_px, blurs_px;
+  std::vector<double> sigmas_px, blurs_px, biases_px;
   for (const ViewMeasurements& frame : frames) {
     blurs_px.push_back(frame.blur_px);
+    biases_px.push_back(Eigen::Map<const Eigen::Vector4d>(frame.bias_px.data()).norm() / 2);
     for (const Measurement& m : frame.edges.all)
       if (m.group < 4) sigmas_px.push_back(m.sigma_px);
   }
   if (sigmas_px.empty()) return 1;
   return std::max(1.0, median(sigmas_px) / fine_fit_limits.usual_sigma_px) +
-         std::max(0.0, median(blurs_px) - fine_fit_limits.usual_blur_px);
+         std::max(0.0, median(blurs_px) - fine_fit_limits.usual_blur_px) +
+         median(biases_px) / fine_fit_limits.doubted_processing_px;
 }
 
 // The print's; what was taken for zero in all frames counts as it was before the fit.

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/coarse_fit.h"
@@ -110,6 +112,27 @@ std::optional<MarkerView> cropped_view(const cv::Mat& bgr, const Camera& camera,
   return view;
 }
 
+void take_processing_off(std::vector<ViewMeasurements>& views) {
+  std::array<std::vector<double>, 4> told_px;
+  std::ptrdiff_t asked = 0;
+  for (const ViewMeasurements& view : views) {
+    if (view.processing.processing != Processing::unknown) ++asked;
+    for (std::size_t k = 0; k < told_px.size(); ++k)
+      if (view.processing.edges && view.processing.edges->bias_px[k])
+        told_px[k].push_back(*view.processing.edges->bias_px[k]);
+  }
+  std::array<double, 4> usual_px{};
+  for (std::size_t k = 0; k < usual_px.size(); ++k)
+    if (2 * std::ssize(told_px[k]) > asked) usual_px[k] = median(told_px[k]);
+  for (ViewMeasurements& view : views) {
+    if (view.processing.processing == Processing::none) continue;
+    for (std::size_t k = 0; k < usual_px.size(); ++k)
+      view.bias_px[k] = view.processing.edges ? view.processing.edges->bias_px[k].value_or(usual_px[k]) : usual_px[k];
+    for (Measurement& m : view.edges.all)
+      if (m.group < 4) m.residual_px -= view.bias_px[m.group];
+  }
+}
+
 ViewMeasurer::ViewMeasurer(const Rig& rig, std::size_t instrument)
     : classes_(rig.instruments), bands_(classes_.of_bands(instrument)), light_(rig.camera.response.table()) {}
 
@@ -119,10 +142,17 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   const ImageView image(view.bgr);
   const LightImage light(image, light_, ChannelGeometry(view.camera));
   const Scene scene{image, view.camera, classes_, marker, bands_};
-  return {
-      measure_edges(scene, light, sighting.unknowns, sighting.film_m, {reach.extra_px, iterations, 1}, sighting.blur),
-      measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px, reach.seam_m, reach.free_gap),
-      std::max(sighting.blur.boundaries_px, sighting.blur.sides_px), sighting.film_m};
+  ViewMeasurements measured;
+  measured.edges =
+      measure_edges(scene, light, sighting.unknowns, sighting.film_m, {reach.extra_px, iterations, 1}, sighting.blur);
+  if (reach.ask_processing)
+    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px);
+  const auto& processed = measured.processing.edges;
+  measured.seam = measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px, reach.seam_m,
+                               reach.free_gap, processed ? std::optional(processed->processing) : std::nullopt);
+  measured.blur_px = std::max(sighting.blur.boundaries_px, sighting.blur.sides_px);
+  measured.film_m = sighting.film_m;
+  return measured;
 }
 
 std::optional<Sighting> ViewMeasurer::settled(const MarkerView& view, const Marker& marker,

@@ -60,17 +60,25 @@ struct ViewMeasurements {
   EdgeMeasurements edges;
   std::optional<SeamEdges> seam;
   double blur_px = 1.2, film_m = film_mean_m;  ///< that they were measured with
+  ProcessingEvidence processing;               ///< unknown when not asked
+  std::array<double, 4> bias_px{};             ///< taken off the boundaries
 };
+
+/// Takes off each view's boundaries what the camera's processing moved them by (picture_processing.h). Views that can't
+/// tell get the median of those that can, as it is one camera.
+void take_processing_off(std::vector<ViewMeasurements>& views);
 
 /// Measures many views of one marker.
 class ViewMeasurer {
  public:
   ViewMeasurer(const Rig& rig, std::size_t instrument);
 
-  /// How far edges are looked for: beyond the blur, and the seam's around the shaft; whether there may be a gap.
+  /// How far edges are looked for: beyond the blur, and the seam's around the shaft; whether there may be a gap;
+  /// whether to find out what the camera did to the picture.
   struct Reach {
     double extra_px = 3, seam_m = 0.5e-3;
     bool free_gap = true;
+    bool ask_processing = false;
   };
   ViewMeasurements measure(const MarkerView& view, const Marker& marker, const Sighting& sighting,
                            const Reach& reach) const;

@@ -444,6 +444,38 @@ EdgeValues processed_edge(const std::array<float, 256>& light_of_value, const Pi
   return values_of(predicted(Filters(processing, false), encoded.value));
 }
 
+std::vector<std::array<double, 3>> filtered_light(const std::array<float, 256>& light_of_value,
+                                                  const PictureProcessing& processing,
+                                                  std::span<const std::array<double, 3>> light) {
+  PictureProcessing unsaturated = processing;
+  unsaturated.saturation = 1;
+  const Filters filters(unsaturated, false);
+  const Encoding encoding(light_of_value);
+  std::vector<std::array<double, 3>> differences(light.size()), out(light.size());  // to luma
+  std::vector<double> luma(light.size());
+  std::size_t near = 128;
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      differences[i][c] = static_cast<double>(encoding.value(static_cast<float>(light[i][c]), near).y);
+      luma[i] += static_cast<double>(luma_of[c]) * differences[i][c];
+    }
+    for (double& difference : differences[i]) difference -= luma[i];
+  }
+  const auto last = static_cast<std::ptrdiff_t>(light.size()) - 1;
+  for (std::ptrdiff_t i = 0; i <= last; ++i) {
+    std::array<double, 3> value{};
+    for (std::ptrdiff_t k = -both_reach; k <= both_reach; ++k) {
+      const auto at = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, last));
+      const auto tap = static_cast<std::size_t>(std::abs(k));
+      for (std::size_t c = 0; c < 3; ++c)
+        value[c] += (tap <= filter_reach ? filters.luma[tap] * luma[at] : 0) + filters.chroma[tap] * differences[at][c];
+    }
+    for (std::size_t c = 0; c < 3; ++c)
+      out[static_cast<std::size_t>(i)][c] = static_cast<double>(encoding.light(value[c]).y);
+  }
+  return out;
+}
+
 bool is_processed(const PictureProcessing& p) {
   const ProcessingLimits& limits = processing_limits;
   return p.chroma_variance_px2 > limits.chroma_variance_px2 || p.sharpening > limits.max_sharpening ||

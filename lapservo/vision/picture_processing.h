@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "lapservo/vision/pooled_edges.h"
 
@@ -26,6 +27,12 @@ struct Plateaus {
 using EdgeValues = std::array<std::array<float, PooledEdge::samples>, 3>;
 EdgeValues processed_edge(const std::array<float, 256>& light_of_value, const PictureProcessing& processing,
                           const Plateaus& plateaus, double offset_px);
+
+/// Light along a line, a pixel apart, as it looks after blurred colour differences and sharpening. What is even stays
+/// as it is, so light is as the camera shows it: `saturation` has been at work.
+std::vector<std::array<double, 3>> filtered_light(const std::array<float, 256>& light_of_value,
+                                                  const PictureProcessing& processing,
+                                                  std::span<const std::array<double, 3>> light);
 
 /// What is to be known of a frame's processing for its boundaries' sake.
 struct ProcessedEdges {

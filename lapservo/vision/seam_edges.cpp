@@ -13,6 +13,7 @@
 #include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
 namespace {
@@ -157,10 +158,11 @@ std::array<double, 3> shaft_light(const SeamView& view, double blur_px) {
   return light;
 }
 
-// Residuals of all profiles when the upper edge lies at `upper_m` and the other one `gap_m` before it; colours, shading
-// and the shaft's light are those that fit best. Weighted by the root of the stations, so that noise is alike.
-Eigen::VectorXd residuals(const Section& section, double upper_m, double gap_m, double blur_px, double radius_m) {
-  constexpr int colors = 5;
+constexpr int seam_colors = 5;  // left, its shading, right, its shading, the shaft
+using SeamBasis = Eigen::Matrix<double, Eigen::Dynamic, seam_colors>;
+
+// How much of each colour a sample shows when the upper edge lies at `upper_m` and the other one `gap_m` before it.
+SeamBasis basis_of(const Section& section, double upper_m, double gap_m, double blur_px, double radius_m) {
   const auto scale_at = [&](double x_m) {
     const auto next = std::lower_bound(section.x_m.begin(), section.x_m.end(), x_m);
     const auto i =
@@ -170,39 +172,61 @@ Eigen::VectorXd residuals(const Section& section, double upper_m, double gap_m, 
   const double lower_m = upper_m - gap_m, per_upper = scale_at(upper_m) / blur_px,
                per_lower = scale_at(lower_m) / blur_px;
   const auto samples = static_cast<Eigen::Index>(section.x_m.size());
-  Eigen::Matrix<double, Eigen::Dynamic, colors> basis(samples, colors);
+  SeamBasis basis(samples, seam_colors);
   for (Eigen::Index i = 0; i < samples; ++i) {
     const double x = section.x_m[static_cast<std::size_t>(i)], turn = x / radius_m;
     const double left = normal_cdf((lower_m - x) * per_lower), right = normal_cdf((x - upper_m) * per_upper);
     basis.row(i) << left, left * turn, right, right * turn, 1 - left - right;
   }
+  return basis;
+}
+
+// 1 where most of a profile's stations show light.
+Eigen::VectorXd used_samples(const Profile& profile) {
+  Eigen::VectorXd used(static_cast<Eigen::Index>(profile.count.size()));
+  for (Eigen::Index i = 0; i < used.size(); ++i)
+    used[i] = 2 * profile.count[static_cast<std::size_t>(i)] > profile.stations ? 1 : 0;
+  return used;
+}
+
+Eigen::VectorXd light_of(const Profile& profile, std::size_t channel, const Eigen::VectorXd& used) {
+  Eigen::VectorXd light(used.size());
+  for (Eigen::Index i = 0; i < used.size(); ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    light[i] = used[i] > 0 ? profile.light[k][channel] / profile.count[k] : 0;
+  }
+  return light;
+}
+
+// The colours that fit light best. In units of a hundredth of white: shading over a radian is of the light's size, the
+// shaft's light is known to a third.
+Eigen::Matrix<double, seam_colors, 1> colors_of(const SeamBasis& basis, const Eigen::VectorXd& used,
+                                                const Eigen::VectorXd& light, double shaft) {
+  constexpr double unit = 0.01;
+  const double shaft_sigma = 0.3 * shaft + 0.005;
+  const Eigen::Matrix<double, seam_colors, Eigen::Dynamic> weighted = basis.transpose() * used.asDiagonal();
+  Eigen::Matrix<double, seam_colors, seam_colors> information = weighted * basis;
+  Eigen::Matrix<double, seam_colors, 1> gradient = weighted * light;
+  information(1, 1) += unit * unit, information(3, 3) += unit * unit;
+  information(0, 0) += 1e-9, information(2, 2) += 1e-9;
+  information(4, 4) += unit * unit / (shaft_sigma * shaft_sigma);
+  gradient[4] += shaft * unit * unit / (shaft_sigma * shaft_sigma);
+  return information.ldlt().solve(gradient);
+}
+
+// Residuals of all profiles with edges there; colours, shading and the shaft's light are those that fit best. Weighted
+// by the root of the stations, so that noise is alike.
+Eigen::VectorXd residuals(const Section& section, double upper_m, double gap_m, double blur_px, double radius_m) {
+  const SeamBasis basis = basis_of(section, upper_m, gap_m, blur_px, radius_m);
+  const Eigen::Index samples = basis.rows();
   Eigen::VectorXd out(samples * 3 * static_cast<Eigen::Index>(section.profiles.size()));
-  out.setZero();
   Eigen::Index at = 0;
   for (const Profile& profile : section.profiles) {
-    const double weight = std::sqrt(profile.stations);
-    Eigen::VectorXd used(samples);
-    for (Eigen::Index i = 0; i < samples; ++i)
-      used[i] = 2 * profile.count[static_cast<std::size_t>(i)] > profile.stations ? 1 : 0;
-    const Eigen::Matrix<double, colors, Eigen::Dynamic> weighted = basis.transpose() * used.asDiagonal();
+    const Eigen::VectorXd used = used_samples(profile);
     for (std::size_t c = 0; c < 3; ++c, at += samples) {
-      Eigen::VectorXd light(samples);
-      for (Eigen::Index i = 0; i < samples; ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        light[i] = used[i] > 0 ? profile.light[k][c] / profile.count[k] : 0;
-      }
-      // In units of a hundredth of white: shading over a radian is of the light's size, the shaft's light is known to
-      // a third.
-      constexpr double unit = 0.01;
-      const double shaft = section.shaft[c], shaft_sigma = 0.3 * shaft + 0.005;
-      Eigen::Matrix<double, colors, colors> information = weighted * basis;
-      Eigen::Matrix<double, colors, 1> gradient = weighted * light;
-      information(1, 1) += unit * unit, information(3, 3) += unit * unit;
-      information(0, 0) += 1e-9, information(2, 2) += 1e-9;
-      information(4, 4) += unit * unit / (shaft_sigma * shaft_sigma);
-      gradient[4] += shaft * unit * unit / (shaft_sigma * shaft_sigma);
-      const Eigen::Matrix<double, colors, 1> color = information.ldlt().solve(gradient);
-      out.segment(at, samples) = weight * used.cwiseProduct(light - basis * color);
+      const Eigen::VectorXd light = light_of(profile, c, used);
+      const auto color = colors_of(basis, used, light, section.shaft[c]);
+      out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(light - basis * color);
     }
   }
   return out;
@@ -254,6 +278,35 @@ std::optional<SeamFit> fit(const Section& section, double expected_gap_m, double
   return best.covariance.allFinite() ? std::optional(best) : std::nullopt;
 }
 
+// Edges that lie where they were found would be found `moved`: by so much the others were, to a part of it.
+void take_off(SeamFit& found, const SeamFit& moved) {
+  const double upper_m = moved.upper_m - found.upper_m, gap_m = moved.gap_m - found.gap_m;
+  const double left = fine_fit_limits.fraction_of_processing;
+  found.upper_m -= upper_m, found.gap_m = std::max(0.0, found.gap_m - gap_m);
+  found.covariance.diagonal() += left * left * Eigen::Vector2d(upper_m * upper_m, gap_m * gap_m);
+}
+
+// What the processing makes of light across edges that lie where they were found.
+Section processed(const Section& section, const SeamFit& found, double blur_px, double radius_m,
+                  const PictureProcessing& processing, const std::array<float, 256>& light_of_value) {
+  const SeamBasis seen = basis_of(section, found.upper_m, found.gap_m, blur_px, radius_m);
+  const SeamBasis true_basis = basis_of(section, found.upper_m, found.gap_m, processing.blur_px, radius_m);
+  Section out = section;
+  for (Profile& profile : out.profiles) {
+    const Eigen::VectorXd used = used_samples(profile);
+    std::vector<std::array<double, 3>> light(section.x_m.size());
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto color = colors_of(seen, used, light_of(profile, c, used), section.shaft[c]);
+      for (std::size_t i = 0; i < light.size(); ++i)
+        light[i][c] = true_basis.row(static_cast<Eigen::Index>(i)).dot(color);
+    }
+    profile.light = filtered_light(light_of_value, processing, light);
+    for (std::size_t i = 0; i < light.size(); ++i)
+      for (double& channel : profile.light[i]) channel *= profile.count[i];
+  }
+  return out;
+}
+
 // An edge of the print that was found `beyond_m` around the shaft from where it is expected.
 SeamEdge edge_at(const SeamView& view, double azimuth_rad, double along_m, double beyond_m, double variance_m2,
                  bool moves_with_gap) {
@@ -274,7 +327,8 @@ SeamEdge edge_at(const SeamView& view, double azimuth_rad, double along_m, doubl
 }  // namespace
 
 std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns,
-                                      double blur_px, double reach_m, bool free_gap) {
+                                      double blur_px, double reach_m, bool free_gap,
+                                      const std::optional<PictureProcessing>& processing) {
   const Marker& marker = scene.marker;
   const ShaftPose& pose = unknowns.pose();
   const auto cylinder = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
@@ -294,10 +348,15 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
   along_m /= weight;
   const auto middle = scene.camera.raw_with_jacobian(view.point(view.upper_rad, along_m));
   const double px_per_m = (middle.d_px_d_point * view.around(view.upper_rad)).norm();
-  const auto found = fit(*section, gap_m, reach_m, free_gap ? reach_m : 0, blur_px, marker.radius_m(), px_per_m);
+  const double radius_m = marker.radius_m(), gap_reach_m = free_gap ? reach_m : 0;
+  auto found = fit(*section, gap_m, reach_m, gap_reach_m, blur_px, radius_m, px_per_m);
   if (!found) return std::nullopt;
+  if (processing) {
+    const Section seen = processed(*section, *found, blur_px, radius_m, *processing, light.light_of_value());
+    if (const auto moved = fit(seen, found->gap_m, reach_m, gap_reach_m, blur_px, radius_m, px_per_m))
+      take_off(*found, *moved);
+  }
 
-  const double radius_m = marker.radius_m();
   SeamEdges edges;
   edges.gap_rad = found->gap_m / radius_m;
   edges.sigma_gap_rad = std::hypot(std::sqrt(found->covariance(1, 1)), floor_px / px_per_m) / radius_m;

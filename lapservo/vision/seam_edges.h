@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "lapservo/vision/light_image.h"
+#include "lapservo/vision/picture_processing.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
@@ -24,8 +25,10 @@ struct SeamEdges {
 
 /// Fits light across the seam: one band, the bare shaft, another band, blurred; colours and shading are free. Looks up
 /// to `reach_m` around the shaft from where pose and marker have the edges. Unless `free_gap`, the print's ends meet:
-/// one edge, the upper. Nullopt when the seam does not face the camera or has no contrast.
+/// one edge, the upper. What `processing` moves the edges by is taken off. Nullopt when the seam does not face the
+/// camera or has no contrast.
 std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns,
-                                      double blur_px, double reach_m, bool free_gap);
+                                      double blur_px, double reach_m, bool free_gap,
+                                      const std::optional<PictureProcessing>& processing);
 
 }  // namespace lapservo::internal
