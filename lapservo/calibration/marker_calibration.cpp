@@ -149,6 +149,25 @@ std::size_t seam_views(const std::vector<ViewMeasurements>& measured) {
   }));
 }
 
+// Whether most frames are too blurred; empty when they are not. Of a frame that did not settle only the rounds tell it.
+std::string blur_refusal(const std::vector<KeyFrame>& frames, const Marker& marker) {
+  const auto blurred = std::count_if(frames.begin(), frames.end(), [&](const KeyFrame& frame) {
+    const double depth_m = frame.sighting.unknowns.pose().camera_from_unrolled.translation.z();
+    return frame.sighting.blur.boundaries_px >
+           max_blur_diameters * marker.diameter_m * frame.view.camera.fx_px / depth_m;
+  });
+  if (2 * static_cast<std::size_t>(blurred) > frames.size()) {
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "%zd of %zu frames are too blurred (by more than %.0f %% of the shaft's width): focus, turn more slowly, "
+        "or come nearer",
+        static_cast<std::ptrdiff_t>(blurred), frames.size(), 100 * max_blur_diameters);
+    return text;
+  }
+  return {};
+}
+
 // Why these frames can't tell the print; empty when they may.
 std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker) {
   char text[240];
@@ -168,20 +187,7 @@ std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker
         deg_from_rad(unseen_rad));
     return text;
   }
-  const auto blurred = std::count_if(frames.begin(), frames.end(), [&](const KeyFrame& frame) {
-    const double depth_m = frame.sighting.unknowns.pose().camera_from_unrolled.translation.z();
-    return frame.sighting.blur.boundaries_px >
-           max_blur_diameters * marker.diameter_m * frame.view.camera.fx_px / depth_m;
-  });
-  if (2 * static_cast<std::size_t>(blurred) > frames.size()) {
-    std::snprintf(
-        text, sizeof text,
-        "%zd of %zu frames are too blurred (by more than %.0f %% of the shaft's width): focus, turn more slowly, "
-        "or come nearer",
-        static_cast<std::ptrdiff_t>(blurred), frames.size(), 100 * max_blur_diameters);
-    return text;
-  }
-  return {};
+  return blur_refusal(frames, marker);
 }
 
 // Whether the last round moved every number by little: by a micrometre, or by a fraction of its sigma, within which
@@ -299,6 +305,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   }
   last = fit.round(rounds.back(), true, true);
   if (!last) return refused(unsolvable);
+  if (const std::string why = blur_refusal(fit.frames(), nominal); !why.empty()) return refused(why);
   calibration.seam_views = seam_views(fit.measured());
   if (calibration.seam_views < min_seam_views)
     return refused(

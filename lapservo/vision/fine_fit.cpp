@@ -64,11 +64,13 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
                          limits.side_fraction_of_motion_blur * motion_blur_px;
   const double unexplained = processed ? std::max(0.0, processed->misfit - limits.usual_misfit) : 0;
   const double unexplained_px = limits.px_per_misfit * unexplained;
+  const double left_of_corrected =
+      processed ? std::hypot(limits.fraction_of_processing, unexplained_share(*processed)) : 1;
   CommonErrors errors;
   double bias_squares_px2 = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     const bool corrected = processed && processed->bias_px[k];
-    const double left_px = (corrected ? limits.fraction_of_processing : 1) * bias_px[k];
+    const double left_px = (corrected ? left_of_corrected : 1) * bias_px[k];
     errors.px[k] = std::hypot(boundary_px, left_px, unexplained_px);
     bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
   }
