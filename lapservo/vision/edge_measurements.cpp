@@ -68,9 +68,9 @@ struct Frame {
     const auto lit = [](double cosine) {
       return edge_limits.film_ambient_fraction + (1 - edge_limits.film_ambient_fraction) * std::max(0.0, cosine);
     };
-    const double light = std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
-                                  edge_limits.film_most_lit);
-    return light + (light - 1) * edge_limits.bare_shaft_light;
+    const double edge_light = std::min(
+        lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m), edge_limits.film_most_lit);
+    return edge_light + (edge_light - 1) * edge_limits.bare_shaft_light;
   }
   double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
 

@@ -167,7 +167,7 @@ void SurfaceTracker::find_in_the_way(std::size_t i, WorkBudget& budget) {
   others_.clear();
   for (std::size_t j = 0; j < rig_.instruments.size(); ++j) {
     if (j == i || !memory_[j]) continue;
-    const ShaftPose& pose = found_[j].fit ? found_[j].fit->unknowns.pose() : memory_[j]->expected_pose().pose();
+    const ShaftPose pose = found_[j].fit ? found_[j].fit->unknowns.pose() : memory_[j]->expected_pose().pose();
     if (!may_meet(rig_.camera, rig_.instruments[i].marker, memory_[i]->expected_pose().pose(),
                   rig_.instruments[j].marker, pose))
       continue;
