@@ -127,8 +127,10 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       memory_(rig.instruments.size()),
       searches_(rig.instruments.size()),
       found_(rig.instruments.size()),
-      covers_(rig.instruments.size()),
       observations_(rig.instruments.size()) {
+  others_.reserve(rig.instruments.size());
+  covers_.reserve(rig.instruments.size());  // copies would have no room
+  for (std::size_t i = 0; i < rig.instruments.size(); ++i) covers_.emplace_back(rig.camera);
   BlurredEdges::instance();  // takes milliseconds, which no frame should
 }
 
@@ -158,8 +160,8 @@ ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {
 }
 
 const ShaftCover& SurfaceTracker::cover_of(std::size_t i, const ShaftPose& pose) {
-  if (!covers_[i]) covers_[i].emplace(rig_.camera, rig_.instruments[i].marker, classes_.of_bands(i), pose);
-  return *covers_[i];
+  if (!covers_[i].drawn()) covers_[i].draw(rig_.camera, rig_.instruments[i].marker, classes_.of_bands(i), pose);
+  return covers_[i];
 }
 
 // Those that may lie before or beside the one that is followed: as found in this frame, or as they are expected.
@@ -181,11 +183,11 @@ void SurfaceTracker::find_others(std::size_t i, std::optional<std::size_t> suppo
   others_.clear();
   for (std::size_t j = 0; j < rig_.instruments.size(); ++j) {
     if (j == i || !(found_[j].fit || j == supposed)) continue;
-    if (!covers_[j]) {
+    if (!covers_[j].drawn()) {
       budget.spend(search_costs.cover);
       cover_of(j, (found_[j].fit ? found_[j].fit : found_[j].beside_another)->unknowns.pose());
     }
-    others_.push_back(&*covers_[j]);
+    others_.push_back(&covers_[j]);
   }
 }
 
@@ -199,7 +201,7 @@ std::size_t SurfaceTracker::follow_known(const ImageView& image, const LightImag
       find_in_the_way(i, budget);
       found_[i] =
           follow(scene_of(image, i), light, memory.expected_pose(), memory.blur, memory.expected_processing(), budget);
-      covers_[i].reset();  // where it was expected
+      covers_[i].clear();  // where it was expected
     }
     if (found_[i].fit) continue;
     memory_[i].reset();
@@ -230,13 +232,13 @@ void SurfaceTracker::find_pair(const ImageView& image, const LightImage& light, 
   const Scene scene = scene_of(image, i);
   const std::vector<Blob> left = without(blobs, others_);
   Found beside = MarkerSearch::look_plainly({scene, light, left, rig_.instruments[i].camera_from_rcm}, budget);
-  covers_[j].reset();  // where it is supposed
+  covers_[j].clear();  // where it is supposed
   if (!beside.fit && !beside.seems) return;
   cover_of(i, beside.fit ? beside.fit->unknowns.pose() : *beside.seems);
   find_others(j, i, budget);
   const FineFit supposed = *found_[j].beside_another;
   Found found = follow(scene_of(image, j), light, supposed.unknowns, supposed.blur, {}, budget);
-  if (!beside.fit || !found.fit) covers_[i].reset();
+  if (!beside.fit || !found.fit) covers_[i].clear();
   if (!found.fit) return;
   found_[j] = std::move(found);
   if (beside.fit) found_[i] = std::move(beside);
@@ -269,7 +271,7 @@ std::size_t SurfaceTracker::found_count() const {
 // again when another one was found, which may lie before them: else the next frame does that.
 void SurfaceTracker::find(const ImageView& image, const LightImage& light, std::optional<double> units) {
   WorkBudget budget(units);
-  std::fill(covers_.begin(), covers_.end(), std::nullopt);
+  for (ShaftCover& cover : covers_) cover.clear();
   std::size_t lost = follow_known(image, light, budget);
   if (lost == 0) return;
   budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);

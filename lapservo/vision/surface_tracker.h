@@ -65,9 +65,9 @@ class SurfaceTracker {
   std::vector<std::optional<Memory>> memory_;
   std::vector<MarkerSearch> searches_;
   std::vector<Found> found_;
-  std::vector<std::optional<ShaftCover>> covers_;  // of those that are known in this frame, where somebody asked
-  bool pairs_wait_ = false;                        // the frame before had no time for them
-  std::vector<const ShaftCover*> others_;          // in the image, to the one that is looked for
+  std::vector<ShaftCover> covers_;         // of those that are known in this frame, where somebody asked
+  bool pairs_wait_ = false;                // the frame before had no time for them
+  std::vector<const ShaftCover*> others_;  // in the image, to the one that is looked for
   std::vector<Observation> observations_;
 };
 
