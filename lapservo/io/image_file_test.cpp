@@ -165,7 +165,8 @@ TEST(Image, ThatLostAStretchOfItsDataIsDamagedOrHardlyChanged) {
     changed += cv::mean(difference.reshape(1))[0] > 2 ? 1 : 0;
   }
   EXPECT_GT(taken, 5) << "a few blocks may be anything";
-  EXPECT_LE(changed, 12) << "those that begin at a row's ends; 176 without looking for shifts, seed " << seed;
+  EXPECT_LE(changed, 20)
+      << "those that begin in the first row or at a row's ends; 176 without looking for shifts, seed " << seed;
 }
 
 // Every byte of a PNG is under a checksum.

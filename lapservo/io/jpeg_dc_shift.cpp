@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "lapservo/core/median.h"
@@ -13,10 +14,12 @@ namespace {
 constexpr float least_shift = 2;               // brightness levels; less moves no boundary by what matters
 constexpr float least_shift_in_quanta = 1.5F;  // one is what rounding makes of a slow change of light
 constexpr float least_shift_over_spread = 2;   // a shift is the same everywhere, a scene's edge along a row is not
-constexpr float max_spread_over_usual = 2;
+constexpr float max_spread_over_usual = 1.5F;
 constexpr float rounding_spread = 0.5F;  // levels, of blocks without any noise
-constexpr int least_borders = 6;         // fewer look alike by chance
-constexpr int borders_beside = 3;        // of which most have to show the shift, or nothing
+constexpr float least_noise = 0.3F;      // levels: of camera's pictures, not of drawn ones
+constexpr float min_spread_over_usual = 0.4F;
+constexpr int max_tries = 4096;    // of a picture made to take time; cameras' have some hundreds
+constexpr int borders_beside = 3;  // of which most have to show the shift, or nothing
 
 using Steps = std::vector<float>;
 
@@ -32,34 +35,43 @@ float spread_about(Steps steps, float from) {
   return *quartile + rounding_spread;
 }
 
-// Of the borders in the rows around a block's.
-float usual_spread(const JpegBlocks& blocks, int block) {
-  const int count = static_cast<int>(blocks.steps.size());
-  const int begin = std::max(block - 2 * blocks.columns, 0);
-  const int end = std::min(block + 3 * blocks.columns, count);
-  return spread_about(part(blocks, begin, end), 0);
+// Of the borders around those that a shift from block `first` on would show in.
+float usual_spread(const JpegBlocks& blocks, int first) {
+  const int count = static_cast<int>(blocks.steps.size()), end = first + blocks.columns;
+  Steps around = part(blocks, std::max(first - 2 * blocks.columns, blocks.columns), first);
+  const Steps behind = part(blocks, end, std::min(end + 2 * blocks.columns, count));
+  around.insert(around.end(), behind.begin(), behind.end());
+  return spread_about(std::move(around), 0);
 }
 
-// Bars and masks in a picture have edges along rows, or most of them. A shift shows up to the end of its first row and
-// from the beginning of the next one, and in nothing before and behind.
-bool is_wrapped(const JpegBlocks& blocks, int first, float shift) {
-  const int next_row = (first / blocks.columns + 1) * blocks.columns;
-  const int end = first + blocks.columns;
-  const auto half_shown = [&](int from, int to) { return median(part(blocks, from, to)) / shift > 0.5F; };
+float median_of_three(const float* steps) {
+  return std::max(std::min(steps[0], steps[1]), std::min(std::max(steps[0], steps[1]), steps[2]));
+}
+
+// Bars, labels and masks in a picture have edges along rows. A shift from block `first` on shows up to the end of its
+// row and from the beginning of the next one, and in nothing before and behind.
+bool is_wrapped(const JpegBlocks& blocks, int first) {
+  const int next_row = (first / blocks.columns + 1) * blocks.columns, end = first + blocks.columns;
   if (std::min(next_row - first, end - next_row) < borders_beside) return false;
-  const bool is_below_another = first > blocks.columns;
-  if (is_below_another && (half_shown(first - borders_beside, first) || !half_shown(first, next_row))) return false;
-  return half_shown(next_row, end) && !half_shown(end, end + borders_beside);
+  const auto three_from = [&](int block) { return median_of_three(&blocks.steps[static_cast<std::size_t>(block)]); };
+  const float shift = three_from(end - borders_beside);
+  const float before = three_from(first - borders_beside), behind = three_from(end);
+  return std::abs(shift) > least_shift / 2 && std::abs(before) < std::abs(shift) / 2 &&
+         std::abs(behind) < std::abs(shift) / 2;
 }
 
-// With a shift from block `first` on, whose borders to blocks that aren't shifted are those from `begin` to `end`.
-std::optional<float> shift_from(const JpegBlocks& blocks, int first, int begin, int end) {
-  const Steps borders = part(blocks, begin, end);
+// Of all from block `first` on.
+std::optional<float> shift_from(const JpegBlocks& blocks, int first) {
+  const int next_row = (first / blocks.columns + 1) * blocks.columns, end = first + blocks.columns;
+  const Steps borders = part(blocks, first, end);
   const float shift = median(Steps(borders));
-  const float spread = spread_about(borders, shift);
+  const float spread = spread_about(borders, shift), usual = usual_spread(blocks, first);
+  // What was drawn has no noise, and edges as even as a shift's.
+  if (usual < least_noise + rounding_spread || spread < min_spread_over_usual * usual) return std::nullopt;
   const float least = std::max({least_shift, least_shift_in_quanta * blocks.quantum, least_shift_over_spread * spread});
-  if (std::abs(shift) < least || spread > max_spread_over_usual * usual_spread(blocks, first)) return std::nullopt;
-  return is_wrapped(blocks, first, shift) ? std::optional(shift) : std::nullopt;
+  if (std::abs(shift) < least || spread > max_spread_over_usual * usual) return std::nullopt;
+  const auto is_shown = [&](int from, int to) { return median(part(blocks, from, to)) / shift > 0.5F; };
+  return is_shown(first, next_row) && is_shown(next_row, end) ? std::optional(shift) : std::nullopt;
 }
 
 }  // namespace
@@ -67,16 +79,13 @@ std::optional<float> shift_from(const JpegBlocks& blocks, int first, int begin, 
 std::optional<float> dc_shift(const JpegBlocks& blocks) {
   const int count = static_cast<int>(blocks.steps.size());
   const int interval = blocks.restart_interval > 0 ? blocks.restart_interval : count;
-  std::vector<double> sums{0};
-  for (const float step : blocks.steps) sums.push_back(sums.back() + step);
-  for (int first = 0; first < count; ++first) {
-    const int begin = std::max(first, blocks.columns);  // the first row has none above
-    const int end = first + blocks.columns;
+  int tries = max_tries;
+  // The first row has no borders above.
+  for (int first = blocks.columns; first + blocks.columns + borders_beside <= count && tries > 0; ++first) {
     const int restart = (first / interval + 1) * interval;
-    if (end - begin < least_borders || end + borders_beside > std::min(count, restart)) continue;
-    const double sum = sums[static_cast<std::size_t>(end)] - sums[static_cast<std::size_t>(begin)];
-    if (std::abs(sum) < least_shift / 2 * (end - begin)) continue;
-    if (const auto shift = shift_from(blocks, first, begin, end)) return shift;
+    if (first + blocks.columns > restart || !is_wrapped(blocks, first)) continue;
+    --tries;
+    if (const auto shift = shift_from(blocks, first)) return shift;
   }
   return std::nullopt;
 }

@@ -28,7 +28,7 @@ void lift(std::vector<float>& steps, int begin, int end, float by) {
 TEST(DcShift, FromAnyBlockWithinARowOnIsFound) {
   Random random(seed);
   int tried = 0, found = 0;
-  for (int first = columns / 2; first < columns * (rows - 2); ++first) {
+  for (int first = columns; first < columns * (rows - 2); ++first) {
     if (first % columns < 4 || first % columns > columns - 4) continue;  // too few borders on one side
     std::vector<float> steps = texture(random);
     const float by = random.bits() % 2 == 0 ? 8 : -8;
@@ -58,10 +58,26 @@ TEST(DcShift, AnEdgeAlongWholeRowsOrPartsOfThemIsNone) {
 }
 
 TEST(DcShift, WhatRoundingMakesOfSlowChangesIsNone) {
-  std::vector<float> flat(columns * rows);
-  lift(flat, 10, 10 + columns, 3);
-  EXPECT_TRUE(dc_shift({flat, 0.25F, columns, 0}));
-  EXPECT_FALSE(dc_shift({flat, 3, columns, 0}));
+  Random random(seed);
+  std::vector<float> steps = texture(random);
+  lift(steps, 130, 130 + columns, 8);
+  EXPECT_TRUE(dc_shift({steps, 0.25F, columns, 0}));
+  EXPECT_FALSE(dc_shift({steps, 8, columns, 0}));
+}
+
+// Labels and bars of screens, higher on one side than on the other: the same step all along, and no noise.
+TEST(DcShift, WhatIsDrawnIsNone) {
+  Random random(seed);
+  for (int row = 0; row < rows - 2; ++row)
+    for (int column = 1; column < columns; ++column) {
+      const int first = row * columns + column;
+      std::vector<float> drawn(columns * rows);
+      lift(drawn, first, first + columns, 30);
+      EXPECT_FALSE(dc_shift({drawn, 0.25F, columns, 0})) << "alone, from block " << first;
+      std::vector<float> over = texture(random);
+      for (int i = std::max(first, columns); i < first + columns; ++i) over[static_cast<std::size_t>(i)] = 30;
+      EXPECT_FALSE(dc_shift({over, 0.25F, columns, 0})) << "over a picture, from block " << first;
+    }
 }
 
 TEST(DcShift, EndsAtARestart) {

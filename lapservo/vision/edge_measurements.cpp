@@ -55,10 +55,9 @@ struct Frame {
     return unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * line.outwards +
            along_m * axes.col(2);
   }
-  // By what fraction of its projected width the film's edge at boundary k, `along_m` from the frame's origin, moves
-  // that boundary: by all of it where it is as bright as the outside beside it, by nothing where it is as dark as the
-  // bare shaft behind it; 0 when it is not seen.
-  double film_shift(std::size_t k, const Generatrix& line, double along_m) const {
+  // How brightly the film's edge at boundary k, `along_m` from the frame's origin, shows, relative to the outside
+  // beside it; 0 when it is not seen.
+  double film_light(std::size_t k, const Generatrix& line, double along_m) const {
     if (k == 1 || k == 2) return 0;
     Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
     to_camera.z() -= along_m;
@@ -68,9 +67,8 @@ struct Frame {
     const auto lit = [](double cosine) {
       return edge_limits.film_ambient_fraction + (1 - edge_limits.film_ambient_fraction) * std::max(0.0, cosine);
     };
-    const double light = std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
-                                  edge_limits.film_most_lit);
-    return light + (light - 1) * edge_limits.bare_shaft_light;
+    return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
+                    edge_limits.film_most_lit);
   }
   double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
 
@@ -119,8 +117,8 @@ bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_p
 std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
                                             const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
                                             double blur_px) {
-  const double film_shift = frame.film_shift(k, generatrix, along_m[k]);
-  const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - film_shift * frame.film_m * generatrix.outwards;
+  const double film_light = frame.film_light(k, generatrix, along_m[k]);
+  const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - film_light * frame.film_m * generatrix.outwards;
   if (!(point.z() > 1e-3)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
@@ -146,7 +144,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.line = *line;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
-                                 -film_shift * film_sigma_m * pull.dot(generatrix.outwards));
+                                 -film_light * film_sigma_m * pull.dot(generatrix.outwards));
   place.measurement.group = k;
   place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));

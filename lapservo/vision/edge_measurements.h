@@ -20,8 +20,8 @@ struct EdgeBlur {
 /// Thickness of the film that carries the marker and stands out from the shaft, before a fit: mean and standard
 /// deviation. Where an end is seen from beyond, the cut edge of the film is seen too, and the boundary that is measured
 /// lies below the film's outside, nearer to the axis: by the thickness where the edge is as bright as the outside, by
-/// less or more as it is darker or brighter (lit diffusely from the camera, with little even light), by nothing where
-/// it is as dark as the bare shaft. The rig does not say how thick the film is, so each fit estimates it.
+/// less or more as it is darker or brighter (lit diffusely from the camera, with some ambient light). The rig does not
+/// say how thick the film is, so each fit estimates it.
 inline constexpr double film_mean_m = 0.07e-3, film_sigma_m = 0.04e-3;
 
 /// How far one point of an edge in the image lies from where a pose has it.

@@ -82,27 +82,6 @@ TEST(FineFit, ErrorsAreAsPredictedWithoutTheRcm) {
   expect_honest(false);
 }
 
-// Where an end is seen from beyond, the film's cut edge moves it, by a tenth of the film's thickness and less.
-// Twice this tolerance moved psi by 0.6 mrad, in all frames alike. Rendered films are 0.1 mm thick.
-TEST(FineFit, AnEndSeenFromBeyondLiesWhereTheFilmHasIt) {
-  constexpr double film_m = 0.1e-3, tolerance_m = 3e-6;
-  double sum_m = 0;
-  int seen = 0;
-  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
-    const Shot& shot = usual_shot(seed);
-    const auto edges = measure_edges(shot.sight.scene(), shot.sight.light(), shot.truth(true), film_m, {5, 6, 1}, {});
-    for (const Measurement& m : edges.all) {
-      const bool shows_film = m.row[m.row.size() - 1] != 0;
-      if (!shows_film) continue;
-      // Towards the middle of the print.
-      sum_m += (m.group == 0 ? 1 : -1) * m.residual_px / m.along_px_per_m;
-      ++seen;
-    }
-  }
-  ASSERT_GT(seen, 200);
-  EXPECT_NEAR(sum_m / seen, 0, tolerance_m);
-}
-
 // Whichever side it comes from: Gauss-Newton with right derivatives ends at the same place.
 TEST(FineFit, ForgetsItsStart) {
   for (std::uint64_t seed = 1; seed <= 6; ++seed)
