@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include "lapservo/core/error.h"
 #include "lapservo/core/input_file.h"
 
 namespace lapservo::internal {
@@ -73,7 +74,12 @@ YAML::Node list_of(const Numbers& numbers, Text text) {
 
 RigText RigText::read(const fs::path& path) {
   constexpr std::size_t max_bytes = std::size_t{16} << 20;
-  return {read_input(path, max_bytes, "a rig"), path};
+  return {read_input(path, max_bytes, "a YAML file"), path};
+}
+
+Rig RigText::rig() const {
+  if (yaml.empty()) throw InputError(path.string(), "is empty, expected a YAML file");
+  return parse_rig(yaml, path.string(), path.parent_path());
 }
 
 std::string moved_rig_yaml(const RigText& rig, const fs::path& destination) {

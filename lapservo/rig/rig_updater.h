@@ -18,6 +18,9 @@ struct RigText {
 
   /// Throws InputError as load_rig() does for what is no file.
   static RigText read(const std::filesystem::path& path);
+
+  /// What load_rig() makes of the file, of this text: a pipe can be read only once. Throws InputError as it does.
+  Rig rig() const;
 };
 
 /// The rig as YAML with another marker for one instrument, for a file at `destination`: every other entry stays as it

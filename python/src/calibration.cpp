@@ -41,7 +41,8 @@ GivenRig rig_of(const py::object& given) {
     return {{rig_yaml(rig), {}}, rig};
   }
   const auto path = given.cast<fs::path>();
-  return {RigText::read(path), load_rig(path)};
+  const RigText text = RigText::read(path);
+  return {text, text.rig()};
 }
 
 std::size_t index_of(const GivenRig& given, const std::optional<std::string>& name) {
