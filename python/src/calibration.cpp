@@ -104,7 +104,7 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
   std::string name;
   for (const py::handle each : pictures) {
     constexpr double fps = 30;
-    const GivenFrames frames(py::reinterpret_borrow<py::object>(each), fps);
+    const GivenFrames frames(py::reinterpret_borrow<py::object>(each), fps, false);
     name = name.empty() || name == frames.name ? frames.name : name + " and others";
     const py::gil_scoped_release others_run;
     recordings.look_at(*frames.source, frames.name, watch);

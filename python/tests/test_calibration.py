@@ -120,6 +120,22 @@ def test_what_does_not_tell_is_refused(recordings, rig):
     assert "item" == refused(lapservo.calibrate_registration, [None], rig).field
 
 
+@pytest.mark.parametrize("times", [(0.0, float("nan")), (0.0, float("inf")), (0.0, 0.0), (1.0, 0.5)])
+def test_times_that_are_none_or_do_not_rise_are_refused(rig, times):
+    grey = np.full((rig.camera.height_px, rig.camera.width_px, 3), 90, np.uint8)
+    frames = [(-1.0, grey)] + [(time, grey) for time in times]
+    for calibrate in (lapservo.calibrate_colour, lapservo.calibrate_marker, lapservo.calibrate_registration):
+        error = refused(calibrate, frames, rig)
+        assert (error.source, error.field, error.value) == ("frames", "item 2", f"at {times[1]:g} s")
+        assert error.expectation.startswith("a time after the ")
+    assert refused(lapservo.calibrate_marker, [(float("nan"), grey)], rig).field == "item 0"
+
+
+def test_pictures_of_a_board_have_no_order():
+    grey = np.full((90, 160, 3), 90, np.uint8)
+    assert "none of 2 pictures" in refused(lapservo.calibrate_camera, [(1.0, grey), (0.5, grey)], "9x6", 0.005).problem
+
+
 def test_what_frames_raise_leaves_the_calibration(rig):
     def broken():
         yield np.full((rig.camera.height_px, rig.camera.width_px, 3), 90, np.uint8)
