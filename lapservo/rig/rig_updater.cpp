@@ -1,5 +1,6 @@
 #include "lapservo/rig/rig_updater.h"
 
+#include <limits>
 #include <system_error>
 
 #include <fmt/format.h>
@@ -147,7 +148,13 @@ std::string updated_rig_yaml(const RigText& rig, const fs::path& destination, st
 }
 
 bool is_response_measured(const RigText& rig) {
-  return camera_of(YAML::Load(rig.yaml), rig.path)["sigma_response"].IsDefined();
+  return sigma_of_response(rig).has_value();
+}
+
+std::optional<double> sigma_of_response(const RigText& rig) {
+  const YAML::Node sigma = camera_of(YAML::Load(rig.yaml), rig.path)["sigma_response"];
+  if (!sigma.IsDefined()) return std::nullopt;
+  return sigma.as<double>(std::numeric_limits<double>::quiet_NaN());
 }
 
 std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas) {

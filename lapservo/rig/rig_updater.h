@@ -64,6 +64,9 @@ std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const Cam
 /// read without complaint.
 bool is_response_measured(const RigText& rig);
 
+/// That sigma_response; NaN where it is no number.
+std::optional<double> sigma_of_response(const RigText& rig);
+
 /// What one of these made for a file at `rig.path`, for one at `destination`: a camera file is found from there.
 std::string moved_rig_yaml(const RigText& rig, const std::filesystem::path& destination);
 

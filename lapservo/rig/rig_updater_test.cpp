@@ -157,6 +157,7 @@ TEST(UpdatedRig, HoldsAnotherCamera) {
   EXPECT_FALSE(is_response_measured(RigText::read(path)));
   testing::write_file(path, text);
   EXPECT_TRUE(is_response_measured(RigText::read(path)));
+  EXPECT_EQ(sigma_of_response(RigText::read(path)), 0.003);
   const Rig updated = load_rig(path);
   EXPECT_TRUE(updated.camera_file.empty());
   EXPECT_EQ(updated.camera.fx_px, measured.fx_px);

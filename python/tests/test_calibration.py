@@ -64,6 +64,28 @@ def test_colours_are_the_command_lines(recordings, swing):
     assert np.allclose(result.hues_deg, hues, atol=4) and result.found >= result.found_before
 
 
+def test_a_measured_response_stays_that_of_a_rig(recordings, swing):
+    images, _ = swing
+    camera, instruments = recordings.rig.camera, recordings.rig.instruments
+    assert camera.sigma_response is None and "sigma_response" not in recordings.rig.to_yaml()
+    measured = lapservo.Camera(camera.width_px, camera.height_px, camera.matrix, response=1.7, sigma_response=0.003)
+    path = recordings.folder / "measured.yaml"
+    lapservo.Rig(measured, instruments).save(path)
+    commanded = recordings.commanded("colour", "swing", "--fps", str(FPS), "--rig", path.name)
+    loaded = lapservo.Rig.load(path)
+    for rig in (loaded, lapservo.Rig(loaded.camera, loaded.instruments), pickle.loads(pickle.dumps(loaded)),
+                lapservo.Rig(pickle.loads(pickle.dumps(loaded.camera)), instruments), lapservo.Rig.parse(loaded.to_yaml())):
+        assert rig.camera.sigma_response == 0.003 and rig.to_yaml() == path.read_text()
+    kept = lapservo.calibrate_colour(images, loaded, fps=FPS)
+    assert kept.rig.camera.response == 1.7 and kept.rig.camera.sigma_response == 0.003
+    assert kept.rig.to_yaml() == lapservo.Rig.parse(commanded.decode()).to_yaml()
+    again = lapservo.calibrate_colour(images, kept.rig, fps=FPS)
+    assert again.rig.camera.response == 1.7
+    replaced = lapservo.calibrate_colour(images, loaded, fps=FPS, replace_response=True)
+    assert replaced.rig.camera.response == "srgb" and replaced.rig.camera.sigma_response is None
+    assert refused(lapservo.Camera, 4, 4, np.eye(3), sigma_response=-1).field == "sigma_response"
+
+
 def test_a_print_is_the_command_lines(recordings):
     images, joints = recordings.record("turn", turning, 48)
     path = recordings.folder / "rig.yaml"
