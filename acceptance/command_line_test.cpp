@@ -12,6 +12,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <utility>
@@ -605,6 +606,13 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
             0)
       << errors();
   EXPECT_NE(output().find("is a convention"), std::string::npos);
+  // A rig from a pipe, which can be read only once, gives the same.
+  ASSERT_EQ(::mkfifo(in("pipe").c_str(), 0600), 0);
+  ASSERT_EQ(std::system(("cat " + unregistered + " >" + in("pipe") + " &").c_str()), 0);
+  ASSERT_EQ(run("calibrate registration " + out("free.csv") + " --rig " + in("pipe") + " --out " + out("piped.yaml")),
+            0)
+      << errors();
+  EXPECT_EQ(read(out("piped.yaml")), read(out("rcm.yaml")));
   ASSERT_EQ(run("track " + in("swing") + " --rig " + out("rig.yaml") + " --out " + out("bound.csv")), 0) << errors();
   EXPECT_EQ(
       run("calibrate registration " + out("bound.csv") + " --rig " + out("rig.yaml") + " --out " + out("no.yaml")), 1);

@@ -104,26 +104,28 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
                 response.sharpening, response.sharpening_px);
 }
 
-void write_results(const CameraOptions& options, const CameraCalibration& calibration) {
+void write_results(const CameraOptions& options, const std::optional<RigText>& rig,
+                   const CameraCalibration& calibration) {
   const std::string fields = measured_camera_yaml(calibration.camera, calibration.sigmas);
   if (!options.camera_info.empty()) {
     write_file(options.camera_info, fields);
     std::printf("camera: %s\n", options.camera_info.c_str());
   }
-  if (options.rig.empty()) {
+  if (!rig) {
     if (options.out.empty()) return;
     write_file(options.out, fields);
     std::printf("camera: %s\n", options.out.c_str());
     return;
   }
-  write_file(options.rig_out(), updated_rig_yaml(RigText::read(options.rig), calibration.camera, calibration.sigmas));
+  write_file(options.rig_out(), updated_rig_yaml(*rig, calibration.camera, calibration.sigmas));
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 
 int run_camera(const CameraOptions& options) {
   const Board board = board_of(options);
-  std::optional<Rig> rig;
-  if (!options.rig.empty()) rig = load_rig(options.rig);
+  std::optional<RigText> text;
+  if (!options.rig.empty()) text = RigText::read(options.rig);
+  const std::optional<Rig> rig = text ? std::optional(text->rig()) : std::nullopt;
   check_files(options, rig);
   watch_for_interrupts();
 
@@ -144,7 +146,7 @@ int run_camera(const CameraOptions& options) {
     write_camera_report(options.report, before, views, calibration);
     std::printf("report: %s\n", options.report.c_str());
   }
-  write_results(options, calibration);
+  write_results(options, text, calibration);
   if (rig && std::any_of(rig->instruments.begin(), rig->instruments.end(),
                          [](const Instrument& instrument) { return instrument.camera_from_rcm.has_value(); }))
     std::printf("camera_from_rcm is as it was: where it was measured with another camera, measure it again\n");

@@ -81,7 +81,8 @@ void show(LiveView& view, const std::vector<cv::Mat>& kept, const Rig& before, c
 }
 
 int run_colour(const ColourOptions& options) {
-  const Rig rig = load_rig(options.rig);
+  const RigText text = RigText::read(options.rig);
+  const Rig rig = text.rig();
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
@@ -92,7 +93,7 @@ int run_colour(const ColourOptions& options) {
   watch_for_interrupts();
 
   const bool live = source->kind() == FrameSource::Kind::live;
-  const bool keep_response = !options.replace_response && is_response_measured(RigText::read(options.rig));
+  const bool keep_response = !options.replace_response && is_response_measured(text);
   const ColourMeasurement measured = measure_colour(rig, index, {*source, options.input, options.deinterlace},
                                                     keep_response, watched_job(), [&](const cv::Mat& bgr) {
                                                       if (view && live) view->show(segmentation_picture(bgr, rig));
@@ -108,8 +109,7 @@ int run_colour(const ColourOptions& options) {
     std::printf("report: %s\n", options.report.c_str());
   }
   out.stream() << updated_rig_yaml(
-      RigText::read(options.rig), options.out, index,
-      MeasuredColour{calibration.hues_deg, calibration.sigma_hues_deg, calibration.response});
+      text, options.out, index, MeasuredColour{calibration.hues_deg, calibration.sigma_hues_deg, calibration.response});
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
   return 0;

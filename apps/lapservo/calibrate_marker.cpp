@@ -37,7 +37,8 @@ void print_table(const std::vector<CalibratedNumber>& numbers) {
 }
 
 int run_marker(const CalibrateOptions& options) {
-  const Rig rig = load_rig(options.rig);
+  const RigText text = RigText::read(options.rig);
+  const Rig rig = text.rig();
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
@@ -66,7 +67,7 @@ int run_marker(const CalibrateOptions& options) {
     write_marker_report(options.report, instrument, calibration);
     std::printf("report: %s\n", options.report.c_str());
   }
-  out.stream() << updated_rig_yaml(RigText::read(options.rig), options.out, index, calibration.marker);
+  out.stream() << updated_rig_yaml(text, options.out, index, calibration.marker);
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
   return 0;

@@ -55,7 +55,8 @@ void print_residuals(const Registration& registration) {
 }
 
 int run_registration(const CalibrateOptions& options) {
-  const Rig rig = load_rig(options.rig);
+  const RigText text = RigText::read(options.rig);
+  const Rig rig = text.rig();
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
@@ -81,7 +82,7 @@ int run_registration(const CalibrateOptions& options) {
     write_registration_report(options.report, instrument, registration);
     std::printf("report: %s\n", options.report.c_str());
   }
-  out.stream() << updated_rig_yaml(RigText::read(options.rig), options.out, index, measured(registration));
+  out.stream() << updated_rig_yaml(text, options.out, index, measured(registration));
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
   return 0;

@@ -1,10 +1,12 @@
 #include "lapservo/rig/rig_updater.h"
 
+#include <limits>
 #include <system_error>
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
 
+#include "lapservo/core/error.h"
 #include "lapservo/core/input_file.h"
 
 namespace lapservo::internal {
@@ -73,7 +75,12 @@ YAML::Node list_of(const Numbers& numbers, Text text) {
 
 RigText RigText::read(const fs::path& path) {
   constexpr std::size_t max_bytes = std::size_t{16} << 20;
-  return {read_input(path, max_bytes, "a rig"), path};
+  return {read_input(path, max_bytes, "a YAML file"), path};
+}
+
+Rig RigText::rig() const {
+  if (yaml.empty()) throw InputError(path.string(), "is empty, expected a YAML file");
+  return parse_rig(yaml, path.string(), path.parent_path());
 }
 
 std::string moved_rig_yaml(const RigText& rig, const fs::path& destination) {
@@ -141,7 +148,13 @@ std::string updated_rig_yaml(const RigText& rig, const fs::path& destination, st
 }
 
 bool is_response_measured(const RigText& rig) {
-  return camera_of(YAML::Load(rig.yaml), rig.path)["sigma_response"].IsDefined();
+  return sigma_of_response(rig).has_value();
+}
+
+std::optional<double> sigma_of_response(const RigText& rig) {
+  const YAML::Node sigma = camera_of(YAML::Load(rig.yaml), rig.path)["sigma_response"];
+  if (!sigma.IsDefined()) return std::nullopt;
+  return sigma.as<double>(std::numeric_limits<double>::quiet_NaN());
 }
 
 std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas) {

@@ -18,6 +18,9 @@ struct RigText {
 
   /// Throws InputError as load_rig() does for what is no file.
   static RigText read(const std::filesystem::path& path);
+
+  /// What load_rig() makes of the file, of this text: a pipe can be read only once. Throws InputError as it does.
+  Rig rig() const;
 };
 
 /// The rig as YAML with another marker for one instrument, for a file at `destination`: every other entry stays as it
@@ -60,6 +63,9 @@ std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const Cam
 /// Whether a rig's camera has a response that was measured: sigma_response stands beside it. The rig must have been
 /// read without complaint.
 bool is_response_measured(const RigText& rig);
+
+/// That sigma_response; NaN where it is no number.
+std::optional<double> sigma_of_response(const RigText& rig);
 
 /// What one of these made for a file at `rig.path`, for one at `destination`: a camera file is found from there.
 std::string moved_rig_yaml(const RigText& rig, const std::filesystem::path& destination);

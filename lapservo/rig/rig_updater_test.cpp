@@ -148,14 +148,16 @@ TEST(UpdatedRig, HoldsAnotherCamera) {
   measured.fx_px = 501.25, measured.chromatic_aberration = {1.0004, 0.9997};
   measured.response = {Response::Kind::table, 1, {0, 0.2, 1}, {0, 0.5, 1}};
   CameraSigmas sigmas;
-  sigmas.fx_px = 0.125, sigmas.red = 1e-5, sigmas.response = 0.003;
+  sigmas.fx_px = 0.12504, sigmas.red = 1.00004e-5, sigmas.response = 0.00300004;
   const std::string text = updated_rig_yaml(RigText::read(path), measured, sigmas);
-  EXPECT_NE(text.find("sigma_response: 0.003"), std::string::npos) << text;
+  EXPECT_NE(text.find("sigma_response: 0.003\n"), std::string::npos) << text;
   EXPECT_NE(text.find("sigma_camera_matrix: {rows: 3, cols: 3, data: [0.125,"), std::string::npos) << text;
+  EXPECT_NE(text.find("sigma_lateral_chromatic_aberration: {blue: 0, red: 1e-05}"), std::string::npos) << text;
   EXPECT_NE(text.find("sigma_translation_m: [0.0001, 0.0001, 0.0002]"), std::string::npos) << text;
   EXPECT_FALSE(is_response_measured(RigText::read(path)));
   testing::write_file(path, text);
   EXPECT_TRUE(is_response_measured(RigText::read(path)));
+  EXPECT_EQ(sigma_of_response(RigText::read(path)), 0.003);
   const Rig updated = load_rig(path);
   EXPECT_TRUE(updated.camera_file.empty());
   EXPECT_EQ(updated.camera.fx_px, measured.fx_px);

@@ -18,6 +18,18 @@ std::string list_of(const Numbers& numbers) {
   return fmt::format("[{}]", fmt::join(numbers, ", "));
 }
 
+// Of standard deviations: three digits, the last ones of an estimate differ from run to run.
+std::string rounded(double sigma) {
+  return fmt::format("{:.3g}", sigma);
+}
+
+template <typename Numbers>
+std::string rounded_list_of(const Numbers& sigmas) {
+  std::string text;
+  for (const double sigma : sigmas) text += (text.empty() ? "" : ", ") + rounded(sigma);
+  return "[" + text + "]";
+}
+
 std::string quoted(const std::string& text) {
   std::string quoted = "\"";
   for (const char c : text) {
@@ -82,18 +94,20 @@ std::string response_yaml(const Response& response) {
 std::string measured_camera_yaml(const Camera& camera, const CameraSigmas& sigmas) {
   const std::array matrix{camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0};
   const std::array sigma{sigmas.fx_px, 0.0, sigmas.cx_px, 0.0, sigmas.fy_px, sigmas.cy_px, 0.0, 0.0, 0.0};
-  const auto matrix_of = [](int rows, int columns, const auto& data) {
-    return fmt::format("{{rows: {}, cols: {}, data: {}}}\n", rows, columns, list_of(data));
+  const auto matrix_of = [](int rows, int columns, const std::string& data) {
+    return fmt::format("{{rows: {}, cols: {}, data: {}}}\n", rows, columns, data);
   };
   std::string text = fmt::format("image_width: {}\nimage_height: {}\ndistortion_model: plumb_bob\n", camera.width_px,
                                  camera.height_px);
-  text += "camera_matrix: " + matrix_of(3, 3, matrix) + "sigma_camera_matrix: " + matrix_of(3, 3, sigma);
-  text += "distortion_coefficients: " + matrix_of(1, 5, camera.distortion) +
-          "sigma_distortion_coefficients: " + matrix_of(1, 5, sigmas.distortion);
-  text += fmt::format("response: {}\nsigma_response: {}\n", response_yaml(camera.response), sigmas.response);
+  text += "camera_matrix: " + matrix_of(3, 3, list_of(matrix)) +
+          "sigma_camera_matrix: " + matrix_of(3, 3, rounded_list_of(sigma));
+  text += "distortion_coefficients: " + matrix_of(1, 5, list_of(camera.distortion)) +
+          "sigma_distortion_coefficients: " + matrix_of(1, 5, rounded_list_of(sigmas.distortion));
+  text += fmt::format("response: {}\nsigma_response: {}\n", response_yaml(camera.response), rounded(sigmas.response));
   const ChromaticAberration& aberration = camera.chromatic_aberration;
   text += fmt::format("lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", aberration.blue, aberration.red);
-  text += fmt::format("sigma_lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", sigmas.blue, sigmas.red);
+  text += fmt::format("sigma_lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", rounded(sigmas.blue),
+                      rounded(sigmas.red));
   if (camera.deinterlace) text += "deinterlace: true\n";
   return text;
 }

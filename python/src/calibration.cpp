@@ -19,6 +19,7 @@
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
 #include "python/src/python_frames.h"
+#include "python/src/python_rig.h"
 
 // What python/lapservo/_calibration.py makes its results of.
 namespace lapservo::python {
@@ -36,12 +37,13 @@ struct GivenRig {
 };
 
 GivenRig rig_of(const py::object& given) {
-  if (py::isinstance<Rig>(given)) {
-    const Rig rig = given.cast<Rig>();
-    return {{rig_yaml(rig), {}}, rig};
+  if (py::isinstance<PythonRig>(given)) {
+    const PythonRig rig = given.cast<PythonRig>();
+    return {{rig.yaml(), {}}, rig};
   }
   const auto path = given.cast<fs::path>();
-  return {RigText::read(path), load_rig(path)};
+  const RigText text = RigText::read(path);
+  return {text, text.rig()};
 }
 
 std::size_t index_of(const GivenRig& given, const std::optional<std::string>& name) {
@@ -82,7 +84,7 @@ py::dict result_of(const std::string& yaml, const GivenRig* given, const std::ve
   for (const CalibratedNumber& n : numbers) rows.append(py::make_tuple(n.name, n.before, n.after, n.sigma));
   py::dict result("yaml"_a = yaml, "origin"_a = given ? given->text.path.string() : "", "numbers"_a = rows,
                   "complaint"_a = complaint, "rig"_a = py::none());
-  if (given) result["rig"] = py::cast(parse_rig(yaml, given->name(), given->text.path.parent_path()));
+  if (given) result["rig"] = py::cast(PythonRig::parse(yaml, given->name(), given->text.path.parent_path()));
   return result;
 }
 
@@ -103,7 +105,7 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
   std::string name;
   for (const py::handle each : pictures) {
     constexpr double fps = 30;
-    const GivenFrames frames(py::reinterpret_borrow<py::object>(each), fps);
+    const GivenFrames frames(py::reinterpret_borrow<py::object>(each), fps, false);
     name = name.empty() || name == frames.name ? frames.name : name + " and others";
     const py::gil_scoped_release others_run;
     recordings.look_at(*frames.source, frames.name, watch);
@@ -123,7 +125,7 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
   py::list views;
   for (std::size_t i = 0; i < measured.views.size(); ++i)
     views.append(py::make_tuple(measured.views[i].name, measured.views[i].corners.size(), calibration.view_rms_px[i]));
-  result["camera"] = py::cast(calibration.camera);
+  result["camera"] = py::cast(PythonCamera{calibration.camera, calibration.sigmas.response});
   result["rms_px"] = calibration.rms_px;
   result["views"] = views;
   result["without_board"] = without_board;

@@ -1,6 +1,9 @@
 #include "python/src/python_frames.h"
 
+#include <cmath>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "lapservo/core/error.h"
 
@@ -12,7 +15,8 @@ constexpr const char* named = "frames";
 // One after another, copied: they are kept longer than Python may.
 class IteratedFrames : public FrameSource {
  public:
-  IteratedFrames(const py::object& given, double fps) : iterator_(py::iter(given)), fps_(fps) {
+  IteratedFrames(const py::object& given, double fps, bool of_one_recording)
+      : iterator_(py::iter(given)), fps_(fps), of_one_recording_(of_one_recording) {
     if (py::hasattr(given, "__len__")) count_ = static_cast<int>(py::len(given));
   }
 
@@ -22,6 +26,7 @@ class IteratedFrames : public FrameSource {
     if (!item && PyErr_Occurred()) throw py::error_already_set();
     if (!item) return std::nullopt;
     Frame frame = frame_of(item);
+    check_time(frame.time_s);
     frame.index = index_++;
     return frame;
   }
@@ -30,6 +35,15 @@ class IteratedFrames : public FrameSource {
   double frames_per_second() const override { return fps_; }
 
  private:
+  void check_time(double time_s) {
+    const bool rises = !of_one_recording_ || !last_s_ || time_s > *last_s_;
+    if (!std::isfinite(time_s) || !rises)
+      throw InputError(named, fmt::format("item {}", index_), fmt::format("at {} s", time_s),
+                       last_s_ && of_one_recording_
+                           ? fmt::format("a time after the {} s of the one before it", *last_s_)
+                           : "a finite time");
+    last_s_ = time_s;
+  }
   Frame frame_of(const py::object& item) const {
     if (py::isinstance<Frame>(item)) return item.cast<Frame>();
     Frame frame;
@@ -50,7 +64,9 @@ class IteratedFrames : public FrameSource {
 
   py::iterator iterator_;
   double fps_;
+  bool of_one_recording_;
   std::optional<int> count_;
+  std::optional<double> last_s_;
   int index_ = 0;
 };
 
@@ -60,14 +76,14 @@ bool is_path(const py::object& given) {
 
 }  // namespace
 
-GivenFrames::GivenFrames(const py::object& given, double fps) : kept(given), name(named) {
+GivenFrames::GivenFrames(const py::object& given, double fps, bool of_one_recording) : kept(given), name(named) {
   if (!(fps >= 0.001 && fps <= 1000))
     throw InputError("fps", "number", std::string(py::str(py::float_(fps))), "0.001 to 1000 frames per second");
   if (is_path(given)) {
     name = given.cast<std::filesystem::path>().string();
     owned = open_frame_source(name, fps);
   } else if (!py::isinstance<FrameSource>(given)) {
-    owned = std::make_unique<IteratedFrames>(given, fps);
+    owned = std::make_unique<IteratedFrames>(given, fps, of_one_recording);
   }
   source = owned ? owned.get() : given.cast<FrameSource*>();
 }

@@ -13,7 +13,8 @@ namespace lapservo::python {
 /// used without.
 struct GivenFrames {
   /// `fps` gives times to the pictures of a folder and to those without. Throws InputError as open_frame_source().
-  GivenFrames(const py::object& given, double fps);
+  /// What is iterated over is refused, as it comes, where a time is not finite or, `of_one_recording`, does not rise.
+  GivenFrames(const py::object& given, double fps, bool of_one_recording = true);
 
   py::object kept;  ///< what `source` is of
   std::unique_ptr<FrameSource> owned;

@@ -1,22 +1,21 @@
-#include "lapservo/rig/rig.h"
-
+#include <cmath>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
+#include "lapservo/rig/rig_updater.h"
 #include "lapservo/rig/rig_writer.h"
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
+#include "python/src/python_rig.h"
 
 namespace lapservo::python {
 namespace {
-
-// What can't be said by a type is checked where files are checked.
-Rig checked(const Rig& rig) {
-  return parse_rig(internal::rig_yaml(rig), "Rig");
-}
 
 // "srgb", "rec709", "linear", a power, or a table of light and value.
 Response response_of(const py::object& given) {
@@ -51,10 +50,14 @@ py::object response_to_python(const Response& response) {
   return py::make_tuple(response.table_light, response.table_value);
 }
 
-Camera make_camera(int width_px, int height_px, const Eigen::Matrix3d& matrix, const std::array<double, 5>& distortion,
-                   const py::object& response, const std::pair<double, double>& chromatic_aberration,
-                   bool deinterlace) {
-  Camera camera;
+PythonCamera make_camera(int width_px, int height_px, const Eigen::Matrix3d& matrix,
+                         const std::array<double, 5>& distortion, const py::object& response,
+                         const std::pair<double, double>& chromatic_aberration, bool deinterlace,
+                         std::optional<double> sigma_response) {
+  PythonCamera camera;
+  if (sigma_response && *sigma_response < 0)
+    throw InputError("Camera", "sigma_response", fmt::format("{}", *sigma_response), "a standard deviation or None");
+  camera.sigma_response = sigma_response;
   camera.width_px = width_px;
   camera.height_px = height_px;
   if (matrix(0, 1) != 0 || matrix.row(1)(0) != 0 || matrix.row(2) != Eigen::RowVector3d(0, 0, 1))
@@ -68,7 +71,7 @@ Camera make_camera(int width_px, int height_px, const Eigen::Matrix3d& matrix, c
   return camera;
 }
 
-Eigen::Matrix3d matrix_of_camera(const Camera& camera) {
+Eigen::Matrix3d matrix_of_camera(const PythonCamera& camera) {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   matrix(0, 0) = camera.fx_px, matrix(1, 1) = camera.fy_px;
   matrix(0, 2) = camera.cx_px, matrix(1, 2) = camera.cy_px;
@@ -76,45 +79,52 @@ Eigen::Matrix3d matrix_of_camera(const Camera& camera) {
 }
 
 void bind_camera(py::module_& m) {
-  py::class_<Camera>(m, "Camera", R"(A pinhole camera with plumb_bob distortion, as in a ROS camera_info.
+  py::class_<PythonCamera>(m, "Camera", R"(A pinhole camera with plumb_bob distortion, as in a ROS camera_info.
 
 Pixel centres lie at integer coordinates. Raw pixels are those of the image; ideal pixels are undistorted with the same
 matrix.)")
       .def(py::init(&make_camera), py::arg("width_px"), py::arg("height_px"), py::arg("matrix"), py::kw_only(),
            py::arg("distortion") = std::array<double, 5>{}, py::arg("response") = py::str("srgb"),
            py::arg("chromatic_aberration") = std::pair(1.0, 1.0), py::arg("deinterlace") = false,
+           py::arg("sigma_response") = py::none(),
            "matrix: float[3, 3] in px; distortion: k1 k2 p1 p2 k3; response: 'srgb', 'rec709', 'linear', a power, or "
-           "(light, value); chromatic_aberration: magnification of blue and of red beside green's.")
+           "(light, value); chromatic_aberration: magnification of blue and of red beside green's; "
+           "sigma_response: of a response that was measured.")
       .def_readonly("width_px", &Camera::width_px)
       .def_readonly("height_px", &Camera::height_px)
       .def_property_readonly("matrix", &matrix_of_camera, "float[3, 3], px")
       .def_readonly("distortion", &Camera::distortion, "k1 k2 p1 p2 k3")
-      .def_property_readonly("response", [](const Camera& camera) { return response_to_python(camera.response); })
+      .def_property_readonly("response", [](const PythonCamera& camera) { return response_to_python(camera.response); })
       .def_property_readonly("chromatic_aberration",
-                             [](const Camera& camera) {
+                             [](const PythonCamera& camera) {
                                return std::pair(camera.chromatic_aberration.blue, camera.chromatic_aberration.red);
                              })
       .def_readonly("deinterlace", &Camera::deinterlace)
+      .def_readonly(
+          "sigma_response", &PythonCamera::sigma_response,
+          "one standard deviation of the response that was measured, of the full value; None where it was not")
       .def(
           "ideal_from_raw",
-          [](const Camera& camera, const Eigen::Vector2d& raw_px) { return camera.ideal_from_raw(raw_px); },
+          [](const PythonCamera& camera, const Eigen::Vector2d& raw_px) { return camera.ideal_from_raw(raw_px); },
           py::arg("raw_px"), "float[2]; None where the distortion can't be inverted.")
       .def(
           "raw_from_ideal",
-          [](const Camera& camera, const Eigen::Vector2d& ideal_px) { return camera.raw_from_ideal(ideal_px); },
+          [](const PythonCamera& camera, const Eigen::Vector2d& ideal_px) { return camera.raw_from_ideal(ideal_px); },
           py::arg("ideal_px"), "float[2] to float[2]")
       .def(py::pickle(
-          [](const Camera& camera) {
+          [](const PythonCamera& camera) {
             const auto& [blue, red] = camera.chromatic_aberration;
             return py::make_tuple(camera.width_px, camera.height_px, matrix_of_camera(camera), camera.distortion,
-                                  response_to_python(camera.response), py::make_tuple(blue, red), camera.deinterlace);
+                                  response_to_python(camera.response), py::make_tuple(blue, red), camera.deinterlace,
+                                  camera.sigma_response);
           },
           [](const py::tuple& state) {
             return make_camera(state[0].cast<int>(), state[1].cast<int>(), state[2].cast<Eigen::Matrix3d>(),
                                state[3].cast<std::array<double, 5>>(), state[4],
-                               state[5].cast<std::pair<double, double>>(), state[6].cast<bool>());
+                               state[5].cast<std::pair<double, double>>(), state[6].cast<bool>(),
+                               state.size() > 7 ? state[7].cast<std::optional<double>>() : std::nullopt);
           }))
-      .def("__repr__", [](const Camera& camera) {
+      .def("__repr__", [](const PythonCamera& camera) {
         return "<lapservo.Camera " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) + ">";
       });
 }
@@ -165,6 +175,18 @@ q = sign * joints + offset, rad and m.)")
 
 }  // namespace
 
+std::string PythonRig::yaml() const {
+  std::string text = internal::rig_yaml(*this);
+  if (!sigma_response) return text;
+  const std::size_t end = text.find('\n', text.find("\n  response: ") + 1);
+  const std::string sigma = std::isnan(*sigma_response) ? ".nan" : fmt::format("{}", *sigma_response);
+  return text.insert(end, "\n  sigma_response: " + sigma);
+}
+
+PythonRig PythonRig::parse(const std::string& yaml, const std::string& source, const std::filesystem::path& folder) {
+  return {parse_rig(yaml, source, folder), internal::sigma_of_response({yaml, folder / "rig.yaml"})};
+}
+
 void bind_rig(py::module_& m) {
   bind_camera(m);
   // Used as an argument before its own file's turn.
@@ -173,33 +195,48 @@ void bind_rig(py::module_& m) {
 The bands run from proximal to distal; tau is the azimuth on the marker from its seam, right-handed about the axis
 towards the tip.)");
   bind_instrument(m);
-  py::class_<Rig, std::shared_ptr<Rig>>(m, "Rig", R"(What stands before which camera.
+  // What the other files take, and what they pickle.
+  py::class_<Rig, std::shared_ptr<Rig>>(m, "_Rig").def(
+      py::pickle([](const Rig& rig) { return internal::rig_yaml(rig); },
+                 [](const std::string& yaml) { return parse_rig(yaml, "pickled rig"); }));
+  py::class_<PythonRig, Rig, std::shared_ptr<PythonRig>>(m, "Rig", R"(What stands before which camera.
 
 `Rig.load("rig.yaml")`, `Rig.parse(text)`, or `Rig(camera, instruments)`. Everything is checked: errors are InputError
 with the field, its value and what was expected.)")
-      .def(py::init([](const Camera& camera, const std::vector<Instrument>& instruments) {
-             return checked(Rig{camera, instruments, {}});
+      .def(py::init([](const PythonCamera& camera, const std::vector<Instrument>& instruments) {
+             // What can't be said by a type is checked where files are checked.
+             return PythonRig::parse(PythonRig{{camera, instruments, {}}, camera.sigma_response}.yaml(), "Rig");
            }),
            py::arg("camera"), py::arg("instruments"))
       .def_static(
-          "load", [](const std::filesystem::path& path) { return load_rig(path); }, py::arg("path"),
-          "Reads a rig's YAML file.")
+          "load",
+          [](const std::filesystem::path& path) {
+            const internal::RigText text = internal::RigText::read(path);
+            return PythonRig{text.rig(), internal::sigma_of_response(text)};
+          },
+          py::arg("path"), "Reads a rig's YAML file.")
       .def_static(
           "parse",
-          [](const std::string& yaml, const std::filesystem::path& folder) { return parse_rig(yaml, "rig", folder); },
+          [](const std::string& yaml, const std::filesystem::path& folder) {
+            return PythonRig::parse(yaml, "rig", folder);
+          },
           py::arg("yaml"), py::arg("folder") = ".",
           "The same from text; `folder` is where a camera file is looked for.")
-      .def_readonly("camera", &Rig::camera)
+      .def_property_readonly("camera",
+                             [](const PythonRig& rig) {
+                               return PythonCamera{rig.camera, rig.sigma_response};
+                             })
       .def_readonly("instruments", &Rig::instruments)
       .def(
           "save",
-          [](const Rig& rig, const std::filesystem::path& path) {
-            internal::write_file(path, internal::rig_yaml(rig));
-          },
-          py::arg("path"), "Writes to_yaml(), whole or not at all. Sigmas of what a file said are not in it.")
-      .def("to_yaml", &internal::rig_yaml, "Text that Rig.parse reads back to the last bit.")
-      .def(py::pickle([](const Rig& rig) { return internal::rig_yaml(rig); },
-                      [](const std::string& yaml) { return parse_rig(yaml, "pickled rig"); }))
+          [](const PythonRig& rig, const std::filesystem::path& path) { internal::write_file(path, rig.yaml()); },
+          py::arg("path"),
+          "Writes to_yaml(), whole or not at all. Of the sigmas that a file has, the response's and the markers' are "
+          "in "
+          "it.")
+      .def("to_yaml", &PythonRig::yaml, "Text that Rig.parse reads back to the last bit.")
+      .def(py::pickle([](const PythonRig& rig) { return rig.yaml(); },
+                      [](const std::string& yaml) { return PythonRig::parse(yaml, "pickled rig"); }))
       .def("__repr__", [](const Rig& rig) {
         std::string names;
         for (const Instrument& instrument : rig.instruments) names += (names.empty() ? "" : ", ") + instrument.name;

@@ -64,6 +64,28 @@ def test_colours_are_the_command_lines(recordings, swing):
     assert np.allclose(result.hues_deg, hues, atol=4) and result.found >= result.found_before
 
 
+def test_a_measured_response_stays_that_of_a_rig(recordings, swing):
+    images, _ = swing
+    camera, instruments = recordings.rig.camera, recordings.rig.instruments
+    assert camera.sigma_response is None and "sigma_response" not in recordings.rig.to_yaml()
+    measured = lapservo.Camera(camera.width_px, camera.height_px, camera.matrix, response=1.7, sigma_response=0.003)
+    path = recordings.folder / "measured.yaml"
+    lapservo.Rig(measured, instruments).save(path)
+    commanded = recordings.commanded("colour", "swing", "--fps", str(FPS), "--rig", path.name)
+    loaded = lapservo.Rig.load(path)
+    for rig in (loaded, lapservo.Rig(loaded.camera, loaded.instruments), pickle.loads(pickle.dumps(loaded)),
+                lapservo.Rig(pickle.loads(pickle.dumps(loaded.camera)), instruments), lapservo.Rig.parse(loaded.to_yaml())):
+        assert rig.camera.sigma_response == 0.003 and rig.to_yaml() == path.read_text()
+    kept = lapservo.calibrate_colour(images, loaded, fps=FPS)
+    assert kept.rig.camera.response == 1.7 and kept.rig.camera.sigma_response == 0.003
+    assert kept.rig.to_yaml() == lapservo.Rig.parse(commanded.decode()).to_yaml()
+    again = lapservo.calibrate_colour(images, kept.rig, fps=FPS)
+    assert again.rig.camera.response == 1.7
+    replaced = lapservo.calibrate_colour(images, loaded, fps=FPS, replace_response=True)
+    assert replaced.rig.camera.response == "srgb" and replaced.rig.camera.sigma_response is None
+    assert refused(lapservo.Camera, 4, 4, np.eye(3), sigma_response=-1).field == "sigma_response"
+
+
 def test_a_print_is_the_command_lines(recordings):
     images, joints = recordings.record("turn", turning, 48)
     path = recordings.folder / "rig.yaml"
@@ -118,6 +140,22 @@ def test_what_does_not_tell_is_refused(recordings, rig):
     backwards = {"time_s": [1.0, 0.5], "a": [0, 0], "b": [0, 0], "c": [0, 0], "d": [0, 0]}
     assert refused(lapservo.calibrate_registration, [grey], free, joints=backwards).value == "0.5"
     assert "item" == refused(lapservo.calibrate_registration, [None], rig).field
+
+
+@pytest.mark.parametrize("times", [(0.0, float("nan")), (0.0, float("inf")), (0.0, 0.0), (1.0, 0.5)])
+def test_times_that_are_none_or_do_not_rise_are_refused(rig, times):
+    grey = np.full((rig.camera.height_px, rig.camera.width_px, 3), 90, np.uint8)
+    frames = [(-1.0, grey)] + [(time, grey) for time in times]
+    for calibrate in (lapservo.calibrate_colour, lapservo.calibrate_marker, lapservo.calibrate_registration):
+        error = refused(calibrate, frames, rig)
+        assert (error.source, error.field, error.value) == ("frames", "item 2", f"at {times[1]:g} s")
+        assert error.expectation.startswith("a time after the ")
+    assert refused(lapservo.calibrate_marker, [(float("nan"), grey)], rig).field == "item 0"
+
+
+def test_pictures_of_a_board_have_no_order():
+    grey = np.full((90, 160, 3), 90, np.uint8)
+    assert "none of 2 pictures" in refused(lapservo.calibrate_camera, [(1.0, grey), (0.5, grey)], "9x6", 0.005).problem
 
 
 def test_what_frames_raise_leaves_the_calibration(rig):
