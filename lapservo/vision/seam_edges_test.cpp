@@ -1,0 +1,61 @@
+#include "lapservo/vision/seam_edges.h"
+
+#include <cmath>
+#include <cstdint>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/testing/camera_effects.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+// A print with a gap whose middle faces the camera.
+struct GapShot {
+  Rig rig = scenes::usual_rig();
+  JointVector q;
+  cv::Mat bgr;
+
+  explicit GapShot(std::uint64_t seed) {
+    Marker& marker = rig.instruments[0].marker;
+    marker.gap_rad = 1e-3 / marker.radius_m();
+    Random random(seed);
+    q = scenes::random_configuration(rig, 0, random);
+    const auto view = view_cylinder(scenes::pose_of(rig, 0, q).camera_from_unrolled, marker.radius_m());
+    q.psi_rad = view.value().facing_azimuth_rad - marker.seam_rad + marker.gap_rad / 2;
+    bgr = scenes::render(rig, {q}, seed);
+  }
+  std::optional<SeamEdges> seam(const cv::Mat& picture, const std::optional<PictureProcessing>& processing) const {
+    constexpr double blur_px = 0.9, reach_m = 0.4e-3;
+    const scenes::Sight sight(rig, picture);
+    const auto unknowns = PoseUnknowns::free(scenes::pose_of(rig, 0, q));
+    return measure_seam(sight.scene(), sight.light(), unknowns, blur_px, reach_m, true, processing);
+  }
+};
+
+// Sharpening draws the edges of dark gaps towards one another.
+TEST(SeamEdges, LieWhereTheyDoWithoutSharpening) {
+  const effects::CameraEffects effects{.sharpening = 0.8, .sharpening_px = 1.4};
+  PictureProcessing processing;
+  processing.blur_px = 0.9;
+  processing.sharpening = effects.sharpening, processing.sharpening_px = effects.sharpening_px;
+  double moved_rad = 0, left_rad = 0;
+  int seen = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const GapShot shot(seed);
+    const cv::Mat sharpened = effects::seen_through(effects, shot.bgr, shot.rig.camera);
+    const auto plain = shot.seam(shot.bgr, std::nullopt);
+    const auto moved = shot.seam(sharpened, std::nullopt), left = shot.seam(sharpened, processing);
+    if (!plain || !moved || !left) continue;
+    moved_rad += moved->gap_rad - plain->gap_rad, left_rad += left->gap_rad - plain->gap_rad;
+    ++seen;
+  }
+  ASSERT_GE(seen, 5);
+  EXPECT_LT(moved_rad / seen, -1e-3) << "or sharpening moves nothing";
+  EXPECT_LT(std::abs(left_rad), 0.4 * std::abs(moved_rad));
+}
+
+}  // namespace
+}  // namespace lapservo::internal
