@@ -79,11 +79,16 @@ std::optional<float> shift_from(const JpegBlocks& blocks, int first) {
 std::optional<float> dc_shift(const JpegBlocks& blocks) {
   const int count = static_cast<int>(blocks.steps.size());
   const int interval = blocks.restart_interval > 0 ? blocks.restart_interval : count;
+  std::vector<double> sums{0};  // of all steps before each block
+  for (const float step : blocks.steps) sums.push_back(sums.back() + step);
   int tries = max_tries;
   // The first row has no borders above.
   for (int first = blocks.columns; first + blocks.columns + borders_beside <= count && tries > 0; ++first) {
     const int restart = (first / interval + 1) * interval;
-    if (first + blocks.columns > restart || !is_wrapped(blocks, first)) continue;
+    const int end = first + blocks.columns;
+    if (end > restart) continue;
+    const double sum = sums[static_cast<std::size_t>(end)] - sums[static_cast<std::size_t>(first)];
+    if (std::abs(sum) < least_shift / 2 * blocks.columns || !is_wrapped(blocks, first)) continue;
     --tries;
     if (const auto shift = shift_from(blocks, first)) return shift;
   }
