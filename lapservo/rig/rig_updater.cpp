@@ -154,12 +154,15 @@ bool is_response_measured(const RigText& rig) {
 std::optional<double> sigma_of_response(const RigText& rig) {
   const YAML::Node sigma = camera_of(YAML::Load(rig.yaml), rig.path)["sigma_response"];
   if (!sigma.IsDefined()) return std::nullopt;
-  return sigma.as<double>(std::numeric_limits<double>::quiet_NaN());
+  const double value = sigma.as<double>(std::numeric_limits<double>::quiet_NaN());
+  return value == 0 ? std::nullopt : std::optional(value);
 }
 
 std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas) {
   YAML::Node root = YAML::Load(rig.yaml);
-  root["camera"] = YAML::Load(measured_camera_yaml(camera, sigmas));
+  CameraSigmas known = sigmas;
+  if (known.response == 0) known.response = sigma_of_response(rig).value_or(0);
+  root["camera"] = YAML::Load(measured_camera_yaml(camera, known));
   return text_of(root);
 }
 

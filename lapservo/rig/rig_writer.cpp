@@ -103,7 +103,8 @@ std::string measured_camera_yaml(const Camera& camera, const CameraSigmas& sigma
           "sigma_camera_matrix: " + matrix_of(3, 3, rounded_list_of(sigma));
   text += "distortion_coefficients: " + matrix_of(1, 5, list_of(camera.distortion)) +
           "sigma_distortion_coefficients: " + matrix_of(1, 5, rounded_list_of(sigmas.distortion));
-  text += fmt::format("response: {}\nsigma_response: {}\n", response_yaml(camera.response), rounded(sigmas.response));
+  text += fmt::format("response: {}\n", response_yaml(camera.response));
+  if (sigmas.response > 0) text += fmt::format("sigma_response: {}\n", rounded(sigmas.response));
   const ChromaticAberration& aberration = camera.chromatic_aberration;
   text += fmt::format("lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", aberration.blue, aberration.red);
   text += fmt::format("sigma_lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", rounded(sigmas.blue),
