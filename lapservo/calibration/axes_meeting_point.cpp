@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
-
 #include "lapservo/calibration/frame_fit.h"
+#include "lapservo/core/dense_matrix.h"
 
 namespace lapservo::internal {
 namespace {
@@ -25,7 +24,11 @@ Eigen::Matrix<double, 2, 3> across(const TimedPose& pose, double reach_m) {
   Eigen::Matrix3d covariance = (marker.sigma_xy_m * marker.sigma_xy_m + tilt_m * tilt_m) * Eigen::Matrix3d::Identity();
   covariance += marker.sigma_z_m * marker.sigma_z_m * ray * ray.transpose();
   const Eigen::Matrix2d seen = directions * covariance * directions.transpose() + 1e-12 * Eigen::Matrix2d::Identity();
-  return seen.llt().matrixL().solve(directions);
+  // Cholesky's factor, by which the rows are divided.
+  const double first = std::sqrt(seen(0, 0)), both = seen(1, 0) / first, second = std::sqrt(seen(1, 1) - both * both);
+  directions.row(0) /= first;
+  directions.row(1) = (directions.row(1) - both * directions.row(0)) / second;
+  return directions;
 }
 
 }  // namespace
@@ -49,7 +52,7 @@ std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>&
     }
     return all;
   };
-  const Eigen::Vector3d start_m = information.ldlt().solve(sum);
+  const Eigen::Vector3d start_m = solve_symmetric(information, sum);
   const auto fit =
       fit_frames(misses, {{start_m.x(), 1e-5}, {start_m.y(), 1e-5}, {start_m.z(), 1e-5}}, poses_per_second(poses));
   if (!fit) return std::nullopt;

@@ -7,8 +7,9 @@
 #include <numbers>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+
+#include "lapservo/core/dense_matrix.h"
 
 namespace lapservo::internal {
 namespace {
@@ -158,7 +159,7 @@ std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel,
       normal.noalias() += row * row.transpose();
       right.noalias() += row * residual;
     }
-    const Eigen::Vector<double, 5> step = normal.ldlt().solve(right);
+    const Eigen::Vector<double, 5> step = solve_symmetric(normal, right);
     if (!step.allFinite()) return std::nullopt;
     p += step;
     p[4] = std::clamp(p[4], 0.3, edge.reach_px);
@@ -166,7 +167,7 @@ std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel,
     if (std::abs(step[2]) < 1e-4 && std::abs(step[4]) < 1e-3) break;
   }
   const Eigen::Matrix<double, 5, 5> covariance =
-      normal.ldlt().solve(Eigen::Matrix<double, 5, 5>::Identity()) * (residual_squares / std::max(1.0, count - 5));
+      solve_symmetric(normal, Eigen::MatrixXd::Identity(5, 5)) * (residual_squares / std::max(1.0, count - 5));
   fit.offset_px = p[2], fit.slope = p[3], fit.blur_px = p[4];
   fit.dark = std::min(p[0], p[0] + p[1]), fit.bright = std::max(p[0], p[0] + p[1]);
   fit.towards_bright = p[1] > 0 ? 1 : -1;

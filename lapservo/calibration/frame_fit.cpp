@@ -6,11 +6,9 @@
 #include <memory>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include "lapservo/calibration/robust_scale.h"
 #include "lapservo/calibration/solve_quietly.h"
+#include "lapservo/core/dense_matrix.h"
 
 namespace lapservo::internal {
 namespace {
@@ -142,28 +140,29 @@ std::optional<Eigen::MatrixXd> covariance(const Linearisation& at, const Eigen::
     const Eigen::MatrixXd jacobian = weights.asDiagonal() * at.jacobian(i);
     const Eigen::VectorXd residual = weights.cwiseProduct(at.residuals.col(i));
     const double trust = 1 / (1 + residual.squaredNorm() / (scale * scale));
-    information += trust * jacobian.transpose() * jacobian;
-    gradients.col(i) = trust * jacobian.transpose() * residual;
+    information += trust * product(jacobian.transpose(), jacobian);
+    gradients.col(i) = trust * product(jacobian.transpose(), residual);
   }
   const Eigen::VectorXd priors = inverse_priors(at.unknowns).cwiseAbs2();
   information.diagonal() += priors;
   // In units of what each number alone would be known to: else metres and radians hide what is open.
   const Eigen::VectorXd units = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd normed = units.asDiagonal() * information * units.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normed);
-  if (!(eigen.eigenvalues()[0] > 1e-10)) return std::nullopt;
-  Eigen::MatrixXd scatter = gradients * gradients.transpose();
+  if (!(eigenvalues_of_symmetric(normed)[0] > 1e-10)) return std::nullopt;
+  Eigen::MatrixXd scatter = product(gradients, gradients.transpose());
   for (Eigen::Index lag = 1; lag < std::min(frames, static_cast<Eigen::Index>(alike_frames)); ++lag) {
     const double weight = 1 - static_cast<double>(lag) / static_cast<double>(alike_frames);
-    const Eigen::MatrixXd shifted = gradients.rightCols(frames - lag) * gradients.leftCols(frames - lag).transpose();
+    const Eigen::MatrixXd shifted =
+        product(gradients.rightCols(frames - lag), gradients.leftCols(frames - lag).transpose());
     scatter += weight * (shifted + shifted.transpose());
   }
   scatter.diagonal() += priors;
   // What the fit and the window of lags take off the scatter.
   const double taken = static_cast<double>(numbers) + static_cast<double>(alike_frames);
   const double freedom = static_cast<double>(frames) / std::max(1.0, static_cast<double>(frames) - taken);
-  const Eigen::MatrixXd inverse = units.asDiagonal() * normed.inverse() * units.asDiagonal();
-  return freedom * inverse * scatter * inverse;
+  const Eigen::MatrixXd inverse =
+      units.asDiagonal() * solve_symmetric(normed, Eigen::MatrixXd::Identity(numbers, numbers)) * units.asDiagonal();
+  return freedom * product(product(inverse, scatter), inverse);
 }
 
 }  // namespace

@@ -7,10 +7,9 @@
 #include <cstddef>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "lapservo/calibration/robust_scale.h"
 #include "lapservo/calibration/solve_quietly.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -201,7 +200,8 @@ std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, const std:
   const PrintCovariance joint = all.topLeftCorner<print_numbers, print_numbers>();
   const Eigen::Matrix<double, print_numbers, common> cross = all.block<print_numbers, common>(0, shared_film);
   const Eigen::Matrix<double, common, common> of_common = all.bottomRightCorner<common, common>();
-  const Eigen::Matrix<double, print_numbers, common> by_common = of_common.ldlt().solve(cross.transpose()).transpose();
+  const Eigen::Matrix<double, print_numbers, common> by_common =
+      solve_symmetric(of_common, cross.transpose()).transpose();
   const PrintCovariance known = joint - by_common * cross.transpose();  // were the common errors known
   const PrintCovariance print = std::max(1.0, noise_scale * noise_scale) * known +
                                 by_common * prior.cwiseAbs2().asDiagonal() * by_common.transpose();

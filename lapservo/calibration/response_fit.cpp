@@ -11,13 +11,12 @@
 #include <type_traits>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <fmt/format.h>
 
 #include "lapservo/calibration/solve_quietly.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/median.h"
 
 namespace lapservo::internal {
@@ -167,7 +166,8 @@ Curve curve_of(const std::function<double(double)>& value_of) {
       splines(i, k) = encoded(unit.data(), light) - s;
     }
   }
-  return (splines.transpose() * splines).ldlt().solve(splines.transpose() * beyond);
+  const Eigen::MatrixXd across = splines.transpose();
+  return solve_symmetric(product(across, splines), product(across, beyond));
 }
 
 // What cameras' curves are like, where the pictures leave it open: standard ones, with contrast (a logistic curve about
@@ -187,7 +187,7 @@ struct CurvePrior {
     CurveMatrix covariance = CurveMatrix::Identity() * other_curve_sigma * other_curve_sigma;
     for (const Curve& curve : family)
       covariance += (curve - mean) * (curve - mean).transpose() / static_cast<double>(family.size());
-    whitening = covariance.inverse().llt().matrixU();
+    whitening = whitening_of(covariance);
   }
   static Curve member(const Response& base, double contrast, double middle, double shoulder) {
     const auto logistic = [&](double x) { return 1 / (1 + std::exp(-contrast * (x - middle))); };

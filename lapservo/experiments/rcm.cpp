@@ -2,10 +2,10 @@
 
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <fmt/format.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/experiments/comparison.h"
 #include "lapservo/experiments/data_file.h"
 #include "lapservo/experiments/positions.h"
@@ -202,7 +202,7 @@ RcmResult::Estimates summed_up(std::vector<RcmResult::Estimate> estimates) {
   for (const Result::Estimate& estimate : summary.estimates) {
     distances.push_back(estimate.error_px.norm());
     if (!estimate.covariance_px2) continue;
-    squares += estimate.error_px.dot(estimate.covariance_px2->ldlt().solve(estimate.error_px));
+    squares += estimate.error_px.dot(solve_symmetric(*estimate.covariance_px2, estimate.error_px).col(0));
     coordinates += 2;
   }
   summary.distance = spread_of(distances);

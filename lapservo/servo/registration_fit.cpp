@@ -4,9 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
@@ -164,7 +162,7 @@ std::optional<RegistrationFit> fit_registration(const Camera& camera, const Mark
   for (int i = 0; i < max_iterations && damping < 1e8; ++i) {
     Normal damped = at->information;
     damped.diagonal() *= 1 + damping;
-    const Numbers step = -damped.ldlt().solve(at->gradient);
+    const Numbers step = -solve_symmetric(damped, at->gradient);
     const auto there = sum(model, sightings, path, x + step, weights, false);
     if (!there || !(there->cost < at->cost)) {
       damping *= 10;
@@ -181,7 +179,7 @@ std::optional<RegistrationFit> fit_registration(const Camera& camera, const Mark
   fit.camera_from_rcm = model.camera_from_rcm(x);
   fit.rms_px = std::sqrt(at->squares_px2 / (8.0 * static_cast<double>(sightings.size())));
   const double worse = std::max(1.0, fit.rms_px / sigma_px);
-  const Normal covariance = alike_images * worse * worse * at->information.inverse();
+  const Normal covariance = alike_images * worse * worse * solve_symmetric(at->information, Normal::Identity());
   fit.sigma_rotation_rad = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   fit.sigma_position_m = std::sqrt(covariance.block<3, 3>(3, 3).trace());
   if (!std::isfinite(fit.sigma_rotation_rad) || !std::isfinite(fit.sigma_position_m)) return std::nullopt;

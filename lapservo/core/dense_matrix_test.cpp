@@ -1,0 +1,36 @@
+#include "lapservo/core/dense_matrix.h"
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo::internal {
+namespace {
+
+Eigen::MatrixXd random_matrix(int rows, int columns, Random& random) {
+  Eigen::MatrixXd matrix(rows, columns);
+  for (int i = 0; i < rows; ++i)
+    for (int j = 0; j < columns; ++j) matrix(i, j) = random.uniform(-1, 1);
+  return matrix;
+}
+
+TEST(DenseMatrix, ASolutionSolvesAndWhiteningMakesUnits) {
+  Random random(3);
+  for (const int size : {1, 2, 5, 9}) {
+    const Eigen::MatrixXd root = random_matrix(size, size + 3, random), right = random_matrix(size, 2, random);
+    const Eigen::MatrixXd covariance = product(root, root.transpose());
+    EXPECT_TRUE(product(covariance, solve_symmetric(covariance, right)).isApprox(right, 1e-9)) << size;
+    const Eigen::MatrixXd whitening = whitening_of(covariance);
+    const Eigen::MatrixXd units = product(product(whitening, covariance), whitening.transpose());
+    EXPECT_TRUE(units.isIdentity(1e-9)) << units;
+    EXPECT_TRUE(whitening.isUpperTriangular(1e-12));
+  }
+}
+
+TEST(DenseMatrix, EigenvaluesRise) {
+  const Eigen::MatrixXd matrix{{2, 1, 0}, {1, 2, 0}, {0, 0, -5}};
+  EXPECT_TRUE(eigenvalues_of_symmetric(matrix).isApprox(Eigen::Vector3d(-5, 1, 3), 1e-12));
+}
+
+}  // namespace
+}  // namespace lapservo::internal
