@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cstdio>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -98,18 +100,24 @@ int run_check(const CalibrateOptions& options) {
   CheckedRig checked;
   {
     Progress progress(std::nullopt);
-    progress.show(1, " of 3: the print");
+    progress.show(1, " of 3: the arm");
     checked.findings = findings_of(rig, index, evidence);
     checked.frames = evidence.frames();
-    if (checked.findings.light) checked.findings.print = check_print(rig, index, evidence.take_key_frames());
-    progress.show(2, " of 3: the arm");
+    // Takes as long as the rest, which needs nothing of it.
+    std::future<PrintCheck> print;
+    if (checked.findings.light)
+      print = std::async(std::launch::async, [&, frames = evidence.take_key_frames()]() mutable {
+        return check_print(rig, index, std::move(frames));
+      });
     if (joints && !evidence.poses().empty())
       checked.findings.arm = check_arm(instrument, rig.camera, evidence.poses(), evidence.tracked_psi(),
                                        joints->recording, joints->source);
     else
       checked.findings.rcm = check_rcm(instrument, evidence.poses());
-    progress.show(3, " of 3: the work space");
+    progress.show(2, " of 3: the work space");
     look_over_work_space(rig, index, evidence, checked);
+    progress.show(3, " of 3: the print");
+    if (print.valid()) checked.findings.print = print.get();
   }
   checked.advice = advice_on(checked.findings);
   std::printf("%s\n", instrument.name.c_str());

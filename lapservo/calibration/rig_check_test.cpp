@@ -108,6 +108,47 @@ TEST(RigEvidence, SearchesEachPictureWhole) {
   EXPECT_EQ(evidence.count(Status::ok), 1);
 }
 
+// With a print that is off, so that all of the trackers have something to do.
+TEST(RigEvidence, IsTheSameFromOneCoreAndFromTwo) {
+  Rig rig = true_rig();
+  rig.instruments[0].marker.bands_upper_m[0] += 0.05e-3;
+  RigEvidence by_one(rig, 0, RigEvidence::Cores::one), by_two(rig, 0, RigEvidence::Cores::two);
+  const std::vector<cv::Mat> pictures = rendered(12, {});
+  for (std::size_t i = 0; i < pictures.size(); ++i)
+    for (RigEvidence* evidence : {&by_one, &by_two}) evidence->add(pictures[i], static_cast<double>(i) / fps);
+  ASSERT_EQ(by_one.frames().size(), by_two.frames().size());
+  for (std::size_t i = 0; i < by_one.frames().size(); ++i) {
+    const FrameEvidence &one = by_one.frames()[i], &two = by_two.frames()[i];
+    EXPECT_EQ(one.status, two.status);
+    EXPECT_EQ(one.sigma_roll_rad, two.sigma_roll_rad);
+    EXPECT_EQ(one.psi_rad, two.psi_rad);
+    EXPECT_EQ(one.width_px, two.width_px);
+    ASSERT_TRUE(one.light && two.light);
+    EXPECT_EQ(one.light->hues_deg, two.light->hues_deg);
+  }
+  ASSERT_GE(by_one.poses().size(), 10U);
+  ASSERT_EQ(by_one.poses().size(), by_two.poses().size());
+  for (std::size_t i = 0; i < by_one.poses().size(); ++i) {
+    const TimedPose &one = by_one.poses()[i], &two = by_two.poses()[i];
+    EXPECT_EQ(one.origin(), two.origin());
+    EXPECT_EQ(one.by_focal.origin_m, two.by_focal.origin_m);
+  }
+  const auto keys_of_one = by_one.take_key_frames(), keys_of_two = by_two.take_key_frames();
+  ASSERT_EQ(keys_of_one.size(), keys_of_two.size());
+  ASSERT_FALSE(keys_of_one.empty());
+  for (std::size_t i = 0; i < keys_of_one.size(); ++i)
+    EXPECT_EQ(keys_of_one[i].sighting.tau_rad, keys_of_two[i].sighting.tau_rad);
+}
+
+// What one half throws reaches the caller, wherever it ran; the other half has come to its end by then.
+TEST(RigEvidence, PassesErrorsOn) {
+  for (const auto cores : {RigEvidence::Cores::one, RigEvidence::Cores::two}) {
+    RigEvidence evidence(true_rig(), 0, cores);
+    EXPECT_ANY_THROW(evidence.add(cv::Mat(), 0));
+    EXPECT_ANY_THROW(evidence.add(cv::Mat(7, 7, CV_8UC3), 0));
+  }
+}
+
 TEST_F(CheckRig, AGoodRigIsGoodEnough) {
   const RigFindings findings = found_out(rig, pictures(), joints, true);
   EXPECT_EQ(needed(findings), std::vector<std::string>{});

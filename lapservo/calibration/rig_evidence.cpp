@@ -1,6 +1,7 @@
 #include "lapservo/calibration/rig_evidence.h"
 
 #include <algorithm>
+#include <future>
 #include <optional>
 
 #include "lapservo/core/median.h"
@@ -35,9 +36,10 @@ TimedPose::ByFocal slope_of(const Rigid3& before, const Rigid3& after, double fo
 
 }  // namespace
 
-RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument)
+RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument, Cores cores)
     : rig_(rig),
       instrument_(instrument),
+      cores_(cores),
       as_it_is_(whole_search(rig)),
       exact_{whole_search(free_rig(rig, 0, 0)), whole_search(free_rig(rig, 0, focal_step))},
       tolerant_{whole_search(free_rig(rig, print_tolerance_m, 0)),
@@ -45,7 +47,7 @@ RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument)
       key_frames_(rig, instrument),
       response_(rig.camera) {}
 
-void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FrameEvidence& frame) {
+void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight) {
   const Marker& marker = rig_.instruments[instrument_].marker;
   // Each edge costs as much as tracking a frame: some of a long recording's are enough.
   constexpr std::size_t every = 3;
@@ -53,22 +55,22 @@ void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, Fra
   if (frames_.size() % every == 0) response_.add(bgr, marker, pose);
   const auto samples = band_samples(bgr, rig_.camera, marker, pose);
   if (samples.empty()) return;
-  frame.light = light_of(samples, marker);
-  frame.width_px = marker.diameter_m * rig_.camera.fx_px / seen.camera_from_unrolled.translation.z();
+  sight.light = light_of(samples, marker);
+  sight.width_px = marker.diameter_m * rig_.camera.fx_px / seen.camera_from_unrolled.translation.z();
 }
 
-bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, FrameEvidence& frame) {
+bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight) {
   const Observation& seen = trackers.at.track(bgr)[instrument_];
   if (seen.status != Status::ok) return false;
-  look_at_light(bgr, seen, frame);
+  look_at_light(bgr, seen, sight);
   const Observation& longer = trackers.longer.track(bgr)[instrument_];
   if (longer.status == Status::ok && seen.marker && longer.marker)
-    poses_.push_back({frame.time_s, *seen.marker,
+    poses_.push_back({time_s, *seen.marker,
                       slope_of(seen.marker->camera_from_marker, longer.marker->camera_from_marker, focal_step)});
   return true;
 }
 
-void RigEvidence::add(const cv::Mat& bgr, double time_s) {
+void RigEvidence::look_at_picture(const cv::Mat& bgr) {
   constexpr int every = 16;  // pixels
   std::vector<int> brightest;
   int clipped = 0;
@@ -78,19 +80,33 @@ void RigEvidence::add(const cv::Mat& bgr, double time_s) {
       brightest.push_back(std::max({pixel[0], pixel[1], pixel[2]}));
       clipped += brightest.back() >= LightImage::saturated_value;
     }
-  if (!brightest.empty()) {
-    clipped_.push_back(static_cast<double>(clipped) / static_cast<double>(brightest.size()));
-    const auto tenth = brightest.begin() + static_cast<std::ptrdiff_t>(brightest.size() * 9 / 10);
-    std::nth_element(brightest.begin(), tenth, brightest.end());
-    values_.push_back(*tenth);
-  }
+  if (brightest.empty()) return;
+  clipped_.push_back(static_cast<double>(clipped) / static_cast<double>(brightest.size()));
+  const auto tenth = brightest.begin() + static_cast<std::ptrdiff_t>(brightest.size() * 9 / 10);
+  std::nth_element(brightest.begin(), tenth, brightest.end());
+  values_.push_back(*tenth);
+}
 
-  const Observation& as_it_is = as_it_is_.track(bgr)[instrument_];
-  FrameEvidence frame{time_s, as_it_is.status, as_it_is.marker ? as_it_is.marker->sigma_roll_rad : 0, {}, {}, 0};
-  if (as_it_is.status == Status::ok && as_it_is.rcm) frame.psi_rad = as_it_is.rcm->q.psi_rad;
-  if (!look_with(exact_, bgr, frame)) look_with(tolerant_, bgr, frame);
+FrameEvidence RigEvidence::tracked_as_it_is(const cv::Mat& bgr, double time_s) {
+  const Observation& seen = as_it_is_.track(bgr)[instrument_];
+  FrameEvidence frame{time_s, seen.status, seen.marker ? seen.marker->sigma_roll_rad : 0, {}, {}, 0};
+  if (seen.status == Status::ok && seen.rcm) frame.psi_rad = seen.rcm->q.psi_rad;
+  return frame;
+}
+
+void RigEvidence::add(const cv::Mat& bgr, double time_s) {
+  // Neither half touches what the other one does, so that both at once find what one after the other would. Should
+  // this one throw, the future waits for the other.
+  auto as_it_is = std::async(cores_ == Cores::two ? std::launch::async : std::launch::deferred, [&] {
+    key_frames_.add(bgr, time_s);
+    return tracked_as_it_is(bgr, time_s);
+  });
+  look_at_picture(bgr);
+  FreeSight free;
+  if (!look_with(exact_, bgr, time_s, free)) look_with(tolerant_, bgr, time_s, free);
+  FrameEvidence frame = as_it_is.get();
+  frame.light = free.light, frame.width_px = free.width_px;
   frames_.push_back(frame);
-  key_frames_.add(bgr, time_s);
 }
 
 std::vector<TrackedPsi> RigEvidence::tracked_psi() const {

@@ -35,7 +35,9 @@ struct PictureLight {
 /// Looks at a recording's frames with all that tells whether the rig is right.
 class RigEvidence {
  public:
-  RigEvidence(const Rig& rig, std::size_t instrument);
+  /// How many cores a frame is looked at with; both find the same.
+  enum class Cores { one, two };
+  RigEvidence(const Rig& rig, std::size_t instrument, Cores cores = Cores::two);
 
   /// 8-bit BGR of the rig's size.
   void add(const cv::Mat& bgr, double time_s);
@@ -57,12 +59,20 @@ class RigEvidence {
   struct FreeTrackers {
     Tracker at, longer;
   };
+  // What those see of the marker.
+  struct FreeSight {
+    std::optional<MarkerLight> light;
+    double width_px = 0;
+  };
   // Whether the marker was found.
-  bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, FrameEvidence& frame);
-  void look_at_light(const cv::Mat& bgr, const Observation& seen, FrameEvidence& frame);
+  bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight);
+  void look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight);
+  void look_at_picture(const cv::Mat& bgr);
+  FrameEvidence tracked_as_it_is(const cv::Mat& bgr, double time_s);
 
   Rig rig_;
   std::size_t instrument_;
+  Cores cores_;
   Tracker as_it_is_;
   FreeTrackers exact_, tolerant_;
   KeyFrames key_frames_;
