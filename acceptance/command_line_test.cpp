@@ -750,6 +750,14 @@ instruments:
     EXPECT_EQ(run("track " + empty + " --rig " + calibrated + " --out " + out("obs.csv")), 1) << errors();
 }
 
+// It must not even be read: nobody writes into this one.
+TEST_F(CommandLine, CalibrateAllRefusesARigThatCanNotBeReplaced) {
+  const std::string pipe = in("pipe");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  expect_refused("calibrate all --no-questions --rig " + pipe,
+                 {"pipe: is a pipe or a device", "each step replaces it"});
+}
+
 TEST_F(CommandLine, CalibrateCameraRefusesBadInput) {
   cv::imwrite(in("large.png"), cv::Mat(90, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
   cv::imwrite(in("small.png"), cv::Mat(80, 160, CV_8UC3, cv::Scalar(20, 20, 20)));

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <unistd.h>
 #include <vector>
 
@@ -244,7 +245,16 @@ std::string recorded(const AllOptions& options, const std::string& name, const c
 }
 #endif
 
+// Before it is read: what a pipe holds is gone then.
+void expect_replaceable(const fs::path& rig) {
+  std::error_code error;
+  const fs::file_status status = fs::status(rig, error);
+  if (fs::is_fifo(status) || fs::is_character_file(status) || fs::is_socket(status))
+    throw InputError(rig.string(), "is a pipe or a device, expected a file: each step replaces it");
+}
+
 int run_all(AllOptions options) {
+  expect_replaceable(options.rig);
   load_rig(options.rig);
   if (options.camera.empty() && (options.enable_motion || !options.robot.empty()))
     throw InputError(options.robot.empty() ? "--enable-motion" : "--robot", "needs --camera: both are to be recorded");

@@ -37,6 +37,19 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
   return nullptr;
 }
 
+// OpenCV's search for a chessboard draws from its thread's random numbers: each picture from the same ones, whatever
+// was looked at before.
+class SameRandomNumbers {
+ public:
+  SameRandomNumbers() { cv::theRNG() = cv::RNG(); }
+  ~SameRandomNumbers() { cv::theRNG() = others_; }
+  SameRandomNumbers(const SameRandomNumbers&) = delete;
+  SameRandomNumbers& operator=(const SameRandomNumbers&) = delete;
+
+ private:
+  cv::RNG others_ = cv::theRNG();
+};
+
 std::vector<BoardCorner> find_chessboard(const Board& board, const cv::Mat& grey, bool thorough) {
   // Half of the size first: quick, and noise and sharpening matter less. What is found is measured elsewhere.
   std::vector<cv::Point2f> points;
@@ -105,6 +118,7 @@ std::string board_problem(const Board& board) {
 std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& bgr, bool thorough) {
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
+  const SameRandomNumbers same;
   try {
     return board.dictionary.empty() ? find_chessboard(board, grey, thorough) : find_charuco(board, grey);
   } catch (const cv::Exception&) {  // of its fits to what is no board

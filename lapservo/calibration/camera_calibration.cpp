@@ -10,6 +10,7 @@
 
 #include "lapservo/calibration/board_edges.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/rounded_sigma.h"
 #include "lapservo/geometry/invertible.h"
 #include "lapservo/geometry/rotation.h"
 
@@ -173,6 +174,20 @@ void add_residuals(const CameraAdjustment& adjustment, const Measured& edges, Ca
   calibration.rms_px = rms_of(all);
 }
 
+// The same from the same pictures: what the last digits of sums are hangs on where in memory the numbers lie.
+Camera rounded_by_sigmas(Camera camera, const CameraSigmas& sigmas) {
+  camera.fx_px = rounded_by_sigma(camera.fx_px, sigmas.fx_px);
+  camera.fy_px = rounded_by_sigma(camera.fy_px, sigmas.fy_px);
+  camera.cx_px = rounded_by_sigma(camera.cx_px, sigmas.cx_px);
+  camera.cy_px = rounded_by_sigma(camera.cy_px, sigmas.cy_px);
+  for (std::size_t i = 0; i < camera.distortion.size(); ++i)
+    camera.distortion[i] = rounded_by_sigma(camera.distortion[i], sigmas.distortion[i]);
+  ChromaticAberration& aberration = camera.chromatic_aberration;
+  aberration.blue = rounded_by_sigma(aberration.blue, sigmas.blue);
+  aberration.red = rounded_by_sigma(aberration.red, sigmas.red);
+  return camera;
+}
+
 // Empty where the views tell enough.
 std::string too_alike(const CameraAdjustment& adjustment) {
   const Camera& camera = adjustment.camera;
@@ -322,7 +337,8 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   const Measured edges = measured(board, views, *fit, true, false);
   adjustment = adjust_what_shows(*fit, edges);
   if (!adjustment) return refuse("the views are too alike to tell the camera");
-  calibration.camera = adjustment->camera, calibration.sigmas = adjustment->sigmas;
+  calibration.camera = rounded_by_sigmas(adjustment->camera, adjustment->sigmas);
+  calibration.sigmas = adjustment->sigmas;
   if (calibration.response) calibration.sigmas.response = calibration.response->sigma;
   calibration.bright_wider_px = adjustment->bright_wider_px[green];
   calibration.poses = adjustment->camera_from_board;

@@ -13,6 +13,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/random.h"
+#include "lapservo/rig/rig_writer.h"
 #include "lapservo/testing/boards.h"
 
 namespace lapservo::internal {
@@ -118,6 +119,18 @@ TEST(CalibrateCamera, FindsLensAberrationAndResponse) {
         (is.cy_px - camera.cy_px) / found.sigmas.cy_px, is.chromatic_aberration.blue - camera.chromatic_aberration.blue,
         is.chromatic_aberration.red - camera.chromatic_aberration.red, response);
   }
+}
+
+TEST(CalibrateCamera, TheSamePicturesGiveTheSameNumbers) {
+  const Camera camera = small_camera();
+  const auto once = [&] { return calibrate_camera(board, views_of({}, camera, 6, 130), {}); };
+  const CameraCalibration first = once();
+  ASSERT_EQ(first.refusal, "");
+  cv::theRNG().next();  // whoever else draws
+  const std::vector<double> elsewhere(12345);
+  EXPECT_EQ(measured_camera_yaml(once().camera, first.sigmas), measured_camera_yaml(first.camera, first.sigmas));
+  const double decimals = first.camera.fx_px * 1e6;
+  EXPECT_NEAR(decimals, std::round(decimals), 1e-3) << "digits far below sigma";
 }
 
 TEST(CalibrateCamera, NamesAResponseThatHasAName) {

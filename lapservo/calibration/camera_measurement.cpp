@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/asked_while_fitting.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo::internal {
@@ -108,6 +109,7 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
         read.looked_at, read.damaged());
     return measured;
   }
+  const AskedWhileFitting asking(watch.is_stopped);
   int step = 0;
   measured.calibration = calibrate_camera(
       board, measured.views, start, [&](const std::string& what) { watch.tell(std::nullopt, ++step, ", " + what); });

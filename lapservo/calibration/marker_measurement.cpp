@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/asked_while_fitting.h"
 #include "lapservo/calibration/seam_registration.h"
 #include "lapservo/core/error.h"
 
@@ -40,6 +41,7 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
                     measured.read.looked_at, measured.read.damaged());
     return measured;
   }
+  const AskedWhileFitting asking(watch.is_stopped);
   measured.calibration = calibrate_marker(rig, index, key_frames.take(), [&](int round, int most) {
     watch.tell(std::nullopt, round, fmt::format(" of at most {} rounds of fitting", most));
   });

@@ -18,6 +18,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/median.h"
+#include "lapservo/core/rounded_sigma.h"
 
 namespace lapservo::internal {
 namespace {
@@ -439,6 +440,13 @@ double quantile(std::vector<double> values, double fraction) {
   return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1))];
 }
 
+// As other measured numbers are, but to digits by which the values still rise.
+Response rounded_by_sigma(Response table, double sigma) {
+  constexpr double of_six_decimals = 0.01;
+  for (double& value : table.table_value) value = internal::rounded_by_sigma(value, std::min(sigma, of_six_decimals));
+  return table;
+}
+
 // A named response that explains the profiles nearly as well is what the camera has.
 void name_response(ProfileFit& profiles, ResponseFit& fit) {
   const double fitted_cost = profiles.cost();
@@ -515,9 +523,10 @@ std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& pro
   std::vector<double> darks, brights;
   for (const BoardEdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
   fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);
-  fit.table = fit.response = table_of(fitted.shared());
+  fit.table = table_of(fitted.shared());
   fit.sigma = curve_sigma_of(fitted.problem(), fitted.shared(), std::max(1.0, fit.misfit[1]), fit.low, fit.high);
   if (!std::isfinite(fit.sigma)) return std::nullopt;
+  fit.table = fit.response = rounded_by_sigma(std::move(fit.table), fit.sigma);
   if (try_named) name_response(fitted, fit);
   return fit;
 }

@@ -46,12 +46,16 @@ class Calibration:
     rig: Any = field(repr=False)
     yaml: str = field(repr=False)
     origin: str = field(repr=False)
+    camera_file: str = field(repr=False)
     numbers: list[CalibratedNumber] = field(repr=False)
     complaint: str = field(repr=False)
 
     def save(self, path: _Path) -> None:
-        """Writes `yaml`, whole or not at all; a camera's own file is named so that it is found from there."""
-        _core._write_calibrated(self.yaml, self.origin, path)
+        """Writes `yaml`, whole or not at all; a camera's own file is named so that it is found from there.
+
+        Raises InputError at that file's own path: there it would be lost.
+        """
+        _core._write_calibrated(self.yaml, self.origin, self.camera_file, path)
 
 
 @dataclass(frozen=True, eq=False)

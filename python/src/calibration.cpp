@@ -2,6 +2,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -82,7 +83,10 @@ py::dict result_of(const std::string& yaml, const GivenRig* given, const std::ve
                    const std::string& complaint) {
   py::list rows;
   for (const CalibratedNumber& n : numbers) rows.append(py::make_tuple(n.name, n.before, n.after, n.sigma));
-  py::dict result("yaml"_a = yaml, "origin"_a = given ? given->text.path.string() : "", "numbers"_a = rows,
+  // Absolute: who saves it may stand in another folder by then.
+  const auto absolute = [](const fs::path& path) { return path.empty() ? "" : fs::absolute(path).string(); };
+  py::dict result("yaml"_a = yaml, "origin"_a = given ? absolute(given->text.path) : "",
+                  "camera_file"_a = given ? absolute(given->rig.camera_file) : "", "numbers"_a = rows,
                   "complaint"_a = complaint, "rig"_a = py::none());
   if (given) result["rig"] = py::cast(PythonRig::parse(yaml, given->name(), given->text.path.parent_path()));
   return result;
@@ -289,9 +293,13 @@ void bind_calibration(py::module_& m) {
   m.def("_calibrate_colour", &calibrate_colour);
   m.def("_calibrate_marker", &calibrate_marker);
   m.def("_calibrate_registration", &calibrate_registration);
-  m.def("_write_calibrated", [](const std::string& yaml, const fs::path& origin, const fs::path& path) {
-    write_file(path, origin.empty() ? yaml : moved_rig_yaml({yaml, origin}, path));
-  });
+  m.def("_write_calibrated",
+        [](const std::string& yaml, const fs::path& origin, const fs::path& camera_file, const fs::path& path) {
+          std::error_code error;
+          if (!camera_file.empty() && fs::equivalent(camera_file, path, error))
+            throw InputError(path.string(), "is the camera's own file, which the rig names, expected another path");
+          write_file(path, origin.empty() ? yaml : moved_rig_yaml({yaml, origin}, path));
+        });
 }
 
 }  // namespace lapservo::python

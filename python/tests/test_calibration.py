@@ -1,6 +1,7 @@
 """Calibrations: the same rig, byte for byte, as the command line writes, by paths and by arrays."""
 
 import pickle
+import signal
 import subprocess
 
 import numpy as np
@@ -115,6 +116,43 @@ def test_a_camera_is_the_command_lines(recordings, tmp_path):
     expect_whole(result, small)
     assert result.camera.matrix[0, 0] == pytest.approx(camera.matrix[0, 0], rel=5e-3) and len(result.views) == 6
     assert np.array_equal(pickle.loads(pickle.dumps(result)).camera.matrix, result.camera.matrix)
+
+
+def test_a_cameras_own_file_is_named_from_anywhere_and_never_written_over(recordings, swing, monkeypatch):
+    images, _ = swing
+    home, elsewhere = recordings.folder / "home", recordings.folder / "elsewhere"
+    for folder in (home / "lens", elsewhere):
+        folder.mkdir(parents=True)
+    lines = recordings.rig.to_yaml().splitlines()
+    instruments = lines.index("instruments:")
+    lens = home / "lens" / "camera.yaml"
+    lens.write_text("".join(f"{line[2:]}\n" for line in lines[1:instruments]) + "sigma_response: 0.003\n")
+    (home / "rig.yaml").write_text("\n".join(["camera: lens/camera.yaml", *lines[instruments:], ""]))
+    monkeypatch.chdir(home)
+    result = lapservo.calibrate_colour(images[:12], "rig.yaml", fps=FPS)
+    monkeypatch.chdir(elsewhere)
+    result.save("saved.yaml")
+    assert "camera: ../home/lens/camera.yaml" in (elsewhere / "saved.yaml").read_text()
+    assert lapservo.Rig.load("saved.yaml").to_yaml() == result.rig.to_yaml()
+    (elsewhere / "link.yaml").symlink_to(lens)
+    before = lens.read_bytes()
+    for path in (lens, "../home/lens/camera.yaml", "link.yaml"):
+        assert "the camera's own file" in refused(result.save, path).problem
+        assert refused(lapservo.calibrate_colour(images[:12], lapservo.Rig.load(home / "rig.yaml"), fps=FPS).save, path)
+    assert lens.read_bytes() == before
+
+
+def test_a_fit_asks_for_signals():
+    pictures = board_pictures(scaled_rig(0.5).camera)
+    asked = []
+    before = signal.signal(signal.SIGALRM, lambda *_: asked.append(True))
+    signal.setitimer(signal.ITIMER_REAL, 1e-3, 1e-3)
+    try:
+        lapservo.calibrate_camera(pictures, "9x6", 0.005)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert len(asked) > 20  # six pictures alone would ask some ten times
 
 
 def refused(call, *arguments, **keywords):
