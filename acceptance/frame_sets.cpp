@@ -7,12 +7,13 @@
 #include <numeric>
 #include <stdexcept>
 
+#include <opencv2/videoio.hpp>
+
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/video_reader.h"
-#include "lapservo/io/video_writer.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/instrument_shaft.h"
@@ -179,9 +180,13 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
 void compress(std::vector<TrueFrame>& frames) {
   const testing::TemporaryFolder folder;
   const auto path = folder.path() / "frames.mp4";
-  VideoWriter writer(path, 30);
-  for (const TrueFrame& frame : frames) writer.add(frame.bgr);
-  writer.commit();
+  {
+    // VideoWriter's are MPEG-4 part 2.
+    cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'), 30,
+                           frames.at(0).bgr.size());
+    if (!writer.isOpened()) throw std::runtime_error("no encoder of H.264");
+    for (const TrueFrame& frame : frames) writer.write(frame.bgr);
+  }
   VideoReader reader(path);
   for (TrueFrame& frame : frames) frame.bgr = reader.next().value().bgr.clone();
 }
