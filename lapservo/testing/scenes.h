@@ -26,6 +26,17 @@ JointVector random_configuration(const Rig& rig, std::size_t instrument, Random&
 
 ShaftPose pose_of(const Rig& rig, std::size_t instrument, const JointVector& q);
 
+/// Two instruments whose markers touch or cross in the image, one before the other: their middles less than 110 px
+/// apart there, their axes a diameter and more apart in space.
+struct CrossingPair {
+  std::vector<JointVector> q;
+  std::array<double, 2> hidden{};  ///< of each marker's visible side, the fraction that the other's shaft hides
+  std::array<double, 2>
+      hidden_inner{};  ///< the same of its inner boundaries, which alone tell psi: of a rest it can be told
+  bool tells_psi(std::size_t instrument) const { return hidden_inner[instrument] < 0.6; }
+};
+CrossingPair crossing_pair(const Rig& rig, Random& random);
+
 /// All instruments of the rig in front of tissue; `configurations` in the rig's order. The seed is that of the noise.
 cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,
                const RenderOptions& options = {});

@@ -21,8 +21,8 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return -1e9;
   const double length_m = scene.marker.length_m(), radius_m = scene.marker.radius_m();
-  const auto color_at = [&](double radius, double azimuth_rad, double along_m) {
-    return scene.class_at_point(pose.camera_from_unrolled * surface_point(radius, azimuth_rad, along_m));
+  const auto point_at = [&](double radius, double azimuth_rad, double along_m) -> Eigen::Vector3d {
+    return pose.camera_from_unrolled * surface_point(radius, azimuth_rad, along_m);
   };
   double score = 0;
   const auto count_empty = [&](std::uint8_t color) {
@@ -35,10 +35,12 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
     const auto ends_m = boundaries_m(scene.marker, tau_rad);
     for (int k = -margin; k < places + margin; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
-      const std::uint8_t color = color_at(radius_m, azimuth_rad, along_m);
-      if (color == Scene::outside) continue;
       const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin();
-      if (!printed || band < 1 || band > 3) {
+      const bool empty = !printed || band < 1 || band > 3;
+      const Eigen::Vector3d point = point_at(radius_m, azimuth_rad, along_m);
+      const std::uint8_t color = empty ? scene.class_at_point(point) : scene.class_on_shaft(point);
+      if (color == Scene::outside) continue;
+      if (empty) {
         count_empty(color);
       } else if (color == scene.bands[static_cast<std::size_t>(band - 1)]) {
         score += 1;
@@ -50,8 +52,8 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
   for (const double side : {-1.0, 1.0})
     for (const double radius : {1.08, 1.2})
       for (int k = 0; k < places; ++k)
-        count_empty(
-            color_at(radius * radius_m, view->facing_azimuth_rad + side * pi / 2, length_m * (k + 0.5) / places));
+        count_empty(scene.class_at_point(
+            point_at(radius * radius_m, view->facing_azimuth_rad + side * pi / 2, length_m * (k + 0.5) / places)));
   return score;
 }
 

@@ -98,6 +98,11 @@ Blob take_blob(Grid& grid, int seed, std::vector<int>& stack) {
   return blob;
 }
 
+void sort_by_size(std::vector<Blob>& blobs) {
+  std::sort(blobs.begin(), blobs.end(),
+            [](const Blob& a, const Blob& b) { return a.samples.size() > b.samples.size(); });
+}
+
 }  // namespace
 
 std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int min_samples) {
@@ -111,8 +116,7 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes
     blob.grid_px = grid_px;
     if (static_cast<int>(blob.samples.size()) >= min_samples) blobs.push_back(std::move(blob));
   }
-  std::sort(blobs.begin(), blobs.end(),
-            [](const Blob& a, const Blob& b) { return a.samples.size() > b.samples.size(); });
+  sort_by_size(blobs);
   return blobs;
 }
 
@@ -121,6 +125,20 @@ std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& clas
   auto blobs = find_blobs(image, classes, grid_px, detection_limits.min_samples);
   if (blobs.size() > detection_limits.max_blobs) blobs.resize(detection_limits.max_blobs);
   return blobs;
+}
+
+std::vector<Blob> without(const std::vector<Blob>& blobs, std::span<const ShaftCover* const> others) {
+  std::vector<Blob> left;
+  for (Blob blob : blobs) {
+    std::erase_if(blob.samples, [&](const Blob::Sample& sample) {
+      return std::any_of(others.begin(), others.end(), [&](const ShaftCover* other) {
+        return other->explains(sample.u + 0.5, sample.v + 0.5, sample.color);
+      });
+    });
+    if (static_cast<int>(blob.samples.size()) >= detection_limits.min_samples) left.push_back(std::move(blob));
+  }
+  sort_by_size(left);
+  return left;
 }
 
 }  // namespace lapservo::internal

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "lapservo/vision/color_classes.h"
 #include "lapservo/vision/image_view.h"
+#include "lapservo/vision/shaft_cover.h"
 
 namespace lapservo::internal {
 
@@ -23,5 +25,9 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes
 
 /// As many of them as detection looks at, on its grid.
 std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& classes);
+
+/// What the instruments that are known to be in the image leave of them, largest first. The parts of one that lies
+/// behind another stay together.
+std::vector<Blob> without(const std::vector<Blob>& blobs, std::span<const ShaftCover* const> others);
 
 }  // namespace lapservo::internal

@@ -115,7 +115,7 @@ SampledSurface sample_surface(const Scene& scene, const ShaftPose& pose, const C
     const Eigen::Vector3d base = point_on(pose, scene.marker, line.azimuth_rad, 0);
     for (int k = 0; k < samples_along; ++k) {
       const Eigen::Vector3d point = base + (surface.first_m + (k + 0.5) * surface.step_m) * axis;
-      line.classes[static_cast<std::size_t>(k)] = scene.class_at_point(point);
+      line.classes[static_cast<std::size_t>(k)] = scene.class_on_shaft(point);
     }
   }
   return surface;

@@ -72,11 +72,13 @@ struct Frame {
   }
   double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
 
-  // The line through a point of the image, when all of it can be sampled.
-  std::optional<EdgeLine> edge_line(const Eigen::Vector2d& centre_px, const Eigen::Vector2d& direction, int before,
-                                    int after, double blur_px) const {
-    if (!light.contains(centre_px - before * direction) || !light.contains(centre_px + after * direction))
-      return std::nullopt;
+  // The line through a point of the image, so deep in the scene, when all of it can be sampled and nothing hides it.
+  std::optional<EdgeLine> edge_line(const Eigen::Vector2d& centre_px, double depth_m, const Eigen::Vector2d& direction,
+                                    int before, int after, double blur_px) const {
+    const Eigen::Vector2d first_px = centre_px - before * direction, last_px = centre_px + after * direction;
+    if (!light.contains(first_px) || !light.contains(last_px)) return std::nullopt;
+    for (const Eigen::Vector2d& place_px : {first_px, centre_px, last_px})
+      if (scene.hidden(place_px, depth_m)) return std::nullopt;
     EdgeLine line;
     line.u_px = static_cast<float>(centre_px.x()), line.v_px = static_cast<float>(centre_px.y());
     line.du = static_cast<float>(direction.x()), line.dv = static_cast<float>(direction.y());
@@ -99,7 +101,7 @@ UnknownVector row_of(const PoseUnknowns& unknowns, const Eigen::Vector3d& point,
 struct BoundaryPlace {
   Measurement measurement;
   Eigen::Vector2d point_px, along;
-  double normal_cosine;
+  double depth_m, normal_cosine;
   EdgeLine line;
 };
 
@@ -109,8 +111,9 @@ bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_p
   const std::size_t k = place.measurement.group;
   const Eigen::Vector2d at_px = place.point_px + static_cast<double>(offset_px) * place.along;
   const double on_band_px = 0.8 * place.line.before, on_shaft_px = on_band_px + 1.5 * place.line.blur_px;
-  const std::uint8_t before = frame.scene.class_at(at_px - (k == 0 ? on_shaft_px : on_band_px) * place.along);
-  const std::uint8_t after = frame.scene.class_at(at_px + (k == 3 ? on_shaft_px : on_band_px) * place.along);
+  const auto color_at = [&](double px) { return frame.scene.class_on_shaft(at_px + px * place.along, place.depth_m); };
+  const std::uint8_t before = color_at(k == 0 ? -on_shaft_px : -on_band_px);
+  const std::uint8_t after = color_at(k == 3 ? on_shaft_px : on_band_px);
   return before == (k == 0 ? 0 : frame.scene.bands[k - 1]) && after == (k == 3 ? 0 : frame.scene.bands[k]);
 }
 
@@ -125,6 +128,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   const double px_per_m = axis_px.norm();
   BoundaryPlace place;
   place.point_px = image.point_px;
+  place.depth_m = point.z();
   place.along = axis_px / px_per_m;
   const Eigen::Vector2d tangent =
       (frame.marker().radius_m() * (image.d_px_d_point * generatrix.around) + slope_m * axis_px).normalized();
@@ -139,7 +143,7 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   const int reach =
       static_cast<int>(std::min({2.5 * line_blur_px + effort.extra_px, 0.6 * gap_px - line_blur_px, 22.0}));
   if (reach < 3) return std::nullopt;
-  const auto line = frame.edge_line(image.point_px, place.along, reach, reach, line_blur_px);
+  const auto line = frame.edge_line(image.point_px, point.z(), place.along, reach, reach, line_blur_px);
   if (!line) return std::nullopt;
   place.line = *line;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
@@ -280,7 +284,7 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
   if (inside < 5) return std::nullopt;
   const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
   if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
-  const auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
+  const auto line = frame.edge_line(image.point_px, point.z(), inwards, outside, inside, blur_px);
   if (!line) return std::nullopt;
   SidePlace place{{}, *line};
   place.line.contour_radius_px = static_cast<float>(radius_px);

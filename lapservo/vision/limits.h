@@ -33,7 +33,8 @@ struct DetectionLimits {
   /// A section's stretch of colour by the shaft's expected width: less is blood's remainder, more is tissue's.
   double narrowest_section = 0.5, widest_section = 1.4;
 
-  double min_rotation_score = 0.5;  ///< colours that match less those that contradict, at the best rotation
+  double min_rotation_score = 0.5;       ///< colours that match less those that contradict, at the best rotation
+  double seeming_rotation_score = 0.85;  ///< what is beside another marker is this one
   /// Of the best score: a rotation 0.7 rad and more away that scores higher is as good.
   double rival_ratio = 0.93;
   double rival_apart_radii = 1;  ///< two places nearer than this are one
@@ -50,10 +51,13 @@ inline constexpr DetectionLimits detection_limits;
 struct SearchCosts {
   double coarse_fit = 350, fine_fit = 700;
   double initial_poses = 200;   ///< of one blob
+  double rcm_starts = 400;      ///< the same, by lines through the RCM
   double agreement = 20;        ///< of one pose with the frame's colours (median: 13)
   double fit_to_result = 2200;  ///< some 70 of these and a fine fit (median: 1400)
   double blobs_per_px = 1.2e-4;
+  double cover = 200;  ///< where one instrument lies, for those that look for another
   double try_start() const { return 2 * (coarse_fit + fine_fit); }
+  double pair() const { return initial_poses + rcm_starts + try_start() + 2 * fine_fit; }
 };
 inline constexpr SearchCosts search_costs;
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "lapservo/core/angles.h"
@@ -9,6 +10,7 @@
 #include "lapservo/vision/cut_shaft.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/limits.h"
+#include "lapservo/vision/rcm_starts.h"
 #include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
@@ -21,6 +23,12 @@ Found refusal(Status status, const PoseUnknowns& unknowns) {
   const bool finite = pose.camera_from_unrolled.translation.allFinite() &&
                       pose.camera_from_unrolled.rotation.coeffs().allFinite() && std::isfinite(pose.psi_rad);
   return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
+}
+
+Found refusal(const Scene& scene, Status status, const FineFit& fit) {
+  Found refused = refusal(status, fit.unknowns);
+  if (status == Status::poor_fit && convinces_beside_another(scene, fit)) refused.beside_another = fit;
+  return refused;
 }
 
 bool contradicts_registration(const FineFit& free) {
@@ -57,10 +65,7 @@ Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const E
   return refusal(Status::uncertain, fit.unknowns);
 }
 
-Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
-  budget.spend(costs.coarse_fit);
-  const CoarseFit coarse = fit_coarsely(scene, start, {});
-  if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score) return {};
+Found try_coarse(const Scene& scene, const LightImage& light, const CoarseFit& coarse, WorkBudget& budget) {
   if (coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
     return refusal(Status::ambiguous, coarse.unknowns);
   budget.spend(costs.fine_fit);
@@ -74,7 +79,16 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
   budget.spend(costs.fine_fit);
   const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
   const Status status = validate(scene, fit);
-  return status == Status::ok ? accepted(scene, light, fit, {}, budget) : refusal(status, fit.unknowns);
+  return status == Status::ok ? accepted(scene, light, fit, {}, budget) : refusal(scene, status, fit);
+}
+
+Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
+  budget.spend(costs.coarse_fit);
+  const CoarseFit coarse = fit_coarsely(scene, start, {});
+  if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score) return {};
+  Found found = try_coarse(scene, light, coarse, budget);
+  if (coarse.rotation_score > detection_limits.seeming_rotation_score) found.seems = coarse.unknowns.pose();
+  return found;
 }
 
 // No marker moves farther from frame to frame.
@@ -83,10 +97,24 @@ double reach_px(const SearchFrame& frame) {
   return of_width * frame.scene.image.width_px;
 }
 
+// Of two that were not found, for whoever looks for another instrument beside it.
+Found more_telling(Found before, Found now) {
+  const auto seems = before.seems ? before.seems : now.seems;
+  Found more = before.beside_another || now.status == Status::no_marker ? std::move(before) : std::move(now);
+  more.seems = seems;
+  return more;
+}
+
 std::vector<PoseUnknowns> starts_in(const SearchFrame& frame, const Blob& blob,
                                     const std::optional<Rigid3>& camera_from_rcm, WorkBudget& budget) {
   budget.spend(costs.initial_poses);
   return initial_poses(frame.scene, blob, camera_from_rcm);
+}
+
+std::vector<PoseUnknowns> starts_among_others(const SearchFrame& frame, const Blob& blob, const Rigid3& camera_from_rcm,
+                                              WorkBudget& budget) {
+  budget.spend(costs.rcm_starts);
+  return starts_through_rcm(frame.scene, blob, camera_from_rcm);
 }
 
 }  // namespace
@@ -103,14 +131,15 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
   budget.spend(costs.fine_fit);
   const FineFit fit = fit_finely(scene, light, coarse.unknowns, blur, processing);
   const Status status = validate(scene, fit);
-  return status == Status::ok ? accepted(scene, light, fit, processing, budget) : refusal(status, fit.unknowns);
+  return status == Status::ok ? accepted(scene, light, fit, processing, budget) : refusal(scene, status, fit);
 }
 
 // The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
 Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm,
-                                   const Blob& blob, Walk& walk, WorkBudget& budget) {
+                                   const Blob& blob, Walk& walk, WorkBudget& budget, Starts by) {
   Found best;
-  const auto starts = starts_in(frame, blob, camera_from_rcm, budget);
+  const auto starts = by == Starts::by_outline ? starts_in(frame, blob, camera_from_rcm, budget)
+                                               : starts_among_others(frame, blob, *camera_from_rcm, budget);
   for (std::size_t i = walk.blobs.start(); i < starts.size(); ++i) {
     if ((camera_from_rcm || i == 0) && !budget.allows(costs.try_start())) {
       walk.blobs.stop(blob, i);
@@ -120,7 +149,7 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional
     if (!found.fit) {
       // A print that is off is no reason to look for it elsewhere, with a boundary less.
       if (found.status == Status::marker_mismatch) return found;
-      if (!best.fit && found.status != Status::no_marker) best = found;
+      if (!best.fit) best = more_telling(std::move(best), std::move(found));
       continue;
     }
     if (!best.fit || found.fit->inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = std::move(found);
@@ -131,15 +160,15 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional
 }
 
 Found MarkerSearch::detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
-                           WorkBudget& budget) {
+                           WorkBudget& budget, Starts by) {
   Found best;
   for (const Blob* blob : walk.blobs.rest(frame.blobs, reach_px(frame))) {
-    Found found = detect_in_blob(frame, camera_from_rcm, *blob, walk, budget);
+    Found found = detect_in_blob(frame, camera_from_rcm, *blob, walk, budget, by);
     if (found.fit || found.status == Status::marker_mismatch) {
       walk.done = true;
       return found;
     }
-    if (found.status != Status::no_marker) best = std::move(found);
+    best = more_telling(std::move(best), std::move(found));
     if (walk.blobs.stopped()) return best;
   }
   walk.done = true;
@@ -253,12 +282,20 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
 }
 
 Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget) {
+  Found among_others;
+  if (!among_others_.done && !is_mismatch) {
+    among_others = detect(frame, frame.camera_from_rcm, among_others_, budget, Starts::through_rcm);
+    if (among_others.fit || !among_others_.done) return among_others;
+    is_mismatch = among_others.status == Status::marker_mismatch;
+  }
   if (!free_.done)
     if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
-  if (!free_.done) return {};
+  if (!free_.done) return among_others;
   // Such a print is not hidden: this is what the search came to.
   if (is_mismatch) hidden_.done = true;
-  return hidden_.done ? Found{} : hidden(frame, budget);
+  if (hidden_.done) return among_others;
+  Found found = hidden(frame, budget);
+  return found.fit ? found : among_others;
 }
 
 Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
@@ -284,11 +321,24 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   budget.allow(longs_turn_ ? WorkBudget::Beyond::one : WorkBudget::Beyond::none);
   Found found = look_long(frame, is_mismatch, plain_is_known, budget);
   if (found.fit || hidden_.done) begin_anew(status_);
-  return found.fit ? found : plain;
+  if (found.fit) return found;
+  if (found.status == Status::marker_mismatch) return found;
+  const Status status = plain.status == Status::no_marker ? found.status : plain.status;
+  Found more = more_telling(std::move(plain), std::move(found));
+  more.status = status;
+  return more;
 }
 
 Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {
   return frame.camera_from_rcm ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
+}
+
+Found MarkerSearch::look_plainly(const SearchFrame& frame, WorkBudget& budget) {
+  Walk by_outline, among_others;
+  Found found = detect(frame, frame.camera_from_rcm, by_outline, budget);
+  if (found.fit) return found;
+  Found other = detect(frame, frame.camera_from_rcm, among_others, budget, Starts::through_rcm);
+  return other.fit ? other : more_telling(std::move(found), std::move(other));
 }
 
 }  // namespace lapservo::internal

@@ -18,8 +18,10 @@ namespace lapservo::internal {
 /// What looking for a marker came to.
 struct Found {
   Status status = Status::no_marker;
-  std::optional<FineFit> fit;        ///< when ok
-  std::optional<ShaftPose> refused;  ///< to draw, when there was something
+  std::optional<FineFit> fit;                  ///< when ok
+  std::optional<ShaftPose> refused;            ///< to draw, when there was something
+  std::optional<FineFit> beside_another = {};  ///< refused, but right if another instrument's marker lies beside it
+  std::optional<ShaftPose> seems = {};         ///< where its colours agree with the frame's, whatever else is said
 };
 
 /// A frame in which one marker is looked for. Borrows everything.
@@ -42,6 +44,8 @@ class MarkerSearch {
  public:
   /// While the search goes on, the status is what it knows so far, or the last whole search came to.
   Found look(const SearchFrame& frame, WorkBudget& budget);
+  /// In this frame alone, and only where it shows plainly.
+  static Found look_plainly(const SearchFrame& frame, WorkBudget& budget);
 
  private:
   // A search from blob to blob; done when none is left.
@@ -50,11 +54,12 @@ class MarkerSearch {
     bool done = false;
   };
   enum class Rival { none, found, not_known_yet };
+  enum class Starts { by_outline, through_rcm };
 
   static Found detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, const Blob& blob,
-                              Walk& walk, WorkBudget& budget);
+                              Walk& walk, WorkBudget& budget, Starts by);
   static Found detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
-                      WorkBudget& budget);
+                      WorkBudget& budget, Starts by = Starts::by_outline);
   static Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget);
   Found look_without_rcm(const SearchFrame& frame, WorkBudget& budget);
   Found look_with_rcm(const SearchFrame& frame, WorkBudget& budget);
@@ -67,7 +72,7 @@ class MarkerSearch {
   void begin_anew(Status status);
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
-  Walk plain_, free_, hidden_;
+  Walk plain_, among_others_, free_, hidden_;
   bool searches_long_ = false;  // what shows plainly was not found
   bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;

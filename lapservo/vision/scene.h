@@ -2,11 +2,13 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/marker/marker.h"
 #include "lapservo/vision/color_classes.h"
 #include "lapservo/vision/image_view.h"
+#include "lapservo/vision/shaft_cover.h"
 
 namespace lapservo::internal {
 
@@ -16,21 +18,49 @@ struct Scene {
   const Camera& camera;
   const ColorClasses& classes;
   const Marker& marker;
-  std::array<std::uint8_t, 3> bands;  ///< colour class of each band
+  std::array<std::uint8_t, 3> bands;            ///< colour class of each band
+  std::span<const ShaftCover* const> others{};  ///< that are known to be in the image
 
+  /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.
   static constexpr std::uint8_t outside = 255;
-  /// Colour class of the nearest pixel, `outside` beyond the image.
+  /// Colour class of the nearest pixel, `outside` beyond the image and of another instrument's marker.
   std::uint8_t class_at(const Eigen::Vector2d& raw_px) const {
+    const std::uint8_t color = class_of_pixel(raw_px);
+    return explained(raw_px, color) ? outside : color;
+  }
+  /// The same at a point before the camera, [m] in its frame; `outside` also when it lies behind it or is hidden.
+  std::uint8_t class_at_point(const Eigen::Vector3d& point_in_camera) const {
+    const std::uint8_t color = class_on_shaft(point_in_camera);
+    return color != outside && explained(camera.raw_from_point(point_in_camera), color) ? outside : color;
+  }
+  /// The same of a point that would hide another instrument behind it.
+  std::uint8_t class_on_shaft(const Eigen::Vector3d& point_in_camera) const {
+    if (!(point_in_camera.z() > 1e-3)) return outside;
+    return class_on_shaft(camera.raw_from_point(point_in_camera), point_in_camera.z());
+  }
+  std::uint8_t class_on_shaft(const Eigen::Vector2d& raw_px, double depth_m) const {
+    return hidden(raw_px, depth_m) ? outside : class_of_pixel(raw_px);
+  }
+  /// Whether another instrument lies before what would be seen there at this depth (z in the camera's frame).
+  bool hidden(const Eigen::Vector2d& raw_px, double depth_m) const {
+    for (const ShaftCover* other : others)
+      if (other->hides(raw_px.x() + 0.5, raw_px.y() + 0.5, depth_m)) return true;
+    return false;
+  }
+  /// Whether it is the class of one of the marker's bands.
+  bool is_ours(std::uint8_t color) const { return color == bands[0] || color == bands[1] || color == bands[2]; }
+
+ private:
+  std::uint8_t class_of_pixel(const Eigen::Vector2d& raw_px) const {
     const double u = raw_px.x() + 0.5, v = raw_px.y() + 0.5;
     if (!(u >= 0 && v >= 0 && u < image.width_px && v < image.height_px)) return outside;
     return classes(image.pixel(static_cast<int>(u), static_cast<int>(v)));
   }
-  /// The same at a point before the camera, [m] in its frame; `outside` when it lies behind.
-  std::uint8_t class_at_point(const Eigen::Vector3d& point_in_camera) const {
-    return point_in_camera.z() > 1e-3 ? class_at(camera.raw_from_point(point_in_camera)) : outside;
+  bool explained(const Eigen::Vector2d& raw_px, std::uint8_t color) const {
+    for (const ShaftCover* other : others)
+      if (other->explains(raw_px.x() + 0.5, raw_px.y() + 0.5, color)) return true;
+    return false;
   }
-  /// Whether it is the class of one of the marker's bands.
-  bool is_ours(std::uint8_t color) const { return color == bands[0] || color == bands[1] || color == bands[2]; }
 };
 
 }  // namespace lapservo::internal

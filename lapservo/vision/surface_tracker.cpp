@@ -128,6 +128,9 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       searches_(rig.instruments.size()),
       found_(rig.instruments.size()),
       observations_(rig.instruments.size()) {
+  others_.reserve(rig.instruments.size());
+  covers_.reserve(rig.instruments.size());  // copies would have no room
+  for (std::size_t i = 0; i < rig.instruments.size(); ++i) covers_.emplace_back(rig.camera);
   BlurredEdges::instance();  // takes milliseconds, which no frame should
 }
 
@@ -141,7 +144,7 @@ void SurfaceTracker::forget() {
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
-  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i)};
+  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_};
 }
 
 void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
@@ -152,34 +155,137 @@ void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
   memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px};
 }
 
-ExpectedProcessing SurfaceTracker::Memory::expected() const {
+ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {
   return {unasked >= ask_every, bias_px};
 }
 
-// Those that are followed first: the others share what is left of the budget.
-void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
+const ShaftCover& SurfaceTracker::cover_of(std::size_t i, const ShaftPose& pose) {
+  if (!covers_[i].drawn()) covers_[i].draw(rig_.camera, rig_.instruments[i].marker, classes_.of_bands(i), pose);
+  return covers_[i];
+}
+
+// Those that may lie before or beside the one that is followed: as found in this frame, or as they are expected.
+void SurfaceTracker::find_in_the_way(std::size_t i, WorkBudget& budget) {
+  others_.clear();
+  for (std::size_t j = 0; j < rig_.instruments.size(); ++j) {
+    if (j == i || !memory_[j]) continue;
+    const ShaftPose pose = found_[j].fit ? found_[j].fit->unknowns.pose() : memory_[j]->expected_pose().pose();
+    if (!may_meet(rig_.camera, rig_.instruments[i].marker, memory_[i]->expected_pose().pose(),
+                  rig_.instruments[j].marker, pose))
+      continue;
+    budget.spend(search_costs.cover);
+    others_.push_back(&cover_of(j, pose));
+  }
+}
+
+// All that were found in this frame, and one that is supposed to be where its cover is, or was refused.
+void SurfaceTracker::find_others(std::size_t i, std::optional<std::size_t> supposed, WorkBudget& budget) {
+  others_.clear();
+  for (std::size_t j = 0; j < rig_.instruments.size(); ++j) {
+    if (j == i || !(found_[j].fit || j == supposed)) continue;
+    if (!covers_[j].drawn()) {
+      budget.spend(search_costs.cover);
+      cover_of(j, (found_[j].fit ? found_[j].fit : found_[j].beside_another)->unknowns.pose());
+    }
+    others_.push_back(&covers_[j]);
+  }
+}
+
+// How many are not found near where they are expected.
+std::size_t SurfaceTracker::follow_known(const ImageView& image, const LightImage& light, WorkBudget& budget) {
   std::size_t lost = 0;
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
     found_[i] = {};
     if (memory_[i]) {
       const Memory& memory = *memory_[i];
-      found_[i] = follow(scene_of(image, i), light, memory.last.changed_by(memory.velocity), memory.blur,
-                         memory.expected(), budget);
+      find_in_the_way(i, budget);
+      found_[i] =
+          follow(scene_of(image, i), light, memory.expected_pose(), memory.blur, memory.expected_processing(), budget);
+      covers_[i].clear();  // where it was expected
     }
     if (found_[i].fit) continue;
     memory_[i].reset();
     ++lost;
   }
+  return lost;
+}
+
+void SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
+                                   std::size_t lost, WorkBudget& budget) {
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
+    if (found_[i].fit) continue;
+    find_others(i, std::nullopt, budget);
+    const Scene scene = scene_of(image, i);
+    const std::vector<Blob> left = without(blobs, others_);
+    found_[i] =
+        budget.share(budget.left() / static_cast<double>(lost--), WorkBudget::Beyond::one, [&](WorkBudget& part) {
+          return searches_[i].look({scene, light, left, rig_.instruments[i].camera_from_rcm}, part);
+        });
+  }
+}
+
+// Looks for i beside j, which was refused for what lies there; if j is right with i there, both are taken, i where its
+// rotation can be told.
+void SurfaceTracker::find_pair(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
+                               std::size_t i, std::size_t j, WorkBudget& budget) {
+  find_others(i, j, budget);
+  const Scene scene = scene_of(image, i);
+  const std::vector<Blob> left = without(blobs, others_);
+  Found beside = MarkerSearch::look_plainly({scene, light, left, rig_.instruments[i].camera_from_rcm}, budget);
+  covers_[j].clear();  // where it is supposed
+  if (!beside.fit && !beside.seems) return;
+  cover_of(i, beside.fit ? beside.fit->unknowns.pose() : *beside.seems);
+  find_others(j, i, budget);
+  const FineFit supposed = *found_[j].beside_another;
+  Found found = follow(scene_of(image, j), light, supposed.unknowns, supposed.blur, {}, budget);
+  if (!beside.fit || !found.fit) covers_[i].clear();
+  if (!found.fit) return;
+  found_[j] = std::move(found);
+  if (beside.fit) found_[i] = std::move(beside);
+}
+
+// Two that are next to one another hinder one another: where one shows well but for the colours beside it, the other is
+// looked for in what it leaves, and both are taken if each is right beside the other. One may be hidden so far that
+// nothing tells its rotation: the other is right beside it all the same.
+void SurfaceTracker::look_for_pairs(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
+                                    WorkBudget& budget) {
+  pairs_wait_ = false;
+  for (std::size_t j = 0; j < rig_.instruments.size(); ++j)
+    for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
+      if (j == i || found_[i].fit || found_[j].fit || !found_[j].beside_another) continue;
+      if (!rig_.instruments[i].camera_from_rcm || !rig_.instruments[j].camera_from_rcm) continue;
+      if (!budget.allows(search_costs.pair())) {
+        pairs_wait_ = true;
+        return;
+      }
+      find_pair(image, light, blobs, i, j, budget);
+    }
+}
+
+std::size_t SurfaceTracker::found_count() const {
+  return static_cast<std::size_t>(
+      std::count_if(found_.begin(), found_.end(), [](const Found& found) { return found.fit.has_value(); }));
+}
+
+// Those that are followed first: the others share what is left of the budget. Without a budget they are looked for
+// again when another one was found, which may lie before them: else the next frame does that.
+void SurfaceTracker::find(const ImageView& image, const LightImage& light, std::optional<double> units) {
+  WorkBudget budget(units);
+  for (ShaftCover& cover : covers_) cover.clear();
+  std::size_t lost = follow_known(image, light, budget);
   if (lost == 0) return;
   budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);
   const std::vector<Blob> blobs = largest_blobs(image, classes_);
-  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
-    if (found_[i].fit) continue;
-    const Scene scene = scene_of(image, i);
-    found_[i] =
-        budget.share(budget.left() / static_cast<double>(lost--), WorkBudget::Beyond::one, [&](WorkBudget& part) {
-          return searches_[i].look({scene, light, blobs, rig_.instruments[i].camera_from_rcm}, part);
-        });
+  for (std::size_t before = lost + 1; lost > 0 && lost < before;) {
+    before = lost;
+    const double share = pairs_wait_ && units ? budget.left() / 2 : budget.left();
+    budget.share(share, WorkBudget::Beyond::none, [&](WorkBudget& part) {
+      look_for_lost(image, light, blobs, lost, part);
+      return 0;
+    });
+    look_for_pairs(image, light, blobs, budget);
+    lost = rig_.instruments.size() - found_count();
+    if (units) return;
   }
 }
 
@@ -187,8 +293,7 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
   const ImageView image(image_bgr);
   const LightImage light(image, light_, channels_);
   if (single_) forget();
-  WorkBudget budget(single_ ? std::nullopt : frame_budget_);
-  find(image, light, budget);
+  find(image, light, single_ ? std::nullopt : frame_budget_);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
     const Found& found = found_[i];
     observations_[i] = {};

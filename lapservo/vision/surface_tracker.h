@@ -11,6 +11,7 @@
 #include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/marker_search.h"
 #include "lapservo/vision/observation.h"
+#include "lapservo/vision/shaft_cover.h"
 
 namespace lapservo::internal {
 
@@ -37,10 +38,22 @@ class SurfaceTracker {
     EdgeBlur blur;
     int unasked = 0;  // frames since the camera was found to do nothing to its pictures
     std::array<double, 4> bias_px{};
-    ExpectedProcessing expected() const;
+    ExpectedProcessing expected_processing() const;
+    PoseUnknowns expected_pose() const { return last.changed_by(velocity); }
   };
-  void find(const ImageView& image, const LightImage& light, WorkBudget& budget);
+  void find(const ImageView& image, const LightImage& light, std::optional<double> units);
+  std::size_t follow_known(const ImageView& image, const LightImage& light, WorkBudget& budget);
+  void look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs, std::size_t lost,
+                     WorkBudget& budget);
+  void look_for_pairs(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
+                      WorkBudget& budget);
+  void find_pair(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs, std::size_t i,
+                 std::size_t j, WorkBudget& budget);
+  std::size_t found_count() const;
   void remember(std::size_t instrument, const FineFit& fit);
+  const ShaftCover& cover_of(std::size_t instrument, const ShaftPose& pose);
+  void find_in_the_way(std::size_t instrument, WorkBudget& budget);
+  void find_others(std::size_t instrument, std::optional<std::size_t> supposed, WorkBudget& budget);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;
 
   Rig rig_;
@@ -52,6 +65,9 @@ class SurfaceTracker {
   std::vector<std::optional<Memory>> memory_;
   std::vector<MarkerSearch> searches_;
   std::vector<Found> found_;
+  std::vector<ShaftCover> covers_;         // of those that are known in this frame, where somebody asked
+  bool pairs_wait_ = false;                // the frame before had no time for them
+  std::vector<const ShaftCover*> others_;  // in the image, to the one that is looked for
   std::vector<Observation> observations_;
 };
 

@@ -75,7 +75,8 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
       if (near_boundary) continue;
       const bool on_marker = band >= 1 && band <= 3;
       total += on_marker;
-      const std::uint8_t color = scene.class_at_point(base + along_m * axis);
+      const Eigen::Vector3d point = base + along_m * axis;
+      const std::uint8_t color = on_marker ? scene.class_on_shaft(point) : scene.class_at_point(point);
       if (color == Scene::outside) continue;
       const bool ours = scene.is_ours(color);
       if (!on_marker) {
@@ -104,7 +105,7 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
           fraction(beside, flank),    std::max(fraction(spilled[0], ring[0]), fraction(spilled[1], ring[1]))};
 }
 
-Status validate(const Scene& scene, const FineFit& fit) {
+Status validate(const Scene& scene, const FineFit& fit, Surroundings surroundings) {
   if (!fit.converged) return Status::poor_fit;
   const ColorAgreement agreement = color_agreement(scene, fit.unknowns.pose());
   if (agreement.in_image < limits.min_in_image) return Status::cut;
@@ -113,8 +114,9 @@ Status validate(const Scene& scene, const FineFit& fit) {
   const double fraction = fit.located_fraction();
   const bool complete = agreement.matching > limits.complete_matching && fraction > limits.complete_fraction;
   const double tolerance = complete ? limits.tolerance_of_complete : 1;
-  if (agreement.wrong > tolerance * limits.max_wrong || agreement.beyond > tolerance * limits.max_beyond ||
-      agreement.beside > tolerance * limits.max_beside)
+  const bool surrounded =
+      agreement.beyond > tolerance * limits.max_beyond || agreement.beside > tolerance * limits.max_beside;
+  if (agreement.wrong > tolerance * limits.max_wrong || (surrounded && surroundings == Surroundings::empty))
     return Status::poor_fit;
 
   // Too little of the marker.
@@ -147,7 +149,16 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::uncertain;
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
-  return validate_sigma(fit, agreement);
+  const Status status = validate_sigma(fit, agreement);
+  // Where another instrument hides a part, that is what makes boundaries miss.
+  const bool hidden = !scene.others.empty() && agreement.in_image < limits.wholly_in_image;
+  return status == Status::marker_mismatch && hidden ? Status::occluded : status;
+}
+
+bool convinces_beside_another(const Scene& scene, const FineFit& fit) {
+  return fit.converged && fit.located_fraction() > limits.well_seen_fraction &&
+         color_agreement(scene, fit.unknowns.pose()).matching > limits.complete_matching &&
+         validate(scene, fit, Surroundings::anothers) == Status::ok;
 }
 
 }  // namespace lapservo::internal

@@ -18,7 +18,16 @@ struct ColorAgreement {
 };
 ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose);
 
+/// Whether colours of the marker may lie beyond its ends and beside its sides.
+enum class Surroundings {
+  empty,    ///< but for a few
+  anothers  ///< may be full of another instrument's marker, which nobody has found yet
+};
+
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
-Status validate(const Scene& scene, const FineFit& fit);
+Status validate(const Scene& scene, const FineFit& fit, Surroundings surroundings = Surroundings::empty);
+
+/// Whether a fit that is not good enough would be, of a marker that shows well, if another instrument's lay beside it.
+bool convinces_beside_another(const Scene& scene, const FineFit& fit);
 
 }  // namespace lapservo::internal
