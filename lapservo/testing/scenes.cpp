@@ -25,10 +25,10 @@ const std::array<Port, 3> ports{{{{90, 180, 270}, {-0.078, 0.067, 0.059}, {-0.02
                                  {{180, 270, 90}, {0.103, 0.019, 0.063}, {0.04, 0.0, 0.1}},
                                  {{270, 90, 180}, {-0.02, -0.1, 0.06}, {0.006, -0.03, 0.1}}}};
 
-constexpr double steepest_rad = 0.35, border_px = 30;
+constexpr double border_px = 30;
 
 // Less than marker_in_view() asks: here the silhouettes' ends alone count, as a lens without distortion shows them.
-bool wholly_in_view(const Rig& rig, const Marker& marker, const Rigid3& pose) {
+bool wholly_in_view(const Rig& rig, const Marker& marker, const Rigid3& pose, double steepest_rad) {
   const auto view = view_cylinder(pose, marker.radius_m());
   if (!view) return false;
   const double beyond_m = pose.inverse().translation.z() - marker.length_m() / 2;
@@ -59,14 +59,16 @@ Rig usual_rig(std::size_t instruments) {
   return rig;
 }
 
-JointVector random_configuration(const Rig& rig, std::size_t i, Random& random) {
+JointVector random_configuration(const Rig& rig, std::size_t i, Random& random, double steepest_rad) {
   const Instrument& instrument = rig.instruments[i];
   for (int attempt = 0; attempt < 50000; ++attempt) {
     const double v_px = random.uniform(0, rig.camera.height_px);  // a statement each: arguments have no order
     const Eigen::Vector2d pixel(random.uniform(0, rig.camera.width_px), v_px);
     auto q = configuration_through(*instrument.camera_from_rcm,
                                    rig.camera.ray_from_ideal(pixel) * random.uniform(0.075, 0.115));
-    if (!q || !wholly_in_view(rig, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(*q))) continue;
+    if (!q) continue;
+    const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(*q);
+    if (!wholly_in_view(rig, instrument.marker, pose, steepest_rad)) continue;
     q->psi_rad = random.uniform(-pi, pi);
     return *q;
   }
@@ -115,7 +117,7 @@ std::array<double, 2> hidden_fractions(const ShaftPose& pose, const Rigid3& othe
 
 }  // namespace
 
-CrossingPair crossing_pair(const Rig& rig, Random& random) {
+CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad) {
   constexpr double near_px = 110;
   const Marker& marker = rig.instruments[0].marker;
   for (;;) {
@@ -123,7 +125,7 @@ CrossingPair crossing_pair(const Rig& rig, Random& random) {
     std::array<Rigid3, 2> shafts;
     std::array<Eigen::Vector2d, 2> middles_px;
     for (std::size_t i = 0; i < 2; ++i) {
-      pair.q.push_back(random_configuration(rig, i, random));
+      pair.q.push_back(random_configuration(rig, i, random, steepest_rad));
       shafts[i] = pose_of(rig, i, pair.q[i]).camera_from_unrolled;
       middles_px[i] = rig.camera.ideal_from_point(shafts[i] * Eigen::Vector3d(0, 0, marker.length_m() / 2));
     }

@@ -21,8 +21,8 @@ using namespace internal;
 /// 960x540, up to three instruments through ports left, right and above; their markers share colours in other orders.
 Rig usual_rig(std::size_t instruments = 1);
 
-/// The marker wholly in view (a lens's distortion neglected), at most 0.35 rad from facing the camera.
-JointVector random_configuration(const Rig& rig, std::size_t instrument, Random& random);
+/// The marker wholly in view (a lens's distortion neglected), at most so far from facing the camera.
+JointVector random_configuration(const Rig& rig, std::size_t instrument, Random& random, double steepest_rad = 0.35);
 
 ShaftPose pose_of(const Rig& rig, std::size_t instrument, const JointVector& q);
 
@@ -35,7 +35,7 @@ struct CrossingPair {
       hidden_inner{};  ///< the same of its inner boundaries, which alone tell psi: of a rest it can be told
   bool tells_psi(std::size_t instrument) const { return hidden_inner[instrument] < 0.6; }
 };
-CrossingPair crossing_pair(const Rig& rig, Random& random);
+CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad = 0.35);
 
 /// All instruments of the rig in front of tissue; `configurations` in the rig's order. The seed is that of the noise.
 cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,

@@ -91,6 +91,11 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
   return found;
 }
 
+// By one that nobody has found.
+bool may_be_hidden_by_another(const Scene& scene, const FineFit& fit) {
+  return fit.located_fraction() < validation_limits.well_located_beside_another && !knows_the_print(scene, fit);
+}
+
 // No marker moves farther from frame to frame.
 double reach_px(const SearchFrame& frame) {
   constexpr double of_width = 0.05;
@@ -146,6 +151,8 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional
       return best;
     }
     Found found = try_start(frame.scene, frame.light, starts[i], budget);
+    if (by == Starts::through_rcm && found.fit && may_be_hidden_by_another(frame.scene, *found.fit))
+      found = refusal(Status::occluded, found.fit->unknowns);
     if (!found.fit) {
       // A print that is off is no reason to look for it elsewhere, with a boundary less.
       if (found.status == Status::marker_mismatch) return found;
@@ -286,8 +293,9 @@ Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool p
   if (!among_others_.done && !is_mismatch) {
     among_others = detect(frame, frame.camera_from_rcm, among_others_, budget, Starts::through_rcm);
     if (among_others.fit || !among_others_.done) return among_others;
-    is_mismatch = among_others.status == Status::marker_mismatch;
+    mismatch_among_others_ = among_others.status == Status::marker_mismatch;
   }
+  is_mismatch |= mismatch_among_others_;
   if (!free_.done)
     if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
   if (!free_.done) return among_others;

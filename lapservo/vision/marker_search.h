@@ -73,7 +73,8 @@ class MarkerSearch {
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
   Walk plain_, among_others_, free_, hidden_;
-  bool searches_long_ = false;  // what shows plainly was not found
+  bool mismatch_among_others_ = false;  // what is among others is a print that is off
+  bool searches_long_ = false;          // what shows plainly was not found
   bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;
   std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last

@@ -202,6 +202,11 @@ class Evidence {
     information_ = certainty * directions.eigenvalues().cwiseMax(0);
     squares_ = certainty * certainty * (directions.eigenvectors().transpose() * gradient).cwiseAbs2();
   }
+  // By how much a print of this standard deviation would be less likely than an exact one, if it looked exact
+  // (logarithm): about how rarely it looks so.
+  double exactness_nats(double sigma_mm) const {
+    return 0.5 * (1 + sigma_mm * sigma_mm * information_.array()).log().sum();
+  }
   // Logarithm of the likelihood of this standard deviation, compared with none.
   double gain(double sigma_mm) const {
     const double variance = sigma_mm * sigma_mm;
@@ -328,7 +333,8 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   if (!exact || !tolerated) return std::nullopt;
   // The exact print's pose is where the measurements were taken.
   if (tolerance_m == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
-  const Weights gains = gains_of(Evidence(sums, errors.doubt_scale), tolerance_mm);
+  const Evidence evidence(sums, errors.doubt_scale);
+  const Weights gains = gains_of(evidence, tolerance_mm);
   const Weights judged_by = weights_of(gains, print_limits.fractions);
   const Weights told_by = weights_of(gains, fractions_to_tell(errors.doubt_scale));
   Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
@@ -347,6 +353,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
+  fit.exactness_nats = evidence.exactness_nats(0.1);
   fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);

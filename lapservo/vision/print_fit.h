@@ -35,6 +35,7 @@ struct PrintFit {
   UnknownVector step;                    ///< to the mean of pose and film, from where the measurements were taken
   UnknownMatrix covariance;              ///< of the pose's unknowns, as it is to be told
   double psi_variance = 0;               ///< by which picture and print are judged
+  double exactness_nats = 0;             ///< how well an exact print is told from one that is off, whatever the pose is
   double off_probability = 0;            ///< that the print is off by more than the tolerance
   double psi_variance_by_tolerance = 0;  ///< of it, what the rig's tolerance adds to an exact print's
   double psi_variance_by_print = 0;      ///< and what the print adds beyond the tolerance

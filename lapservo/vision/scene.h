@@ -20,6 +20,7 @@ struct Scene {
   const Marker& marker;
   std::array<std::uint8_t, 3> bands;            ///< colour class of each band
   std::span<const ShaftCover* const> others{};  ///< that are known to be in the image
+  bool print_is_known = false;                  ///< it was seen to be as the rig says
 
   /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.
   static constexpr std::uint8_t outside = 255;

@@ -54,9 +54,11 @@ class ShaftCover {
   using EndsOfLines = std::array<std::array<double, 4>, lines>;  // where each visible line crosses the boundaries [m]
   static constexpr std::uint32_t bit(std::uint8_t color) { return color == 0 || color > 31 ? 0 : 1U << color; }
 
+  static constexpr double most_px = 1e6;
   std::optional<std::size_t> index(double u_px, double v_px) const {
+    if (!(u_px >= 0 && v_px >= 0 && u_px < most_px && v_px < most_px)) return std::nullopt;
     const int column = static_cast<int>(u_px) / cell_px - left_, row = static_cast<int>(v_px) / cell_px - top_;
-    if (!(u_px >= 0 && v_px >= 0) || column < 0 || row < 0 || column >= columns_ || row >= rows_) return std::nullopt;
+    if (column < 0 || row < 0 || column >= columns_ || row >= rows_) return std::nullopt;
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column);
   }
   void frame(const Camera& camera);

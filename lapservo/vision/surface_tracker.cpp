@@ -13,6 +13,7 @@
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/marker_pose.h"
+#include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
 namespace {
@@ -126,6 +127,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       channels_(rig.camera),
       memory_(rig.instruments.size()),
       searches_(rig.instruments.size()),
+      print_is_known_(rig.instruments.size()),
       found_(rig.instruments.size()),
       observations_(rig.instruments.size()) {
   others_.reserve(rig.instruments.size());
@@ -137,14 +139,17 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
 void SurfaceTracker::forget(std::size_t i) {
   memory_[i].reset();
   searches_[i] = MarkerSearch();
+  print_is_known_[i] = false;
 }
 
 void SurfaceTracker::forget() {
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) forget(i);
+  pairs_wait_ = false;
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
-  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_};
+  return {
+      image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_, print_is_known_[i] != 0};
 }
 
 void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
@@ -231,7 +236,10 @@ void SurfaceTracker::find_pair(const ImageView& image, const LightImage& light, 
   find_others(i, j, budget);
   const Scene scene = scene_of(image, i);
   const std::vector<Blob> left = without(blobs, others_);
-  Found beside = MarkerSearch::look_plainly({scene, light, left, rig_.instruments[i].camera_from_rcm}, budget);
+  // What is left then follows j.
+  Found beside = budget.share(budget.left() - search_costs.follow(), WorkBudget::Beyond::one, [&](WorkBudget& part) {
+    return MarkerSearch::look_plainly({scene, light, left, rig_.instruments[i].camera_from_rcm}, part);
+  });
   covers_[j].clear();  // where it is supposed
   if (!beside.fit && !beside.seems) return;
   cover_of(i, beside.fit ? beside.fit->unknowns.pose() : *beside.seems);
@@ -306,6 +314,7 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     if (!found.fit) continue;
     observations_[i] = observation_of(scene_of(image, i), *found.fit, rig_.instruments[i].camera_from_rcm);
     remember(i, *found.fit);
+    print_is_known_[i] |= shows_the_print(*found.fit);
   }
   return observations_;
 }

@@ -64,6 +64,7 @@ class SurfaceTracker {
   ChannelGeometry channels_;
   std::vector<std::optional<Memory>> memory_;
   std::vector<MarkerSearch> searches_;
+  std::vector<char> print_is_known_;  // by instrument: it was seen to be as the rig says
   std::vector<Found> found_;
   std::vector<ShaftCover> covers_;         // of those that are known in this frame, where somebody asked
   bool pairs_wait_ = false;                // the frame before had no time for them

@@ -126,7 +126,9 @@ Status validate(const Scene& scene, const FineFit& fit, Surroundings surrounding
     return Status::occluded;
   // With the RCM both ends confirm what is left of a hidden marker; without it they are needed always.
   const bool in_image = agreement.in_image > limits.wholly_in_image;
-  const bool needs_both_ends = !fit.unknowns.q() || (fraction < limits.mostly_hidden && in_image);
+  const bool hidden_by_another = !scene.others.empty() && !in_image;
+  const bool needs_both_ends = !fit.unknowns.q() || (fraction < limits.mostly_hidden && in_image) ||
+                               (hidden_by_another && fraction < limits.well_located_beside_another);
   if (needs_both_ends &&
       std::min(fit.used[0], fit.used[3]) < std::max(limits.min_of_end, fit.lines / limits.end_one_in))
     return agreement.in_image < limits.wholly_in_image ? Status::cut : Status::occluded;
@@ -150,9 +152,16 @@ Status validate(const Scene& scene, const FineFit& fit, Surroundings surrounding
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
   const Status status = validate_sigma(fit, agreement);
-  // Where another instrument hides a part, that is what makes boundaries miss.
-  const bool hidden = !scene.others.empty() && agreement.in_image < limits.wholly_in_image;
-  return status == Status::marker_mismatch && hidden ? Status::occluded : status;
+  return status == Status::ok && hidden_by_another && !knows_the_print(scene, fit) ? Status::occluded : status;
+}
+
+bool knows_the_print(const Scene& scene, const FineFit& fit) {
+  return scene.print_is_known || fit.exactness_nats > limits.min_exactness_nats;
+}
+
+bool shows_the_print(const FineFit& fit) {
+  return fit.exactness_nats > limits.nats_of_known && fit.print_off_probability < limits.off_probability_of_known &&
+         fit.located_fraction() > limits.well_located_beside_another;
 }
 
 bool convinces_beside_another(const Scene& scene, const FineFit& fit) {

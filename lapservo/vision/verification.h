@@ -27,6 +27,13 @@ enum class Surroundings {
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
 Status validate(const Scene& scene, const FineFit& fit, Surroundings surroundings = Surroundings::empty);
 
+/// Whether a print that is off would show in what is left of a marker, or is known to be the rig's. Where much is
+/// hidden one boundary may hold psi, and a print's error looks like a turn.
+bool knows_the_print(const Scene& scene, const FineFit& fit);
+
+/// Whether a fit shows the print to be the rig's, for the frames to come.
+bool shows_the_print(const FineFit& fit);
+
 /// Whether a fit that is not good enough would be, of a marker that shows well, if another instrument's lay beside it.
 bool convinces_beside_another(const Scene& scene, const FineFit& fit);
 
