@@ -16,10 +16,7 @@
 #include "lapservo/calibration/marker_calibration.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
-#include "lapservo/io/video_reader.h"
-#include "lapservo/io/video_writer.h"
 #include "lapservo/testing/camera_effects.h"
-#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::acceptance {
 using namespace internal;
@@ -95,16 +92,6 @@ std::vector<double> errors_over_sigmas(const Marker& found, const Marker& truth)
   all.push_back((found.skew_m - truth.skew_m) / *found.sigmas.skew_m);
   if (found.gap_rad > 0) all.push_back((found.gap_rad - truth.gap_rad) / *found.sigmas.gap_rad);
   return all;
-}
-
-void compress(std::vector<TrueFrame>& frames) {
-  const testing::TemporaryFolder folder;
-  const auto path = folder.path() / "turn.mp4";
-  VideoWriter writer(path, 30);
-  for (const TrueFrame& frame : frames) writer.add(frame.bgr);
-  writer.commit();
-  VideoReader reader(path);
-  for (TrueFrame& frame : frames) frame.bgr = reader.next().value().bgr.clone();
 }
 
 std::string text_of(const std::map<std::string, int>& statuses) {

@@ -11,11 +11,14 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/video_reader.h"
+#include "lapservo/io/video_writer.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/sample_frames.h"
+#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::acceptance {
 using namespace internal;
@@ -171,6 +174,16 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
     frames.push_back(std::move(frame));
   }
   return frames;
+}
+
+void compress(std::vector<TrueFrame>& frames) {
+  const testing::TemporaryFolder folder;
+  const auto path = folder.path() / "frames.mp4";
+  VideoWriter writer(path, 30);
+  for (const TrueFrame& frame : frames) writer.add(frame.bgr);
+  writer.commit();
+  VideoReader reader(path);
+  for (TrueFrame& frame : frames) frame.bgr = reader.next().value().bgr.clone();
 }
 
 std::vector<std::vector<JointVector>> random_configurations(const Rig& rig, int count, std::uint64_t seed,

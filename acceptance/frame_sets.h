@@ -75,6 +75,9 @@ struct RenderedSet {
 };
 std::vector<TrueFrame> rendered_frames(const RenderedSet& set);
 
+/// The frames as a video of theirs (H.264, 30 frames/s) gives them back.
+void compress(std::vector<TrueFrame>& frames);
+
 /// The rig of configs/example.yaml.
 Rig example_rig();
 

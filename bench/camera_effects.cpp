@@ -13,9 +13,6 @@
 
 #include "acceptance/frame_sets.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/io/video_reader.h"
-#include "lapservo/io/video_writer.h"
-#include "lapservo/testing/temporary_folder.h"
 
 namespace {
 using namespace lapservo;
@@ -64,7 +61,6 @@ void score_condition(const std::string& condition, const std::vector<TrueFrame>&
 // To and fro between two poses, through libavcodec.
 void score_video(int poses, std::uint64_t seed) {
   constexpr int frames_each = 30;
-  const testing::TemporaryFolder folder;
   Score score;
   for (int i = 0; i * frames_each < poses; ++i) {
     RenderedSet set;
@@ -76,13 +72,9 @@ void score_video(int poses, std::uint64_t seed) {
       set.configurations.push_back(
           {JointVector::from_vector(from + (to - from) * (0.5 - 0.5 * std::cos(two_pi * k / frames_each)) / 4)});
     auto frames = rendered_frames(set);
-    const auto path = folder.path() / (std::to_string(i) + ".mp4");
-    VideoWriter writer(path, 30);
-    for (const TrueFrame& frame : frames) writer.add(frame.bgr);
-    writer.commit();
-    VideoReader reader(path);
+    compress(frames);
     Tracker tracker(set.rig);
-    for (TrueFrame& frame : frames) score.add(frame, tracker.track(reader.next().value().bgr));
+    for (const TrueFrame& frame : frames) score.add(frame, tracker.track(frame.bgr));
   }
   print_row("h264", score);
 }

@@ -14,6 +14,15 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t enough_live_views = 12;
+// Of a video four frames a second are looked at, as a hand moves a board, and about so many of a long one: the corners
+// of 1280x720 take some 60 ms to find, the views kept are at most a tenth of these.
+constexpr std::size_t enough_frames = 120;
+
+int every_of_video(const FrameSource& source) {
+  const int quarter_second = std::max(1, static_cast<int>(source.frames_per_second() / 4));
+  const std::size_t frames = source.frame_count().value_or(0);
+  return std::max(quarter_second, static_cast<int>((frames + enough_frames - 1) / enough_frames));
+}
 
 std::string name_of(const Frame& frame) {
   return frame.file.empty() ? fmt::format("frame {}", frame.index) : frame.file.string();
@@ -59,7 +68,7 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
                               const std::function<void(const std::string&)>& say) {
   const bool pictures = source.kind() == FrameSource::Kind::image || source.kind() == FrameSource::Kind::folder;
   const bool live = source.kind() == FrameSource::Kind::live;
-  const int every = pictures || live ? 1 : std::max(1, static_cast<int>(source.frames_per_second() / 4));
+  const int every = pictures || live ? 1 : every_of_video(source);
   std::string said;
   int read = 0;
   while (!(read_.stopped = watch.stopped())) {

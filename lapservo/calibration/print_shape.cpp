@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "lapservo/core/rounded_sigma.h"
 #include "lapservo/marker/sensitivity.h"
 
 namespace lapservo::internal {
@@ -17,13 +18,6 @@ PrintNumbers upper_row(int boundary) {
 }
 PrintNumbers lower_row(int boundary) {
   return unit(3 + boundary);
-}
-
-// The last digits of an estimated covariance differ from run to run.
-double three_digits(double sigma) {
-  if (!(sigma > 0) || !std::isfinite(sigma)) return sigma;
-  const double units = std::pow(10.0, 2 - std::floor(std::log10(sigma)));
-  return std::round(sigma * units) / units;
 }
 
 }  // namespace
@@ -59,7 +53,7 @@ PrintShape changed_by(const PrintShape& shape, const PrintNumbers& change) {
 }
 
 MarkerSigmas sigmas_of(const PrintCovariance& covariance, MarkerSigmas others) {
-  const auto sigma = [&](const PrintNumbers& row) { return three_digits(std::sqrt(row.dot(covariance * row))); };
+  const auto sigma = [&](const PrintNumbers& row) { return rounded_sigma(std::sqrt(row.dot(covariance * row))); };
   std::array<double, 3> upper{}, lower{};
   for (int i = 0; i < 3; ++i) {
     upper[static_cast<std::size_t>(i)] = sigma(upper_row(i + 1) - upper_row(i));
@@ -86,7 +80,7 @@ double tolerance_of(const PrintShape& shape, const PrintCovariance& covariance, 
     const double unit_rad = predicted_print_error_rad(printed, tau_rad, 1);
     of_a_metre += unit_rad * unit_rad;
   }
-  return three_digits(std::sqrt(variance / of_a_metre));
+  return rounded_sigma(std::sqrt(variance / of_a_metre));
 }
 
 }  // namespace lapservo::internal

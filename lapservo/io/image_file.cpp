@@ -12,8 +12,8 @@
 
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
-#include "lapservo/core/lower_case.h"
 #include "lapservo/core/input_file.h"
+#include "lapservo/core/lower_case.h"
 #include "lapservo/io/exif_orientation.h"
 #include "lapservo/io/image_encoding.h"
 #include "lapservo/io/jpeg_picture.h"

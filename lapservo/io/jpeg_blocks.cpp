@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 namespace lapservo::internal {
 namespace {
@@ -43,13 +45,12 @@ bool is_impossible(const JCOEF* block, float quantum) {
 }
 
 // One row of MCUs' upper borders, below the row of blocks before.
-void add_steps(JpegComponent& component, int across, JBLOCKROW row, const JQUANT_TBL& scale) {
-  const int width = static_cast<int>(component.above.size());
-  for (int first = 0; first < width; first += across) {
-    const int end = std::min(first + across, width);
+void add_steps(JpegComponent& component, int across, const std::vector<JpegBorderLight>& below) {
+  const std::size_t width = below.size(), step_width = static_cast<std::size_t>(across);
+  for (std::size_t first = 0; first < width; first += step_width) {
+    const std::size_t end = std::min(first + step_width, width);
     float step = 0;
-    for (int i = first; i < end; ++i)
-      step += step_between(component.above[static_cast<std::size_t>(i)], border_light(row[i], scale));
+    for (std::size_t i = first; i < end; ++i) step += step_between(component.above[i], below[i]);
     component.steps.push_back(step / static_cast<float>(end - first));
   }
 }
@@ -66,14 +67,17 @@ void read_component(jpeg_decompress_struct& info, int index, jvirt_barray_ptr co
   component.quantum = quantum_of(scale);
   component.columns = (static_cast<int>(layout.width_in_blocks) + across - 1) / across;
   component.above.resize(layout.width_in_blocks);
+  std::vector<JpegBorderLight> light(layout.width_in_blocks);
   for (JDIMENSION i = 0; i < layout.height_in_blocks; ++i) {
     JBLOCKROW row = *info.mem->access_virt_barray(reinterpret_cast<j_common_ptr>(&info), coefficients, i, 1, FALSE);
-    if (i == 0) component.steps.assign(static_cast<std::size_t>(component.columns), 0);
-    if (i > 0 && i % down == 0) add_steps(component, across, row, scale);
-    for (std::size_t column = 0; column < component.above.size(); ++column) {
+    const bool first_of_mcu = i % down == 0, last_of_mcu = i % down + 1 == down;
+    for (std::size_t column = 0; column < light.size(); ++column) {
       component.has_impossible = component.has_impossible || is_impossible(row[column], component.quantum);
-      if (i % down + 1 == down) component.above[column] = border_light(row[column], scale);
+      if (first_of_mcu || last_of_mcu) light[column] = border_light(row[column], scale);
     }
+    if (i == 0) component.steps.assign(static_cast<std::size_t>(component.columns), 0);
+    if (i > 0 && first_of_mcu) add_steps(component, across, light);
+    if (last_of_mcu) std::swap(component.above, light);
   }
 }
 

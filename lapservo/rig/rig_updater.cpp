@@ -8,6 +8,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/input_file.h"
+#include "lapservo/core/rounded_sigma.h"
 
 namespace lapservo::internal {
 namespace {
@@ -58,10 +59,6 @@ std::string exact(double value) {
 std::string rounded_hue(double value) {
   return fmt::format("{:.2f}", value);
 }
-// Of a standard deviation.
-std::string rounded(double value) {
-  return fmt::format("{:.3g}", value);
-}
 
 template <typename Numbers, typename Text>
 YAML::Node list_of(const Numbers& numbers, Text text) {
@@ -109,10 +106,10 @@ std::string updated_rig_yaml(const RigText& rig, const fs::path& destination, st
   return with_instrument(rig, destination, instrument, [&](YAML::Node entry) {
     YAML::Node transform;
     transform["translation_m"] = list_of(measured.camera_from_rcm.translation, exact);
-    transform["sigma_translation_m"] = list_of(measured.sigma_translation_m, rounded);
+    transform["sigma_translation_m"] = list_of(measured.sigma_translation_m, sigma_text);
     transform["quaternion_xyzw"] = list_of(measured.camera_from_rcm.rotation.coeffs(), exact);
     if (measured.sigma_quaternion_xyzw)
-      transform["sigma_quaternion_xyzw"] = list_of(*measured.sigma_quaternion_xyzw, rounded);
+      transform["sigma_quaternion_xyzw"] = list_of(*measured.sigma_quaternion_xyzw, sigma_text);
     entry["camera_from_rcm"] = transform;
     if (measured.joints) {
       YAML::Node joints;
@@ -120,12 +117,12 @@ std::string updated_rig_yaml(const RigText& rig, const fs::path& destination, st
       for (const std::string& name : measured.joints->names) joints["names"].push_back(name);
       joints["sign"] = list_of(measured.joints->sign, exact);
       joints["offset"] = list_of(measured.joints->offset, exact);
-      joints["sigma_offset"] = list_of(measured.sigma_offset, rounded);
+      joints["sigma_offset"] = list_of(measured.sigma_offset, sigma_text);
       entry["joints"] = joints;
     }
     if (measured.image_delay_s) {
       entry["image_delay_s"] = exact(*measured.image_delay_s);
-      entry["sigma_image_delay_s"] = rounded(measured.sigma_image_delay_s);
+      entry["sigma_image_delay_s"] = sigma_text(measured.sigma_image_delay_s);
     }
   });
 }
@@ -142,7 +139,7 @@ std::string updated_rig_yaml(const RigText& rig, const fs::path& destination, st
   const auto with_colour = [&](YAML::Node entry) {
     YAML::Node marker = entry["marker"];
     marker["hues_deg"] = list_of(colour.hues_deg, rounded_hue);
-    marker["sigma_hues_deg"] = list_of(colour.sigma_hues_deg, rounded);
+    marker["sigma_hues_deg"] = list_of(colour.sigma_hues_deg, sigma_text);
   };
   return edited(root, rig.path, destination, instrument, with_colour);
 }
@@ -154,12 +151,15 @@ bool is_response_measured(const RigText& rig) {
 std::optional<double> sigma_of_response(const RigText& rig) {
   const YAML::Node sigma = camera_of(YAML::Load(rig.yaml), rig.path)["sigma_response"];
   if (!sigma.IsDefined()) return std::nullopt;
-  return sigma.as<double>(std::numeric_limits<double>::quiet_NaN());
+  const double value = sigma.as<double>(std::numeric_limits<double>::quiet_NaN());
+  return value == 0 ? std::nullopt : std::optional(value);
 }
 
 std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas) {
   YAML::Node root = YAML::Load(rig.yaml);
-  root["camera"] = YAML::Load(measured_camera_yaml(camera, sigmas));
+  CameraSigmas known = sigmas;
+  if (known.response == 0) known.response = sigma_of_response(rig).value_or(0);
+  root["camera"] = YAML::Load(measured_camera_yaml(camera, known));
   return text_of(root);
 }
 

@@ -57,14 +57,16 @@ struct MeasuredColour {
 std::string updated_rig_yaml(const RigText& rig, const std::filesystem::path& destination, std::size_t instrument,
                              const MeasuredColour& colour);
 
-/// The same with another camera, which stands in the rig itself whatever file the old one came from.
+/// The same with another camera, which stands in the rig itself whatever file the old one came from. Where its response
+/// was not measured it is the rig's, whose sigma_response stays.
 std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas);
 
 /// Whether a rig's camera has a response that was measured: sigma_response stands beside it. The rig must have been
 /// read without complaint.
 bool is_response_measured(const RigText& rig);
 
-/// That sigma_response; NaN where it is no number.
+/// That sigma_response; NaN where it is no number. Nullopt for 0, too, by which earlier versions said that it was not
+/// measured.
 std::optional<double> sigma_of_response(const RigText& rig);
 
 /// What one of these made for a file at `rig.path`, for one at `destination`: a camera file is found from there.

@@ -141,6 +141,18 @@ TEST(UpdatedRig, MayMoveAsIfMadeForThere) {
   }
 }
 
+TEST(UpdatedRig, SaysNothingOfAResponseThatWasNotMeasured) {
+  const Files files;
+  const auto path = files.folder / "rig.yaml";
+  const RigText rig = RigText::read(path);
+  const std::string text = updated_rig_yaml(rig, load_rig(path).camera, {});
+  EXPECT_EQ(text.find("sigma_response"), std::string::npos) << text;
+  EXPECT_FALSE(is_response_measured({text, path}));
+  std::string earlier = text;  // as earlier versions wrote it
+  earlier.insert(earlier.find("response:"), "sigma_response: 0\n  ");
+  EXPECT_FALSE(is_response_measured({earlier, path})) << earlier;
+}
+
 TEST(UpdatedRig, HoldsAnotherCamera) {
   const Files files;
   const auto path = files.folder / "rig.yaml";
@@ -158,6 +170,8 @@ TEST(UpdatedRig, HoldsAnotherCamera) {
   testing::write_file(path, text);
   EXPECT_TRUE(is_response_measured(RigText::read(path)));
   EXPECT_EQ(sigma_of_response(RigText::read(path)), 0.003);
+  sigmas.response = 0;  // another time the pictures don't tell
+  EXPECT_EQ(updated_rig_yaml(RigText::read(path), measured, sigmas), text);
   const Rig updated = load_rig(path);
   EXPECT_TRUE(updated.camera_file.empty());
   EXPECT_EQ(updated.camera.fx_px, measured.fx_px);

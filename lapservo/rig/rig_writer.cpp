@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "lapservo/core/rounded_sigma.h"
+
 namespace lapservo::internal {
 namespace {
 
@@ -18,15 +20,10 @@ std::string list_of(const Numbers& numbers) {
   return fmt::format("[{}]", fmt::join(numbers, ", "));
 }
 
-// Of standard deviations: three digits, the last ones of an estimate differ from run to run.
-std::string rounded(double sigma) {
-  return fmt::format("{:.3g}", sigma);
-}
-
 template <typename Numbers>
 std::string rounded_list_of(const Numbers& sigmas) {
   std::string text;
-  for (const double sigma : sigmas) text += (text.empty() ? "" : ", ") + rounded(sigma);
+  for (const double sigma : sigmas) text += (text.empty() ? "" : ", ") + sigma_text(sigma);
   return "[" + text + "]";
 }
 
@@ -103,11 +100,12 @@ std::string measured_camera_yaml(const Camera& camera, const CameraSigmas& sigma
           "sigma_camera_matrix: " + matrix_of(3, 3, rounded_list_of(sigma));
   text += "distortion_coefficients: " + matrix_of(1, 5, list_of(camera.distortion)) +
           "sigma_distortion_coefficients: " + matrix_of(1, 5, rounded_list_of(sigmas.distortion));
-  text += fmt::format("response: {}\nsigma_response: {}\n", response_yaml(camera.response), rounded(sigmas.response));
+  text += fmt::format("response: {}\n", response_yaml(camera.response));
+  if (sigmas.response > 0) text += fmt::format("sigma_response: {}\n", sigma_text(sigmas.response));
   const ChromaticAberration& aberration = camera.chromatic_aberration;
   text += fmt::format("lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", aberration.blue, aberration.red);
-  text += fmt::format("sigma_lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", rounded(sigmas.blue),
-                      rounded(sigmas.red));
+  text += fmt::format("sigma_lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", sigma_text(sigmas.blue),
+                      sigma_text(sigmas.red));
   if (camera.deinterlace) text += "deinterlace: true\n";
   return text;
 }

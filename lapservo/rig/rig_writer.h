@@ -15,7 +15,7 @@ struct CameraSigmas {
   double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
   std::array<double, 5> distortion{};
   double blue = 0, red = 0;  ///< of the lateral chromatic aberration
-  double response = 0;       ///< of encoded values (0 to 1)
+  double response = 0;       ///< of encoded values (0 to 1); 0: was not measured, and is not written
 };
 
 /// The lines of a rig's `camera`, or of a camera file, with one standard deviation of each number.

@@ -31,6 +31,14 @@ struct Blotch {
   double azimuth_rad, along_m, radius_m;  ///< azimuth on the marker (tau)
 };
 
+/// What else may be printed on the film in the place of the bands: cells, dark or bright, a row after the other. Rows
+/// go round from tau = 0, columns along from the proximal end, all of one size.
+struct PrintedCells {
+  int rows = 0, columns = 0;
+  std::vector<std::uint8_t> dark;  ///< rows * columns; 0: bright
+  static constexpr float bright_reflectance = 0.6F, dark_reflectance = 0.03F;
+};
+
 /// A shaft with its marker as a physical thing: the print on a film around a thinner black shaft with a rounded tip.
 struct ShaftModel {
   Marker marker;
@@ -38,6 +46,7 @@ struct ShaftModel {
   double shaft_before_m = 0.3;    ///< length of shaft shown on the proximal side
   double shaft_beyond_m = 0.012;  ///< and on the distal side, before the tip
   std::vector<Blotch> blotches;
+  PrintedCells cells{};  ///< none: the marker's bands
 
   double tip_radius_m() const { return 1.05 * marker.radius_m(); }
 };

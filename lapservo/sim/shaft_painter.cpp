@@ -73,6 +73,10 @@ void PixelRays::fill(RayRow& rays, int begin, int v) const {
 ShaftPainter::ShaftPainter(const ShaftModel& model, const ShaftPlacement& placement, const Lighting& lighting,
                            const Disc& tip)
     : tracer_(model, placement), lighting_(lighting, tracer_), reflectances_(reflectances(model.marker)), tip_(tip) {
+  if (model.cells.rows > 0) {
+    reflectances_.at(static_cast<std::size_t>(Part::band_0)) = Light::Constant(PrintedCells::bright_reflectance);
+    reflectances_.at(static_cast<std::size_t>(Part::band_2)) = Light::Constant(PrintedCells::dark_reflectance);
+  }
   if (placement.covered)
     for (const Part band : {Part::band_0, Part::band_1, Part::band_2})
       reflectances_.at(static_cast<std::size_t>(band)) = reflectances_.at(static_cast<std::size_t>(Part::blood));

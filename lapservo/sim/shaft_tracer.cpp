@@ -29,7 +29,8 @@ void RayRow::resize(std::size_t count) {
   part.resize(count);
 }
 
-ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placement) : blotches_(model.blotches) {
+ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placement)
+    : blotches_(model.blotches), cells_(model.cells) {
   const Marker& marker = model.marker;
   const Rigid3 unrolled_from_camera = placement.camera_from_unrolled.inverse();
   const Eigen::Vector3d camera = unrolled_from_camera.translation;
@@ -61,6 +62,7 @@ ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placemen
 void ShaftTracer::trace(RayRow& rays, bool with_tip) const {
   square_ ? trace_square(rays) : trace_askew(rays);
   if (with_tip) trace_tip(rays);
+  if (cells_.rows > 0) print(rays);
   if (!blotches_.empty()) stain(rays);
 }
 
@@ -176,6 +178,18 @@ void ShaftTracer::trace_tip(RayRow& rays) const {
     if (depth_m < nearest_m || (rays.part[i] != Part::nothing && rays.depth_m[i] < depth_m)) continue;
     rays.part[i] = Part::tip;
     rays.depth_m[i] = depth_m;
+  }
+}
+
+void ShaftTracer::print(RayRow& rays) const {
+  const auto cell = [](float place, float whole, int count) {
+    return std::clamp(static_cast<int>(place / whole * static_cast<float>(count)), 0, count - 1);
+  };
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!is_band(rays.part[i])) continue;
+    const int row = cell(tau_rad(rays.azimuth_rad[i]), full_turn, cells_.rows);
+    const int column = cell(rays.along_m[i], length_m_, cells_.columns);
+    rays.part[i] = cells_.dark[static_cast<std::size_t>(row * cells_.columns + column)] ? Part::band_2 : Part::band_0;
   }
 }
 

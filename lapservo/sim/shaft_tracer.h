@@ -10,7 +10,8 @@
 
 namespace lapservo::internal {
 
-/// What a camera ray meets first on a shaft. `film_edge` is the face of the film at the marker's two ends.
+/// What a camera ray meets first on a shaft. Of printed cells the bright ones are band_0, the dark ones band_2.
+/// `film_edge` is the face of the film at the marker's two ends.
 enum class Part : std::uint8_t { nothing, band_0, band_1, band_2, shaft, film_edge, tip, blood };
 
 constexpr bool is_band(Part part) {
@@ -63,6 +64,7 @@ class ShaftTracer {
   void trace_square(RayRow& rays) const;
   void trace_askew(RayRow& rays) const;
   void trace_tip(RayRow& rays) const;
+  void print(RayRow& rays) const;
   void stain(RayRow& rays) const;
 
   bool visible_;
@@ -78,6 +80,7 @@ class ShaftTracer {
   float covered_rad_;
   bool square_;  // both ends are circles, and the print reaches round
   std::vector<Blotch> blotches_;
+  PrintedCells cells_;
 };
 
 }  // namespace lapservo::internal

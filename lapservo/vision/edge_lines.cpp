@@ -44,6 +44,11 @@ struct LineLanes {
   std::size_t samples = 0;  // of the longest
 };
 
+// How many samples each line has.
+V samples_of(const LineLanes& lines) {
+  return hn::Add(hn::Sub(lines.last.load(), lines.first.load()), hn::Set(Floats(), 1));
+}
+
 LineLanes lanes_of(std::span<const EdgeLine> lines, std::size_t lanes) {
   LineLanes out;
   for (std::size_t j = 0; j < lanes; ++j) {
@@ -145,7 +150,7 @@ struct BlurredLanes {
 };
 
 template <bool WithRoots>
-BlurredLanes blurred_at(V u) {
+HWY_INLINE BlurredLanes blurred_at(const BlurredEdge* table, V u) {
   const Floats d;
   const V first = hn::Set(d, BlurredEdges::first_u), last = hn::Set(d, BlurredEdges::last_u);
   const V per_sigma = hn::Set(d, static_cast<float>(BlurredEdges::per_sigma));
@@ -155,7 +160,7 @@ BlurredLanes blurred_at(V u) {
   constexpr int stride = sizeof(BlurredEdge) / sizeof(float);
   const VI index = hn::Mul(i, hn::Set(Ints(), stride));
   const auto field = [&](int offset) HWY_ATTR {
-    const float* entries = &BlurredEdges::instance().entries()->density + offset;
+    const float* entries = &table->density + offset;
     const V here = hn::GatherIndex(d, entries, index), next = hn::GatherIndex(d, entries + stride, index);
     return hn::MulAdd(f, hn::Sub(next, here), here);
   };
@@ -172,15 +177,17 @@ BlurredLanes blurred_at(V u) {
   return edge;
 }
 
-V dot(const Column& a, const Column& b, std::size_t samples) {
-  V even = hn::Zero(Floats()), odd = even;
-  std::size_t i = 0;
-  for (; i + 1 < samples; i += 2) {
-    even = hn::MulAdd(a[i].load(), b[i].load(), even);
-    odd = hn::MulAdd(a[i + 1].load(), b[i + 1].load(), odd);
+// The dot products of columns with one, which is read once.
+template <std::size_t Count>
+HWY_INLINE std::array<V, Count> dots(const std::array<const Column*, Count>& columns, const Column& with,
+                                     std::size_t samples) {
+  std::array<V, Count> sums;
+  sums.fill(hn::Zero(Floats()));
+  for (std::size_t i = 0; i < samples; ++i) {
+    const V here = with[i].load();
+    for (std::size_t k = 0; k < Count; ++k) sums[k] = hn::MulAdd((*columns[k])[i].load(), here, sums[k]);
   }
-  if (i < samples) even = hn::MulAdd(a[i].load(), b[i].load(), even);
-  return hn::Add(even, odd);
+  return sums;
 }
 
 void subtract(Column& from, V factor, const Column& column, std::size_t samples) {
@@ -191,26 +198,28 @@ void scale(Column& column, V factor, std::size_t samples) {
   for (std::size_t i = 0; i < samples; ++i) column[i].store(hn::Mul(factor, column[i].load()));
 }
 
-// The model's linear basis, a constant and then the shapes, made orthonormal; and the parts of the shapes' derivatives,
-// by the edge's position and by the blur, that it can't imitate. Common to the three channels.
+// The model's linear basis, a constant and then the shapes, made orthonormal; and the shapes' derivatives by the edge's
+// position and by the blur, with the Gram matrices of what the basis can't imitate of them. Common to the three
+// channels.
 template <std::size_t Shapes>
 struct Basis {
   static constexpr std::size_t linear = Shapes + 1;
+  using Columns = std::array<Column, Shapes>;
+  using Imitated = std::array<std::array<V, linear>, Shapes>;  // of each derivative, along each unit
+  using Gram = std::array<std::array<V, Shapes>, Shapes>;
+
   std::array<Column, linear> unit;
   std::array<std::array<V, linear>, linear> triangle;  // of the orthogonalisation
-  std::array<Column, Shapes> by_position, by_blur;
-  std::array<std::array<V, Shapes>, Shapes> position_gram, blur_gram;
+  Columns by_position, by_blur;
+  Imitated position_imitated, blur_imitated;
+  Gram position_gram, blur_gram;
   Mask independent;
 
   Basis(const LineLanes& lines, const Column& present, V edge_px) {
-    unit[0] = present;
     fill(lines, present, edge_px);
-    orthogonalise(lines.samples);
-    for (std::size_t s = 0; s < Shapes; ++s)
-      for (std::size_t t = 0; t < Shapes; ++t) {
-        position_gram[s][t] = dot(by_position[s], by_position[t], lines.samples);
-        blur_gram[s][t] = dot(by_blur[s], by_blur[t], lines.samples);
-      }
+    orthogonalise(lines, present);
+    tell_apart(by_position, lines.samples, position_imitated, position_gram);
+    tell_apart(by_blur, lines.samples, blur_imitated, blur_gram);
   }
 
  private:
@@ -225,10 +234,11 @@ struct Basis {
       rise = hn::Mul(root_scale, root_blur), fall = hn::Div(root_scale, root_blur);
       bend = hn::Div(blur, hn::Mul(hn::Set(d, 4), radius));
     }
+    const BlurredEdge* table = BlurredEdges::instance().entries();
     V from_edge = hn::Sub(lines.first.load(), edge_px);
     for (std::size_t i = 0; i < lines.samples; ++i, from_edge = hn::Add(from_edge, one)) {
       const V here = present[i].load(), u = hn::Mul(from_edge, inverse_blur);
-      const BlurredLanes edge = blurred_at<Shapes == 2>(u);
+      const BlurredLanes edge = blurred_at<Shapes == 2>(table, u);
       const V slope = hn::Neg(hn::Mul(hn::Mul(here, edge.density), inverse_blur));
       unit[1][i].store(hn::Mul(here, edge.step));
       by_position[0][i].store(slope);
@@ -243,26 +253,40 @@ struct Basis {
     }
   }
 
-  void orthogonalise(std::size_t samples) {
+  void orthogonalise(const LineLanes& lines, const Column& present) {
     const Floats d;
-    independent = hn::Eq(hn::Zero(d), hn::Zero(d));
-    for (std::size_t j = 0; j < linear; ++j) {
+    const std::size_t samples = lines.samples;
+    triangle[0][0] = hn::Sqrt(samples_of(lines));
+    const V constant = hn::Div(hn::Set(d, 1), triangle[0][0]);
+    for (std::size_t i = 0; i < samples; ++i) unit[0][i].store(hn::Mul(constant, present[i].load()));
+    independent = hn::Eq(constant, constant);
+    for (std::size_t j = 1; j < linear; ++j) {
       Column& column = unit[j];
-      const V before = dot(column, column, samples);
+      const V before = dots<1>({&column}, column, samples)[0];
       for (std::size_t k = 0; k < j; ++k) {
-        triangle[k][j] = dot(unit[k], column, samples);
+        triangle[k][j] = dots<1>({&unit[k]}, column, samples)[0];
         subtract(column, triangle[k][j], unit[k], samples);
       }
-      const V square = dot(column, column, samples);
+      const V square = dots<1>({&column}, column, samples)[0];
       independent = hn::And(independent, hn::Gt(square, hn::Mul(hn::Set(d, 1e-5F), before)));
       triangle[j][j] = hn::Sqrt(square);
       scale(column, hn::Div(hn::Set(d, 1), triangle[j][j]), samples);
     }
-    for (std::size_t s = 0; s < Shapes; ++s)
-      for (const Column& column : unit) {
-        subtract(by_position[s], dot(column, by_position[s], samples), column, samples);
-        subtract(by_blur[s], dot(column, by_blur[s], samples), column, samples);
+  }
+
+  void tell_apart(const Columns& derivatives, std::size_t samples, Imitated& imitated, Gram& gram) const {
+    for (std::size_t s = 0; s < Shapes; ++s) {
+      std::array<const Column*, linear + Shapes> columns;
+      for (std::size_t j = 0; j < linear; ++j) columns[j] = &unit[j];
+      for (std::size_t r = 0; r < Shapes; ++r) columns[linear + r] = &derivatives[r];
+      const auto products = dots(columns, derivatives[s], samples);
+      std::copy_n(products.begin(), linear, imitated[s].begin());
+      for (std::size_t r = 0; r <= s; ++r) {
+        V left = products[linear + r];
+        for (std::size_t j = 0; j < linear; ++j) left = hn::NegMulAdd(imitated[s][j], imitated[r][j], left);
+        gram[s][r] = gram[r][s] = left;
       }
+    }
   }
 };
 
@@ -273,20 +297,36 @@ struct FitLanes {
   Mask converged;
 };
 
+// What a line shows: light by channel, and the sums of its squares.
+struct LineLight {
+  const std::array<Column, 3>& light;
+  V squares;
+
+  LineLight(const std::array<Column, 3>& of_light, std::size_t samples) : light(of_light), squares(hn::Zero(Floats())) {
+    for (const Column& channel : light) squares = hn::Add(squares, dots<1>({&channel}, channel, samples)[0]);
+  }
+};
+
 // One variable-projection step: linear amplitudes per channel, then the position in what they leave.
 template <std::size_t Shapes>
-FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, const Column& present, V edge_px) {
+FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& present, V edge_px) {
   const Floats d;
   const V zero = hn::Zero(d);
   const Basis<Shapes> basis(lines, present, edge_px);
   constexpr std::size_t linear = Basis<Shapes>::linear;
+  std::array<const Column*, linear + 2 * Shapes> columns;
+  for (std::size_t j = 0; j < linear; ++j) columns[j] = &basis.unit[j];
+  for (std::size_t s = 0; s < Shapes; ++s) {
+    columns[linear + s] = &basis.by_position[s];
+    columns[linear + Shapes + s] = &basis.by_blur[s];
+  }
   FitLanes fit{zero, zero, zero, zero, zero, {zero, zero, zero}, basis.independent};
-  V position_gradient = zero, squares = zero;
+  V position_gradient = zero, squares = seen.squares;
   for (std::size_t c = 0; c < 3; ++c) {
+    const auto products = dots(columns, seen.light[c], lines.samples);
     std::array<V, linear> amplitude;
-    squares = hn::Add(squares, dot(light[c], light[c], lines.samples));
     for (std::size_t j = 0; j < linear; ++j) {
-      amplitude[j] = dot(basis.unit[j], light[c], lines.samples);
+      amplitude[j] = products[j];
       squares = hn::NegMulAdd(amplitude[j], amplitude[j], squares);
     }
     for (std::size_t j = linear; j-- > 0;) {
@@ -296,8 +336,13 @@ FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, con
     }
     for (std::size_t s = 0; s < Shapes; ++s) {
       const V a = amplitude[s + 1];
-      position_gradient = hn::MulAdd(a, dot(basis.by_position[s], light[c], lines.samples), position_gradient);
-      fit.blur_gradient = hn::MulAdd(a, dot(basis.by_blur[s], light[c], lines.samples), fit.blur_gradient);
+      V by_position = products[linear + s], by_blur = products[linear + Shapes + s];
+      for (std::size_t j = 0; j < linear; ++j) {
+        by_position = hn::NegMulAdd(basis.position_imitated[s][j], products[j], by_position);
+        by_blur = hn::NegMulAdd(basis.blur_imitated[s][j], products[j], by_blur);
+      }
+      position_gradient = hn::MulAdd(a, by_position, position_gradient);
+      fit.blur_gradient = hn::MulAdd(a, by_blur, fit.blur_gradient);
       for (std::size_t t = 0; t < Shapes; ++t) {
         const V both = hn::Mul(a, amplitude[t + 1]);
         fit.information = hn::MulAdd(both, basis.position_gram[s][t], fit.information);
@@ -306,8 +351,8 @@ FitLanes project(const LineLanes& lines, const std::array<Column, 3>& light, con
       fit.step[c] = hn::Add(fit.step[c], a);
     }
   }
-  const V samples = hn::Add(hn::Sub(lines.last.load(), lines.first.load()), hn::Set(d, 1));
-  const V degrees = hn::MulAdd(hn::Set(d, 3), hn::Sub(samples, hn::Set(d, static_cast<float>(linear))), hn::Set(d, -1));
+  const V degrees =
+      hn::MulAdd(hn::Set(d, 3), hn::Sub(samples_of(lines), hn::Set(d, static_cast<float>(linear))), hn::Set(d, -1));
   fit.offset = hn::Div(position_gradient, fit.information);
   fit.residual_variance = hn::Div(hn::Max(zero, squares), degrees);
   // Comparisons with what is not finite are false.
@@ -332,9 +377,9 @@ FitLanes select(Mask mask, const FitLanes& yes, const FitLanes& no) {
 
 // iterate() of edge_profile.cpp in every lane.
 template <std::size_t Shapes>
-FitLanes iterate(const LineLanes& lines, const std::array<Column, 3>& light, const Column& present, int iterations) {
+FitLanes iterate(const LineLanes& lines, const LineLight& light, const Column& present, int iterations) {
   const Floats d;
-  const V reach = hn::Mul(hn::Set(d, 0.5F), hn::Add(hn::Sub(lines.last.load(), lines.first.load()), hn::Set(d, 1)));
+  const V reach = hn::Mul(hn::Set(d, 0.5F), samples_of(lines));
   V edge_px = hn::Zero(d);
   FitLanes fit{};
   Mask active = hn::Eq(edge_px, edge_px);
@@ -362,7 +407,7 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
     present[i].store(hn::IfThenElseZero(hn::Le(t, lanes.last.load()), hn::Set(d, 1)));
   const SampledLanes sampled =
       image.channels().differs() ? sample<true>(image, lanes, present) : sample<false>(image, lanes, present);
-  const FitLanes fit = iterate<Shapes>(lanes, sampled.light, present, iterations);
+  const FitLanes fit = iterate<Shapes>(lanes, LineLight(sampled.light, lanes.samples), present, iterations);
   Lanes offset, information, variance, blur_gradient, blur_information, converged;
   std::array<Lanes, 3> step;
   offset.store(fit.offset), information.store(fit.information), variance.store(fit.residual_variance);

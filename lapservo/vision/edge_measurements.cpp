@@ -91,9 +91,9 @@ struct Frame {
 // Measurement::row of a point, moving along `pull` [px/m], with its parts by psi and by the film.
 UnknownVector row_of(const PoseUnknowns& unknowns, const Eigen::Vector3d& point, const Eigen::Vector3d& pull,
                      double by_psi, double by_film) {
-  UnknownVector row(unknowns.size() + 1);
-  row << unknowns.row(point, pull), by_film;
+  UnknownVector row = unknowns.row(point, pull, 1);
   row[unknowns.size() - 1] = by_psi;
+  row[unknowns.size()] = by_film;
   return row;
 }
 

@@ -5,10 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/core/median.h"
@@ -120,66 +119,85 @@ struct Sums {
 };
 
 // Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two
-// edges, the residual, and 1. Of fixed size, which is several times faster.
+// edges, the residual, and 1. Of fixed size, which is several times faster; symmetric, of which the lower half is
+// summed.
+template <int Unknowns>
 class Products {
  public:
+  static constexpr int at_print = Unknowns, at_residual = at_print + 2, at_one = at_print + 3;
+
   void add(const Measurement& m, double weight) {
     Row row = Row::Zero();
-    for (Eigen::Index i = 0; i < m.row.size(); ++i) row[i] = m.row[i];
-    row.segment<2>(at_print) = print_row(m);
+    row.template head<Unknowns>() = m.row.head<Unknowns>();
+    row.template segment<2>(at_print) = print_row(m);
     row[at_residual] = m.residual_px;
     row[at_one] = 1;
-    const Row weighted = weight * row;
-    sums_.noalias() += weighted * row.transpose();
+    add_columns(row, weight, std::make_integer_sequence<int, at_one + 1>());
   }
-  auto xx(int unknowns) const { return sums_.topLeftCorner(unknowns, unknowns); }
-  auto nx(int edge, int unknowns) const { return sums_.row(at_print + edge).head(unknowns); }
-  double nn(int edge, int other) const { return sums_(at_print + edge, at_print + other); }
-  auto x(Eigen::Index by, int unknowns) const { return sums_.col(by).head(unknowns); }
-  double n(Eigen::Index by, int edge) const { return sums_(at_print + edge, by); }
+  Eigen::Matrix<double, Unknowns, Unknowns> xx() const {
+    return sums_.template topLeftCorner<Unknowns, Unknowns>().template selfadjointView<Eigen::Lower>();
+  }
+  auto x(int by) const { return sums_.row(by).template head<Unknowns>(); }
+  auto nx(int edge) const { return x(at_print + edge); }
+  double nn(int edge, int other) const {
+    return sums_(at_print + std::max(edge, other), at_print + std::min(edge, other));
+  }
+  double n(int by, int edge) const { return sums_(by, at_print + edge); }
   double weight() const { return sums_(at_one, at_one); }
-  double residual() const { return sums_(at_residual, at_one); }
-  static constexpr Eigen::Index at_print = max_unknowns, at_residual = at_print + 2, at_one = at_print + 3;
+  double residual() const { return sums_(at_one, at_residual); }
 
  private:
-  static constexpr Eigen::Index size = at_one + 2;  // even: a whole number of registers
+  static constexpr int size = at_one + 1 + (at_one + 1) % 2;  // a whole number of registers
   using Row = Eigen::Matrix<double, size, 1>;
+
+  template <int... Columns>
+  void add_columns(const Row& row, double weight, std::integer_sequence<int, Columns...>) {
+    (add_column<Columns>(row, weight), ...);
+  }
+  template <int Column>
+  void add_column(const Row& row, double weight) {
+    constexpr int count = size - (Column - Column % 2);  // from a register's first on
+    sums_.col(Column).template tail<count>() += (weight * row[Column]) * row.template tail<count>();
+  }
+
   Eigen::Matrix<double, size, size> sums_ = Eigen::Matrix<double, size, size>::Zero();
 };
 
 // Adds a group's products to the sums of all, and tells its pull.
-Pull gathered(const Products& products, std::size_t group, int unknowns, Equations& all) {
+template <int Unknowns>
+Pull gathered(const Products<Unknowns>& products, std::size_t group, Equations& all) {
+  using Of = Products<Unknowns>;
   Pull pull;
-  pull.x = products.x(Products::at_one, unknowns);
+  pull.x = products.x(Of::at_one);
   pull.weight = products.weight();
   pull.residual = products.residual();
-  all.xx += products.xx(unknowns);
-  all.x += products.x(Products::at_residual, unknowns);
+  all.xx += products.xx();
+  all.x += products.x(Of::at_residual).transpose();
   if (group >= errors_of_boundary.size()) return pull;
   const auto& errors = errors_of_boundary[group];
   for (const int edge : {0, 1}) {
     const int error = errors[static_cast<std::size_t>(edge)];
-    all.nx.row(error) += products.nx(edge, unknowns);
+    all.nx.row(error) += products.nx(edge);
     for (const int other : {0, 1}) all.nn(error, errors[static_cast<std::size_t>(other)]) += products.nn(edge, other);
-    all.n[error] += products.n(Products::at_residual, edge);
-    pull.n[error] += products.n(Products::at_one, edge);
+    all.n[error] += products.n(Of::at_residual, edge);
+    pull.n[error] += products.n(Of::at_one, edge);
   }
   return pull;
 }
 
-Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
-             double film_prior, const CommonErrors& errors) {
-  const int unknowns = pose_unknowns + 1;
+template <int Unknowns>
+Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
+             const CommonErrors& errors) {
   const double certainty = 1 / (errors.noise_scale * errors.noise_scale);
-  std::array<Products, measurement_groups> products;
+  std::array<Products<Unknowns>, measurement_groups> products;
   for (const Measurement& m : measurements) {
     const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
     products[m.group].add(m, certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px));
   }
-  Sums sums{Equations(unknowns), {}};
-  sums.equations.add(UnknownVector::Unit(unknowns, pose_unknowns), PrintVector::Zero(), certainty, film_prior);
+  Sums sums{Equations(Unknowns), {}};
+  sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), certainty, film_prior);
   for (std::size_t group = 0; group < measurement_groups; ++group) {
-    sums.pulls[group] = gathered(products[group], group, unknowns, sums.equations);
+    sums.pulls[group] = gathered(products[group], group, sums.equations);
     sums.pulls[group].error_px = errors.noise_scale * errors.px[group];
   }
   return sums;
@@ -196,9 +214,9 @@ class Evidence {
         e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
     const auto inverse = inverse_of(e.xx);
     if (!inverse) return;  // the frame tells nothing of the print
-    const CrossMatrix through = e.nx * *inverse;
+    const CrossMatrix through = e.nx.lazyProduct(*inverse);
     const PrintVector gradient = e.n - through * e.x;
-    const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(e.nn - through * e.nx.transpose());
+    const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(e.nn - through.lazyProduct(e.nx.transpose()));
     information_ = certainty * directions.eigenvalues().cwiseMax(0);
     squares_ = certainty * certainty * (directions.eigenvectors().transpose() * gradient).cwiseAbs2();
   }
@@ -225,18 +243,34 @@ struct Solution {
   UnknownMatrix covariance;
 };
 
+// Of a matrix of the print's errors: a measurement is of one boundary, so boundaries stand in blocks of their own.
+PrintMatrix inverse_by_boundary(const PrintMatrix& information) {
+  PrintMatrix inverse = PrintMatrix::Zero();
+  for (const auto& [upper, lower] : errors_of_boundary) {
+    const double a = information(upper, upper), b = information(upper, lower), c = information(lower, lower);
+    if (upper == lower) {
+      inverse(upper, upper) = 1 / a;
+      continue;
+    }
+    const double determinant = a * c - b * b;
+    inverse(upper, upper) = c / determinant, inverse(lower, lower) = a / determinant;
+    inverse(upper, lower) = inverse(lower, upper) = -b / determinant;
+  }
+  return inverse;
+}
+
 // The likeliest pose when each of the print's errors has this standard deviation, and how sure it is.
 std::optional<Solution> solved(const Sums& sums, double sigma_mm) {
   const Equations& e = sums.equations;
-  const PrintMatrix of_print = e.nn + PrintMatrix::Identity() / std::max(sigma_mm * sigma_mm, 1e-18);
-  const Eigen::LLT<PrintMatrix> print(of_print);
-  const CrossMatrix by_x = print.solve(e.nx);
-  const auto inverted = inverse_of(e.xx - e.nx.transpose() * by_x);
+  const PrintMatrix print_covariance =
+      inverse_by_boundary(e.nn + PrintMatrix::Identity() / std::max(sigma_mm * sigma_mm, 1e-18));
+  const CrossMatrix by_x = print_covariance.lazyProduct(e.nx);
+  const auto inverted = inverse_of(e.xx - e.nx.transpose().lazyProduct(by_x));
   if (!inverted) return std::nullopt;
   const UnknownMatrix& inverse = *inverted;
   Solution solution;
   solution.step = inverse * (e.x - by_x.transpose() * e.n);
-  solution.print_mm = print.solve(e.n - e.nx * solution.step);
+  solution.print_mm = print_covariance * (e.n - e.nx * solution.step);
   solution.covariance = inverse;
   for (const Pull& pull : sums.pulls) {
     const UnknownVector shift = inverse * (pull.x - by_x.transpose() * pull.n);
@@ -326,7 +360,8 @@ double scatter_sigmas(std::span<const Measurement> measurements, const ResidualL
 
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
                                   double film_prior, double tolerance_m, const CommonErrors& errors) {
-  const Sums sums = sums_of(measurements, lines, pose_unknowns, film_prior, errors);
+  const Sums sums = pose_unknowns == 4 ? sums_of<5>(measurements, lines, film_prior, errors)
+                                       : sums_of<7>(measurements, lines, film_prior, errors);
   const double tolerance_mm = tolerance_m / mm;
   const auto exact = solved(sums, 0);
   auto tolerated = tolerance_m > 0 ? solved(sums, tolerance_mm) : exact;

@@ -198,21 +198,34 @@ Eigen::VectorXd light_of(const Profile& profile, std::size_t channel, const Eige
   return light;
 }
 
-// The colours that fit light best. In units of a hundredth of white: shading over a radian is of the light's size, the
-// shaft's light is known to a third.
-Eigen::Matrix<double, seam_colors, 1> colors_of(const SeamBasis& basis, const Eigen::VectorXd& used,
-                                                const Eigen::VectorXd& light, double shaft) {
-  constexpr double unit = 0.01;
-  const double shaft_sigma = 0.3 * shaft + 0.005;
-  const Eigen::Matrix<double, seam_colors, Eigen::Dynamic> weighted = basis.transpose() * used.asDiagonal();
-  Eigen::Matrix<double, seam_colors, seam_colors> information = weighted * basis;
-  Eigen::Matrix<double, seam_colors, 1> gradient = weighted * light;
-  information(1, 1) += unit * unit, information(3, 3) += unit * unit;
-  information(0, 0) += 1e-9, information(2, 2) += 1e-9;
-  information(4, 4) += unit * unit / (shaft_sigma * shaft_sigma);
-  gradient[4] += shaft * unit * unit / (shaft_sigma * shaft_sigma);
-  return information.ldlt().solve(gradient);
-}
+using SeamColors = Eigen::Matrix<double, seam_colors, 1>;
+
+// The colours that fit a profile's light best. In units of a hundredth of white: shading over a radian is of the
+// light's size, the shaft's light is known to a third.
+class ColorFit {
+ public:
+  ColorFit(const SeamBasis& basis, const Eigen::VectorXd& used)
+      : weighted_(basis.transpose() * used.asDiagonal()), information_(weighted_ * basis) {
+    information_(1, 1) += unit * unit, information_(3, 3) += unit * unit;
+    information_(0, 0) += 1e-9, information_(2, 2) += 1e-9;
+  }
+
+  SeamColors colors(const Eigen::VectorXd& light, double shaft) const {
+    const double shaft_sigma = 0.3 * shaft + 0.005, weight = unit * unit / (shaft_sigma * shaft_sigma);
+    SeamInformation information = information_;
+    SeamColors gradient = weighted_ * light;
+    information(4, 4) += weight;
+    gradient[4] += shaft * weight;
+    return information.ldlt().solve(gradient);
+  }
+
+ private:
+  using SeamInformation = Eigen::Matrix<double, seam_colors, seam_colors>;
+  static constexpr double unit = 0.01;
+
+  Eigen::Matrix<double, seam_colors, Eigen::Dynamic> weighted_;
+  SeamInformation information_;
+};
 
 // Residuals of all profiles with edges there; colours, shading and the shaft's light are those that fit best. Weighted
 // by the root of the stations, so that noise is alike.
@@ -223,10 +236,11 @@ Eigen::VectorXd residuals(const Section& section, double upper_m, double gap_m, 
   Eigen::Index at = 0;
   for (const Profile& profile : section.profiles) {
     const Eigen::VectorXd used = used_samples(profile);
+    const ColorFit fit(basis, used);
     for (std::size_t c = 0; c < 3; ++c, at += samples) {
       const Eigen::VectorXd light = light_of(profile, c, used);
-      const auto color = colors_of(basis, used, light, section.shaft[c]);
-      out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(light - basis * color);
+      const SeamColors colors = fit.colors(light, section.shaft[c]);
+      out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(light - basis * colors);
     }
   }
   return out;
@@ -294,11 +308,12 @@ Section processed(const Section& section, const SeamFit& found, double blur_px, 
   Section out = section;
   for (Profile& profile : out.profiles) {
     const Eigen::VectorXd used = used_samples(profile);
+    const ColorFit fit(seen, used);
     std::vector<std::array<double, 3>> light(section.x_m.size());
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto color = colors_of(seen, used, light_of(profile, c, used), section.shaft[c]);
+      const SeamColors colors = fit.colors(light_of(profile, c, used), section.shaft[c]);
       for (std::size_t i = 0; i < light.size(); ++i)
-        light[i][c] = true_basis.row(static_cast<Eigen::Index>(i)).dot(color);
+        light[i][c] = true_basis.row(static_cast<Eigen::Index>(i)).dot(colors);
     }
     profile.light = filtered_light(light_of_value, processing, light);
     for (std::size_t i = 0; i < light.size(); ++i)

@@ -37,7 +37,8 @@ struct GapShot {
 
 // Sharpening draws the edges of dark gaps towards one another.
 TEST(SeamEdges, LieWhereTheyDoWithoutSharpening) {
-  const effects::CameraEffects effects{.sharpening = 0.8, .sharpening_px = 1.4};
+  effects::CameraEffects effects;
+  effects.sharpening = 0.8, effects.sharpening_px = 1.4;
   PictureProcessing processing;
   processing.blur_px = 0.9;
   processing.sharpening = effects.sharpening, processing.sharpening_px = effects.sharpening_px;

@@ -1,8 +1,5 @@
 #include "lapservo/vision/shaft_pose.h"
 
-#include <cmath>
-#include <cstddef>
-
 namespace lapservo::internal {
 
 PoseUnknowns PoseUnknowns::rcm(const Rigid3& camera_from_rcm, const JointVector& q) {
@@ -21,29 +18,27 @@ PoseUnknowns PoseUnknowns::free(const ShaftPose& pose) {
 }
 
 void PoseUnknowns::derive() {
-  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
   if (camera_from_rcm_) {
     pose_ = {*camera_from_rcm_ * rcm_from_unrolled(*q_), q_->psi_rad};
     pivot_ = camera_from_rcm_->translation;
-    const Eigen::Vector3d theta_axis = camera_from_rcm_->rotation * Eigen::Vector3d::UnitZ();
-    const Eigen::Vector3d phi_axis = pose_.camera_from_unrolled.rotation * Eigen::Vector3d::UnitY();
-    const Eigen::Vector3d shaft_axis = pose_.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
-    twists_[0] = {theta_axis, zero}, twists_[1] = {phi_axis, zero}, twists_[2] = {zero, shaft_axis};
+    rotations_[0] = camera_from_rcm_->rotation * Eigen::Vector3d::UnitZ();              // theta
+    rotations_[1] = pose_.camera_from_unrolled.rotation * Eigen::Vector3d::UnitY();     // phi
+    translations_[0] = pose_.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();  // rho
     return;
   }
   pivot_ = pose_.camera_from_unrolled.translation;
   const Eigen::Matrix3d axes = pose_.camera_from_unrolled.rotation.toRotationMatrix();
-  twists_[0] = {axes.col(0), zero}, twists_[1] = {axes.col(1), zero};
-  for (int i = 0; i < 3; ++i) twists_[static_cast<std::size_t>(2 + i)] = {zero, axes.col(i)};
+  rotations_ = {axes.col(0), axes.col(1)};
+  translations_ = {axes.col(0), axes.col(1), axes.col(2)};
 }
 
-UnknownVector PoseUnknowns::row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction) const {
-  UnknownVector row = UnknownVector::Zero(size());
+UnknownVector PoseUnknowns::row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction,
+                                int beyond) const {
+  UnknownVector row = UnknownVector::Zero(size() + beyond);
   const Eigen::Vector3d moment = (point_in_camera - pivot_).cross(direction);
-  for (int i = 0; i + 1 < size(); ++i) {
-    const Twist& twist = twists_[static_cast<std::size_t>(i)];
-    row[i] = twist.angular.dot(moment) + twist.linear.dot(direction);
-  }
+  row[0] = rotations_[0].dot(moment), row[1] = rotations_[1].dot(moment);
+  row[2] = translations_[0].dot(direction);
+  if (!camera_from_rcm_) row[3] = translations_[1].dot(direction), row[4] = translations_[2].dot(direction);
   return row;
 }
 

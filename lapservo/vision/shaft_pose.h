@@ -34,8 +34,9 @@ class PoseUnknowns {
   /// Present in the first form.
   const std::optional<JointVector>& q() const { return q_; }
 
-  /// Rows d(n . p)/d(unknowns but psi) for a point p (camera frame) that moves with the shaft; psi's entry is 0.
-  UnknownVector row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction) const;
+  /// Row d(n . p)/d(unknowns) for a point p (camera frame) that moves with the shaft; psi's entry is 0, and so are those
+  /// of as many unknowns `beyond` the pose's.
+  UnknownVector row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction, int beyond = 0) const;
 
   /// The pose after a small change of the unknowns.
   PoseUnknowns changed_by(const UnknownVector& step) const;
@@ -44,16 +45,15 @@ class PoseUnknowns {
   PoseUnknowns with_psi(double psi_rad) const;
 
  private:
-  struct Twist {
-    Eigen::Vector3d angular, linear;
-  };
   void derive();
 
   std::optional<Rigid3> camera_from_rcm_;
   std::optional<JointVector> q_;
   ShaftPose pose_;
   Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
-  std::array<Twist, 5> twists_{};
+  // In the order of the unknowns: axes of the two rotations, about the pivot, then directions of the translations.
+  std::array<Eigen::Vector3d, 2> rotations_;
+  std::array<Eigen::Vector3d, 3> translations_;
 };
 
 }  // namespace lapservo::internal

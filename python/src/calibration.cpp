@@ -125,12 +125,13 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
   py::list views;
   for (std::size_t i = 0; i < measured.views.size(); ++i)
     views.append(py::make_tuple(measured.views[i].name, measured.views[i].corners.size(), calibration.view_rms_px[i]));
-  result["camera"] = py::cast(PythonCamera{calibration.camera, calibration.sigmas.response});
+  const auto sigma_response = calibration.response ? std::optional(calibration.sigmas.response) : std::nullopt;
+  result["camera"] =
+      given ? py::object(result["rig"].attr("camera")) : py::cast(PythonCamera{calibration.camera, sigma_response});
   result["rms_px"] = calibration.rms_px;
   result["views"] = views;
   result["without_board"] = without_board;
   result["advice"] = measured.advice;
-  result["response_measured"] = calibration.response.has_value();
   result["sigma_response"] = calibration.response ? py::cast(calibration.response->sigma) : py::none();
   result["sharpening"] = calibration.response ? calibration.response->sharpening : 0.0;
   return result;
@@ -246,9 +247,7 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
   const GivenRig given = rig_of(rig);
   const std::size_t index = index_of(given, instrument_name);
   Instrument instrument = given.rig.instruments[index];
-  const bool table = py::isinstance<py::str>(frames) || py::hasattr(frames, "__fspath__")
-                         ? frames.cast<fs::path>().extension() == ".csv"
-                         : false;
+  const bool table = is_path(frames) && frames.cast<fs::path>().extension() == ".csv";
   std::optional<GivenFrames> source;
   if (!table) source.emplace(frames, fps);
   const std::string name = table ? frames.cast<fs::path>().string() : source->name;

@@ -16,6 +16,8 @@ PYBIND11_MODULE(_lapservo, m) {
       const py::object type = py::module_::import("lapservo._errors").attr("InputError");
       const py::object error = type(e.what(), e.source(), e.field(), e.value(), e.expectation(), e.problem());
       PyErr_SetObject(type.ptr(), error.ptr());
+    } catch (const py::cast_error& e) {  // a value of a type that is not expected
+      PyErr_SetString(PyExc_TypeError, e.what());
     }
   });
   bind_rig(m);

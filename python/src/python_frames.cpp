@@ -70,11 +70,11 @@ class IteratedFrames : public FrameSource {
   int index_ = 0;
 };
 
+}  // namespace
+
 bool is_path(const py::object& given) {
   return py::isinstance<py::str>(given) || py::hasattr(given, "__fspath__");
 }
-
-}  // namespace
 
 GivenFrames::GivenFrames(const py::object& given, double fps, bool of_one_recording) : kept(given), name(named) {
   if (!(fps >= 0.001 && fps <= 1000))

@@ -8,6 +8,9 @@
 
 namespace lapservo::python {
 
+/// A str or what os.PathLike is.
+bool is_path(const py::object& given);
+
 /// Frames that Python gives, by one of: a path (a picture, a folder, a video, a camera), a FrameSource, or anything
 /// that is iterated over: uint8[H, W, 3], (time_s, uint8[H, W, 3]) or Frame. Created and destroyed with Python's lock,
 /// used without.

@@ -156,7 +156,12 @@ q = sign * joints + offset, rad and m.)")
            "names: of the four columns of a recording; sign: 1 or -1 each; offset: rad, rad, m, rad.")
       .def_readonly("names", &Joints::names)
       .def_readonly("sign", &Joints::sign)
-      .def_readonly("offset", &Joints::offset, "rad, rad, m, rad");
+      .def_readonly("offset", &Joints::offset, "rad, rad, m, rad")
+      .def(py::pickle([](const Joints& joints) { return py::make_tuple(joints.names, joints.sign, joints.offset); },
+                      [](const py::tuple& state) {
+                        return Joints{state[0].cast<std::array<std::string, 4>>(),
+                                      state[1].cast<std::array<double, 4>>(), state[2].cast<std::array<double, 4>>()};
+                      }));
   py::class_<Instrument>(m, "Instrument", "What wears a marker, and where it enters the body.")
       .def(py::init(&make_instrument), py::arg("name"), py::arg("marker"), py::kw_only(),
            py::arg("camera_from_rcm") = py::none(), py::arg("joints") = py::none(),

@@ -13,6 +13,10 @@ SOURCE = pathlib.Path(__file__).resolve().parents[2]
 Q = np.array([0.05, 1.57, 0.064, 1.2])
 
 
+def pytest_configure(config):
+    config.addinivalue_line("markers", "wire: loops through a robot's wire in real time")
+
+
 @pytest.fixture(scope="session")
 def rig():
     return lapservo.Rig.load(SOURCE / "configs" / "paper.yaml")

@@ -24,10 +24,10 @@ def scaled_rig(scale):
                              joints=lapservo.Joints(["yaw", "pitch", "insertion", "roll"]))])
 
 
-def joints_of(motion, frames):
+def joints_of(motion, frames, as_if_fps=FPS):
     times = np.arange(-0.5, frames / FPS + 0.5, 0.02)
     columns = dict(zip(("yaw", "pitch", "insertion", "roll"), np.array([motion(t) for t in times]).T))
-    return {"time_s": times - DELAY_S} | columns
+    return {"time_s": times * FPS / as_if_fps - DELAY_S} | columns
 
 
 def swinging(t):
@@ -49,12 +49,13 @@ class Recordings:
         self.rig = scaled_rig(0.75)
         (folder / "rig.yaml").write_text(self.rig.to_yaml())
 
-    def record(self, name, motion, frames):
+    def record(self, name, motion, frames, as_if_fps=FPS):
+        """Pictures and joints; faster than the motion is where the pictures are said to come at another rate."""
         poses = self.folder / f"{name}.csv"
         poses.write_text("theta_rad,phi_rad,rho_m,psi_rad\n" + "".join(row(motion(i / FPS)) for i in range(frames)))
         subprocess.run([TOOL, "render", "--rig", self.folder / "rig.yaml", "--poses", poses, "--out", self.folder / name],
                        check=True, capture_output=True)
-        joints = joints_of(motion, frames)
+        joints = joints_of(motion, frames, as_if_fps)
         (self.folder / f"{name}_joints.csv").write_text(
             ",".join(joints) + "\n" + "".join(row(values) for values in zip(*joints.values())))
         return [frame.image for frame in lapservo.open_frames(self.folder / name)], joints
@@ -70,22 +71,23 @@ class Recordings:
         return out.read_bytes()
 
 
+def blurred(light, sigma_px):
+    kernel = np.exp(-0.5 * (np.arange(-4, 5) / sigma_px) ** 2)
+    rows = np.pad(light, ((4, 4), (0, 0)), "edge")
+    across = np.pad(sum(w * rows[i:i + len(light)] for i, w in enumerate(kernel)), ((0, 0), (4, 4)), "edge")
+    return sum(w * across[:, i:i + light.shape[1]] for i, w in enumerate(kernel)) / kernel.sum() ** 2
+
+
 def board_picture(camera, camera_from_board, seed):
     """A board of 9 x 6 inner corners, 5 mm apart, blurred by a lens and encoded as sRGB."""
     over, blur_px = 3, 0.8
-    v, u = np.mgrid[:over * camera.height_px, :over * camera.width_px] / over - (1 - 1 / over) / 2
-    rays = np.linalg.inv(camera.matrix) @ np.stack([u.ravel(), v.ravel(), np.ones(u.size)])
-    from_camera = np.linalg.inv(camera_from_board)
-    direction, origin = from_camera[:3, :3] @ rays, from_camera[:3, 3:]
-    x, y = (origin + direction * (-origin[2] / direction[2]))[:2] / 0.005
-    column, line = np.floor(x).astype(int), np.floor(y).astype(int)
+    squares_from_image = np.linalg.inv(camera.matrix @ camera_from_board[:3, [0, 1, 3]] @ np.diag([0.005, 0.005, 1]))
+    v, u = (np.arange(over * n) / over - (1 - 1 / over) / 2 for n in (camera.height_px, camera.width_px))
+    x, y, z = (a * u + b * v[:, None] + c for a, b, c in squares_from_image)
+    column, line = np.floor(x / z), np.floor(y / z)
     on_board = (column >= -1) & (column < 9) & (line >= -1) & (line < 6)
-    light = np.where(on_board & ((column + line) % 2 == 0), 0.04, 0.75).reshape(u.shape)
-    light = light.reshape(camera.height_px, over, camera.width_px, over).mean((1, 3))
-    kernel = np.exp(-0.5 * (np.arange(-4, 5) / blur_px) ** 2)
-    for axis in (0, 1):
-        light = np.apply_along_axis(lambda line: np.convolve(np.pad(line, 4, "edge"), kernel / kernel.sum(), "valid"), axis,
-                                    light)
+    light = np.where(on_board & ((column + line) % 2 == 0), 0.04, 0.75)
+    light = blurred(light.reshape(camera.height_px, over, camera.width_px, over).mean((1, 3)), blur_px)
     noise = np.random.default_rng(seed).normal(0, 0.004, (*light.shape, 3))
     light = np.clip(light[..., None] + noise, 0, 1)
     encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055)

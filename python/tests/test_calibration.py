@@ -165,3 +165,12 @@ def test_what_frames_raise_leaves_the_calibration(rig):
 
     with pytest.raises(ZeroDivisionError, match="the camera's driver"):
         lapservo.calibrate_marker(broken(), rig)
+
+
+@pytest.mark.parametrize("wrong", [3, None, [1, 2]])
+def test_a_wrong_type_is_a_type_error(rig, image, wrong):
+    with pytest.raises(TypeError):
+        lapservo.calibrate_colour([image], wrong)
+    if wrong is not None:
+        with pytest.raises(TypeError):
+            lapservo.calibrate_registration([image], rig, joints=wrong)

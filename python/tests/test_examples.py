@@ -2,16 +2,15 @@ import os
 import pathlib
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import time
-import xmlrpc.client
 
 import lapservo
 import numpy as np
 import pytest
 from conftest import SOURCE
+from ros_master import free_port, wait_for_master
 
 EXAMPLES = SOURCE / "examples" / "python"
 RIG = SOURCE / "configs" / "paper.yaml"
@@ -34,23 +33,12 @@ def test_examples_run(tmp_path):
     assert "largest errors" in run("own_robot.py", RIG)
 
 
-def wait_for_master(uri):
-    for _ in range(300):
-        try:
-            return xmlrpc.client.ServerProxy(uri).getPid("/test")
-        except OSError:
-            time.sleep(0.1)
-    raise TimeoutError("rosmaster does not answer within 30 s")
-
-
 @pytest.fixture
 def ros(tmp_path):
     """A rosmaster of its own on loopback, and this process a node of it."""
     rospy = pytest.importorskip("rospy")
     master = shutil.which("rosmaster") or pytest.skip("python3-rosmaster is not installed")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+    port = free_port()
     os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1", ROS_LOG_DIR=str(tmp_path))
     running = subprocess.Popen([master, "--core", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     wait_for_master(os.environ["ROS_MASTER_URI"])

@@ -101,6 +101,9 @@ def test_results_pickle(rig, image):
         assert np.array_equal(again.edges_covariance_px2, seen.edges_covariance_px2)
         assert np.array_equal(again.overlay(image), seen.overlay(image))
     assert pickle.loads(pickle.dumps(rig)).to_yaml() == rig.to_yaml()
+    joints = pickle.loads(pickle.dumps(rig.instruments[0].joints))
+    assert joints.names == rig.instruments[0].joints.names and joints.sign == rig.instruments[0].joints.sign
+    assert joints.offset == rig.instruments[0].joints.offset
 
 
 def test_threads_share_a_tracker(rig, image):

@@ -1,0 +1,155 @@
+"""Every block of commands and code in README.md, CONTRIBUTING.md and docs/ is run, in its page's order.
+
+A page has a folder with what it takes for granted. Recordings are folders of pictures, whatever their names end in: what
+compression does to a calibration is measured elsewhere. What is not run, or not to its end, stands in lists with the reason: here,
+and in doc_shell.py. A block that is in no list and does not run fails.
+"""
+
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+from conftest import SOURCE
+from doc_blocks import BLOCKS, PAGES
+from doc_shell import BUILD, Shell
+from recordings import TOOL, Recordings, board_pictures, swinging
+
+import lapservo
+
+#: Pages that a test of their own runs from the first block to the last, and the languages that it knows.
+ELSEWHERE = {"tutorial.md": ("acceptance/tutorial_test.cpp", ["yaml", "sh", "sh", "sh", "sh", "sh", "sh"]),
+             "quickstart.md": ("debian/tests/quickstart", ["text", "sh", "python", "cpp", "sh", "sh"])}
+
+#: Blocks that are no code, by page and first line.
+TEXT = {("README.md", "lapservo/core geometry marker kinematics rcm   no pictures, no control"): "what the folders are",
+        ("quickstart.md", "./dev package"): "makes and installs the packages: `./dev package test` does"}
+
+#: Lines that can't be run here, by how they begin.
+NOT_RUN = {
+    "git clone <": "fetches",
+    "./dev ": "installs and builds; CI runs it",
+    "pip install ": "builds; the test python.install does it with what is built",
+    "cmake --": "builds",
+    "build/modules/": "is built for the tests that it is",
+    "ctest ": "runs the tests that this is one of",
+    "rosbag record": "is ROS's own; swing.bag is what `lapservo record` wrote in the line before",
+    "ssh ": "another computer",
+}
+
+#: Files that pages show, by how their paths begin, and the test that runs them or reads them.
+SHOWN = {"examples/cpp/": "cmake/test_install.cmake", "examples/own_robot/": "cmake/test_install.cmake",
+         "examples/python/": "python/tests/test_examples.py", "transports/ros2/msg/": "transports/ros2/CMakeLists.txt"}
+
+RUN = ("sh", "python", "cpp", "yaml")
+WIRE = re.compile(r"ros[12]:|sim-robot")  # in real time
+FRAMES, FPS = 50, 30
+
+
+def reason_not_run(command):
+    return next((why for begin, why in NOT_RUN.items() if command.startswith(begin)), None)
+
+
+def run_lines(blocks):
+    return [line for block in blocks if block.language == "sh" for line in block.commands() if not reason_not_run(line)]
+
+
+def page_parameter(page):
+    blocks = [block for block in BLOCKS if block.page == page and block.language in RUN]
+    in_real_time = any(WIRE.search(line) for line in run_lines(blocks))
+    return pytest.param(blocks, id=page.name, marks=[pytest.mark.wire] if in_real_time else [])
+
+
+def test_every_block_says_what_it_is():
+    for block in BLOCKS:
+        if block.language == "text":
+            assert (block.page.name, block.text.splitlines()[0]) in TEXT, block.where
+        elif not block.language.startswith(("{toctree}", "{include} ../build/reference/", "{literalinclude} ../")):
+            assert block.language in RUN, block.where
+
+
+def test_what_pages_show_is_run_by_a_test():
+    for block in BLOCKS:
+        if not block.language.startswith("{literalinclude}"):
+            continue
+        path = block.language.split("../")[1]
+        test = next(test for begin, test in SHOWN.items() if path.startswith(begin))
+        file = SOURCE / path
+        name = file.parent.name if file.name == "CMakeLists.txt" else file.stem
+        assert file.is_file() and re.search(rf"\b{name}\b", (SOURCE / test).read_text()), f"{block.where}: {test}"
+
+
+def test_the_lists_name_what_there_is():
+    lines = [line for block in BLOCKS if block.language == "sh" for line in block.commands()]
+    for begin in NOT_RUN:
+        assert any(line.startswith(begin) for line in lines), f"nothing begins with {begin!r} any more"
+    for page, (test, languages) in ELSEWHERE.items():
+        assert page.split(".")[0] in (SOURCE / test).read_text()
+        assert [block.language for block in BLOCKS if block.page.name == page] == languages
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory):
+    recordings = Recordings(tmp_path_factory.mktemp("recorded"))
+    recordings.record("swing", swinging, FRAMES, as_if_fps=FPS)
+    boards = recordings.folder / "boards"
+    boards.mkdir()
+    for i, picture in enumerate(board_pictures(recordings.rig.camera)):
+        (boards / f"{i}.png").write_bytes(lapservo.Picture(picture)._repr_png_())
+    return recordings
+
+
+def furnish(folder, recorded):
+    (folder / "configs").symlink_to(SOURCE / "configs")
+    (folder / "build").symlink_to(BUILD)
+    (folder / "arm.yaml").symlink_to(SOURCE / "configs" / "paper.yaml")
+    for name in ("boards", "boards.mp4"):
+        (folder / name).symlink_to(recorded.folder / "boards")
+    for name in ("swing.mp4", "motion.mp4", "turn.mp4", "turn"):
+        shutil.copytree(recorded.folder / "swing", folder / name, ignore=shutil.ignore_patterns("rig.yaml", "truth.csv"))
+    for name in ("joints.csv", "turn_joints.csv"):
+        shutil.copy(recorded.folder / "swing_joints.csv", folder / name)
+    (folder / "swing.bag").symlink_to("swing")
+    for name in ("rig.yaml", "my_rig.yaml", "designed.yaml"):
+        shutil.copy(recorded.folder / "rig.yaml", folder / name)
+
+
+def run_cpp(block, folder):
+    library = BUILD / "liblapservo.so"
+    if not library.exists():
+        pytest.skip(f"{library} is not built")
+    (folder / "see.cpp").write_text(block.text)
+    includes = ["-I", SOURCE, "-isystem", "/usr/include/eigen3", "-isystem", "/usr/include/opencv4"]
+    subprocess.run(["g++", "-std=c++20", "-Wall", "-Werror", *includes, "see.cpp", "-o", "see", library,
+                    f"-Wl,-rpath,{BUILD}", "-lopencv_core"], cwd=folder, check=True)
+    example = SOURCE / "acceptance" / "frames" / "png"
+    said = subprocess.run(["./see", example / "rig.yaml", example / "0000.png"], cwd=folder, check=True, capture_output=True,
+                          text=True).stdout
+    assert re.match(r"psi = -?[0-9.]+ rad, sigma = 0\.0[0-9]+ rad\n", said), said
+
+
+def run_python(block, folder, environment):
+    if "video.mp4" in block.text:
+        subprocess.run([TOOL, "render", "--rig", "configs/paper.yaml", "--count", "3", "--video", "--out", "rendered"], cwd=folder,
+                       check=True, capture_output=True)
+        (folder / "video.mp4").symlink_to("rendered/video.mp4")
+    subprocess.run([sys.executable, "-c", block.text], cwd=folder, env=environment, check=True)
+
+
+@pytest.mark.parametrize("blocks", [page_parameter(page) for page in PAGES if page.name not in ELSEWHERE])
+def test_every_block_runs(blocks, request, tmp_path):
+    if blocks:
+        furnish(tmp_path, request.getfixturevalue("recorded"))
+    shell = Shell(tmp_path)
+    for block in blocks:
+        print(block.where, flush=True)
+        if block.language == "yaml":
+            assert lapservo.Rig.parse(block.text).instruments
+        elif block.language == "cpp":
+            run_cpp(block, tmp_path)
+        elif block.language == "python":
+            run_python(block, tmp_path, shell.environment)
+        else:
+            shell.run_all(run_lines([block]))
+    shutil.rmtree(tmp_path / "swing", ignore_errors=True)  # half a gigabyte of images
