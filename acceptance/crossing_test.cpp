@@ -34,12 +34,12 @@ struct Tally {
   int all = 0, tell = 0, found = 0, found_of_those = 0, wrong = 0;
   double squares = 0, normalised = 0, largest_rad = 0;
 
-  void add(const Observation& o, double true_psi_rad, bool tells_psi) {
+  void add(const Observation& o, double true_psi_rad, bool tells_psi, bool swapped) {
     ++all, tell += tells_psi;
     if (o.status != Status::ok || !o.rcm) return;
     ++found, found_of_those += tells_psi;
     const double error_rad = wrap_pi(o.rcm->q.psi_rad - true_psi_rad);
-    wrong += std::abs(error_rad) > 0.1;
+    wrong += swapped || std::abs(error_rad) > 0.1;
     squares += error_rad * error_rad;
     normalised += error_rad * error_rad / o.rcm->covariance(3, 3);
     largest_rad = std::max(largest_rad, std::abs(error_rad));
@@ -189,6 +189,15 @@ class Pair {
   double true_psi_rad(std::size_t k) const {
     return pair_.q[k].psi_rad + shafts_[k].marker.seam_rad - rig_.instruments[k].marker.seam_rad;
   }
+  // Whether what is taken for one lies nearer to where the other is.
+  bool swapped(const Observation& o, std::size_t k) const {
+    if (o.status != Status::ok) return false;
+    const auto away_m = [&](std::size_t of) {
+      const Rigid3 there = *rig_.instruments[of].camera_from_rcm * rcm_from_unrolled(pair_.q[of]);
+      return (there.translation - o.camera_from_unrolled.translation).norm();
+    };
+    return away_m(1 - k) < away_m(k);
+  }
   const scenes::CrossingPair& pair() const { return pair_; }
 
  private:
@@ -222,7 +231,7 @@ class Crossing : public ::testing::Test {
       const scenes::CrossingPair& of = pair.pair();
       Tally& part = of.hidden[k] > 0 ? tallies.behind : tallies.front;
       const int wrong = part.wrong;
-      part.add(seen[k], pair.true_psi_rad(k), of.tells_psi(k));
+      part.add(seen[k], pair.true_psi_rad(k), of.tells_psi(k), pair.swapped(seen[k], k));
       if (part.wrong > wrong || (lists && seen[k].status != Status::ok))
         std::printf("%s, instrument %zu: %s%s, %.2f of it hidden, %.2f of its inner boundaries\n", name.c_str(), k,
                     std::string(to_string(seen[k].status)).c_str(), part.wrong > wrong ? ", wrong" : "", of.hidden[k],

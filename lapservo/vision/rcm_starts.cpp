@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/median.h"
@@ -15,6 +16,9 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t line_count = 64, samples = 160, most_starts = 3;
+// Of the middle band's colour (fraction_in_order): another's marker has at most 0.04, and crossing ones' mostly 0.16
+// and more where one of them lies before the other.
+constexpr double least_in_order = 0.1;
 
 // Rays of the camera by their angles: alpha about the direction to the RCM, beta from it. A shaft's axis lies on one
 // alpha, from the RCM (beta = 0) to its tip.
@@ -44,25 +48,72 @@ struct Fan {
   double beta_rad(double sample) const { return first_beta_rad + sample * step_beta_rad; }
 };
 
-std::optional<Fan> fan_over(const Scene& scene, const Blob& blob, const RaysFromRcm& rays) {
-  std::optional<double> middle_rad;
-  double first_alpha = 1e9, last_alpha = -1e9, first_beta = 1e9, last_beta = -1e9;
+// A place of a blob that has one of the marker's colours.
+struct Place {
+  double alpha_rad, beta_rad;
+  std::uint8_t color;
+};
+
+// Alpha is continuous over the blob.
+std::vector<Place> places_of(const Scene& scene, const Blob& blob, const RaysFromRcm& rays) {
+  std::vector<Place> places;
+  places.reserve(blob.samples.size());
   for (const Blob::Sample& sample : blob.samples) {
+    if (!scene.is_ours(sample.color)) continue;
     const auto ideal_px = scene.camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
-    if (!ideal_px || !scene.is_ours(sample.color)) continue;
+    if (!ideal_px) continue;
     const Eigen::Vector3d ray = scene.camera.ray_from_ideal(*ideal_px);
-    const double alpha_rad = rays.alpha_rad(ray), beta_rad = rays.beta_rad(ray);
-    if (!middle_rad) middle_rad = alpha_rad;
-    const double turned_rad = *middle_rad + wrap_pi(alpha_rad - *middle_rad);
-    first_alpha = std::min(first_alpha, turned_rad), last_alpha = std::max(last_alpha, turned_rad);
-    first_beta = std::min(first_beta, beta_rad), last_beta = std::max(last_beta, beta_rad);
+    const double alpha_rad = rays.alpha_rad(ray);
+    const double middle_rad = places.empty() ? alpha_rad : places.front().alpha_rad;
+    places.push_back({middle_rad + wrap_pi(alpha_rad - middle_rad), rays.beta_rad(ray), sample.color});
+  }
+  return places;
+}
+
+std::optional<Fan> fan_over(const std::vector<Place>& places) {
+  if (places.empty()) return std::nullopt;
+  double first_alpha = 1e9, last_alpha = -1e9, first_beta = 1e9, last_beta = -1e9;
+  for (const Place& place : places) {
+    first_alpha = std::min(first_alpha, place.alpha_rad), last_alpha = std::max(last_alpha, place.alpha_rad);
+    first_beta = std::min(first_beta, place.beta_rad), last_beta = std::max(last_beta, place.beta_rad);
   }
   // All round: the shaft points at the camera.
-  if (!middle_rad || last_alpha - first_alpha > pi) return std::nullopt;
+  if (last_alpha - first_alpha > pi) return std::nullopt;
   const double margin_rad = 0.2 * (last_beta - first_beta) + 0.01;
   first_beta = std::max(0.0, first_beta - margin_rad), last_beta = std::min(pi, last_beta + margin_rad);
   return Fan{first_alpha, std::max(1e-6, (last_alpha - first_alpha) / (line_count - 1)), first_beta,
              (last_beta - first_beta) / samples};
+}
+
+// How much of the middle band's colour lies between the others, as seen from the RCM, as in a marker that nothing hides
+// and of which most shows. In another's, whose bands have another order, it doesn't, and to see that costs next to
+// nothing.
+double fraction_in_order(const Scene& scene, const Fan& fan, const std::vector<Place>& places) {
+  constexpr std::size_t parts = 16;
+  struct Part {
+    std::vector<double> first_rad, last_rad;  // the first band's places and the last one's
+  };
+  std::array<Part, parts> all;
+  const auto part_of = [&](const Place& place) -> Part& {
+    const double line = (place.alpha_rad - fan.first_alpha_rad) / fan.step_alpha_rad;
+    return all[std::min(parts - 1, static_cast<std::size_t>(std::max(0.0, line)) * parts / line_count)];
+  };
+  for (const Place& place : places) {
+    if (place.color == scene.bands[0]) part_of(place).first_rad.push_back(place.beta_rad);
+    if (place.color == scene.bands[2]) part_of(place).last_rad.push_back(place.beta_rad);
+  }
+  int middle = 0, in_order = 0;
+  for (const Place& place : places) {
+    if (place.color != scene.bands[1]) continue;
+    const Part& part = part_of(place);
+    const auto before = std::count_if(part.first_rad.begin(), part.first_rad.end(),
+                                      [&](double beta_rad) { return beta_rad < place.beta_rad; });
+    const auto behind = std::count_if(part.last_rad.begin(), part.last_rad.end(),
+                                      [&](double beta_rad) { return beta_rad > place.beta_rad; });
+    constexpr int enough = 3;
+    ++middle, in_order += before >= enough && behind >= enough;
+  }
+  return in_order / std::max(1.0, static_cast<double>(middle));
 }
 
 // A line's split into the bands, and how well it agrees [samples].
@@ -195,8 +246,11 @@ std::optional<PoseUnknowns> start_of(const Scene& scene, const RaysFromRcm& rays
 std::vector<PoseUnknowns> starts_through_rcm(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
   if (!(camera_from_rcm.translation.norm() > 1e-3)) return {};
   const RaysFromRcm rays(camera_from_rcm);
-  const auto fan = fan_over(scene, blob, rays);
+  const std::vector<Place> places = places_of(scene, blob, rays);
+  const auto fan = fan_over(places);
   if (!fan) return {};
+  // Where no other is known, this is one that lies before it: one behind is looked for when that one was found.
+  if (scene.others.empty() && fraction_in_order(scene, *fan, places) < least_in_order) return {};
   Lines lines;
   for (std::size_t i = 0; i < line_count; ++i) lines[i] = line_at(scene, rays, *fan, i);
   std::vector<PoseUnknowns> starts;
