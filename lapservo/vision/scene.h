@@ -32,7 +32,8 @@ struct Scene {
   /// The same at a point before the camera, [m] in its frame; `outside` also when it lies behind it or is hidden.
   std::uint8_t class_at_point(const Eigen::Vector3d& point_in_camera) const {
     const std::uint8_t color = class_on_shaft(point_in_camera);
-    return color != outside && explained(camera.raw_from_point(point_in_camera), color) ? outside : color;
+    return !others.empty() && color != outside && explained(camera.raw_from_point(point_in_camera), color) ? outside
+                                                                                                           : color;
   }
   /// The same of a point that would hide another instrument behind it.
   std::uint8_t class_on_shaft(const Eigen::Vector3d& point_in_camera) const {

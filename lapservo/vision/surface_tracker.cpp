@@ -183,9 +183,11 @@ void SurfaceTracker::find_in_the_way(std::size_t i, WorkBudget& budget) {
   }
 }
 
-// All that were found in this frame, and one that is supposed to be where its cover is, or was refused.
+// All that were found in this frame, and one that is supposed to be where its cover is, or was refused. Where no RCM
+// tells which places are possible, nobody is looked for behind another.
 void SurfaceTracker::find_others(std::size_t i, std::optional<std::size_t> supposed, WorkBudget& budget) {
   others_.clear();
+  if (!rig_.instruments[i].camera_from_rcm) return;
   for (std::size_t j = 0; j < rig_.instruments.size(); ++j) {
     if (j == i || !(found_[j].fit || j == supposed)) continue;
     if (!covers_[j].drawn()) {
@@ -221,10 +223,12 @@ void SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
     if (found_[i].fit) continue;
     find_others(i, std::nullopt, budget);
     const Scene scene = scene_of(image, i);
-    const std::vector<Blob> left = without(blobs, others_);
+    std::vector<Blob> left;
+    if (!others_.empty()) left = without(blobs, others_);
     found_[i] =
         budget.share(budget.left() / static_cast<double>(lost--), WorkBudget::Beyond::one, [&](WorkBudget& part) {
-          return searches_[i].look({scene, light, left, rig_.instruments[i].camera_from_rcm}, part);
+          return searches_[i].look({scene, light, others_.empty() ? blobs : left, rig_.instruments[i].camera_from_rcm},
+                                   part);
         });
   }
 }
