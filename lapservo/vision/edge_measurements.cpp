@@ -55,9 +55,10 @@ struct Frame {
     return unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * line.outwards +
            along_m * axes.col(2);
   }
-  // How brightly the film's edge at boundary k, `along_m` from the frame's origin, shows, relative to the outside
-  // beside it; 0 when it is not seen.
-  double film_light(std::size_t k, const Generatrix& line, double along_m) const {
+  // By what fraction of its projected width the film's edge at boundary k, `along_m` from the frame's origin, moves
+  // that boundary: by all of it where it is as bright as the outside beside it, by nothing where it is as dark as the
+  // bare shaft behind it; 0 when it is not seen. Without gloss, which see_gloss() adds.
+  double film_shift(std::size_t k, const Generatrix& line, double along_m) const {
     if (k == 1 || k == 2) return 0;
     Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
     to_camera.z() -= along_m;
@@ -67,8 +68,9 @@ struct Frame {
     const auto lit = [](double cosine) {
       return edge_limits.film_ambient_fraction + (1 - edge_limits.film_ambient_fraction) * std::max(0.0, cosine);
     };
-    return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
-                    edge_limits.film_most_lit);
+    const double light = std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
+                                  edge_limits.film_most_lit);
+    return light + (light - 1) * edge_limits.bare_shaft_light;
   }
   double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
 
@@ -100,6 +102,9 @@ struct BoundaryPlace {
   Measurement measurement;
   Eigen::Vector2d point_px, along;
   double normal_cosine;
+  double film_px_per_m = 0;  // how far the whole film's projected edge would move it inwards; 0 when that is not seen
+  double film_by_ambient = 0, film_shift = 0;
+  double gloss_px = 0;  // how far gloss moves it back
   EdgeLine line;
 };
 
@@ -117,8 +122,8 @@ bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_p
 std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
                                             const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
                                             double blur_px) {
-  const double film_light = frame.film_light(k, generatrix, along_m[k]);
-  const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - film_light * frame.film_m * generatrix.outwards;
+  const double film_shift = frame.film_shift(k, generatrix, along_m[k]);
+  const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - film_shift * frame.film_m * generatrix.outwards;
   if (!(point.z() > 1e-3)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
@@ -144,7 +149,16 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.line = *line;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
   place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
-                                 -film_light * film_sigma_m * pull.dot(generatrix.outwards));
+                                 -film_shift * film_sigma_m * pull.dot(generatrix.outwards));
+  if (film_shift != 0) {
+    place.film_shift = film_shift;
+    place.film_px_per_m = -pull.dot(generatrix.outwards);
+    Eigen::Vector3d to_camera = frame.camera_in_unrolled - frame.marker().radius_m() * generatrix.outwards_unrolled;
+    to_camera.z() -= along_m[k];
+    to_camera.normalize();
+    const double cf = std::abs(to_camera.z()), co = std::max(0.1, generatrix.outwards_unrolled.dot(to_camera));
+    place.film_by_ambient = (co - cf) / (co * co);
+  }
   place.measurement.group = k;
   place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
@@ -152,6 +166,66 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   place.measurement.normal = normal.cast<float>();
   place.measurement.clear_px = static_cast<float>(0.6 * gap_px * std::abs(place.normal_cosine) - blur_px);
   return place;
+}
+
+// Where a step is located that stands for two, by the width between them: a film's edge, `shift` of the whole step from
+// the shaft, as wide as so many blurs. That of a narrow one is at `shift`; one brighter than the outside pulls less far
+// the wider it is. Solves (1 - s) P(x) + s P(x - w) = 1/2, P of a blur sqrt(2) times as wide.
+double wide_film_shift(double shift, double width_blurs) {
+  if (width_blurs < 0.3 || (shift > 0 && shift < 1)) return shift;
+  double x = shift * width_blurs;
+  for (int i = 0; i < 3; ++i) {
+    const double beyond = x - width_blurs;
+    const double value = 0.5 * ((1 - shift) * std::erf(0.5 * x) + shift * std::erf(0.5 * beyond));
+    const double slope =
+        ((1 - shift) * std::exp(-0.25 * x * x) + shift * std::exp(-0.25 * beyond * beyond)) / std::sqrt(4 * pi);
+    if (!(slope > 0.05)) return shift;
+    x -= value / slope;
+  }
+  return x / width_blurs;
+}
+
+// A gloss that the bare shaft and the outside throw back is not on the film's edge between them, which faces elsewhere:
+// it lies darker than both by it, and moves the end the less. The shaft, which is black, shows how much gloss there is;
+// what all lines show alike veils the picture.
+void see_gloss(const Frame& frame, std::size_t k, double blur_px, std::span<BoundaryPlace> places,
+               std::span<const EdgeFit> edges) {
+  constexpr double veil_quantile = 0.2;
+  struct Shaft {
+    std::size_t index;
+    std::array<float, 3> light;
+  };
+  InplaceVector<Shaft, max_lines> shafts;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const BoundaryPlace& place = places[i];
+    if (place.measurement.group != k || place.film_px_per_m == 0 || !edges[i].converged) continue;
+    const EdgeLine& line = place.line;
+    const auto beyond = static_cast<float>(k == 0 ? -line.before : line.after);
+    shafts.push_back({i, frame.light.at(line.u_px + beyond * line.du, line.v_px + beyond * line.dv).light});
+  }
+  if (shafts.size() < edge_limits.min_alike) return;
+  std::array<float, 3> veil{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    InplaceVector<float, max_lines> values;
+    for (const Shaft& shaft : shafts) values.push_back(shaft.light[c]);
+    const auto low = values.begin() + static_cast<std::ptrdiff_t>(veil_quantile * static_cast<double>(values.size()));
+    std::nth_element(values.begin(), low, values.end());
+    veil[c] = *low;
+  }
+  for (const Shaft& shaft : shafts) {
+    const std::array<float, 3>& step = edges[shaft.index].step;
+    float gloss = 0, square = 1e-6F;
+    for (std::size_t c = 0; c < 3; ++c) {
+      gloss += std::abs(step[c]) * std::max(0.0F, shaft.light[c] - veil[c]);
+      square += step[c] * step[c];
+    }
+    BoundaryPlace& place = places[shaft.index];
+    const double lit = place.film_shift - std::min<double>(gloss / square, edge_limits.most_gloss);
+    const double less = place.film_shift - wide_film_shift(lit, frame.film_m * std::abs(place.film_px_per_m) / blur_px);
+    place.measurement.row[place.measurement.row.size() - 1] -= less * film_sigma_m * place.film_px_per_m;
+    place.gloss_px = less * frame.film_m * place.film_px_per_m;
+    place.measurement.expected_px -= static_cast<float>(place.gloss_px) * place.measurement.normal;
+  }
 }
 
 // A boundary point that was located.
@@ -191,9 +265,14 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
     const double variance = 0.5 * (edge->residual_variance + typical_variance) * edge_limits.interpolation_noise;
     const double cosine = place->normal_cosine;
     Measurement measurement = place->measurement;
-    measurement.residual_px = edge->offset_px * cosine;
+    measurement.residual_px = edge->offset_px * cosine + place->gloss_px;
+    const double shift_px = place->measurement.row[place->measurement.row.size() - 1] * film_mean_m / film_sigma_m;
+    const double film_px =
+        std::hypot(edge_limits.film_doubt * shift_px, edge_limits.film_doubt2 * shift_px * shift_px,
+                   edge_limits.film_doubt_a * place->film_by_ambient * film_mean_m * place->film_px_per_m);
     measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
-                                     edge_limits.single_floor_px * edge_limits.single_floor_px);
+                                     edge_limits.single_floor_px * edge_limits.single_floor_px + film_px * film_px);
+    out.film_shift_px[measurement.group] += std::abs(shift_px) / static_cast<double>(candidates.size());
     out.all.push_back(measurement);
     out.boundary_blur.add(*edge, variance);
   }
@@ -224,6 +303,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px
     }
   }
   const EdgeFits edges = locate_steps(frame.light, lines, effort.iterations);
+  for (const std::size_t end : {0U, 3U}) see_gloss(frame, end, blur_px, places, edges);
   for (std::size_t k = 0; k < 4; ++k) {
     InplaceVector<Candidate, max_lines> candidates;
     for (std::size_t i = 0; i < places.size(); ++i)

@@ -64,6 +64,7 @@ struct EdgeMeasurements {
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at
   BlurEvidence boundary_blur, side_blur;
+  std::array<double, 4> film_shift_px{};  ///< mean of what the film moves a boundary's points by
 };
 
 /// Looks around `unknowns` in linear light, to a fraction of a pixel. Nothing when the pose shows no shaft.

@@ -53,7 +53,8 @@ double median_sigma_px(std::span<const Measurement> measurements) {
 // What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
 // processing may have moved each boundary; of those that `processed` tells, it is corrected.
 CommonErrors common_errors(std::span<const Measurement> measurements, const ResidualLines& lines, const EdgeBlur& blur,
-                           const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px) {
+                           const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px,
+                           const std::array<double, 4>& film_shift_px) {
   const FineFitLimits& limits = fine_fit_limits;
   const double motion_blur_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
   const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - limits.usual_blur_px);
@@ -71,7 +72,7 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   for (std::size_t k = 0; k < 4; ++k) {
     const bool corrected = processed && processed->bias_px[k];
     const double left_px = (corrected ? left_of_corrected : 1) * bias_px[k];
-    errors.px[k] = std::hypot(boundary_px, left_px, unexplained_px);
+    errors.px[k] = std::hypot(std::hypot(boundary_px, left_px, unexplained_px), limits.fraction_of_film * film_shift_px[k]);
     bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
   }
   errors.px[4] = errors.px[5] = side_px;
@@ -171,7 +172,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
   const ResidualLines lines = residual_lines(pass.all);
   const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker.tolerance_m,
-                               common_errors(pass.all, lines, fit.blur, evidence.edges, fit.bias_px));
+                               common_errors(pass.all, lines, fit.blur, evidence.edges, fit.bias_px, pass.film_shift_px));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdlib>
 
 #include <array>
 #include <cstddef>
@@ -88,12 +89,19 @@ struct EdgeLimits {
 
   /// Light on the film's edge: the fraction that is even (the rest is diffuse, from the camera), and by that on the
   /// outside at most.
-  double film_ambient_fraction = 0.18, film_most_lit = 2;
+  double film_ambient_fraction = getenv("FILM_AMBIENT") ? atof(getenv("FILM_AMBIENT")) : 0.05, film_most_lit = 2;
+  /// Light of the bare shaft by the step of light at an end, gloss and veils aside: black plastic reflects 2 to 5 %, a
+  /// print's bright channels half.
+  double bare_shaft_light = 0.04;
+  double film_doubt = getenv("FILM_DOUBT") ? atof(getenv("FILM_DOUBT")) : 0.0;
+  double film_doubt2 = getenv("FILM_DOUBT2") ? atof(getenv("FILM_DOUBT2")) : 0.5;
+  double film_doubt_a = getenv("FILM_DOUBTA") ? atof(getenv("FILM_DOUBTA")) : 0.0;
+  double most_gloss = 0.6;  ///< on the shaft beside an end, by the step of light there, that is believed
   double seam_blurs = 2.5, seam_px = 1.5;  ///< boundaries that jump at the seam, this near to it, are left out
   /// Of a blur, and by how much a pass may change it: wider is no edge, and far steps overshoot.
   double min_blur_px = 0.5, max_blur_px = 8, min_blur_change = 0.6, max_blur_change = 1.7;
 };
-inline constexpr EdgeLimits edge_limits;
+inline const EdgeLimits edge_limits;
 
 /// Robust weights of all fits: the Cauchy loss' scale, and what is no inlier.
 inline constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
@@ -102,7 +110,7 @@ inline constexpr double cauchy_scale_sigmas = 2.5, inlier_sigmas = 5;
 struct FineFitLimits {
   /// What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole: it does not
   /// average over lines. With it error over sigma is 0.7 on the rotation samples, 1.3 on rendered ones (usual).
-  double common_boundary_px = 0.007, common_side_px = 0.02;
+  double common_boundary_px = getenv("FLOOR") ? atof(getenv("FLOOR")) : 0.007, common_side_px = 0.02;
   /// And as a fraction of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. A occluding contour
   /// that motion blurs is worst: the part of its blur that the boundaries do not have.
   double usual_blur_px = 1.2, common_fraction_of_blur = 0.05, side_fraction_of_motion_blur = 0.15;
@@ -110,6 +118,7 @@ struct FineFitLimits {
   /// moves them by doubted_processing_px (rms) doubles the noise before the print is blamed.
   double fraction_of_processing = 0.25, doubted_processing_px = 0.1;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
+  double fraction_of_film = getenv("FILM_COMMON") ? atof(getenv("FILM_COMMON")) : 0.0;
   double usual_misfit = 0.004, px_per_misfit = 8;
   /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
   /// sigma grows by so much for all that is missing.
@@ -123,7 +132,7 @@ struct FineFitLimits {
   double sharp_blur_px = 1.8;    ///< a blur below it may flicker where few sides are left
   double settled_sigmas = 0.01;  ///< a reweighting that moves the unknowns by less is the last
 };
-inline constexpr FineFitLimits fine_fit_limits;
+inline const FineFitLimits fine_fit_limits;
 
 /// When a camera's processing is believed (picture_processing.cpp).
 struct ProcessingLimits {
