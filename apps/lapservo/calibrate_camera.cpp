@@ -106,7 +106,9 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
 
 void write_results(const CameraOptions& options, const std::optional<RigText>& rig,
                    const CameraCalibration& calibration) {
-  const std::string fields = measured_camera_yaml(calibration.camera, calibration.sigmas);
+  CameraSigmas sigmas = calibration.sigmas;
+  if (rig && sigmas.response == 0) sigmas.response = sigma_of_response(*rig).value_or(0);  // the response is the rig's
+  const std::string fields = measured_camera_yaml(calibration.camera, sigmas);
   if (!options.camera_info.empty()) {
     write_file(options.camera_info, fields);
     std::printf("camera: %s\n", options.camera_info.c_str());
@@ -117,7 +119,7 @@ void write_results(const CameraOptions& options, const std::optional<RigText>& r
     std::printf("camera: %s\n", options.out.c_str());
     return;
   }
-  write_file(options.rig_out(), updated_rig_yaml(*rig, calibration.camera, calibration.sigmas));
+  write_file(options.rig_out(), updated_rig_yaml(*rig, calibration.camera, sigmas));
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 
@@ -183,7 +185,8 @@ void add_calibrate_camera(Command parent, Run& run_later) {
       "by\n"
       "20 to 40 degrees to all sides; fix exposure and focus. A camera is looked at until its views suffice, or "
       "Ctrl-C.\n"
-      "All numbers are written with one standard deviation each (sigma_...).\n"
+      "All numbers are written with one standard deviation each (sigma_...), the response's where the pictures tell "
+      "it.\n"
       "Example:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml --report camera.html");
   command.runs(run_later, [options] { return run_camera(*options); });
 }

@@ -167,7 +167,7 @@ std::optional<BoardEdgeFit> fit_edge(const EdgePixels& edge, int channel,
     if (std::abs(step[2]) < 1e-4 && std::abs(step[4]) < 1e-3) break;
   }
   const Eigen::Matrix<double, 5, 5> covariance =
-      solve_symmetric(normal, Eigen::MatrixXd::Identity(5, 5)) * (residual_squares / std::max(1.0, count - 5));
+      inverse_of_symmetric(normal) * (residual_squares / std::max(1.0, count - 5));
   fit.offset_px = p[2], fit.slope = p[3], fit.blur_px = p[4];
   fit.dark = std::min(p[0], p[0] + p[1]), fit.bright = std::max(p[0], p[0] + p[1]);
   fit.towards_bright = p[1] > 0 ? 1 : -1;

@@ -9,20 +9,19 @@
 #include <fmt/format.h>
 
 #include "lapservo/calibration/asked_while_fitting.h"
+#include "lapservo/calibration/frame_recording.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t enough_live_views = 12;
-// Of a video four frames a second are looked at, as a hand moves a board, and about so many of a long one: the corners
-// of 1280x720 take some 60 ms to find, the views kept are at most a tenth of these.
-constexpr std::size_t enough_frames = 120;
-
-int every_of_video(const FrameSource& source) {
+// Of a video four frames a second are looked at, as a hand moves a board, and of a long one at least so many, and four
+// for each view that is wanted: the corners of 1280x720 take some 60 ms to find.
+int every_of_video(const FrameSource& source, std::size_t most_views) {
+  constexpr int enough_frames = 120;
   const int quarter_second = std::max(1, static_cast<int>(source.frames_per_second() / 4));
-  const std::size_t frames = source.frame_count().value_or(0);
-  return std::max(quarter_second, static_cast<int>((frames + enough_frames - 1) / enough_frames));
+  return std::max(quarter_second, every_of(source, std::max(enough_frames, 4 * static_cast<int>(most_views))));
 }
 
 std::string name_of(const Frame& frame) {
@@ -61,7 +60,7 @@ Board board_of(const BoardWords& words, const BoardWords::Names& names) {
 }
 
 BoardRecordings::BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig)
-    : views_(board, most_views), whose_("the rig's camera") {
+    : views_(board, most_views), most_views_(most_views), whose_("the rig's camera") {
   if (rig) size_ = cv::Size(rig->camera.width_px, rig->camera.height_px);
 }
 
@@ -69,7 +68,7 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
                               const std::function<void(const std::string&)>& say) {
   const bool pictures = source.kind() == FrameSource::Kind::image || source.kind() == FrameSource::Kind::folder;
   const bool live = source.kind() == FrameSource::Kind::live;
-  const int every = pictures || live ? 1 : every_of_video(source);
+  const int every = pictures || live ? 1 : every_of_video(source, most_views_);
   std::string said;
   int read = 0;
   while (!(read_.stopped = watch.stopped())) {

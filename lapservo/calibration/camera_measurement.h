@@ -27,7 +27,8 @@ struct BoardWords {
 };
 Board board_of(const BoardWords& words, const BoardWords::Names& names = {});
 
-/// Gathers views of a board: every picture of folders; of videos and cameras those that differ, a few a second.
+/// Gathers views of a board: every picture of folders; of videos and cameras those that differ, of four frames a second
+/// or fewer.
 class BoardRecordings {
  public:
   /// `rig`: whose camera took them, which tells their size; else the first one does.
@@ -47,6 +48,7 @@ class BoardRecordings {
 
  private:
   BoardViews views_;
+  std::size_t most_views_;
   std::optional<cv::Size> size_;
   std::string whose_;
   FramesRead read_;

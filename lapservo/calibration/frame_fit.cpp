@@ -160,8 +160,7 @@ std::optional<Eigen::MatrixXd> covariance(const Linearisation& at, const Eigen::
   // What the fit and the window of lags take off the scatter.
   const double taken = static_cast<double>(numbers) + static_cast<double>(alike_frames);
   const double freedom = static_cast<double>(frames) / std::max(1.0, static_cast<double>(frames) - taken);
-  const Eigen::MatrixXd inverse =
-      units.asDiagonal() * solve_symmetric(normed, Eigen::MatrixXd::Identity(numbers, numbers)) * units.asDiagonal();
+  const Eigen::MatrixXd inverse = units.asDiagonal() * inverse_of_symmetric(normed) * units.asDiagonal();
   return freedom * product(product(inverse, scatter), inverse);
 }
 

@@ -140,7 +140,7 @@ TEST(RigEvidence, IsTheSameFromOneCoreAndFromTwo) {
     EXPECT_EQ(keys_of_one[i].sighting.tau_rad, keys_of_two[i].sighting.tau_rad);
 }
 
-// What one half throws reaches the caller, wherever it ran; the other half has come to its end by then.
+// What both halves throw reaches the caller once, wherever they ran.
 TEST(RigEvidence, PassesErrorsOn) {
   for (const auto cores : {RigEvidence::Cores::one, RigEvidence::Cores::two}) {
     RigEvidence evidence(true_rig(), 0, cores);

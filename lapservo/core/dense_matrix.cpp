@@ -1,5 +1,7 @@
 #include "lapservo/core/dense_matrix.h"
 
+#include <limits>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
@@ -13,10 +15,16 @@ Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& matrix, const Eigen::Matr
   return matrix.ldlt().solve(right);
 }
 
+Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& matrix) {
+  const Eigen::LDLT<Eigen::MatrixXd> factor(matrix);
+  const Eigen::Index size = matrix.rows();
+  if (!(factor.vectorD().minCoeff() > 0))
+    return Eigen::MatrixXd::Constant(size, size, std::numeric_limits<double>::quiet_NaN());
+  return factor.solve(Eigen::MatrixXd::Identity(size, size));
+}
+
 Eigen::MatrixXd whitening_of(const Eigen::MatrixXd& covariance) {
-  const Eigen::MatrixXd inverse =
-      solve_symmetric(covariance, Eigen::MatrixXd::Identity(covariance.rows(), covariance.cols()));
-  return inverse.llt().matrixU();
+  return inverse_of_symmetric(covariance).llt().matrixU();
 }
 
 Eigen::VectorXd eigenvalues_of_symmetric(const Eigen::MatrixXd& matrix) {

@@ -8,8 +8,12 @@ namespace lapservo::internal {
 /// in every file that has it. On the heap: nothing for what is done each frame.
 Eigen::MatrixXd product(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
-/// x of matrix * x = right, for a symmetric matrix that is positive or negative (semi-)definite.
+/// x of matrix * x = right, for a symmetric matrix that is positive or negative (semi-)definite. Where that is
+/// singular, directions of which it says nothing may get 0.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
+
+/// Of a symmetric positive definite matrix; NaN where it is none.
+Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& matrix);
 
 /// The upper triangular W with W^T W = covariance^-1, which makes errors of unit size of such errors.
 Eigen::MatrixXd whitening_of(const Eigen::MatrixXd& covariance);

@@ -27,6 +27,13 @@ TEST(DenseMatrix, ASolutionSolvesAndWhiteningMakesUnits) {
   }
 }
 
+TEST(DenseMatrix, WhatHasNoInverseGetsNone) {
+  const Eigen::MatrixXd regular{{2, 1}, {1, 3}}, singular{{2, 0, 0}, {0, 0, 0}, {0, 0, 3}}, indefinite{{1, 0}, {0, -1}};
+  EXPECT_TRUE(product(regular, inverse_of_symmetric(regular)).isIdentity(1e-12));
+  EXPECT_TRUE(inverse_of_symmetric(singular).array().isNaN().all());
+  EXPECT_TRUE(inverse_of_symmetric(indefinite).array().isNaN().all());
+}
+
 TEST(DenseMatrix, EigenvaluesRise) {
   const Eigen::MatrixXd matrix{{2, 1, 0}, {1, 2, 0}, {0, 0, -5}};
   EXPECT_TRUE(eigenvalues_of_symmetric(matrix).isApprox(Eigen::Vector3d(-5, 1, 3), 1e-12));

@@ -179,7 +179,7 @@ std::optional<RegistrationFit> fit_registration(const Camera& camera, const Mark
   fit.camera_from_rcm = model.camera_from_rcm(x);
   fit.rms_px = std::sqrt(at->squares_px2 / (8.0 * static_cast<double>(sightings.size())));
   const double worse = std::max(1.0, fit.rms_px / sigma_px);
-  const Normal covariance = alike_images * worse * worse * solve_symmetric(at->information, Normal::Identity());
+  const Normal covariance = alike_images * worse * worse * inverse_of_symmetric(at->information);
   fit.sigma_rotation_rad = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   fit.sigma_position_m = std::sqrt(covariance.block<3, 3>(3, 3).trace());
   if (!std::isfinite(fit.sigma_rotation_rad) || !std::isfinite(fit.sigma_position_m)) return std::nullopt;

@@ -34,8 +34,8 @@ class PoseUnknowns {
   /// Present in the first form.
   const std::optional<JointVector>& q() const { return q_; }
 
-  /// Row d(n . p)/d(unknowns) for a point p (camera frame) that moves with the shaft; psi's entry is 0, and so are those
-  /// of as many unknowns `beyond` the pose's.
+  /// Row d(n . p)/d(unknowns) for a point p (camera frame) that moves with the shaft; psi's entry is 0, and so are
+  /// those of as many unknowns `beyond` the pose's.
   UnknownVector row(const Eigen::Vector3d& point_in_camera, const Eigen::Vector3d& direction, int beyond = 0) const;
 
   /// The pose after a small change of the unknowns.
@@ -52,8 +52,9 @@ class PoseUnknowns {
   ShaftPose pose_;
   Eigen::Vector3d pivot_ = Eigen::Vector3d::Zero();
   // In the order of the unknowns: axes of the two rotations, about the pivot, then directions of the translations.
-  std::array<Eigen::Vector3d, 2> rotations_;
-  std::array<Eigen::Vector3d, 3> translations_;
+  std::array<Eigen::Vector3d, 2> rotations_{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  std::array<Eigen::Vector3d, 3> translations_{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
+                                               Eigen::Vector3d::Zero()};
 };
 
 }  // namespace lapservo::internal

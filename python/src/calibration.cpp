@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/asked_while_fitting.h"
 #include "lapservo/calibration/camera_measurement.h"
 #include "lapservo/calibration/colour_measurement.h"
 #include "lapservo/calibration/marker_measurement.h"
@@ -259,10 +260,12 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
   if (read) instrument.joints = read->joints;
   MeasuredPoses poses;
   Registration registration;
+  const JobWatch watch = watch_of(progress);
   {
     const py::gil_scoped_release others_run;
+    const AskedWhileFitting asking(watch.is_stopped);
     poses = table ? poses_in_table(name, instrument.name)
-                  : poses_in_frames(given.rig, index, {*source->source, name, deinterlace}, watch_of(progress));
+                  : poses_in_frames(given.rig, index, {*source->source, name, deinterlace}, watch);
     expect_result(poses.none, name);
     registration =
         read ? register_arm(instrument, poses.all, read->recording, read->source) : register_rcm(instrument, poses.all);

@@ -9,7 +9,7 @@ namespace py = pybind11;
 PYBIND11_MODULE(_lapservo, m) {
   using namespace lapservo::python;
   m.attr("__version__") = LAPSERVO_VERSION;
-  py::register_exception_translator([](std::exception_ptr thrown) {
+  py::register_local_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const lapservo::InputError& e) {

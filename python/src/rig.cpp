@@ -188,8 +188,19 @@ std::string PythonRig::yaml() const {
   return text.insert(end, "\n  sigma_response: " + sigma);
 }
 
+namespace {
+
+// Who uses it may stand in another folder by then.
+PythonRig with_absolute_camera_file(PythonRig rig) {
+  if (!rig.camera_file.empty()) rig.camera_file = std::filesystem::absolute(rig.camera_file);
+  return rig;
+}
+
+}  // namespace
+
 PythonRig PythonRig::parse(const std::string& yaml, const std::string& source, const std::filesystem::path& folder) {
-  return {parse_rig(yaml, source, folder), internal::sigma_of_response({yaml, folder / "rig.yaml"})};
+  return with_absolute_camera_file(
+      {parse_rig(yaml, source, folder), internal::sigma_of_response({yaml, folder / "rig.yaml"})});
 }
 
 void bind_rig(py::module_& m) {
@@ -217,7 +228,7 @@ with the field, its value and what was expected.)")
           "load",
           [](const std::filesystem::path& path) {
             const internal::RigText text = internal::RigText::read(path);
-            return PythonRig{text.rig(), internal::sigma_of_response(text)};
+            return with_absolute_camera_file({text.rig(), internal::sigma_of_response(text)});
           },
           py::arg("path"), "Reads a rig's YAML file.")
       .def_static(
@@ -240,8 +251,12 @@ with the field, its value and what was expected.)")
           "in "
           "it.")
       .def("to_yaml", &PythonRig::yaml, "Text that Rig.parse reads back to the last bit.")
-      .def(py::pickle([](const PythonRig& rig) { return rig.yaml(); },
-                      [](const std::string& yaml) { return PythonRig::parse(yaml, "pickled rig"); }))
+      .def(py::pickle([](const PythonRig& rig) { return py::make_tuple(rig.yaml(), rig.camera_file.string()); },
+                      [](const py::tuple& state) {
+                        PythonRig rig = PythonRig::parse(state[0].cast<std::string>(), "pickled rig");
+                        rig.camera_file = state[1].cast<std::string>();
+                        return rig;
+                      }))
       .def("__repr__", [](const Rig& rig) {
         std::string names;
         for (const Instrument& instrument : rig.instruments) names += (names.empty() ? "" : ", ") + instrument.name;

@@ -34,14 +34,16 @@ CAMERA, NO_CAMERA = "/dev/video0", "/dev/video-none"
 INSTEAD = {r"lapservo (track|view) 0 ": r"lapservo \1 swing.mp4 ", r"--view\b": "", r"--web\b": "--web 0",
            r"lapservo view\b": "lapservo view --port 0", CAMERA: NO_CAMERA}
 #: Exit code 1: what was found is not good enough, or the arm is not yet where it shall be.
-MAY_BE_1 = re.compile(r"\S*lapservo (check|servo|calibrate all) ")
+MAY_BE_1 = re.compile(r"\S*lapservo (check|servo (?!--replay run/)|calibrate all) ")
+#: Of what was interrupted: ended by itself, said so, or as shells have it.
+INTERRUPTED = (0, 1, 130)
 LONGEST_S = 120
 
 
 class Running:
     def __init__(self, command, folder, environment):
         self.command, self.folder = command, folder
-        self.output = tempfile.TemporaryFile("w+", dir=folder)
+        self.output = tempfile.TemporaryFile("a+", dir=folder)  # so that reading does not move where it writes
         self.process = subprocess.Popen(["bash", "-c", command], cwd=folder, env=environment, stdin=subprocess.DEVNULL,
                                         stdout=self.output, stderr=subprocess.STDOUT, start_new_session=True)
 
@@ -63,7 +65,8 @@ class Running:
 
     def interrupt(self):
         self.signal(signal.SIGINT)
-        return self.result()
+        result = self.result()
+        assert result in INTERRUPTED, f"{result} after Ctrl-C: {self.said()}"
 
     def signal(self, number):
         with contextlib.suppress(ProcessLookupError):
@@ -77,7 +80,7 @@ class Shell:
         self.folder, self.port = folder, free_port()
         self.environment = os.environ | {
             "PATH": f"{BUILD}:{os.environ['PATH']}", "PYTHONPATH": str(pathlib.Path(lapservo.__file__).resolve().parents[1]),
-            "ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": str(100 + os.getpid() % 100), "ROS_IP": "127.0.0.1",
+            "ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": str(20 + os.getpid() % 50), "ROS_IP": "127.0.0.1",
             "ROS_MASTER_URI": f"http://127.0.0.1:{self.port}", "ROS_LOG_DIR": str(folder)}
 
     def start(self, command):
@@ -107,9 +110,10 @@ class Shell:
     def beside(self, commands):
         """Services that go on meanwhile. Whatever ends one before is an error."""
         services = []
-        try:
+        with contextlib.ExitStack() as stack:
             for command in commands:
                 services.append(self.start(command))
+                stack.callback(services[-1].interrupt)
                 if command.startswith("rosmaster"):
                     wait_for_master(self.environment["ROS_MASTER_URI"])
                 else:
@@ -117,9 +121,6 @@ class Shell:
             yield
             for service in services:
                 assert service.process.poll() is None, service.said()
-        finally:
-            for service in reversed(services):
-                service.interrupt()
 
     def run_all(self, commands):
         own = [command for command in commands if SERVICES.match(command)]

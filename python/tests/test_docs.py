@@ -118,7 +118,7 @@ def furnish(folder, recorded):
 def run_cpp(block, folder):
     library = BUILD / "liblapservo.so"
     if not library.exists():
-        pytest.skip(f"{library} is not built")
+        pytest.fail(f"{library} is not built")
     (folder / "see.cpp").write_text(block.text)
     includes = ["-I", SOURCE, "-isystem", "/usr/include/eigen3", "-isystem", "/usr/include/opencv4"]
     subprocess.run(["g++", "-std=c++20", "-Wall", "-Werror", *includes, "see.cpp", "-o", "see", library,
