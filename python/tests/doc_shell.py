@@ -22,7 +22,7 @@ SERVICES = re.compile(r"(\S*lapservo sim-robot|rosmaster) ")
 #: What is stopped as soon as it says this, or this file is there, from which on it does what the page is about: the rest takes
 #: minutes, or has no end.
 ENOUGH = {
-    r"\S*lapservo experiment all ": pathlib.Path("results/unfinished"),
+    r"\S*lapservo experiment all ": pathlib.Path("results/unfinished/illumination.csv"),
     r"\S*lapservo calibrate all ": r"\ncamera: ",
     r"\S*lapservo view ": "page: http://127.0.0.1",
     r"\S*lapservo servo .*--robot ros[12]:": "  track\n",
