@@ -37,7 +37,7 @@ INSTEAD = {r"lapservo (track|view) 0 ": r"lapservo \1 swing.mp4 ", r"--view\b": 
 MAY_BE_1 = re.compile(r"\S*lapservo (check|servo (?!--replay run/)|calibrate all) ")
 #: Of what was interrupted: ended by itself, said so, or as shells have it.
 INTERRUPTED = (0, 1, 130)
-LONGEST_S = 120
+LONGEST_S = 300
 
 
 class Running:
