@@ -37,10 +37,8 @@ struct Scene {
 
   Rigid3 camera_from_marker() const {
     const Instrument& instrument = rig.instruments[0];
-    return *instrument.camera_from_rcm * rcm_from_unrolled(q) *
-           Rigid3{
-               Eigen::Quaterniond(Eigen::AngleAxisd(q.psi_rad + instrument.marker.seam_rad, Eigen::Vector3d::UnitZ())),
-               Eigen::Vector3d::Zero()};
+    return lapservo::camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q),
+                                        q.psi_rad);
   }
 };
 

@@ -83,11 +83,6 @@ namespace {
 
 using Corners = std::array<Eigen::Vector2d, 4>;
 
-Eigen::Vector2d projected(const Eigen::Vector3d& point_m, const Rigid3& camera_from_marker, const Camera& camera) {
-  const Eigen::Vector3d at = camera_from_marker * point_m;
-  return {camera.fx_px * at.x() / at.z() + camera.cx_px, camera.fy_px * at.y() / at.z() + camera.cy_px};
-}
-
 struct Line {
   Eigen::Vector2d through, normal;
 };
@@ -98,7 +93,7 @@ Line straight_side(const TagBundle& bundle, std::size_t tag, std::size_t corner,
   constexpr int count = 16;
   Eigen::Matrix2Xd points(2, count);
   for (int i = 0; i < count; ++i)
-    points.col(i) = projected(bundle.side_m(tag, corner, (i + 0.5) / count), pose, camera);
+    points.col(i) = camera.ideal_from_point(pose * bundle.side_m(tag, corner, (i + 0.5) / count));
   const Eigen::Vector2d middle = points.rowwise().mean();
   const Eigen::Matrix2Xd off = points.colwise() - middle;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(off * off.transpose());
@@ -116,7 +111,7 @@ Corners beside_px(const TagBundle& bundle, std::size_t tag, const Rigid3& pose, 
     normals << one.normal.transpose(), other.normal.transpose();
     const Eigen::Vector2d meet =
         normals.inverse() * Eigen::Vector2d(one.normal.dot(one.through), other.normal.dot(other.through));
-    beside[k] = meet - projected(bundle.corners_m(tag)[k], pose, camera);
+    beside[k] = meet - camera.ideal_from_point(pose * bundle.corners_m(tag)[k]);
   }
   return beside;
 }

@@ -106,9 +106,8 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
 
 void write_results(const CameraOptions& options, const std::optional<RigText>& rig,
                    const CameraCalibration& calibration) {
-  CameraSigmas sigmas = calibration.sigmas;
-  if (rig && sigmas.response == 0) sigmas.response = sigma_of_response(*rig).value_or(0);  // the response is the rig's
-  const std::string fields = measured_camera_yaml(calibration.camera, sigmas);
+  const std::string fields = rig ? measured_camera_yaml(*rig, calibration.camera, calibration.sigmas)
+                                 : measured_camera_yaml(calibration.camera, calibration.sigmas);
   if (!options.camera_info.empty()) {
     write_file(options.camera_info, fields);
     std::printf("camera: %s\n", options.camera_info.c_str());
@@ -119,7 +118,7 @@ void write_results(const CameraOptions& options, const std::optional<RigText>& r
     std::printf("camera: %s\n", options.out.c_str());
     return;
   }
-  write_file(options.rig_out(), updated_rig_yaml(*rig, calibration.camera, sigmas));
+  write_file(options.rig_out(), updated_rig_yaml(*rig, calibration.camera, calibration.sigmas));
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 

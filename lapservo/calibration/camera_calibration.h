@@ -33,6 +33,7 @@ class BoardViews {
   /// Returns whether a board was found.
   bool add(const std::string& name, const cv::Mat& bgr, bool always);
   const std::vector<BoardView>& views() const { return views_; }
+  std::size_t most() const { return most_; }
   bool full() const { return views_.size() >= most_; }
   int found() const { return found_; }
   std::vector<BoardView> take() { return std::move(views_); }

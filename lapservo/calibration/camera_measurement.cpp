@@ -60,7 +60,7 @@ Board board_of(const BoardWords& words, const BoardWords::Names& names) {
 }
 
 BoardRecordings::BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig)
-    : views_(board, most_views), most_views_(most_views), whose_("the rig's camera") {
+    : views_(board, most_views), whose_("the rig's camera") {
   if (rig) size_ = cv::Size(rig->camera.width_px, rig->camera.height_px);
 }
 
@@ -68,7 +68,7 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
                               const std::function<void(const std::string&)>& say) {
   const bool pictures = source.kind() == FrameSource::Kind::image || source.kind() == FrameSource::Kind::folder;
   const bool live = source.kind() == FrameSource::Kind::live;
-  const int every = pictures || live ? 1 : every_of_video(source, most_views_);
+  const int every = pictures || live ? 1 : every_of_video(source, views_.most());
   std::string said;
   int read = 0;
   while (!(read_.stopped = watch.stopped())) {

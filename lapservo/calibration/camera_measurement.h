@@ -48,7 +48,6 @@ class BoardRecordings {
 
  private:
   BoardViews views_;
-  std::size_t most_views_;
   std::optional<cv::Size> size_;
   std::string whose_;
   FramesRead read_;

@@ -523,10 +523,9 @@ std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& pro
   std::vector<double> darks, brights;
   for (const BoardEdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
   fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);
-  fit.table = table_of(fitted.shared());
   fit.sigma = curve_sigma_of(fitted.problem(), fitted.shared(), std::max(1.0, fit.misfit[1]), fit.low, fit.high);
   if (!std::isfinite(fit.sigma)) return std::nullopt;
-  fit.table = fit.response = rounded_by_sigma(std::move(fit.table), fit.sigma);
+  fit.table = fit.response = rounded_by_sigma(table_of(fitted.shared()), fit.sigma);
   if (try_named) name_response(fitted, fit);
   return fit;
 }

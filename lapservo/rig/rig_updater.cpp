@@ -155,11 +155,14 @@ std::optional<double> sigma_of_response(const RigText& rig) {
   return value == 0 ? std::nullopt : std::optional(value);
 }
 
+std::string measured_camera_yaml(const RigText& rig, const Camera& camera, CameraSigmas sigmas) {
+  if (sigmas.response == 0) sigmas.response = sigma_of_response(rig).value_or(0);
+  return measured_camera_yaml(camera, sigmas);
+}
+
 std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas) {
   YAML::Node root = YAML::Load(rig.yaml);
-  CameraSigmas known = sigmas;
-  if (known.response == 0) known.response = sigma_of_response(rig).value_or(0);
-  root["camera"] = YAML::Load(measured_camera_yaml(camera, known));
+  root["camera"] = YAML::Load(measured_camera_yaml(rig, camera, sigmas));
   return text_of(root);
 }
 

@@ -57,8 +57,11 @@ struct MeasuredColour {
 std::string updated_rig_yaml(const RigText& rig, const std::filesystem::path& destination, std::size_t instrument,
                              const MeasuredColour& colour);
 
-/// The same with another camera, which stands in the rig itself whatever file the old one came from. Where its response
-/// was not measured it is the rig's, whose sigma_response stays.
+/// measured_camera_yaml() of a camera that was a rig's: where its response was not measured it is the rig's, whose
+/// sigma_response stays.
+std::string measured_camera_yaml(const RigText& rig, const Camera& camera, CameraSigmas sigmas);
+
+/// The rig with that camera, which stands in the rig itself whatever file the old one came from.
 std::string updated_rig_yaml(const RigText& rig, const Camera& camera, const CameraSigmas& sigmas);
 
 /// Whether a rig's camera has a response that was measured: sigma_response stands beside it. The rig must have been

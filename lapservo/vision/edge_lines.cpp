@@ -190,6 +190,10 @@ HWY_INLINE std::array<V, Count> dots(const std::array<const Column*, Count>& col
   return sums;
 }
 
+HWY_INLINE V dot(const Column& a, const Column& b, std::size_t samples) {
+  return dots<1>({&a}, b, samples)[0];
+}
+
 void subtract(Column& from, V factor, const Column& column, std::size_t samples) {
   for (std::size_t i = 0; i < samples; ++i) from[i].store(hn::NegMulAdd(factor, column[i].load(), from[i].load()));
 }
@@ -262,12 +266,12 @@ struct Basis {
     independent = hn::Eq(constant, constant);
     for (std::size_t j = 1; j < linear; ++j) {
       Column& column = unit[j];
-      const V before = dots<1>({&column}, column, samples)[0];
+      const V before = dot(column, column, samples);
       for (std::size_t k = 0; k < j; ++k) {
-        triangle[k][j] = dots<1>({&unit[k]}, column, samples)[0];
+        triangle[k][j] = dot(unit[k], column, samples);
         subtract(column, triangle[k][j], unit[k], samples);
       }
-      const V square = dots<1>({&column}, column, samples)[0];
+      const V square = dot(column, column, samples);
       independent = hn::And(independent, hn::Gt(square, hn::Mul(hn::Set(d, 1e-5F), before)));
       triangle[j][j] = hn::Sqrt(square);
       scale(column, hn::Div(hn::Set(d, 1), triangle[j][j]), samples);
@@ -303,7 +307,7 @@ struct LineLight {
   V squares;
 
   LineLight(const std::array<Column, 3>& of_light, std::size_t samples) : light(of_light), squares(hn::Zero(Floats())) {
-    for (const Column& channel : light) squares = hn::Add(squares, dots<1>({&channel}, channel, samples)[0]);
+    for (const Column& channel : light) squares = hn::Add(squares, dot(channel, channel, samples));
   }
 };
 
