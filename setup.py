@@ -17,7 +17,8 @@ class CMakeBuild(build_ext):
     def build_extension(self, ext):
         build = pathlib.Path(os.environ.get("LAPSERVO_BUILD", SOURCE / "build" / "pip"))
         if "LAPSERVO_BUILD" not in os.environ:
-            settings = ["-DCMAKE_BUILD_TYPE=Release", "-DLAPSERVO_BUILD_TESTS=OFF", "-DLAPSERVO_BUILD_BENCH=OFF"]
+            settings = ["-DCMAKE_BUILD_TYPE=Release", "-DLAPSERVO_BUILD_TESTS=OFF", "-DLAPSERVO_BUILD_BENCH=OFF",
+                        "-DLAPSERVO_FROM_NOTHING=ON"]
             subprocess.run(["cmake", "-G", "Ninja", "-S", SOURCE, "-B", build, f"-DPython_EXECUTABLE={sys.executable}",
                             *settings], check=True)
             subprocess.run(["cmake", "--build", build, "--target", "lapservo_python"], check=True)

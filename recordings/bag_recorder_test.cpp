@@ -16,7 +16,7 @@
 #include "transports/ros2/cdr_encoder.h"
 
 namespace lapservo::internal {
-namespace {
+namespace bag_recorder_test {
 using eprosima::fastcdr::Cdr;
 using lapservo::testing::input_error;
 
@@ -137,5 +137,5 @@ TEST(BagRecorder, RecordsFromSeveralThreads) {
   for (int i = 0; i < count; ++i) EXPECT_EQ(std::get<ImageMessage>(images[i]).stamp_s, begin_s + i);
 }
 
-}  // namespace
+}  // namespace bag_recorder_test
 }  // namespace lapservo::internal

@@ -15,7 +15,7 @@
 #include "transports/ros2/cdr_decoder.h"
 
 namespace lapservo::internal {
-namespace {
+namespace open_bag_test {
 using testing::BagEntry;
 using testing::input_error;
 
@@ -185,5 +185,5 @@ TEST(CdrDecoder, ReadsBothByteOrdersAndNothingThatIsCutShort) {
   }
 }
 
-}  // namespace
+}  // namespace open_bag_test
 }  // namespace lapservo::internal

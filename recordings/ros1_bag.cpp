@@ -19,7 +19,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "ROS 1 bags are little-endian, and so is what is copied");
 
-using Bytes = std::span<const std::uint8_t>;
+using ByteView = std::span<const std::uint8_t>;
 using Fields = std::map<std::string, std::string, std::less<>>;
 
 enum Op : std::uint8_t { message_op = 2, bag_op = 3, chunk_op = 5, chunk_info_op = 6, connection_op = 7 };
@@ -35,22 +35,22 @@ constexpr std::string_view magic = "#ROSBAG V2.0\n";
 
 // The first of the bytes; nullopt where there are fewer.
 template <typename T>
-std::optional<T> taken(Bytes& from) {
+std::optional<T> taken(ByteView& from) {
   if (from.size() < sizeof(T)) return std::nullopt;
   T value;
   std::memcpy(&value, from.data(), sizeof value);
   from = from.subspan(sizeof value);
   return value;
 }
-std::optional<Bytes> block_taken(Bytes& from) {
+std::optional<ByteView> block_taken(ByteView& from) {
   const auto size = taken<std::uint32_t>(from);
   if (!size || *size > from.size()) return std::nullopt;
-  const Bytes block = from.first(*size);
+  const ByteView block = from.first(*size);
   from = from.subspan(*size);
   return block;
 }
 
-std::optional<Fields> fields_of(Bytes header) {
+std::optional<Fields> fields_of(ByteView header) {
   Fields fields;
   while (!header.empty()) {
     const auto field = block_taken(header);
@@ -118,7 +118,7 @@ class RecordFile {
  private:
   std::vector<std::uint8_t> block(std::uint64_t& at) {
     const auto length = bytes(at, 4);
-    Bytes from(length);
+    ByteView from(length);
     const std::uint32_t size = *taken<std::uint32_t>(from);
     auto content = bytes(at + 4, size);
     at += 4 + std::uint64_t{size};
@@ -157,7 +157,7 @@ class Ros1Messages : public BagMessages {
           !std::binary_search(connections_.begin(), connections_.end(), *connection))
         continue;
       return decode_bag_message(
-          type_, []<typename Message>(const Bytes& bytes) { return decode_ros1<Message>(bytes); }, *data);
+          type_, []<typename Message>(const ByteView& bytes) { return decode_ros1<Message>(bytes); }, *data);
     }
   }
 
@@ -182,7 +182,7 @@ class Ros1Messages : public BagMessages {
   RecordFile file_;
   std::size_t next_ = 0;
   std::vector<std::uint8_t> content_;
-  Bytes rest_;
+  ByteView rest_;
 };
 
 class Ros1Bag : public Bag {
@@ -246,7 +246,7 @@ class Ros1Bag : public Bag {
     const auto begin_s = time_in(record.fields, "start_time"), end_s = time_in(record.fields, "end_time");
     if (!place || !begin_s || !end_s || record.data.size() % 8 != 0) refuse_damage(path_, at);
     Chunk chunk{*place, {}, *begin_s, *end_s};
-    for (Bytes counts(record.data); !counts.empty();) {
+    for (ByteView counts(record.data); !counts.empty();) {
       const auto connection = *taken<std::uint32_t>(counts);
       chunk.messages[connection] = *taken<std::uint32_t>(counts);
     }

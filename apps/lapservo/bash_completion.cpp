@@ -11,7 +11,7 @@ std::string joined(const std::vector<std::string>& words) {
   return result;
 }
 
-std::string quoted(const std::string& text) {
+std::string in_quotes(const std::string& text) {
   return "'" + text + "'";  // names of commands and options, and their choices, hold no quotes
 }
 
@@ -38,15 +38,15 @@ bool takes_files(const CommandDescription& command) {
 }
 
 std::string command_case(const CommandDescription& command) {
-  return "    " + quoted(command.name()) + ")\n      options=" + quoted(joined(option_names(command))) +
-         " words=" + quoted(joined(plain_words(command))) + " files=" + (takes_files(command) ? "1" : "") + " ;;\n";
+  return "    " + in_quotes(command.name()) + ")\n      options=" + in_quotes(joined(option_names(command))) +
+         " words=" + in_quotes(joined(plain_words(command))) + " files=" + (takes_files(command) ? "1" : "") + " ;;\n";
 }
 
 std::string value_case(const CommandDescription& command, const OptionDescription& option) {
   std::string patterns;
   for (const std::string& name : option.names)
-    patterns += (patterns.empty() ? "" : "|") + quoted(command.name() + " " + name);
-  return "    " + patterns + ")\n      value=1 words=" + quoted(joined(option.choices)) +
+    patterns += (patterns.empty() ? "" : "|") + in_quotes(command.name() + " " + name);
+  return "    " + patterns + ")\n      value=1 words=" + in_quotes(joined(option.choices)) +
          " files=" + (option.takes_file_or_text() ? "1" : "") + " ;;\n";
 }
 
@@ -55,7 +55,7 @@ std::string value_case(const CommandDescription& command, const OptionDescriptio
 std::string bash_completion(const CommandDescription& root) {
   std::string names, commands, values;
   for (const CommandDescription* command : all_commands(root)) {
-    if (command != &root) names += (names.empty() ? "" : "|") + quoted(command->name());
+    if (command != &root) names += (names.empty() ? "" : "|") + in_quotes(command->name());
     commands += command_case(*command);
     for (const OptionDescription& option : command->options)
       if (!option.positional && option.takes_value) values += value_case(*command, option);

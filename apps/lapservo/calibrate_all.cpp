@@ -44,7 +44,7 @@ constexpr const char* to_record_turn = "a slow full turn about the shaft's axis,
 constexpr const char* to_record_swing =
     "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s";
 
-std::string quoted(const std::string& word) {
+std::string shell_word(const std::string& word) {
   const bool plain = word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./:,=") ==
                      std::string::npos;
   if (plain && !word.empty()) return word;
@@ -55,7 +55,7 @@ std::string quoted(const std::string& word) {
 
 std::string command_line(const std::vector<std::string>& arguments) {
   std::string text = "lapservo";
-  for (const std::string& argument : arguments) text += " " + quoted(argument);
+  for (const std::string& argument : arguments) text += " " + shell_word(argument);
   return text;
 }
 

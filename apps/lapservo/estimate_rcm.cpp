@@ -32,7 +32,7 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-struct Options {
+struct EstimateRcmOptions {
   std::string observations, rig, out;
   double sigma_px = 0;  // 0: to be estimated
   double common_px = 0.01;
@@ -57,8 +57,8 @@ const Instrument* find_instrument(const std::optional<Rig>& rig, const std::stri
   return index ? &rig->instruments[*index] : nullptr;
 }
 
-Eigen::Vector2d read_ideal_point(const CsvTable& table, std::size_t row, const char* edge, const Options& options,
-                                 const std::optional<Rig>& rig) {
+Eigen::Vector2d read_ideal_point(const CsvTable& table, std::size_t row, const char* edge,
+                                 const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
   const double u_px = table.number(row, fmt::format("{}_u_px", edge));
   const double v_px = table.number(row, fmt::format("{}_v_px", edge));
   Eigen::Vector2d raw(u_px, v_px);
@@ -72,7 +72,7 @@ Eigen::Vector2d read_ideal_point(const CsvTable& table, std::size_t row, const c
 }
 
 // Every instrument of the file has an entry, if only an empty one.
-LinesByInstrument read_lines(const Options& options, const std::optional<Rig>& rig) {
+LinesByInstrument read_lines(const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
   const CsvTable table = CsvTable::read(options.observations);
   const double sigma_px = options.sigma_px > 0 ? options.sigma_px : 1;
   LinesByInstrument lines;
@@ -91,7 +91,7 @@ LinesByInstrument read_lines(const Options& options, const std::optional<Rig>& r
   return lines;
 }
 
-Result weighted_result(const std::vector<LineObservation>& lines, const Options& options) {
+Result weighted_result(const std::vector<LineObservation>& lines, const EstimateRcmOptions& options) {
   const bool known = options.sigma_px > 0;
   const RcmEstimate estimate =
       estimate_projected_rcm(lines, {known ? NoiseScale::known : NoiseScale::estimated, options.common_px});
@@ -124,7 +124,7 @@ Result pairwise_result(const std::vector<LineObservation>& lines, const Result& 
   return result;
 }
 
-std::vector<Result> estimate_all(const Options& options, const std::optional<Rig>& rig) {
+std::vector<Result> estimate_all(const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
   std::vector<Result> results;
   for (const auto& [name, rows] : read_lines(options, rig)) {
     const Instrument* instrument = find_instrument(rig, name);
@@ -216,7 +216,7 @@ void warn(const Result& r) {
         r.instrument.c_str());
 }
 
-int run(const Options& options) {
+int run(const EstimateRcmOptions& options) {
   std::optional<Rig> rig;
   if (!options.rig.empty()) rig = load_rig(options.rig);
   InputFiles inputs;
@@ -241,7 +241,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_estimate_rcm(Command app, Run& run_later) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<EstimateRcmOptions>();
   Command command = app.add_subcommand(
       "estimate-rcm", "Estimate where the RCM appears in the image, from the lines on which the instrument was seen.");
   command

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uintmax_t needed_bytes = 16 << 20;
 
-struct Options {
+struct ExperimentOptions {
   std::string name, out, rig, method = "both";
   std::uint64_t seed = 1;
   bool force = false;
@@ -65,7 +65,7 @@ std::string names() {
   return text + "all";
 }
 
-ExperimentSetup setup_of(const Options& options) {
+ExperimentSetup setup_of(const ExperimentOptions& options) {
   ExperimentSetup setup;
   setup.rig = single_instrument(options.rig.empty() ? paper_rig() : load_rig(options.rig), options.rig);
   setup.seed = options.seed;
@@ -85,7 +85,7 @@ std::string missing_from(const std::vector<ReportSection>& sections, const std::
   return text.empty() ? "" : "This report is not whole: it was stopped." + text;
 }
 
-Report report_of(std::vector<ReportSection> sections, const std::string& missing, const Options& options) {
+Report report_of(std::vector<ReportSection> sections, const std::string& missing, const ExperimentOptions& options) {
   return {
       "lapservo: the experiments of the paper",
       {"\u201cImage-Based Trajectory Tracking Control of 4-DoF Laparoscopic Instruments Using a Rotation "
@@ -100,7 +100,7 @@ Report report_of(std::vector<ReportSection> sections, const std::string& missing
 }
 
 // The library knows the rig, but not its file.
-[[noreturn]] void rethrow_with_rig(const InputError& error, const Options& options) {
+[[noreturn]] void rethrow_with_rig(const InputError& error, const ExperimentOptions& options) {
   if (error.source() == "rig" && !options.rig.empty()) throw error.with_source(options.rig);
   throw error;
 }
@@ -120,7 +120,7 @@ struct Outcome {
   std::string stopped_in;  // the first experiment that has no section
 };
 
-Outcome run_experiments(ExperimentSetup setup, const Options& options, const fs::path& folder) {
+Outcome run_experiments(ExperimentSetup setup, const ExperimentOptions& options, const fs::path& folder) {
   Outcome outcome;
   for (const auto& [name, experiment] : experiments()) {
     if (options.name != "all" && options.name != name) continue;
@@ -143,7 +143,7 @@ Outcome run_experiments(ExperimentSetup setup, const Options& options, const fs:
   return outcome;
 }
 
-int run(const Options& options) {
+int run(const ExperimentOptions& options) {
   ExperimentSetup setup = setup_of(options);
   InputFiles inputs;
   inputs.add_rig(options.rig, setup.rig);
@@ -163,7 +163,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_experiment(Command app, Run& run_later) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ExperimentOptions>();
   Command command = app.add_subcommand("experiment", "The paper's experiments, in a simulator, as a report.");
   std::vector<std::string> choices{"all"};
   for (const Named& named : experiments()) choices.push_back(named.name);

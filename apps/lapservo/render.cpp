@@ -34,7 +34,7 @@ using namespace internal;
 namespace {
 constexpr std::uintmax_t needed_bytes = 4 << 20;
 
-struct Options {
+struct RenderArguments {
   std::string rig, out, poses, background = "tissue", condition = "rendered", format = "png";
   int count = 20;
   std::uint64_t seed = 1;
@@ -52,7 +52,7 @@ JointVector random_configuration(const Camera& camera, const Instrument& instrum
       rig, "instrument " + instrument.name + " is never wholly in view between 60 and 140 mm: check camera_from_rcm");
 }
 
-std::vector<Configurations> random_configurations(const Rig& rig, const Options& options) {
+std::vector<Configurations> random_configurations(const Rig& rig, const RenderArguments& options) {
   Random random(options.seed);
   const int knots = options.moving ? std::max(2, options.count / 25 + 2) : options.count;
   std::vector<Configurations> drawn;
@@ -78,7 +78,7 @@ std::vector<Configurations> random_configurations(const Rig& rig, const Options&
   return path;
 }
 
-cv::Mat background_light(const Camera& camera, const Options& options) {
+cv::Mat background_light(const Camera& camera, const RenderArguments& options) {
   if (options.background == "tissue") return make_tissue(camera.width_px, camera.height_px, options.seed);
   cv::Mat picture = read_image(options.background), scaled;
   cv::resize(picture, scaled, {camera.width_px, camera.height_px}, 0, 0, cv::INTER_AREA);
@@ -102,7 +102,7 @@ std::vector<Blotch> blotches(const Marker& marker, double fraction, Random& rand
   return discs;
 }
 
-Renderer make_renderer(const Rig& rig, const Options& options) {
+Renderer make_renderer(const Rig& rig, const RenderArguments& options) {
   Random random(options.seed + 1);
   std::vector<ShaftModel> shafts;
   for (const Instrument& instrument : rig.instruments) {
@@ -137,7 +137,7 @@ Exposure exposure_of(const Rig& rig, const std::vector<Configurations>& frames, 
   return exposure;
 }
 
-int run(const Options& options) {
+int run(const RenderArguments& options) {
   const Rig rig = load_rig(options.rig);
   for (const Instrument& instrument : rig.instruments)
     if (!instrument.camera_from_rcm)
@@ -186,7 +186,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_render(Command app, Run& run_later) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<RenderArguments>();
   Command command = app.add_subcommand("render", "Render frames of a rig with exact truth.");
   command.add_option("--rig", options->rig, "Camera and instruments, with camera_from_rcm").required();
   command

@@ -24,7 +24,7 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-struct Options {
+struct SimRobotOptions {
   std::string rig, transport = "ros2", arm = "PSM1", camera = "/endoscope";
   std::vector<double> start;
   double latency_ms = 80, fps = 30, duration_s = 0;
@@ -33,7 +33,7 @@ struct Options {
 };
 
 // Where the paper's trajectory can be followed from, unless said.
-JointVector start_of(const Options& options, const Rig& rig, const ArmConfig& arm) {
+JointVector start_of(const SimRobotOptions& options, const Rig& rig, const ArmConfig& arm) {
   if (!options.start.empty()) return JointVector::from_vector(Eigen::Vector4d(options.start.data()));
   constexpr double margin_px = 20, duration_s = 20;
   ControllerConfig controller;
@@ -43,7 +43,7 @@ JointVector start_of(const Options& options, const Rig& rig, const ArmConfig& ar
                       random, "the paper's trajectory, which --start replaces");
 }
 
-int run(const Options& options) {
+int run(const SimRobotOptions& options) {
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
   const Rig rig = single_instrument(load_rig(options.rig), options.rig);
@@ -81,7 +81,7 @@ int run(const Options& options) {
 }  // namespace
 
 void add_sim_robot(Command app, Run& run_later) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SimRobotOptions>();
   Command command =
       app.add_subcommand("sim-robot", "Be an arm and its camera, simulated, for another process to steer.");
   command.add_option("--rig", options->rig, "What stands before the camera");

@@ -34,7 +34,7 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-struct Options {
+struct TrackOptions {
   std::string input, rig, out = "obs.csv", overlay, image_topic;
   std::string method = "surface";
   bool single = false, deinterlace = false, view = false;
@@ -45,7 +45,7 @@ struct Options {
 };
 
 // What is known to be read before the first frame; rigs beside the frames come with them.
-InputFiles inputs_of(const Options& options) {
+InputFiles inputs_of(const TrackOptions& options) {
   InputFiles inputs;
   std::error_code error;
   inputs.add(options.input);
@@ -53,7 +53,7 @@ InputFiles inputs_of(const Options& options) {
   return inputs;
 }
 
-void refuse_outputs(const Options& options, const InputFiles& inputs) {
+void refuse_outputs(const TrackOptions& options, const InputFiles& inputs) {
   inputs.refuse_as_output(options.out);
   inputs.refuse_as_output(options.overlay);
   inputs.refuse_in_folder(options.overlay);
@@ -67,7 +67,7 @@ void refuse_outputs(const Options& options, const InputFiles& inputs) {
 // in its folder. The tracker begins anew when the rig changes.
 class RigByFrame {
  public:
-  explicit RigByFrame(const Options& options)
+  explicit RigByFrame(const TrackOptions& options)
       : options_(options),
         tracking_{.method = method_from_string(options.method).value(),
                   .single = options.single,
@@ -113,7 +113,7 @@ class RigByFrame {
     tracker_.reset();
   }
 
-  const Options& options_;
+  const TrackOptions& options_;
   TrackerOptions tracking_;
   fs::path path_;
   std::shared_ptr<const Rig> rig_;
@@ -140,7 +140,7 @@ struct Tally {
   }
 };
 
-void say_moved(const Options& options, const Frame& frame) {
+void say_moved(const TrackOptions& options, const Frame& frame) {
   std::fprintf(
       stderr,
       "lapservo: %s: the endoscope moved: from %d frames before frame %d (%.2f s) on shafts miss the RCM of the "
@@ -148,7 +148,7 @@ void say_moved(const Options& options, const Frame& frame) {
       options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s);
 }
 
-[[noreturn]] void rethrow_with_frame(const InputError& error, const Options& options, const Frame& frame) {
+[[noreturn]] void rethrow_with_frame(const InputError& error, const TrackOptions& options, const Frame& frame) {
   if (error.source() == "image") throw error.with_source(frame.file.empty() ? options.input : frame.file.string());
   throw error;
 }
@@ -158,14 +158,14 @@ bool is_live(const std::string& input) {
   return names_live_images(input) && !input.starts_with("/dev/");
 }
 
-std::unique_ptr<LiveFrames> open_live(const Options& options) {
+std::unique_ptr<LiveFrames> open_live(const TrackOptions& options) {
   if (!is_live(options.input)) return nullptr;
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML: live images have none beside them");
   return std::make_unique<LiveFrames>(options.input, load_rig(options.rig).camera);
 }
 
-PageConfig page_config_of(const Options& options, const FrameSource& source) {
+PageConfig page_config_of(const TrackOptions& options, const FrameSource& source) {
   PageConfig config;
   config.title = (options.page_only ? "view " : "track ") + options.input;
   if (options.page_only) config.option = "--port";
@@ -180,7 +180,7 @@ void wait_on_page(WebView& web, std::optional<double> until_s) {
     clock.sleep_until(std::min(until_s.value_or(INFINITY), clock.now_s() + 0.05));
 }
 
-int run(const Options& options) {
+int run(const TrackOptions& options) {
   options.web.check();
   refuse_outputs(options, inputs_of(options));
   RigByFrame rigs(options);
@@ -261,7 +261,7 @@ int run(const Options& options) {
 }
 
 // What both commands take.
-void add_input_options(Command command, Options& options) {
+void add_input_options(Command command, TrackOptions& options) {
   command
       .add_option(
           "input", options.input,
@@ -287,7 +287,7 @@ void add_input_options(Command command, Options& options) {
 }  // namespace
 
 void add_track(Command app, Run& run_later) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TrackOptions>();
   Command command =
       app.add_subcommand("track", "Measure the instruments in pictures, a video, a bag or a camera's frames.");
   add_input_options(command, *options);
@@ -309,7 +309,7 @@ void add_track(Command app, Run& run_later) {
 }
 
 void add_view(Command app, Run& run_later) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<TrackOptions>();
   options->page_only = true;
   options->out.clear();
   Command command =

@@ -93,17 +93,17 @@ void add_points(const EdgePixels& edge, const BoardEdgeFit& fit, int channel, st
   }
 }
 
-struct Measured {
+struct MeasuredEdges {
   std::vector<std::vector<EdgePoint>> points;  // by view
   std::vector<BoardEdgeProfile> profiles;
 };
 
 constexpr int green = 1;
 
-Measured measured(const Board& board, const std::vector<BoardView>& views, const Fit& fit, bool all_channels,
-                  bool with_profiles) {
+MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, const Fit& fit, bool all_channels,
+                       bool with_profiles) {
   const std::array<float, 256> light = fit.camera.response.table();
-  Measured result;
+  MeasuredEdges result;
   for (std::size_t i = 0; i < views.size(); ++i) {
     auto& points = result.points.emplace_back();
     for (const EdgePixels& edge :
@@ -142,7 +142,7 @@ struct Refined {
 };
 
 // What the views can't tell from nothing stays nothing: k3, and pixels that are not square.
-std::optional<CameraAdjustment> adjust_what_shows(const Fit& fit, const Measured& edges) {
+std::optional<CameraAdjustment> adjust_what_shows(const Fit& fit, const MeasuredEdges& edges) {
   CameraFreedom freedom;
   auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom);
   if (!all) return std::nullopt;
@@ -158,7 +158,7 @@ Fit fit_of(const CameraAdjustment& adjustment) {
   return {adjustment.camera, adjustment.camera_from_board};
 }
 
-void add_residuals(const CameraAdjustment& adjustment, const Measured& edges, CameraCalibration& calibration) {
+void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edges, CameraCalibration& calibration) {
   std::vector<double> all;
   for (std::size_t i = 0; i < edges.points.size(); ++i) {
     std::vector<double> of_view;
@@ -334,7 +334,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
     fit->camera.response = response->response;
   }
   told("edges in all colours");
-  const Measured edges = measured(board, views, *fit, true, false);
+  const MeasuredEdges edges = measured(board, views, *fit, true, false);
   adjustment = adjust_what_shows(*fit, edges);
   if (!adjustment) return refuse("the views are too alike to tell the camera");
   calibration.camera = rounded_by_sigmas(adjustment->camera, adjustment->sigmas);

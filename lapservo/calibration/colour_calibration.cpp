@@ -99,21 +99,22 @@ std::array<double, 3> best_start(const Rig& rig, std::size_t instrument, const s
   return best;
 }
 
-struct Measured {
+struct MeasuredHues {
   std::array<double, 3> hues_deg{}, sigma_deg{};
   int found = 0;
   double clipped = 0, moved_m = 0, turned_rad = 0;
 };
 
 // With the marker where these hues find it.
-Measured measure(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames, MarkerResponse* response) {
+MeasuredHues measure(const Rig& rig, std::size_t instrument, const std::vector<cv::Mat>& frames,
+                     MarkerResponse* response) {
   const Marker& marker = rig.instruments[instrument].marker;
   Tracker tracker(rig, {.single = true});
   std::array<std::vector<double>, 3> beyond_deg;
   std::vector<double> clipped;
   std::vector<Eigen::Vector3d> places;
   Eigen::Vector2d turn = Eigen::Vector2d::Zero();  // sum of its directions
-  Measured measured;
+  MeasuredHues measured;
   for (const cv::Mat& frame : frames) {
     const Observation& seen = tracker.track(frame)[instrument];
     if (seen.status != Status::ok) continue;
@@ -151,7 +152,7 @@ Measured measure(const Rig& rig, std::size_t instrument, const std::vector<cv::M
   return measured;
 }
 
-std::string refusal_of(const Measured& measured, std::size_t frames, const std::string& name) {
+std::string refusal_of(const MeasuredHues& measured, std::size_t frames, const std::string& name) {
   const auto& hues = measured.hues_deg;
   if (2 * static_cast<std::size_t>(measured.found) < frames)
     return fmt::format(
@@ -203,7 +204,7 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
   say("which hues move");
   std::array<double, 3> hues_deg = best_start(rig, instrument, frames);
   MarkerResponse response(rig.camera);
-  Measured measured;
+  MeasuredHues measured;
   constexpr int rounds = 2;
   for (int round = 0; round < rounds; ++round) {
     say("the bands' hues");

@@ -13,7 +13,7 @@
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
-namespace {
+namespace seam_registration_test {
 
 Instrument instrument_with_joints() {
   Instrument instrument = lapservo::testing::paper_test_rig().instruments[0];
@@ -92,5 +92,5 @@ TEST(JointRecording, NamesWhatIsWrong) {
   EXPECT_EQ(recording.joints[1], (std::array<double, 4>{5, 6, 7, 8}));
 }
 
-}  // namespace
+}  // namespace seam_registration_test
 }  // namespace lapservo::internal

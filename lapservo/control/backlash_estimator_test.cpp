@@ -9,7 +9,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace backlash_estimator_test {
 
 constexpr double period_s = 1.0 / 60;
 
@@ -123,5 +123,5 @@ TEST(BacklashEstimator, KeepsWhatItKnowsThroughAnInterruption) {
   EXPECT_LT(after.sigma, 1.5 * before.sigma);
 }
 
-}  // namespace
+}  // namespace backlash_estimator_test
 }  // namespace lapservo::internal

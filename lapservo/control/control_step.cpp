@@ -6,14 +6,14 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<ControlAction, 3> words{
+constexpr Words<ControlAction, 3> action_words{
     {{ControlAction::track, "track"}, {ControlAction::probe, "probe"}, {ControlAction::hold, "hold"}}};
-static_assert(names_all(words, ControlAction::hold));
+static_assert(names_all(action_words, ControlAction::hold));
 
 }  // namespace
 
 std::string_view to_string(ControlAction action) {
-  return word_of(words, action);
+  return word_of(action_words, action);
 }
 
 }  // namespace lapservo

@@ -4,11 +4,11 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/robot/backlash.h"
 #include "lapservo/core/random.h"
+#include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
-namespace {
+namespace gap_crossing_test {
 
 constexpr double period_s = 1.0 / 60;
 
@@ -111,5 +111,5 @@ TEST(CrossGaps, StaysWithinRateAndAcceleration) {
   }
 }
 
-}  // namespace
+}  // namespace gap_crossing_test
 }  // namespace lapservo::internal

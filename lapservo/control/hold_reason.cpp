@@ -6,29 +6,29 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<HoldReason, 17> words{{{HoldReason::none, "none"},
-                                       {HoldReason::no_image_yet, "no_image_yet"},
-                                       {HoldReason::marker_lost, "marker_lost"},
-                                       {HoldReason::stale_image, "stale_image"},
-                                       {HoldReason::frozen_image, "frozen_image"},
-                                       {HoldReason::wild_joints, "wild_joints"},
-                                       {HoldReason::endoscope_moved, "endoscope_moved"},
-                                       {HoldReason::outlier, "outlier"},
-                                       {HoldReason::no_history, "no_history"},
-                                       {HoldReason::psi_contradicted, "psi_contradicted"},
-                                       {HoldReason::not_modelled, "not_modelled"},
-                                       {HoldReason::singular, "singular"},
-                                       {HoldReason::not_following, "not_following"},
-                                       {HoldReason::not_learnt, "not_learnt"},
-                                       {HoldReason::bad_time, "bad_time"},
-                                       {HoldReason::non_finite, "non_finite"},
-                                       {HoldReason::arm_not_enabled, "arm_not_enabled"}}};
-static_assert(names_all(words, HoldReason::arm_not_enabled));
+constexpr Words<HoldReason, 17> reason_words{{{HoldReason::none, "none"},
+                                              {HoldReason::no_image_yet, "no_image_yet"},
+                                              {HoldReason::marker_lost, "marker_lost"},
+                                              {HoldReason::stale_image, "stale_image"},
+                                              {HoldReason::frozen_image, "frozen_image"},
+                                              {HoldReason::wild_joints, "wild_joints"},
+                                              {HoldReason::endoscope_moved, "endoscope_moved"},
+                                              {HoldReason::outlier, "outlier"},
+                                              {HoldReason::no_history, "no_history"},
+                                              {HoldReason::psi_contradicted, "psi_contradicted"},
+                                              {HoldReason::not_modelled, "not_modelled"},
+                                              {HoldReason::singular, "singular"},
+                                              {HoldReason::not_following, "not_following"},
+                                              {HoldReason::not_learnt, "not_learnt"},
+                                              {HoldReason::bad_time, "bad_time"},
+                                              {HoldReason::non_finite, "non_finite"},
+                                              {HoldReason::arm_not_enabled, "arm_not_enabled"}}};
+static_assert(names_all(reason_words, HoldReason::arm_not_enabled));
 
 }  // namespace
 
 std::string_view to_string(HoldReason reason) {
-  return word_of(words, reason);
+  return word_of(reason_words, reason);
 }
 
 }  // namespace lapservo

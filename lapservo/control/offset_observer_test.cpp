@@ -7,7 +7,7 @@
 #include "lapservo/control/tracking_law.h"
 
 namespace lapservo::internal {
-namespace {
+namespace offset_observer_test {
 
 using testing::TestRig;
 
@@ -227,5 +227,5 @@ TEST(OffsetObserver, RefusesWhatIsNotANumber) {
   EXPECT_EQ(world.observer.offset(), before);
 }
 
-}  // namespace
+}  // namespace offset_observer_test
 }  // namespace lapservo::internal

@@ -8,7 +8,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace setpoint_leash_test {
 
 constexpr double period_s = 1.0 / 60, lag_s = 0.03;
 const JointLimits limits;
@@ -116,5 +116,5 @@ TEST(SetpointLeash, StaysWithinTheLimitsWhateverIsWanted) {
   }
 }
 
-}  // namespace
+}  // namespace setpoint_leash_test
 }  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace tracking_law_test {
 
 Eigen::Matrix4d random_matrix(Random& random) {
   Eigen::Matrix4d matrix;
@@ -106,5 +106,5 @@ TEST(DampedInverse, StaysBoundedAndContinuousThroughSingularities) {
   }
 }
 
-}  // namespace
+}  // namespace tracking_law_test
 }  // namespace lapservo::internal

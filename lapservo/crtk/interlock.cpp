@@ -15,20 +15,20 @@ constexpr double memory_s = 0.25;  // by which a set-point that was sent comes b
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
 constexpr double same_other = 4e-3;
 
-constexpr Words<Blocked, 13> words{{{Blocked::none, "none"},
-                                    {Blocked::no_joint_states, "no_joint_states"},
-                                    {Blocked::old_joint_states, "old_joint_states"},
-                                    {Blocked::non_finite_joints, "non_finite_joints"},
-                                    {Blocked::no_setpoint, "no_setpoint"},
-                                    {Blocked::no_operating_state, "no_operating_state"},
-                                    {Blocked::not_enabled, "not_enabled"},
-                                    {Blocked::not_homed, "not_homed"},
-                                    {Blocked::busy, "busy"},
-                                    {Blocked::far_from_setpoint, "far_from_setpoint"},
-                                    {Blocked::held, "held"},
-                                    {Blocked::foreign_command, "foreign_command"},
-                                    {Blocked::stopped, "stopped"}}};
-static_assert(names_all(words, Blocked::stopped));
+constexpr Words<Blocked, 13> blocked_words{{{Blocked::none, "none"},
+                                            {Blocked::no_joint_states, "no_joint_states"},
+                                            {Blocked::old_joint_states, "old_joint_states"},
+                                            {Blocked::non_finite_joints, "non_finite_joints"},
+                                            {Blocked::no_setpoint, "no_setpoint"},
+                                            {Blocked::no_operating_state, "no_operating_state"},
+                                            {Blocked::not_enabled, "not_enabled"},
+                                            {Blocked::not_homed, "not_homed"},
+                                            {Blocked::busy, "busy"},
+                                            {Blocked::far_from_setpoint, "far_from_setpoint"},
+                                            {Blocked::held, "held"},
+                                            {Blocked::foreign_command, "foreign_command"},
+                                            {Blocked::stopped, "stopped"}}};
+static_assert(names_all(blocked_words, Blocked::stopped));
 
 bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
@@ -37,7 +37,7 @@ bool all_finite(const std::vector<double>& values) {
 }  // namespace
 
 std::string_view to_string(Blocked blocked) {
-  return word_of(words, blocked);
+  return word_of(blocked_words, blocked);
 }
 
 Interlock::Interlock(const InterlockConfig& config)

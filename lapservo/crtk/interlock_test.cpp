@@ -8,7 +8,7 @@
 #include "lapservo/crtk/joint_map.h"
 
 namespace lapservo::internal {
-namespace {
+namespace interlock_test {
 
 constexpr double epoch_s = 1.7e9, tick_s = 0.002, joints_period_s = 0.004;
 const double max_s = InterlockConfig().max_age_s;
@@ -329,5 +329,5 @@ TEST(Interlock, CountsWhatItDrops) {
   EXPECT_GE(bench.interlock.counts().joint_states, 24);
 }
 
-}  // namespace
+}  // namespace interlock_test
 }  // namespace lapservo::internal

@@ -11,7 +11,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 
 namespace lapservo::internal {
-namespace {
+namespace joint_map_test {
 
 constexpr double half_pi = std::numbers::pi / 2;
 
@@ -88,5 +88,5 @@ TEST(JointMap, FindsTheFourAmongOthersAndRefusesMissingAndRepeatedOnes) {
   EXPECT_FALSE(find_joints(psm(), {}));
 }
 
-}  // namespace
+}  // namespace joint_map_test
 }  // namespace lapservo::internal

@@ -11,17 +11,17 @@ namespace {
 constexpr double jump_s = 0.25;         // no network reorders messages by so much
 constexpr double drift_s_per_s = 1e-3;  // twice what adjtime slews by
 
-constexpr Words<StampVerdict, 5> words{{{StampVerdict::fresh, "fresh"},
-                                        {StampVerdict::repeated, "repeated"},
-                                        {StampVerdict::late, "late"},
-                                        {StampVerdict::jumped, "jumped"},
-                                        {StampVerdict::unusable, "unusable"}}};
-static_assert(names_all(words, StampVerdict::unusable));
+constexpr Words<StampVerdict, 5> verdict_words{{{StampVerdict::fresh, "fresh"},
+                                                {StampVerdict::repeated, "repeated"},
+                                                {StampVerdict::late, "late"},
+                                                {StampVerdict::jumped, "jumped"},
+                                                {StampVerdict::unusable, "unusable"}}};
+static_assert(names_all(verdict_words, StampVerdict::unusable));
 
 }  // namespace
 
 std::string_view to_string(StampVerdict verdict) {
-  return word_of(words, verdict);
+  return word_of(verdict_words, verdict);
 }
 
 void StampClock::start_anew(double stamp_s, double arrival_s) {

@@ -8,7 +8,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace stamp_clock_test {
 
 constexpr double epoch_s = 1.7e9, period_s = 0.01;
 
@@ -64,5 +64,5 @@ TEST(StampClock, APauseIsNoJump) {
   EXPECT_EQ(clock.read(epoch_s + 1, 2.0001).verdict, StampVerdict::fresh);
 }
 
-}  // namespace
+}  // namespace stamp_clock_test
 }  // namespace lapservo::internal

@@ -118,7 +118,8 @@ std::string row_of(const std::vector<std::string>& cells, const char* tag) {
 }
 
 std::string html_from(const Table& table) {
-  std::string text = table.words ? "<div class=\"scroll\"><table class=\"words\">\n" : "<div class=\"scroll\"><table>\n";
+  std::string text =
+      table.words ? "<div class=\"scroll\"><table class=\"words\">\n" : "<div class=\"scroll\"><table>\n";
   if (!table.caption.empty()) text += fmt::format("<caption>{}</caption>\n", escaped(table.caption));
   text += "<thead>" + row_of(table.header, "th") + "</thead>\n<tbody>\n";
   for (const auto& row : table.rows) text += row_of(row, "td");

@@ -20,17 +20,16 @@ namespace {
 
 constexpr int light_count = static_cast<int>(IlluminationResult::lights.size());
 
-using Result = IlluminationResult;
 // By frame (position after position under one light, then the next light), then by method.
 using Sightings = std::vector<std::vector<Observation>>;
 
 std::size_t frame_of(int position, int light) {
-  return static_cast<std::size_t>(light * Result::positions + position);
+  return static_cast<std::size_t>(light * IlluminationResult::positions + position);
 }
 
 // What was seen of one position: each point against its own centroid over the lights.
-void add_position(std::vector<Result::Point>& points, const Sightings& sightings, std::size_t method, int position,
-                  const CentreLine& truth, const Camera& camera) {
+void add_position(std::vector<IlluminationResult::Point>& points, const Sightings& sightings, std::size_t method,
+                  int position, const CentreLine& truth, const Camera& camera) {
   for (int k = 0; k < 4; ++k) {
     std::vector<Eigen::Vector2d> seen;
     std::vector<int> under;
@@ -47,12 +46,13 @@ void add_position(std::vector<Result::Point>& points, const Sightings& sightings
   }
 }
 
-std::vector<Result::Largest> max_distances(const std::vector<Result::Point>& points) {
+std::vector<IlluminationResult::Largest> max_distances(const std::vector<IlluminationResult::Point>& points) {
   std::map<std::pair<int, int>, std::vector<double>> by_point;
-  for (const Result::Point& point : points) by_point[{point.position, point.point}].push_back(point.to_centroid_px);
-  std::vector<Result::Largest> largest;
+  for (const IlluminationResult::Point& point : points)
+    by_point[{point.position, point.point}].push_back(point.to_centroid_px);
+  std::vector<IlluminationResult::Largest> largest;
   for (const auto& [where, distances] : by_point)
-    if (distances.size() == Result::lights.size())
+    if (distances.size() == IlluminationResult::lights.size())
       largest.push_back({where.first, where.second, *std::max_element(distances.begin(), distances.end())});
   return largest;
 }
@@ -72,7 +72,7 @@ cv::Mat example(const ExperimentSetup& setup, Stage& stage, const JointVector& q
   const Eigen::Vector2d middle = marker_middle_px(setup.rig.camera, setup.rig.instruments[0], q);
   std::array<cv::Mat, 4> tiles;
   for (std::size_t light = 0; light < tiles.size(); ++light) {
-    const cv::Mat frame = stage.render(q, Result::lights[light], frame_seed(setup.seed, 0));
+    const cv::Mat frame = stage.render(q, IlluminationResult::lights[light], frame_seed(setup.seed, 0));
     tiles[light] = tile_of(draw_overlay(frame, setup.rig, eyes.observe(frame)), middle);
   }
   cv::Mat upper, lower, both;
@@ -82,29 +82,29 @@ cv::Mat example(const ExperimentSetup& setup, Stage& stage, const JointVector& q
   return both;
 }
 
-Series by_position(const Result::OfMethod& of_method) {
+Series by_position(const IlluminationResult::OfMethod& of_method) {
   Series series{method_title(of_method.method), {}, {}, {}, Draw::points, method_color(of_method.method)};
-  for (const Result::Largest& largest : of_method.largest) {
+  for (const IlluminationResult::Largest& largest : of_method.largest) {
     series.x.push_back(largest.position + 1);
     series.y.push_back(largest.px);
   }
   return series;
 }
 
-Series by_light(const Result::OfMethod& of_method) {
+Series by_light(const IlluminationResult::OfMethod& of_method) {
   Series series{method_title(of_method.method), {}, {}, {}, Draw::line_and_points, method_color(of_method.method)};
   for (int light = 0; light < light_count; ++light) {
     std::vector<double> distances;
-    for (const Result::Point& point : of_method.points)
+    for (const IlluminationResult::Point& point : of_method.points)
       if (point.light == light) distances.push_back(point.to_centroid_px);
     if (distances.empty()) continue;
-    series.x.push_back(100 * Result::lights[static_cast<std::size_t>(light)]);
+    series.x.push_back(100 * IlluminationResult::lights[static_cast<std::size_t>(light)]);
     series.y.push_back(spread_of(distances).mean);
   }
   return series;
 }
 
-Plot map_of_points(const Result::OfMethod& of_method, const Camera& camera) {
+Plot map_of_points(const IlluminationResult::OfMethod& of_method, const Camera& camera) {
   Plot plot{"Where the points were (" + method_title(of_method.method) + ")",
             {"u", "px", 0, camera.width_px},
             {"v", "px", 0, camera.height_px},
@@ -113,7 +113,7 @@ Plot map_of_points(const Result::OfMethod& of_method, const Camera& camera) {
             true};
   for (int k = 0; k < 4; ++k) {
     Series series{fmt::format("e{}", k), {}, {}, {}, Draw::points, k};
-    for (const Result::Point& point : of_method.points)
+    for (const IlluminationResult::Point& point : of_method.points)
       if (point.point == k && point.light == 0) {
         series.x.push_back(point.raw_px.x());
         series.y.push_back(point.raw_px.y());
@@ -123,41 +123,43 @@ Plot map_of_points(const Result::OfMethod& of_method, const Camera& camera) {
   return plot;
 }
 
-Plot distance_plot(const std::string& title, Axis x, const std::string& y, const Result& result,
-                   Series (*series_of)(const Result::OfMethod&)) {
+Plot distance_plot(const std::string& title, Axis x, const std::string& y, const IlluminationResult& result,
+                   Series (*series_of)(const IlluminationResult::OfMethod&)) {
   Plot plot{title, std::move(x), {y, "px", {}, {}, true}, {}, {}, false};
   for (const auto& of_method : result.methods) plot.series.push_back(series_of(of_method));
   return plot;
 }
 
-Plot plot_of_largest(const Result& result) {
-  Plot plot = distance_plot("Largest distance to the centroid, by position",
-                            {"position", "", 0, Result::positions + 1.0}, "largest distance", result, by_position);
-  plot.references.push_back(
-      {fmt::format("the paper\u2019s mean: {} px", Result::paper_mean_px), Result::paper_mean_px});
+Plot plot_of_largest(const IlluminationResult& result) {
+  Plot plot =
+      distance_plot("Largest distance to the centroid, by position",
+                    {"position", "", 0, IlluminationResult::positions + 1.0}, "largest distance", result, by_position);
+  plot.references.push_back({fmt::format("the paper\u2019s mean: {} px", IlluminationResult::paper_mean_px),
+                             IlluminationResult::paper_mean_px});
   return plot;
 }
 
 std::string percents() {
   std::string text;
-  for (std::size_t i = 0; i < Result::lights.size(); ++i)
+  for (std::size_t i = 0; i < IlluminationResult::lights.size(); ++i)
     text += fmt::format("{}{:.0f}",
-                        i == 0                          ? ""
-                        : i + 1 < Result::lights.size() ? ", "
-                                                        : " and ",
-                        100 * Result::lights[i]);
+                        i == 0                                      ? ""
+                        : i + 1 < IlluminationResult::lights.size() ? ", "
+                                                                    : " and ",
+                        100 * IlluminationResult::lights[i]);
   return text + " %";
 }
 
-std::vector<Comparison> comparisons_of(const Result& result) {
+std::vector<Comparison> comparisons_of(const IlluminationResult& result) {
   const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
     return compared(what, paper, result.methods, text_of);
   };
-  const std::string points = fmt::format("{}", 4 * Result::positions);
-  const std::string measurements = fmt::format("{}", 4 * Result::positions * light_count);
+  const std::string points = fmt::format("{}", 4 * IlluminationResult::positions);
+  const std::string measurements = fmt::format("{}", 4 * IlluminationResult::positions * light_count);
   return {row("largest distance of a point\u2019s four measurements to their centroid, mean \u00b1 std of " + points +
                   " points",
-              fmt::format("{:.2f} \u00b1 {:.2f} px", Result::paper_mean_px, Result::paper_deviation_px),
+              fmt::format("{:.2f} \u00b1 {:.2f} px", IlluminationResult::paper_mean_px,
+                          IlluminationResult::paper_deviation_px),
               [](const auto& m) { return mean_and_deviation(m.of_largest, "px"); }),
           row("points found under all four lights", points,
               [](const auto& m) { return fmt::format("{}", m.largest.size()); }),
@@ -175,27 +177,27 @@ std::vector<Comparison> comparisons_of(const Result& result) {
 IlluminationResult measure_illumination(const ExperimentSetup& setup) {
   const Camera& camera = setup.rig.camera;
   Random random(setup.seed);
-  const auto positions = spread_positions(setup.rig, Result::positions, random);
+  const auto positions = spread_positions(setup.rig, IlluminationResult::positions, random);
   const cv::Mat tissue = make_tissue(camera.width_px, camera.height_px, setup.seed);
 
   const Rig unregistered = without_registration(setup.rig);
 
-  Sightings sightings(static_cast<std::size_t>(Result::positions * light_count));
+  Sightings sightings(static_cast<std::size_t>(IlluminationResult::positions * light_count));
   const auto make_worker = [&] {
     return [&, stage = std::make_shared<Stage>(setup.rig, tissue),
             eyes = std::make_shared<Eyes>(unregistered, setup.methods)](int frame) {
-      const auto position = static_cast<std::size_t>(frame % Result::positions);
-      const double light = Result::lights[static_cast<std::size_t>(frame / Result::positions)];
+      const auto position = static_cast<std::size_t>(frame % IlluminationResult::positions);
+      const double light = IlluminationResult::lights[static_cast<std::size_t>(frame / IlluminationResult::positions)];
       sightings[static_cast<std::size_t>(frame)] =
           eyes->observe(stage->render(positions[position], light, frame_seed(setup.seed, frame)));
     };
   };
-  in_parallel(Result::positions * light_count, make_worker, setup.keep_going);
+  in_parallel(IlluminationResult::positions * light_count, make_worker, setup.keep_going);
 
-  Result result;
+  IlluminationResult result;
   for (std::size_t m = 0; m < setup.methods.size(); ++m) {
-    std::vector<Result::Point> points;
-    for (int i = 0; i < Result::positions; ++i) {
+    std::vector<IlluminationResult::Point> points;
+    for (int i = 0; i < IlluminationResult::positions; ++i) {
       const JointVector& q = positions[static_cast<std::size_t>(i)];
       const Rigid3 unrolled = *setup.rig.instruments[0].camera_from_rcm * rcm_from_unrolled(q);
       const auto truth = centre_line(camera, setup.rig.instruments[0].marker, unrolled, q.psi_rad);
@@ -209,11 +211,11 @@ IlluminationResult measure_illumination(const ExperimentSetup& setup) {
 }
 
 IlluminationResult::OfMethod summed_up(Method method, std::vector<IlluminationResult::Point> points) {
-  Result::OfMethod of_method{method, std::move(points), {}, {}, {}, {}};
+  IlluminationResult::OfMethod of_method{method, std::move(points), {}, {}, {}, {}};
   of_method.largest = max_distances(of_method.points);
   std::vector<double> largest, to_centroid, to_truth;
-  for (const Result::Largest& of_point : of_method.largest) largest.push_back(of_point.px);
-  for (const Result::Point& point : of_method.points) {
+  for (const IlluminationResult::Largest& of_point : of_method.largest) largest.push_back(of_point.px);
+  for (const IlluminationResult::Point& point : of_method.points) {
     to_centroid.push_back(point.to_centroid_px);
     to_truth.push_back(point.to_truth_px);
   }
@@ -227,13 +229,13 @@ void write_data(const IlluminationResult& result, const std::filesystem::path& f
   DataFile file(folder / "illumination.csv",
                 {"method", "position", "light_percent", "point", "u_px", "v_px", "to_centroid_px", "to_truth_px"});
   for (const auto& of_method : result.methods)
-    for (const Result::Point& p : of_method.points)
+    for (const IlluminationResult::Point& p : of_method.points)
       file.row({std::string(to_string(of_method.method)), p.position,
-                100 * Result::lights[static_cast<std::size_t>(p.light)], fmt::format("e{}", p.point), p.raw_px.x(),
-                p.raw_px.y(), p.to_centroid_px, p.to_truth_px});
+                100 * IlluminationResult::lights[static_cast<std::size_t>(p.light)], fmt::format("e{}", p.point),
+                p.raw_px.x(), p.raw_px.y(), p.to_centroid_px, p.to_truth_px});
   DataFile largest(folder / "illumination_largest.csv", {"method", "position", "point", "largest_to_centroid_px"});
   for (const auto& of_method : result.methods)
-    for (const Result::Largest& l : of_method.largest)
+    for (const IlluminationResult::Largest& l : of_method.largest)
       largest.row({std::string(to_string(of_method.method)), l.position, fmt::format("e{}", l.point), l.px});
   file.commit();
   largest.commit();
@@ -246,7 +248,7 @@ ReportSection section_of(const IlluminationResult& result, const ExperimentSetup
       "Each of the four boundary points should stay where it is. As in the paper: of each point in each position the "
       "largest distance of its {} measurements to their centroid, and of these {} distances the mean and the standard "
       "deviation.",
-      Result::positions, percents(), light_count, 4 * Result::positions)};
+      IlluminationResult::positions, percents(), light_count, 4 * IlluminationResult::positions)};
   section.comparisons = comparisons_of(result);
   section.figures.push_back({plot_of_largest(result), "The four points of each position, as the paper measures them."});
   section.figures.push_back({distance_plot("Distance to the centroid, by light", {"power of the lamps", "%", 30, 110},

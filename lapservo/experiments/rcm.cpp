@@ -18,8 +18,7 @@
 namespace lapservo::internal {
 namespace {
 
-using Result = RcmResult;
-constexpr int frames = Result::sets * Result::positions;
+constexpr int all_frames = RcmResult::sets * RcmResult::positions;
 constexpr double nominal_sigma_px = 0.1;  // only its being the same for all lines counts
 // What all lines share, as `lapservo estimate-rcm` has it: the sides of the shaft are lit unequally.
 constexpr double common_px = 0.01;
@@ -27,16 +26,16 @@ constexpr double common_px = 0.01;
 // Pairs of lines that cross at less make up the long tail of the intersections.
 constexpr double well_crossed_rad = 10 * pi / 180;
 
-std::vector<LineObservation> lines_of_set(const Result::OfMethod& of_method, int set) {
+std::vector<LineObservation> lines_of_set(const RcmResult::OfMethod& of_method, int set) {
   std::vector<LineObservation> lines;
-  for (const Result::Line& line : of_method.lines)
+  for (const RcmResult::Line& line : of_method.lines)
     if (line.set == set) lines.push_back(line_between(line.from_px, line.to_px, nominal_sigma_px));
   return lines;
 }
 
-void estimate(Result::OfMethod& of_method, const Eigen::Vector2d& true_px) {
-  std::vector<Result::Estimate> pairwise, least_squares;
-  for (int set = 0; set < Result::sets; ++set) {
+void estimate(RcmResult::OfMethod& of_method, const Eigen::Vector2d& true_px) {
+  std::vector<RcmResult::Estimate> pairwise, least_squares;
+  for (int set = 0; set < RcmResult::sets; ++set) {
     const auto lines = lines_of_set(of_method, set);
     if (const auto mean = mean_of_intersections(lines))
       pairwise.push_back({set, mean->point_px - true_px, mean->covariance_px2});
@@ -51,9 +50,9 @@ std::string estimator_name(bool pairwise) {
   return pairwise ? "mean of intersections" : "total least squares";
 }
 
-std::vector<double> distances_of(const Result::OfMethod& of_method, double min_angle_rad) {
+std::vector<double> distances_of(const RcmResult::OfMethod& of_method, double min_angle_rad) {
   std::vector<double> distances;
-  for (const Result::Intersection& at : of_method.intersections)
+  for (const RcmResult::Intersection& at : of_method.intersections)
     if (at.angle_rad >= min_angle_rad) distances.push_back(at.distance_px);
   return distances;
 }
@@ -73,24 +72,24 @@ Figure robust_figure(Plot plot, const std::string& caption) {
   return {std::move(plot), caption + " " + where};
 }
 
-Figure cloud_of_intersections(const Result::OfMethod& of_method, const Eigen::Vector2d& true_px) {
+Figure cloud_of_intersections(const RcmResult::OfMethod& of_method, const Eigen::Vector2d& true_px) {
   Plot plot = error_plane("Intersections about the truth: " + method_title(of_method.method));
   Series series{"of two lines", {}, {}, {}, Draw::points, method_color(of_method.method)};
-  for (const Result::Intersection& at : of_method.intersections)
+  for (const RcmResult::Intersection& at : of_method.intersections)
     if (at.set == 0) {
       series.x.push_back(at.px.x() - true_px.x());
       series.y.push_back(at.px.y() - true_px.y());
     }
   plot.series.push_back(std::move(series));
-  return robust_figure(std::move(plot), fmt::format("The {} pairs of the first set.", Result::pairs));
+  return robust_figure(std::move(plot), fmt::format("The {} pairs of the first set.", RcmResult::pairs));
 }
 
-Figure cloud_of_estimates(const Result::OfMethod& of_method) {
+Figure cloud_of_estimates(const RcmResult::OfMethod& of_method) {
   Plot plot = error_plane("Estimates about the truth: " + method_title(of_method.method));
   for (const bool pairwise : {true, false}) {
     const auto& of = pairwise ? of_method.pairwise : of_method.least_squares;
     Series series{estimator_name(pairwise), {}, {}, {}, Draw::points, pairwise ? 1 : 0};
-    for (const Result::Estimate& estimate : of.estimates) {
+    for (const RcmResult::Estimate& estimate : of.estimates) {
       series.x.push_back(estimate.error_px.x());
       series.y.push_back(estimate.error_px.y());
     }
@@ -98,11 +97,11 @@ Figure cloud_of_estimates(const Result::OfMethod& of_method) {
   }
   return robust_figure(
       std::move(plot),
-      fmt::format("One estimate from each of {} sets; both estimators, the same lines.", Result::sets));
+      fmt::format("One estimate from each of {} sets; both estimators, the same lines.", RcmResult::sets));
 }
 
 // What fraction of the intersections lies within a distance.
-Plot fractions_within(const Result& result) {
+Plot fractions_within(const RcmResult& result) {
   Plot plot{"Distances of the intersections from the true RCM",
             {"distance", "px", {}, {}, true},
             {"fraction within", "%", 0, 100},
@@ -118,8 +117,8 @@ Plot fractions_within(const Result& result) {
     }
     plot.series.push_back(std::move(series));
   }
-  plot.series.push_back({fmt::format("the paper\u2019s mean, {} px", Result::paper_mean_px),
-                         {Result::paper_mean_px, Result::paper_mean_px},
+  plot.series.push_back({fmt::format("the paper\u2019s mean, {} px", RcmResult::paper_mean_px),
+                         {RcmResult::paper_mean_px, RcmResult::paper_mean_px},
                          {0, 100},
                          {},
                          Draw::dashed,
@@ -128,8 +127,8 @@ Plot fractions_within(const Result& result) {
 }
 
 // The lines of the first set, from the RCM to their far ends.
-Plot fan(const Result& result, const Camera& camera) {
-  const Result::OfMethod& of_method = result.methods.back();
+Plot fan(const RcmResult& result, const Camera& camera) {
+  const RcmResult::OfMethod& of_method = result.methods.back();
   Plot plot{
       "The centre lines of the first set meet in the RCM", {"u", "px", {}, {}}, {"v", "px", {}, {}}, {}, {}, true};
   const double right = camera.width_px - 1, bottom = camera.height_px - 1;
@@ -140,7 +139,7 @@ Plot fan(const Result& result, const Camera& camera) {
   const auto add = [](Series& series, const Eigen::Vector2d& p) {
     series.x.push_back(p.x()), series.y.push_back(p.y());
   };
-  for (const Result::Line& line : of_method.lines) {
+  for (const RcmResult::Line& line : of_method.lines) {
     if (line.set != 0) continue;
     add(extended, result.true_px), add(extended, line.from_px), gap(extended);
     add(seen, line.from_px), add(seen, line.to_px), gap(seen);
@@ -151,7 +150,7 @@ Plot fan(const Result& result, const Camera& camera) {
   return plot;
 }
 
-Table by_estimator(const Result& result) {
+Table by_estimator(const RcmResult& result) {
   Table table{
       "Distance of the estimate from the true RCM",
       {"lines of", "estimator", "mean [px]", "std [px]", "median [px]", "largest [px]", "error / sigma", "sets"},
@@ -163,12 +162,12 @@ Table by_estimator(const Result& result) {
                             fmt::format("{:.3f}", of.distance.mean), fmt::format("{:.3f}", of.distance.deviation),
                             fmt::format("{:.3f}", of.distance.median), fmt::format("{:.3f}", of.distance.largest),
                             fmt::format("{:.2f}", of.in_sigmas),
-                            fmt::format("{} of {}", of.estimates.size(), Result::sets)});
+                            fmt::format("{} of {}", of.estimates.size(), RcmResult::sets)});
     }
   return table;
 }
 
-std::vector<Comparison> comparisons_of(const Result& result) {
+std::vector<Comparison> comparisons_of(const RcmResult& result) {
   const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
     return compared(what, paper, result.methods, text_of);
   };
@@ -176,16 +175,16 @@ std::vector<Comparison> comparisons_of(const Result& result) {
     return [fraction](const auto& m) { return with_digits(quantile_of(distances_of(m, 0), fraction), 3) + " px"; };
   };
   return {row("intersections of two lines: distance from the true RCM, mean \u00b1 std",
-              fmt::format("{:.2f} \u00b1 {:.2f} px", Result::paper_mean_px, Result::paper_deviation_px),
+              fmt::format("{:.2f} \u00b1 {:.2f} px", RcmResult::paper_mean_px, RcmResult::paper_deviation_px),
               [](const auto& m) { return mean_and_deviation(m.distance, "px"); }),
           row("of pairs of lines that cross at 10\u00b0 or more", "",
               [](const auto& m) { return mean_and_deviation(spread_of(distances_of(m, well_crossed_rad)), "px"); }),
           row("median of all", "", quantile(0.5)),
           row("nine in ten are within", "", quantile(0.9)),
-          row("intersections", fmt::format("{}", Result::pairs),
+          row("intersections", fmt::format("{}", RcmResult::pairs),
               [](const auto& m) { return fmt::format("{}", m.intersections.size()); }),
-          row("lines", fmt::format("{}", Result::positions),
-              [](const auto& m) { return fmt::format("{} of {}", m.lines.size(), frames); }),
+          row("lines", fmt::format("{}", RcmResult::positions),
+              [](const auto& m) { return fmt::format("{} of {}", m.lines.size(), all_frames); }),
           row("the estimate itself, mean of a set\u2019s intersections (eq. 9): distance from the true RCM", "",
               [](const auto& m) { return mean_and_deviation(m.pairwise.distance, "px"); }),
           row("the estimate itself, weighted total least squares", "",
@@ -195,11 +194,11 @@ std::vector<Comparison> comparisons_of(const Result& result) {
 }  // namespace
 
 RcmResult::Estimates summed_up(std::vector<RcmResult::Estimate> estimates) {
-  Result::Estimates summary{std::move(estimates), {}, 0};
+  RcmResult::Estimates summary{std::move(estimates), {}, 0};
   std::vector<double> distances;
   double squares = 0;
   int coordinates = 0;
-  for (const Result::Estimate& estimate : summary.estimates) {
+  for (const RcmResult::Estimate& estimate : summary.estimates) {
     distances.push_back(estimate.error_px.norm());
     if (!estimate.covariance_px2) continue;
     squares += estimate.error_px.dot(solve_symmetric(*estimate.covariance_px2, estimate.error_px).col(0));
@@ -225,7 +224,7 @@ Rig with_rcm_in_view(Rig rig) {
 
 std::vector<RcmResult::Intersection> intersections_of(const std::vector<RcmResult::Line>& lines,
                                                       const Eigen::Vector2d& true_px) {
-  std::vector<Result::Intersection> found;
+  std::vector<RcmResult::Intersection> found;
   for (std::size_t i = 0; i < lines.size(); ++i)
     for (std::size_t k = i + 1; k < lines.size() && lines[k].set == lines[i].set; ++k) {
       const LineObservation a = line_between(lines[i].from_px, lines[i].to_px, nominal_sigma_px),
@@ -241,15 +240,15 @@ std::vector<RcmResult::Intersection> intersections_of(const std::vector<RcmResul
 
 RcmResult measure_rcm(const ExperimentSetup& setup) {
   const Rig rig = with_rcm_in_view(setup.rig);
-  Result result{rig, projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm).value(), {}};
+  RcmResult result{rig, projected_rcm_px(rig.camera, *rig.instruments[0].camera_from_rcm).value(), {}};
   Random random(setup.seed + 2);
   std::vector<JointVector> positions;
-  for (int set = 0; set < Result::sets; ++set)
-    for (const JointVector& q : spread_positions(rig, Result::positions, random)) positions.push_back(q);
+  for (int set = 0; set < RcmResult::sets; ++set)
+    for (const JointVector& q : spread_positions(rig, RcmResult::positions, random)) positions.push_back(q);
   const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, setup.seed + 2);
   const Rig unregistered = without_registration(rig);  // to know the RCM would be to bring it in
 
-  std::vector<std::vector<Observation>> sightings(frames);
+  std::vector<std::vector<Observation>> sightings(all_frames);
   const auto make_worker = [&] {
     return [&, stage = std::make_shared<Stage>(rig, tissue),
             eyes = std::make_shared<Eyes>(unregistered, setup.methods)](int frame) {
@@ -257,15 +256,15 @@ RcmResult measure_rcm(const ExperimentSetup& setup) {
           stage->render(positions[static_cast<std::size_t>(frame)], 1, frame_seed(setup.seed + 2, frame)));
     };
   };
-  in_parallel(frames, make_worker, setup.keep_going);
+  in_parallel(all_frames, make_worker, setup.keep_going);
 
   for (std::size_t m = 0; m < setup.methods.size(); ++m) {
-    Result::OfMethod of_method{setup.methods[m], {}, {}, {}, {}, {}};
-    for (int frame = 0; frame < frames; ++frame) {
+    RcmResult::OfMethod of_method{setup.methods[m], {}, {}, {}, {}, {}};
+    for (int frame = 0; frame < all_frames; ++frame) {
       const Observation& o = sightings[static_cast<std::size_t>(frame)][m];
       if (o.status == Status::ok)
         of_method.lines.push_back(
-            {frame / Result::positions, frame % Result::positions, o.edges_ideal_px[0], o.edges_ideal_px[3]});
+            {frame / RcmResult::positions, frame % RcmResult::positions, o.edges_ideal_px[0], o.edges_ideal_px[3]});
     }
     of_method.intersections = intersections_of(of_method.lines, result.true_px);
     of_method.distance = spread_of(distances_of(of_method, 0));
@@ -285,13 +284,13 @@ void write_data(const RcmResult& result, const std::filesystem::path& folder) {
                           "true_v_px", "distance_px", "angle_rad"});
   for (const auto& of_method : result.methods) {
     const std::string word(to_string(of_method.method));
-    for (const Result::Intersection& at : of_method.intersections)
+    for (const RcmResult::Intersection& at : of_method.intersections)
       intersections.row({word, at.set, at.first, at.second, at.px.x(), at.px.y(), result.true_px.x(),
                          result.true_px.y(), at.distance_px, at.angle_rad});
-    for (const Result::Line& line : of_method.lines)
+    for (const RcmResult::Line& line : of_method.lines)
       lines.row({word, line.set, line.position, line.from_px.x(), line.from_px.y(), line.to_px.x(), line.to_px.y()});
     for (const bool pairwise : {true, false})
-      for (const Result::Estimate& e : (pairwise ? of_method.pairwise : of_method.least_squares).estimates) {
+      for (const RcmResult::Estimate& e : (pairwise ? of_method.pairwise : of_method.least_squares).estimates) {
         const auto covariance = [&e](int i, int j) -> std::optional<double> {
           if (!e.covariance_px2) return std::nullopt;
           return i == j ? std::sqrt((*e.covariance_px2)(i, i)) : (*e.covariance_px2)(i, j);
@@ -313,15 +312,15 @@ ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) 
           "({:.1f}, {:.1f}) px. {} positions give {} lines and {} intersections of two; the paper\u2019s figure is the "
           "distance of each intersection from the RCM as seen in the picture. Here: {} sets of {} positions, pooled, "
           "against the exact RCM.",
-          result.true_px.x(), result.true_px.y(), Result::positions, Result::positions, Result::pairs, Result::sets,
-          Result::positions),
+          result.true_px.x(), result.true_px.y(), RcmResult::positions, RcmResult::positions, RcmResult::pairs,
+          RcmResult::sets, RcmResult::positions),
       "What the loop goes by is one estimate from all lines, whose error the paper does not give: its mean of the "
       "intersections (eq. 9), or the default\u2019s weighted total least squares, which leaves outliers out and states "
       "its covariance."};
   section.comparisons = comparisons_of(result);
   for (const auto& of_method : result.methods)
     section.figures.push_back(cloud_of_intersections(of_method, result.true_px));
-  section.figures.push_back({fractions_within(result), fmt::format("All {} sets.", Result::sets)});
+  section.figures.push_back({fractions_within(result), fmt::format("All {} sets.", RcmResult::sets)});
   section.figures.push_back(
       {fan(result, result.rig.camera), "As " + method_title(result.methods.back().method) + " saw them."});
   for (const auto& of_method : result.methods) section.figures.push_back(cloud_of_estimates(of_method));

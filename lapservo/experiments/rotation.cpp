@@ -15,12 +15,11 @@
 namespace lapservo::internal {
 namespace {
 
-using Result = RotationResult;
-constexpr int all_trials = Result::sets * Result::trials, frames = all_trials * Result::steps;
+constexpr int all_trials = RotationResult::sets * RotationResult::trials, frames = all_trials * RotationResult::steps;
 
 double true_rotation_rad(int frame) {
-  return initial_rotation_rad(frame / Result::steps % Result::trials) +
-         two_pi * (frame % Result::steps) / Result::steps;
+  return initial_rotation_rad(frame / RotationResult::steps % RotationResult::trials) +
+         two_pi * (frame % RotationResult::steps) / RotationResult::steps;
 }
 
 std::uint64_t seed_of(const ExperimentSetup& setup, int set) {
@@ -33,7 +32,7 @@ std::string mrad(double rad) {
 }
 
 // Fig. 5 of the paper.
-Plot one_trial(const Result& result) {
+Plot one_trial(const RotationResult& result) {
   Plot plot{fmt::format("Figure 5: one trial, from {:.2f} rad", initial_rotation_rad(0)),
             {"time", "s", {}, {}},
             {"rotation", "rad", {}, {}},
@@ -41,13 +40,13 @@ Plot one_trial(const Result& result) {
             {},
             false};
   Series reference{"reference", {}, {}, {}, Draw::dashed, -1};
-  for (int step = 0; step < Result::steps; ++step) {
-    reference.x.push_back(Result::turn_s * step / Result::steps);
+  for (int step = 0; step < RotationResult::steps; ++step) {
+    reference.x.push_back(RotationResult::turn_s * step / RotationResult::steps);
     reference.y.push_back(true_rotation_rad(step));
   }
   for (const auto& of_method : result.methods) {
     Series series{method_title(of_method.method), {}, {}, {}, Draw::points, method_color(of_method.method)};
-    for (const Result::Sample& sample : of_method.samples)
+    for (const RotationResult::Sample& sample : of_method.samples)
       if (sample.set == 0 && sample.trial == 0) {
         series.x.push_back(sample.time_s());
         series.y.push_back(sample.measured_rad);
@@ -59,7 +58,7 @@ Plot one_trial(const Result& result) {
 }
 
 // Fig. 6 of the paper.
-Plot distribution_by_trial(const Result::OfMethod& of_method) {
+Plot distribution_by_trial(const RotationResult::OfMethod& of_method) {
   Plot plot{"Figure 6: errors by trial, " + method_title(of_method.method),
             {"initial rotation", "rad", {}, {}},
             {"error", "mrad", {}, {}},
@@ -67,7 +66,7 @@ Plot distribution_by_trial(const Result::OfMethod& of_method) {
             {{"no error", 0}},
             false};
   Series series{"", {}, {}, {}, Draw::boxes, method_color(of_method.method)};
-  for (const Result::Sample& sample : of_method.samples)
+  for (const RotationResult::Sample& sample : of_method.samples)
     if (sample.set == 0) {
       series.x.push_back(initial_rotation_rad(sample.trial));
       series.y.push_back(1e3 * sample.error_rad());
@@ -77,7 +76,7 @@ Plot distribution_by_trial(const Result::OfMethod& of_method) {
 }
 
 // Where in a turn the errors are.
-Plot error_against_true(const Result::OfMethod& of_method) {
+Plot error_against_true(const RotationResult::OfMethod& of_method) {
   Plot plot{"Error against rotation, " + method_title(of_method.method),
             {"true rotation", "rad", {}, {}},
             {"error", "mrad", {}, {}},
@@ -85,7 +84,7 @@ Plot error_against_true(const Result::OfMethod& of_method) {
             {{"no error", 0}},
             false};
   Series series{"", {}, {}, {}, Draw::points, method_color(of_method.method)};
-  for (const Result::Sample& sample : of_method.samples)
+  for (const RotationResult::Sample& sample : of_method.samples)
     if (sample.set == 0) {
       series.x.push_back(sample.true_rad);
       series.y.push_back(1e3 * sample.error_rad());
@@ -94,7 +93,7 @@ Plot error_against_true(const Result::OfMethod& of_method) {
   return plot;
 }
 
-Plot deviation_by_trial(const Result& result) {
+Plot deviation_by_trial(const RotationResult& result) {
   Plot plot{"Table I: standard deviation of the error",
             {"initial rotation", "rad", {}, {}},
             {"standard deviation", "mrad", {}, {}, true},
@@ -102,14 +101,14 @@ Plot deviation_by_trial(const Result& result) {
             {},
             false};
   Series paper{"the paper", {}, {}, {}, Draw::line_and_points, -1};
-  for (int trial = 0; trial < Result::trials; ++trial) {
+  for (int trial = 0; trial < RotationResult::trials; ++trial) {
     paper.x.push_back(initial_rotation_rad(trial));
-    paper.y.push_back(1e3 * Result::paper_deviation_rad[static_cast<std::size_t>(trial)]);
+    paper.y.push_back(1e3 * RotationResult::paper_deviation_rad[static_cast<std::size_t>(trial)]);
   }
   for (const auto& of_method : result.methods) {
     Series series{method_title(of_method.method), paper.x, {}, {}, Draw::line_and_points,
                   method_color(of_method.method)};
-    for (std::size_t trial = 0; trial < Result::trials; ++trial)
+    for (std::size_t trial = 0; trial < RotationResult::trials; ++trial)
       series.y.push_back(1e3 * of_method.by_trial[trial].deviation);
     plot.series.push_back(std::move(series));
   }
@@ -117,7 +116,7 @@ Plot deviation_by_trial(const Result& result) {
   return plot;
 }
 
-Table table_one(const Result& result) {
+Table table_one(const RotationResult& result) {
   Table table{"Table I: mean and standard deviation of the error in each trial of the first set [mrad]",
               {"initial rotation [rad]", "the paper: mean", "std"},
               {}};
@@ -126,9 +125,10 @@ Table table_one(const Result& result) {
                            std::string(": mean"));
     table.header.emplace_back("std");
   }
-  for (std::size_t trial = 0; trial < Result::trials; ++trial) {
+  for (std::size_t trial = 0; trial < RotationResult::trials; ++trial) {
     std::vector<std::string> row{fmt::format("{:.2f}", initial_rotation_rad(static_cast<int>(trial))),
-                                 mrad(Result::paper_mean_rad[trial]), mrad(Result::paper_deviation_rad[trial])};
+                                 mrad(RotationResult::paper_mean_rad[trial]),
+                                 mrad(RotationResult::paper_deviation_rad[trial])};
     for (const auto& of_method : result.methods) {
       row.push_back(mrad(of_method.by_trial[trial].mean));
       row.push_back(mrad(of_method.by_trial[trial].deviation));
@@ -142,14 +142,14 @@ std::string from_to(double least, double most) {
   return fmt::format("{} to {} mrad", mrad(least), mrad(most));
 }
 
-std::string range_of(const Result::OfMethod& of_method, double Spread::*figure) {
+std::string range_of(const RotationResult::OfMethod& of_method, double Spread::*figure) {
   const auto [least, most] =
       std::minmax_element(of_method.by_trial.begin(), of_method.by_trial.end(),
                           [&](const Spread& a, const Spread& b) { return a.*figure < b.*figure; });
   return from_to((*least).*figure, (*most).*figure);
 }
 
-std::string range_of(const std::array<double, Result::trials>& figures) {
+std::string range_of(const std::array<double, RotationResult::trials>& figures) {
   const auto [least, most] = std::minmax_element(figures.begin(), figures.end());
   return from_to(*least, *most);
 }
@@ -158,14 +158,14 @@ std::string percent(double fraction) {
   return fmt::format("{:.3g} %", 100 * fraction);
 }
 
-std::vector<Comparison> comparisons_of(const Result& result) {
+std::vector<Comparison> comparisons_of(const RotationResult& result) {
   const auto row = [&](const std::string& what, const std::string& paper, const auto& text_of) {
     return compared(what, paper, result.methods, text_of);
   };
-  const Pooled paper = pooled(Result::paper_mean_rad, Result::paper_deviation_rad);
-  return {row("standard deviation of the error, from trial to trial", range_of(Result::paper_deviation_rad),
+  const Pooled paper = pooled(RotationResult::paper_mean_rad, RotationResult::paper_deviation_rad);
+  return {row("standard deviation of the error, from trial to trial", range_of(RotationResult::paper_deviation_rad),
               [](const auto& m) { return range_of(m, &Spread::deviation); }),
-          row("mean error, from trial to trial", range_of(Result::paper_mean_rad),
+          row("mean error, from trial to trial", range_of(RotationResult::paper_mean_rad),
               [](const auto& m) { return range_of(m, &Spread::mean); }),
           row("rms error of all trials together, bias included", mrad(paper.rms) + " mrad (from its Table I)",
               [](const auto& m) { return mrad(m.all.rms) + " mrad"; }),
@@ -183,9 +183,9 @@ std::vector<Comparison> comparisons_of(const Result& result) {
               [](const auto& m) { return fmt::format("{} of {}", m.samples.size(), frames); })};
 }
 
-std::vector<Figure> figures_of(const Result& result) {
+std::vector<Figure> figures_of(const RotationResult& result) {
   std::vector<Figure> figures{
-      {one_trial(result), fmt::format("Every frame of the first trial: a turn in {:.0f} s.", Result::turn_s)}};
+      {one_trial(result), fmt::format("Every frame of the first trial: a turn in {:.0f} s.", RotationResult::turn_s)}};
   const std::string boxes =
       "The first set. Boxes from quartile to quartile, with the median; whiskers to the farthest within 1.5 times "
       "that. ";
@@ -200,7 +200,8 @@ std::vector<Figure> figures_of(const Result& result) {
 }  // namespace
 
 double initial_rotation_rad(int trial) {
-  return Result::first_rad + (Result::last_rad - Result::first_rad) * trial / (Result::trials - 1);
+  return RotationResult::first_rad +
+         (RotationResult::last_rad - RotationResult::first_rad) * trial / (RotationResult::trials - 1);
 }
 
 Pooled pooled(std::span<const double> means, std::span<const double> deviations) {
@@ -211,11 +212,11 @@ Pooled pooled(std::span<const double> means, std::span<const double> deviations)
 }
 
 RotationResult::OfMethod summed_up(Method method, std::vector<RotationResult::Sample> samples) {
-  Result::OfMethod of_method{method, std::move(samples), {}, {}, {}, 0, 0};
+  RotationResult::OfMethod of_method{method, std::move(samples), {}, {}, {}, 0, 0};
   std::vector<std::vector<double>> errors(all_trials);
   std::vector<double> all, in_sigmas;
-  for (const Result::Sample& sample : of_method.samples) {
-    errors[static_cast<std::size_t>(sample.set * Result::trials + sample.trial)].push_back(sample.error_rad());
+  for (const RotationResult::Sample& sample : of_method.samples) {
+    errors[static_cast<std::size_t>(sample.set * RotationResult::trials + sample.trial)].push_back(sample.error_rad());
     all.push_back(sample.error_rad());
     in_sigmas.push_back(sample.error_rad() / sample.sigma_rad);
   }
@@ -231,9 +232,9 @@ RotationResult measure_rotation(const ExperimentSetup& setup) {
   const Camera& camera = setup.rig.camera;
   std::vector<JointVector> positions;
   std::vector<cv::Mat> tissues;
-  for (int set = 0; set < Result::sets; ++set) {
+  for (int set = 0; set < RotationResult::sets; ++set) {
     Random random(seed_of(setup, set));
-    for (const JointVector& q : spread_positions(setup.rig, Result::trials, random)) positions.push_back(q);
+    for (const JointVector& q : spread_positions(setup.rig, RotationResult::trials, random)) positions.push_back(q);
     tissues.push_back(make_tissue(camera.width_px, camera.height_px, seed_of(setup, set)));
   }
 
@@ -241,10 +242,10 @@ RotationResult measure_rotation(const ExperimentSetup& setup) {
   const auto make_worker = [&] {
     return [&, stage = std::shared_ptr<Stage>(), stage_set = -1,
             eyes = std::make_shared<Eyes>(setup.rig, setup.methods)](int frame) mutable {
-      const int set = frame / (Result::trials * Result::steps);
+      const int set = frame / (RotationResult::trials * RotationResult::steps);
       if (set != stage_set) stage = std::make_shared<Stage>(setup.rig, tissues[static_cast<std::size_t>(set)]);
       stage_set = set;
-      JointVector q = positions[static_cast<std::size_t>(frame / Result::steps)];
+      JointVector q = positions[static_cast<std::size_t>(frame / RotationResult::steps)];
       q.psi_rad = true_rotation_rad(frame);
       sightings[static_cast<std::size_t>(frame)] =
           eyes->observe(stage->render(q, 1, frame_seed(seed_of(setup, set), frame)));
@@ -252,16 +253,17 @@ RotationResult measure_rotation(const ExperimentSetup& setup) {
   };
   in_parallel(frames, make_worker, setup.keep_going);
 
-  Result result;
+  RotationResult result;
   for (std::size_t m = 0; m < setup.methods.size(); ++m) {
-    std::vector<Result::Sample> samples;
+    std::vector<RotationResult::Sample> samples;
     for (int frame = 0; frame < frames; ++frame) {
       const Observation& o = sightings[static_cast<std::size_t>(frame)][m];
       if (o.status != Status::ok || !o.rcm) continue;
       const double true_rad = true_rotation_rad(frame);
-      const int trial = frame / Result::steps;
-      samples.push_back({trial / Result::trials, trial % Result::trials, frame % Result::steps, true_rad,
-                         true_rad + wrap_pi(o.rcm->q.psi_rad - true_rad), std::sqrt(o.rcm->covariance(3, 3))});
+      const int trial = frame / RotationResult::steps;
+      samples.push_back({trial / RotationResult::trials, trial % RotationResult::trials, frame % RotationResult::steps,
+                         true_rad, true_rad + wrap_pi(o.rcm->q.psi_rad - true_rad),
+                         std::sqrt(o.rcm->covariance(3, 3))});
     }
     result.methods.push_back(summed_up(setup.methods[m], std::move(samples)));
   }
@@ -275,12 +277,12 @@ void write_data(const RotationResult& result, const std::filesystem::path& folde
                                                    "std_error_rad", "rms_error_rad", "largest_error_rad"});
   for (const auto& of_method : result.methods) {
     const std::string word(to_string(of_method.method));
-    for (const Result::Sample& s : of_method.samples)
+    for (const RotationResult::Sample& s : of_method.samples)
       samples.row({word, s.set, s.trial, s.step, s.time_s(), s.true_rad, s.measured_rad, s.error_rad(), s.sigma_rad});
     for (int i = 0; i < all_trials; ++i) {
       const Spread& spread = of_method.by_trial[static_cast<std::size_t>(i)];
-      const int trial = i % Result::trials;
-      trials.row({word, i / Result::trials, trial, initial_rotation_rad(trial), static_cast<int>(spread.count),
+      const int trial = i % RotationResult::trials;
+      trials.row({word, i / RotationResult::trials, trial, initial_rotation_rad(trial), static_cast<int>(spread.count),
                   spread.mean, spread.deviation, spread.rms, spread.largest});
     }
   }
@@ -295,7 +297,8 @@ ReportSection section_of(const RotationResult& result, const ExperimentSetup& se
       "instrument turns about its shaft once round, in {} steps, and the rotation measured in every frame is compared "
       "with the true one. {} such sets, each with other places, background and noise, are pooled where it says "
       "\u201call\u201d or \u201cfrom trial to trial\u201d.",
-      Result::trials, Result::first_rad, Result::last_rad, Result::steps, Result::sets)};
+      RotationResult::trials, RotationResult::first_rad, RotationResult::last_rad, RotationResult::steps,
+      RotationResult::sets)};
   section.comparisons = comparisons_of(result);
   section.figures = figures_of(result);
   section.tables.push_back(table_one(result));

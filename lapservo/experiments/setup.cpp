@@ -1,6 +1,5 @@
 #include "lapservo/experiments/setup.h"
 
-
 namespace lapservo::internal {
 
 Rig without_registration(Rig rig) {

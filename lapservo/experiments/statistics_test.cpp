@@ -7,7 +7,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace statistics_test {
 
 constexpr std::uint64_t seed = 72;
 
@@ -77,5 +77,5 @@ TEST(WithDigits, NeverHasAnExponent) {
   EXPECT_EQ(with_digits(0, 3), "0.00");
 }
 
-}  // namespace
+}  // namespace statistics_test
 }  // namespace lapservo::internal

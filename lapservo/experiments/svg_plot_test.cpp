@@ -11,7 +11,7 @@
 #include "lapservo/experiments/test_markup.h"
 
 namespace lapservo::internal {
-namespace {
+namespace svg_plot_test {
 
 constexpr std::uint64_t seed = 71;
 
@@ -209,5 +209,5 @@ TEST(Svg, LimitsLeaveOutliersOutAndCountThem) {
   EXPECT_LT(*plot.x.high, 10);
 }
 
-}  // namespace
+}  // namespace svg_plot_test
 }  // namespace lapservo::internal

@@ -10,7 +10,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace cylinder_test {
 
 constexpr std::uint64_t seed = 22;
 constexpr double radius_m = 0.0042;
@@ -102,5 +102,5 @@ TEST(Rigid3, InverseAndProductFormAGroup) {
   }
 }
 
-}  // namespace
+}  // namespace cylinder_test
 }  // namespace lapservo::internal

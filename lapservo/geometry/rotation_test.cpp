@@ -7,7 +7,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace rotation_test {
 
 constexpr std::uint64_t seed = 31;
 
@@ -47,5 +47,5 @@ TEST(RotationVector, GoesThereAndBackTheShorterWay) {
   }
 }
 
-}  // namespace
+}  // namespace rotation_test
 }  // namespace lapservo::internal

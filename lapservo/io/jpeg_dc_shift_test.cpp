@@ -8,7 +8,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace jpeg_dc_shift_test {
 
 constexpr std::uint64_t seed = 20261122;
 constexpr int columns = 40, rows = 20;
@@ -89,5 +89,5 @@ TEST(DcShift, EndsAtARestart) {
   EXPECT_FALSE(dc_shift({steps, 0.25F, columns, 7}));
 }
 
-}  // namespace
+}  // namespace jpeg_dc_shift_test
 }  // namespace lapservo::internal

@@ -19,7 +19,7 @@
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
-namespace {
+namespace observation_csv_test {
 
 constexpr std::uint64_t seed = 59;
 
@@ -206,5 +206,5 @@ TEST(ObservationCsv, SaysAtOnceThatItCanNotBeWritten) {
   EXPECT_TRUE(testing::input_error([&] { ObservationCsv csv(path); }).starts_with(path + ": can't be written"));
 }
 
-}  // namespace
+}  // namespace observation_csv_test
 }  // namespace lapservo::internal

@@ -17,7 +17,7 @@
 #include "lapservo/testing/markers.h"
 
 namespace lapservo::internal {
-namespace {
+namespace design_test {
 using testing::marker_with;
 
 constexpr std::uint64_t seed = 47;
@@ -149,5 +149,5 @@ TEST(DesignMarker, MinimisesThePrintsErrorsWithTheNoise) {
   EXPECT_TRUE(in_linear_family(by_both));
 }
 
-}  // namespace
+}  // namespace design_test
 }  // namespace lapservo::internal

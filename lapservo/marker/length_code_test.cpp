@@ -13,7 +13,7 @@
 #include "lapservo/testing/markers.h"
 
 namespace lapservo::internal {
-namespace {
+namespace length_code_test {
 using testing::marker_with;
 
 constexpr std::uint64_t seed = 47;
@@ -117,5 +117,5 @@ TEST(PerspectiveErrors, HaveNoCrossRatioWhereItTurnsBack) {
   EXPECT_TRUE(std::isnan(errors.by_cross_ratio_rad));
 }
 
-}  // namespace
+}  // namespace length_code_test
 }  // namespace lapservo::internal

@@ -16,7 +16,7 @@
 #include "lapservo/testing/markers.h"
 
 namespace lapservo::internal {
-namespace {
+namespace sensitivity_test {
 using testing::marker_with;
 
 constexpr std::uint64_t seed = 43;
@@ -172,5 +172,5 @@ TEST(PredictedPrintError, IsTheSpreadOverRandomPrints) {
   EXPECT_NEAR(std::sqrt(square) / predicted_print_error_rad(marker, tau_rad, error_m), 1, 0.05);
 }
 
-}  // namespace
+}  // namespace sensitivity_test
 }  // namespace lapservo::internal

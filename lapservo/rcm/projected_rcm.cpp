@@ -193,16 +193,16 @@ double larger_sigma(const Eigen::Matrix2d& covariance) {
                        .eigenvalues()[1]);
 }
 
-constexpr Words<RcmStatus, 4> words{{{RcmStatus::ok, "ok"},
-                                     {RcmStatus::too_few_lines, "too_few_lines"},
-                                     {RcmStatus::parallel, "parallel"},
-                                     {RcmStatus::not_converged, "not_converged"}}};
-static_assert(names_all(words, RcmStatus::not_converged));
+constexpr Words<RcmStatus, 4> status_words{{{RcmStatus::ok, "ok"},
+                                            {RcmStatus::too_few_lines, "too_few_lines"},
+                                            {RcmStatus::parallel, "parallel"},
+                                            {RcmStatus::not_converged, "not_converged"}}};
+static_assert(names_all(status_words, RcmStatus::not_converged));
 
 }  // namespace
 
 std::string_view to_string(RcmStatus status) {
-  return word_of(words, status);
+  return word_of(status_words, status);
 }
 
 RcmEstimate estimate_projected_rcm(std::span<const LineObservation> given, const RcmOptions& options) {

@@ -6,20 +6,20 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<OperatingState, 4> words{{{OperatingState::disabled, "DISABLED"},
-                                          {OperatingState::enabled, "ENABLED"},
-                                          {OperatingState::paused, "PAUSED"},
-                                          {OperatingState::fault, "FAULT"}}};
-static_assert(names_all(words, OperatingState::fault));
+constexpr Words<OperatingState, 4> state_words{{{OperatingState::disabled, "DISABLED"},
+                                                {OperatingState::enabled, "ENABLED"},
+                                                {OperatingState::paused, "PAUSED"},
+                                                {OperatingState::fault, "FAULT"}}};
+static_assert(names_all(state_words, OperatingState::fault));
 
 }  // namespace
 
 std::string_view to_string(OperatingState state) {
-  return word_of(words, state);
+  return word_of(state_words, state);
 }
 
 std::optional<OperatingState> operating_state_from_string(std::string_view word) {
-  return read_word(words, word);
+  return read_word(state_words, word);
 }
 
 }  // namespace lapservo

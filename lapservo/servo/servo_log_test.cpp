@@ -13,7 +13,7 @@
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
-namespace {
+namespace servo_log_test {
 
 constexpr std::uint64_t seed = 5;
 
@@ -156,5 +156,5 @@ TEST(ServoLog, NamesWhatIsWrong) {
   EXPECT_FALSE(testing::input_error([&] { read_servo_log(folder / "none.csv"); }).empty());
 }
 
-}  // namespace
+}  // namespace servo_log_test
 }  // namespace lapservo::internal

@@ -14,7 +14,7 @@
 #include "lapservo/testing/rigs.h"
 
 namespace lapservo::internal {
-namespace {
+namespace servo_test {
 
 constexpr double period_s = 1.0 / 60;
 const Eigen::Vector4d start(0.05, 1.57, 0.064, 1.2);
@@ -483,5 +483,5 @@ TEST(MovedEndoscope, IsNoEncoderThatIsSetWhileTheArmIsNotEnabled) {
   EXPECT_EQ(world.steps(120).registration, 0);
 }
 
-}  // namespace
+}  // namespace servo_test
 }  // namespace lapservo::internal

@@ -10,13 +10,11 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/sim/render_queue.h"
+#include "lapservo/sim/same_moment.h"
 
 namespace lapservo {
 using namespace internal;
 namespace {
-
-// Moments that are equal but for rounding.
-constexpr double same_s = 1e-9;
 
 bool is_being_rendered(const std::future<cv::Mat>& picture) {
   return picture.valid() && picture.wait_for(std::chrono::seconds(0)) == std::future_status::timeout;
@@ -85,7 +83,7 @@ void Endoscope::expose(const Exposure& shafts) {
 
 std::vector<EndoscopePicture> Endoscope::arrived(double time_s) {
   std::vector<EndoscopePicture> pictures;
-  while (!on_the_way_.empty() && on_the_way_.front().picture.stamp_s <= time_s + same_s) {
+  while (!on_the_way_.empty() && on_the_way_.front().picture.stamp_s <= time_s + same_moment_s) {
     OnTheWay& first = on_the_way_.front();
     if (config_.real_time && is_being_rendered(first.rendered)) break;
     if (first.rendered.valid()) first.picture.bgr = first.rendered.get();

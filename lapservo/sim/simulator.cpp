@@ -11,13 +11,12 @@
 #include "lapservo/core/error.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/same_moment.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo {
 using namespace internal;
 namespace {
-
-constexpr double same_s = 1e-9;  // moments that are equal but for rounding
 
 const Instrument& first_instrument(const Rig& rig) {
   if (rig.instruments.empty()) throw InputError("simulator", "instruments", "none", "at least one in the rig");
@@ -36,12 +35,12 @@ Endoscope make_endoscope(const Rig& rig, const SimulatorConfig& config) {
   return Endoscope(camera, {shaft}, tissue, config.render, config.endoscope, config.seed);
 }
 
-void check(bool right, const char* field, double value, const char* expected) {
+void check_motion(bool right, const char* field, double value, const char* expected) {
   if (!right) throw InputError("endoscope motion", field, fmt::format("{}", value), expected);
 }
 
 Rigid3 camera_from_camera_before(const EndoscopeMotion& motion, double time_s) {
-  const double passed_s = time_s + same_s - motion.begin_s;
+  const double passed_s = time_s + same_moment_s - motion.begin_s;
   if (passed_s < 0) return {};
   const double part = passed_s < motion.duration_s ? passed_s / motion.duration_s : 1;
   return Rigid3{rotation_by(part * motion.rotation_rad), part * motion.translation_m}.inverse();
@@ -50,10 +49,10 @@ Rigid3 camera_from_camera_before(const EndoscopeMotion& motion, double time_s) {
 }  // namespace
 
 const EndoscopeMotion& EndoscopeMotion::checked() const {
-  check(begin_s >= 0 && std::isfinite(begin_s), "begin_s", begin_s, "0 or more");
-  check(duration_s >= 0 && std::isfinite(duration_s), "duration_s", duration_s, "0 or more");
-  check(translation_m.norm() <= 1, "translation_m", translation_m.norm(), "at most 1 in length");
-  check(rotation_rad.norm() <= 4, "rotation_rad", rotation_rad.norm(), "at most 4 in length");
+  check_motion(begin_s >= 0 && std::isfinite(begin_s), "begin_s", begin_s, "0 or more");
+  check_motion(duration_s >= 0 && std::isfinite(duration_s), "duration_s", duration_s, "0 or more");
+  check_motion(translation_m.norm() <= 1, "translation_m", translation_m.norm(), "at most 1 in length");
+  check_motion(rotation_rad.norm() <= 4, "rotation_rad", rotation_rad.norm(), "at most 4 in length");
   return *this;
 }
 
@@ -83,7 +82,7 @@ std::optional<StampedImage> Simulator::newest() {
 }
 
 void Simulator::sleep_until(double time_s) {
-  while (time_s - time_s_ > same_s) {
+  while (time_s - time_s_ > same_moment_s) {
     if (arm_->faulted()) path_.reset();
     const double next_s = path_ ? std::min(time_s, time_s_ + arm_period_s_) : time_s;
     if (path_) arm_->servo_jp(path_->at(next_s).position);
@@ -118,7 +117,7 @@ void Simulator::step(double dt_s) {
   while (true) {
     const std::vector<double> moments_s = endoscope_.next_moments_s();
     const double next_s = moments_s[exposing_.size()];
-    if (next_s > end_s + same_s) break;
+    if (next_s > end_s + same_moment_s) break;
     arm_->step(std::max(0.0, next_s - time_s_));
     time_s_ = std::max(time_s_, next_s);
     if (exposing_.size() == moments_s.size() / 2) truth_[taken_] = true_q();

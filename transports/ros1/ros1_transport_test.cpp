@@ -17,7 +17,7 @@
 #include "transports/ros1/test_ros_master.h"
 
 namespace lapservo::internal {
-namespace {
+namespace ros1_transport_test {
 
 constexpr double stamp_s = 1700000000.123456;
 
@@ -201,5 +201,5 @@ TEST_F(Ros1Wire, EndsThoughItsMasterHangs) {
   EXPECT_EQ(joints.count(), heard);
 }
 
-}  // namespace
+}  // namespace ros1_transport_test
 }  // namespace lapservo::internal

@@ -23,7 +23,7 @@
 #include "transports/ros2/wire.h"
 
 namespace lapservo::internal {
-namespace {
+namespace wire_bytes_test {
 
 using eprosima::fastcdr::Cdr;
 using Fields = std::map<std::string, std::string>;  // by name: pose.pose.position.x, status[0].values[1].key
@@ -242,5 +242,5 @@ TEST(WireBytes, AreReadAsBagsAre) {
   EXPECT_EQ(read->positions, joints.positions);
 }
 
-}  // namespace
+}  // namespace wire_bytes_test
 }  // namespace lapservo::internal
