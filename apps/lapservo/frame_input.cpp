@@ -1,6 +1,9 @@
 #include "apps/lapservo/frame_input.h"
 
+#include <utility>
+
 #include "lapservo/core/error.h"
+#include "lapservo/io/read_ahead.h"
 #include "recordings/bag_frames.h"
 #include "recordings/open_bag.h"
 
@@ -8,9 +11,10 @@ namespace lapservo::app {
 using namespace internal;
 
 std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic) {
-  if (is_bag(input)) return std::make_unique<BagFrames>(open_bag(input), image_topic);
+  if (is_bag(input)) return read_ahead(std::make_unique<BagFrames>(open_bag(input), image_topic));
   refuse_topic_outside_bags("--image-topic", image_topic, input);
-  return open_frame_source(input, folder_fps);
+  auto source = open_frame_source(input, folder_fps);
+  return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }
 
 void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input) {

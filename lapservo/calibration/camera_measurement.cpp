@@ -82,7 +82,10 @@ void BoardRecordings::look_at(FrameSource& source, const std::string& name, cons
       continue;
     }
     ++read_.looked_at;
-    if (!views_.add(name_of(*frame), frame->bgr, pictures) && pictures) without_board_.push_back(name_of(*frame));
+    // The rest is still read, since it may be damaged, but no view would be taken of it.
+    const bool searched = pictures || !views_.full();
+    if (searched && !views_.add(name_of(*frame), frame->bgr, pictures) && pictures)
+      without_board_.push_back(name_of(*frame));
     watch.tell(source.frame_count(), read, fmt::format(", {} views", views_.views().size()));
     if (!live) continue;
     const std::string wanted = views_.views().empty() ? "show the board" : advice(views_.views(), *size_);

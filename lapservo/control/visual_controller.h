@@ -71,6 +71,8 @@ class VisualController {
   const ControllerConfig& config() const { return config_; }
   /// The delay as believed now, known or estimated.
   double delay_s() const { return estimator_->delay_s(); }
+  /// Whether it is more than a guess.
+  bool delay_is_known() const { return estimator_->delay_is_known(); }
   double arm_lag_s() const { return arm_response_.lag_s(); }
 
  private:

@@ -14,11 +14,6 @@ constexpr int agreed_after = 10, moved_after = 2;
 // Of theta, phi (rad), rho (m) against the joints, from one image to the next: more than these tell.
 const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
 
-// From one image to the next the offset does not change by more than these, many times what it usually does, half of
-// what the joints moved, and what a delay that is off makes of their acceleration.
-const Eigen::Array3d min_step(1.5e-3, 1.5e-3, 3e-4);
-constexpr double unusual = 8, of_motion = 0.5, wrong_delay_s = 0.15, max_apart_s = 0.1;
-
 // Offsets from so long ago are those of before the endoscope began to move.
 constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
 
@@ -67,7 +62,7 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
   // An endoscope that moved would show another picture.
   if (image->repetition != Repetition::none) return;
   // Without a marker there would be nothing to measure with.
-  const bool moves = stepped(*image);
+  const bool moves = stepped(*image, controller.delay_is_known());
   const bool contradicts = image->marker && (!image->q || jumped(*image->q));
   contradicting_ = contradicts ? contradicting_ + 1 : 0;
   if (!contradicts && !(moves && image->marker)) return drop_suspicion(controller);
@@ -83,31 +78,13 @@ void EndoscopeRecovery::drop_suspicion(VisualController& controller) {
   contradicting_ = 0;
 }
 
-// What moves with the endoscope slowly jumps nowhere, but goes away from where it was a moment ago: enough to wait for
-// what the next images show.
-bool EndoscopeRecovery::stepped(const ImageMeasurement& image) {
-  constexpr double weight = 0.05;
-  if (!image.q) {
-    step_.reset();
-    return false;
-  }
-  const Step now{image.registration, *measured_, (*image.q - measured_->q).head<3>()};
-  const auto before = std::exchange(step_, now);
-  const double apart_s =
-      before && before->registration == now.registration ? now.measured.stamp_s - before->measured.stamp_s : 0;
-  if (!(apart_s > 0 && apart_s < max_apart_s)) return false;
-  const Eigen::Array3d step = (now.offset - before->offset).array().abs();
-  const Eigen::Array3d moved = (now.measured.q - before->measured.q).head<3>().array().abs();
-  const Eigen::Array3d faster = (now.measured.rate - before->measured.rate).head<3>().array().abs();
-  Eigen::Array3d by_motion = of_motion * moved + wrong_delay_s * faster;
-  by_motion.head<2>() = by_motion.head<2>().maxCoeff();  // theta's and phi's, where the frame is off
-  const bool unusually = (step > min_step + unusual * usual_step_squared_.sqrt() + by_motion).any();
-  if (unusually) {
-    step_ = before;
-  } else {
-    usual_step_squared_ += weight * (step.square() - usual_step_squared_);
-  }
-  return unusually;
+bool EndoscopeRecovery::stepped(const ImageMeasurement& image, bool delay_is_known) {
+  if (!image.q || image.registration != registration_of_steps_) steps_.interrupt();
+  registration_of_steps_ = image.registration;
+  if (!image.q) return false;
+  return steps_.add(
+      {measured_->stamp_s, measured_->q.head<3>(), measured_->rate.head<3>(), (*image.q - measured_->q).head<3>()},
+      delay_is_known);
 }
 
 void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {

@@ -9,6 +9,7 @@
 #include "lapservo/control/probing.h"
 #include "lapservo/control/visual_controller.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/servo/offset_steps.h"
 #include "lapservo/servo/registration_fit.h"
 #include "lapservo/servo/servo_decision.h"
 
@@ -43,7 +44,7 @@ class EndoscopeRecovery {
   enum class Phase { watching, resting, exploring, failed };
 
   bool jumped(const Eigen::Vector4d& q_seen) const;
-  bool stepped(const ImageMeasurement& image);
+  bool stepped(const ImageMeasurement& image, bool delay_is_known);
   void notice(VisualController& controller);
   void drop_suspicion(VisualController& controller);
   void trust_before();
@@ -81,16 +82,11 @@ class EndoscopeRecovery {
   int failed_ = 0;                    ///< attempts
   std::deque<Offset> offsets_;        ///< while images agreed, in order of time
   std::optional<Measured> measured_;  ///< at the latest image
-  struct Step {
-    int registration = 0;
-    Measured measured;
-    Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< of what was seen: theta, phi, rho
-  };
-  bool suspected_ = false;                                      ///< held until the next image
-  std::optional<Step> step_;                                    ///< of the latest image that told q and had not moved
-  Eigen::Array3d usual_step_squared_ = Eigen::Array3d::Zero();  ///< from image to image
-  GapPath path_;                                                ///< since the offset that is trusted
-  Eigen::Vector4d trusted_ = Eigen::Vector4d::Zero();           ///< offset, of before the endoscope moved
+  bool suspected_ = false;            ///< held until the next image
+  OffsetSteps steps_;                 ///< of images that told q
+  int registration_of_steps_ = 0;
+  GapPath path_;                                       ///< since the offset that is trusted
+  Eigen::Vector4d trusted_ = Eigen::Vector4d::Zero();  ///< offset, of before the endoscope moved
   std::vector<MarkerSighting> sightings_;
   double sighted_s_ = 0;  ///< stamp of the latest of them
   double rests_since_s_ = 0, explored_s_ = 0;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
+#include <cstdlib>
 #include <mutex>
 #include <string>
 
@@ -53,6 +54,8 @@ struct Case {
   float smoke = 0;
   std::vector<Blotch> blotches{};
   std::optional<Interval> dark{};
+  double jitter_s = 0.001, dropped_fraction = 0.005;
+  ArmConfig arm{};
 };
 
 struct Record {
@@ -178,6 +181,9 @@ PastRun run_case(const Case& c) {
   simulated.seed = c.seed;
   simulated.endoscope.latency_s = c.latency_s;
   simulated.endoscope.exposure_s = c.exposure_s;
+  simulated.endoscope.jitter_s = c.jitter_s;
+  simulated.endoscope.dropped_fraction = c.dropped_fraction;
+  simulated.arm = c.arm;
   simulated.render.smoke = c.smoke;
   simulated.blotches = c.blotches;
   Random random(c.seed);
@@ -428,8 +434,8 @@ void expect_measured_anew(const Rig& rig, const Case& c, double max_px) {
       *held_s, *measured_s, max_px, wrong_s, 1e3 * last[0], last[1], last[2], last[3],
       done.records.back().decision.control.limited ? ", limited" : "");
   expect_replays(done, rig, controller);
-  // The first images of a slow move tell little: 83 to 117 ms, by builds whose last bits differ.
-  EXPECT_LE(*held_s, c.endoscope->duration_s > 0 ? 0.15 : 0.1);
+  // By the first image that shows it, 83 or 100 ms; by the second one where builds' last bits differ.
+  EXPECT_LE(*held_s, c.endoscope->duration_s > 0 ? 0.12 : 0.1);
   EXPECT_LE(wrong_s, c.duration_s - endoscope_moves_s - 0.3);
   expect_within_limits(done, controller);
   if (c.endoscope->duration_s == 0) expect_right_where_ok(done, c.latency_s, controller.period_s);
@@ -475,6 +481,74 @@ TEST(Run, DISABLED_MeasuresManyMovedEndoscopes) {
     c.duration_s = 12.5;
     c.endoscope = random_motion(rig, i % 2 ? random.uniform(0, 0.6) : 0, random);
     expect_measured_anew(rig, c, 1.5);
+  }
+}
+
+int number_of(const char* name, int usual) {
+  const char* said = std::getenv(name);
+  return said ? std::atoi(said) : usual;
+}
+
+// By hand: LAPSERVO_ENDOSCOPES=N LAPSERVO_ENDOSCOPE_SEED=S --gtest_also_run_disabled_tests
+// --gtest_filter='*MovedEndoscopeIsHeld'. How long after the beginning, and after the first picture that shows it.
+TEST(Run, DISABLED_MeasuresWhenAMovedEndoscopeIsHeld) {
+  const Rig rig = testing::small_test_rig();
+  const int seed = number_of("LAPSERVO_ENDOSCOPE_SEED", 1);
+  Random random(static_cast<std::uint64_t>(seed));
+  for (const double duration_s : {0.0, 0.3, 0.6, 1.0, 2.0, 4.0}) {
+    for (int i = 0; i < number_of("LAPSERVO_ENDOSCOPES", 5); ++i) {
+      Case c;
+      c.seed = static_cast<std::uint64_t>(100 * seed + i);
+      c.endoscope = random_motion(rig, duration_s, random);
+      c.duration_s = endoscope_moves_s + std::max(0.4, duration_s / 2);
+      const PastRun done = run_case(c);
+      std::optional<double> held_s, shown_s;
+      int held_before = 0;
+      for (const Record& record : done.records) {
+        const double since_s = record.input.time_s - endoscope_moves_s;
+        const bool holds = record.decision.control.action == ControlAction::hold;
+        if (since_s < 0.08 && since_s > -1 && record.decision.control.reason == HoldReason::endoscope_moved)
+          ++held_before;
+        if (!shown_s && record.input.image &&
+            record.input.image->time_s > endoscope_moves_s + c.latency_s + (duration_s > 0 ? 0.002 : -0.002))
+          shown_s = since_s;
+        if (since_s > 0.07 && !held_s && holds) held_s = since_s;
+      }
+      std::printf("ramp %.1f s: held %.3f s after the beginning, first picture of it after %.3f s, held before %d\n",
+                  duration_s, held_s.value_or(-1), shown_s.value_or(-1), held_before);
+    }
+  }
+}
+
+// The same with an endoscope that stands still: registrations, arms, cameras and pictures as they may be. In how many
+// ticks, of all, it was taken for one that moves.
+TEST(Run, DISABLED_MeasuresHowOftenARestingEndoscopeIsHeld) {
+  const int seed = number_of("LAPSERVO_ENDOSCOPE_SEED", 1);
+  std::vector<Case> cases(15);
+  cases[1].jitter_s = 0.004;
+  cases[2].jitter_s = 0.008;
+  cases[3].dropped_fraction = 0.1;
+  cases[4].arm.backlash = {0, 0, 8e-4, 0.03};
+  cases[5].arm.backlash = {1e-3, 1e-3, 8e-4, 0.03};
+  cases[6].arm.rcm_offset_m = {0.003, -0.003, 0.003};
+  cases[7].arm.rcm_offset_m = {-0.006, 0.006, 0.006};
+  cases[8].exposure_s = 0.015;
+  cases[9].smoke = 0.35F;
+  cases[10].blotches = {{0.5, 0.012, 0.002}, {2.5, 0.02, 0.0015}, {4.5, 0.03, 0.002}, {5.5, 0.008, 0.0015}};
+  cases[11].latency_s = 0.2;
+  cases[12].hidden = Interval{2, 2.4};
+  cases[13].arm.rcm_offset_m = {0.0005, -0.0005, 0.0005};
+  cases[14].arm.rcm_offset_m = {-0.001, 0.001, 0.001};
+  for (std::size_t k = static_cast<std::size_t>(number_of("LAPSERVO_ENDOSCOPE_CASE", 0)); k < cases.size(); ++k) {
+    int ticks = 0, held = 0;
+    for (int i = 0; i < number_of("LAPSERVO_ENDOSCOPES", 2); ++i) {
+      Case c = cases[k];
+      c.seed = static_cast<std::uint64_t>(100 * seed + i);
+      c.duration_s = 5;
+      for (const Record& record : run_case(c).records)
+        ++ticks, held += record.decision.control.reason == HoldReason::endoscope_moved;
+    }
+    std::printf("case %zu: held as moved in %d of %d ticks\n", k, held, ticks);
   }
 }
 

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <deque>
+
+#include <Eigen/Core>
+
+namespace lapservo::internal {
+
+/// What one image says of the joints, theta, phi (rad) and rho (m): where they were measured when it was exposed, how
+/// fast they moved since the image before, and how far from there the image shows the instrument.
+struct SeenOffset {
+  double stamp_s = 0;
+  Eigen::Vector3d measured = Eigen::Vector3d::Zero(), rate_per_s = Eigen::Vector3d::Zero();
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+};
+
+/// Tells when the offset of what images show from the joints changes faster than it usually does: what moves with the
+/// endoscope slowly jumps nowhere, but goes away from where it was a moment ago. What an image that came late, a delay
+/// that is off, motion and play make of it is taken off first.
+class OffsetSteps {
+ public:
+  /// Whether it lies elsewhere than a moment ago. Images that do are compared with those before them until these are
+  /// 0.1 s old; then it has to go on moving.
+  bool add(const SeenOffset& now, bool delay_is_known);
+  /// What comes next has nothing to do with what came before.
+  void interrupt() { seen_.clear(); }
+
+ private:
+  struct Seen {
+    SeenOffset at;
+    bool unusual = false;
+    Eigen::Vector3d path = Eigen::Vector3d::Zero();  ///< that the joints have gone since the beginning, without sign
+  };
+  /// Of one distance in time.
+  struct Usual {
+    Eigen::Array3d step_squared = Eigen::Array3d::Zero();
+    double late_s2 = 0;
+  };
+  struct Change {
+    Eigen::Array3d unexplained = Eigen::Array3d::Zero();  ///< without sign
+    double late_s = 0;                                    ///< by which the image would have to be late or early
+  };
+  Change change(const Seen& before, const Seen& now, const Usual& usual, bool delay_is_known) const;
+  bool is_unusual(const Change& change, const Seen& before, const Seen& now, const Usual& usual) const;
+  const Seen* latest(bool unusual) const;
+  const Seen* oldest(bool unusual) const;
+
+  std::deque<Seen> seen_;  ///< in order of time, of the last 0.1 s
+  Usual from_latest_, from_oldest_;
+};
+
+}  // namespace lapservo::internal

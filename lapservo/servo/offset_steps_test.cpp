@@ -1,0 +1,105 @@
+#include "lapservo/servo/offset_steps.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double period_s = 1 / 60.0;
+
+// Joints that swing, images whose stamps are off by up to `jitter_s`, and an offset that the caller adds to.
+class Swing {
+ public:
+  explicit Swing(std::uint64_t seed, double jitter_s = 0.001) : random_(seed), jitter_s_(jitter_s) {}
+
+  SeenOffset next(const Eigen::Vector3d& offset = Eigen::Vector3d::Zero(), double late_s = 0) {
+    const double t = period_s * count_++;
+    const Eigen::Vector3d shown = at(t + late_s + random_.uniform(-jitter_s_, jitter_s_));
+    const Eigen::Vector3d noise(3e-5 * random_.normal(), 3e-5 * random_.normal(), 3e-6 * random_.normal());
+    return {t, at(t), (at(t) - at(t - period_s)) / period_s, shown - at(t) + noise + offset};
+  }
+
+ private:
+  static Eigen::Vector3d at(double t) {
+    return {0.3 * std::sin(1.3 * t), 0.2 * std::sin(0.9 * t + 1), 0.01 * std::sin(1.1 * t + 2)};
+  }
+  Random random_;
+  double jitter_s_;
+  int count_ = 0;
+};
+
+TEST(OffsetSteps, IsSilentWhileTheJointsSwing) {
+  for (const double jitter_s : {0.0, 0.001, 0.004})
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Swing swing(seed, jitter_s);
+      OffsetSteps steps;
+      for (int i = 0; i < 600; ++i)
+        EXPECT_EQ(steps.add(swing.next(), i > 60) && i > 20, false) << jitter_s << " " << seed << " " << i;
+    }
+}
+
+// As slow as 30 mm and 20 degrees in some seconds are: within five images, and for as long as it goes on.
+TEST(OffsetSteps, TellsAnOffsetThatMovesOnAndOn) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    Swing swing(seed);
+    OffsetSteps steps;
+    for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
+    const Eigen::Vector3d per_s(0.15, -0.12, 0.008);
+    int told = 0;
+    for (int i = 1; i <= 60; ++i) {
+      const bool unusual = steps.add(swing.next(i * period_s * per_s), true);
+      told += unusual;
+      if (i >= 5 && i <= 10) {
+        EXPECT_TRUE(unusual) << seed << " " << i;
+      }
+    }
+    EXPECT_GT(told, 40) << seed;
+  }
+}
+
+TEST(OffsetSteps, TellsAJumpForATenthOfASecondOnly) {
+  Swing swing(3);
+  OffsetSteps steps;
+  for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
+  const Eigen::Vector3d elsewhere(0.004, -0.004, 0.001);
+  EXPECT_TRUE(steps.add(swing.next(elsewhere), true));
+  for (int i = 0; i < 7; ++i) steps.add(swing.next(elsewhere), true);
+  for (int i = 0; i < 30; ++i) EXPECT_FALSE(steps.add(swing.next(elsewhere), true)) << i;
+}
+
+// One image that is off is one.
+TEST(OffsetSteps, GoesOnAfterAnOutlier) {
+  Swing swing(4);
+  OffsetSteps steps;
+  for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
+  EXPECT_TRUE(steps.add(swing.next({0.01, 0, 0}), true));
+  for (int i = 0; i < 30; ++i) EXPECT_FALSE(steps.add(swing.next(), true)) << i;
+}
+
+// Where images came late before, one more is nothing new.
+TEST(OffsetSteps, LearnsHowLateImagesCome) {
+  Swing swing(5);
+  OffsetSteps steps;
+  for (int i = 0; i < 300; ++i) steps.add(swing.next(Eigen::Vector3d::Zero(), i % 7 == 0 ? 0.012 : 0), true);
+  for (int i = 0; i < 300; ++i)
+    EXPECT_FALSE(steps.add(swing.next(Eigen::Vector3d::Zero(), i % 7 == 0 ? 0.012 : 0), true)) << i;
+}
+
+TEST(OffsetSteps, IgnoresTimeThatGoesBackAndWhatWasInterrupted) {
+  Swing swing(6);
+  OffsetSteps steps;
+  SeenOffset seen;
+  for (int i = 0; i < 100; ++i) steps.add(seen = swing.next(), true);
+  seen.stamp_s -= 0.02;
+  seen.offset[0] += 1;
+  EXPECT_FALSE(steps.add(seen, true));
+  steps.interrupt();
+  EXPECT_FALSE(steps.add(swing.next({0.1, 0.1, 0.01}), true));
+}
+
+}  // namespace
+}  // namespace lapservo::internal
