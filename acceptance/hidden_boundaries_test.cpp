@@ -1,5 +1,5 @@
 // Prints that are off and not calibrated, on which blood hides the whole of an inner boundary or most of it: what is
-// left may look like a turn. LAPSERVO_HIDDEN and LAPSERVO_HIDDEN_SEED set how many of each kind (12; a third of them
+// left may look like a turn. LAPSERVO_HIDDEN and LAPSERVO_HIDDEN_SEED set how many of each kind (4; a fourth of them
 // moving) and which (seed 1); LAPSERVO_HIDDEN_LIST=1 says what becomes of each.
 
 #include <cmath>
@@ -103,7 +103,7 @@ struct Tally {
 
 class HiddenBoundaries : public ::testing::Test {
  protected:
-  const int pictures = from_environment("LAPSERVO_HIDDEN", 12);
+  const int pictures = from_environment("LAPSERVO_HIDDEN", 4);
   const int seed = from_environment("LAPSERVO_HIDDEN_SEED", 1);
   const bool lists = from_environment("LAPSERVO_HIDDEN_LIST", 0) != 0;
   const Rig rig = example_rig();
