@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "acceptance/frame_sets.h"
+#include "acceptance/random_print.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
@@ -19,22 +20,6 @@ namespace {
 
 constexpr double mm = 1e-3;
 constexpr double steepest_rad = 0.35;
-
-struct Print {
-  Marker marker;
-  double error_m;  // standard deviation of the bands' lengths
-};
-
-// Every band is off by itself, at either edge; the last takes up what keeps the ends circles, unless wrapped askew.
-Print random_print(const Marker& nominal, double error_m, bool askew, Random& random) {
-  Print print{nominal, error_m};
-  auto &upper = print.marker.bands_upper_m, &lower = print.marker.bands_lower_m;
-  for (auto* bands : {&upper, &lower})
-    for (double& band : *bands) band += error_m * random.normal();
-  if (!askew) lower[2] = print.marker.length_m() - lower[0] - lower[1];
-  print.marker.seam_rad += 0.05 * random.normal();
-  return print;
-}
 
 struct Tally {
   int frames = 0, wrong = 0;

@@ -186,6 +186,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const double doubt =
       1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit.located_fraction());
   fit.covariance = doubt * doubt * print->covariance;
+  fit.inner_sigma_m = print->inner_sigma_m;
   fit.print_off_probability = print->off_probability;
   fit.psi_variance = doubt * doubt * print->psi_variance;
   fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;

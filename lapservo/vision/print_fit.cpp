@@ -216,8 +216,11 @@ class Evidence {
     if (!inverse) return;  // the frame tells nothing of the print
     const CrossMatrix through = e.nx.lazyProduct(*inverse);
     const PrintVector gradient = e.n - through * e.x;
-    const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(e.nn - through.lazyProduct(e.nx.transpose()));
+    const PrintMatrix information = e.nn - through.lazyProduct(e.nx.transpose());
+    const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(information);
     information_ = certainty * directions.eigenvalues().cwiseMax(0);
+    for (std::size_t k = 0; k < inner_.size(); ++k)
+      inner_[k] = certainty * information.block<2, 2>(errors_of_boundary[k + 1][0], errors_of_boundary[k + 1][0]).sum();
     squares_ = certainty * certainty * (directions.eigenvectors().transpose() * gradient).cwiseAbs2();
   }
   // Logarithm of the likelihood of this standard deviation, compared with none.
@@ -226,10 +229,15 @@ class Evidence {
     const PrintVector spread = 1 + variance * information_.array();
     return 0.5 * (variance * squares_.cwiseQuotient(spread).sum() - std::log(spread.prod()));
   }
+  // PrintFit::inner_sigma_m, in millimetres.
+  double inner_sigma_mm() const {
+    return 1 / std::sqrt(std::max(*std::min_element(inner_.begin(), inner_.end()), 1e-6));
+  }
 
  private:
   PrintVector information_ = PrintVector::Zero(),
               squares_ = PrintVector::Zero();  // along the directions that are independent
+  std::array<double, 2> inner_{};              // about where each inner boundary lies as a whole [1/mm^2]
 };
 
 struct Solution {
@@ -363,7 +371,8 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   if (!exact || !tolerated) return std::nullopt;
   // The exact print's pose is where the measurements were taken.
   if (tolerance_m == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
-  const Weights gains = gains_of(Evidence(sums, errors.doubt_scale), tolerance_mm);
+  const Evidence evidence(sums, errors.doubt_scale);
+  const Weights gains = gains_of(evidence, tolerance_mm);
   const Weights judged_by = weights_of(gains, print_limits.fractions);
   const Weights told_by = weights_of(gains, fractions_to_tell(errors.doubt_scale));
   Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
@@ -382,6 +391,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
+  fit.inner_sigma_m = evidence.inner_sigma_mm() * mm;
   fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);

@@ -38,6 +38,9 @@ struct PrintFit {
   double off_probability = 0;            ///< that the print is off by more than the tolerance
   double psi_variance_by_tolerance = 0;  ///< of it, what the rig's tolerance adds to an exact print's
   double psi_variance_by_print = 0;      ///< and what the print adds beyond the tolerance
+  /// How exactly it shows where on the print an inner boundary lies as a whole, were all others where the rig says; of
+  /// both the worse, one sigma. Where one is hidden the other's error is a turn, and nothing shows it: a metre.
+  double inner_sigma_m = 1;
 };
 
 /// Tells the print's errors from the settled measurements' residuals. How large they usually are is not known, so the

@@ -33,6 +33,35 @@ bool misses_a_boundary(const FineFit& fit, const ColorAgreement& agreement) {
   return missing && agreement.matching > limits.unhidden_matching && fit.blur.boundaries_px < limits.unblurred_px;
 }
 
+// Of how many of its lines a boundary is located.
+double located_of_lines(const FineFit& fit, std::size_t boundary) {
+  return static_cast<double>(fit.used[boundary]) / std::max(1, fit.lines);
+}
+
+// Whether what shows of three boundaries holds the fourth, an end, as well.
+bool needs_no_other_end(const FineFit& fit) {
+  return fit.located_fraction() > limits.less_hidden &&
+         std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.well_located &&
+         std::max(located_of_lines(fit, 0), located_of_lines(fit, 3)) > limits.wholly_located;
+}
+
+double max_spilled(const FineFit& fit) {
+  const bool located = std::min(located_of_lines(fit, 0), located_of_lines(fit, 3)) > limits.half_located;
+  return located ? limits.max_spilled_of_located : limits.max_spilled;
+}
+
+// A boundary on fewer lines may be the blood's.
+int fewest_lines(const FineFit& fit) {
+  return std::max(limits.min_of_end, fit.lines / limits.end_one_in);
+}
+
+// Whether a print that is off would show. Where one inner boundary is left, its error looks like a turn.
+bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit) {
+  const bool both_show = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.missed_fraction;
+  return scene.marker.tolerance_m > 0 || both_show ||
+         (fit.inner_sigma_m < limits.max_inner_sigma_m && std::min(fit.used[1], fit.used[2]) >= fewest_lines(fit));
+}
+
 // Sigma of psi, and whom to blame when it is too large: the print or the picture.
 Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
   const auto squared = [](double x) { return x * x; };
@@ -124,13 +153,13 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::occluded;
   // With the RCM both ends confirm what is left of a hidden marker; without it they are needed always.
   const bool in_image = agreement.in_image > limits.wholly_in_image;
-  const bool needs_both_ends = !fit.unknowns.q() || (fraction < limits.mostly_hidden && in_image);
-  if (needs_both_ends &&
-      std::min(fit.used[0], fit.used[3]) < std::max(limits.min_of_end, fit.lines / limits.end_one_in))
+  const bool needs_both_ends =
+      !fit.unknowns.q() || (fraction < limits.mostly_hidden && in_image && !needs_no_other_end(fit));
+  if (needs_both_ends && std::min(fit.used[0], fit.used[3]) < fewest_lines(fit))
     return agreement.in_image < limits.wholly_in_image ? Status::cut : Status::occluded;
 
   // Boundaries and sides that agree badly.
-  if (fraction < limits.partly_hidden && agreement.spilled > limits.max_spilled) return Status::poor_fit;
+  if (fraction < limits.partly_hidden && agreement.spilled > max_spilled(fit)) return Status::poor_fit;
   const bool few_sides = limits.sides_one_in * fit.sides_used < fit.sides_in_image;
   const double more_rms_sigmas = few_sides ? 0
                                            : limits.rms_per_fraction * std::clamp(fraction - limits.rms_from_fraction,
@@ -147,7 +176,8 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::uncertain;
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
-  return validate_sigma(fit, agreement);
+  const Status status = validate_sigma(fit, agreement);
+  return status == Status::ok && !would_show_a_print_that_is_off(scene, fit) ? Status::occluded : status;
 }
 
 }  // namespace lapservo::internal

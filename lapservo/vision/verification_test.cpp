@@ -100,6 +100,28 @@ TEST(Verification, AFitWithoutSupportIsNotOk) {
   EXPECT_EQ(validate(scene, fit), Status::poor_fit);
 }
 
+// Where nothing shows whether the print is off, its rig has to say that it is measured.
+TEST(Verification, AnInnerBoundaryThatIsHiddenLeavesThePrintInDoubt) {
+  const Shot& shot = usual_shot(1);
+  const FineFit right = fit_from_truth(shot);
+  EXPECT_LT(right.inner_sigma_m, 3e-6);
+  Rig measured = shot.rig;
+  measured.instruments[0].marker.tolerance_m = 5e-6;
+  const Sight of_measured(measured, shot.bgr);
+  for (const std::size_t boundary : {1U, 2U}) {
+    FineFit fit = right;
+    fit.used[boundary] = fit.in_image[boundary] = fit.lines / 5;
+    EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok);
+    fit.inner_sigma_m = 1e-4;
+    EXPECT_EQ(validate(shot.sight.scene(), fit), Status::occluded);
+    EXPECT_EQ(validate(of_measured.scene(), fit), Status::ok);
+    fit = right;
+    fit.used[boundary] = 2, fit.in_image[boundary] = 2;
+    EXPECT_EQ(validate(shot.sight.scene(), fit), Status::occluded);
+    EXPECT_EQ(validate(of_measured.scene(), fit), Status::ok);
+  }
+}
+
 TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
   const Shot& shot = usual_shot(1);
   FineFit fit = fit_from_truth(shot);
