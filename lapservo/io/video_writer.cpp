@@ -36,15 +36,20 @@ void VideoWriter::add(const cv::Mat& frame) {
   if (!encoder_) encoder_ = std::make_unique<VideoEncoder>(temporary_->path(), name, frame.size(), frames_per_second_);
   if (frame.type() != CV_8UC3 || frame.size() != encoder_->size())
     throw InputError(name, "can't take a frame of another size or kind than the first");
-  encoder_->add(frame);
   ++frames_;
+  if (failed_) return;
+  try {
+    encoder_->add(frame);
+  } catch (const InputError&) {  // commit() tells, once whoever writes other results has written them
+    failed_ = true;
+  }
 }
 
 void VideoWriter::commit() {
   if (!encoder_) return;
-  encoder_->finish();
+  if (!failed_) encoder_->finish();
   encoder_.reset();
-  if (frames_in(temporary_->path()) != frames_)
+  if (failed_ || frames_in(temporary_->path()) != frames_)
     throw InputError(target_.name.string(), "could not be written to its end (is the disk full?)");
   temporary_->commit();
 }

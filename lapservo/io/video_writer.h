@@ -19,8 +19,8 @@ class VideoWriter {
   /// Throws InputError at once when it can't be written.
   VideoWriter(const std::filesystem::path& path, double frames_per_second);
 
-  /// 8-bit BGR, all of one size. Throws InputError when there is no encoder for the name's ending, and when the disk is
-  /// full.
+  /// 8-bit BGR, all of one size. Throws InputError when there is no encoder for the name's ending; commit()
+  /// tells of a full disk.
   void add(const cv::Mat& frame);
   /// Throws InputError when the file does not hold every frame in the end. Without frames there is no video.
   void commit();
@@ -31,6 +31,7 @@ class VideoWriter {
   double frames_per_second_;
   std::unique_ptr<VideoEncoder> encoder_;  // goes before its file
   int frames_ = 0;
+  bool failed_ = false;
 };
 
 }  // namespace lapservo::internal
