@@ -5,13 +5,13 @@
 #include <map>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "acceptance/frame_sets.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/kinematics/features.h"
 #include "lapservo/sim/tissue.h"
 
@@ -315,9 +315,8 @@ TEST(Rendered, Stress) {
   sets["noise"].options.sensor.read_noise *= 4;
   sets["warm"].options.sensor.gains = Light(0.8F, 1, 1.2F);
   sets["jpeg"].after = [](const cv::Mat& image) {
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 85});
-    return cv::imdecode(bytes, cv::IMREAD_COLOR);
+    constexpr int quality = 85;
+    return decode_image(encode_jpeg(image, quality), "a rendered picture");
   };
   Score all;
   for (const auto& [name, set] : sets)

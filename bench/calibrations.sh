@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # calibrations.sh [WIDTH [HEIGHT [SECONDS [TOOL...]]]]: how long each calibration takes for a recording of a minute (30 frames a
-# second, MPEG-4 part 2, rendered once and kept in build/calibrations), as rows of docs/performance.md. TOOL: camera, colour,
+# second, H.264, rendered once and kept in build/calibrations), as rows of docs/performance.md. TOOL: camera, colour,
 # marker, registration, check; all without any. Needs build/lapservo and build/bench/board_video.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -18,13 +18,12 @@
 #include <unistd.h>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
-
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/random_start.h"
 #include "lapservo/core/random.h"
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/image_receiver.h"
+#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
@@ -72,9 +71,7 @@ void be_the_arm(const Options& options, const Rig& rig, int to) {
     config.alter_image = [&](ImageMessage& image) {
       const cv::Mat bgr(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC3, image.data.data(),
                         image.step);
-      CompressedImageMessage message{image.stamp_s, "bgr8; jpeg compressed bgr8", {}};
-      cv::imencode(".jpg", bgr, message.data, {cv::IMWRITE_JPEG_QUALITY, jpeg_quality});
-      say_compressed(message);
+      say_compressed({image.stamp_s, "bgr8; jpeg compressed bgr8", encode_jpeg(bgr, jpeg_quality)});
     };
   }
   SimRobot robot(*transport, rig, simulator, config);

@@ -8,7 +8,7 @@
 namespace lapservo::internal {
 namespace {
 
-// In the order in which they are preferred, with the names that the decoder knows.
+// What a V4l2Device takes, with the names that the decoder knows.
 struct Known {
   std::uint32_t pixel_format;
   std::string_view encoding;
@@ -23,28 +23,6 @@ auto find(std::uint32_t pixel_format) {
 }
 
 }  // namespace
-
-std::optional<V4l2Offer> best_offer(const std::vector<V4l2Offer>& offers) {
-  std::optional<V4l2Offer> best;
-  const auto is_better = [&](const V4l2Offer& offer) {
-    constexpr double same = 0.5;  // 29.97 is 30
-    const double faster = offer.max_frames_per_second - best->max_frames_per_second;
-    if (std::abs(faster) > same) return faster > 0;
-    return find(offer.pixel_format) < find(best->pixel_format);
-  };
-  for (const V4l2Offer& offer : offers)
-    if (find(offer.pixel_format) != known.end() && (!best || is_better(offer))) best = offer;
-  return best;
-}
-
-std::string four_letters(std::uint32_t pixel_format) {
-  std::string letters;
-  for (int shift = 0; shift < 32; shift += 8) {
-    const char letter = static_cast<char>(pixel_format >> shift & 0x7f);
-    letters += letter > ' ' && letter <= '~' ? letter : '?';
-  }
-  return letters;
-}
 
 std::variant<ImageMessage, CompressedImageMessage> v4l2_message(const V4l2Layout& layout,
                                                                 std::span<const std::uint8_t> bytes, double stamp_s) {

@@ -3,11 +3,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "cameras/camera.h"
 #include "cameras/v4l2_format.h"
 #include "lapservo/crtk/image_decoder.h"
+#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/testing/input_error.h"
 
 namespace lapservo::internal {
@@ -51,8 +51,7 @@ TEST(V4l2Format, EveryRawFormatBecomesBgr) {
 
 // Cameras leave out the Huffman tables that JPEG's standard names.
 TEST(V4l2Format, MotionJpegWithoutTablesIsReadable) {
-  std::vector<std::uint8_t> jpeg;
-  cv::imencode(".jpg", cv::Mat(16, 16, CV_8UC3, cv::Scalar(10, 200, 30)), jpeg, {cv::IMWRITE_JPEG_QUALITY, 95});
+  std::vector<std::uint8_t> jpeg = encode_jpeg(cv::Mat(16, 16, CV_8UC3, cv::Scalar(10, 200, 30)));
   for (std::size_t at = 2; jpeg[at + 1] != 0xda;) {
     const std::size_t length = 2 + 256u * jpeg[at + 2] + jpeg[at + 3];
     if (jpeg[at + 1] == 0xc4) {

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "lapservo/core/csv.h"
+#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/io/overlay.h"
 #include "web/page_files.h"
 #include "web/page_state.h"
@@ -58,9 +58,7 @@ long after_of(const HttpRequest& request) {
 }
 
 std::string jpeg_of(const PageImage& image) {
-  std::vector<unsigned char> bytes;
-  cv::imencode(".jpg", draw_overlay(image.bgr, *image.rig, image.observations), bytes,
-               {cv::IMWRITE_JPEG_QUALITY, jpeg_quality});
+  const auto bytes = encode_jpeg(draw_overlay(image.bgr, *image.rig, image.observations), jpeg_quality);
   return {bytes.begin(), bytes.end()};
 }
 

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "lapservo/core/error.h"
+#include "lapservo/io/image_file.h"
 #include "lapservo/testing/rigs.h"
 #include "web/test_http.h"
 
@@ -70,7 +70,8 @@ TEST(LivePage, ShowsTheNewestImageToWhoeverWaits) {
   ASSERT_EQ(http_status(answer), 200);
   EXPECT_NE(answer.find("X-Number: 3\r\n"), std::string::npos) << answer.substr(0, 600);
   const std::string jpeg = body_of(answer);
-  const cv::Mat shown = cv::imdecode(std::vector<unsigned char>(jpeg.begin(), jpeg.end()), cv::IMREAD_COLOR);
+  const cv::Mat shown =
+      decode_image({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()}, "the page's picture");
   ASSERT_EQ(shown.size(), cv::Size(rig.camera.width_px, rig.camera.height_px));
   EXPECT_NEAR(shown.at<cv::Vec3b>(shown.rows / 2, shown.cols / 2)[1], 200, 3);
   EXPECT_EQ(http_status(http(port, "GET", "/picture?after=3")), 204);

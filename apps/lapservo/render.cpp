@@ -180,6 +180,7 @@ int run(const RenderArguments& options) {
   truth.commit();
   folder.commit();
   std::printf("%zu frames with truth.csv and rig.yaml: %s\n", frames.size(), options.out.c_str());
+  if (video && !video_remark().empty()) std::printf("the video is %s\n", video_remark().c_str());
   return 0;
 }
 

@@ -25,6 +25,7 @@
 #include "lapservo/io/observation_csv.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/overlay_writer.h"
+#include "lapservo/io/video_encoder.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/registration_watch.h"
 #include "lapservo/vision/tracker.h"
@@ -247,6 +248,7 @@ int run(const TrackOptions& options) {
   std::printf("%s%d frames%s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str());
   if (csv) std::printf("observations: %s\n", options.out.c_str());
   if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
+  if (overlay && overlay->is_video() && !video_remark().empty()) std::printf("overlay: %s\n", video_remark().c_str());
   if (live && !live->dropped().empty()) std::printf("no frames: %s\n", live->dropped().c_str());
   if (const std::string complaint = source->complaint(); !stopped && !complaint.empty()) {
     std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options.input.c_str(),

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include <opencv2/core/utils/logger.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "fuzz/campaign/mutations.h"
@@ -23,6 +22,8 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
+#include "lapservo/io/image_encoding.h"
+#include "lapservo/io/video_writer.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/instrument_shaft.h"
@@ -133,20 +134,25 @@ std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
     psi_rad.push_back(q.psi_rad);
   }
   std::vector<Sample> all;
-  for (const char* extension : {".png", ".jpg", ".bmp", ".tif", ".webp"}) {
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(extension, frames[0], bytes);
+  for (const char* extension : {".png", ".jpg", ".bmp", ".tif", ".webp", ".ppm"}) {
+    const auto bytes = encode_image(std::string("sample") + extension, frames[0]);
     all.push_back({extension, {bytes.begin(), bytes.end()}, {psi_rad[0]}});
   }
   for (const char* extension : {".mkv", ".mp4", ".avi", ".ts"}) {
     const fs::path path = folder / (std::string("sample") + extension);
     const bool motion_jpeg = std::string(extension) == ".avi";
-    cv::VideoWriter video(
-        path.string(), cv::CAP_FFMPEG,
-        motion_jpeg ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G') : cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
-        size);
-    for (const cv::Mat& frame : frames) video.write(frame);
-    video.release();
+    if (std::string(extension) == ".mkv") {  // H.264
+      VideoWriter video(path, 25);
+      for (const cv::Mat& frame : frames) video.add(frame);
+      video.commit();
+    } else {
+      cv::VideoWriter video(
+          path.string(), cv::CAP_FFMPEG,
+          motion_jpeg ? cv::VideoWriter::fourcc('M', 'J', 'P', 'G') : cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25,
+          size);
+      for (const cv::Mat& frame : frames) video.write(frame);
+      video.release();
+    }
     all.push_back({extension, text_of(path), psi_rad});
     fs::remove(path);
   }

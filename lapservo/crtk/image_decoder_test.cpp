@@ -1,10 +1,10 @@
 #include "lapservo/crtk/image_decoder.h"
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/random.h"
+#include "lapservo/io/png_encoding.h"
 
 namespace lapservo::internal {
 namespace {
@@ -127,7 +127,7 @@ TEST(ImageDecoder, CompressedImages) {
   cv::randu(picture, cv::Scalar::all(0), cv::Scalar::all(255));
   CompressedImageMessage message;
   message.format = "bgr8; png compressed bgr8";
-  cv::imencode(".png", picture, message.data);
+  message.data = encode_png(picture);
   const DecodedImage png = decode(message);
   ASSERT_TRUE(std::holds_alternative<cv::Mat>(png));
   EXPECT_EQ(cv::norm(std::get<cv::Mat>(png), picture, cv::NORM_INF), 0);

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "lapservo/core/atomic_file.h"
+#include "lapservo/io/jpeg_encoding.h"
 
 namespace lapservo::internal {
 namespace {
@@ -85,9 +85,9 @@ std::string base64(std::span<const std::uint8_t> bytes) {
 
 // JPEG: a frame with the sensor's noise takes ten times the room as PNG.
 std::string html_from(const Picture& picture) {
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".jpg", picture.bgr, bytes, {cv::IMWRITE_JPEG_QUALITY, 88}))
-    throw std::runtime_error("a picture of the report could not be encoded");
+  constexpr int quality = 88;
+  const auto bytes = encode_jpeg(picture.bgr, quality);
+  if (bytes.empty()) throw std::runtime_error("a picture of the report could not be encoded");
   return fmt::format("<img alt=\"{}\" width=\"{}\" height=\"{}\" src=\"data:image/jpeg;base64,{}\"/>",
                      escaped(picture.title), picture.bgr.cols, picture.bgr.rows, base64(bytes));
 }

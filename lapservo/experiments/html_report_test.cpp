@@ -5,10 +5,10 @@
 #include <sstream>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/test_markup.h"
+#include "lapservo/io/image_file.h"
 
 namespace lapservo::internal {
 namespace {
@@ -93,7 +93,7 @@ TEST(HtmlReport, EmbedsPictures) {
     bits = bits << 6 | static_cast<std::uint32_t>(digits.find(c));
     if ((held += 6) >= 8) bytes.push_back(static_cast<std::uint8_t>(bits >> (held -= 8)));
   }
-  const cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_COLOR);
+  const cv::Mat picture = decode_image(bytes, "the report's picture");
   ASSERT_EQ(picture.size(), cv::Size(60, 40));
   EXPECT_NEAR(picture.at<cv::Vec3b>(20, 30)[0], 200, 6);
   EXPECT_NEAR(picture.at<cv::Vec3b>(20, 30)[2], 20, 6);

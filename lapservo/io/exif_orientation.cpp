@@ -4,47 +4,27 @@
 #include <cstring>
 #include <string_view>
 
+#include "lapservo/io/numbers.h"
+#include "lapservo/io/tiff_directory.h"
+
 namespace lapservo::internal {
 namespace {
 using Bytes = std::span<const std::uint8_t>;
+
+constexpr int orientation_tag = 0x0112;
 
 bool begins_with(Bytes bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
 }
 
-// Unsigned numbers at a place of bytes of either order; 0 beyond their end.
-struct Numbers {
-  Bytes bytes;
-  bool big_endian;
-
-  std::size_t of(std::size_t at, std::size_t count) const {
-    if (at > bytes.size() || bytes.size() - at < count) return 0;
-    std::size_t value = 0;
-    for (std::size_t i = 0; i < count; ++i) value = value << 8 | bytes[at + (big_endian ? i : count - 1 - i)];
-    return value;
-  }
-};
-
 Bytes from(Bytes bytes, std::size_t at) {
   return at < bytes.size() ? bytes.subspan(at) : Bytes{};
 }
 
-// EXIF is a TIFF header too. Its first directory: a count, then entries of tag, type, count and value, 12 bytes each.
-std::optional<int> of_tiff(Bytes bytes) {
-  const bool big = begins_with(bytes, std::string_view("MM\0*", 4));
-  if (!big && !begins_with(bytes, std::string_view("II*\0", 4))) return std::nullopt;
-  const Numbers numbers{bytes, big};
-  const std::size_t directory = numbers.of(4, 4), entries = numbers.of(directory, 2);
-  for (std::size_t i = 0; i < entries; ++i) {
-    const std::size_t at = directory + 2 + 12 * i;
-    if (numbers.of(at, 2) == 0x0112) return static_cast<int>(numbers.of(at + 8, 2));
-  }
-  return std::nullopt;
-}
-
+// EXIF is a TIFF header too.
 std::optional<int> of_exif(Bytes bytes) {
   constexpr std::string_view prefix("Exif\0\0", 6);
-  return of_tiff(begins_with(bytes, prefix) ? from(bytes, prefix.size()) : bytes);
+  return tiff_tag(begins_with(bytes, prefix) ? from(bytes, prefix.size()) : bytes, orientation_tag);
 }
 
 // Segments up to the start of the scan: FF, a marker, a length that counts itself.
@@ -81,7 +61,7 @@ std::optional<int> exif_orientation(Bytes picture) {
   if (begins_with(picture, "\xff\xd8")) return of_jpeg(picture);
   if (begins_with(picture, "\x89PNG")) return of_chunks(picture, 8, true);
   if (begins_with(picture, "RIFF")) return of_chunks(picture, 12, false);
-  return of_tiff(picture);
+  return tiff_tag(picture, orientation_tag);
 }
 
 }  // namespace lapservo::internal

@@ -1,16 +1,13 @@
 #include "lapservo/io/frame_source.h"
 
 #include <algorithm>
-#include <cctype>
-#include <chrono>
 #include <system_error>
 #include <utility>
 #include <vector>
 
-#include <opencv2/videoio.hpp>
-
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/live_source.h"
 #include "lapservo/io/video_reader.h"
 
 namespace lapservo {
@@ -71,47 +68,6 @@ class VideoSource : public FrameSource {
   int index_ = 0;
 };
 
-class LiveSource : public FrameSource {
- public:
-  LiveSource(const std::string& name, cv::VideoCapture capture) : name_(name), capture_(std::move(capture)) {
-    const double fps = capture_.get(cv::CAP_PROP_FPS);
-    if (fps > 0 && fps < 10000) fps_ = fps;
-    first_ = read();
-    if (!first_) throw InputError(name_, "gives no frames, expected a camera or stream");
-  }
-
-  std::optional<Frame> next() override {
-    std::optional<cv::Mat> image = first_ ? std::exchange(first_, std::nullopt) : read();
-    if (!image) return std::nullopt;
-    const auto now = std::chrono::steady_clock::now();
-    if (index_ == 0) start_ = now;
-    Frame frame{std::move(*image), index_, std::chrono::duration<double>(now - start_).count(), {}, {}};
-    ++index_;
-    return frame;
-  }
-  Kind kind() const override { return Kind::live; }
-  std::optional<int> frame_count() const override { return std::nullopt; }
-  double frames_per_second() const override { return fps_; }
-
- private:
-  std::optional<cv::Mat> read() {
-    cv::Mat image;
-    try {
-      if (!capture_.read(image) || image.empty()) return std::nullopt;
-    } catch (const cv::Exception&) {
-      return std::nullopt;
-    }
-    return bgr8_from(image, name_).clone();
-  }
-
-  std::string name_;
-  cv::VideoCapture capture_;
-  std::optional<cv::Mat> first_;
-  double fps_ = 30;
-  int index_ = 0;
-  std::chrono::steady_clock::time_point start_;
-};
-
 std::vector<fs::path> pictures_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -128,34 +84,11 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
   return files;
 }
 
-cv::VideoCapture open_capture(const std::string& input) {
-  cv::VideoCapture capture;
-  try {
-    const bool index =
-        !input.empty() && std::all_of(input.begin(), input.end(), [](unsigned char c) { return std::isdigit(c); });
-    if (index && input.size() < 4) {
-      capture.open(std::stoi(input));
-    } else {
-      capture.open(input);
-    }
-  } catch (const cv::Exception&) {
-    capture.release();
-  }
-  if (!capture.isOpened()) throw InputError(input, "can't be opened, expected a camera or stream");
-  return capture;
-}
-
-bool is_live(const std::string& input) {
-  if (input.find("://") != std::string::npos || input.starts_with("/dev/video")) return true;
-  return !input.empty() && input.size() < 4 && !fs::exists(input) &&
-         std::all_of(input.begin(), input.end(), [](unsigned char c) { return std::isdigit(c); });
-}
-
 }  // namespace
 
 std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps) {
   using Kind = FrameSource::Kind;
-  if (is_live(input)) return std::make_unique<LiveSource>(input, open_capture(input));
+  if (is_live(input)) return open_live_source(input);
   std::error_code error;  // of a name that no file can have, or a folder that may not be looked into
   if (!fs::exists(input, error))
     throw InputError(input, "does not exist, expected a picture, a folder of pictures or a video");

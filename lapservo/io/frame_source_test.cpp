@@ -9,11 +9,11 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/videoio.hpp>
 
 #include "lapservo/core/random.h"
+#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/io/video_reader.h"
+#include "lapservo/io/video_writer.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
@@ -23,17 +23,16 @@ namespace fs = std::filesystem;
 
 constexpr int frames = 20;
 
-void write_video(const fs::path& path, const char* codec) {
-  cv::VideoWriter video(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]),
-                        25, {320, 240});
-  ASSERT_TRUE(video.isOpened()) << path;
+void write_video(const fs::path& path) {
+  VideoWriter video(path, 25);
   cv::RNG random(7);
   for (int i = 0; i < frames; ++i) {
     cv::Mat image(240, 320, CV_8UC3);
     random.fill(image, cv::RNG::UNIFORM, 60, 200);
     image(cv::Rect(10 * i, 50, 40, 40)).setTo(cv::Scalar(20, 40, 250));
-    video.write(image);
+    video.add(image);
   }
+  video.commit();
 }
 
 std::string bytes_of(const fs::path& path) {
@@ -61,9 +60,8 @@ Read read(const fs::path& path) {
 
 TEST(VideoSource, GivesEveryFrameOfAWholeVideo) {
   const testing::TemporaryFolder folder;
-  for (const auto& [name, codec] :
-       {std::pair{"a.mp4", "mp4v"}, {"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
-    write_video(folder / name, codec);
+  for (const char* name : {"a.mp4", "a.mkv", "a.avi", "a.ts"}) {
+    write_video(folder / name);
     const Read whole = read(folder / name);
     EXPECT_EQ(whole.frames, frames) << name;
     EXPECT_EQ(whole.damaged, 0) << name;
@@ -74,7 +72,7 @@ TEST(VideoSource, GivesEveryFrameOfAWholeVideo) {
 // Whoever takes his time with the frames gets them all.
 TEST(VideoReader, IsPatientOnceItIsOpen) {
   const testing::TemporaryFolder folder;
-  write_video(folder / "a.mkv", "mp4v");
+  write_video(folder / "a.mkv");
   constexpr std::chrono::seconds patience(2);
   VideoReader reader(folder / "a.mkv", patience);
   std::this_thread::sleep_for(patience + std::chrono::milliseconds(50));
@@ -86,8 +84,8 @@ TEST(VideoReader, IsPatientOnceItIsOpen) {
 
 TEST(VideoSource, SaysThatAVideoEndsEarly) {
   const testing::TemporaryFolder folder;
-  for (const auto& [name, codec] : {std::pair{"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
-    write_video(folder / name, codec);
+  for (const char* name : {"a.mkv", "a.avi", "a.ts"}) {
+    write_video(folder / name);
     const std::string whole = bytes_of(folder / name);
     testing::write_file(folder / name, whole.substr(0, whole.size() / 2));
     const Read half = read(folder / name);
@@ -99,8 +97,8 @@ TEST(VideoSource, SaysThatAVideoEndsEarly) {
 // Of damage within its data the decoder learns most of the time; then the frame says so and the video as a whole.
 TEST(VideoSource, MarksDamagedFrames) {
   const testing::TemporaryFolder folder;
-  for (const auto& [name, codec] : {std::pair{"a.mp4", "mp4v"}, {"a.avi", "MJPG"}}) {
-    write_video(folder / name, codec);
+  for (const char* name : {"a.mp4", "a.avi"}) {
+    write_video(folder / name);
     std::string bytes = bytes_of(folder / name);
     Random random(3);
     for (std::size_t i = bytes.size() / 3; i < bytes.size() / 3 + 200; ++i)
@@ -120,8 +118,7 @@ TEST(VideoSource, MarksFramesOfMotionJpegWhoseDataGoOn) {
   for (int i = 0; i < 6; ++i) {
     cv::Mat image(240, 320, CV_8UC3, cv::Scalar(90, 120, 60));
     image(cv::Rect(40 * i, 50, 40, 40)).setTo(cv::Scalar(20, 40, 250));
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(".jpg", image, bytes);
+    const std::vector<std::uint8_t> bytes = encode_jpeg(image);
     std::string frame(bytes.begin(), bytes.end());
     constexpr std::size_t end_marker = 2, more = 40;
     if (i == 3) frame.insert(frame.size() - end_marker, frame.substr(frame.size() - end_marker - more, more));

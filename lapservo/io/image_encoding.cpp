@@ -1,27 +1,34 @@
 #include "lapservo/io/image_encoding.h"
 
-#include <cstdint>
-#include <vector>
-
-#include <opencv2/imgcodecs.hpp>
-
 #include "lapservo/core/error.h"
+#include "lapservo/core/lower_case.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/jpeg_encoding.h"
+#include "lapservo/io/libav_picture.h"
+#include "lapservo/io/png_encoding.h"
+#include "lapservo/io/webp_picture.h"
 
 namespace lapservo::internal {
-namespace {
 namespace fs = std::filesystem;
 
-std::vector<std::uint8_t> encode_image(const fs::path& name, const cv::Mat& image) {
-  std::vector<std::uint8_t> bytes;
-  try {
-    if (has_image_extension(name) && cv::imencode(name.extension().string(), image, bytes)) return bytes;
-  } catch (const cv::Exception&) {
-  }
-  throw InputError(name.string(), "can't be written as a picture");
+namespace {
+
+std::vector<std::uint8_t> encoded_as(const std::string& extension, const cv::Mat& image) {
+  if (extension == ".png") return encode_png(image);
+  if (extension == ".jpg" || extension == ".jpeg") return encode_jpeg(image);
+  const bool takes = !image.empty() && image.depth() == CV_8U;
+  if (extension == ".webp" && takes) return encode_webp(bgr8_from(image, "picture"));
+  return libav_encode(extension, image);
 }
 
 }  // namespace
+
+std::vector<std::uint8_t> encode_image(const fs::path& name, const cv::Mat& image) {
+  const std::string extension = lower_case(name.extension().string());
+  const auto bytes = encoded_as(extension, image);
+  if (bytes.empty()) throw InputError(name.string(), "can't be written as a picture");
+  return bytes;
+}
 
 void write_open_image(AtomicFile& file, const fs::path& name, const cv::Mat& image) {
   const auto bytes = encode_image(name, image);

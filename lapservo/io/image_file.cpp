@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/atomic_file.h"
@@ -17,7 +16,11 @@
 #include "lapservo/io/exif_orientation.h"
 #include "lapservo/io/image_encoding.h"
 #include "lapservo/io/jpeg_picture.h"
+#include "lapservo/io/libav_picture.h"
+#include "lapservo/io/numbers.h"
 #include "lapservo/io/png_picture.h"
+#include "lapservo/io/tiff_directory.h"
+#include "lapservo/io/webp_picture.h"
 
 namespace lapservo {
 using namespace internal;
@@ -31,9 +34,8 @@ bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
 }
 
-std::uint32_t big_endian(std::span<const std::uint8_t> bytes, std::size_t at) {
-  return std::uint32_t{bytes[at]} << 24 | std::uint32_t{bytes[at + 1]} << 16 | std::uint32_t{bytes[at + 2]} << 8 |
-         std::uint32_t{bytes[at + 3]};
+[[noreturn]] void refuse_pixel_type(const std::string& source) {
+  throw InputError(source, "pixel type", "floating point or signed", "8 or 16 bits a channel");
 }
 
 struct PictureSize {
@@ -41,7 +43,8 @@ struct PictureSize {
 };
 
 PictureSize png_size(std::span<const std::uint8_t> bytes) {
-  return {big_endian(bytes, 16), big_endian(bytes, 20)};
+  const Numbers numbers{bytes, true};
+  return {static_cast<std::uint32_t>(numbers.of(16, 4)), static_cast<std::uint32_t>(numbers.of(20, 4))};
 }
 
 // Of the first frame header (SOF); zero without one. Steps over garbage between segments as decoders do.
@@ -78,6 +81,26 @@ bool is_jpeg(std::span<const std::uint8_t> bytes) {
   return starts_with(bytes, "\xff\xd8");
 }
 
+// Up to the end of a BMP's last row; of a run-length encoded one to where it says that it ends.
+std::size_t bmp_bytes(std::span<const std::uint8_t> bytes) {
+  const Numbers numbers{bytes, false};
+  constexpr std::size_t old_header = 12, run_length_8 = 1, run_length_4 = 2;
+  const bool old = numbers.of(14, 4) == old_header;
+  const std::size_t width = numbers.of(18, old ? 2 : 4), bits = numbers.of(old ? 24 : 28, 2);
+  const std::size_t compression = old ? 0 : numbers.of(30, 4);
+  if (compression == run_length_8 || compression == run_length_4) return numbers.of(2, 4);
+  const auto rows = static_cast<std::int32_t>(numbers.of(old ? 20 : 22, old ? 2 : 4));  // negative: from the top
+  const std::size_t step = (width * bits + 31) / 32 * 4;
+  return numbers.of(10, 4) + step * static_cast<std::size_t>(std::abs(std::int64_t{rows}));
+}
+
+// Of a format whose decoder takes what is there.
+std::size_t least_bytes(std::span<const std::uint8_t> bytes, const std::string& format) {
+  constexpr std::size_t riff_header = 8;
+  if (format == "WebP") return riff_header + Numbers{bytes, false}.of(4, 4);
+  return format == "BMP" ? bmp_bytes(bytes) : 0;
+}
+
 // Decoders return half a picture for half a file, and fill gigabytes for a few bytes: ask for end and size beforehand.
 void check_whole(std::span<const std::uint8_t> bytes, const std::string& source) {
   using namespace std::string_view_literals;
@@ -92,17 +115,24 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
       throw InputError(source, "is a truncated JPEG, expected a whole picture");
     check_size(jpeg_size(bytes), source);
   }
+  if (const std::string format = rare_format(bytes); bytes.size() < least_bytes(bytes, format))
+    throw InputError(source, "is a truncated " + format + ", expected a whole picture");
+}
+
+// What OpenCV read once, and others may send.
+void refuse_unread(std::span<const std::uint8_t> bytes, const std::string& source) {
+  constexpr int tile_width = 322, sample_format = 339, is_unsigned = 1;
+  const std::string format = rare_format(bytes);
+  if (tiff_tag(bytes, sample_format).value_or(is_unsigned) != is_unsigned) refuse_pixel_type(source);
+  if (tiff_tag(bytes, tile_width)) throw InputError(source, "is a TIFF in tiles, which is not read: convert it to PNG");
+  if (!format.empty() && format != "WebP" && !libav_decodes(format))
+    throw InputError(source, "is a picture of format " + format + ", which is not read: convert it to PNG");
 }
 
 DecodedPicture decode(std::span<const std::uint8_t> bytes) {
   if (is_png(bytes)) return decode_png(bytes);
   if (is_jpeg(bytes)) return decode_jpeg(bytes);
-  try {
-    const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U, const_cast<std::uint8_t*>(bytes.data()));
-    return {cv::imdecode(buffer, cv::IMREAD_UNCHANGED), ""};
-  } catch (const cv::Exception&) {
-    return {};
-  }
+  return {rare_format(bytes) == "WebP" ? decode_webp(bytes) : libav_decode(bytes), ""};
 }
 
 }  // namespace
@@ -119,7 +149,7 @@ cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
   if (image.depth() == CV_16U) {
     image.convertTo(eight_bit, CV_8U, 1.0 / 257);
   } else if (image.depth() != CV_8U) {
-    throw InputError(source, "pixel type", "floating point or signed", "8 or 16 bits a channel");
+    refuse_pixel_type(source);
   }
   cv::Mat bgr;
   switch (eight_bit.channels()) {
@@ -156,11 +186,13 @@ bool has_few_colors(const cv::Mat& bgr) {
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (bytes.empty()) throw InputError(source, "is empty, expected a picture");
   check_whole(bytes, source);
+  refuse_unread(bytes, source);
   if (const auto orientation = exif_orientation(bytes); orientation && *orientation != 1)
     throw InputError(source, "EXIF orientation", std::to_string(*orientation),
                      "1: the pixels as the calibrated camera has them, not to be turned");
   DecodedPicture decoded = decode(bytes);
   if (decoded.bgr.empty()) throw InputError(source, "can't be decoded, expected a picture");
+  check_size({static_cast<std::uint32_t>(decoded.bgr.cols), static_cast<std::uint32_t>(decoded.bgr.rows)}, source);
   Picture picture{bgr8_from(decoded.bgr, source), std::nullopt};
   if (!decoded.complaint.empty()) {
     picture.flaw = Status::damaged;

@@ -41,6 +41,7 @@ class VideoOverlay : public OverlayWriter {
   VideoOverlay(const fs::path& path, double fps) : video_(path, fps) {}
   void add(const Frame&, const cv::Mat& overlay) override { video_.add(overlay); }
   void commit() override { video_.commit(); }
+  bool is_video() const override { return true; }
 
  private:
   VideoWriter video_;

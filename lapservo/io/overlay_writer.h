@@ -16,6 +16,7 @@ class OverlayWriter {
   virtual ~OverlayWriter() = default;
   virtual void add(const Frame& frame, const cv::Mat& overlay) = 0;
   virtual void commit() = 0;
+  virtual bool is_video() const { return false; }
 };
 
 /// Throws InputError at once when PATH can't be written.

@@ -8,29 +8,16 @@
 #include <utility>
 
 extern "C" {
-#include <libavcodec/avcodec.h>
-#include <libavformat/avformat.h>
 #include <libavutil/display.h>
-#include <libswscale/swscale.h>
 }
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/jpeg_picture.h"
+#include "lapservo/io/libav.h"
 
 namespace lapservo::internal {
 namespace {
 using Clock = std::chrono::steady_clock;
-
-template <auto free>
-struct Freed {
-  template <typename Object>
-  void operator()(Object* object) const {
-    free(&object);
-  }
-};
-struct FreedScaler {
-  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
-};
 
 constexpr std::int64_t transport_packet_bytes = 188;
 
@@ -47,9 +34,10 @@ bool turned(const AVStream& stream) {
 
 class VideoReader::State {
  public:
-  State(const std::filesystem::path& path, std::chrono::milliseconds patience) : source_(path.string()) {
+  State(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind)
+      : source_(path.string()), kind_(kind), patience_(patience) {
     av_log_set_level(AV_LOG_QUIET);
-    open(patience);
+    open();
     stream_ = format_->streams[choose_stream()];
     if (turned(*stream_))
       throw InputError(source_, "is to be turned for display, expected the camera's pixels upright");
@@ -91,14 +79,18 @@ class VideoReader::State {
   }
 
  private:
-  void open(std::chrono::milliseconds patience) {
-    deadline_ = Clock::now() + patience;
+  void open() {
+    deadline_ = Clock::now() + patience_;
     AVFormatContext* format = avformat_alloc_context();
     format->interrupt_callback = {past, &deadline_};
-    const bool opened = avformat_open_input(&format, source_.c_str(), nullptr, nullptr) == 0;
+    AVDictionary* options = nullptr;
+    if (kind_ == Kind::stream) av_dict_set(&options, "rtsp_transport", "tcp", 0);  // which loses nothing
+    const bool opened = avformat_open_input(&format, source_.c_str(), nullptr, &options) == 0;
+    av_dict_free(&options);
     format_.reset(opened ? format : nullptr);
     if (!opened || avformat_find_stream_info(format, nullptr) < 0)
-      throw InputError(source_, "can't be read, expected a picture or a video");
+      throw InputError(source_, kind_ == Kind::file ? "can't be read, expected a picture or a video"
+                                                    : "can't be opened, expected a camera or stream");
     deadline_ = Clock::time_point::max();  // the file keeps asking; whoever measures slowly is not late
   }
 
@@ -113,7 +105,8 @@ class VideoReader::State {
     decoder_.reset(codec ? avcodec_alloc_context3(codec) : nullptr);
     if (!decoder_ || avcodec_parameters_to_context(decoder_.get(), stream_->codecpar) < 0)
       throw InputError(source_, "can't be decoded, expected a video");
-    decoder_->thread_count = 0;
+    // With slices in parallel, FFmpeg's decoder of H.264 forgets what it complained of.
+    decoder_->thread_count = codec->id == AV_CODEC_ID_H264 ? 1 : 0;
     decoder_->thread_type = FF_THREAD_SLICE;  // with frames in parallel, nobody knows whose error it is
     decoder_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
     if (avcodec_open2(decoder_.get(), codec, nullptr) < 0)
@@ -122,6 +115,7 @@ class VideoReader::State {
 
   // Gives the decoder its next packet; false when it complains of it.
   bool feed() {
+    if (kind_ == Kind::stream) deadline_ = Clock::now() + patience_;
     while (av_read_frame(format_.get(), packet_.get()) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
       if (ours && ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0 || is_damaged_jpeg(*packet_))) tainted_ = true;
@@ -171,12 +165,14 @@ class VideoReader::State {
   }
 
   std::string source_;
+  Kind kind_;
+  std::chrono::milliseconds patience_;
   Clock::time_point deadline_;
-  std::unique_ptr<AVFormatContext, Freed<avformat_close_input>> format_;
-  std::unique_ptr<AVCodecContext, Freed<avcodec_free_context>> decoder_;
-  std::unique_ptr<AVPacket, Freed<av_packet_free>> packet_{av_packet_alloc()};
-  std::unique_ptr<AVFrame, Freed<av_frame_free>> frame_{av_frame_alloc()};
-  std::unique_ptr<SwsContext, FreedScaler> scaler_;
+  std::unique_ptr<AVFormatContext, libav::Freed<avformat_close_input>> format_;
+  libav::Codec decoder_;
+  libav::Packet packet_{av_packet_alloc()};
+  libav::Frame frame_{av_frame_alloc()};
+  libav::Scaler scaler_;
   AVStream* stream_ = nullptr;
   cv::Mat last_;
   int frames_ = 0, damaged_ = 0;
@@ -184,8 +180,8 @@ class VideoReader::State {
   bool spoiled_ = false;  // the last frame is damaged
 };
 
-VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience)
-    : state_(std::make_unique<State>(path, patience)) {}
+VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind)
+    : state_(std::make_unique<State>(path, patience, kind)) {}
 VideoReader::~VideoReader() = default;
 
 std::optional<VideoReader::Image> VideoReader::next() {

@@ -18,10 +18,14 @@ class VideoReader {
     bool damaged = false;  ///< the decoder complained of it, or of one that it was predicted from
   };
 
+  /// A stream (rtsp://...) is waited for as long when it falls silent, and has ended then.
+  enum class Kind { file, stream };
+
   /// Throws InputError when it holds no video that can be decoded, or one that is to be turned for display: a
   /// calibration belongs to the pixels in one orientation and nobody can tell to which.
   /// Opening may take no longer than `patience`; reading may.
-  explicit VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience = std::chrono::seconds(5));
+  explicit VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience = std::chrono::seconds(5),
+                       Kind kind = Kind::file);
   ~VideoReader();
 
   /// nullopt at the end.

@@ -1,9 +1,6 @@
 #include "lapservo/io/video_writer.h"
 
-#include <cmath>
 #include <string>
-
-#include <opencv2/videoio.hpp>
 
 #include "lapservo/core/error.h"
 
@@ -11,50 +8,48 @@ namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
-// The last frame is asked for, as an index or a header may promise what a full disk did not take. Some containers
-// (MPEG-TS) don't know how many frames they hold: these are counted.
-bool holds_frames(const fs::path& path, int count) {
-  cv::VideoCapture capture(path.string(), cv::CAP_FFMPEG);
-  cv::Mat frame;
-  if (!capture.isOpened()) return false;
-  if (std::lround(capture.get(cv::CAP_PROP_FRAME_COUNT)) == count && capture.set(cv::CAP_PROP_POS_FRAMES, count - 1) &&
-      capture.read(frame))
-    return true;
-  capture.open(path.string(), cv::CAP_FFMPEG);
+// An index or a header may promise what a full disk did not take.
+int frames_in(const fs::path& path) {
+  AVFormatContext* opened = nullptr;
+  if (avformat_open_input(&opened, path.c_str(), nullptr, nullptr) < 0) return 0;
+  const std::unique_ptr<AVFormatContext, libav::Freed<avformat_close_input>> file(opened);
+  const libav::Packet packet(av_packet_alloc());
   int found = 0;
-  while (capture.grab()) ++found;
-  return found == count;
+  while (av_read_frame(file.get(), packet.get()) >= 0) {
+    found += (packet->flags & AV_PKT_FLAG_CORRUPT) == 0 ? 1 : 0;
+    av_packet_unref(packet.get());
+  }
+  return found;
 }
 
 }  // namespace
 
 VideoWriter::VideoWriter(const fs::path& path, double frames_per_second)
-    : target_(output_target(path)),
-      frames_per_second_(frames_per_second),
-      writer_(std::make_unique<cv::VideoWriter>()) {
+    : target_(output_target(path)), frames_per_second_(frames_per_second) {
   if (target_.is_stream)
     throw InputError(path.string(), "is no regular file, expected a video to write, like overlay.mp4");
   temporary_.emplace(target_, TemporaryFile::Name::always);
 }
 
-VideoWriter::~VideoWriter() {
-  writer_->release();  // before its file goes
-}
-
 void VideoWriter::add(const cv::Mat& frame) {
-  if (frames_ == 0)
-    writer_->open(temporary_->path().string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'),
-                  frames_per_second_, frame.size());
-  if (!writer_->isOpened())
-    throw InputError(target_.name.string(), "can't be written as a video, expected a name like overlay.mp4");
-  writer_->write(frame);
+  const std::string name = target_.name.string();
+  if (!encoder_) encoder_ = std::make_unique<VideoEncoder>(temporary_->path(), name, frame.size(), frames_per_second_);
+  if (frame.type() != CV_8UC3 || frame.size() != encoder_->size())
+    throw InputError(name, "can't take a frame of another size or kind than the first");
   ++frames_;
+  if (failed_) return;
+  try {
+    encoder_->add(frame);
+  } catch (const InputError&) {  // commit() tells, once whoever writes other results has written them
+    failed_ = true;
+  }
 }
 
 void VideoWriter::commit() {
-  if (frames_ == 0) return;
-  writer_->release();
-  if (!holds_frames(temporary_->path(), frames_))
+  if (!encoder_) return;
+  if (!failed_) encoder_->finish();
+  encoder_.reset();
+  if (failed_ || frames_in(temporary_->path()) != frames_)
     throw InputError(target_.name.string(), "could not be written to its end (is the disk full?)");
   temporary_->commit();
 }

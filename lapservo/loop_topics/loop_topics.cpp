@@ -7,9 +7,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include "lapservo/core/error.h"
+#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/io/overlay.h"
 
 namespace lapservo::internal {
@@ -248,8 +248,8 @@ void LoopTopics::draw() {
     message.format = "bgr8; jpeg compressed bgr8";
     Rig rig = rig_;
     rig.instruments.front().camera_from_rcm = drawing->camera_from_rcm;
-    cv::imencode(".jpg", draw_overlay(drawing->bgr, rig, drawing->observations), message.data,
-                 {cv::IMWRITE_JPEG_QUALITY, 80});
+    constexpr int quality = 80;
+    message.data = encode_jpeg(draw_overlay(drawing->bgr, rig, drawing->observations), quality);
     overlay_(message);
   }
 }

@@ -5,11 +5,12 @@
 #include <functional>
 #include <map>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
+#include "lapservo/io/image_file.h"
+#include "lapservo/io/jpeg_encoding.h"
 
 namespace lapservo::effects {
 using namespace internal;
@@ -20,7 +21,8 @@ void map_values(cv::Mat& picture, const std::function<double(double)>& function)
   constexpr int levels = 4096;
   std::vector<float> table(levels + 2);
   for (int i = 0; i <= levels + 1; ++i)
-    table[static_cast<std::size_t>(i)] = static_cast<float>(function(std::pow(std::min(1.0, static_cast<double>(i) / levels), 2)));
+    table[static_cast<std::size_t>(i)] =
+        static_cast<float>(function(std::pow(std::min(1.0, static_cast<double>(i) / levels), 2)));
   for (auto* value = picture.ptr<float>(); value != picture.ptr<float>() + 3 * picture.total(); ++value) {
     const float place = std::sqrt(std::clamp(*value, 0.0F, 1.0F)) * levels;
     const auto i = static_cast<std::size_t>(place);
@@ -129,9 +131,7 @@ void subsample(cv::Mat& picture, bool left_sited) {
 
 cv::Mat compressed(const cv::Mat& picture, int quality) {
   if (quality == 0) return picture;
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".jpg", picture, bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
-  return cv::imdecode(bytes, cv::IMREAD_COLOR);
+  return decode_image(encode_jpeg(picture, quality), "a picture of a test");
 }
 
 Response response_of(const CameraEffects& effects) {

@@ -7,12 +7,11 @@
 #include <variant>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
-
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/overlay.h"
+#include "lapservo/io/png_encoding.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rig/instrument_index.h"
 #include "python/src/bindings.h"
@@ -282,8 +281,7 @@ void bind_frames(py::module_& m) {
   m.def(
       "_png",
       [](const Image& image) {
-        std::vector<unsigned char> bytes;
-        cv::imencode(".png", view_of(image), bytes);
+        const auto bytes = internal::encode_png(view_of(image));
         return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
       },
       py::arg("image"));

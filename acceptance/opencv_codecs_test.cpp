@@ -1,0 +1,215 @@
+// Pictures and videos beside OpenCV's codecs, which share nothing with ours but libjpeg and libpng.
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "lapservo/core/random.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/io/image_encoding.h"
+#include "lapservo/io/image_file.h"
+#include "lapservo/io/jpeg_encoding.h"
+#include "lapservo/io/png_encoding.h"
+#include "lapservo/io/video_writer.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo::internal {
+namespace {
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr std::uint64_t seed = 61;
+
+// Shades with noise, odd in size.
+cv::Mat picture_of(int type, Random& random) {
+  cv::Mat image(87, 131, type);
+  const double scale = image.depth() == CV_16U ? 257 : 1;
+  for (int v = 0; v < image.rows; ++v)
+    for (int u = 0; u < image.cols; ++u)
+      for (int c = 0; c < image.channels(); ++c) {
+        const double value = scale * (80 + 60 * std::sin(0.05 * u + c) * std::cos(0.07 * v) + 6 * random.normal());
+        const int at = u * image.channels() + c;
+        if (image.depth() == CV_16U)
+          image.ptr<std::uint16_t>(v)[at] = cv::saturate_cast<std::uint16_t>(value);
+        else
+          image.ptr<std::uint8_t>(v)[at] = cv::saturate_cast<std::uint8_t>(value);
+      }
+  return image;
+}
+
+Bytes opencv_encode(const std::string& extension, const cv::Mat& image, const std::vector<int>& options = {}) {
+  Bytes bytes;
+  EXPECT_TRUE(cv::imencode(extension, image, bytes, options)) << extension;
+  return bytes;
+}
+
+// As image_file.h has it.
+cv::Mat opencv_decode(const Bytes& bytes) {
+  return bgr8_from(cv::imdecode(bytes, cv::IMREAD_UNCHANGED), "p");
+}
+
+double largest_difference(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() ? cv::norm(a, b, cv::NORM_INF) : 1e9;
+}
+
+TEST(Encoding, GivesTheBytesOfOpenCv) {
+  Random random(seed);
+  for (const int type : {CV_8UC1, CV_8UC3}) {
+    const cv::Mat image = picture_of(type, random);
+    for (const int quality : {1, 50, 80, 95, 100})
+      EXPECT_EQ(encode_jpeg(image, quality), opencv_encode(".jpg", image, {cv::IMWRITE_JPEG_QUALITY, quality}))
+          << type << " " << quality;
+  }
+  for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4}) {
+    const cv::Mat image = picture_of(type, random);
+    EXPECT_EQ(encode_png(image), opencv_encode(".png", image)) << type;
+  }
+}
+
+TEST(Encoding, IsReadByOpenCv) {
+  Random random(seed);
+  for (const std::string extension : {".bmp", ".tif", ".tiff", ".webp", ".ppm", ".pgm"})
+    for (const int type : {CV_8UC1, CV_8UC3}) {
+      const cv::Mat image = picture_of(type, random);
+      cv::Mat expected = image;
+      if (extension == ".pgm" && type == CV_8UC3) cv::cvtColor(image, expected, cv::COLOR_BGR2GRAY);
+      EXPECT_EQ(largest_difference(opencv_decode(encode_image("a" + extension, image)), bgr8_from(expected, "p")), 0)
+          << extension << " " << type;
+    }
+}
+
+TEST(Decoding, GivesThePixelsOfOpenCv) {
+  Random random(seed);
+  struct Case {
+    std::string extension;
+    std::vector<int> types, options;
+  };
+  constexpr int tiff = cv::IMWRITE_TIFF_COMPRESSION, none = 1, lzw = 5, deflate = 8, packbits = 32773;
+  const std::vector<int> eight{CV_8UC1, CV_8UC3}, all{CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4};
+  for (const Case& one :
+       {Case{".jpg", eight, {}}, Case{".png", all, {}}, Case{".bmp", {CV_8UC1, CV_8UC3, CV_8UC4}, {}},
+        Case{".tif", all, {tiff, none}}, Case{".tif", all, {tiff, lzw}}, Case{".tif", all, {tiff, deflate}},
+        Case{".tif", all, {tiff, packbits}}, Case{".webp", {CV_8UC3, CV_8UC4}, {}},
+        Case{".webp", {CV_8UC3, CV_8UC4}, {cv::IMWRITE_WEBP_QUALITY, 90}}, Case{".ppm", {CV_8UC3, CV_16UC3}, {}},
+        Case{".ppm", {CV_8UC3}, {cv::IMWRITE_PXM_BINARY, 0}}, Case{".pgm", {CV_8UC1, CV_16UC1}, {}},
+        Case{".pgm", {CV_8UC1}, {cv::IMWRITE_PXM_BINARY, 0}}, Case{".pbm", {CV_8UC1}, {}}})
+    for (const int type : one.types) {
+      const Bytes bytes = opencv_encode(one.extension, picture_of(type, random), one.options);
+      const std::string name = one.extension + " " + cv::typeToString(type);
+      EXPECT_EQ(largest_difference(decode_image(bytes, name), opencv_decode(bytes)), 0) << name;
+    }
+}
+
+constexpr int frames = 20;
+
+void write_video(const std::filesystem::path& path, const char* codec) {
+  cv::VideoWriter video(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]),
+                        25, {320, 240});
+  ASSERT_TRUE(video.isOpened()) << path;
+  cv::RNG random(7);
+  for (int i = 0; i < frames; ++i) {
+    cv::Mat image(240, 320, CV_8UC3);
+    random.fill(image, cv::RNG::UNIFORM, 60, 200);
+    image(cv::Rect(10 * i, 50, 40, 40)).setTo(cv::Scalar(20, 40, 250));
+    video.write(image);
+  }
+}
+
+std::string bytes_of(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct Read {
+  int frames = 0, damaged = 0;
+  std::string complaint;
+};
+
+Read read(const std::filesystem::path& path) {
+  const auto source = open_frame_source(path.string(), 30);
+  Read result;
+  while (const auto frame = source->next()) {
+    EXPECT_EQ(frame->index, result.frames);
+    EXPECT_EQ(frame->bgr.size(), cv::Size(320, 240));
+    ++result.frames;
+    result.damaged += frame->flaw == Status::damaged;
+  }
+  result.complaint = source->complaint();
+  return result;
+}
+
+TEST(OpenCvsVideo, GivesEveryFrame) {
+  const testing::TemporaryFolder folder;
+  for (const auto& [name, codec] :
+       {std::pair{"a.mp4", "mp4v"}, {"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
+    write_video(folder / name, codec);
+    const Read whole = read(folder / name);
+    EXPECT_EQ(whole.frames, frames) << name;
+    EXPECT_EQ(whole.damaged, 0) << name;
+    EXPECT_EQ(whole.complaint, "") << name;
+  }
+}
+
+TEST(OpenCvsVideo, ThatEndsEarlySaysSo) {
+  const testing::TemporaryFolder folder;
+  for (const auto& [name, codec] : {std::pair{"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
+    write_video(folder / name, codec);
+    const std::string whole = bytes_of(folder / name);
+    testing::write_file(folder / name, whole.substr(0, whole.size() / 2));
+    const Read half = read(folder / name);
+    EXPECT_LT(half.frames, frames) << name;
+    EXPECT_NE(half.complaint, "") << name;
+  }
+}
+
+// Of damage within its data the decoder learns most of the time; then the frame says so and the video as a whole.
+TEST(OpenCvsVideo, HasItsDamagedFramesMarked) {
+  const testing::TemporaryFolder folder;
+  for (const auto& [name, codec] : {std::pair{"a.mp4", "mp4v"}, {"a.avi", "MJPG"}}) {
+    write_video(folder / name, codec);
+    std::string bytes = bytes_of(folder / name);
+    Random random(3);
+    for (std::size_t i = bytes.size() / 3; i < bytes.size() / 3 + 200; ++i)
+      bytes[i] = static_cast<char>(random.bits() & 0x7f);
+    testing::write_file(folder / name, bytes);
+    const Read damaged = read(folder / name);
+    EXPECT_GE(damaged.damaged, 1) << name;
+    EXPECT_NE(damaged.complaint, "") << name;
+  }
+}
+
+// Ours, read by OpenCV, shows what was written, in all that is smooth.
+TEST(OurVideo, IsReadByOpenCv) {
+  const testing::TemporaryFolder folder;
+  for (const std::string name : {"a.mp4", "a.mkv", "a.avi", "a.ts"}) {
+    VideoWriter writer(folder / name, 30);
+    std::vector<cv::Mat> written;
+    for (int i = 0; i < 5; ++i) {
+      written.emplace_back(240, 320, CV_8UC3, cv::Scalar(90, 120, 60));
+      written.back()(cv::Rect(40 * i, 50, 80, 80)).setTo(cv::Scalar(20, 40, 220));
+      writer.add(written.back());
+    }
+    writer.commit();
+    cv::VideoCapture reader((folder / name).string(), cv::CAP_FFMPEG);
+    ASSERT_TRUE(reader.isOpened()) << name;
+    EXPECT_NEAR(reader.get(cv::CAP_PROP_FPS), 30, 0.01) << name;
+    cv::Mat frame;
+    for (int i = 0; i < 5; ++i) {
+      ASSERT_TRUE(reader.read(frame)) << name << " " << i;
+      const cv::Rect inside(40 * i + 10, 60, 60, 60), outside(0, 150, 320, 80);
+      EXPECT_LE(cv::norm(frame(inside), written[static_cast<std::size_t>(i)](inside), cv::NORM_INF), 4) << name;
+      EXPECT_LE(cv::norm(frame(outside), written[static_cast<std::size_t>(i)](outside), cv::NORM_INF), 4) << name;
+    }
+    EXPECT_FALSE(reader.read(frame)) << name;
+  }
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <memory>
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+#include <libswscale/swscale.h>
+}
+
+/// FFmpeg's objects with owners.
+namespace lapservo::internal::libav {
+
+template <auto free>
+struct Freed {
+  template <typename Object>
+  void operator()(Object* object) const {
+    free(&object);
+  }
+};
+struct FreedScaler {
+  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
+};
+
+using Codec = std::unique_ptr<AVCodecContext, Freed<avcodec_free_context>>;
+using Frame = std::unique_ptr<AVFrame, Freed<av_frame_free>>;
+using Packet = std::unique_ptr<AVPacket, Freed<av_packet_free>>;
+using Scaler = std::unique_ptr<SwsContext, FreedScaler>;
+
+}  // namespace lapservo::internal::libav

@@ -1,0 +1,255 @@
+#include "lapservo/io/libav_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <optional>
+#include <string_view>
+
+extern "C" {
+#include <libavutil/opt.h>
+#include <libavutil/pixdesc.h>
+}
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/io/libav.h"
+#include "lapservo/io/tiff_directory.h"
+
+namespace lapservo::internal {
+namespace {
+using namespace std::string_view_literals;
+using libav::Codec;
+using libav::Frame;
+using libav::Packet;
+using libav::Scaler;
+
+constexpr std::int64_t max_pixels = std::int64_t{16384} * 16384;
+
+struct Format {
+  std::string_view magic, name;
+  AVCodecID codec = AV_CODEC_ID_NONE;
+  std::string_view magic_at_8 = {};
+};
+constexpr std::array formats{
+    Format{"BM"sv, "BMP", AV_CODEC_ID_BMP},
+    Format{"P1"sv, "PNM", AV_CODEC_ID_PBM},
+    Format{"P2"sv, "PNM", AV_CODEC_ID_PGM},
+    Format{"P3"sv, "PNM", AV_CODEC_ID_PPM},
+    Format{"P4"sv, "PNM", AV_CODEC_ID_PBM},
+    Format{"P5"sv, "PNM", AV_CODEC_ID_PGM},
+    Format{"P6"sv, "PNM", AV_CODEC_ID_PPM},
+    Format{"II*\0"sv, "TIFF", AV_CODEC_ID_TIFF},
+    Format{"MM\0*"sv, "TIFF", AV_CODEC_ID_TIFF},
+    Format{"RIFF"sv, "WebP", AV_CODEC_ID_NONE, "WEBP"sv},
+    Format{"\0\0\0\x0cjP  "sv, "JPEG 2000"},
+    Format{"\xff\x4f\xff\x51"sv, "JPEG 2000"},
+    Format{"\x76\x2f\x31\x01"sv, "OpenEXR"},
+    Format{"#?RADIANCE"sv, "Radiance HDR"},
+    Format{"#?RGBE"sv, "Radiance HDR"},
+    Format{"\x59\xa6\x6a\x95"sv, "Sun raster"},
+    Format{"P7"sv, "PAM"},
+    Format{"PF"sv, "PFM"},
+    Format{"Pf"sv, "PFM"},
+    Format{"GIF8"sv, "GIF"},
+    Format{"II+\0"sv, "BigTIFF"},
+    Format{"MM\0+"sv, "BigTIFF"},
+};
+
+const Format* format_of(std::span<const std::uint8_t> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const auto found = std::find_if(formats.begin(), formats.end(), [&](const Format& format) {
+    return text.starts_with(format.magic) &&
+           (format.magic_at_8.empty() || (text.size() >= 12 && text.substr(8).starts_with(format.magic_at_8)));
+  });
+  return found == formats.end() ? nullptr : &*found;
+}
+
+Packet packet_of(std::span<const std::uint8_t> bytes) {
+  Packet packet(av_packet_alloc());
+  if (!packet || av_new_packet(packet.get(), static_cast<int>(bytes.size())) < 0) return nullptr;
+  std::memcpy(packet->data, bytes.data(), bytes.size());
+  return packet;
+}
+
+Codec open_decoder(AVCodecID id) {
+  const AVCodec* codec = avcodec_find_decoder(id);
+  Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
+  if (!context) return nullptr;
+  context->thread_count = 1;
+  context->max_pixels = max_pixels;
+  context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
+  return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
+}
+
+Frame decoded_frame(AVCodecID id, std::span<const std::uint8_t> bytes) {
+  av_log_set_level(AV_LOG_QUIET);
+  const Codec decoder = open_decoder(id);
+  const Packet packet = packet_of(bytes);
+  Frame frame(av_frame_alloc());
+  if (!decoder || !packet || !frame || avcodec_send_packet(decoder.get(), packet.get()) < 0) return nullptr;
+  avcodec_send_packet(decoder.get(), nullptr);
+  if (avcodec_receive_frame(decoder.get(), frame.get()) < 0) return nullptr;
+  const bool flawed = (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame->decode_error_flags != 0;
+  return flawed ? nullptr : std::move(frame);
+}
+
+// The pixels as another format has them, which must be one of a single plane.
+cv::Mat converted(const AVFrame& frame, AVPixelFormat format, int type) {
+  const Scaler scaler(sws_getContext(
+      frame.width, frame.height, static_cast<AVPixelFormat>(frame.format), frame.width, frame.height, format,
+      SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP, nullptr, nullptr, nullptr));
+  if (!scaler) return {};
+  cv::Mat pixels(frame.height, frame.width, type);
+  std::uint8_t* rows[4] = {pixels.data};
+  const int steps[4] = {static_cast<int>(pixels.step)};
+  sws_scale(scaler.get(), frame.data, frame.linesize, 0, frame.height, rows, steps);
+  return pixels;
+}
+
+cv::Mat as_it_lies(const AVFrame& frame, int type) {
+  return cv::Mat(frame.height, frame.width, type, frame.data[0], static_cast<std::size_t>(frame.linesize[0])).clone();
+}
+
+cv::Mat recoloured(const cv::Mat& pixels, int conversion) {
+  cv::Mat result;
+  if (!pixels.empty()) cv::cvtColor(pixels, result, conversion);
+  return result;
+}
+
+cv::Mat first_channel(const cv::Mat& pixels) {
+  cv::Mat first;
+  cv::extractChannel(pixels, first, 0);
+  return first;
+}
+
+// One bit a pixel, in whole bytes a row.
+cv::Mat of_bits(const AVFrame& frame, std::uint8_t of_one) {
+  cv::Mat pixels(frame.height, frame.width, CV_8UC1);
+  for (int v = 0; v < frame.height; ++v) {
+    const std::uint8_t* bits = frame.data[0] + static_cast<std::ptrdiff_t>(v) * frame.linesize[0];
+    for (int u = 0; u < frame.width; ++u) {
+      const bool one = (bits[u / 8] >> (7 - u % 8) & 1) != 0;
+      pixels.at<std::uint8_t>(v, u) = one ? of_one : static_cast<std::uint8_t>(255 - of_one);
+    }
+  }
+  return pixels;
+}
+
+// Without the scaler where it would go through YUV, or take grey for a video's, whose black is 16.
+cv::Mat pixels_of(const Frame& decoded) {
+  if (!decoded) return {};
+  const AVFrame& frame = *decoded;
+  switch (frame.format) {
+    case AV_PIX_FMT_GRAY8:
+      return as_it_lies(frame, CV_8UC1);
+    case AV_PIX_FMT_MONOBLACK:
+      return of_bits(frame, 255);
+    case AV_PIX_FMT_MONOWHITE:
+      return of_bits(frame, 0);
+    case AV_PIX_FMT_YA8:
+      return first_channel(as_it_lies(frame, CV_8UC2));
+    case AV_PIX_FMT_GRAY16LE:
+    case AV_PIX_FMT_GRAY16BE:
+      return converted(frame, AV_PIX_FMT_GRAY16, CV_16UC1);
+    case AV_PIX_FMT_RGB48LE:
+    case AV_PIX_FMT_RGB48BE:
+      return recoloured(converted(frame, AV_PIX_FMT_RGB48, CV_16UC3), cv::COLOR_RGB2BGR);
+    case AV_PIX_FMT_RGBA64LE:
+    case AV_PIX_FMT_RGBA64BE:
+      return recoloured(converted(frame, AV_PIX_FMT_RGBA64, CV_16UC4), cv::COLOR_RGBA2BGRA);
+    default:
+      return converted(frame, AV_PIX_FMT_BGR24, CV_8UC3);
+  }
+}
+
+struct Encoding {
+  std::string_view extension;
+  const char* encoder;
+  AVPixelFormat color, grey;  ///< none: grey is written as colour, or colour as grey
+  const char *option = nullptr, *value = nullptr;
+};
+constexpr std::array encodings{
+    Encoding{".bmp", "bmp", AV_PIX_FMT_BGR24, AV_PIX_FMT_GRAY8},
+    Encoding{".tif", "tiff", AV_PIX_FMT_RGB24, AV_PIX_FMT_GRAY8, "compression_algo", "lzw"},
+    Encoding{".tiff", "tiff", AV_PIX_FMT_RGB24, AV_PIX_FMT_GRAY8, "compression_algo", "lzw"},
+    Encoding{".ppm", "ppm", AV_PIX_FMT_RGB24, AV_PIX_FMT_NONE},
+    Encoding{".pgm", "pgm", AV_PIX_FMT_NONE, AV_PIX_FMT_GRAY8},
+};
+
+cv::Mat laid_out(const cv::Mat& image, AVPixelFormat format) {
+  const bool is_grey = image.channels() == 1;
+  switch (format) {
+    case AV_PIX_FMT_GRAY8:
+      return is_grey ? image : recoloured(image, cv::COLOR_BGR2GRAY);
+    case AV_PIX_FMT_RGB24:
+      return recoloured(image, is_grey ? cv::COLOR_GRAY2RGB : cv::COLOR_BGR2RGB);
+    default:
+      return is_grey ? recoloured(image, cv::COLOR_GRAY2BGR) : image;
+  }
+}
+
+AVPixelFormat layout_of(const Encoding& encoding, bool is_grey) {
+  if (is_grey) return encoding.grey != AV_PIX_FMT_NONE ? encoding.grey : encoding.color;
+  return encoding.color != AV_PIX_FMT_NONE ? encoding.color : encoding.grey;
+}
+
+Codec open_encoder(const Encoding& encoding, AVPixelFormat format, const cv::Mat& pixels) {
+  const AVCodec* codec = avcodec_find_encoder_by_name(encoding.encoder);
+  Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
+  if (!context) return nullptr;
+  context->width = pixels.cols;
+  context->height = pixels.rows;
+  context->pix_fmt = format;
+  context->time_base = {1, 1};
+  context->thread_count = 1;
+  if (encoding.option && av_opt_set(context->priv_data, encoding.option, encoding.value, 0) < 0) return nullptr;
+  return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
+}
+
+Frame frame_around(const cv::Mat& pixels, AVPixelFormat format) {
+  Frame frame(av_frame_alloc());
+  if (!frame) return nullptr;
+  frame->width = pixels.cols;
+  frame->height = pixels.rows;
+  frame->format = format;
+  frame->data[0] = pixels.data;
+  frame->linesize[0] = static_cast<int>(pixels.step);
+  return frame;
+}
+
+}  // namespace
+
+std::string rare_format(std::span<const std::uint8_t> bytes) {
+  const Format* format = format_of(bytes);
+  return format ? std::string(format->name) : "";
+}
+
+bool libav_decodes(const std::string& format) {
+  return std::any_of(formats.begin(), formats.end(),
+                     [&](const Format& known) { return known.name == format && known.codec != AV_CODEC_ID_NONE; });
+}
+
+cv::Mat libav_decode(std::span<const std::uint8_t> bytes) {
+  const Format* format = format_of(bytes);
+  if (!format || format->codec == AV_CODEC_ID_NONE) return {};
+  if (format->codec != AV_CODEC_ID_TIFF) return pixels_of(decoded_frame(format->codec, bytes));
+  return pixels_of(decoded_frame(format->codec, tiff_of_pixels(bytes)));
+}
+
+std::vector<std::uint8_t> libav_encode(const std::string& extension, const cv::Mat& image) {
+  const auto encoding =
+      std::find_if(encodings.begin(), encodings.end(), [&](const Encoding& e) { return e.extension == extension; });
+  if (encoding == encodings.end() || image.empty() || (image.type() != CV_8UC1 && image.type() != CV_8UC3)) return {};
+  av_log_set_level(AV_LOG_QUIET);
+  const AVPixelFormat format = layout_of(*encoding, image.channels() == 1);
+  const cv::Mat pixels = laid_out(image, format);
+  const Codec encoder = open_encoder(*encoding, format, pixels);
+  const Frame frame = frame_around(pixels, format);
+  const Packet packet(av_packet_alloc());
+  if (!encoder || !frame || !packet || avcodec_send_frame(encoder.get(), frame.get()) < 0) return {};
+  avcodec_send_frame(encoder.get(), nullptr);
+  if (avcodec_receive_packet(encoder.get(), packet.get()) < 0) return {};
+  return {packet->data, packet->data + packet->size};
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/io/libav.h"
+
+namespace lapservo::internal {
+
+/// What is to be said of a video when this FFmpeg has no libx264: that it is MPEG-4 part 2; else empty.
+std::string video_remark();
+
+/// A video file while it is written, by FFmpeg's libraries: H.264 (libx264) that browsers play, in Rec. 601's limited
+/// range, as VideoReader reads it back. Pictures of an odd width or height, which 4:2:0 can't hold, are 4:4:4, which
+/// not every browser plays. Without libx264 it is MPEG-4 part 2.
+class VideoEncoder {
+ public:
+  /// The container goes by the name's ending. Throws InputError naming `shown` when there is none for it.
+  VideoEncoder(const std::filesystem::path& path, const std::string& shown, const cv::Size& size,
+               double frames_per_second);
+
+  cv::Size size() const { return {codec_->width, codec_->height}; }
+  /// 8-bit BGR of that size, a frame's time after the one before. Throws InputError when it can't be written.
+  void add(const cv::Mat& bgr);
+  /// Writes what is left, and the container's index.
+  void finish();
+
+ private:
+  struct FreedFile {
+    void operator()(AVFormatContext* file) const;
+  };
+
+  void open_codec(const cv::Size& size, double frames_per_second);
+  void open_file(const std::filesystem::path& path);
+  void convert(const cv::Mat& bgr);
+  void write_packets();
+  [[noreturn]] void refuse() const;
+  void need(int result) const;
+
+  std::string shown_;
+  std::unique_ptr<AVFormatContext, FreedFile> file_;
+  libav::Codec codec_;
+  libav::Scaler scaler_;
+  libav::Frame frame_{av_frame_alloc()};
+  libav::Packet packet_{av_packet_alloc()};
+};
+
+}  // namespace lapservo::internal
