@@ -24,7 +24,7 @@ int colour_type_of(int channels) {
   return channels == 1 ? PNG_COLOR_TYPE_GRAY : channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_RGB_ALPHA;
 }
 
-// A frame with noise takes a tenth of the time of zlib's own way, and is hardly larger: differences to the left,
+// A frame with noise takes much less time than zlib's own way, and is hardly larger: differences to the left,
 // and of what repeats only runs.
 void be_fast(png_structp png) {
   png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
