@@ -214,10 +214,11 @@ TEST(Image, OfARareFormatIsRefusedWhereverTheFileIsCut) {
   const cv::Mat image = random_image<std::uint8_t>(12, 13, CV_8UC3, random);
   for (const std::string extension : {".bmp", ".tif", ".webp", ".ppm"}) {
     const Bytes whole = encoded(image, extension);
-    for (std::size_t size = 1; size < whole.size(); ++size)
-      if (const std::string said = refusal(std::span(whole).first(size)); said.empty())
-        EXPECT_TRUE(same(decode_image(std::span(whole).first(size), "p"), image))
-            << extension << " " << size << " of " << whole.size() << " bytes";
+    for (std::size_t size = 1; size < whole.size(); ++size) {
+      if (!refusal(std::span(whole).first(size)).empty()) continue;
+      EXPECT_TRUE(same(decode_image(std::span(whole).first(size), "p"), image))
+          << extension << " " << size << " of " << whole.size() << " bytes";
+    }
   }
 }
 
