@@ -552,7 +552,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   constexpr int frames = 72;
   std::string poses = "theta_rad,phi_rad,rho_m,psi_rad\n", joints = "time_s,yaw,pitch,insertion,roll\n";
   const auto q_at = [](double t) {
-    return std::array{-0.0778 + 0.25 * std::sin(0.9 * t), 1.75 + 0.18 * std::sin(1.3 * t + 1),
+    return std::array{-0.0778 + 0.25 * std::sin(0.9 * t), 1.75 + 0.14 * std::sin(1.3 * t + 1),
                       0.140 + 0.010 * std::sin(0.7 * t), 1.2 * std::sin(0.8 * t + 2)};
   };
   const auto row = [](const std::array<double, 4>& numbers) {

@@ -156,7 +156,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
   const bool needs_both_ends =
       !fit.unknowns.q() || (fraction < limits.mostly_hidden && in_image && !needs_no_other_end(fit));
   if (needs_both_ends && std::min(fit.used[0], fit.used[3]) < fewest_lines(fit))
-    return agreement.in_image < limits.wholly_in_image ? Status::cut : Status::occluded;
+    return in_image ? Status::occluded : Status::cut;
 
   // Boundaries and sides that agree badly.
   if (fraction < limits.partly_hidden && agreement.spilled > max_spilled(fit)) return Status::poor_fit;
@@ -177,7 +177,8 @@ Status validate(const Scene& scene, const FineFit& fit) {
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
   const Status status = validate_sigma(fit, agreement);
-  return status == Status::ok && !would_show_a_print_that_is_off(scene, fit) ? Status::occluded : status;
+  if (status != Status::ok || would_show_a_print_that_is_off(scene, fit)) return status;
+  return in_image ? Status::occluded : Status::cut;
 }
 
 }  // namespace lapservo::internal
