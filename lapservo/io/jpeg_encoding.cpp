@@ -18,7 +18,7 @@ struct Encoder {
   unsigned long size;
 };
 
-void on_error(j_common_ptr info) {
+void on_jpeg_encoding_error(j_common_ptr info) {
   std::longjmp(static_cast<Encoder*>(info->client_data)->leave, 1);
 }
 
@@ -28,7 +28,7 @@ bool write_picture(Encoder& encoder, const cv::Mat& image, int quality) {
   if (setjmp(encoder.leave) != 0) return false;
   encoder.info.client_data = &encoder;
   encoder.info.err = jpeg_std_error(&encoder.errors);
-  encoder.errors.error_exit = on_error;
+  encoder.errors.error_exit = on_jpeg_encoding_error;
   encoder.errors.output_message = print_nothing;
   jpeg_create_compress(&encoder.info);
   jpeg_mem_dest(&encoder.info, &encoder.bytes, &encoder.size);

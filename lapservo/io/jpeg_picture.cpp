@@ -37,7 +37,7 @@ void on_message(j_common_ptr info, int level) {
   if (level < 0) keep_complaint(info);
 }
 
-void on_error(j_common_ptr info) {
+void on_jpeg_error(j_common_ptr info) {
   keep_complaint(info);
   std::longjmp(decoder_of(info).leave, 1);
 }
@@ -57,7 +57,7 @@ void print_nothing(j_common_ptr) {}
 void read_header(Decoder& decoder, std::span<const std::uint8_t> bytes) {
   decoder.info.client_data = &decoder;
   decoder.info.err = jpeg_std_error(&decoder.errors);
-  decoder.errors.error_exit = on_error;
+  decoder.errors.error_exit = on_jpeg_error;
   decoder.errors.emit_message = on_message;
   decoder.errors.output_message = print_nothing;
   decoder.progress.progress_monitor = on_progress;

@@ -18,10 +18,6 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 using namespace std::string_view_literals;
-using libav::Codec;
-using libav::Frame;
-using libav::Packet;
-using libav::Scaler;
 
 constexpr std::int64_t max_pixels = std::int64_t{16384} * 16384;
 
@@ -64,16 +60,16 @@ const Format* format_of(std::span<const std::uint8_t> bytes) {
   return found == formats.end() ? nullptr : &*found;
 }
 
-Packet packet_of(std::span<const std::uint8_t> bytes) {
-  Packet packet(av_packet_alloc());
+libav::Packet packet_of(std::span<const std::uint8_t> bytes) {
+  libav::Packet packet(av_packet_alloc());
   if (!packet || av_new_packet(packet.get(), static_cast<int>(bytes.size())) < 0) return nullptr;
   std::memcpy(packet->data, bytes.data(), bytes.size());
   return packet;
 }
 
-Codec open_decoder(AVCodecID id) {
+libav::Codec open_decoder(AVCodecID id) {
   const AVCodec* codec = avcodec_find_decoder(id);
-  Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
+  libav::Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
   if (!context) return nullptr;
   context->thread_count = 1;
   context->max_pixels = max_pixels;
@@ -81,11 +77,11 @@ Codec open_decoder(AVCodecID id) {
   return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
 }
 
-Frame decoded_frame(AVCodecID id, std::span<const std::uint8_t> bytes) {
+libav::Frame decoded_frame(AVCodecID id, std::span<const std::uint8_t> bytes) {
   av_log_set_level(AV_LOG_QUIET);
-  const Codec decoder = open_decoder(id);
-  const Packet packet = packet_of(bytes);
-  Frame frame(av_frame_alloc());
+  const libav::Codec decoder = open_decoder(id);
+  const libav::Packet packet = packet_of(bytes);
+  libav::Frame frame(av_frame_alloc());
   if (!decoder || !packet || !frame || avcodec_send_packet(decoder.get(), packet.get()) < 0) return nullptr;
   avcodec_send_packet(decoder.get(), nullptr);
   if (avcodec_receive_frame(decoder.get(), frame.get()) < 0) return nullptr;
@@ -95,7 +91,7 @@ Frame decoded_frame(AVCodecID id, std::span<const std::uint8_t> bytes) {
 
 // The pixels as another format has them, which must be one of a single plane.
 cv::Mat converted(const AVFrame& frame, AVPixelFormat format, int type) {
-  const Scaler scaler(sws_getContext(
+  const libav::Scaler scaler(sws_getContext(
       frame.width, frame.height, static_cast<AVPixelFormat>(frame.format), frame.width, frame.height, format,
       SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP, nullptr, nullptr, nullptr));
   if (!scaler) return {};
@@ -136,7 +132,7 @@ cv::Mat of_bits(const AVFrame& frame, std::uint8_t of_one) {
 }
 
 // Without the scaler where it would go through YUV, or take grey for a video's, whose black is 16.
-cv::Mat pixels_of(const Frame& decoded) {
+cv::Mat pixels_of(const libav::Frame& decoded) {
   if (!decoded) return {};
   const AVFrame& frame = *decoded;
   switch (frame.format) {
@@ -193,9 +189,9 @@ AVPixelFormat layout_of(const Encoding& encoding, bool is_grey) {
   return encoding.color != AV_PIX_FMT_NONE ? encoding.color : encoding.grey;
 }
 
-Codec open_encoder(const Encoding& encoding, AVPixelFormat format, const cv::Mat& pixels) {
+libav::Codec open_encoder(const Encoding& encoding, AVPixelFormat format, const cv::Mat& pixels) {
   const AVCodec* codec = avcodec_find_encoder_by_name(encoding.encoder);
-  Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
+  libav::Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
   if (!context) return nullptr;
   context->width = pixels.cols;
   context->height = pixels.rows;
@@ -206,8 +202,8 @@ Codec open_encoder(const Encoding& encoding, AVPixelFormat format, const cv::Mat
   return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
 }
 
-Frame frame_around(const cv::Mat& pixels, AVPixelFormat format) {
-  Frame frame(av_frame_alloc());
+libav::Frame frame_around(const cv::Mat& pixels, AVPixelFormat format) {
+  libav::Frame frame(av_frame_alloc());
   if (!frame) return nullptr;
   frame->width = pixels.cols;
   frame->height = pixels.rows;
@@ -243,9 +239,9 @@ std::vector<std::uint8_t> libav_encode(const std::string& extension, const cv::M
   av_log_set_level(AV_LOG_QUIET);
   const AVPixelFormat format = layout_of(*encoding, image.channels() == 1);
   const cv::Mat pixels = laid_out(image, format);
-  const Codec encoder = open_encoder(*encoding, format, pixels);
-  const Frame frame = frame_around(pixels, format);
-  const Packet packet(av_packet_alloc());
+  const libav::Codec encoder = open_encoder(*encoding, format, pixels);
+  const libav::Frame frame = frame_around(pixels, format);
+  const libav::Packet packet(av_packet_alloc());
   if (!encoder || !frame || !packet || avcodec_send_frame(encoder.get(), frame.get()) < 0) return {};
   avcodec_send_frame(encoder.get(), nullptr);
   if (avcodec_receive_packet(encoder.get(), packet.get()) < 0) return {};

@@ -7,7 +7,7 @@
 namespace lapservo::internal {
 namespace {
 
-void on_error(png_structp png, png_const_charp) {
+void on_png_encoding_error(png_structp png, png_const_charp) {
   png_longjmp(png, 1);
 }
 
@@ -56,7 +56,7 @@ std::vector<std::uint8_t> encode_png(const cv::Mat& image) {
       (channels != 1 && channels != 3 && channels != 4))
     return {};
   std::vector<std::uint8_t> bytes;
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, on_error, ignore_warning);
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, on_png_encoding_error, ignore_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;
   if (info) png_set_write_fn(png, &bytes, append, flush_nothing);
   const bool written = info && write_picture(png, info, image);

@@ -17,7 +17,7 @@ struct Source {
   }
 };
 
-void on_error(png_structp png, png_const_charp text) {
+void on_png_error(png_structp png, png_const_charp text) {
   static_cast<Source*>(png_get_error_ptr(png))->keep(text);
   png_longjmp(png, 1);
 }
@@ -66,7 +66,7 @@ void read_rows(png_structp png, png_infop info, cv::Mat& image, std::vector<png_
 
 DecodedPicture decode_png(std::span<const std::uint8_t> bytes) {
   Source source{bytes, {}};
-  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_error, on_warning);
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_png_error, on_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;
   DecodedPicture picture;
   std::vector<png_bytep> rows;

@@ -12,8 +12,8 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 
-// Tried on rendered frames with a sensor's noise (docs/design.md): as large, as near to the picture and as fast to read as MPEG-4
-// part 2 was.
+// Tried on rendered frames with a sensor's noise (docs/design.md): as large, as near to the picture and as fast to read
+// as MPEG-4 part 2 was.
 constexpr const char *preset = "ultrafast", *crf = "22";
 
 // Containers that list no codecs (MPEG-TS) take it, unless they are single pictures or nothing but bytes.
