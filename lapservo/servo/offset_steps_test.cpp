@@ -7,7 +7,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace offset_steps_test {
 
 constexpr double period_s = 1 / 60.0;
 
@@ -101,5 +101,5 @@ TEST(OffsetSteps, IgnoresTimeThatGoesBackAndWhatWasInterrupted) {
   EXPECT_FALSE(steps.add(swing.next({0.1, 0.1, 0.01}), true));
 }
 
-}  // namespace
+}  // namespace offset_steps_test
 }  // namespace lapservo::internal
