@@ -35,7 +35,9 @@ void BagRecorder::add(const std::string& topic, Message message) {
     ++counts_.unstamped;
     return;
   }
-  if (!std::holds_alternative<JointMessage>(message) && waiting_bytes_ + bytes > max_waiting_bytes) {
+  const bool is_image = !std::holds_alternative<JointMessage>(message);
+  counts_.arrived += is_image;
+  if (is_image && waiting_bytes_ + bytes > max_waiting_bytes) {
     ++counts_.dropped;
     return;
   }

@@ -20,6 +20,7 @@ namespace lapservo::internal {
 struct RecordedCounts {
   long images = 0, joints = 0;
   long dropped = 0;  ///< images that came faster than they could be written
+  long arrived = 0;  ///< images that came, be they written, dropped or waiting for the disk
   long unstamped = 0;
 };
 

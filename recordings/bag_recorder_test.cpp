@@ -128,6 +128,7 @@ TEST(BagRecorder, RecordsFromSeveralThreads) {
   recorder.add("/image", image_at(0));
   recorder.finish();
   EXPECT_EQ(recorder.counts().images, count);
+  EXPECT_EQ(recorder.counts().arrived, count);
   EXPECT_EQ(recorder.counts().joints, count);
   EXPECT_EQ(recorder.counts().unstamped, 2);
   const auto bag = open_bag((folder / "bag").string());

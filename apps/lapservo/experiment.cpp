@@ -27,7 +27,7 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t needed_bytes = 16 << 20;
+constexpr std::uintmax_t experiment_bytes = 16 << 20;
 
 struct ExperimentOptions {
   std::string name, out, rig, method = "both";
@@ -147,7 +147,7 @@ int run(const ExperimentOptions& options) {
   ExperimentSetup setup = setup_of(options);
   InputFiles inputs;
   inputs.add_rig(options.rig, setup.rig);
-  OutputFolder folder(options.out, setup.rig, inputs, options.force, needed_bytes);
+  OutputFolder folder(options.out, setup.rig, inputs, options.force, experiment_bytes);
   watch_for_interrupts();
   Outcome outcome = run_experiments(std::move(setup), options, folder / "");
   const std::string missing = missing_from(outcome.sections, outcome.stopped_in);

@@ -16,12 +16,12 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-const std::array<std::string, 4> names{"e0 (proximal end)", "e1", "e2", "e3 (distal end)"};
+const std::array<std::string, 4> boundary_names{"e0 (proximal end)", "e1", "e2", "e3 (distal end)"};
 
 void add_print(Plot& plot, const Marker& marker, const std::string& name, Draw draw) {
   constexpr int steps = 24;
   for (std::size_t k = 0; k < 4; ++k) {
-    Series series{.name = fmt::format("{}, {}", names[k], name),
+    Series series{.name = fmt::format("{}, {}", boundary_names[k], name),
                   .x = {},
                   .y = {},
                   .sigma = {},
@@ -66,7 +66,7 @@ void write_marker_report(const std::filesystem::path& path, const Instrument& in
                   "{:.3f} px rms and the calibrated one by {:.3f} px, each with the poses that fit it best.",
                   calibration.frames, calibration.seam_views, calibration.before_px, calibration.after_px)};
   const auto residual_plot = [](const std::string& title, const std::vector<PrintResidual>& residuals) {
-    return print_residual_plot(title, residuals, names, "the print", 120);
+    return print_residual_plot(title, residuals, boundary_names, "the print", 120);
   };
   section.figures = {{residual_plot("Before: the rig's print", calibration.before),
                       "Where boundaries were found, beyond where the rig's print has them; means over 3 degrees."},

@@ -220,8 +220,9 @@ std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recor
     recording.check();
     const RecordedCounts counts = recording.counts();
     const double now_s = clock.now_s();
-    if (std::exchange(images, counts.images + counts.dropped) != counts.images + counts.dropped) last_image_s = now_s;
-    if (!first_s && counts.images > 0) first_s = now_s;
+    if (std::exchange(images, counts.arrived) != counts.arrived)
+      last_image_s = now_s;  // a slow disk is no silent camera
+    if (!first_s && counts.arrived > 0) first_s = now_s;
     progress.show(static_cast<int>(counts.images), fmt::format(" images, {} joint readings", counts.joints));
     if (!first_s && now_s > begin_s + patience_s) return fmt::format("no image came within {:.0f} s", patience_s);
     if (const auto ended = recording.ended()) return *ended;

@@ -6,7 +6,7 @@ namespace lapservo::app {
 namespace {
 
 // Text that Markdown takes for text, but for what stands in backticks already.
-std::string plain(const std::string& text) {
+std::string in_markdown(const std::string& text) {
   std::string result;
   bool code = false;
   for (const char c : text) {
@@ -17,13 +17,13 @@ std::string plain(const std::string& text) {
   return result;
 }
 
-std::string option_entry(const OptionDescription& option) {
+std::string markdown_entry(const OptionDescription& option) {
   std::string entry;
   for (const std::string& name : option.names) entry += (entry.empty() ? "`" : ", `") + name + "`";
   if (!option.positional && option.takes_value && option.choices.empty())
-    entry += " *" + plain(option.type_shown()) + "*";
+    entry += " *" + in_markdown(option.type_shown()) + "*";
   if (option.required) entry += ", required";
-  entry += "\n: " + plain(option.description);
+  entry += "\n: " + in_markdown(option.description);
   std::string notes;
   for (const std::string& choice : option.choices) notes += (notes.empty() ? "One of `" : ", `") + choice + "`";
   if (!option.default_value.empty())
@@ -40,13 +40,13 @@ std::string code_block(const std::vector<std::string>& lines) {
 
 std::string section(const CommandDescription& command) {
   std::string text = std::string(command.words.size() < 3 ? "## " : "### ") + command.name() + "\n\n" +
-                     plain(command.description) + "\n\n";
+                     in_markdown(command.description) + "\n\n";
   for (const OptionDescription& option : command.options)
-    if (option.positional) text += option_entry(option);
+    if (option.positional) text += markdown_entry(option);
   for (const OptionDescription& option : command.options)
-    if (!option.positional && option.names.back() != "--help") text += option_entry(option);
+    if (!option.positional && option.names.back() != "--help") text += markdown_entry(option);
   const FooterParts footer = footer_parts(command.footer);
-  for (const std::string& line : footer.text) text += plain(line) + "\n";
+  for (const std::string& line : footer.text) text += in_markdown(line) + "\n";
   text += "\n";
   if (!footer.examples.empty()) text += code_block(footer.examples);
   return text;

@@ -32,7 +32,7 @@
 namespace lapservo::app {
 using namespace internal;
 namespace {
-constexpr std::uintmax_t needed_bytes = 4 << 20;
+constexpr std::uintmax_t frames_bytes = 4 << 20;
 
 struct RenderArguments {
   std::string rig, out, poses, background = "tissue", condition = "rendered", format = "png";
@@ -147,7 +147,7 @@ int run(const RenderArguments& options) {
   inputs.add_rig(options.rig, rig);
   inputs.add(options.poses);
   inputs.add(options.background);
-  OutputFolder folder(options.out, rig, inputs, options.force, needed_bytes);
+  OutputFolder folder(options.out, rig, inputs, options.force, frames_bytes);
   const auto frames =
       options.poses.empty() ? random_configurations(rig, options) : read_configurations(options.poses, rig);
   Renderer renderer = make_renderer(rig, options);

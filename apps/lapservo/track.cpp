@@ -202,13 +202,14 @@ int run(const TrackOptions& options) {
   const double begin_s = clock.now_s();
   Tally tally;
   RegistrationWatch registration;
-  bool stopped = false;
+  bool stopped = false, read_to_the_end = false;
   {
     Progress progress(source->frame_count());
     while (!(stopped = interrupted()) && (options.frames == 0 || tally.frames < options.frames)) {
       const auto frame = source->next();
       if (!frame) {
         stopped = interrupted();
+        read_to_the_end = true;
         break;
       }
       const double came_s = clock.now_s() - (live ? live->age_s() : 0);
@@ -250,7 +251,7 @@ int run(const TrackOptions& options) {
   if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
   if (overlay && overlay->is_video() && !video_remark().empty()) std::printf("overlay: %s\n", video_remark().c_str());
   if (live && !live->dropped().empty()) std::printf("no frames: %s\n", live->dropped().c_str());
-  if (const std::string complaint = source->complaint(); !stopped && !complaint.empty()) {
+  if (const std::string complaint = read_to_the_end && !stopped ? source->complaint() : ""; !complaint.empty()) {
     std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options.input.c_str(),
                  complaint.c_str());
     return 1;

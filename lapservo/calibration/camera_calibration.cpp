@@ -46,13 +46,13 @@ Rigid3 pose_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
   return {rotation_by(vector_of(rotation_vector)), vector_of(translation)};
 }
 
-struct Fit {
+struct LensFit {
   Camera camera;
   std::vector<Rigid3> camera_from_board;
 };
 
 // By the corners alone, to start with: OpenCV's, without k3.
-std::optional<Fit> first_fit(const Board& board, const std::vector<BoardView>& views, const Camera& start) {
+std::optional<LensFit> first_fit(const Board& board, const std::vector<BoardView>& views, const Camera& start) {
   std::vector<std::vector<cv::Point3f>> on_board;
   std::vector<std::vector<cv::Point2f>> in_picture;
   for (const BoardView& view : views) {
@@ -61,7 +61,7 @@ std::optional<Fit> first_fit(const Board& board, const std::vector<BoardView>& v
   }
   cv::Mat matrix, distortion;
   std::vector<cv::Mat> rotations, translations;
-  Fit fit{start, {}};
+  LensFit fit{start, {}};
   fit.camera.width_px = views.front().bgr.cols, fit.camera.height_px = views.front().bgr.rows;
   try {
     cv::calibrateCamera(on_board, in_picture, views.front().bgr.size(), matrix, distortion, rotations, translations,
@@ -100,7 +100,7 @@ struct MeasuredEdges {
 
 constexpr int green = 1;
 
-MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, const Fit& fit, bool all_channels,
+MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, const LensFit& fit, bool all_channels,
                        bool with_profiles) {
   const std::array<float, 256> light = fit.camera.response.table();
   MeasuredEdges result;
@@ -137,12 +137,12 @@ double rms_of(const std::vector<double>& values) {
 }
 
 struct Refined {
-  Fit fit;
+  LensFit fit;
   CameraAdjustment adjustment;
 };
 
 // What the views can't tell from nothing stays nothing: k3, and pixels that are not square.
-std::optional<CameraAdjustment> adjust_what_shows(const Fit& fit, const MeasuredEdges& edges) {
+std::optional<CameraAdjustment> adjust_what_shows(const LensFit& fit, const MeasuredEdges& edges) {
   CameraFreedom freedom;
   auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom);
   if (!all) return std::nullopt;
@@ -154,7 +154,7 @@ std::optional<CameraAdjustment> adjust_what_shows(const Fit& fit, const Measured
   return adjust_camera(camera, all->camera_from_board, edges.points, freedom);
 }
 
-Fit fit_of(const CameraAdjustment& adjustment) {
+LensFit fit_of(const CameraAdjustment& adjustment) {
   return {adjustment.camera, adjustment.camera_from_board};
 }
 

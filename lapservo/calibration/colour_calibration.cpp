@@ -17,7 +17,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t min_frames = 8, trial_frames = 8;
+constexpr std::size_t min_colour_frames = 8, trial_frames = 8;
 constexpr double reach_deg = 65;        // between an ink's hue and the rig's
 constexpr double least_apart_deg = 40;  // between two bands: nearer, and each keeps no room for light and shade
 constexpr double max_clipped = 0.3;     // of the marker's pixels: their hues are the sensor's, not the ink's
@@ -195,8 +195,8 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
     if (progress) progress(what);
   };
   ColourCalibration calibration;
-  if (frames.size() < min_frames)
-    return calibration.refusal = fmt::format("{} frames, at least {} are needed", frames.size(), min_frames),
+  if (frames.size() < min_colour_frames)
+    return calibration.refusal = fmt::format("{} frames, at least {} are needed", frames.size(), min_colour_frames),
            calibration;
   const Instrument& of = rig.instruments[instrument];
   say("the rig's hues");

@@ -21,7 +21,7 @@ constexpr int sectors = 60;
 constexpr std::size_t max_per_sector = 2;
 constexpr double max_time_s = 1e9;
 
-constexpr std::size_t min_edges = 40, min_frames = 12, min_seam_views = 3;
+constexpr std::size_t min_edges = 40, min_turn_frames = 12, min_seam_views = 3;
 constexpr double widest_unseen_rad = 0.9;  // between neighbouring facing azimuths; a view measures +-0.9 rad
 // Of the diameter's image. Of 0.01 sides are found to 0.05 px, of 0.024 (--blur-px 2.2) 0.8 px inside, and all lengths
 // with them.
@@ -49,9 +49,9 @@ double worth(const Sighting& sighting) {
 }
 
 // The frames and the print while they are being fitted.
-class Fit {
+class TurnFit {
  public:
-  Fit(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames)
+  TurnFit(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames)
       : measurer_(rig, instrument), marker_(rig.instruments[instrument].marker), frames_(std::move(frames)) {
     for (KeyFrame& frame : frames_) settle(frame);
   }
@@ -171,11 +171,11 @@ std::string blur_refusal(const std::vector<KeyFrame>& frames, const Marker& mark
 // Why these frames can't tell the print; empty when they may.
 std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker) {
   char text[240];
-  if (frames.size() < min_frames) {
+  if (frames.size() < min_turn_frames) {
     std::snprintf(text, sizeof text,
                   "%zu frames show the marker wholly, from different sides, and at least %zu are needed: film a slow "
                   "full turn about the shaft's axis, the whole marker in view",
-                  frames.size(), min_frames);
+                  frames.size(), min_turn_frames);
     return text;
   }
   const double unseen_rad = widest_unseen(frames, marker);
@@ -272,7 +272,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   const Marker nominal = rig.instruments[instrument].marker;
   if (const std::string why = refusal_of(frames, nominal); !why.empty()) return refused(why);
   const std::string unsolvable = "the frames contradict one another: is it one marker, and the rig's camera?";
-  Fit fit(rig, instrument, std::move(frames));
+  TurnFit fit(rig, instrument, std::move(frames));
   MarkerCalibration calibration;
 
   // The rig's print first, to start the poses and to tell what it leaves.
@@ -292,7 +292,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     last = fit.round(rounds[stage], true, stage + 1 == rounds.size());
     if (!last) return refused(unsolvable);
     if (i >= 2) fit.drop_misfits(*last);
-    if (fit.frames().size() < min_frames) return refused(unsolvable);
+    if (fit.frames().size() < min_turn_frames) return refused(unsolvable);
     settled = last->covariance && is_settled(*last, nominal.radius_m());
     if (gap_judged || !(settled || i == gap_round)) continue;
     // A gap that can't be told from none is none: then the print's ends meet in one edge.

@@ -98,7 +98,8 @@ class CheckRig : public ::testing::Test {
 // What blood hides is found in the one picture that there is, however long that takes.
 TEST(RigEvidence, SearchesEachPictureWhole) {
   Rig rig = true_rig();
-  rig.instruments[0].marker.tolerance_m = 5e-6;  // a print that was measured may show little of itself
+  MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;  // a print that was measured may show little of itself
+  sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
   Random random(5);
   const JointVector q = scenes::random_configuration(rig, 0, random);
   ShaftModel shaft = shaft_of(rig.instruments[0]);

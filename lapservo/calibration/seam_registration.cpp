@@ -14,7 +14,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t min_frames = 8;
+constexpr std::size_t min_seam_frames = 8;
 
 std::optional<double> psi_at(const JointRecording& recording, const Joints& joints, double time_s) {
   const auto at = recording.at(time_s);
@@ -47,13 +47,13 @@ SeamRegistration register_seam(const Instrument& instrument, const MarkerCalibra
       differences.push_back(psi_of(frame.sighting.unknowns.pose(), instrument.camera_from_rcm.value()) - *psi_rad);
   }
   result.frames = differences.size();
-  if (differences.size() < min_frames) {
+  if (differences.size() < min_seam_frames) {
     char text[240];
     std::snprintf(
         text, sizeof text,
         "%zu frames lie within the recording of the joints, at least %zu are needed: the frames run from %.2f "
         "to %.2f s, the recording from %.2f to %.2f s",
-        differences.size(), min_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
+        differences.size(), min_seam_frames, first_s, last_s, recording.time_s.front(), recording.time_s.back());
     result.refusal = text;
     return result;
   }

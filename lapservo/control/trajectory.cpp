@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::array<const char*, 4> feature_names{"s_rad", "r_px", "l_px", "d_px"};
 
-void require_finite(const char* what, const Eigen::Vector4d& values) {
+void require_finite_features(const char* what, const Eigen::Vector4d& values) {
   for (int i = 0; i < 4; ++i) {
     if (!std::isfinite(values[i])) {
       throw InputError("trajectory", std::string(what) + "." + feature_names[static_cast<std::size_t>(i)],
@@ -25,8 +25,8 @@ void require_finite(const char* what, const Eigen::Vector4d& values) {
   }
 }
 
-void require_positive(const char* what, const Eigen::Vector4d& values) {
-  require_finite(what, values);
+void require_positive_features(const char* what, const Eigen::Vector4d& values) {
+  require_finite_features(what, values);
   for (int i = 0; i < 4; ++i) {
     if (!(values[i] > 0)) {
       throw InputError("trajectory", std::string(what) + "." + feature_names[static_cast<std::size_t>(i)],
@@ -109,17 +109,17 @@ Trajectory from_table(const CsvTable& table, const std::string& source) {
 }  // namespace
 
 Trajectory set_point(const Eigen::Vector4d& features) {
-  require_finite("set_point", features);
+  require_finite_features("set_point", features);
   return {0, [features](double) {
             return DesiredFeatures{features, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
           }};
 }
 
 Trajectory sinusoids(const Sinusoids& sinusoids) {
-  require_finite("offset", sinusoids.offset);
-  require_finite("amplitude", sinusoids.amplitude);
-  require_finite("phase_rad", sinusoids.phase_rad);
-  require_positive("omega_rad_s", sinusoids.omega_rad_s);
+  require_finite_features("offset", sinusoids.offset);
+  require_finite_features("amplitude", sinusoids.amplitude);
+  require_finite_features("phase_rad", sinusoids.phase_rad);
+  require_positive_features("omega_rad_s", sinusoids.omega_rad_s);
   return {0, [sinusoids](double time_s) {
             const Eigen::Array4d omega = sinusoids.omega_rad_s.array();
             const Eigen::Array4d angle = omega * time_s + sinusoids.phase_rad.array();
@@ -131,15 +131,15 @@ Trajectory sinusoids(const Sinusoids& sinusoids) {
 
 Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::Vector4d& max_rate, double dwell_s) {
   if (points.size() < 2) throw InputError("trajectory", "points", std::to_string(points.size()), "two points or more");
-  require_positive("max_rate", max_rate);
+  require_positive_features("max_rate", max_rate);
   if (!(dwell_s >= 0)) throw InputError("trajectory", "dwell_s", std::to_string(dwell_s), "0 or more seconds");
   constexpr double peak_rate = 1.875;  // of the minimum-jerk motion over unit distance in unit time
   std::vector<Segment> segments;
   Eigen::Vector4d from = points.front();
   double start_s = 0;
   for (std::size_t i = 1; i < points.size(); ++i) {
-    require_finite("points", points[i - 1]);
-    require_finite("points", points[i]);
+    require_finite_features("points", points[i - 1]);
+    require_finite_features("points", points[i]);
     Eigen::Vector4d change = points[i] - from;
     change[0] = wrap_pi(change[0]);
     const double duration_s = peak_rate * change.cwiseAbs().cwiseQuotient(max_rate).maxCoeff();
@@ -159,7 +159,7 @@ Trajectory trajectory_through(std::vector<double> times_s, std::vector<Eigen::Ve
   if (times_s.size() < 2 || times_s.size() != features.size())
     throw InputError(source, "expected at least two rows of time_s,s_rad,r_px,l_px,d_px");
   for (std::size_t row = 0; row < times_s.size(); ++row) {
-    require_finite("features", features[row]);
+    require_finite_features("features", features[row]);
     if (!std::isfinite(times_s[row]) || (row > 0 && !(times_s[row] > times_s[row - 1])))
       throw InputError(source, "row " + std::to_string(row + 1) + ".time_s", std::to_string(times_s[row]),
                        row == 0 ? "a number" : "a time after " + std::to_string(times_s[row - 1]));

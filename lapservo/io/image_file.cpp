@@ -121,10 +121,16 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
 
 // What OpenCV read once, and others may send.
 void refuse_unread(std::span<const std::uint8_t> bytes, const std::string& source) {
-  constexpr int tile_width = 322, sample_format = 339, is_unsigned = 1;
+  constexpr int compression = 259, photometric = 262, tile_width = 322, sample_format = 339;
+  constexpr int jpeg_before_tiff_6 = 6, in_jpeg = 7, ycbcr = 6, is_unsigned = 1;
   const std::string format = rare_format(bytes);
   if (tiff_tag(bytes, sample_format).value_or(is_unsigned) != is_unsigned) refuse_pixel_type(source);
-  if (tiff_tag(bytes, tile_width)) throw InputError(source, "is a TIFF in tiles, which is not read: convert it to PNG");
+  const int packed_by = tiff_tag(bytes, compression).value_or(0);
+  const char* const kind = tiff_tag(bytes, tile_width)                               ? "in tiles"
+                           : tiff_tag(bytes, photometric).value_or(0) == ycbcr       ? "in YCbCr"
+                           : packed_by == jpeg_before_tiff_6 || packed_by == in_jpeg ? "in JPEG's compression"
+                                                                                     : nullptr;
+  if (kind) throw InputError(source, std::string("is a TIFF ") + kind + ", which is not read: convert it to PNG");
   if (!format.empty() && format != "WebP" && !libav_decodes(format))
     throw InputError(source, "is a picture of format " + format + ", which is not read: convert it to PNG");
 }

@@ -22,14 +22,14 @@ void on_jpeg_encoding_error(j_common_ptr info) {
   std::longjmp(static_cast<Encoder*>(info->client_data)->leave, 1);
 }
 
-void print_nothing(j_common_ptr) {}
+void ignore_jpeg_message(j_common_ptr) {}
 
 bool write_picture(Encoder& encoder, const cv::Mat& image, int quality) {
   if (setjmp(encoder.leave) != 0) return false;
   encoder.info.client_data = &encoder;
   encoder.info.err = jpeg_std_error(&encoder.errors);
   encoder.errors.error_exit = on_jpeg_encoding_error;
-  encoder.errors.output_message = print_nothing;
+  encoder.errors.output_message = ignore_jpeg_message;
   jpeg_create_compress(&encoder.info);
   jpeg_mem_dest(&encoder.info, &encoder.bytes, &encoder.size);
   encoder.info.image_width = static_cast<JDIMENSION>(image.cols);
@@ -54,7 +54,8 @@ std::vector<std::uint8_t> encode_jpeg(const cv::Mat& image, int quality) {
   Encoder encoder{};
   const bool written = write_picture(encoder, image, quality);
   jpeg_destroy_compress(&encoder.info);
-  std::vector<std::uint8_t> bytes(encoder.bytes, encoder.bytes + (written ? encoder.size : 0));
+  if (!written) return {};  // out of memory: whose the bytes are then, the library does not say
+  std::vector<std::uint8_t> bytes(encoder.bytes, encoder.bytes + encoder.size);
   std::free(encoder.bytes);
   return bytes;
 }

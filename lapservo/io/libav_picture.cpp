@@ -67,19 +67,31 @@ libav::Packet packet_of(std::span<const std::uint8_t> bytes) {
   return packet;
 }
 
-libav::Codec open_decoder(AVCodecID id) {
+// Where a decoder leaves out pixels without a word, what it left shows.
+int filled_buffer(AVCodecContext* context, AVFrame* frame, int flags) {
+  const int result = avcodec_default_get_buffer2(context, frame, flags);
+  for (const AVBufferRef* buffer : frame->buf)
+    if (result >= 0 && buffer)
+      std::memset(buffer->data, *static_cast<const std::uint8_t*>(context->opaque), buffer->size);
+  return result;
+}
+
+// Its pixels are fill at first, which has to outlive it.
+libav::Codec open_decoder(AVCodecID id, std::uint8_t& fill) {
   const AVCodec* codec = avcodec_find_decoder(id);
   libav::Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
   if (!context) return nullptr;
   context->thread_count = 1;
   context->max_pixels = max_pixels;
+  context->opaque = &fill;
+  context->get_buffer2 = filled_buffer;
   context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
   return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
 }
 
-libav::Frame decoded_frame(AVCodecID id, std::span<const std::uint8_t> bytes) {
+libav::Frame decoded_frame(AVCodecID id, std::span<const std::uint8_t> bytes, std::uint8_t fill) {
   av_log_set_level(AV_LOG_QUIET);
-  const libav::Codec decoder = open_decoder(id);
+  const libav::Codec decoder = open_decoder(id, fill);
   const libav::Packet packet = packet_of(bytes);
   libav::Frame frame(av_frame_alloc());
   if (!decoder || !packet || !frame || avcodec_send_packet(decoder.get(), packet.get()) < 0) return nullptr;
@@ -228,8 +240,15 @@ bool libav_decodes(const std::string& format) {
 cv::Mat libav_decode(std::span<const std::uint8_t> bytes) {
   const Format* format = format_of(bytes);
   if (!format || format->codec == AV_CODEC_ID_NONE) return {};
-  if (format->codec != AV_CODEC_ID_TIFF) return pixels_of(decoded_frame(format->codec, bytes));
-  return pixels_of(decoded_frame(format->codec, tiff_of_pixels(bytes)));
+  const std::vector<std::uint8_t> tiff =
+      format->codec == AV_CODEC_ID_TIFF ? tiff_of_pixels(bytes) : std::vector<std::uint8_t>();
+  const auto decoded = [&](std::uint8_t fill) {
+    return pixels_of(decoded_frame(format->codec, tiff.empty() ? bytes : tiff, fill));
+  };
+  const cv::Mat pixels = decoded(0), again = decoded(255);
+  const bool whole = !pixels.empty() && pixels.size() == again.size() && pixels.type() == again.type() &&
+                     cv::norm(pixels, again, cv::NORM_INF) == 0;
+  return whole ? pixels : cv::Mat();
 }
 
 std::vector<std::uint8_t> libav_encode(const std::string& extension, const cv::Mat& image) {

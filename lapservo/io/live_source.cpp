@@ -99,6 +99,30 @@ cv::Mat decoded(std::span<const std::uint8_t> jpeg) {
   }
 }
 
+std::size_t bytes_a_pixel(std::uint32_t format) {
+  switch (format) {
+    case V4L2_PIX_FMT_BGR24:
+    case V4L2_PIX_FMT_RGB24:
+      return 3;
+    case V4L2_PIX_FMT_YUYV:
+    case V4L2_PIX_FMT_UYVY:
+      return 2;
+    case V4L2_PIX_FMT_NV12:
+      return 1;  // of brightness
+    default:
+      return 0;
+  }
+}
+
+// Whether all rows are there; the last one need not be padded. Colours of two pixels, or of four, are one.
+bool is_whole(const V4l2Layout& layout, std::size_t rows, std::size_t bytes) {
+  const std::size_t row = layout.width * bytes_a_pixel(layout.pixel_format);
+  const bool colors_shared = layout.pixel_format != V4L2_PIX_FMT_BGR24 && layout.pixel_format != V4L2_PIX_FMT_RGB24;
+  const bool even = layout.width % 2 == 0 && (layout.pixel_format != V4L2_PIX_FMT_NV12 || layout.height % 2 == 0);
+  return row > 0 && rows > 0 && layout.step >= row && (even || !colors_shared) &&
+         bytes >= (rows - 1) * layout.step + row;
+}
+
 }  // namespace
 
 cv::Mat bgr_of(const V4l2Layout& layout, std::span<const std::uint8_t> bytes) {
@@ -107,7 +131,7 @@ cv::Mat bgr_of(const V4l2Layout& layout, std::span<const std::uint8_t> bytes) {
   const bool is_jpeg = layout.pixel_format == V4L2_PIX_FMT_MJPEG || layout.pixel_format == V4L2_PIX_FMT_JPEG;
   if (is_jpeg) return decoded(bytes);
   const std::size_t rows = is_nv12 ? layout.height + layout.height / 2 : layout.height;
-  if (bytes.size() < rows * layout.step) return {};
+  if (!is_whole(layout, rows, bytes.size())) return {};
   auto* const data = const_cast<std::uint8_t*>(bytes.data());
   const auto pixels = [&](int type) { return cv::Mat(height, width, type, data, layout.step); };
   switch (layout.pixel_format) {

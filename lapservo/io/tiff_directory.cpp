@@ -14,9 +14,9 @@ using Bytes = std::span<const std::uint8_t>;
 constexpr std::size_t entry_bytes = 12;  // tag, type, count and value
 
 // Size, bits, compression, photometric interpretation, fill order, strips, samples, planes, options of fax compression,
-// predictor, palette, alpha, subsampled colours.
-constexpr std::array<std::size_t, 19> tags_of_pixels{256, 257, 258, 259, 262, 266, 273, 277, 278, 279,
-                                                     284, 292, 293, 317, 320, 338, 347, 530, 532};
+// predictor, palette. Not which sample is alpha (338): the decoder takes the fourth, and refuses that tag.
+constexpr std::array<std::size_t, 15> tags_of_pixels{256, 257, 258, 259, 262, 266, 273, 277,
+                                                     278, 279, 284, 292, 293, 317, 320};
 
 std::optional<Numbers> numbers_of(Bytes picture) {
   const auto begins_with = [&](std::string_view magic) {

@@ -16,11 +16,12 @@ namespace {
 // as MPEG-4 part 2 was.
 constexpr const char *preset = "ultrafast", *crf = "22";
 
-// Containers that list no codecs (MPEG-TS) take it, unless they are single pictures or nothing but bytes.
+// Not containers of several files, as playlists are. Those that list no codecs (MPEG-TS) take it, unless they are
+// nothing but bytes.
 bool takes(const AVOutputFormat* container, const AVCodec* codec) {
-  if (!codec) return false;
+  if (!codec || (container->flags & AVFMT_NOFILE) != 0) return false;
   const int answer = avformat_query_codec(container, codec->id, FF_COMPLIANCE_NORMAL);
-  return answer == 1 || (answer < 0 && (container->flags & (AVFMT_NOFILE | AVFMT_NOTIMESTAMPS)) == 0);
+  return answer == 1 || (answer < 0 && (container->flags & AVFMT_NOTIMESTAMPS) == 0);
 }
 
 const AVCodec* encoder_for(const AVOutputFormat* container) {
@@ -107,7 +108,7 @@ void VideoEncoder::open_file(const std::filesystem::path& path) {
   if (!stream || avcodec_parameters_from_context(stream->codecpar, codec_.get()) < 0) refuse();
   stream->time_base = codec_->time_base;
   stream->avg_frame_rate = codec_->framerate;
-  need(avio_open(&file_->pb, path.c_str(), AVIO_FLAG_WRITE));
+  need(avio_open(&file_->pb, ("file:" + path.string()).c_str(), AVIO_FLAG_WRITE));
   AVDictionary* options = nullptr;
   av_dict_set(&options, "movflags", "+faststart", 0);  // the index first, for who plays it while it comes
   const int written = avformat_write_header(file_.get(), &options);

@@ -85,7 +85,7 @@ class VideoReader::State {
     format->interrupt_callback = {past, &deadline_};
     AVDictionary* options = nullptr;
     if (kind_ == Kind::stream) av_dict_set(&options, "rtsp_transport", "tcp", 0);  // which loses nothing
-    const bool opened = avformat_open_input(&format, source_.c_str(), nullptr, &options) == 0;
+    const bool opened = avformat_open_input(&format, url().c_str(), nullptr, &options) == 0;
     av_dict_free(&options);
     format_.reset(opened ? format : nullptr);
     if (!opened || avformat_find_stream_info(format, nullptr) < 0)
@@ -93,6 +93,9 @@ class VideoReader::State {
                                                     : "can't be opened, expected a camera or stream");
     deadline_ = Clock::time_point::max();  // the file keeps asking; whoever measures slowly is not late
   }
+
+  // A file may have a colon in its name.
+  std::string url() const { return kind_ == Kind::file ? "file:" + source_ : source_; }
 
   std::size_t choose_stream() const {
     const int chosen = av_find_best_stream(format_.get(), AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
@@ -105,10 +108,12 @@ class VideoReader::State {
     decoder_.reset(codec ? avcodec_alloc_context3(codec) : nullptr);
     if (!decoder_ || avcodec_parameters_to_context(decoder_.get(), stream_->codecpar) < 0)
       throw InputError(source_, "can't be decoded, expected a video");
-    // With slices in parallel, FFmpeg's decoder of H.264 forgets what it complained of.
-    decoder_->thread_count = codec->id == AV_CODEC_ID_H264 ? 1 : 0;
-    decoder_->thread_type = FF_THREAD_SLICE;  // with frames in parallel, nobody knows whose error it is
+    // With frames in parallel nobody knows whose error it is; with slices FFmpeg's decoders of H.264 and H.265 forget
+    // what they complained of, that of MPEG-2 does not.
+    decoder_->thread_count = codec->id == AV_CODEC_ID_MPEG2VIDEO ? 0 : 1;
+    decoder_->thread_type = FF_THREAD_SLICE;
     decoder_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
+    if (codec->id == AV_CODEC_ID_H264) decoder_->err_recognition |= AV_EF_AGGRESSIVE;
     if (avcodec_open2(decoder_.get(), codec, nullptr) < 0)
       throw InputError(source_, "can't be decoded, expected a video");
   }

@@ -127,13 +127,13 @@ std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, d
 }
 
 // Points on the sides, in the outline's frame.
-struct SidePoints {
+struct OutlineSides {
   std::vector<Eigen::Vector2d> low, high;
 };
 
 // The blob's extent along the shaft, and sections across it: of the shaft as wide as it is, or where that gives too
 // few, with what the image's border leaves of it. Round 0 and 1 only turn and shift the frame.
-std::optional<SidePoints> find_sides(const Scene& scene, const BlobShape& shape, Outline& outline, bool last_round) {
+std::optional<OutlineSides> find_sides(const Scene& scene, const BlobShape& shape, Outline& outline, bool last_round) {
   constexpr int sections = 13;
   constexpr std::size_t enough = 4;
   double widest = 0;
@@ -146,7 +146,7 @@ std::optional<SidePoints> find_sides(const Scene& scene, const BlobShape& shape,
   }
   const double reach_px = widest * 1.3 + 12, finest_px = std::max(1.0, reach_px / 150);
   const double step_px = last_round ? finest_px : std::max(finest_px, reach_px / 40);
-  SidePoints whole, cut;
+  OutlineSides whole, cut;
   int low_cut = 0, high_cut = 0;
   for (int i = 0; i < sections; ++i) {
     const double x = outline.first_x + (outline.last_x - outline.first_x) * (i + 0.5) / sections;

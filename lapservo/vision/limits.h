@@ -202,8 +202,8 @@ struct ValidationLimits {
   /// And where both ends are located on so much of their lines (2 of the 18).
   double max_spilled_of_located = 0.2, half_located = 0.4;
 
-  /// How exactly it must show that each inner boundary lies on the print where the rig says, unless the rig tells a
-  /// tolerance_m. Prints made by hand are off by 0.05 to 0.3 mm; 0.1 mm is a turn of 0.05 to 0.1 rad, and five sigma.
+  /// How exactly it must show that each inner boundary lies on the print where the rig says, unless its bands
+  /// were measured. Prints made by hand are off by 0.05 to 0.3 mm; 0.1 mm is a turn of 0.05 to 0.1 rad, and five sigma.
   double max_inner_sigma_m = 0.02e-3;
 
   /// Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves

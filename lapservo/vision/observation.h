@@ -21,7 +21,7 @@ enum class Status {
   ambiguous,        ///< two explanations fit about as well
   poor_fit,         ///< something was found that does not look like the marker on closer sight
   uncertain,        ///< found, but the rotation's standard deviation is too large to be of use
-  marker_mismatch,  ///< the print is not as the rig says: calibrate the marker, or set its tolerance_m
+  marker_mismatch,  ///< the print is not as the rig says: calibrate the marker
   damaged,          ///< the decoder of the picture or video complained: its pixels are not the camera's
   few_colors,       ///< the picture has no more colours than a palette: its pixels are not the camera's
   interlaced,       ///< the frame is made of two fields, of two moments: use --deinterlace

@@ -400,7 +400,8 @@ struct BloodyMotion {
 // Whose print was measured: it may show little of itself.
 Rig measured_rig() {
   Rig rig = scenes::usual_rig();
-  rig.instruments[0].marker.tolerance_m = 5e-6;
+  MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;
+  sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
   return rig;
 }
 

@@ -55,10 +55,12 @@ int fewest_lines(const FineFit& fit) {
   return std::max(limits.min_of_end, fit.lines / limits.end_one_in);
 }
 
-// Whether a print that is off would show. Where one inner boundary is left, its error looks like a turn.
+// Whether a print that is off would show. Where one inner boundary is left, its error looks like a turn. One whose
+// bands were measured is not off.
 bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit) {
+  if (scene.marker.sigmas.bands_upper_m && scene.marker.sigmas.bands_lower_m) return true;
   const bool both_show = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.missed_fraction;
-  return scene.marker.tolerance_m > 0 || both_show ||
+  return both_show ||
          (fit.inner_sigma_m < limits.max_inner_sigma_m && std::min(fit.used[1], fit.used[2]) >= fewest_lines(fit));
 }
 

@@ -106,7 +106,8 @@ TEST(Verification, AnInnerBoundaryThatIsHiddenLeavesThePrintInDoubt) {
   const FineFit right = fit_from_truth(shot);
   EXPECT_LT(right.inner_sigma_m, 3e-6);
   Rig measured = shot.rig;
-  measured.instruments[0].marker.tolerance_m = 5e-6;
+  MarkerSigmas& sigmas = measured.instruments[0].marker.sigmas;
+  sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
   const Sight of_measured(measured, shot.bgr);
   for (const std::size_t boundary : {1U, 2U}) {
     FineFit fit = right;
