@@ -117,6 +117,7 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
   }
   if (const std::string format = rare_format(bytes); bytes.size() < least_bytes(bytes, format))
     throw InputError(source, "is a truncated " + format + ", expected a whole picture");
+  if (!tiff_has_its_rows(bytes)) throw InputError(source, "is a truncated TIFF, expected a whole picture");
 }
 
 // What OpenCV read once, and others may send.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 #include <string_view>
+#include <zlib.h>
 
 #include "lapservo/io/numbers.h"
 
@@ -37,7 +38,69 @@ Directory directory_of(const Numbers& numbers) {
   return {at, numbers.of(at, 2)};
 }
 
+// All values of a tag; none of one that is missing or of another type than 16 and 32 bits.
+std::vector<std::size_t> values_of(const Numbers& numbers, std::size_t tag) {
+  constexpr std::size_t is_short = 3, is_long = 4, in_entry = 4;
+  const Directory directory = directory_of(numbers);
+  for (std::size_t i = 0; i < directory.entries; ++i) {
+    const std::size_t at = directory.entry(i), type = numbers.of(at + 2, 2), count = numbers.of(at + 4, 4);
+    if (numbers.of(at, 2) != tag || (type != is_short && type != is_long)) continue;
+    const std::size_t size = type == is_short ? 2 : 4;
+    const std::size_t from = count * size <= in_entry ? at + 8 : numbers.of(at + 8, 4);
+    std::vector<std::size_t> values;
+    for (std::size_t k = 0; k < count && from + k * size < numbers.bytes.size(); ++k)
+      values.push_back(numbers.of(from + k * size, size));
+    return values;
+  }
+  return {};
+}
+
+std::size_t value_of(const Numbers& numbers, std::size_t tag, std::size_t otherwise) {
+  const std::vector<std::size_t> values = values_of(numbers, tag);
+  return values.empty() ? otherwise : values.front();
+}
+
+// How many bytes come out of a packed strip, up to most.
+std::size_t inflated_bytes(Bytes strip, std::size_t most) {
+  z_stream stream{};
+  if (inflateInit(&stream) != Z_OK) return 0;
+  std::array<std::uint8_t, 1 << 14> scratch{};
+  stream.next_in = const_cast<std::uint8_t*>(strip.data());
+  stream.avail_in = static_cast<uInt>(strip.size());
+  std::size_t bytes = 0;
+  for (int result = Z_OK; result == Z_OK && bytes < most; bytes += scratch.size() - stream.avail_out) {
+    stream.next_out = scratch.data(), stream.avail_out = scratch.size();
+    result = inflate(&stream, Z_NO_FLUSH);
+  }
+  inflateEnd(&stream);
+  return std::min(bytes, most);
+}
+
+std::size_t bytes_of_rows(const Numbers& numbers) {
+  constexpr std::size_t width = 256, height = 257, bits_a_sample = 258, samples_a_pixel = 277;
+  const std::size_t bits = value_of(numbers, bits_a_sample, 1) * value_of(numbers, samples_a_pixel, 1);
+  return value_of(numbers, height, 0) * ((value_of(numbers, width, 0) * bits + 7) / 8);
+}
+
 }  // namespace
+
+bool tiff_has_its_rows(Bytes picture) {
+  constexpr std::size_t compression = 259, offsets = 273, lengths = 279, deflate = 8, adobe_deflate = 32946;
+  const auto numbers = numbers_of(picture);
+  if (!numbers) return true;
+  const std::size_t packed_by = value_of(*numbers, compression, 1);
+  if (packed_by != deflate && packed_by != adobe_deflate) return true;
+  const std::vector<std::size_t> from = values_of(*numbers, offsets), length = values_of(*numbers, lengths);
+  constexpr std::size_t max_bytes = std::size_t{16384} * 16384 * 8;  // more than any picture that is read
+  const std::size_t needed = bytes_of_rows(*numbers);
+  if (needed > max_bytes) return false;
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < std::min(from.size(), length.size()) && bytes < needed; ++i) {
+    if (from[i] > picture.size() || length[i] > picture.size() - from[i]) return false;
+    bytes += inflated_bytes(picture.subspan(from[i], length[i]), needed - bytes);
+  }
+  return bytes >= needed;
+}
 
 std::optional<int> tiff_tag(Bytes picture, int tag) {
   const auto numbers = numbers_of(picture);
