@@ -204,7 +204,7 @@ struct ValidationLimits {
 
   /// How exactly it must show that each inner boundary lies on the print where the rig says, unless its bands
   /// were measured. Prints made by hand are off by 0.05 to 0.3 mm; 0.1 mm is a turn of 0.05 to 0.1 rad, and five sigma.
-  double max_inner_sigma_m = 0.02e-3;
+  double max_inner_sigma_m = 0.02e-3, tolerance_of_prints_m = 0.1e-3;
 
   /// Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
   /// many, noisy. So the boundaries' rms may grow with the located fraction, where more than a quarter of the sides

@@ -56,9 +56,10 @@ int fewest_lines(const FineFit& fit) {
 }
 
 // Whether a print that is off would show. Where one inner boundary is left, its error looks like a turn. One whose
-// bands were measured is not off.
+// bands were measured is not off, and a tolerance of that size is in sigma.
 bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit) {
   if (scene.marker.sigmas.bands_upper_m && scene.marker.sigmas.bands_lower_m) return true;
+  if (scene.marker.tolerance_m >= limits.tolerance_of_prints_m) return true;
   const bool both_show = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.missed_fraction;
   return both_show ||
          (fit.inner_sigma_m < limits.max_inner_sigma_m && std::min(fit.used[1], fit.used[2]) >= fewest_lines(fit));
