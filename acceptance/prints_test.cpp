@@ -2,6 +2,7 @@
 // LAPSERVO_PRINTS, LAPSERVO_PRINT_POSES and LAPSERVO_PRINT_SEED set how many (20 and 3; the figures of docs/accuracy.md
 // are of 200 and 10) and which.
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -43,10 +44,11 @@ class Prints : public ::testing::Test {
   }
 
   // What is seen of a print by a tracker that takes it for that of `believed`.
-  Tally seen(const Print& print, const Rig& believed, int number, bool moving) const {
+  Tally seen(const Print& print, const Rig& believed, int number, bool moving, const Sensor& sensor = {}) const {
     RenderedSet set;
     set.rig = rig;
     set.configurations = places(number, moving);
+    set.options.sensor = sensor;
     set.seed = static_cast<std::uint64_t>(number);
     set.rig.instruments[0].marker = print.marker;
     Tracker tracker(believed, {.method = Method::surface, .single = !moving});
@@ -54,6 +56,32 @@ class Prints : public ::testing::Test {
     for (const TrueFrame& frame : rendered_frames(set))
       tally.add(tracker.track(frame.bgr)[0], frame.truths[0].q.psi_rad, print.marker.seam_rad - nominal.seam_rad);
     return tally;
+  }
+
+  // Seen with defocus, too little light or both.
+  Tally seen_poorly(Off off) const {
+    struct Poor {
+      const char* name;
+      bool blurred, dark;
+    };
+    constexpr std::array<Poor, 3> kinds{{{"defocused", true, false}, {"dark", false, true}, {"both", true, true}}};
+    Tally all;
+    int number = 10'000 * (1 + static_cast<int>(off));
+    for (const Poor& kind : kinds) {
+      Tally tally;
+      for (int i = 0; i < (prints + 3) / 4; ++i, ++number) {
+        Random drawn(static_cast<std::uint64_t>(seed) * 1'000'000 + static_cast<std::uint64_t>(number));
+        Sensor sensor;
+        const double blur_px = drawn.uniform(2, 3.2), light = drawn.uniform(0.1, 0.3);
+        if (kind.blurred) sensor.blur_px = blur_px;
+        if (kind.dark) sensor.gains = Light::Constant(static_cast<float>(light));
+        tally.add(seen({off_print(nominal, off, drawn), 0}, rig, number, false, sensor));
+      }
+      tally.show(kind.name);
+      all.add(tally);
+    }
+    all.show("poor pictures");
+    return all;
   }
 
   double random_error_m() { return random.uniform(0.02 * mm, 0.3 * mm); }
@@ -99,6 +127,19 @@ TEST_F(Prints, ThatAreTrackedOrAskewAreNotTrustedEither) {
     EXPECT_EQ(all.wrong, 0);
     EXPECT_LE(rms(all.errors_sigmas), 2);
   }
+}
+
+// Where the print's errors show worse they are not taken for a turn: most of all both inner boundaries', alike. What is
+// left are those whose errors happen to be a turn (docs/accuracy.md).
+TEST_F(Prints, ThatAreOffAreHardlyEverTrustedInPoorPictures) {
+  const Tally bands = seen_poorly(Off::bands), ink = seen_poorly(Off::middle_ink), exact = seen_poorly(Off::nowhere);
+  EXPECT_LE(bands.fraction("ok"), 0.15);
+  EXPECT_LE(bands.wrong, 0.03 * bands.frames);
+  EXPECT_LE(ink.fraction("ok"), 0.15);
+  EXPECT_EQ(ink.wrong, 0);
+  EXPECT_LE(rms(ink.errors_sigmas), 2);
+  EXPECT_GE(exact.fraction("ok"), 0.95);
+  EXPECT_LE(rms(exact.errors_sigmas), 1.5);
 }
 
 // Whoever says how far the print may be off gets a pose whose sigma holds.

@@ -168,7 +168,7 @@ void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& sha
     add(i, zero * shared_sigmas[static_cast<std::size_t>(i - shared_film)]);
 }
 
-// As the tracker has it (fine_fit.cpp): compression and motion blur move edges, in all frames alike.
+// Compression, motion blur and processing move edges, in all frames alike.
 double doubt_scale(const std::vector<ViewMeasurements>& frames) {
   std::vector<double> sigmas_px, blurs_px, biases_px;
   for (const ViewMeasurements& frame : frames) {

@@ -76,8 +76,12 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   }
   errors.px[4] = errors.px[5] = side_px;
   errors.noise_scale = std::max(1.0, scatter_sigmas(measurements, lines));
-  errors.doubt_scale = std::max(1.0, median_sigma_px(measurements) / limits.usual_sigma_px) + beyond_px +
-                       std::sqrt(bias_squares_px2) / limits.doubted_processing_px;
+  const double compressed_px = std::max(0.0, median_sigma_px(measurements) - limits.usual_sigma_px);
+  const double processed_px = left_of_corrected * std::sqrt(bias_squares_px2);
+  errors.doubt.boundary_px = std::hypot(limits.doubted_of_sigma * compressed_px, processed_px);
+  errors.doubt.tilt_px = std::hypot(errors.doubt.boundary_px, limits.doubted_tilt_of_blur * beyond_px);
+  errors.doubt.length_fraction =
+      std::hypot(limits.doubted_length_of_sigma * compressed_px, limits.doubted_length_of_blur * beyond_px);
   return errors;
 }
 
@@ -170,7 +174,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.sides_in_image = pass.sides_in_image;
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
   const ResidualLines lines = residual_lines(pass.all);
-  const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker.tolerance_m,
+  const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker,
                                common_errors(pass.all, lines, fit.blur, evidence.edges, fit.bias_px));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));

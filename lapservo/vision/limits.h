@@ -107,7 +107,7 @@ struct FineFitLimits {
   /// that motion blurs is worst: the part of its blur that the boundaries do not have.
   double usual_blur_px = 1.2, common_fraction_of_blur = 0.05, side_fraction_of_motion_blur = 0.15;
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well. A processing that
-  /// moves them by doubted_processing_px (rms) doubles the noise before the print is blamed.
+  /// moves them by doubted_processing_px (rms) doubles what `calibrate marker` says of its numbers.
   double fraction_of_processing = 0.25, doubted_processing_px = 0.1;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
   double usual_misfit = 0.004, px_per_misfit = 8;
@@ -115,6 +115,13 @@ struct FineFitLimits {
   /// sigma grows by so much for all that is missing.
   double usual_fraction = 0.7, doubt_of_hidden = 4;
   double usual_sigma_px = 0.05;  ///< of an edge; compressed ones (--format jpg) have three times that
+
+  /// What is doubted before the print is blamed (PrintDoubt): by what is beyond the usual sigma of an edge, by the blur
+  /// beyond a lens's and by what the processing moved. Residuals of exact prints, each about the pose: boundaries 0.03
+  /// px in JPEG, 0.09 in H.264, 0.007 in defocus (2 to 3.2 px); their tilts 0.03, 0.08, 0.05; the marker looks shorter
+  /// by 0.5 % in defocus. In the dark and in noise nothing is left of it.
+  double doubted_of_sigma = 0.8, doubted_length_of_sigma = 0.1;
+  double doubted_tilt_of_blur = 0.05, doubted_length_of_blur = 0.002;
 
   double settled_px = 1.5;    ///< a pass that moves no point farther is the last
   double settled_blur = 0.1;  ///< change of the blur, a fraction of it, below which edges need not be located again
@@ -149,11 +156,13 @@ struct PrintLimits {
   /// tenth, and with all sizes alike frames that tell nothing lost 17 % of what was found.
   std::array<double, 8> sigmas_mm{0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64};
   std::array<double, 8> fractions{0.05, 0.025, 0.0125, 0.00625, 0.006, 0.0016, 0.0008, 0.0004};
-  /// How sure the pose is goes by these, where the evidence is clear (CommonErrors::doubt_scale; to the inverse of its
-  /// square). Nobody prints, cuts and wraps to 5 um: with half of them there, lucky prints were taken for exact ones
-  /// (error / sigma 2.06). Blaming the print by these, a focal length that is off by 3 % was a print that is off; in
-  /// doubt, a defocused exact print's sigma was 9 mrad.
-  std::array<double, 8> fractions_of_clear{0, 0.04, 0.07, 0.03, 0.006, 0.0016, 0.0008, 0.0004};
+  /// How sure the pose is goes by these. Nobody prints, cuts and wraps to 5 um: with half of them there, lucky prints
+  /// were taken for exact ones (error / sigma 2.06). Those off by 0.1 mm count where a picture shows little of them.
+  /// Blaming the print by these, a focal length that is off by 3 % was a print that is off.
+  std::array<double, 8> told_fractions{0, 0.035, 0.06, 0.03, 0.06, 0.06, 0.0008, 0.0004};
+  /// From this size on, inks lie aside. With smaller ones exact prints in small pictures had more sigma, and a wrong
+  /// registration was no longer seen.
+  double least_ink_aside_mm = 0.06;
   double min_weight = 1e-6;  ///< less is too unlikely to count
 };
 inline constexpr PrintLimits print_limits;
@@ -170,6 +179,9 @@ struct ValidationLimits {
   double max_sigma_print_off_rad = 0.01;  ///< where the print is certainly off: how far is known from four numbers
                                           ///< at best, so ten sigma
   double certainly_off = 0.999;           ///< probability
+  /// And of psi as it is told, where prints that are off by 0.1 mm count for more: in defocus and in the dark they show
+  /// little. A compressed picture of 400 pixels of an exact print has 35 mrad.
+  double max_sigma_told_rad = 0.04;
   /// Times what the rig's tolerance_m adds to the variance: who sets it wants to live with it.
   double tolerance_slack = 1.5;
   double well_seen_fraction = 0.7;  ///< of the boundary points, to blame the print

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/core/median.h"
@@ -203,25 +204,89 @@ Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lin
   return sums;
 }
 
+// What is assumed of the print's errors [mm]: each by itself, and where an ink lies aside both inner boundaries alike
+// as well, which looks most like a turn: the covariance sigma^2 (I + c c^T).
+struct Prior {
+  double sigma_mm = 0;
+  bool ink_aside = false;
+};
+
+const PrintVector& inner_shift() {
+  static const PrintVector c = (PrintVector() << 0, 1, 1, 1, 1, 0).finished();
+  return c;
+}
+
+// (I + c c^T)^(1/2), where |c| is 2.
+const PrintMatrix& root_of_ink_aside() {
+  static const PrintMatrix root =
+      PrintMatrix::Identity() + (std::sqrt(5.0) - 1) / 4 * inner_shift() * inner_shift().transpose();
+  return root;
+}
+
+// Where the boundaries lie at both edges of the print [m].
+PrintVector places_on(const Marker& marker) {
+  const auto &upper = marker.bands_upper_m, &lower = marker.bands_lower_m;
+  return (PrintVector() << 0, upper[0], lower[0], upper[0] + upper[1], lower[0] + lower[1], marker.length_m())
+      .finished();
+}
+
+// PrintDoubt as a covariance of the print's errors [mm^2].
+PrintMatrix doubted_mm2(const PrintDoubt& doubt, const Sums& sums, const Marker& marker) {
+  constexpr double least_variance = 1e-4;  // of a boundary's turn fractions
+  const PrintMatrix& nn = sums.equations.nn;
+  const PrintVector longer_mm = doubt.length_fraction / mm * places_on(marker);
+  PrintMatrix covariance = longer_mm * longer_mm.transpose();
+  for (std::size_t k = 0; k < errors_of_boundary.size(); ++k) {
+    const auto [upper, lower] = errors_of_boundary[k];
+    const double weight = sums.pulls[k].weight;
+    if (!(weight > 0)) continue;
+    if (upper == lower) {
+      covariance(upper, upper) += doubt.boundary_px * doubt.boundary_px * weight / nn(upper, upper);
+      continue;
+    }
+    const double square = nn(upper, upper) + 2 * nn(upper, lower) + nn(lower, lower), mm2_per_px2 = weight / square;
+    const double middle = (nn(lower, lower) + nn(upper, lower)) / square;
+    const double variance = std::max(least_variance, nn(lower, lower) / square - middle * middle);
+    const Eigen::Vector2d tilted(-middle, 1 - middle);
+    const Eigen::Matrix2d both = mm2_per_px2 * (doubt.boundary_px * doubt.boundary_px * Eigen::Matrix2d::Ones() +
+                                                doubt.tilt_px * doubt.tilt_px / variance * tilted * tilted.transpose());
+    covariance.block<2, 2>(upper, upper) += both;
+  }
+  return covariance;
+}
+
 // What the residuals say about the print's errors, whatever the pose, the film and the common errors are.
+struct PrintInformation {
+  PrintMatrix information = PrintMatrix::Zero();
+  PrintVector gradient = PrintVector::Zero();
+
+  // PrintFit::inner_sigma_m, in millimetres.
+  double inner_sigma_mm() const {
+    const double e1 = information.block<2, 2>(1, 1).sum(), e2 = information.block<2, 2>(3, 3).sum();
+    return 1 / std::sqrt(std::max(std::min(e1, e2), 1e-6));
+  }
+};
+
+PrintInformation information_of(const Sums& sums, const PrintMatrix& doubted) {
+  Equations e = sums.equations;
+  for (const Pull& pull : sums.pulls)
+    if (pull.weight > 0) e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
+  const auto inverse = inverse_of(e.xx);
+  if (!inverse) return {};  // the frame tells nothing of the print
+  const CrossMatrix through = e.nx.lazyProduct(*inverse);
+  const PrintMatrix undoubted = e.nn - through.lazyProduct(e.nx.transpose());
+  const PrintMatrix left = (PrintMatrix::Identity() + undoubted * doubted).inverse();
+  return {left * undoubted, left * (e.n - through * e.x)};
+}
+
+// How likely that makes prints of any size of errors.
 class Evidence {
  public:
-  Evidence(const Sums& sums, double doubt_scale) {
-    const double certainty = 1 / (doubt_scale * doubt_scale);
-    Equations e = sums.equations;
-    for (const Pull& pull : sums.pulls)
-      if (pull.weight > 0)
-        e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
-    const auto inverse = inverse_of(e.xx);
-    if (!inverse) return;  // the frame tells nothing of the print
-    const CrossMatrix through = e.nx.lazyProduct(*inverse);
-    const PrintVector gradient = e.n - through * e.x;
-    const PrintMatrix information = e.nn - through.lazyProduct(e.nx.transpose());
-    const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(information);
-    information_ = certainty * directions.eigenvalues().cwiseMax(0);
-    for (std::size_t k = 0; k < inner_.size(); ++k)
-      inner_[k] = certainty * information.block<2, 2>(errors_of_boundary[k + 1][0], errors_of_boundary[k + 1][0]).sum();
-    squares_ = certainty * certainty * (directions.eigenvectors().transpose() * gradient).cwiseAbs2();
+  // `root` of the prior's covariance for a sigma of one.
+  Evidence(const PrintInformation& print, const PrintMatrix& root) {
+    const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(root * print.information * root);
+    information_ = directions.eigenvalues().cwiseMax(0);
+    squares_ = (directions.eigenvectors().transpose() * (root * print.gradient)).cwiseAbs2();
   }
   // Logarithm of the likelihood of this standard deviation, compared with none.
   double gain(double sigma_mm) const {
@@ -229,15 +294,9 @@ class Evidence {
     const PrintVector spread = 1 + variance * information_.array();
     return 0.5 * (variance * squares_.cwiseQuotient(spread).sum() - std::log(spread.prod()));
   }
-  // PrintFit::inner_sigma_m, in millimetres.
-  double inner_sigma_mm() const {
-    return 1 / std::sqrt(std::max(*std::min_element(inner_.begin(), inner_.end()), 1e-6));
-  }
 
  private:
-  PrintVector information_ = PrintVector::Zero(),
-              squares_ = PrintVector::Zero();  // along the directions that are independent
-  std::array<double, 2> inner_{};              // about where each inner boundary lies as a whole [1/mm^2]
+  PrintVector information_, squares_;  // along the directions that are independent
 };
 
 struct Solution {
@@ -262,11 +321,15 @@ PrintMatrix inverse_by_boundary(const PrintMatrix& information) {
   return inverse;
 }
 
-// The likeliest pose when each of the print's errors has this standard deviation, and how sure it is.
-std::optional<Solution> solved(const Sums& sums, double sigma_mm) {
+// The likeliest pose when the print's errors are so, and how sure it is.
+std::optional<Solution> solved(const Sums& sums, const Prior& prior) {
   const Equations& e = sums.equations;
-  const PrintMatrix print_covariance =
-      inverse_by_boundary(e.nn + PrintMatrix::Identity() / std::max(sigma_mm * sigma_mm, 1e-18));
+  const double variance = std::max(prior.sigma_mm * prior.sigma_mm, 1e-18);
+  PrintMatrix print_covariance = inverse_by_boundary(e.nn + PrintMatrix::Identity() / variance);
+  if (prior.ink_aside) {  // whose prior's inverse is (I - c c^T / 5) / variance
+    const PrintVector moved = print_covariance * inner_shift();
+    print_covariance += moved * moved.transpose() / (5 * variance - inner_shift().dot(moved));
+  }
   const CrossMatrix by_x = print_covariance.lazyProduct(e.nx);
   const auto inverted = inverse_of(e.xx - e.nx.transpose().lazyProduct(by_x));
   if (!inverted) return std::nullopt;
@@ -314,10 +377,19 @@ class Mixture {
 constexpr std::size_t sizes = print_sigmas_mm.size();
 using Weights = std::array<double, sizes + 1>;  // of the tolerated print, and of those that are off by print_sigmas_mm
 
+// Of a print that is off by this size and the tolerance.
+Prior prior_of(std::size_t size, double tolerance_mm) {
+  return {std::hypot(print_sigmas_mm[size], tolerance_mm), print_sigmas_mm[size] >= print_limits.least_ink_aside_mm};
+}
+
 // The likelihoods' logarithms, the largest 0.
-Weights gains_of(const Evidence& evidence, double tolerance_mm) {
-  Weights gains{evidence.gain(tolerance_mm)};
-  for (std::size_t i = 0; i < sizes; ++i) gains[i + 1] = evidence.gain(std::hypot(print_sigmas_mm[i], tolerance_mm));
+Weights gains_of(const PrintInformation& print, double tolerance_mm) {
+  const Evidence alone(print, PrintMatrix::Identity()), ink_aside(print, root_of_ink_aside());
+  Weights gains{alone.gain(tolerance_mm)};
+  for (std::size_t i = 0; i < sizes; ++i) {
+    const Prior prior = prior_of(i, tolerance_mm);
+    gains[i + 1] = (prior.ink_aside ? ink_aside : alone).gain(prior.sigma_mm);
+  }
   const double best = *std::max_element(gains.begin(), gains.end());
   for (double& gain : gains) gain -= best;
   return gains;
@@ -328,14 +400,6 @@ Weights weights_of(const Weights& gains, const std::array<double, sizes>& fracti
   Weights weights{(1 - std::accumulate(fractions.begin(), fractions.end(), 0.0)) * std::exp(gains[0])};
   for (std::size_t i = 0; i < sizes; ++i) weights[i + 1] = fractions[i] * std::exp(gains[i + 1]);
   return weights;
-}
-
-std::array<double, sizes> fractions_to_tell(double doubt_scale) {
-  std::array<double, sizes> fractions{};
-  const double clear = 1 / (doubt_scale * doubt_scale);
-  for (std::size_t i = 0; i < sizes; ++i)
-    fractions[i] = std::lerp(print_limits.fractions[i], print_limits.fractions_of_clear[i], clear);
-  return fractions;
 }
 
 }  // namespace
@@ -362,24 +426,24 @@ double scatter_sigmas(std::span<const Measurement> measurements, const ResidualL
 }
 
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
-                                  double film_prior, double tolerance_m, const CommonErrors& errors) {
+                                  double film_prior, const Marker& marker, const CommonErrors& errors) {
   const Sums sums = pose_unknowns == 4 ? sums_of<5>(measurements, lines, film_prior, errors)
                                        : sums_of<7>(measurements, lines, film_prior, errors);
-  const double tolerance_mm = tolerance_m / mm;
-  const auto exact = solved(sums, 0);
-  auto tolerated = tolerance_m > 0 ? solved(sums, tolerance_mm) : exact;
+  const double tolerance_mm = marker.tolerance_m / mm;
+  const auto exact = solved(sums, {});
+  auto tolerated = tolerance_mm > 0 ? solved(sums, {tolerance_mm}) : exact;
   if (!exact || !tolerated) return std::nullopt;
   // The exact print's pose is where the measurements were taken.
-  if (tolerance_m == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
-  const Evidence evidence(sums, errors.doubt_scale);
-  const Weights gains = gains_of(evidence, tolerance_mm);
+  if (tolerance_mm == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
+  const PrintInformation print = information_of(sums, doubted_mm2(errors.doubt, sums, marker));
+  const Weights gains = gains_of(print, tolerance_mm);
   const Weights judged_by = weights_of(gains, print_limits.fractions);
-  const Weights told_by = weights_of(gains, fractions_to_tell(errors.doubt_scale));
+  const Weights told_by = weights_of(gains, print_limits.told_fractions);
   Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
   judged.add(*tolerated, judged_by[0]), told.add(*tolerated, told_by[0]);
   for (std::size_t i = 0; i < sizes; ++i) {
     if (std::max(judged_by[i + 1], told_by[i + 1]) < print_limits.min_weight) continue;
-    const auto off = solved(sums, std::hypot(print_sigmas_mm[i], tolerance_mm));
+    const auto off = solved(sums, prior_of(i, tolerance_mm));
     if (!off) return std::nullopt;
     judged.add(*off, judged_by[i + 1]), told.add(*off, told_by[i + 1]);
   }
@@ -391,7 +455,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
-  fit.inner_sigma_m = evidence.inner_sigma_mm() * mm;
+  fit.inner_sigma_m = print.inner_sigma_mm() * mm;
   fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);

@@ -4,17 +4,25 @@
 #include <optional>
 #include <span>
 
+#include "lapservo/marker/marker.h"
 #include "lapservo/vision/edge_measurements.h"
 #include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo::internal {
 
+/// How a picture that is blurred, compressed or processed moves boundaries as a print's errors would, one sigma each:
+/// every boundary as a whole, the inner ones about their middle (rms over what shows), and all as if the marker were
+/// longer by this fraction.
+struct PrintDoubt {
+  double boundary_px = 0, tilt_px = 0, length_fraction = 0;
+};
+
 /// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
-/// says, and by how much it is to be taken larger still before the print is blamed: motion blur and compression move
-/// boundaries as a print's errors would.
+/// says, and what is doubted before the print is blamed.
 struct CommonErrors {
   std::array<double, measurement_groups> px{};
-  double noise_scale = 1, doubt_scale = 1;
+  double noise_scale = 1;
+  PrintDoubt doubt;
 };
 
 /// A group's residuals as a straight line over the print: of boundaries in metres along the shaft, of sides a constant
@@ -30,7 +38,8 @@ using ResidualLines = std::array<ResidualLine, measurement_groups>;
 ResidualLines residual_lines(std::span<const Measurement> measurements);
 
 /// A pose, given that the print may lie elsewhere than the rig says: each boundary at either edge of the print (tau = 0
-/// and tau -> 2 pi, linear between; the ends are circles). These six errors are normal, independent and alike.
+/// and tau -> 2 pi, linear between; the ends are circles). These six errors are normal, independent and alike; large
+/// ones have a seventh beside them that both inner boundaries share: an ink that lies aside.
 struct PrintFit {
   UnknownVector step;                    ///< to the mean of pose and film, from where the measurements were taken
   UnknownMatrix covariance;              ///< of the pose's unknowns, as it is to be told
@@ -48,7 +57,7 @@ struct PrintFit {
 /// makes the residuals. On return the residuals are those that the step and the print's likeliest errors leave.
 /// `lines` are those of these residuals, `film_prior` as the fit has it. Nullopt when a direction is not seen at all.
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
-                                  double film_prior, double tolerance_m, const CommonErrors& errors);
+                                  double film_prior, const Marker& marker, const CommonErrors& errors);
 
 /// Root mean square of the boundaries' residuals in sigmas, each about its own line; outliers do not count.
 double scatter_sigmas(std::span<const Measurement> measurements, const ResidualLines& lines);

@@ -70,9 +70,11 @@ Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
   const auto squared = [](double x) { return x * x; };
   const bool off = fit.print_off_probability > limits.certainly_off;
   const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
-  const double variance = fit.psi_variance;
-  if (fit.psi_variance_by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
-  if (variance < limit + limits.tolerance_slack * fit.psi_variance_by_tolerance) return Status::ok;
+  const double told_limit = squared(limits.max_sigma_told_rad), by_tolerance = fit.psi_variance_by_tolerance;
+  const double variance = fit.psi_variance, told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
+  if (by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
+  const double slack = limits.tolerance_slack * by_tolerance;
+  if (variance < limit + slack && told < told_limit + slack) return Status::ok;
   const bool well_seen = fit.located_fraction() > limits.well_seen_fraction;
   return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
 }
