@@ -116,7 +116,7 @@ TEST_F(CalibrateMarker, KeepsFramesOfEitherWayOfTheTurn) {
     frames.push_back(scenes::render(rig, {q}, static_cast<std::uint64_t>(i)));
   }
   KeyFrames key_frames(rig, 0);
-  for (int i = 0; i < 15; ++i) key_frames.add(frames[static_cast<std::size_t>(i < 8 ? i : 14 - i)], 0);
+  for (int i = 0; i < 29; ++i) key_frames.add(frames[static_cast<std::size_t>(i % 14 < 8 ? i % 14 : 14 - i % 14)], 0);
   int there = 0, back = 0;
   for (const KeyFrame& frame : key_frames.take()) {
     there += frame.turned_rad > 0, back += frame.turned_rad < 0;
@@ -124,8 +124,8 @@ TEST_F(CalibrateMarker, KeepsFramesOfEitherWayOfTheTurn) {
       EXPECT_NEAR(std::abs(frame.turned_rad), 0.2, 0.01);
     }
   }
-  EXPECT_EQ(there, 7);
-  EXPECT_EQ(back, 7);
+  EXPECT_EQ(there, 14);
+  EXPECT_EQ(back, 14);
 }
 
 TEST_F(CalibrateMarker, RefusesWhatCanNotTell) {
