@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <map>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 
 #include "acceptance/frame_sets.h"
 #include "acceptance/random_print.h"
+#include "acceptance/tally.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/sim/instrument_shaft.h"
@@ -69,40 +69,6 @@ std::vector<Blotch> blood_of(const Kind& kind, const Marker& print, Random& rand
   return blood;
 }
 
-// How a print is off: each boundary by itself, or inks that were not laid one on the other: the middle band as a whole.
-enum class Off { nowhere, bands, middle_ink };
-
-Marker printed(const Marker& nominal, Off off, Random& random) {
-  const double error_m = random.uniform(0.05 * mm, 0.3 * mm);
-  const bool askew = random.uniform() < 0.2;
-  if (off == Off::nowhere) return nominal;
-  if (off == Off::bands) return random_print(nominal, error_m, askew, random).marker;
-  Marker marker = nominal;
-  const double aside_m = random.uniform() < 0.5 ? error_m : -error_m;
-  for (auto* bands : {&marker.bands_upper_m, &marker.bands_lower_m}) (*bands)[0] += aside_m, (*bands)[2] -= aside_m;
-  return marker;
-}
-
-struct Tally {
-  int frames = 0, wrong = 0;
-  std::map<std::string, int> statuses;
-  std::vector<double> errors_rad, errors_sigmas;
-
-  void add(const Tally& other) {
-    frames += other.frames, wrong += other.wrong;
-    for (const auto& [status, count] : other.statuses) statuses[status] += count;
-    errors_rad.insert(errors_rad.end(), other.errors_rad.begin(), other.errors_rad.end());
-    errors_sigmas.insert(errors_sigmas.end(), other.errors_sigmas.begin(), other.errors_sigmas.end());
-  }
-  void show(const std::string& name) const {
-    std::printf("%s: %d frames", name.c_str(), frames);
-    for (const auto& [status, count] : statuses) std::printf(", %d %s", count, status.c_str());
-    std::printf("; psi rms %.1f mrad, largest %.1f mrad, error / sigma %.2f, %d wrong\n", 1e3 * rms(errors_rad),
-                1e3 * largest(errors_rad), rms(errors_sigmas), wrong);
-    std::fflush(stdout);
-  }
-};
-
 class HiddenBoundaries : public ::testing::Test {
  protected:
   const int pictures = from_environment("LAPSERVO_HIDDEN", 4);
@@ -115,7 +81,7 @@ class HiddenBoundaries : public ::testing::Test {
     Random random(static_cast<std::uint64_t>(seed) * 1'000'000 + static_cast<std::uint64_t>(number));
     const Instrument& instrument = rig.instruments[0];
     ShaftModel shaft = shaft_of(instrument);
-    shaft.marker = printed(instrument.marker, off, random);
+    shaft.marker = off_print(instrument.marker, off, random);
     shaft.blotches = blood_of(kind, shaft.marker, random);
     JointVector q = random_configurations(rig, 1, random.bits(), steepest_rad)[0][0];
     const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, static_cast<std::uint64_t>(number));
@@ -125,16 +91,12 @@ class HiddenBoundaries : public ::testing::Test {
     Tally tally;
     for (int frame = 0; frame < frames; ++frame) {
       const Observation o = tracker.track(renderer.render({placement_of(instrument, q)}, number * 100 + frame))[0];
-      ++tally.frames, ++tally.statuses[std::string(to_string(o.status))];
+      tally.add(o, q.psi_rad, seam_error_rad);
       const double error_rad = o.rcm ? wrap_pi(o.rcm->q.psi_rad - q.psi_rad - seam_error_rad) : 0;
       if (lists)
         std::printf("  %s, %d, frame %d: %s, psi off by %.1f mrad\n", kind.name.c_str(), number, frame,
                     std::string(to_string(o.status)).c_str(), 1e3 * error_rad);
       q.psi_rad += 0.05, q.rho_m += 0.2 * mm, q.theta_rad += 0.003;
-      if (o.status != Status::ok || !o.rcm) continue;
-      tally.wrong += std::abs(error_rad) > 0.1;
-      tally.errors_rad.push_back(error_rad);
-      tally.errors_sigmas.push_back(error_rad / std::sqrt(o.rcm->covariance(3, 3)));
     }
     return tally;
   }

@@ -2,16 +2,16 @@
 // LAPSERVO_PRINTS, LAPSERVO_PRINT_POSES and LAPSERVO_PRINT_SEED set how many (20 and 3; the figures of docs/accuracy.md
 // are of 200 and 10) and which.
 
-#include <cmath>
-#include <cstdio>
+#include <cstdint>
 #include <map>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "acceptance/frame_sets.h"
 #include "acceptance/random_print.h"
-#include "lapservo/core/angles.h"
+#include "acceptance/tally.h"
 #include "lapservo/core/random.h"
 
 namespace lapservo::acceptance {
@@ -20,39 +20,6 @@ namespace {
 
 constexpr double mm = 1e-3;
 constexpr double steepest_rad = 0.35;
-
-struct Tally {
-  int frames = 0, wrong = 0;
-  std::map<std::string, int> statuses;
-  std::vector<double> errors_rad, errors_sigmas;
-
-  // The seam's error is none that a picture could show.
-  void add(const Observation& o, double true_psi_rad, double seam_error_rad) {
-    ++frames;
-    ++statuses[std::string(to_string(o.status))];
-    if (o.status != Status::ok || !o.rcm) return;
-    const double error_rad = wrap_pi(o.rcm->q.psi_rad - true_psi_rad - seam_error_rad);
-    wrong += std::abs(error_rad) > 0.1;
-    errors_rad.push_back(error_rad);
-    errors_sigmas.push_back(error_rad / std::sqrt(o.rcm->covariance(3, 3)));
-  }
-  void add(const Tally& other) {
-    frames += other.frames, wrong += other.wrong;
-    for (const auto& [status, count] : other.statuses) statuses[status] += count;
-    errors_rad.insert(errors_rad.end(), other.errors_rad.begin(), other.errors_rad.end());
-    errors_sigmas.insert(errors_sigmas.end(), other.errors_sigmas.begin(), other.errors_sigmas.end());
-  }
-  double fraction(const std::string& status) const {
-    const auto found = statuses.find(status);
-    return found == statuses.end() ? 0 : static_cast<double>(found->second) / frames;
-  }
-  void show(const std::string& name) const {
-    std::printf("%s: %d frames", name.c_str(), frames);
-    for (const auto& [status, count] : statuses) std::printf(", %d %s", count, status.c_str());
-    std::printf("; psi rms %.1f mrad, largest %.1f mrad, error / sigma %.2f, %d wrong\n", 1e3 * rms(errors_rad),
-                1e3 * largest(errors_rad), rms(errors_sigmas), wrong);
-  }
-};
 
 class Prints : public ::testing::Test {
  protected:

@@ -23,4 +23,21 @@ inline Print random_print(const Marker& nominal, double error_m, bool askew, int
   return print;
 }
 
+/// How a print is off: each boundary by itself, or inks that were not laid one on the other: the middle band as a
+/// whole.
+enum class Off { nowhere, bands, middle_ink };
+
+/// One that is off by 0.05 to 0.3 mm in this way.
+inline Marker off_print(const Marker& nominal, Off off, internal::Random& random) {
+  constexpr double mm = 1e-3;
+  const double error_m = random.uniform(0.05 * mm, 0.3 * mm);
+  const bool askew = random.uniform() < 0.2;
+  if (off == Off::nowhere) return nominal;
+  if (off == Off::bands) return random_print(nominal, error_m, askew, random).marker;
+  Marker marker = nominal;
+  const double aside_m = random.uniform() < 0.5 ? error_m : -error_m;
+  for (auto* bands : {&marker.bands_upper_m, &marker.bands_lower_m}) (*bands)[0] += aside_m, (*bands)[2] -= aside_m;
+  return marker;
+}
+
 }  // namespace lapservo::acceptance
