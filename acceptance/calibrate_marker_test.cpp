@@ -2,8 +2,9 @@
 // calibrated, and tracked in other places with the calibrated rig. LAPSERVO_PRINTS, LAPSERVO_PRINT_SEED and
 // LAPSERVO_TURN_FRAMES set how many (1), which, and of how many frames (90). LAPSERVO_TURN_WAY is there, back, or both
 // one after the other. LAPSERVO_PRINT_CAMERA names what the
-// camera does to all pictures (camera_effects.h; none), or h264: then the turn is a video, and the other places are not
-// compressed.
+// camera does to all pictures (camera_effects.h; none), or h264 or video: then the turn is a video, by OpenCV's encoder
+// or by lapservo's, and the other places are not compressed. Also told is what the tracker makes of these places by the
+// true print.
 
 #include <cmath>
 #include <cstdio>
@@ -121,7 +122,8 @@ class CalibrateMarker : public ::testing::TestWithParam<Errors> {
   const std::string way = chosen_way != nullptr ? chosen_way : "there";
 
   effects::CameraEffects effects_of(int print) const {
-    return effects::draw(camera == "h264" ? "none" : camera, static_cast<std::uint64_t>(100 * seed + print));
+    return effects::draw(camera == "h264" || camera == "video" ? "none" : camera,
+                         static_cast<std::uint64_t>(100 * seed + print));
   }
   std::vector<TrueFrame> rendered(const Marker& print, std::vector<std::vector<JointVector>> places,
                                   std::uint64_t of_seed, const effects::CameraEffects& effects) const {
@@ -137,7 +139,7 @@ class CalibrateMarker : public ::testing::TestWithParam<Errors> {
 };
 
 TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
-  std::vector<double> before_rad, after_rad, after_sigmas, written_sigmas;
+  std::vector<double> before_rad, after_rad, true_rad, after_sigmas, written_sigmas;
   std::map<std::string, int> after_statuses;
   for (int i = 0; i < prints; ++i) {
     const effects::CameraEffects effects = effects_of(i);
@@ -150,7 +152,8 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
     const auto own_seed = static_cast<std::uint64_t>(100 * seed + i);
     KeyFrames key_frames(nominal, 0);
     auto turned = rendered(print, turn_of_way(nominal, turn_frames, own_seed, way), own_seed, effects);
-    if (camera == "h264") compress(turned);
+    if (camera == "h264") compress(turned, Encoder::opencv);
+    if (camera == "video") compress(turned, Encoder::lapservo);
     for (const TrueFrame& frame : turned) key_frames.add(frame.bgr, 0);
     const int found = key_frames.found();
     const MarkerCalibration calibration = calibrate_marker(nominal, 0, key_frames.take());
@@ -159,25 +162,31 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
     rig.instruments[0].marker = calibration.marker;
     const auto frames =
         rendered(print, random_configurations(nominal, held_out, 7 * own_seed, steepest_rad), own_seed, effects);
-    const Tracked before = tracked(frames, tolerant), after = tracked(frames, rig);
+    Rig exact = nominal;
+    exact.instruments[0].marker = print;
+    const Tracked before = tracked(frames, tolerant), after = tracked(frames, rig), by_true = tracked(frames, exact);
     const auto sigmas = errors_over_sigmas(calibration.marker, print);
     std::printf(
         "print %d: %d found, %zu used, %zu with the seam, %.3f px before, %.3f px after; psi rms %.2f mrad before, "
-        "%.2f after (mean %.2f), error / sigma %.2f;%s; gap %.3f of %.3f mm; written / sigma %.2f\n",
+        "%.2f after (mean %.2f), %.2f with the true print (mean %.2f), error / sigma %.2f;%s; gap %.3f of %.3f mm; "
+        "written / sigma %.2f\n",
         i, found, calibration.frames, calibration.seam_views, calibration.before_px, calibration.after_px,
         1e3 * rms(before.errors_rad), 1e3 * rms(after.errors_rad), 1e3 * mean(after.errors_rad),
-        rms(after.errors_sigmas), text_of(after.statuses).c_str(), 1e3 * calibration.marker.gap_rad * print.radius_m(),
+        1e3 * rms(by_true.errors_rad), 1e3 * mean(by_true.errors_rad), rms(after.errors_sigmas),
+        text_of(after.statuses).c_str(), 1e3 * calibration.marker.gap_rad * print.radius_m(),
         1e3 * print.gap_rad * print.radius_m(), rms(sigmas));
     const auto append = [](std::vector<double>& all, const std::vector<double>& more) {
       all.insert(all.end(), more.begin(), more.end());
     };
-    append(before_rad, before.errors_rad), append(after_rad, after.errors_rad);
+    append(before_rad, before.errors_rad), append(after_rad, after.errors_rad), append(true_rad, by_true.errors_rad);
     append(after_sigmas, after.errors_sigmas), append(written_sigmas, sigmas);
     for (const auto& [status, count] : after.statuses) after_statuses[status] += count;
   }
-  std::printf("all: psi rms %.1f mrad before, %.2f after, error / sigma %.2f;%s; written numbers' error / sigma %.2f\n",
-              1e3 * rms(before_rad), 1e3 * rms(after_rad), rms(after_sigmas), text_of(after_statuses).c_str(),
-              rms(written_sigmas));
+  std::printf(
+      "all: psi rms %.1f mrad before, %.2f after, %.2f with the true prints, error / sigma %.2f;%s; written numbers' "
+      "error / sigma %.2f\n",
+      1e3 * rms(before_rad), 1e3 * rms(after_rad), 1e3 * rms(true_rad), rms(after_sigmas),
+      text_of(after_statuses).c_str(), rms(written_sigmas));
   // Of some prints nothing is ok before: then there is nothing to compare with.
   if (GetParam().bands_m > 0 && !before_rad.empty()) {
     EXPECT_LE(rms(after_rad), 0.1 * rms(before_rad));

@@ -13,6 +13,7 @@
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/video_encoder.h"
 #include "lapservo/io/video_reader.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/visibility.h"
@@ -177,11 +178,15 @@ std::vector<TrueFrame> rendered_frames(const RenderedSet& set) {
   return frames;
 }
 
-void compress(std::vector<TrueFrame>& frames) {
+void compress(std::vector<TrueFrame>& frames, Encoder encoder) {
   const testing::TemporaryFolder folder;
   const auto path = folder.path() / "frames.mp4";
-  {
-    // VideoWriter's are MPEG-4 part 2.
+  if (encoder == Encoder::lapservo) {
+    VideoEncoder writer(path, "frames.mp4", frames.at(0).bgr.size(), 30);
+    for (const TrueFrame& frame : frames) writer.add(frame.bgr);
+    writer.finish();
+  } else {
+    // VideoWriter's own choice is MPEG-4 part 2.
     cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'), 30,
                            frames.at(0).bgr.size());
     if (!writer.isOpened()) throw std::runtime_error("no encoder of H.264");

@@ -75,8 +75,9 @@ struct RenderedSet {
 };
 std::vector<TrueFrame> rendered_frames(const RenderedSet& set);
 
-/// The frames as a video of theirs (H.264, 30 frames/s) gives them back.
-void compress(std::vector<TrueFrame>& frames);
+/// The frames as a video of theirs gives them back: libx264, 30 frames/s, as OpenCV sets it up or as lapservo does.
+enum class Encoder { opencv, lapservo };
+void compress(std::vector<TrueFrame>& frames, Encoder encoder = Encoder::opencv);
 
 /// The rig of configs/example.yaml.
 Rig example_rig();

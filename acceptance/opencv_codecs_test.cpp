@@ -2,8 +2,6 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -13,13 +11,13 @@
 #include <opencv2/videoio.hpp>
 
 #include "lapservo/core/random.h"
-#include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_encoding.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/io/png_encoding.h"
 #include "lapservo/io/video_writer.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/videos.h"
 
 namespace lapservo::internal {
 namespace {
@@ -107,42 +105,16 @@ TEST(Decoding, GivesThePixelsOfOpenCv) {
     }
 }
 
-constexpr int frames = 20;
+constexpr int frames = testing::video_frames;
+using testing::read_file;
+using testing::read_video;
+using testing::VideoRead;
 
 void write_video(const std::filesystem::path& path, const char* codec) {
   cv::VideoWriter video(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]),
-                        25, {320, 240});
+                        25, testing::video_size);
   ASSERT_TRUE(video.isOpened()) << path;
-  cv::RNG random(7);
-  for (int i = 0; i < frames; ++i) {
-    cv::Mat image(240, 320, CV_8UC3);
-    random.fill(image, cv::RNG::UNIFORM, 60, 200);
-    image(cv::Rect(10 * i, 50, 40, 40)).setTo(cv::Scalar(20, 40, 250));
-    video.write(image);
-  }
-}
-
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-struct Read {
-  int frames = 0, damaged = 0;
-  std::string complaint;
-};
-
-Read read(const std::filesystem::path& path) {
-  const auto source = open_frame_source(path.string(), 30);
-  Read result;
-  while (const auto frame = source->next()) {
-    EXPECT_EQ(frame->index, result.frames);
-    EXPECT_EQ(frame->bgr.size(), cv::Size(320, 240));
-    ++result.frames;
-    result.damaged += frame->flaw == Status::damaged;
-  }
-  result.complaint = source->complaint();
-  return result;
+  testing::for_each_picture([&](const cv::Mat& image) { video.write(image); });
 }
 
 TEST(OpenCvsVideo, GivesEveryFrame) {
@@ -150,7 +122,7 @@ TEST(OpenCvsVideo, GivesEveryFrame) {
   for (const auto& [name, codec] :
        {std::pair{"a.mp4", "mp4v"}, {"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
     write_video(folder / name, codec);
-    const Read whole = read(folder / name);
+    const VideoRead whole = read_video(folder / name);
     EXPECT_EQ(whole.frames, frames) << name;
     EXPECT_EQ(whole.damaged, 0) << name;
     EXPECT_EQ(whole.complaint, "") << name;
@@ -161,9 +133,9 @@ TEST(OpenCvsVideo, ThatEndsEarlySaysSo) {
   const testing::TemporaryFolder folder;
   for (const auto& [name, codec] : {std::pair{"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
     write_video(folder / name, codec);
-    const std::string whole = bytes_of(folder / name);
+    const std::string whole = read_file(folder / name);
     testing::write_file(folder / name, whole.substr(0, whole.size() / 2));
-    const Read half = read(folder / name);
+    const VideoRead half = read_video(folder / name);
     EXPECT_LT(half.frames, frames) << name;
     EXPECT_NE(half.complaint, "") << name;
   }
@@ -174,12 +146,9 @@ TEST(OpenCvsVideo, HasItsDamagedFramesMarked) {
   const testing::TemporaryFolder folder;
   for (const auto& [name, codec] : {std::pair{"a.mp4", "mp4v"}, {"a.avi", "MJPG"}}) {
     write_video(folder / name, codec);
-    std::string bytes = bytes_of(folder / name);
-    Random random(3);
-    for (std::size_t i = bytes.size() / 3; i < bytes.size() / 3 + 200; ++i)
-      bytes[i] = static_cast<char>(random.bits() & 0x7f);
-    testing::write_file(folder / name, bytes);
-    const Read damaged = read(folder / name);
+    const std::string whole = read_file(folder / name);
+    testing::write_file(folder / name, testing::with_damage(whole, whole.size() / 3, 3));
+    const VideoRead damaged = read_video(folder / name);
     EXPECT_GE(damaged.damaged, 1) << name;
     EXPECT_NE(damaged.complaint, "") << name;
   }

@@ -4,7 +4,6 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -12,15 +11,11 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/testing/sample_frames.h"
+#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo {
 namespace {
 namespace fs = std::filesystem;
-
-std::string read(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 // Without blanks and backticks at its ends.
 std::string bare(const std::string& cell) {
@@ -39,7 +34,7 @@ std::string all_tests(const fs::path& root) {
   std::string text;
   for (const char* folder : {"lapservo", "acceptance"})
     for (const auto& entry : fs::recursive_directory_iterator(root / folder))
-      if (entry.path().string().ends_with("_test.cpp")) text += read(entry.path());
+      if (entry.path().string().ends_with("_test.cpp")) text += testing::read_file(entry.path());
   return text;
 }
 
@@ -53,7 +48,7 @@ TEST(PaperTable, NamesOnlyWhatThereIs) {
     SCOPED_TRACE(line);
     const auto row = cells(line);
     ASSERT_EQ(row.size(), 5U);
-    EXPECT_NE(read(root / row[2]).find(row[3]), std::string::npos) << row[2] << " has no " << row[3];
+    EXPECT_NE(testing::read_file(root / row[2]).find(row[3]), std::string::npos) << row[2] << " has no " << row[3];
     std::string test = row[4];
     if (const auto dot = test.find('.'); dot != std::string::npos) test.replace(dot, 1, ", ");
     EXPECT_NE(tests.find(test + (test.empty() ? "" : ")")), std::string::npos) << "no test " << row[4];

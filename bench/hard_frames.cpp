@@ -92,7 +92,7 @@ void for_each_frame(cv::Size size_px, const Sequence& sequence, int frames,
     const Condition& condition = sequence.parts[static_cast<std::size_t>(run) % sequence.parts.size()];
     const Rig rig = scaled_rig(size_px, condition.instruments);
     Renderer renderer = renderer_of(rig, condition, static_cast<std::uint64_t>(run) + 1);
-    for (int i = 0; i < frames / runs; ++i) {
+    for (int i = 0; i < std::max(1, frames / runs); ++i) {
       std::vector<ShaftPlacement> placed = placements(rig, 31 * run + i);
       for (std::size_t k = 0; k < std::min(placed.size(), condition.covered.size()); ++k)
         placed[k].covered = condition.covered[k];

@@ -62,6 +62,10 @@ int run_marker(const CalibrateOptions& options) {
       "diameter_m is the rig's (%.3f mm): pictures tell lengths in diameters; a smaller shaft nearer by looks "
       "the same\n",
       1e3 * instrument.marker.diameter_m);
+  if (calibration.seam_may_lag)
+    std::printf(
+        "the pictures look compressed, and the turn goes one way: where video leaves the seam behind, psi is up to "
+        "3 mrad off; turn the instrument there and back\n");
   if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
   if (!options.report.empty()) {
     write_marker_report(options.report, instrument, calibration);
@@ -93,7 +97,8 @@ void add_calibrate_marker(Command parent, Run& run_later) {
   command.footer(
       "Turn the instrument about its axis once, or a little more, in 20 to 60 s, near and sharp, the whole marker in "
       "view;\n"
-      "it may move otherwise too. All numbers are written with one standard deviation each (sigma_...).\n"
+      "it may move otherwise too. For a compressed video turn it there and back. All numbers are written with one "
+      "standard deviation each (sigma_...).\n"
       "Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml --report marker.html");
   command.runs(run_later, [options] { return run_marker(*options); });
 }

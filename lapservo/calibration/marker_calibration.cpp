@@ -43,6 +43,13 @@ std::size_t sector_of(double tau_rad) {
   return static_cast<std::size_t>(std::min(sectors - 1.0, wrap_two_pi(tau_rad) / two_pi * sectors));
 }
 
+// The marker's other azimuths face the camera as it turns; farther than so from one frame to the next it jumped.
+double turn_between(double before_tau_rad, double tau_rad) {
+  constexpr double farthest_turn_rad = 0.6;
+  const double turned_rad = wrap_pi(before_tau_rad - tau_rad);
+  return std::abs(turned_rad) < farthest_turn_rad ? turned_rad : 0;
+}
+
 // Sharper is better, and a pose that settled best.
 double worth(const Sighting& sighting) {
   return (sighting.settled ? 100 : 0) - sighting.blur.boundaries_px - sighting.blur.sides_px;
@@ -73,6 +80,7 @@ class TurnFit {
       auto measured = measurer_.measure(frame.view, marker_, frame.sighting,
                                         {extra_px, how.seam_reach_m, free_gap_, how.ask_processing});
       if (measured.edges.all.size() < min_edges) return true;  // too few for a pose
+      measured.turned_rad = frame.turned_rad;
       measured_.push_back(std::move(measured));
       return false;
     });
@@ -233,13 +241,16 @@ MarkerCalibration refused(std::string why) {
 }  // namespace
 
 KeyFrames::KeyFrames(const Rig& rig, std::size_t instrument)
-    : rig_(rig), instrument_(instrument), survey_(rig, instrument), sectors_(sectors) {}
+    : rig_(rig), instrument_(instrument), survey_(rig, instrument), sectors_(2 * sectors) {}
 
 bool KeyFrames::add(const cv::Mat& bgr, double time_s) {
   const auto sighting = survey_.find(bgr);
+  const auto before_rad = std::exchange(last_tau_rad_, std::nullopt);
   if (!sighting) return false;
   ++found_;
-  auto& sector = sectors_[sector_of(sighting->tau_rad)];
+  last_tau_rad_ = sighting->tau_rad;
+  const double turned_rad = before_rad ? turn_between(*before_rad, sighting->tau_rad) : 0;
+  auto& sector = sectors_[sector_of(sighting->tau_rad) + (turned_rad < 0 ? sectors : 0)];
   auto worst = sector.end();
   if (sector.size() >= max_per_sector) {
     worst = std::min_element(sector.begin(), sector.end(), [](const KeyFrame& a, const KeyFrame& b) {
@@ -250,7 +261,7 @@ bool KeyFrames::add(const cv::Mat& bgr, double time_s) {
   const Marker& marker = rig_.instruments[instrument_].marker;
   auto view = cropped_view(bgr, rig_.camera, marker, sighting->unknowns.pose().camera_from_unrolled);
   if (!view) return true;
-  KeyFrame frame{std::move(*view), *sighting, std::min(time_s, max_time_s)};
+  KeyFrame frame{std::move(*view), *sighting, std::min(time_s, max_time_s), turned_rad};
   if (worst == sector.end())
     sector.push_back(std::move(frame));
   else
@@ -307,6 +318,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   if (!last) return refused(unsolvable);
   if (const std::string why = blur_refusal(fit.frames(), nominal); !why.empty()) return refused(why);
   calibration.seam_views = seam_views(fit.measured());
+  calibration.seam_may_lag = last->lags;
   if (calibration.seam_views < min_seam_views)
     return refused(
         "the seam is not seen well enough to tell where the print begins: film it slowly passing the camera, without "

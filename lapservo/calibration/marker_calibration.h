@@ -19,6 +19,7 @@ struct KeyFrame {
   MarkerView view;
   Sighting sighting;
   double time_s = 0;
+  double turned_rad = 0;  ///< about the axis since the frame before, as psi counts; 0 where that is not known
 };
 
 /// Chooses, out of all frames of a turn, some from all sides of the marker.
@@ -36,7 +37,8 @@ class KeyFrames {
   Rig rig_;
   std::size_t instrument_;
   MarkerSurvey survey_;
-  std::vector<std::vector<KeyFrame>> sectors_;  // by the azimuth that faces the camera
+  std::vector<std::vector<KeyFrame>> sectors_;  // by the azimuth that faces the camera, for either way of the turn
+  std::optional<double> last_tau_rad_;
   int found_ = 0;
 };
 
@@ -52,6 +54,8 @@ struct MarkerCalibration {
   Marker marker;               ///< with its sigmas; tolerance_m is what they leave
   std::size_t frames = 0;      ///< that were used
   std::size_t seam_views = 0;  ///< of them, those that show the seam
+  /// Compressed pictures of a turn of one way: the seam may lie behind in all of them. There and back would tell.
+  bool seam_may_lag = false;
   /// Of boundaries' points about a fit of the poses, for the rig's print and for the calibrated one: rms of what is no
   /// outlier to the latter.
   double before_px = 0, after_px = 0;

@@ -105,6 +105,29 @@ TEST_F(CalibrateMarker, AnExactPrintStaysAsItIs) {
   EXPECT_EQ(calibration.marker.gap_rad, 0);
 }
 
+// What a video leaves behind differs between the two.
+TEST_F(CalibrateMarker, KeepsFramesOfEitherWayOfTheTurn) {
+  Random random(4);
+  const JointVector start = scenes::random_configuration(rig, 0, random);
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < 8; ++i) {
+    JointVector q = start;
+    q.psi_rad = wrap_pi(q.psi_rad + 0.2 * i);
+    frames.push_back(scenes::render(rig, {q}, static_cast<std::uint64_t>(i)));
+  }
+  KeyFrames key_frames(rig, 0);
+  for (int i = 0; i < 29; ++i) key_frames.add(frames[static_cast<std::size_t>(i % 14 < 8 ? i % 14 : 14 - i % 14)], 0);
+  int there = 0, back = 0;
+  for (const KeyFrame& frame : key_frames.take()) {
+    there += frame.turned_rad > 0, back += frame.turned_rad < 0;
+    if (frame.turned_rad != 0) {
+      EXPECT_NEAR(std::abs(frame.turned_rad), 0.2, 0.01);
+    }
+  }
+  EXPECT_EQ(there, 14);
+  EXPECT_EQ(back, 14);
+}
+
 TEST_F(CalibrateMarker, RefusesWhatCanNotTell) {
   const Marker print = real_print(nominal, 0);
   const auto refusal = [&](const Turn& turn) {

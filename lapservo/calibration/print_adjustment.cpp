@@ -19,9 +19,9 @@ constexpr double mm = 1e-3;
 // Of a frame: its pose and, as in every fit of the tracker, the film's thickness in film_sigma_m.
 constexpr int frame_numbers = 7, film = 6;
 // After the print's numbers (lengths in mm): what all films are off by, in film_sigma_m, and all sides, the seam's
-// edges and each boundary, in all frames alike [px].
+// edges and each boundary, in all frames alike [px]; and by how much the seam's edges stay behind their motion [px].
 constexpr int shared_film = print_numbers, sides = shared_film + 1, seam = sides + 1, boundaries = seam + 2;
-constexpr int shared_numbers = boundaries + 4;
+constexpr int seam_lag = boundaries + 4, shared_numbers = seam_lag + 1;
 constexpr int gap = print_numbers - 1;
 constexpr std::size_t upper_group = measurement_groups, groups = measurement_groups + 2;
 
@@ -33,6 +33,11 @@ constexpr double print_prior_mm = 2, gap_prior_rad = 0.5;
 constexpr std::array shared_sigmas{1.0, 0.05, 0.03, 0.03, 0.05, 0.01, 0.01, 0.05};
 constexpr double zero = 1e-3;            // of these
 constexpr double common_seam_px = 0.03;  // of one frame
+// Compressed video leaves the seam's edges 0.05 to 0.14 px behind and the bands' boundaries, which move less, 0.02 px
+// at most. A turn there and back tells by how much; one of one way can't tell it from a seam that lies elsewhere.
+constexpr double seam_lag_px = 0.1, seam_lag_from_px = 0.2;
+constexpr std::ptrdiff_t min_seam_views_each_way = 3;
+constexpr double min_noise_of_lag = 0.3;  // of edges, beyond the usual
 
 using SharedRow = std::array<double, shared_numbers>;
 
@@ -109,8 +114,10 @@ SharedRow shared_row(const Measurement& m, const PrintShape& shape, double cover
   return row;
 }
 
-SharedRow shared_row(const SeamEdge& edge, bool lower) {
+SharedRow shared_row(const SeamEdge& edge, bool lower, double turned_rad) {
   SharedRow row{};
+  const double moved_px = edge.row[edge.row.size() - 1] * turned_rad;
+  row[seam_lag] = -moved_px / std::hypot(moved_px, seam_lag_from_px);
   row[gap] = edge.by_gap_px;
   row[lower ? seam + 1 : seam] = 1;
   return row;
@@ -126,10 +133,9 @@ struct FrameBlocks {
 double common_sigma_px(std::size_t group, const ViewMeasurements& frame) {
   const double more_px =
       fine_fit_limits.common_fraction_of_blur * std::max(0.0, frame.blur_px - fine_fit_limits.usual_blur_px);
-  if (group < 4)
-    return std::hypot(fine_fit_limits.common_boundary_px + more_px,
-                      fine_fit_limits.fraction_of_processing * frame.bias_px[group]);
-  return group < measurement_groups ? fine_fit_limits.common_side_px + more_px : common_seam_px + more_px;
+  if (group >= measurement_groups) return common_seam_px + more_px;
+  const double usual_px = group < 4 ? fine_fit_limits.common_boundary_px : fine_fit_limits.common_side_px;
+  return std::hypot(usual_px + more_px, fine_fit_limits.fraction_of_processing * frame.bias_px[group]);
 }
 
 void add_frame(ceres::Problem& problem, const ViewMeasurements& frame, const PrintShape& shape, double covered_rad,
@@ -148,7 +154,8 @@ void add_frame(ceres::Problem& problem, const ViewMeasurements& frame, const Pri
   }
   const auto add_seam = [&](const std::optional<SeamEdge>& edge, std::size_t group) {
     if (!edge) return;
-    auto* cost = new LinearCost(edge->row, shared_row(*edge, group != upper_group), edge->residual_px, edge->sigma_px);
+    auto* cost = new LinearCost(edge->row, shared_row(*edge, group != upper_group, frame.turned_rad), edge->residual_px,
+                                edge->sigma_px);
     blocks.seam.push_back(cost);
     add(cost, group), used[group] = true;
   };
@@ -158,34 +165,59 @@ void add_frame(ceres::Problem& problem, const ViewMeasurements& frame, const Pri
       problem.AddResidualBlock(new Prior(1, 0, 0, common_sigma_px(group, frame)), nullptr, &blocks.common[group]);
 }
 
-void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& shared) {
+bool tells_lag(const std::vector<ViewMeasurements>& frames) {
+  const auto views = [&](double way) {
+    return std::count_if(frames.begin(), frames.end(), [=](const ViewMeasurements& frame) {
+      return frame.seam && (frame.seam->upper || frame.seam->lower) && way * frame.turned_rad > 0;
+    });
+  };
+  return std::min(views(1), views(-1)) >= min_seam_views_each_way;
+}
+
+void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& shared, bool free_lag) {
   const auto add = [&](int index, double sigma) {
     problem.AddResidualBlock(new Prior(shared_numbers, index, 0, sigma), nullptr, shared.data());
   };
   for (int i = 0; i < gap; ++i) add(i, print_prior_mm);
   add(gap, gap_prior_rad);
-  for (int i = shared_film; i < shared_numbers; ++i)
-    add(i, zero * shared_sigmas[static_cast<std::size_t>(i - shared_film)]);
+  for (int i = shared_film; i < seam_lag; ++i) add(i, zero * shared_sigmas[static_cast<std::size_t>(i - shared_film)]);
+  add(seam_lag, free_lag ? seam_lag_px : zero * seam_lag_px);
+}
+
+// How much noisier edges are than usual: those of compressed pictures.
+double noise_of_edges(const std::vector<ViewMeasurements>& frames) {
+  std::vector<double> sigmas_px;
+  for (const ViewMeasurements& frame : frames)
+    for (const Measurement& m : frame.edges.all)
+      if (m.group < 4) sigmas_px.push_back(m.sigma_px);
+  return sigmas_px.empty() ? 1 : std::max(1.0, median(sigmas_px) / fine_fit_limits.usual_sigma_px);
 }
 
 // Compression, motion blur and processing move edges, in all frames alike.
 double doubt_scale(const std::vector<ViewMeasurements>& frames) {
-  std::vector<double> sigmas_px, blurs_px, biases_px;
+  std::vector<double> blurs_px, biases_px;
   for (const ViewMeasurements& frame : frames) {
     blurs_px.push_back(frame.blur_px);
     biases_px.push_back(Eigen::Map<const Eigen::Vector4d>(frame.bias_px.data()).norm() / 2);
-    for (const Measurement& m : frame.edges.all)
-      if (m.group < 4) sigmas_px.push_back(m.sigma_px);
   }
-  if (sigmas_px.empty()) return 1;
-  return std::max(1.0, median(sigmas_px) / fine_fit_limits.usual_sigma_px) +
-         std::max(0.0, median(blurs_px) - fine_fit_limits.usual_blur_px) +
+  if (blurs_px.empty()) return 1;
+  return noise_of_edges(frames) + std::max(0.0, median(blurs_px) - fine_fit_limits.usual_blur_px) +
          median(biases_px) / fine_fit_limits.doubted_processing_px;
 }
 
-// The print's; what was taken for zero in all frames counts as it was before the fit.
+// One sigma of what was taken for zero in all frames, from the film on.
+Eigen::VectorXd sigmas_of_common(const std::vector<ViewMeasurements>& frames, bool free_lag) {
+  const auto known = static_cast<Eigen::Index>(shared_sigmas.size());
+  Eigen::VectorXd sigmas(free_lag ? known : known + 1);
+  sigmas.head(known) = doubt_scale(frames) * Eigen::Map<const Eigen::VectorXd>(shared_sigmas.data(), known);
+  sigmas[0] = shared_sigmas[0];  // the film is as thick in any picture
+  if (!free_lag) sigmas[known] = seam_lag_px * std::min(1.0, noise_of_edges(frames) - 1);
+  return sigmas;
+}
+
+// The print's; what was taken for zero in all frames, by `prior`, counts as it was before the fit.
 std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, const std::array<double, shared_numbers>& shared,
-                                             bool free_gap, double noise_scale, double doubt_scale) {
+                                             bool free_gap, double noise_scale, const Eigen::VectorXd& prior) {
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
   ceres::Covariance covariance(options);
@@ -193,15 +225,11 @@ std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, const std:
   if (!covariance.Compute(blocks, &problem)) return std::nullopt;
   Eigen::Matrix<double, shared_numbers, shared_numbers, Eigen::RowMajor> all;
   if (!covariance.GetCovarianceBlock(shared.data(), shared.data(), all.data())) return std::nullopt;
-  constexpr int common = shared_numbers - shared_film;
-  Eigen::Matrix<double, common, 1> prior =
-      doubt_scale * Eigen::Map<const Eigen::Matrix<double, common, 1>>(shared_sigmas.data());
-  prior[0] = shared_sigmas[0];  // the film is as thick in any picture
+  const Eigen::Index common = prior.size();
   const PrintCovariance joint = all.topLeftCorner<print_numbers, print_numbers>();
-  const Eigen::Matrix<double, print_numbers, common> cross = all.block<print_numbers, common>(0, shared_film);
-  const Eigen::Matrix<double, common, common> of_common = all.bottomRightCorner<common, common>();
-  const Eigen::Matrix<double, print_numbers, common> by_common =
-      solve_symmetric(of_common, cross.transpose()).transpose();
+  const Eigen::MatrixXd cross = all.block(0, shared_film, print_numbers, common);
+  const Eigen::MatrixXd of_common = all.block(shared_film, shared_film, common, common);
+  const Eigen::MatrixXd by_common = solve_symmetric(of_common, cross.transpose()).transpose();
   const PrintCovariance known = joint - by_common * cross.transpose();  // were the common errors known
   const PrintCovariance print = std::max(1.0, noise_scale * noise_scale) * known +
                                 by_common * prior.cwiseAbs2().asDiagonal() * by_common.transpose();
@@ -219,7 +247,8 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   std::vector<FrameBlocks> blocks(frames.size());
   ceres::Problem problem;
   problem.AddParameterBlock(shared.data(), shared_numbers);
-  add_priors(problem, shared);
+  const bool free_lag = tells_lag(frames);
+  add_priors(problem, shared, free_lag);
   const PrintShape shape = PrintShape::of(marker);
   for (std::size_t i = 0; i < frames.size(); ++i)
     add_frame(problem, frames[i], shape, marker.covered_rad(), options.loss_scale_sigmas, shared, blocks[i]);
@@ -238,6 +267,7 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   if (!solve_quietly(solver, problem, summary)) return std::nullopt;
 
   Adjustment result;
+  result.lags = !free_lag && noise_of_edges(frames) > 1 + min_noise_of_lag;
   for (int i = 0; i < print_numbers; ++i) result.print[i] = shared[static_cast<std::size_t>(i)] * (i == gap ? 1 : mm);
   std::vector<double> sigmas;
   for (const FrameBlocks& frame : blocks) {
@@ -251,7 +281,8 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   }
   result.noise_scale = robust_scale(std::move(sigmas));
   if (options.with_covariance) {
-    result.covariance = covariance_of(problem, shared, options.free_gap, result.noise_scale, doubt_scale(frames));
+    result.covariance =
+        covariance_of(problem, shared, options.free_gap, result.noise_scale, sigmas_of_common(frames, free_lag));
     if (!result.covariance) return std::nullopt;
   }
   return result;

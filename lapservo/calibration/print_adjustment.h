@@ -25,6 +25,8 @@ struct Adjustment {
   /// How many times what the measurements say of themselves their scatter is; robust.
   double noise_scale = 1;
   std::optional<PrintCovariance> covariance;  ///< of the print, when asked for
+  /// The pictures look compressed and turn one way: the seam may stay behind, by what nobody knows.
+  bool lags = false;
 };
 
 /// Fits the poses of all frames and one print to what was measured near the believed ones, linearised there, with a

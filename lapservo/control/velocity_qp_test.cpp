@@ -9,7 +9,7 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace {
+namespace velocity_qp_test {
 
 struct Problem {
   Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();
@@ -132,5 +132,5 @@ TEST(VelocityQp, ReturnsTheWantedPointWhenItIsFeasible) {
   EXPECT_FALSE(solution.constrained);
 }
 
-}  // namespace
+}  // namespace velocity_qp_test
 }  // namespace lapservo::internal

@@ -10,7 +10,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t max_joints = 64;
-constexpr double memory_s = 0.25;  // by which a set-point that was sent comes back as the arm's
+constexpr double memory_s = 0.25;  // by which a set-point that was sent is the arm's
 // What an arm may make of a set-point (units, coupling, rounding) before it is somebody else's.
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
 constexpr double same_other = 4e-3;
@@ -99,7 +99,7 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
   if (!moving_) {
     names_ = message.names;
     places_ = *places;
-  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_, arrival_s))) {
+  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_))) {
     on_foreign_command();
   }
   watch(arrival_s);
@@ -115,10 +115,10 @@ void Interlock::on_foreign_command() {
 }
 
 // Between those that were sent of late: the arm may interpolate, and what comes back is from a moment ago.
-bool Interlock::is_ours(const Reading& setpoint, double now_s) const {
+bool Interlock::is_ours(const Reading& setpoint) const {
   Eigen::Vector4d lower = last_, upper = last_;
   for (const Sent& sent : sent_) {
-    if (now_s - sent.time_s > memory_s) continue;
+    if (setpoint.time_s - sent.time_s > memory_s) continue;
     lower = lower.cwiseMin(sent.q);
     upper = upper.cwiseMax(sent.q);
   }
@@ -235,7 +235,7 @@ std::optional<std::vector<double>> Interlock::tick(double now_s) {
     return std::nullopt;
   }
   sent_.push_back({now_s, last_});
-  while (now_s - sent_.front().time_s > memory_s) sent_.pop_front();
+  while (now_s - sent_.front().time_s > memory_s + config_.max_age_s) sent_.pop_front();
   ++counts_.set_points;
   return all_joints();
 }

@@ -115,7 +115,7 @@ class Interlock {
   void watch(double now_s);
   void forget_path();
   void start(double now_s);
-  bool is_ours(const Reading& setpoint, double now_s) const;
+  bool is_ours(const Reading& setpoint) const;
   Eigen::Vector4d within_limits(const Eigen::Vector4d& wanted) const;
   std::vector<double> all_joints() const;
 

@@ -253,6 +253,20 @@ TEST(Interlock, TheArmsOwnSetPointMayComeBackLate) {
   EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
 }
 
+// A quarter of a second to the arm, and its answer was on its way for nearly as long as answers count.
+TEST(Interlock, TheWayBackCountsByTheStamp) {
+  Bench bench;
+  bench.control(0.3, slow);
+  JointMessage late = bench.message(bench.setpoint);
+  bench.control(0.2, slow);
+  const double stamped_s = bench.now_s;
+  bench.talking = false;
+  bench.pass(max_s - 2 * tick_s);
+  late.stamp_s = epoch_s + stamped_s;
+  bench.interlock.on_setpoint(late, bench.now_s);
+  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+}
+
 TEST(Interlock, DoesNotStartWhereTheArmIsFarFromItsSetPoint) {
   Bench bench;
   bench.sag[1] = 0.06;

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <thread>
 #include <vector>
@@ -22,53 +20,29 @@ extern "C" {
 #include "lapservo/io/video_writer.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/videos.h"
 
 namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr int frames = 20;
+constexpr int frames = testing::video_frames;
+using testing::read_file;
+using testing::read_video;
+using testing::VideoRead;
+using testing::with_damage;
 
 void write_video(const fs::path& path) {
   VideoWriter video(path, 25);
-  cv::RNG random(7);
-  for (int i = 0; i < frames; ++i) {
-    cv::Mat image(240, 320, CV_8UC3);
-    random.fill(image, cv::RNG::UNIFORM, 60, 200);
-    image(cv::Rect(10 * i, 50, 40, 40)).setTo(cv::Scalar(20, 40, 250));
-    video.add(image);
-  }
+  testing::for_each_picture([&](const cv::Mat& image) { video.add(image); });
   video.commit();
-}
-
-std::string bytes_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-struct Read {
-  int frames = 0, damaged = 0;
-  std::string complaint;
-};
-
-Read read(const fs::path& path) {
-  const auto source = open_frame_source(path.string(), 30);
-  Read result;
-  while (const auto frame = source->next()) {
-    EXPECT_EQ(frame->index, result.frames);
-    EXPECT_EQ(frame->bgr.size(), cv::Size(320, 240));
-    ++result.frames;
-    result.damaged += frame->flaw == Status::damaged;
-  }
-  result.complaint = source->complaint();
-  return result;
 }
 
 TEST(VideoSource, GivesEveryFrameOfAWholeVideo) {
   const testing::TemporaryFolder folder;
   for (const char* name : {"a.mp4", "a.mkv", "a.avi", "a.ts"}) {
     write_video(folder / name);
-    const Read whole = read(folder / name);
+    const VideoRead whole = read_video(folder / name);
     EXPECT_EQ(whole.frames, frames) << name;
     EXPECT_EQ(whole.damaged, 0) << name;
     EXPECT_EQ(whole.complaint, "") << name;
@@ -92,9 +66,9 @@ TEST(VideoSource, SaysThatAVideoEndsEarly) {
   const testing::TemporaryFolder folder;
   for (const char* name : {"a.mkv", "a.avi", "a.ts"}) {
     write_video(folder / name);
-    const std::string whole = bytes_of(folder / name);
+    const std::string whole = read_file(folder / name);
     testing::write_file(folder / name, whole.substr(0, whole.size() / 2));
-    const Read half = read(folder / name);
+    const VideoRead half = read_video(folder / name);
     EXPECT_LT(half.frames, frames) << name;
     EXPECT_NE(half.complaint, "") << name;
   }
@@ -105,12 +79,9 @@ TEST(VideoSource, MarksDamagedFrames) {
   const testing::TemporaryFolder folder;
   for (const char* name : {"a.mp4", "a.avi"}) {
     write_video(folder / name);
-    std::string bytes = bytes_of(folder / name);
-    Random random(3);
-    for (std::size_t i = bytes.size() / 3; i < bytes.size() / 3 + 200; ++i)
-      bytes[i] = static_cast<char>(random.bits() & 0x7f);
-    testing::write_file(folder / name, bytes);
-    const Read damaged = read(folder / name);
+    const std::string whole = read_file(folder / name);
+    testing::write_file(folder / name, with_damage(whole, whole.size() / 3, 3));
+    const VideoRead damaged = read_video(folder / name);
     EXPECT_GE(damaged.damaged, 1) << name;
     EXPECT_NE(damaged.complaint, "") << name;
   }
@@ -150,17 +121,13 @@ TEST(VideoSource, MarksDamagedFramesOfSeveralSlices) {
   if (!avcodec_find_encoder_by_name("libx264")) GTEST_SKIP() << "FFmpeg here lacks libx264";
   const testing::TemporaryFolder folder;
   write_sliced_video(folder / "a.h264");
-  EXPECT_EQ(read(folder / "a.h264").complaint, "");
-  const std::string whole = bytes_of(folder / "a.h264");
+  EXPECT_EQ(read_video(folder / "a.h264").complaint, "");
+  const std::string whole = read_file(folder / "a.h264");
   int told = 0;
   constexpr int tries = 8;
   for (int i = 0; i < tries; ++i) {
-    Random random(static_cast<std::uint64_t>(i));
-    std::string bytes = whole;
-    for (std::size_t k = whole.size() / 2; k < whole.size() / 2 + 200; ++k)
-      bytes[k] = static_cast<char>(random.bits() & 0x7f);
-    testing::write_file(folder / "a.h264", bytes);
-    told += read(folder / "a.h264").damaged > 0;
+    testing::write_file(folder / "a.h264", with_damage(whole, whole.size() / 2, static_cast<std::uint64_t>(i)));
+    told += read_video(folder / "a.h264").damaged > 0;
   }
   EXPECT_EQ(told, tries);
 }
@@ -180,7 +147,7 @@ TEST(VideoSource, MarksFramesOfMotionJpegWhoseDataGoOn) {
     video += frame;
   }
   testing::write_file(folder / "a.mjpeg", video);
-  const Read damaged = read(folder / "a.mjpeg");
+  const VideoRead damaged = read_video(folder / "a.mjpeg");
   EXPECT_EQ(damaged.frames, 6);
   EXPECT_EQ(damaged.damaged, 1);
 }

@@ -63,7 +63,11 @@ class StreamSource : public LiveSource {
 class CameraSource : public LiveSource {
  public:
   explicit CameraSource(const std::string& device) : device_(device, std::nullopt) { begin(device); }
-  double frames_per_second() const override { return 30; }
+  double frames_per_second() const override {
+    constexpr double usual = 30;
+    const double told = device_.layout().frames_per_second;
+    return told > 0 ? told : usual;
+  }
 
  private:
   std::optional<Image> read() override {

@@ -104,15 +104,8 @@ bool tiff_has_its_rows(Bytes picture) {
 
 std::optional<int> tiff_tag(Bytes picture, int tag) {
   const auto numbers = numbers_of(picture);
-  if (!numbers) return std::nullopt;
-  const Directory directory = directory_of(*numbers);
-  for (std::size_t i = 0; i < directory.entries; ++i) {
-    const std::size_t at = directory.entry(i), count = numbers->of(at + 4, 4);
-    constexpr std::size_t fitting = 2;  // more values than these lie elsewhere
-    if (numbers->of(at, 2) == static_cast<std::size_t>(tag))
-      return static_cast<int>(numbers->of(count > fitting ? numbers->of(at + 8, 4) : at + 8, 2));
-  }
-  return std::nullopt;
+  const auto values = numbers ? values_of(*numbers, static_cast<std::size_t>(tag)) : std::vector<std::size_t>{};
+  return values.empty() ? std::nullopt : std::optional(static_cast<int>(values.front()));
 }
 
 std::vector<std::uint8_t> tiff_of_pixels(Bytes picture) {

@@ -7,7 +7,8 @@
 
 namespace lapservo::internal {
 
-/// The first value, of 16 bits, of a tag in a TIFF's first directory; nullopt without it, and for what is no TIFF.
+/// The first value, of 16 or 32 bits, of a tag in a TIFF's first directory; nullopt without it, and for what is no
+/// TIFF.
 std::optional<int> tiff_tag(std::span<const std::uint8_t> picture, int tag);
 
 /// Whether the strips of a TIFF that is packed by DEFLATE hold all its rows. FFmpeg's decoder takes what memory holds

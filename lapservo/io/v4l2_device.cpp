@@ -147,6 +147,17 @@ cv::Size present_size(const OpenDevice& device) {
   return {static_cast<int>(format.fmt.pix.width), static_cast<int>(format.fmt.pix.height)};
 }
 
+// As fast as it can: a wish. What the driver makes of it; 0 where it does not tell.
+double set_frame_rate(const OpenDevice& device, double wanted) {
+  constexpr std::uint32_t scale = 1000;
+  v4l2_streamparm parameters{};
+  parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  v4l2_fract& period = parameters.parm.capture.timeperframe;
+  period = {scale, static_cast<std::uint32_t>(wanted * scale)};
+  if (!device.call(wanted > 0 ? VIDIOC_S_PARM : VIDIOC_G_PARM, &parameters)) return wanted;
+  return period.numerator > 0 ? 1.0 * period.denominator / period.numerator : wanted;
+}
+
 V4l2Layout negotiate(const OpenDevice& device, std::optional<cv::Size> wanted) {
   const cv::Size chosen = wanted ? *wanted : present_size(device);
   const auto width = static_cast<std::uint32_t>(chosen.width), height = static_cast<std::uint32_t>(chosen.height);
@@ -163,14 +174,8 @@ V4l2Layout negotiate(const OpenDevice& device, std::optional<cv::Size> wanted) {
   if (got.pixelformat != offer->pixel_format || got.width != width || got.height != height)
     device.refuse("gives " + four_letters(got.pixelformat) + " " + std::to_string(got.width) + "x" +
                   std::to_string(got.height) + ", expected " + size + whose);
-  if (offer->max_frames_per_second > 0) {
-    v4l2_streamparm parameters{};
-    parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    constexpr std::uint32_t scale = 1000;
-    parameters.parm.capture.timeperframe = {scale, static_cast<std::uint32_t>(offer->max_frames_per_second * scale)};
-    device.call(VIDIOC_S_PARM, &parameters);  // a wish: what comes is counted by its stamps
-  }
-  return {got.pixelformat, got.width, got.height, got.bytesperline};
+  return {got.pixelformat, got.width, got.height, got.bytesperline,
+          set_frame_rate(device, offer->max_frames_per_second)};
 }
 
 double stamp_of(const v4l2_buffer& buffer) {

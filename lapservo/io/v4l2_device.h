@@ -25,9 +25,10 @@ std::optional<V4l2Offer> best_offer(const std::vector<V4l2Offer>& offers);
 /// "YUYV" of V4L2_PIX_FMT_YUYV.
 std::string four_letters(std::uint32_t pixel_format);
 
-/// How a device's images lie in its buffers.
+/// How a device's images lie in its buffers, and how often they come.
 struct V4l2Layout {
   std::uint32_t pixel_format = 0, width = 0, height = 0, step = 0;
+  double frames_per_second = 0;  ///< 0: unknown
 };
 
 /// A Video4Linux device that streams, in the best of its offers.

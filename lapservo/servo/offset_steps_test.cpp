@@ -1,5 +1,6 @@
 #include "lapservo/servo/offset_steps.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -87,6 +88,39 @@ TEST(OffsetSteps, LearnsHowLateImagesCome) {
   for (int i = 0; i < 300; ++i) steps.add(swing.next(Eigen::Vector3d::Zero(), i % 7 == 0 ? 0.012 : 0), true);
   for (int i = 0; i < 300; ++i)
     EXPECT_FALSE(steps.add(swing.next(Eigen::Vector3d::Zero(), i % 7 == 0 ? 0.012 : 0), true)) << i;
+}
+
+// Joints at rest, then theta at 1.5 rad/s, and what images show of it: of phi so much of theta's path, all as if by a
+// delay that is off by `delay_off_s`. How many of the images while it moves are told.
+int told_of_a_start(double phi_of_path, double delay_off_s, bool delay_is_known) {
+  constexpr double per_s = 1.5;
+  Random random(7);
+  OffsetSteps steps;
+  int told = 0;
+  for (int i = 0; i < 180; ++i) {
+    const double moves_s = period_s * std::max(0, i - 120), before_s = period_s * std::max(0, i - 121);
+    const double theta_rad = per_s * moves_s, rate_per_s = (theta_rad - per_s * before_s) / period_s;
+    const Eigen::Vector3d noise(3e-5 * random.normal(), 3e-5 * random.normal(), 3e-6 * random.normal());
+    const bool unusual = steps.add({period_s * i,
+                                    {theta_rad, 0, 0},
+                                    {rate_per_s, 0, 0},
+                                    noise + Eigen::Vector3d(-rate_per_s * delay_off_s, phi_of_path * theta_rad, 0)},
+                                   delay_is_known);
+    told += unusual && i > 120;
+  }
+  return told;
+}
+
+// A frame that is off turns theta's motion into some of phi's.
+TEST(OffsetSteps, ExpectsSomeOfThePathOfARegistrationThatIsOff) {
+  EXPECT_EQ(told_of_a_start(0.08, 0, true), 0);
+  EXPECT_GT(told_of_a_start(0.3, 0, true), 0);
+}
+
+TEST(OffsetSteps, ExpectsADelayThatIsOffByAsMuchAsItMayBe) {
+  EXPECT_EQ(told_of_a_start(0, 0.015, true), 0);
+  EXPECT_EQ(told_of_a_start(0, 0.1, false), 0);
+  EXPECT_GT(told_of_a_start(0, 0.3, true), 0);
 }
 
 TEST(OffsetSteps, IgnoresTimeThatGoesBackAndWhatWasInterrupted) {

@@ -21,8 +21,9 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return -1e9;
   const double length_m = scene.marker.length_m(), radius_m = scene.marker.radius_m();
-  const auto color_at = [&](double radius, double azimuth_rad, double along_m) {
-    return scene.class_at_point(pose.camera_from_unrolled * surface_point(radius, azimuth_rad, along_m));
+  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  const auto base_of = [&](double radius, double azimuth_rad) -> Eigen::Vector3d {
+    return pose.camera_from_unrolled * surface_point(radius, azimuth_rad, 0);
   };
   double score = 0;
   const auto count_empty = [&](std::uint8_t color) {
@@ -33,9 +34,10 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
     const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
     const bool printed = is_printed(scene.marker, tau_rad);
     const auto ends_m = boundaries_m(scene.marker, tau_rad);
+    const Eigen::Vector3d base = base_of(radius_m, azimuth_rad);
     for (int k = -margin; k < places + margin; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
-      const std::uint8_t color = color_at(radius_m, azimuth_rad, along_m);
+      const std::uint8_t color = scene.class_at_point(base + along_m * axis);
       if (color == Scene::outside) continue;
       const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin();
       if (!printed || band < 1 || band > 3) {
@@ -48,10 +50,10 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
     }
   }
   for (const double side : {-1.0, 1.0})
-    for (const double radius : {1.08, 1.2})
-      for (int k = 0; k < places; ++k)
-        count_empty(
-            color_at(radius * radius_m, view->facing_azimuth_rad + side * pi / 2, length_m * (k + 0.5) / places));
+    for (const double radii : {1.08, 1.2}) {
+      const Eigen::Vector3d base = base_of(radii * radius_m, view->facing_azimuth_rad + side * pi / 2);
+      for (int k = 0; k < places; ++k) count_empty(scene.class_at_point(base + length_m * (k + 0.5) / places * axis));
+    }
   return score;
 }
 

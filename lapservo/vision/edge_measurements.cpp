@@ -286,6 +286,8 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
   place.line.contour_radius_px = static_cast<float>(radius_px);
   place.measurement.row = row_of(frame.unknowns, point, image.d_px_d_point.transpose() * inwards, 0, 0);
   place.measurement.group = side.group;
+  place.measurement.expected_px = image.point_px.cast<float>();
+  place.measurement.normal = inwards.cast<float>();
   return place;
 }
 

@@ -32,7 +32,7 @@ struct Measurement {
   std::size_t group;          ///< 0..3: the boundary; 4 and 5: the sides
   double turn_fraction = 0;   ///< tau by what the print covers
   double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides
-  Eigen::Vector2f expected_px{0, 0}, normal{0, 0};  ///< of boundaries: where the pose has it, and the image normal
+  Eigen::Vector2f expected_px{0, 0}, normal{0, 0};  ///< where the pose has it, and the image normal; of sides inwards
   float clear_px = 0;  ///< of boundaries: how far along the normal no other boundary and its blur reaches
 };
 inline constexpr std::size_t measurement_groups = 6;

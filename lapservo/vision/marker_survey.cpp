@@ -12,6 +12,7 @@
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/limits.h"
+#include "lapservo/vision/side_biases.h"
 #include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
@@ -113,23 +114,25 @@ std::optional<MarkerView> cropped_view(const cv::Mat& bgr, const Camera& camera,
 }
 
 void take_processing_off(std::vector<ViewMeasurements>& views) {
-  std::array<std::vector<double>, 4> told_px;
+  constexpr std::size_t groups = measurement_groups;
+  const auto told = [](const ViewMeasurements& view, std::size_t group) -> std::optional<double> {
+    if (!view.processing.edges) return std::nullopt;
+    return group < 4 ? view.processing.edges->bias_px[group] : view.side_biases_px[group - 4];
+  };
+  std::array<std::vector<double>, groups> told_px;
   std::ptrdiff_t asked = 0;
   for (const ViewMeasurements& view : views) {
     if (view.processing.processing != Processing::unknown) ++asked;
-    for (std::size_t k = 0; k < told_px.size(); ++k)
-      if (view.processing.edges && view.processing.edges->bias_px[k])
-        told_px[k].push_back(*view.processing.edges->bias_px[k]);
+    for (std::size_t k = 0; k < groups; ++k)
+      if (const auto bias_px = told(view, k)) told_px[k].push_back(*bias_px);
   }
-  std::array<double, 4> usual_px{};
-  for (std::size_t k = 0; k < usual_px.size(); ++k)
+  std::array<double, groups> usual_px{};
+  for (std::size_t k = 0; k < groups; ++k)
     if (2 * std::ssize(told_px[k]) > asked) usual_px[k] = median(told_px[k]);
   for (ViewMeasurements& view : views) {
     if (view.processing.processing == Processing::none) continue;
-    for (std::size_t k = 0; k < usual_px.size(); ++k)
-      view.bias_px[k] = view.processing.edges ? view.processing.edges->bias_px[k].value_or(usual_px[k]) : usual_px[k];
-    for (Measurement& m : view.edges.all)
-      if (m.group < 4) m.residual_px -= view.bias_px[m.group];
+    for (std::size_t k = 0; k < groups; ++k) view.bias_px[k] = told(view, k).value_or(usual_px[k]);
+    for (Measurement& m : view.edges.all) m.residual_px -= view.bias_px[m.group];
   }
 }
 
@@ -148,6 +151,10 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   if (reach.ask_processing)
     measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px);
   const auto& processed = measured.processing.edges;
+  if (const auto cylinder = view_cylinder(sighting.unknowns.pose().camera_from_unrolled, marker.radius_m());
+      processed && cylinder)
+    measured.side_biases_px = side_biases_px(light, measured.edges.all, processed->processing, sighting.blur,
+                                             marker.radius_m() / cylinder->camera_to_axis_m * view.camera.fx_px);
   measured.seam = measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px, reach.seam_m,
                                reach.free_gap, processed ? std::optional(processed->processing) : std::nullopt);
   measured.blur_px = std::max(sighting.blur.boundaries_px, sighting.blur.sides_px);

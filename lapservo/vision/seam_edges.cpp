@@ -6,10 +6,10 @@
 #include <cstddef>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
@@ -205,7 +205,7 @@ using SeamColors = Eigen::Matrix<double, seam_colors, 1>;
 class ColorFit {
  public:
   ColorFit(const SeamBasis& basis, const Eigen::VectorXd& used)
-      : weighted_(basis.transpose() * used.asDiagonal()), information_(weighted_ * basis) {
+      : weighted_(basis.transpose() * used.asDiagonal()), information_(weighted_.lazyProduct(basis)) {
     information_(1, 1) += unit * unit, information_(3, 3) += unit * unit;
     information_(0, 0) += 1e-9, information_(2, 2) += 1e-9;
   }
@@ -213,10 +213,10 @@ class ColorFit {
   SeamColors colors(const Eigen::VectorXd& light, double shaft) const {
     const double shaft_sigma = 0.3 * shaft + 0.005, weight = unit * unit / (shaft_sigma * shaft_sigma);
     SeamInformation information = information_;
-    SeamColors gradient = weighted_ * light;
+    SeamColors gradient = weighted_.lazyProduct(light);
     information(4, 4) += weight;
     gradient[4] += shaft * weight;
-    return information.ldlt().solve(gradient);
+    return solve_symmetric(information, gradient);
   }
 
  private:
@@ -240,7 +240,7 @@ Eigen::VectorXd residuals(const Section& section, double upper_m, double gap_m, 
     for (std::size_t c = 0; c < 3; ++c, at += samples) {
       const Eigen::VectorXd light = light_of(profile, c, used);
       const SeamColors colors = fit.colors(light, section.shaft[c]);
-      out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(light - basis * colors);
+      out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(light - basis.lazyProduct(colors));
     }
   }
   return out;
@@ -274,9 +274,9 @@ std::optional<SeamFit> fit(const Section& section, double expected_gap_m, double
     slopes.col(0) = (at(best.upper_m + delta_m, best.gap_m) - residual) / delta_m;
     slopes.col(1).setZero();
     if (free_gap) slopes.col(1) = (at(best.upper_m, best.gap_m + delta_m) - residual) / delta_m;
-    information = slopes.transpose() * slopes;
+    information = slopes.transpose().lazyProduct(slopes);
     information.diagonal() += Eigen::Vector2d(1e-12, free_gap ? 1e-12 : 1e9) * information.trace();
-    Eigen::Vector2d step = -information.ldlt().solve(slopes.transpose() * residual);
+    Eigen::Vector2d step = -information.inverse() * slopes.transpose().lazyProduct(residual);
     if (!step.allFinite()) return std::nullopt;
     step = step.cwiseMax(-2 * step_m).cwiseMin(2 * step_m);
     Eigen::VectorXd next = at(best.upper_m + step[0], best.gap_m + step[1]);

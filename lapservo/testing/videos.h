@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include "lapservo/core/random.h"
+#include "lapservo/io/frame_source.h"
+
+namespace lapservo::testing {
+
+inline constexpr int video_frames = 20;
+inline const cv::Size video_size(320, 240);
+
+/// A square that moves over noise: hands each of video_frames pictures of video_size to `write`.
+template <typename Write>
+void for_each_picture(const Write& write) {
+  cv::RNG random(7);
+  for (int i = 0; i < video_frames; ++i) {
+    cv::Mat image(video_size, CV_8UC3);
+    random.fill(image, cv::RNG::UNIFORM, 60, 200);
+    image(cv::Rect(10 * i, 50, 40, 40)).setTo(cv::Scalar(20, 40, 250));
+    write(image);
+  }
+}
+
+/// What a video of such pictures gives.
+struct VideoRead {
+  int frames = 0, damaged = 0;
+  std::string complaint;
+};
+
+inline VideoRead read_video(const std::filesystem::path& path) {
+  const auto source = open_frame_source(path.string(), 30);
+  VideoRead result;
+  while (const auto frame = source->next()) {
+    EXPECT_EQ(frame->index, result.frames);
+    EXPECT_EQ(frame->bgr.size(), video_size);
+    ++result.frames;
+    result.damaged += frame->flaw == Status::damaged;
+  }
+  result.complaint = source->complaint();
+  return result;
+}
+
+/// The bytes with 200 of them, from `from` on, drawn at random.
+inline std::string with_damage(std::string bytes, std::size_t from, std::uint64_t seed) {
+  internal::Random random(seed);
+  for (std::size_t i = from; i < from + 200; ++i) bytes[i] = static_cast<char>(random.bits() & 0x7f);
+  return bytes;
+}
+
+}  // namespace lapservo::testing
