@@ -157,9 +157,9 @@ struct PrintLimits {
   std::array<double, 8> sigmas_mm{0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64};
   std::array<double, 8> fractions{0.05, 0.025, 0.0125, 0.00625, 0.006, 0.0016, 0.0008, 0.0004};
   /// How sure the pose is goes by these. Nobody prints, cuts and wraps to 5 um: with half of them there, lucky prints
-  /// were taken for exact ones (error / sigma 2.06). Those off by 0.1 mm count where a picture shows little of them.
-  /// Blaming the print by these, a focal length that is off by 3 % was a print that is off.
-  std::array<double, 8> told_fractions{0, 0.035, 0.06, 0.03, 0.06, 0.06, 0.0008, 0.0004};
+  /// were taken for exact ones (error / sigma 2.06). Blaming the print by these, a focal length that is off by 3 % was
+  /// a print that is off.
+  std::array<double, 8> told_fractions{0, 0.04, 0.07, 0.03, 0.006, 0.0016, 0.0008, 0.0004};
   /// From this size on, inks lie aside. With smaller ones exact prints in small pictures had more sigma, and a wrong
   /// registration was no longer seen.
   double least_ink_aside_mm = 0.06;
@@ -179,8 +179,7 @@ struct ValidationLimits {
   double max_sigma_print_off_rad = 0.01;  ///< where the print is certainly off: how far is known from four numbers
                                           ///< at best, so ten sigma
   double certainly_off = 0.999;           ///< probability
-  /// And of psi as it is told, where prints that are off by 0.1 mm count for more: in defocus and in the dark they show
-  /// little. A compressed picture of 400 pixels of an exact print has 35 mrad.
+  /// And of psi as it is told, of which prints that are off are more: in defocus and in the dark they show little.
   double max_sigma_told_rad = 0.04;
   /// Times what the rig's tolerance_m adds to the variance: who sets it wants to live with it.
   double tolerance_slack = 1.5;
