@@ -131,9 +131,11 @@ TEST_F(Prints, ThatAreTrackedOrAskewAreNotTrustedEither) {
 
 // Where the print's errors show worse they are not taken for a turn: least of all both inner boundaries', alike. What
 // is left are those whose errors happen to be a turn (docs/accuracy.md).
-TEST_F(Prints, ThatAreOffAreHardlyEverTrustedInPoorPictures) {
+TEST_F(Prints, InPoorPicturesAreHardlyEverTrustedWhereTheyAreOff) {
   const Tally bands = seen_poorly(Off::bands), ink = seen_poorly(Off::middle_ink), exact = seen_poorly(Off::nowhere);
+  EXPECT_LE(bands.fraction("ok"), 0.15);
   EXPECT_LE(bands.wrong, 0.03 * bands.frames);
+  EXPECT_LE(ink.fraction("ok"), 0.15);
   EXPECT_EQ(ink.wrong, 0);
   EXPECT_GE(exact.fraction("ok"), 0.95);
   EXPECT_LE(rms(exact.errors_sigmas), 1.5);

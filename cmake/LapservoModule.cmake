@@ -94,9 +94,11 @@ endfunction()
 # For sanitized tests. Of an inline function that several objects have, as of Eigen's, the linker takes the first one's for all
 # of them, and a program's own objects, which are not optimised, would come first.
 function(lapservo_link_optimised_first target)
-  if(NOT LAPSERVO_SANITIZE)
-    return()
+  if(LAPSERVO_SANITIZE)  # when all libraries are there
+    cmake_language(EVAL CODE "cmake_language(DEFER DIRECTORY [[${PROJECT_SOURCE_DIR}]] CALL lapservo_put_optimised_first ${target})")
   endif()
+endfunction()
+function(lapservo_put_optimised_first target)
   lapservo_libraries_of(${target} libraries)
   set(archives)
   foreach(library IN LISTS libraries)

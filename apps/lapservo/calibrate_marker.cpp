@@ -64,8 +64,8 @@ int run_marker(const CalibrateOptions& options) {
       1e3 * instrument.marker.diameter_m);
   if (calibration.seam_may_lag)
     std::printf(
-        "the pictures look compressed, and the turn goes one way: where video leaves the seam behind, psi is up to "
-        "3 mrad off; turn the instrument there and back\n");
+        "the pictures look compressed, and the turn does not go both ways: if they come from a video, which leaves the "
+        "seam a little behind, psi is some mrad off; turn the instrument there and back\n");
   if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
   if (!options.report.empty()) {
     write_marker_report(options.report, instrument, calibration);

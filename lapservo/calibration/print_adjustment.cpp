@@ -114,10 +114,14 @@ SharedRow shared_row(const Measurement& m, const PrintShape& shape, double cover
   return row;
 }
 
+double moved_px(const SeamEdge& edge, double turned_rad) {
+  return edge.row[edge.row.size() - 1] * turned_rad;
+}
+
 SharedRow shared_row(const SeamEdge& edge, bool lower, double turned_rad) {
   SharedRow row{};
-  const double moved_px = edge.row[edge.row.size() - 1] * turned_rad;
-  row[seam_lag] = -moved_px / std::hypot(moved_px, seam_lag_from_px);
+  const double along_px = moved_px(edge, turned_rad);
+  row[seam_lag] = -along_px / std::hypot(along_px, seam_lag_from_px);
   row[gap] = edge.by_gap_px;
   row[lower ? seam + 1 : seam] = 1;
   return row;
@@ -165,10 +169,13 @@ void add_frame(ceres::Problem& problem, const ViewMeasurements& frame, const Pri
       problem.AddResidualBlock(new Prior(1, 0, 0, common_sigma_px(group, frame)), nullptr, &blocks.common[group]);
 }
 
+// Views that hardly moved tell no lag, and which way they did is their poses' error as well.
 bool tells_lag(const std::vector<ViewMeasurements>& frames) {
   const auto views = [&](double way) {
     return std::count_if(frames.begin(), frames.end(), [=](const ViewMeasurements& frame) {
-      return frame.seam && (frame.seam->upper || frame.seam->lower) && way * frame.turned_rad > 0;
+      if (!frame.seam || !(way * frame.turned_rad > 0)) return false;
+      const auto& edge = frame.seam->upper ? frame.seam->upper : frame.seam->lower;
+      return edge && std::abs(moved_px(*edge, frame.turned_rad)) > seam_lag_from_px;
     });
   };
   return std::min(views(1), views(-1)) >= min_seam_views_each_way;

@@ -38,14 +38,20 @@ Directory directory_of(const Numbers& numbers) {
   return {at, numbers.of(at, 2)};
 }
 
-// All values of a tag; none of one that is missing or of another type than 16 and 32 bits.
+// Of an unsigned type; 0 of others.
+std::size_t bytes_of_type(std::size_t type) {
+  constexpr std::size_t is_byte = 1, is_short = 3, is_long = 4;
+  return type == is_byte ? 1 : type == is_short ? 2 : type == is_long ? 4 : 0;
+}
+
+// All values of a tag; none of one that is missing or of another type than 8, 16 and 32 bits.
 std::vector<std::size_t> values_of(const Numbers& numbers, std::size_t tag) {
-  constexpr std::size_t is_short = 3, is_long = 4, in_entry = 4;
+  constexpr std::size_t in_entry = 4;
   const Directory directory = directory_of(numbers);
   for (std::size_t i = 0; i < directory.entries; ++i) {
-    const std::size_t at = directory.entry(i), type = numbers.of(at + 2, 2), count = numbers.of(at + 4, 4);
-    if (numbers.of(at, 2) != tag || (type != is_short && type != is_long)) continue;
-    const std::size_t size = type == is_short ? 2 : 4;
+    const std::size_t at = directory.entry(i), count = numbers.of(at + 4, 4);
+    const std::size_t size = bytes_of_type(numbers.of(at + 2, 2));
+    if (numbers.of(at, 2) != tag || size == 0) continue;
     const std::size_t from = count * size <= in_entry ? at + 8 : numbers.of(at + 8, 4);
     std::vector<std::size_t> values;
     for (std::size_t k = 0; k < count && from + k * size < numbers.bytes.size(); ++k)

@@ -7,7 +7,7 @@
 
 namespace lapservo::internal {
 
-/// The first value, of 16 or 32 bits, of a tag in a TIFF's first directory; nullopt without it, and for what is no
+/// The first value, of 8, 16 or 32 bits, of a tag in a TIFF's first directory; nullopt without it, and for what is no
 /// TIFF.
 std::optional<int> tiff_tag(std::span<const std::uint8_t> picture, int tag);
 

@@ -154,8 +154,9 @@ double set_frame_rate(const OpenDevice& device, double wanted) {
   parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   v4l2_fract& period = parameters.parm.capture.timeperframe;
   period = {scale, static_cast<std::uint32_t>(wanted * scale)};
-  if (!device.call(wanted > 0 ? VIDIOC_S_PARM : VIDIOC_G_PARM, &parameters)) return wanted;
-  return period.numerator > 0 ? 1.0 * period.denominator / period.numerator : wanted;
+  const bool told = device.call(wanted > 0 ? VIDIOC_S_PARM : VIDIOC_G_PARM, &parameters);
+  const double rate = told && period.numerator > 0 ? 1.0 * period.denominator / period.numerator : 0;
+  return rate > 0.1 && rate < 10000 ? rate : 0;
 }
 
 V4l2Layout negotiate(const OpenDevice& device, std::optional<cv::Size> wanted) {

@@ -76,12 +76,15 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   }
   errors.px[4] = errors.px[5] = side_px;
   errors.noise_scale = std::max(1.0, scatter_sigmas(measurements, lines));
-  const double compressed_px = std::max(0.0, median_sigma_px(measurements) - limits.usual_sigma_px);
+  const double sigma_px = median_sigma_px(measurements);
+  errors.inner_doubt_scale = std::max(1.0, sigma_px / limits.usual_sigma_px) + beyond_px +
+                             std::sqrt(bias_squares_px2) / limits.doubted_processing_px;
+  const double beyond_usual_px = std::max(0.0, sigma_px - limits.usual_sigma_px);
   const double processed_px = left_of_corrected * std::sqrt(bias_squares_px2);
-  errors.doubt.boundary_px = std::hypot(limits.doubted_of_sigma * compressed_px, processed_px);
+  errors.doubt.boundary_px = std::hypot(limits.doubted_of_sigma * beyond_usual_px, processed_px);
   errors.doubt.tilt_px = std::hypot(errors.doubt.boundary_px, limits.doubted_tilt_of_blur * beyond_px);
   errors.doubt.length_fraction =
-      std::hypot(limits.doubted_length_of_sigma * compressed_px, limits.doubted_length_of_blur * beyond_px);
+      std::hypot(limits.doubted_length_of_sigma * beyond_usual_px, limits.doubted_length_of_blur * beyond_px);
   return errors;
 }
 

@@ -107,7 +107,8 @@ struct FineFitLimits {
   /// that motion blurs is worst: the part of its blur that the boundaries do not have.
   double usual_blur_px = 1.2, common_fraction_of_blur = 0.05, side_fraction_of_motion_blur = 0.15;
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well. A processing that
-  /// moves them by doubted_processing_px (rms) doubles what `calibrate marker` says of its numbers.
+  /// moves them by doubted_processing_px (rms) doubles the noise where a hidden boundary's print is asked for, and what
+  /// `calibrate marker` says.
   double fraction_of_processing = 0.25, doubted_processing_px = 0.1;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
   double usual_misfit = 0.004, px_per_misfit = 8;

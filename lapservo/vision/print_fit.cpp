@@ -259,12 +259,7 @@ PrintMatrix doubted_mm2(const PrintDoubt& doubt, const Sums& sums, const Marker&
 struct PrintInformation {
   PrintMatrix information = PrintMatrix::Zero();
   PrintVector gradient = PrintVector::Zero();
-
-  // PrintFit::inner_sigma_m, in millimetres.
-  double inner_sigma_mm() const {
-    const double e1 = information.block<2, 2>(1, 1).sum(), e2 = information.block<2, 2>(3, 3).sum();
-    return 1 / std::sqrt(std::max(std::min(e1, e2), 1e-6));
-  }
+  double inner_sigma_mm = 1e3;  // where the less exact of the inner boundaries lies as a whole, nothing doubted
 };
 
 PrintInformation information_of(const Sums& sums, const PrintMatrix& doubted) {
@@ -275,8 +270,9 @@ PrintInformation information_of(const Sums& sums, const PrintMatrix& doubted) {
   if (!inverse) return {};  // the frame tells nothing of the print
   const CrossMatrix through = e.nx.lazyProduct(*inverse);
   const PrintMatrix undoubted = e.nn - through.lazyProduct(e.nx.transpose());
+  const double inner = std::min(undoubted.block<2, 2>(1, 1).sum(), undoubted.block<2, 2>(3, 3).sum());
   const PrintMatrix left = (PrintMatrix::Identity() + undoubted * doubted).inverse();
-  return {left * undoubted, left * (e.n - through * e.x)};
+  return {left * undoubted, left * (e.n - through * e.x), 1 / std::sqrt(std::max(inner, 1e-6))};
 }
 
 // How likely that makes prints of any size of errors.
@@ -455,7 +451,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
-  fit.inner_sigma_m = print.inner_sigma_mm() * mm;
+  fit.inner_sigma_m = errors.inner_doubt_scale * print.inner_sigma_mm * mm;
   fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);

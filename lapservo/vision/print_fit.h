@@ -23,6 +23,7 @@ struct CommonErrors {
   std::array<double, measurement_groups> px{};
   double noise_scale = 1;
   PrintDoubt doubt;
+  double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_sigma_m
 };
 
 /// A group's residuals as a straight line over the print: of boundaries in metres along the shaft, of sides a constant
