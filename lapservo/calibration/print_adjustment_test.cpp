@@ -75,11 +75,13 @@ TEST_F(SeamLag, IsTakenOffWhereTheTurnGoesBothWays) {
   EXPECT_LT(both_m, 0.15 * one_m);
 }
 
-// Every second one, so that a turn there and back has as many as one way.
-std::vector<ViewMeasurements> halved(const std::vector<ViewMeasurements>& views) {
-  std::vector<ViewMeasurements> half;
-  for (std::size_t i = 0; i < views.size(); i += 2) half.push_back(views[i]);
-  return half;
+// As many one way as there and back.
+std::vector<ViewMeasurements> passing_twice(const std::vector<ViewMeasurements>& seen, bool and_back) {
+  std::vector<ViewMeasurements> views = passing(seen, 0, and_back);
+  if (and_back) return views;
+  const auto again = views;
+  views.insert(views.end(), again.begin(), again.end());
+  return views;
 }
 
 TEST_F(SeamLag, IsNotToldByFramesThatHardlyMove) {
@@ -95,7 +97,7 @@ TEST_F(SeamLag, IsNotToldByFramesThatHardlyMove) {
 TEST_F(SeamLag, IsDoubtedInACompressedTurnOfOneWay) {
   const Marker& marker = rig.instruments[0].marker;
   const auto sigma_and_doubt = [&](bool and_back, double noisier) {
-    auto views = and_back ? halved(passing(seen(), 0, true)) : passing(seen(), 0, false);
+    auto views = passing_twice(seen(), and_back);
     for (ViewMeasurements& view : views)
       for (Measurement& m : view.edges.all) m.sigma_px *= noisier;
     const auto adjustment = adjust(views, marker, {.with_covariance = true});

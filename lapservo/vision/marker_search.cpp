@@ -31,8 +31,8 @@ bool contradicts_registration(const FineFit& free) {
 // What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.
 Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
   constexpr double doubt = 1.5;
-  fit.covariance *= doubt * doubt;
   const Status status = validate(scene, fit);
+  fit.covariance *= doubt * doubt;
   return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
 
