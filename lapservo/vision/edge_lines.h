@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <span>
 
 #include "lapservo/core/inplace_vector.h"
@@ -17,6 +18,15 @@ struct EdgeLine {
   float blur_px = 1;            ///< of the edge along the line, one sigma
   float contour_radius_px = 0;  ///< for locate_contours
 };
+
+/// How far a line across a shaft's side reaches out of it and into it: of so wide a blur and, where the side's place is
+/// not known to a fraction of it, some more.
+inline int outside_of_side_px(double blur_px, double extra_px) {
+  return static_cast<int>(std::min(2.5 * blur_px + extra_px, 14.0));
+}
+inline int inside_of_side_px(double radius_px) {
+  return static_cast<int>(std::min(0.34 * radius_px, 26.0));
+}
 
 inline constexpr std::size_t max_edge_lines = 512;
 using EdgeFits = InplaceVector<EdgeFit, max_edge_lines>;

@@ -275,8 +275,7 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
   if (inwards.dot(frame.scene.camera.raw_from_point(frame.point(side.deep, along_m)) - image.point_px) < 0)
     inwards = -inwards;
   const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
-  const int inside = static_cast<int>(std::min(0.34 * radius_px, 26.0));
-  const int outside = static_cast<int>(std::min(2.5 * blur_px + effort.extra_px, 14.0));
+  const int inside = inside_of_side_px(radius_px), outside = outside_of_side_px(blur_px, effort.extra_px);
   if (inside < 5) return std::nullopt;
   const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
   if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;

@@ -94,8 +94,8 @@ std::optional<double> bias_on_line(const LightImage& light, const Measurement& m
   EdgeLine line;
   const Eigen::Vector2f at_px = m.expected_px + static_cast<float>(m.residual_px) * m.normal;
   line.u_px = at_px.x(), line.v_px = at_px.y(), line.du = m.normal.x(), line.dv = m.normal.y();
-  line.before = static_cast<int>(std::min(2.5 * blur.sides_px + extra_px, 14.0));
-  line.after = static_cast<int>(std::min(0.34 * radius_px, 26.0));
+  line.before = outside_of_side_px(blur.sides_px, extra_px);
+  line.after = inside_of_side_px(radius_px);
   const auto contains = [&](int t) {
     return light.contains((at_px + static_cast<float>(t) * m.normal).cast<double>());
   };
