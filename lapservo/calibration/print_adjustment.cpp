@@ -10,6 +10,7 @@
 #include "lapservo/calibration/robust_scale.h"
 #include "lapservo/calibration/solve_quietly.h"
 #include "lapservo/core/dense_matrix.h"
+#include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -191,34 +192,38 @@ void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& sha
   add(seam_lag, free_lag ? seam_lag_px : zero * seam_lag_px);
 }
 
-// How much noisier edges are than usual: those of compressed pictures.
-double noise_of_edges(const std::vector<ViewMeasurements>& frames) {
+double sigma_of_edges_px(const std::vector<ViewMeasurements>& frames) {
   std::vector<double> sigmas_px;
   for (const ViewMeasurements& frame : frames)
     for (const Measurement& m : frame.edges.all)
       if (m.group < 4) sigmas_px.push_back(m.sigma_px);
-  return sigmas_px.empty() ? 1 : std::max(1.0, median(sigmas_px) / fine_fit_limits.usual_sigma_px);
+  return sigmas_px.empty() ? fine_fit_limits.usual_sigma_px : median(sigmas_px);
 }
 
-// Compression, motion blur and processing move edges, in all frames alike.
-double doubt_scale(const std::vector<ViewMeasurements>& frames) {
+// By how much edges are noisier than usual: those of compressed pictures are.
+double noise_beyond_usual(double sigma_px) {
+  return std::max(0.0, sigma_px / fine_fit_limits.usual_sigma_px - 1);
+}
+
+// As the tracker has it, in all frames alike.
+double common_doubt_scale(const std::vector<ViewMeasurements>& frames, double edges_px) {
   std::vector<double> blurs_px, biases_px;
   for (const ViewMeasurements& frame : frames) {
     blurs_px.push_back(frame.blur_px);
     biases_px.push_back(Eigen::Map<const Eigen::Vector4d>(frame.bias_px.data()).norm() / 2);
   }
   if (blurs_px.empty()) return 1;
-  return noise_of_edges(frames) + std::max(0.0, median(blurs_px) - fine_fit_limits.usual_blur_px) +
-         median(biases_px) / fine_fit_limits.doubted_processing_px;
+  return doubt_scale(edges_px, median(blurs_px), median(biases_px));
 }
 
 // One sigma of what was taken for zero in all frames, from the film on.
-Eigen::VectorXd sigmas_of_common(const std::vector<ViewMeasurements>& frames, bool free_lag) {
+Eigen::VectorXd sigmas_of_common(const std::vector<ViewMeasurements>& frames, double edges_px, bool free_lag) {
   const auto known = static_cast<Eigen::Index>(shared_sigmas.size());
   Eigen::VectorXd sigmas(free_lag ? known : known + 1);
-  sigmas.head(known) = doubt_scale(frames) * Eigen::Map<const Eigen::VectorXd>(shared_sigmas.data(), known);
+  sigmas.head(known) =
+      common_doubt_scale(frames, edges_px) * Eigen::Map<const Eigen::VectorXd>(shared_sigmas.data(), known);
   sigmas[0] = shared_sigmas[0];  // the film is as thick in any picture
-  if (!free_lag) sigmas[known] = seam_lag_px * std::min(1.0, noise_of_edges(frames) - 1);
+  if (!free_lag) sigmas[known] = seam_lag_px * std::min(1.0, noise_beyond_usual(edges_px));
   return sigmas;
 }
 
@@ -274,7 +279,8 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   if (!solve_quietly(solver, problem, summary)) return std::nullopt;
 
   Adjustment result;
-  result.lags = !free_lag && noise_of_edges(frames) > 1 + min_noise_of_lag;
+  const double edges_px = sigma_of_edges_px(frames);
+  result.lags = !free_lag && noise_beyond_usual(edges_px) > min_noise_of_lag;
   for (int i = 0; i < print_numbers; ++i) result.print[i] = shared[static_cast<std::size_t>(i)] * (i == gap ? 1 : mm);
   std::vector<double> sigmas;
   for (const FrameBlocks& frame : blocks) {
@@ -288,8 +294,8 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   }
   result.noise_scale = robust_scale(std::move(sigmas));
   if (options.with_covariance) {
-    result.covariance =
-        covariance_of(problem, shared, options.free_gap, result.noise_scale, sigmas_of_common(frames, free_lag));
+    result.covariance = covariance_of(problem, shared, options.free_gap, result.noise_scale,
+                                      sigmas_of_common(frames, edges_px, free_lag));
     if (!result.covariance) return std::nullopt;
   }
   return result;

@@ -77,10 +77,10 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   errors.px[4] = errors.px[5] = side_px;
   errors.noise_scale = std::max(1.0, scatter_sigmas(measurements, lines));
   const double sigma_px = median_sigma_px(measurements);
-  errors.inner_doubt_scale = std::max(1.0, sigma_px / limits.usual_sigma_px) + beyond_px +
-                             std::sqrt(bias_squares_px2) / limits.doubted_processing_px;
+  const double moved_px = std::sqrt(bias_squares_px2);
+  errors.inner_doubt_scale = doubt_scale(sigma_px, std::max(blur.boundaries_px, blur.sides_px), moved_px);
   const double beyond_usual_px = std::max(0.0, sigma_px - limits.usual_sigma_px);
-  const double processed_px = left_of_corrected * std::sqrt(bias_squares_px2);
+  const double processed_px = left_of_corrected * moved_px;
   errors.doubt.boundary_px = std::hypot(limits.doubted_of_sigma * beyond_usual_px, processed_px);
   errors.doubt.tilt_px = std::hypot(errors.doubt.boundary_px, limits.doubted_tilt_of_blur * beyond_px);
   errors.doubt.length_fraction =
@@ -112,6 +112,12 @@ struct Change {
 double FineFit::located_fraction() const {
   const int located = used[0] + used[1] + used[2] + used[3];
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
+}
+
+double doubt_scale(double sigma_px, double blur_px, double bias_px) {
+  const FineFitLimits& limits = fine_fit_limits;
+  return std::max(1.0, sigma_px / limits.usual_sigma_px) + std::max(0.0, blur_px - limits.usual_blur_px) +
+         bias_px / limits.doubted_processing_px;
 }
 
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
