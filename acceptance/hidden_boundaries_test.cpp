@@ -92,10 +92,10 @@ class HiddenBoundaries : public ::testing::Test {
     for (int frame = 0; frame < frames; ++frame) {
       const Observation o = tracker.track(renderer.render({placement_of(instrument, q)}, number * 100 + frame))[0];
       tally.add(o, q.psi_rad, seam_error_rad);
-      const double error_rad = o.rcm ? wrap_pi(o.rcm->q.psi_rad - q.psi_rad - seam_error_rad) : 0;
       if (lists)
         std::printf("  %s, %d, frame %d: %s, psi off by %.1f mrad\n", kind.name.c_str(), number, frame,
-                    std::string(to_string(o.status)).c_str(), 1e3 * error_rad);
+                    std::string(to_string(o.status)).c_str(),
+                    1e3 * (o.rcm ? wrap_pi(o.rcm->q.psi_rad - q.psi_rad - seam_error_rad) : 0));
       q.psi_rad += 0.05, q.rho_m += 0.2 * mm, q.theta_rad += 0.003;
     }
     return tally;

@@ -44,17 +44,17 @@ class Prints : public ::testing::Test {
   }
 
   // What is seen of a print by a tracker that takes it for that of `believed`.
-  Tally seen(const Print& print, const Rig& believed, int number, bool moving, const Sensor& sensor = {}) const {
+  Tally seen(const Marker& print, const Rig& believed, int number, bool moving, const Sensor& sensor = {}) const {
     RenderedSet set;
     set.rig = rig;
     set.configurations = places(number, moving);
     set.options.sensor = sensor;
     set.seed = static_cast<std::uint64_t>(number);
-    set.rig.instruments[0].marker = print.marker;
+    set.rig.instruments[0].marker = print;
     Tracker tracker(believed, {.method = Method::surface, .single = !moving});
     Tally tally;
     for (const TrueFrame& frame : rendered_frames(set))
-      tally.add(tracker.track(frame.bgr)[0], frame.truths[0].q.psi_rad, print.marker.seam_rad - nominal.seam_rad);
+      tally.add(tracker.track(frame.bgr)[0], frame.truths[0].q.psi_rad, print.seam_rad - nominal.seam_rad);
     return tally;
   }
 
@@ -75,7 +75,7 @@ class Prints : public ::testing::Test {
         const double blur_px = drawn.uniform(2, 3.2), light = drawn.uniform(0.1, 0.3);
         if (kind.blurred) sensor.blur_px = blur_px;
         if (kind.dark) sensor.gains = Light::Constant(static_cast<float>(light));
-        tally.add(seen({off_print(nominal, off, drawn), 0}, rig, number, false, sensor));
+        tally.add(seen(off_print(nominal, off, drawn), rig, number, false, sensor));
       }
       tally.show(kind.name);
       all.add(tally);
@@ -92,7 +92,7 @@ TEST_F(Prints, ThatAreOffAreNotTrusted) {
   std::map<int, Tally> by_error;
   for (int i = 0; i < prints; ++i) {
     const Print print = random_print(nominal, random_error_m(), false, random);
-    const Tally tally = seen(print, rig, i, false);
+    const Tally tally = seen(print.marker, rig, i, false);
     all.add(tally), by_error[static_cast<int>(print.error_m / (0.05 * mm))].add(tally);
   }
   for (const auto& [error, tally] : by_error)
@@ -112,7 +112,7 @@ TEST_F(Prints, ThatLookLikeATurnHaveASigmaThatHolds) {
   Tally all;
   for (int i = 0; i < drawn; ++i)
     if (const Print print = random_print(nominal, random_error_m(), false, random); print.error_m < most_m)
-      all.add(seen(print, rig, i, false));
+      all.add(seen(print.marker, rig, i, false));
   all.show("off by less than 0.05 mm");
   EXPECT_EQ(all.wrong, 0);
   EXPECT_LE(rms(all.errors_sigmas), 2);
@@ -122,7 +122,7 @@ TEST_F(Prints, ThatAreTrackedOrAskewAreNotTrustedEither) {
   for (const bool askew : {false, true}) {
     Tally all;
     for (int i = 0; i < prints; ++i)
-      all.add(seen(random_print(nominal, random_error_m(), askew, random), rig, i, true));
+      all.add(seen(random_print(nominal, random_error_m(), askew, random).marker, rig, i, true));
     all.show(askew ? "tracked, distal end askew" : "tracked");
     EXPECT_EQ(all.wrong, 0);
     EXPECT_LE(rms(all.errors_sigmas), 2);
@@ -146,7 +146,8 @@ TEST_F(Prints, WithinTheToleranceAreFound) {
   Rig tolerant = rig;
   tolerant.instruments[0].marker.tolerance_m = 0.1 * mm;
   Tally all;
-  for (int i = 0; i < prints; ++i) all.add(seen(random_print(nominal, 0.06 * mm, false, random), tolerant, i, false));
+  for (int i = 0; i < prints; ++i)
+    all.add(seen(random_print(nominal, 0.06 * mm, false, random).marker, tolerant, i, false));
   all.show("tolerated");
   EXPECT_GE(all.fraction("ok"), 0.9);
   EXPECT_LE(rms(all.errors_sigmas), 2);
