@@ -79,7 +79,8 @@ void EndoscopeRecovery::drop_suspicion(VisualController& controller) {
 }
 
 bool EndoscopeRecovery::stepped(const ImageMeasurement& image, bool delay_is_known) {
-  if (!image.q || image.registration != registration_of_steps_) steps_.interrupt();
+  if (!image.q) steps_.interrupt();
+  if (image.registration != registration_of_steps_) steps_.drop_latest();
   registration_of_steps_ = image.registration;
   if (!image.q) return false;
   return steps_.add(
