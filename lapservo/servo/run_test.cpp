@@ -563,6 +563,26 @@ void print(const HeldMotion& motion, const EndoscopeMotion& endoscope) {
       motion.measured_s.value_or(-1), motion.wrong_s, motion.held_before);
 }
 
+// From rest to rest it shows little at first and gains speed from image to image.
+TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyWhenThatIsPlain) {
+  const Rig rig = testing::small_test_rig();
+  Random random(1);
+  for (const double duration_s : {1.0, 2.0}) {
+    SCOPED_TRACE(duration_s);
+    Case c;
+    c.endoscope = random_motion(rig, duration_s, random);
+    c.endoscope->profile = MotionProfile::smooth;
+    c.duration_s = endoscope_moves_s + duration_s / 2;
+    const PastRun done = run_case(c);
+    const ControllerConfig controller = config_of(rig, c).controller;
+    const HeldMotion motion = held_motion(done, c, rig, controller.period_s);
+    ASSERT_TRUE(motion.plain_s && motion.held_s);
+    EXPECT_LE(*motion.held_s - *motion.plain_s, 0.1 + controller.period_s);
+    EXPECT_EQ(motion.held_before, 0);
+    expect_within_limits(done, controller);
+  }
+}
+
 // By hand: LAPSERVO_ENDOSCOPES=N LAPSERVO_ENDOSCOPE_SEED=S --gtest_also_run_disabled_tests
 // --gtest_filter='*MovedEndoscopeIsHeld'.
 TEST(Run, DISABLED_MeasuresWhenAMovedEndoscopeIsHeld) {
