@@ -13,11 +13,13 @@
 namespace lapservo::app {
 namespace {
 
-EndoscopeMotion motion_of(const std::vector<double>& numbers) {
+EndoscopeMotion motion_of(const SimulationOptions& options) {
   constexpr double m_per_mm = 1e-3;
+  const std::vector<double>& numbers = options.endoscope_motion;
   EndoscopeMotion motion{numbers[0], numbers[1], Eigen::Vector3d(&numbers[2]), Eigen::Vector3d(&numbers[5])};
   motion.translation_m *= m_per_mm;
   motion.rotation_rad *= internal::rad_from_deg(1);
+  if (options.endoscope_profile == "smooth") motion.profile = MotionProfile::smooth;
   return motion;
 }
 
@@ -58,6 +60,11 @@ void add_simulation_options(Command command, SimulationOptions& options, const s
       .finite_number()
       .delimiter(',')
       .expected(8);
+  command
+      .add_option("--endoscope-profile", options.endoscope_profile,
+                  only + "how it moves: even, at one speed, or smooth, from rest to rest")
+      .shows_default()
+      .one_of({"even", "smooth"});
   command.add_option("--exposure-ms", options.exposure_ms, only + "the shutter is open for so long: motion blur")
       .shows_default()
       .number_between(0.0, 200.0);
@@ -106,7 +113,7 @@ std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, cons
   if (!options.light.empty())
     simulator->change_light({options.light[0], options.light[0] + options.light[1]},
                             static_cast<float>(std::max(0.0, options.light[2])));
-  if (!options.endoscope_motion.empty()) simulator->move_endoscope(motion_of(options.endoscope_motion));
+  if (!options.endoscope_motion.empty()) simulator->move_endoscope(motion_of(options));
   return simulator;
 }
 

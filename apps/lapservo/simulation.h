@@ -13,6 +13,7 @@ namespace lapservo::app {
 struct SimulationOptions {
   std::string dynamics = "first-order";
   std::vector<double> endoscope_motion;  ///< s, s, 3 x mm, 3 x degrees
+  std::string endoscope_profile = "even";
   double exposure_ms = 0, smoke = 0;
   int blood = 0;                           ///< blotches
   std::vector<double> light;               ///< s, s, times

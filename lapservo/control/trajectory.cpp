@@ -9,6 +9,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/minimum_jerk.h"
 
 namespace lapservo {
 using namespace internal;
@@ -55,10 +56,9 @@ struct Segment {
 DesiredFeatures minimum_jerk(const Segment& segment, double time_s) {
   if (segment.duration_s <= 0) return {segment.from + segment.change, Eigen::Vector4d::Zero(), Eigen::Vector4d::Zero()};
   const double x = std::clamp((time_s - segment.start_s) / segment.duration_s, 0.0, 1.0);
-  const double position = x * x * x * (10 + x * (6 * x - 15));
-  const double rate = 30 * x * x * (1 - x) * (1 - x) / segment.duration_s;
-  const double acceleration = 60 * x * (1 - x) * (1 - 2 * x) / (segment.duration_s * segment.duration_s);
-  return {segment.from + segment.change * position, segment.change * rate, segment.change * acceleration};
+  const double per_s = 1 / segment.duration_s;
+  return {segment.from + segment.change * MinimumJerk::position(x), segment.change * MinimumJerk::rate(x) * per_s,
+          segment.change * MinimumJerk::acceleration(x) * per_s * per_s};
 }
 
 struct Spline {
@@ -133,7 +133,6 @@ Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::V
   if (points.size() < 2) throw InputError("trajectory", "points", std::to_string(points.size()), "two points or more");
   require_positive_features("max_rate", max_rate);
   if (!(dwell_s >= 0)) throw InputError("trajectory", "dwell_s", std::to_string(dwell_s), "0 or more seconds");
-  constexpr double peak_rate = 1.875;  // of the minimum-jerk motion over unit distance in unit time
   std::vector<Segment> segments;
   Eigen::Vector4d from = points.front();
   double start_s = 0;
@@ -142,7 +141,7 @@ Trajectory via_points(const std::vector<Eigen::Vector4d>& points, const Eigen::V
     require_finite_features("points", points[i]);
     Eigen::Vector4d change = points[i] - from;
     change[0] = wrap_pi(change[0]);
-    const double duration_s = peak_rate * change.cwiseAbs().cwiseQuotient(max_rate).maxCoeff();
+    const double duration_s = MinimumJerk::peak_rate * change.cwiseAbs().cwiseQuotient(max_rate).maxCoeff();
     segments.push_back({start_s, duration_s, from, change});
     from += change;
     start_s += duration_s + dwell_s;

@@ -79,7 +79,8 @@ void EndoscopeRecovery::drop_suspicion(VisualController& controller) {
 }
 
 bool EndoscopeRecovery::stepped(const ImageMeasurement& image, bool delay_is_known) {
-  if (!image.q || image.registration != registration_of_steps_) steps_.interrupt();
+  if (!image.q) steps_.interrupt();
+  if (image.registration != registration_of_steps_) steps_.drop_latest();
   registration_of_steps_ = image.registration;
   if (!image.q) return false;
   return steps_.add(
@@ -206,6 +207,8 @@ void EndoscopeRecovery::wait_for_rest(const ServoInput& input) {
   if (!seen) return;
   add_sighting(*seen, apart_s);
   if (sightings_.size() < min_rest_images || input.image->time_s - rests_since_s_ < rest_s) return;
+  // Those before may still show the end of a motion that ends smoothly.
+  sightings_.erase(sightings_.begin(), sightings_.end() - min_rest_images);
   phase_ = Phase::exploring;
   explored_s_ = 0;
   seen_s_ = input.time_s;

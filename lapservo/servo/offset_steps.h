@@ -16,7 +16,9 @@ struct SeenOffset {
 
 /// Tells when the offset of what images show from the joints changes faster than it usually does: what moves with the
 /// endoscope slowly jumps nowhere, but goes away from where it was a moment ago. What an image that came late, a delay
-/// that is off, motion and play make of it is taken off first.
+/// that is off, motion and play make of it is taken off first. How fast it changes usually is learnt half a second
+/// later, so that what begins to move is not taken for usual while it gains speed. What one joint alone shows is that
+/// joint's own, play, a slip or a drift, and learnt at once.
 class OffsetSteps {
  public:
   /// Whether it lies elsewhere than a moment ago. Images that do are compared with those before them until these are
@@ -24,6 +26,8 @@ class OffsetSteps {
   bool add(const SeenOffset& now, bool delay_is_known);
   /// What comes next has nothing to do with what came before.
   void interrupt() { seen_.clear(); }
+  /// Nor is what came in the last half second anything to learn from.
+  void drop_latest() { interrupt(), latest_.clear(); }
 
  private:
   struct Seen {
@@ -37,15 +41,23 @@ class OffsetSteps {
     double late_s2 = 0;
   };
   struct Change {
-    Eigen::Array3d unexplained = Eigen::Array3d::Zero();  ///< without sign
-    double late_s = 0;                                    ///< by which the image would have to be late or early
+    Eigen::Array3d seen = Eigen::Array3d::Zero(), unexplained = Eigen::Array3d::Zero();
+    Eigen::Array3d path = Eigen::Array3d::Zero();  ///< which may have to do with it
+    double late_s = 0;                             ///< by which the image would have to be late or early
+  };
+  struct Changes {
+    double stamp_s = 0;
+    Change from_latest{}, from_oldest{};
   };
   Change change(const Seen& before, const Seen& now, const Usual& usual, bool delay_is_known) const;
-  bool is_unusual(const Change& change, const Seen& before, const Seen& now, const Usual& usual) const;
+  bool is_unusual(const Change& change, const Usual& usual) const;
+  bool is_of_one_joint(const Change& change) const;
+  void learn(const Changes& changes, bool delay_is_known);
   const Seen* latest(bool unusual) const;
   const Seen* oldest(bool unusual) const;
 
-  std::deque<Seen> seen_;  ///< in order of time, of the last 0.1 s
+  std::deque<Seen> seen_;       ///< in order of time, of the last 0.1 s
+  std::deque<Changes> latest_;  ///< not learnt yet
   Usual from_latest_, from_oldest_;
 };
 

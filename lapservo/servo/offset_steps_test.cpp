@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/core/minimum_jerk.h"
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
@@ -60,6 +61,56 @@ TEST(OffsetSteps, TellsAnOffsetThatMovesOnAndOn) {
     }
     EXPECT_GT(told, 40) << seed;
   }
+}
+
+// By how much the offset has moved from rest, on a smooth way that takes `duration_s`, when the first image is told.
+double told_after_mrad(OffsetSteps& steps, Swing& swing, double duration_s) {
+  const Eigen::Vector3d way(0.3, -0.2, 0.015);
+  for (int i = 0; i * period_s < duration_s; ++i) {
+    const Eigen::Vector3d moved = MinimumJerk::position(i * period_s / duration_s) * way;
+    if (steps.add(swing.next(moved), true)) return 1e3 * moved[0];
+  }
+  return 1e3 * way[0];
+}
+
+// Its speed grows little from image to image: what it gained is not usual.
+TEST(OffsetSteps, TellsAnOffsetThatGainsSpeedByAndBy) {
+  for (const double duration_s : {0.6, 1.0, 2.0, 4.0})
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      Swing swing(seed);
+      OffsetSteps steps;
+      for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
+      EXPECT_LT(told_after_mrad(steps, swing, duration_s), 20) << duration_s << " " << seed;
+    }
+}
+
+// Nor is it when it is over and all begins anew.
+TEST(OffsetSteps, LearnsNothingFromWhatMovedBeforeItIsTold) {
+  Swing swing(8);
+  OffsetSteps steps;
+  for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
+  const double first_mrad = told_after_mrad(steps, swing, 2);
+  steps.drop_latest();
+  for (int i = 0; i < 60; ++i) EXPECT_FALSE(steps.add(swing.next(), true)) << i;
+  EXPECT_LT(told_after_mrad(steps, swing, 2), 1.5 * first_mrad);
+}
+
+// What an encoder or a belt does; the same in two joints is told.
+TEST(OffsetSteps, TakesAJointThatSlipsForThatJoints) {
+  const auto told = [](const Eigen::Vector3d& per_s) {
+    Swing swing(9);
+    OffsetSteps steps;
+    int count = 0;
+    for (int i = 0; i < 150; ++i) EXPECT_FALSE(steps.add(swing.next(), true));
+    for (int i = 0; i < 60; ++i) {
+      const double gained = MinimumJerk::position(std::min(1.0, i / 30.0));  // in half a second
+      count += steps.add(swing.next(gained * per_s), true);
+    }
+    return count;
+  };
+  EXPECT_LE(told({0.03, 0, 0}), 2);
+  EXPECT_LE(told({0, -0.03, 0}), 2);
+  EXPECT_GT(told({0.03, -0.03, 0}), 5);
 }
 
 TEST(OffsetSteps, TellsAJumpForATenthOfASecondOnly) {

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/minimum_jerk.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/same_moment.h"
@@ -42,7 +43,8 @@ void check_motion(bool right, const char* field, double value, const char* expec
 Rigid3 camera_from_camera_before(const EndoscopeMotion& motion, double time_s) {
   const double passed_s = time_s + same_moment_s - motion.begin_s;
   if (passed_s < 0) return {};
-  const double part = passed_s < motion.duration_s ? passed_s / motion.duration_s : 1;
+  const double passed = passed_s < motion.duration_s ? passed_s / motion.duration_s : 1;
+  const double part = motion.profile == MotionProfile::smooth ? MinimumJerk::position(passed) : passed;
   return Rigid3{rotation_by(part * motion.rotation_rad), part * motion.translation_m}.inverse();
 }
 

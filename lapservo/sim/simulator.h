@@ -36,12 +36,16 @@ struct Interval {
   bool contains(double time_s) const { return begin_s <= time_s && time_s < end_s; }
 };
 
-/// The endoscope moves: the camera goes evenly, within `duration_s` (0: at once), by this much in its own frame as it
-/// was when it began.
+/// Evenly, or from rest to rest as a hand moves, with the least jerk.
+enum class MotionProfile { even, smooth };
+
+/// The endoscope moves: the camera goes, within `duration_s` (0: at once), by this much in its own frame as it was when
+/// it began.
 struct EndoscopeMotion {
   double begin_s = 0, duration_s = 0;
   Eigen::Vector3d translation_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d rotation_rad = Eigen::Vector3d::Zero();  ///< vector: about its direction, by its length
+  MotionProfile profile = MotionProfile::even;
 
   /// Returns itself if all its numbers make sense; else throws InputError naming the first field that doesn't.
   const EndoscopeMotion& checked() const;

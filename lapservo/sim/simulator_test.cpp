@@ -198,6 +198,24 @@ TEST(Simulator, TheEndoscopeMovesByWhatItIsTold) {
   EXPECT_LT((whole * simulator.placement().camera_from_unrolled.translation - first.translation).norm(), 1e-12);
 }
 
+// From rest to rest, as far as evenly after all and half of the time.
+TEST(Simulator, TheEndoscopeMovesSmoothlyWhereItIsTold) {
+  const Rig rig = small_rig();
+  SimulatorConfig config = without_offsets();
+  config.endoscope.pictures = false;
+  Simulator simulator(rig, config, in_view(rig));
+  const EndoscopeMotion motion{0.2, 0.4, {0.03, 0, -0.01}, {0, 0.3, 0.1}, MotionProfile::smooth};
+  simulator.move_endoscope(motion);
+  const auto part_after = [&](double dt_s) {
+    simulator.step(dt_s);
+    return simulator.camera_from_first_camera().inverse().translation.norm() / motion.translation_m.norm();
+  };
+  EXPECT_NEAR(part_after(0.24), 0.00856, 1e-5);  // a tenth of it
+  EXPECT_NEAR(part_after(0.16), 0.5, 1e-8);
+  EXPECT_NEAR(part_after(0.16), 1 - 0.00856, 1e-5);
+  EXPECT_NEAR(part_after(0.2), 1, 1e-12);
+}
+
 TEST(Simulator, RefusesNonsense) {
   Rig rig = small_rig();
   rig.instruments[0].camera_from_rcm.reset();
