@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <future>
 #include <optional>
+#include <utility>
 
 #include "lapservo/core/median.h"
 #include "lapservo/geometry/rotation.h"
@@ -39,20 +40,20 @@ TimedPose::ByFocal slope_of(const Rigid3& before, const Rigid3& after, double fo
 RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument, Cores cores)
     : rig_(rig),
       instrument_(instrument),
-      cores_(cores),
       as_it_is_(whole_search(rig)),
       exact_{whole_search(free_rig(rig, 0, 0)), whole_search(free_rig(rig, 0, focal_step))},
       tolerant_{whole_search(free_rig(rig, print_tolerance_m, 0)),
                 whole_search(free_rig(rig, print_tolerance_m, focal_step))},
       key_frames_(rig, instrument),
-      response_(rig.camera) {}
+      response_(rig.camera),
+      worker_(cores == Cores::two ? SerialWorker::Thread::own : SerialWorker::Thread::none) {}
 
 void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight) {
   const Marker& marker = rig_.instruments[instrument_].marker;
   // Each edge costs as much as tracking a frame: some of a long recording's are enough.
   constexpr std::size_t every = 3;
   const ShaftPose pose{seen.camera_from_unrolled, seen.psi_rad};
-  if (frames_.size() % every == 0) response_.add(bgr, marker, pose);
+  if ((frames_.size() + unfinished_.size()) % every == 0) response_.add(bgr, marker, pose);
   const auto samples = band_samples(bgr, rig_.camera, marker, pose);
   if (samples.empty()) return;
   sight.light = light_of(samples, marker);
@@ -95,23 +96,43 @@ FrameEvidence RigEvidence::tracked_as_it_is(const cv::Mat& bgr, double time_s) {
 }
 
 void RigEvidence::add(const cv::Mat& bgr, double time_s) {
-  // Neither half touches what the other one does, so that both at once find what one after the other would. Should
-  // this one throw, the future waits for the other.
-  auto as_it_is = std::async(cores_ == Cores::two ? std::launch::async : std::launch::deferred, [&] {
+  // The worker's half and this one share nothing, so that both at once find what one after the other would. Some frames
+  // apart, as now the one and then the other takes longer.
+  constexpr std::size_t most_unfinished = 4;
+  finish_all_but(most_unfinished - 1);
+  auto as_it_is = worker_.run([this, bgr, time_s] {
     key_frames_.add(bgr, time_s);
     return tracked_as_it_is(bgr, time_s);
   });
   look_at_picture(bgr);
   FreeSight free;
   if (!look_with(exact_, bgr, time_s, free)) look_with(tolerant_, bgr, time_s, free);
-  FrameEvidence frame = as_it_is.get();
-  frame.light = free.light, frame.width_px = free.width_px;
-  frames_.push_back(frame);
+  unfinished_.push_back({std::move(as_it_is), free});
+}
+
+void RigEvidence::finish_all_but(std::size_t unfinished) const {
+  while (unfinished_.size() > unfinished) {
+    Unfinished next = std::move(unfinished_.front());
+    unfinished_.pop_front();
+    FrameEvidence frame = next.as_it_is.get();
+    frame.light = next.free.light, frame.width_px = next.free.width_px;
+    frames_.push_back(frame);
+  }
+}
+
+const std::vector<FrameEvidence>& RigEvidence::frames() const {
+  finish_all_but(0);
+  return frames_;
+}
+
+std::vector<KeyFrame> RigEvidence::take_key_frames() {
+  finish_all_but(0);
+  return key_frames_.take();
 }
 
 std::vector<TrackedPsi> RigEvidence::tracked_psi() const {
   std::vector<TrackedPsi> tracked;
-  for (const FrameEvidence& frame : frames_)
+  for (const FrameEvidence& frame : frames())
     if (frame.psi_rad) tracked.push_back({frame.time_s, *frame.psi_rad});
   return tracked;
 }
@@ -122,7 +143,7 @@ PictureLight RigEvidence::picture() const {
 }
 
 int RigEvidence::count(Status status) const {
-  return static_cast<int>(std::count_if(frames_.begin(), frames_.end(),
+  return static_cast<int>(std::count_if(frames().begin(), frames().end(),
                                         [&](const FrameEvidence& frame) { return frame.status == status; }));
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
+#include <future>
 #include <optional>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include "lapservo/calibration/marker_calibration.h"
 #include "lapservo/calibration/marker_response.h"
 #include "lapservo/calibration/timed_pose.h"
+#include "lapservo/core/serial_worker.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/tracker.h"
 
@@ -35,14 +38,16 @@ struct PictureLight {
 /// Looks at a recording's frames with all that tells whether the rig is right.
 class RigEvidence {
  public:
-  /// How many cores a frame is looked at with; both find the same.
+  /// How many cores frames are looked at with; both find the same.
   enum class Cores { one, two };
   RigEvidence(const Rig& rig, std::size_t instrument, Cores cores = Cores::two);
 
-  /// 8-bit BGR of the rig's size.
+  /// 8-bit BGR of the rig's size, whose pixels stay as they are: the second core may look at them some frames later.
+  /// Then it also throws what was wrong with one before.
   void add(const cv::Mat& bgr, double time_s);
 
-  const std::vector<FrameEvidence>& frames() const { return frames_; }
+  // What follows waits for all frames that were added.
+  const std::vector<FrameEvidence>& frames() const;
   /// By the image alone, whatever the print; with TimedPose::by_focal.
   const std::vector<TimedPose>& poses() const { return poses_; }
   std::vector<TrackedPsi> tracked_psi() const;
@@ -51,7 +56,7 @@ class RigEvidence {
   PictureLight picture() const;
   int count(Status status) const;
   /// Empties what it takes.
-  std::vector<KeyFrame> take_key_frames() { return key_frames_.take(); }
+  std::vector<KeyFrame> take_key_frames();
 
  private:
   static constexpr double focal_step = 0.01;
@@ -64,22 +69,30 @@ class RigEvidence {
     std::optional<MarkerLight> light;
     double width_px = 0;
   };
+  // A frame that the second core may not have looked at yet.
+  struct Unfinished {
+    std::future<FrameEvidence> as_it_is;
+    FreeSight free;
+  };
   // Whether the marker was found.
   bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight);
   void look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight);
   void look_at_picture(const cv::Mat& bgr);
   FrameEvidence tracked_as_it_is(const cv::Mat& bgr, double time_s);
+  void finish_all_but(std::size_t unfinished) const;
 
   Rig rig_;
   std::size_t instrument_;
-  Cores cores_;
   Tracker as_it_is_;
   FreeTrackers exact_, tolerant_;
   KeyFrames key_frames_;
   MarkerResponse response_;
-  std::vector<FrameEvidence> frames_;
   std::vector<TimedPose> poses_;
   std::vector<double> values_, clipped_;
+  // When they are finished changes nothing that can be seen.
+  mutable std::vector<FrameEvidence> frames_;
+  mutable std::deque<Unfinished> unfinished_;
+  SerialWorker worker_;  // the last to come and the first to go: it uses the trackers
 };
 
 }  // namespace lapservo::internal

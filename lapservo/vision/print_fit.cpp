@@ -7,13 +7,11 @@
 #include <numeric>
 #include <utility>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/core/median.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
+#include "lapservo/vision/print_evidence.h"
 
 namespace lapservo::internal {
 namespace {
@@ -21,10 +19,6 @@ namespace {
 constexpr auto& print_sigmas_mm = print_limits.sigmas_mm;
 constexpr double mm = 1e-3;  // the print's errors are in millimetres here
 
-// e0, e1 at both edges, e2 at both edges, e3: the ends are circles.
-constexpr int print_errors = 6;
-using PrintVector = Eigen::Matrix<double, print_errors, 1>;
-using PrintMatrix = Eigen::Matrix<double, print_errors, print_errors>;
 using CrossMatrix = Eigen::Matrix<double, print_errors, Eigen::Dynamic, 0, print_errors, max_unknowns>;
 
 // A measurement of a group whose residuals are fitted by a line: along the shaft in metres, a side's in pixels.
@@ -72,9 +66,6 @@ Eigen::Vector2d print_row(const Measurement& m) {
   const double along = mm * m.along_px_per_m;
   return {along * (1 - m.turn_fraction), along * m.turn_fraction};
 }
-
-// Which of the print's errors a boundary has at its upper and at its lower edge.
-constexpr std::array<std::array<int, 2>, 4> errors_of_boundary{{{0, 0}, {1, 2}, {3, 4}, {5, 5}}};
 
 double print_shift_px(const Measurement& m, const PrintVector& print_mm) {
   if (m.group >= errors_of_boundary.size()) return 0;
@@ -204,96 +195,28 @@ Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lin
   return sums;
 }
 
-// What is assumed of the print's errors [mm]: each by itself, and where an ink lies aside both inner boundaries alike
-// as well, which looks most like a turn: the covariance sigma^2 (I + c c^T).
-struct Prior {
-  double sigma_mm = 0;
-  bool ink_aside = false;
-};
-
-const PrintVector& inner_shift() {
-  static const PrintVector c = (PrintVector() << 0, 1, 1, 1, 1, 0).finished();
-  return c;
-}
-
-// (I + c c^T)^(1/2), where |c| is 2.
-const PrintMatrix& root_of_ink_aside() {
-  static const PrintMatrix root =
-      PrintMatrix::Identity() + (std::sqrt(5.0) - 1) / 4 * inner_shift() * inner_shift().transpose();
-  return root;
-}
-
-// Where the boundaries lie at both edges of the print [m].
-PrintVector places_on(const Marker& marker) {
-  const auto &upper = marker.bands_upper_m, &lower = marker.bands_lower_m;
-  return (PrintVector() << 0, upper[0], lower[0], upper[0] + upper[1], lower[0] + lower[1], marker.length_m())
-      .finished();
-}
-
-// PrintDoubt as a covariance of the print's errors [mm^2].
-PrintMatrix doubted_mm2(const PrintDoubt& doubt, const Sums& sums, const Marker& marker) {
-  constexpr double least_variance = 1e-4;  // of a boundary's turn fractions
-  const PrintMatrix& nn = sums.equations.nn;
-  const PrintVector longer_mm = doubt.length_fraction / mm * places_on(marker);
-  PrintMatrix covariance = longer_mm * longer_mm.transpose();
-  for (std::size_t k = 0; k < errors_of_boundary.size(); ++k) {
-    const auto [upper, lower] = errors_of_boundary[k];
-    const double weight = sums.pulls[k].weight;
-    if (!(weight > 0)) continue;
-    if (upper == lower) {
-      covariance(upper, upper) += doubt.boundary_px * doubt.boundary_px * weight / nn(upper, upper);
-      continue;
-    }
-    const double square = nn(upper, upper) + 2 * nn(upper, lower) + nn(lower, lower), mm2_per_px2 = weight / square;
-    const double middle = (nn(lower, lower) + nn(upper, lower)) / square;
-    const double variance = std::max(least_variance, nn(lower, lower) / square - middle * middle);
-    const Eigen::Vector2d tilted(-middle, 1 - middle);
-    const Eigen::Matrix2d both = mm2_per_px2 * (doubt.boundary_px * doubt.boundary_px * Eigen::Matrix2d::Ones() +
-                                                doubt.tilt_px * doubt.tilt_px / variance * tilted * tilted.transpose());
-    covariance.block<2, 2>(upper, upper) += both;
-  }
-  return covariance;
-}
-
 // What the residuals say about the print's errors, whatever the pose, the film and the common errors are.
-struct PrintInformation {
-  PrintMatrix information = PrintMatrix::Zero();
-  PrintVector gradient = PrintVector::Zero();
-  double inner_sigma_mm = 1e3;  // where the less exact of the inner boundaries lies as a whole, nothing doubted
-};
-
-PrintInformation information_of(const Sums& sums, const PrintMatrix& doubted) {
+std::optional<PrintInformation> information_of(const Sums& sums) {
   Equations e = sums.equations;
   for (const Pull& pull : sums.pulls)
     if (pull.weight > 0) e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
   const auto inverse = inverse_of(e.xx);
-  if (!inverse) return {};  // the frame tells nothing of the print
+  if (!inverse) return std::nullopt;
   const CrossMatrix through = e.nx.lazyProduct(*inverse);
-  const PrintMatrix undoubted = e.nn - through.lazyProduct(e.nx.transpose());
-  const double inner = std::min(undoubted.block<2, 2>(1, 1).sum(), undoubted.block<2, 2>(3, 3).sum());
-  const PrintMatrix left = (PrintMatrix::Identity() + undoubted * doubted).inverse();
-  return {left * undoubted, left * (e.n - through * e.x), 1 / std::sqrt(std::max(inner, 1e-6))};
+  return PrintInformation{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
 }
 
-// How likely that makes prints of any size of errors.
-class Evidence {
- public:
-  // `root` of the prior's covariance for a sigma of one.
-  Evidence(const PrintInformation& print, const PrintMatrix& root) {
-    const Eigen::SelfAdjointEigenSolver<PrintMatrix> directions(root * print.information * root);
-    information_ = directions.eigenvalues().cwiseMax(0);
-    squares_ = (directions.eigenvectors().transpose() * (root * print.gradient)).cwiseAbs2();
-  }
-  // Logarithm of the likelihood of this standard deviation, compared with none.
-  double gain(double sigma_mm) const {
-    const double variance = sigma_mm * sigma_mm;
-    const PrintVector spread = 1 + variance * information_.array();
-    return 0.5 * (variance * squares_.cwiseQuotient(spread).sum() - std::log(spread.prod()));
-  }
+// One sigma of where the less exact of the inner boundaries lies as a whole.
+double inner_sigma_mm(const PrintMatrix& information) {
+  const double inner = std::min(information.block<2, 2>(1, 1).sum(), information.block<2, 2>(3, 3).sum());
+  return 1 / std::sqrt(std::max(inner, 1e-6));
+}
 
- private:
-  PrintVector information_, squares_;  // along the directions that are independent
-};
+PrintShapes doubted_shapes_mm(const PrintDoubt& doubt, const Sums& sums, const Marker& marker) {
+  std::array<double, 4> weights{};
+  for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = sums.pulls[k].weight;
+  return shapes_of(doubt, sums.equations.nn, weights, marker);
+}
 
 struct Solution {
   UnknownVector step;
@@ -301,31 +224,10 @@ struct Solution {
   UnknownMatrix covariance;
 };
 
-// Of a matrix of the print's errors: a measurement is of one boundary, so boundaries stand in blocks of their own.
-PrintMatrix inverse_by_boundary(const PrintMatrix& information) {
-  PrintMatrix inverse = PrintMatrix::Zero();
-  for (const auto& [upper, lower] : errors_of_boundary) {
-    const double a = information(upper, upper), b = information(upper, lower), c = information(lower, lower);
-    if (upper == lower) {
-      inverse(upper, upper) = 1 / a;
-      continue;
-    }
-    const double determinant = a * c - b * b;
-    inverse(upper, upper) = c / determinant, inverse(lower, lower) = a / determinant;
-    inverse(upper, lower) = inverse(lower, upper) = -b / determinant;
-  }
-  return inverse;
-}
-
 // The likeliest pose when the print's errors are so, and how sure it is.
-std::optional<Solution> solved(const Sums& sums, const Prior& prior) {
+std::optional<Solution> solved(const Sums& sums, const PrintPrior& prior) {
   const Equations& e = sums.equations;
-  const double variance = std::max(prior.sigma_mm * prior.sigma_mm, 1e-18);
-  PrintMatrix print_covariance = inverse_by_boundary(e.nn + PrintMatrix::Identity() / variance);
-  if (prior.ink_aside) {  // whose prior's inverse is (I - c c^T / 5) / variance
-    const PrintVector moved = print_covariance * inner_shift();
-    print_covariance += moved * moved.transpose() / (5 * variance - inner_shift().dot(moved));
-  }
+  const PrintMatrix print_covariance = covariance_of(e.nn, prior);
   const CrossMatrix by_x = print_covariance.lazyProduct(e.nx);
   const auto inverted = inverse_of(e.xx - e.nx.transpose().lazyProduct(by_x));
   if (!inverted) return std::nullopt;
@@ -374,18 +276,15 @@ constexpr std::size_t sizes = print_sigmas_mm.size();
 using Weights = std::array<double, sizes + 1>;  // of the tolerated print, and of those that are off by print_sigmas_mm
 
 // Of a print that is off by this size and the tolerance.
-Prior prior_of(std::size_t size, double tolerance_mm) {
+PrintPrior prior_of(std::size_t size, double tolerance_mm) {
   return {std::hypot(print_sigmas_mm[size], tolerance_mm), print_sigmas_mm[size] >= print_limits.least_ink_aside_mm};
 }
 
 // The likelihoods' logarithms, the largest 0.
 Weights gains_of(const PrintInformation& print, double tolerance_mm) {
-  const Evidence alone(print, PrintMatrix::Identity()), ink_aside(print, root_of_ink_aside());
-  Weights gains{alone.gain(tolerance_mm)};
-  for (std::size_t i = 0; i < sizes; ++i) {
-    const Prior prior = prior_of(i, tolerance_mm);
-    gains[i + 1] = (prior.ink_aside ? ink_aside : alone).gain(prior.sigma_mm);
-  }
+  const PrintEvidence evidence(print);
+  Weights gains{evidence.gain({tolerance_mm})};
+  for (std::size_t i = 0; i < sizes; ++i) gains[i + 1] = evidence.gain(prior_of(i, tolerance_mm));
   const double best = *std::max_element(gains.begin(), gains.end());
   for (double& gain : gains) gain -= best;
   return gains;
@@ -431,8 +330,9 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   if (!exact || !tolerated) return std::nullopt;
   // The exact print's pose is where the measurements were taken.
   if (tolerance_mm == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
-  const PrintInformation print = information_of(sums, doubted_mm2(errors.doubt, sums, marker));
-  const Weights gains = gains_of(print, tolerance_mm);
+  // Nothing, where the frame tells nothing of the print.
+  const PrintInformation print = information_of(sums).value_or(PrintInformation{});
+  const Weights gains = gains_of(doubted(print, doubted_shapes_mm(errors.doubt, sums, marker)), tolerance_mm);
   const Weights judged_by = weights_of(gains, print_limits.fractions);
   const Weights told_by = weights_of(gains, print_limits.told_fractions);
   Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
@@ -451,7 +351,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
-  fit.inner_sigma_m = errors.inner_doubt_scale * print.inner_sigma_mm * mm;
+  fit.inner_sigma_m = errors.inner_doubt_scale * inner_sigma_mm(print.information) * mm;
   fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);

@@ -6,16 +6,10 @@
 
 #include "lapservo/marker/marker.h"
 #include "lapservo/vision/edge_measurements.h"
+#include "lapservo/vision/print_doubt.h"
 #include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo::internal {
-
-/// How a picture that is blurred, compressed or processed moves boundaries as a print's errors would, one sigma each:
-/// every boundary as a whole, the inner ones about their middle (rms over what shows), and all as if the marker were
-/// longer by this fraction.
-struct PrintDoubt {
-  double boundary_px = 0, tilt_px = 0, length_fraction = 0;
-};
 
 /// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
 /// says, and what is doubted before the print is blamed.
