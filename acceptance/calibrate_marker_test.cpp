@@ -10,12 +10,15 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "acceptance/frame_sets.h"
 #include "lapservo/calibration/marker_calibration.h"
+#include "lapservo/calibration/marker_measurement.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/testing/camera_effects.h"
@@ -195,6 +198,46 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
   EXPECT_LE(rms(after_sigmas), 2);
   EXPECT_LE(rms(written_sigmas), 2);
   EXPECT_GE(after_statuses["ok"], 0.95 * prints * held_out);
+}
+
+// A turn's frames, as a video has them or as files of their own.
+class TurnsFrames : public FrameSource {
+ public:
+  TurnsFrames(const std::vector<TrueFrame>& frames, bool files) : frames_(frames), files_(files) {}
+  std::optional<Frame> next() override {
+    if (next_ == frames_.size()) return std::nullopt;
+    Frame frame{frames_[next_].bgr, static_cast<int>(next_), static_cast<double>(next_) / 30, {}, {}};
+    if (files_) frame.file = std::to_string(next_) + ".jpg";
+    ++next_;
+    return frame;
+  }
+  Kind kind() const override { return files_ ? Kind::folder : Kind::video; }
+  std::optional<int> frame_count() const override { return static_cast<int>(frames_.size()); }
+  double frames_per_second() const override { return 30; }
+
+ private:
+  const std::vector<TrueFrame>& frames_;
+  bool files_;
+  std::size_t next_ = 0;
+};
+
+TEST(CalibrateMarkerByVideo, OneWayMayLeaveTheSeamBehind) {
+  RenderedSet set;
+  set.rig = example_rig();
+  set.seed = 7;
+  set.configurations = turn(set.rig, 60, set.seed);
+  std::vector<TrueFrame> frames = rendered_frames(set);
+  const auto measured = [&](bool files) {
+    TurnsFrames source(frames, files);
+    return measure_marker(set.rig, 0, {source, "turn"}, std::nullopt, {}).calibration;
+  };
+  const MarkerCalibration plain = measured(false);
+  compress(frames, Encoder::lapservo);
+  const MarkerCalibration video = measured(false), pictures = measured(true);
+  for (const auto* calibration : {&plain, &video, &pictures}) ASSERT_EQ(calibration->refusal, "");
+  EXPECT_FALSE(plain.seam_may_lag);
+  EXPECT_TRUE(video.seam_may_lag);
+  EXPECT_FALSE(pictures.seam_may_lag) << "no encoder saw the picture before";
 }
 
 INSTANTIATE_TEST_SUITE_P(

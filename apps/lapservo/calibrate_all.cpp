@@ -40,7 +40,8 @@ struct Step {
   std::vector<std::string> arguments;  // beyond the subcommand, the input, the rig and the joints
 };
 
-constexpr const char* to_record_turn = "a slow full turn about the shaft's axis, 20 s or more, near and sharp";
+constexpr const char* to_record_turn =
+    "a slow full turn about the shaft's axis, there and back, 20 s or more each way, near and sharp";
 constexpr const char* to_record_swing =
     "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s";
 
@@ -287,7 +288,8 @@ void add_calibrate_all(Command parent, Run& run_later) {
   command.add_option("--square-mm", options->square_mm, "Width of its squares").number_between(0.1, 1000.0);
   command.add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
   command.add_option("--motion", options->motion, "For the colours: the marker in motion; else --swing, else --turn");
-  command.add_option("--turn", options->turn, "For the marker: a slow full turn about the shaft's axis");
+  command.add_option("--turn", options->turn,
+                     "For the marker: a slow full turn about the shaft's axis, there and back");
   command.add_option("--swing", options->swing, "For the registration: a smooth swing");
   command.add_option("--joints", options->joints, "CSV of the joints meanwhile");
   command.add_option("--check", options->judged, "For the check: a recording; else --swing");

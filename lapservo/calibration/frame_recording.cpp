@@ -38,6 +38,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
       continue;
     }
     ++frames.looked_at;
+    frames.pictures += frame->file.empty() ? 0 : 1;
     watch.tell(source.frame_count(), read, look(deinterlace ? field.of(frame->bgr) : frame->bgr, frame->time_s));
   }
   frames.complaint = source.complaint();

@@ -33,6 +33,7 @@ struct JobWatch {
 /// What became of a recording's frames.
 struct FramesRead {
   int looked_at = 0, flawed = 0;
+  int pictures = 0;       ///< of those looked at, files of their own: no encoder saw the one before
   bool stopped = false;   ///< by the user
   std::string complaint;  ///< what could not be read; empty when all was
 

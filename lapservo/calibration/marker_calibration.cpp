@@ -1,6 +1,7 @@
 #include "lapservo/calibration/marker_calibration.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -55,6 +56,17 @@ double worth(const Sighting& sighting) {
   return (sighting.settled ? 100 : 0) - sighting.blur.boundaries_px - sighting.blur.sides_px;
 }
 
+// Whether a frame tells a pose by itself: of one boundary and the sides a turn and a shift along the shaft look alike,
+// and both ends tell no turn. With one such frame the print has no covariance.
+bool tells_pose(const EdgeMeasurements& edges) {
+  constexpr int min_lines = 5, min_boundaries = 2;
+  std::array<int, 4> lines{};
+  for (const Measurement& m : edges.all)
+    if (m.group < lines.size()) ++lines[m.group];
+  const auto seen = std::count_if(lines.begin(), lines.end(), [](int of_one) { return of_one >= min_lines; });
+  return seen >= min_boundaries && std::max(lines[1], lines[2]) >= min_lines;
+}
+
 // The frames and the print while they are being fitted.
 class TurnFit {
  public:
@@ -80,6 +92,7 @@ class TurnFit {
       auto measured = measurer_.measure(frame.view, marker_, frame.sighting,
                                         {extra_px, how.seam_reach_m, free_gap_, how.ask_processing});
       if (measured.edges.all.size() < min_edges) return true;  // too few for a pose
+      if (with_covariance && !tells_pose(measured.edges)) return true;
       measured.turned_rad = frame.turned_rad;
       measured_.push_back(std::move(measured));
       return false;

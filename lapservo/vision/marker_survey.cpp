@@ -20,6 +20,9 @@ namespace {
 
 // A print that is off by half a millimetre leaves nine tenths of the surface with the colour that the rig's would have.
 constexpr double min_matching = 0.6, max_wrong = 0.15, max_beside = 0.2;
+// Where boundaries are measured, what blurs luma is light's blur: libx264 hardly blurs it after the response, but a fit
+// of its wide and ragged blur of colour differences takes some, and then moves e2 by 0.155 px for 0.1.
+constexpr double least_sharpening = 0;
 
 std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unknowns, const EdgeBlur& blur,
                                     bool settled) {
@@ -149,7 +152,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   measured.edges =
       measure_edges(scene, light, sighting.unknowns, sighting.film_m, {reach.extra_px, iterations, 1}, sighting.blur);
   if (reach.ask_processing)
-    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px);
+    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px, least_sharpening);
   const auto& processed = measured.processing.edges;
   if (const auto cylinder = view_cylinder(sighting.unknowns.pose().camera_from_unrolled, marker.radius_m());
       processed && cylinder)

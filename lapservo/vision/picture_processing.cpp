@@ -276,11 +276,12 @@ struct Block {
 class Problem {
  public:
   Problem(const std::array<float, 256>& light_of_value, const PooledEdges& edges, double blur_px,
-          const SharedVector& sigmas)
+          const SharedVector& sigmas, double least_sharpening = least_sharpening_known)
       : encoding_(light_of_value),
         edges_(edges),
         prior_(expected(edges, blur_px)),
-        certainty_(sigmas.cwiseAbs2().cwiseInverse()) {
+        certainty_(sigmas.cwiseAbs2().cwiseInverse()),
+        least_sharpening_(least_sharpening) {
     for (std::size_t k = 0; k < 4; ++k)
       for (std::size_t c = 0; c < 3; ++c)
         for (int i = 0; i < samples; ++i) {
@@ -332,7 +333,7 @@ class Problem {
     next.processing += step;
     next.processing[chroma_variance] = std::clamp(next.processing[chroma_variance], 0.0, max_chroma_variance_px2);
     next.processing[saturation] = std::clamp(next.processing[saturation], 0.5, 2.0);
-    next.processing[sharpening] = std::clamp(next.processing[sharpening], -0.35, 2.0);
+    next.processing[sharpening] = std::clamp(next.processing[sharpening], least_sharpening_, 2.0);
     const SharedVector taken = next.processing - state.processing;
     for (std::size_t k = 0; k < 4; ++k)
       if (is_seen(edges_[k]))
@@ -380,6 +381,7 @@ class Problem {
   const PooledEdges& edges_;
   State prior_;
   SharedVector certainty_;
+  double least_sharpening_;
   std::array<AllSamples, 4> measured_{AllSamples::Zero(), AllSamples::Zero(), AllSamples::Zero(), AllSamples::Zero()};
   std::array<AllSamples, 4> usable_ = measured_;  // 1 or 0
 };
@@ -495,9 +497,9 @@ std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light
 }
 
 std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
-                                      double blur_px) {
+                                      double blur_px, double least_sharpening) {
   if (!is_enough(edges)) return std::nullopt;
-  const Problem problem(light_of_value, edges, blur_px, expected_sigmas());
+  const Problem problem(light_of_value, edges, blur_px, expected_sigmas(), least_sharpening);
   const Problem without(light_of_value, edges, blur_px, sigmas_of_none());
   const State state = minimised(problem);
   ProcessedEdges out;
@@ -530,14 +532,15 @@ std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges) {
   return magnitudes_px;
 }
 
-ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px) {
+ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
+                                   double least_sharpening) {
   constexpr int glance = 12, look = EdgeMeasurements::max_lines;  // places of a boundary
   if (blur_px > processing_limits.max_blur_px) return {};
   const auto& light_of_value = light.light_of_value();
   const auto guess = first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px);
   if (!guess) return {};
   if (!is_processed(*guess)) return {Processing::none, std::nullopt};
-  auto explained = explain(light_of_value, pool_edges(light, measurements, look), blur_px);
+  auto explained = explain(light_of_value, pool_edges(light, measurements, look), blur_px, least_sharpening);
   if (!explained) return {};
   if (is_believed(*explained)) return {Processing::found, std::move(explained)};
   if (explained->misfit_without < processing_limits.max_misfit_of_none) return {Processing::none, std::nullopt};

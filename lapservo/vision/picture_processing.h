@@ -18,6 +18,9 @@ struct PictureProcessing {
   double sharpening_px = 1.2;      ///< that blur
 };
 
+/// Below 0 luma is blurred after the response: by so much at most.
+inline constexpr double least_sharpening_known = -0.35;
+
 /// The light on both sides of a boundary, as encoded values b, g, r before the processing.
 struct Plateaus {
   std::array<double, 3> before, after;
@@ -49,10 +52,10 @@ bool is_processed(const PictureProcessing& processing);
 std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
                                              double blur_px);
 
-/// The likeliest processing, from what all boundaries look like. `blur_px` is what fit_step was told. Nullopt when too
-/// little was seen.
+/// The likeliest processing, from what all boundaries look like; one that sharpens by `least_sharpening` and more.
+/// `blur_px` is what fit_step was told. Nullopt when too little was seen.
 std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
-                                      double blur_px);
+                                      double blur_px, double least_sharpening = least_sharpening_known);
 
 /// Whether the frame looks like that rather than like none.
 bool is_believed(const ProcessedEdges& edges);
@@ -73,6 +76,7 @@ struct ProcessingEvidence {
 };
 
 /// Of the boundaries among `measurements`, which fit_step located with `blur_px`.
-ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px);
+ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
+                                   double least_sharpening = least_sharpening_known);
 
 }  // namespace lapservo::internal

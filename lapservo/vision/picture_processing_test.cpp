@@ -60,6 +60,15 @@ TEST(PictureProcessing, IsToldFromTheBoundaries) {
   }
 }
 
+// A blur of luma after the response, where it may be one and where it may not.
+TEST(PictureProcessing, SharpensNoLessThanItMay) {
+  const PooledEdges edges = edges_of({.blur_px = 0.9, .chroma_variance_px2 = 2, .sharpening = -0.3}, 0);
+  const auto any = explain(srgb(), edges, 1), none = explain(srgb(), edges, 1, 0);
+  ASSERT_TRUE(any && none);
+  EXPECT_LT(any->processing.sharpening, -0.1);
+  EXPECT_GE(none->processing.sharpening, 0);
+}
+
 TEST(PictureProcessing, TooLittleTellsNothing) {
   PooledEdges edges = edges_of({.blur_px = 1, .sharpening = 0.7}, 0);
   edges[0].places = edges[1].places = 2;

@@ -58,5 +58,24 @@ TEST(SeamEdges, LieWhereTheyDoWithoutSharpening) {
   EXPECT_LT(std::abs(left_rad), 0.4 * std::abs(moved_rad));
 }
 
+// What compression does to a seam is alike along the shaft.
+TEST(SeamEdges, KnowHowFarCompressionMovesThem) {
+  effects::CameraEffects jpeg;
+  jpeg.jpeg_quality = 50;
+  double squares = 0, sigmas_px = 0;
+  int seen = 0;
+  for (std::uint64_t seed = 1; seed <= 24; ++seed) {
+    const GapShot shot(seed);
+    const auto plain = shot.seam(shot.bgr, std::nullopt);
+    const auto compressed = shot.seam(effects::seen_through(jpeg, shot.bgr, shot.rig.camera), std::nullopt);
+    if (!plain || !compressed) continue;
+    squares += std::pow((compressed->gap_rad - plain->gap_rad) / compressed->sigma_gap_rad, 2), ++seen;
+    if (compressed->upper) sigmas_px = std::max(sigmas_px, compressed->upper->sigma_px);
+  }
+  ASSERT_GE(seen, 12);
+  EXPECT_LT(std::sqrt(squares / seen), 1.5) << seen;
+  EXPECT_LT(sigmas_px, 1) << "or nothing is told";
+}
+
 }  // namespace
 }  // namespace lapservo::internal

@@ -98,6 +98,8 @@ class MarkerCalibration(Calibration):
 
     Of `looked_at` frames the marker was found in `found`; `frames` of them, from all sides, are used, `seam_views` of
     these show the seam. Boundaries miss the rig's print by before_px rms and the calibrated one by after_px.
+    seam_may_lag: the frames look like a compressed video's and turn one way only: psi may be some mrad off, which a turn
+    there and back would tell.
     """
 
     instrument: str
@@ -107,6 +109,7 @@ class MarkerCalibration(Calibration):
     seam_views: int
     before_px: float
     after_px: float
+    seam_may_lag: bool
 
     @property
     def marker(self) -> Any:

@@ -234,6 +234,7 @@ py::dict calibrate_marker(const py::object& frames, const py::object& rig, const
   result["seam_views"] = calibration.seam_views;
   result["before_px"] = calibration.before_px;
   result["after_px"] = calibration.after_px;
+  result["seam_may_lag"] = calibration.seam_may_lag;
   return result;
 }
 

@@ -97,6 +97,7 @@ def test_a_print_is_the_command_lines(recordings):
     assert result.found == 48 and np.allclose(result.marker.bands_upper_m, recordings.rig.instruments[0].marker.bands_upper_m,
                                               atol=5e-5)
     assert set(result.marker.sigmas) >= {"bands_upper_m", "wrap_m", "gap_rad", "seam_rad"}
+    assert result.seam_may_lag is False
 
 
 def test_a_camera_is_the_command_lines(recordings, tmp_path):
