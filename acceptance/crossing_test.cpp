@@ -278,7 +278,7 @@ TEST_F(Crossing, BothInstrumentsAreFound) {
   EXPECT_EQ(all.wrong, 0);
   EXPECT_LT(all.error_by_sigma(), 1.5);
   EXPECT_GE(exact_in_front.found, 0.95 * exact_in_front.all);
-  EXPECT_GE(exact.found, 0.5 * exact.all);
+  EXPECT_GE(exact.found_of_those, 0.75 * exact.tell);
   EXPECT_LT(exact.error_by_sigma(), 1.5);
 }
 

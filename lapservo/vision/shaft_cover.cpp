@@ -54,6 +54,12 @@ double distance_px(const Segment& a, const Segment& b) {
 
 }  // namespace
 
+void ShaftCover::reserve(const Camera& camera) {
+  const auto cells = [](int size_px) { return static_cast<std::size_t>(size_px / cell_px + 1); };
+  cells_.reserve(cells(camera.width_px) * cells(camera.height_px));
+  sections_.reserve(static_cast<std::size_t>(camera.width_px) + static_cast<std::size_t>(camera.height_px));
+}
+
 void ShaftCover::draw(const Camera& camera, const Marker& marker, const std::array<std::uint8_t, 3>& bands,
                       const ShaftPose& pose) {
   drawn_ = true;

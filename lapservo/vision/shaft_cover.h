@@ -22,6 +22,9 @@ class ShaftCover {
  public:
   static constexpr int cell_px = 4;
 
+  /// Makes room for an instrument in a camera's image, since frames that are tracked allocate nothing.
+  void reserve(const Camera& camera);
+
   /// `bands`: the colour classes of the marker's bands.
   void draw(const Camera& camera, const Marker& marker, const std::array<std::uint8_t, 3>& bands,
             const ShaftPose& pose);

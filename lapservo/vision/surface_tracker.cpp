@@ -132,6 +132,8 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       covers_(rig.instruments.size()),
       observations_(rig.instruments.size()) {
   others_.reserve(rig.instruments.size());
+  if (rig.instruments.size() > 1)
+    for (ShaftCover& cover : covers_) cover.reserve(rig.camera);
   BlurredEdges::instance();  // takes milliseconds, which no frame should
 }
 
@@ -252,8 +254,8 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
     if (again && !new_others) continue;
     // What took twice the work in this frame has all of the next one.
     const auto beyond = followed_twice_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::one;
-    const double part = budget.left() / static_cast<double>(lost--) * (others_.empty() ? 1 : search_costs.part_beside);
-    found_[i] = budget.share(part, beyond, [&](WorkBudget& part) { return look_for(image, light, blobs, i, part); });
+    const double units = budget.left() / static_cast<double>(lost--) * (others_.empty() ? 1 : search_costs.part_beside);
+    found_[i] = budget.share(units, beyond, [&](WorkBudget& part) { return look_for(image, light, blobs, i, part); });
     any |= found_[i].fit.has_value();
   }
   return any;
