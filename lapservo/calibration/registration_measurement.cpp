@@ -14,7 +14,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int enough = 3600;
+constexpr int enough_images = 3600;
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 }  // namespace
@@ -26,12 +26,12 @@ MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const Fram
   Tracker tracker(free, {.frame_budget = std::nullopt});
   const std::string& name = rig.instruments[instrument].name;
   MeasuredPoses poses;
-  poses.read =
-      read_frames(recording, free, every_of(recording.source, enough), watch, [&](const cv::Mat& bgr, double time_s) {
-        const Observation& seen = tracker.track(bgr)[instrument];
-        if (seen.status == Status::ok && seen.marker) poses.all.push_back({time_s, *seen.marker});
-        return fmt::format(", {} in {}", name, poses.all.size());
-      });
+  poses.read = read_frames(recording, free, every_of(recording.source, enough_images), watch,
+                           [&](const cv::Mat& bgr, double time_s) {
+                             const Observation& seen = tracker.track(bgr)[instrument];
+                             if (seen.status == Status::ok && seen.marker) poses.all.push_back({time_s, *seen.marker});
+                             return fmt::format(", {} in {}", name, poses.all.size());
+                           });
   if (poses.all.empty())
     poses.none = fmt::format("{} is in none of {} frames{}", name, poses.read.looked_at, poses.read.damaged());
   return poses;

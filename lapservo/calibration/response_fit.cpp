@@ -27,7 +27,7 @@ namespace {
 // of [0, 1] without those that move the ends.
 constexpr int parts = 8, curve_numbers = parts + 1;
 // All edges share: c_k; the logarithm of dark over bright reflectance; sharpening's strength and log blur.
-constexpr int ratio = curve_numbers, strength = ratio + 1, shared_numbers = strength + 2;
+constexpr int ratio = curve_numbers, strength = ratio + 1, common_numbers = strength + 2;
 // Those at like angles to the rows of pixels: how blurred edges differ from a normal distribution's at so many steps on
 // either side. What filters on pixels make of a lens' blur is symmetric and no more.
 constexpr int shape_numbers = 8;
@@ -220,7 +220,7 @@ struct ShapePrior {
   }
 };
 
-using Shared = std::array<double, shared_numbers>;
+using Shared = std::array<double, common_numbers>;
 using Shape = std::array<double, shape_numbers>;
 
 std::size_t shape_of(const BoardEdgeProfile& profile) {
@@ -288,7 +288,7 @@ double curve_sigma_of(ceres::Problem& problem, const Shared& shared, double scal
   if (!covariance.Compute(std::vector<std::pair<const double*, const double*>>{{shared.data(), shared.data()}},
                           &problem))
     return std::numeric_limits<double>::infinity();
-  Eigen::Matrix<double, shared_numbers, shared_numbers, Eigen::RowMajor> c;
+  Eigen::Matrix<double, common_numbers, common_numbers, Eigen::RowMajor> c;
   covariance.GetCovarianceBlock(shared.data(), shared.data(), c.data());
   // The curve's values at some lights, less what another exposure would be.
   constexpr int places = 41;
@@ -399,13 +399,13 @@ class ProfileFit {
   void add_costs() {
     for (std::size_t i = 0; i < profiles_.size(); ++i) {
       auto* cost =
-          new ceres::AutoDiffCostFunction<ProfileCost, ceres::DYNAMIC, shared_numbers, shape_numbers, edge_numbers>(
+          new ceres::AutoDiffCostFunction<ProfileCost, ceres::DYNAMIC, common_numbers, shape_numbers, edge_numbers>(
               new ProfileCost{&profiles_[i], &given_}, static_cast<int>(profiles_[i].value.size()) + 3);
       problem_.AddResidualBlock(cost, nullptr, shared_.data(), shapes_[shape_of(profiles_[i])].data(),
                                 edges_[i].data());
     }
     problem_.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<CurvePrior, CurvePrior::size, shared_numbers>(new CurvePrior), nullptr,
+        new ceres::AutoDiffCostFunction<CurvePrior, CurvePrior::size, common_numbers>(new CurvePrior), nullptr,
         shared_.data());
     for (Shape& shape : shapes_)
       problem_.AddResidualBlock(
@@ -420,7 +420,7 @@ class ProfileFit {
     return run(sharpened ? std::vector<int>{} : std::vector<int>{strength, strength + 1});
   }
   bool run(const std::vector<int>& fixed) {
-    problem_.SetManifold(shared_.data(), fixed.empty() ? nullptr : new ceres::SubsetManifold(shared_numbers, fixed));
+    problem_.SetManifold(shared_.data(), fixed.empty() ? nullptr : new ceres::SubsetManifold(common_numbers, fixed));
     return solve_quietly(solver_, problem_, summary_);
   }
 

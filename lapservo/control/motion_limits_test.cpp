@@ -8,6 +8,7 @@
 #include "lapservo/robot/joint_path.h"
 
 namespace lapservo::internal {
+namespace motion_limits_test {
 namespace {
 
 constexpr double period_s = 1.0 / 60;
@@ -123,4 +124,5 @@ TEST(MotionLimits, BrakingKeepsTheDirectionAndStops) {
 }
 
 }  // namespace
+}  // namespace motion_limits_test
 }  // namespace lapservo::internal

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using testing::input_error;
 using testing::TemporaryFolder;
 
-std::string refusal(const fs::path& path) {
+std::string refusal_to_write(const fs::path& path) {
   return input_error([&] { output_target(path); });
 }
 
@@ -34,7 +34,7 @@ TEST(OutputTarget, FollowsLinksToFilesThatAreThereOrNot) {
   EXPECT_EQ(output_target(folder / "dangling").file, folder / "sub/missing.csv");
   EXPECT_FALSE(output_target(folder / "dangling").existing);
   fs::create_symlink("loop", folder / "loop");
-  EXPECT_EQ(refusal(folder / "loop"),
+  EXPECT_EQ(refusal_to_write(folder / "loop"),
             (folder / "loop").string() + ": can't be written: Too many levels of symbolic links");
 }
 
@@ -48,17 +48,17 @@ TEST(OutputTarget, KnowsWhatIsNoRegularFile) {
 TEST(OutputTarget, RefusesWhatCanNotBeAFile) {
   const TemporaryFolder folder;
   const std::string place = folder.path().string();
-  EXPECT_EQ(refusal(""), "output: has no name, expected a file to write");
-  EXPECT_EQ(refusal(folder.path()), place + ": is a folder, expected a file to write");
-  EXPECT_EQ(refusal(place + "/"), place + "/: is a folder, expected a file to write");
-  EXPECT_EQ(refusal(place + "/none/"), place + "/none/: is a folder's name, expected a file to write");
+  EXPECT_EQ(refusal_to_write(""), "output: has no name, expected a file to write");
+  EXPECT_EQ(refusal_to_write(folder.path()), place + ": is a folder, expected a file to write");
+  EXPECT_EQ(refusal_to_write(place + "/"), place + "/: is a folder, expected a file to write");
+  EXPECT_EQ(refusal_to_write(place + "/none/"), place + "/none/: is a folder's name, expected a file to write");
   testing::write_file(folder / "file", "");
-  EXPECT_EQ(refusal(folder / "file/x"), place + "/file/x: can't be written: Not a directory");
+  EXPECT_EQ(refusal_to_write(folder / "file/x"), place + "/file/x: can't be written: Not a directory");
   const FileDescriptor listening(::socket(AF_UNIX, SOCK_STREAM, 0));
   sockaddr_un address{AF_UNIX, {}};
   (folder / "socket").string().copy(address.sun_path, sizeof address.sun_path - 1);
   ASSERT_EQ(::bind(listening.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  EXPECT_EQ(refusal(folder / "socket"), place + "/socket: is a socket, expected a file to write");
+  EXPECT_EQ(refusal_to_write(folder / "socket"), place + "/socket: is a socket, expected a file to write");
 }
 
 TEST(OutputTarget, AFileThatMayNotBeWrittenIsNotReplaced) {
@@ -66,7 +66,7 @@ TEST(OutputTarget, AFileThatMayNotBeWrittenIsNotReplaced) {
   const TemporaryFolder folder;
   testing::write_file(folder / "precious.csv", "old");
   fs::permissions(folder / "precious.csv", fs::perms::owner_read);
-  EXPECT_EQ(refusal(folder / "precious.csv"),
+  EXPECT_EQ(refusal_to_write(folder / "precious.csv"),
             (folder / "precious.csv").string() + ": can't be written: Permission denied");
 }
 

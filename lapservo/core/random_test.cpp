@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 namespace lapservo::internal {
+namespace random_test {
 namespace {
 
 constexpr std::uint64_t seed = 12;
@@ -77,4 +78,5 @@ TEST(Random, SuccessiveNormalsAreUncorrelated) {
 }
 
 }  // namespace
+}  // namespace random_test
 }  // namespace lapservo::internal
