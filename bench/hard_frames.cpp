@@ -1,7 +1,8 @@
 // hard_frames [FRAMES] [WIDTH HEIGHT]: what frames cost in which a marker is searched for long: a table of CPU time a
-// frame over moving sequences of two instruments whose markers are clean, bloody, in smoke, hidden, mirrored or not
-// there.
+// frame over moving sequences of two instruments whose markers are clean, bloody, in smoke, hidden, crossing,
+// mirrored or not there.
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -44,6 +45,7 @@ struct Condition {
   std::vector<bool> covered{};  // by instrument; not covered when absent
   int instruments = 2;          // that are there
   bool mirrored = false;
+  bool crossing = false;
 };
 
 struct Sequence {
@@ -58,6 +60,7 @@ const std::vector<Sequence>& sequences() {
       {"smoke", {{.smoke = 0.5}, {.smoke = 0.65}, {.smoke = 0.75}, {.smoke = 0.85}}},
       {"blood, smoke", {{.blood = 0.3, .smoke = 0.4}, {.blood = 0.6, .smoke = 0.5}}},
       {"hidden", {{.covered = {true, false}}, {.blood = 0.6, .covered = {false, true}}, {.covered = {true, true}}}},
+      {"crossing", {{.crossing = true}, {.blood = 0.4, .crossing = true}, {.smoke = 0.5, .crossing = true}}},
       {"mirrored", {{.mirrored = true}, {.blood = 0.4, .mirrored = true}}},
       {"another's", {{.covered = {true, true}, .instruments = 3}}},
       {"none", {{.instruments = 0}}}};
@@ -74,6 +77,19 @@ Renderer renderer_of(const Rig& rig, const Condition& condition, std::uint64_t s
   RenderOptions options;
   options.smoke = static_cast<float>(condition.smoke);
   return Renderer(rig.camera, std::move(shafts), make_tissue(rig.camera.width_px, rig.camera.height_px, seed), options);
+}
+
+// One marker 12 mm behind the other, past which it moves.
+std::vector<ShaftPlacement> crossing_placements(const Rig& rig, int index) {
+  std::vector<ShaftPlacement> placed;
+  for (std::size_t i = 0; i < rig.instruments.size(); ++i) {
+    const double side = i == 0 ? 1 : -1, way_m = 0.012 * std::sin(0.1 * index);
+    const Eigen::Vector3d point(0.003 + side * way_m, 0.4 * side * way_m, 0.09 + (i == 0 ? 0 : 0.012));
+    JointVector q = configuration_through(*rig.instruments[i].camera_from_rcm, point).value();
+    q.psi_rad = 0.5 + 0.03 * index;
+    placed.push_back(placement_of(rig.instruments[i], q));
+  }
+  return placed;
 }
 
 // The camera's picture the other way round.
@@ -93,7 +109,9 @@ void for_each_frame(cv::Size size_px, const Sequence& sequence, int frames,
     const Rig rig = scaled_rig(size_px, condition.instruments);
     Renderer renderer = renderer_of(rig, condition, static_cast<std::uint64_t>(run) + 1);
     for (int i = 0; i < std::max(1, frames / runs); ++i) {
-      std::vector<ShaftPlacement> placed = placements(rig, 31 * run + i);
+      const int index = 31 * run + i;
+      std::vector<ShaftPlacement> placed =
+          condition.crossing ? crossing_placements(rig, index) : placements(rig, index);
       for (std::size_t k = 0; k < std::min(placed.size(), condition.covered.size()); ++k)
         placed[k].covered = condition.covered[k];
       const cv::Mat frame = renderer.render(placed, static_cast<std::uint64_t>(i));

@@ -1,5 +1,6 @@
 #include "lapservo/testing/scenes.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <stdexcept>
@@ -8,6 +9,7 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/marker/azimuths.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 
@@ -23,10 +25,10 @@ const std::array<Port, 3> ports{{{{90, 180, 270}, {-0.078, 0.067, 0.059}, {-0.02
                                  {{180, 270, 90}, {0.103, 0.019, 0.063}, {0.04, 0.0, 0.1}},
                                  {{270, 90, 180}, {-0.02, -0.1, 0.06}, {0.006, -0.03, 0.1}}}};
 
-constexpr double steepest_rad = 0.35, border_px = 30;
+constexpr double border_px = 30;
 
 // Less than marker_in_view() asks: here the silhouettes' ends alone count, as a lens without distortion shows them.
-bool wholly_in_view(const Rig& rig, const Marker& marker, const Rigid3& pose) {
+bool wholly_in_view(const Rig& rig, const Marker& marker, const Rigid3& pose, double steepest_rad) {
   const auto view = view_cylinder(pose, marker.radius_m());
   if (!view) return false;
   const double beyond_m = pose.inverse().translation.z() - marker.length_m() / 2;
@@ -57,14 +59,16 @@ Rig usual_rig(std::size_t instruments) {
   return rig;
 }
 
-JointVector random_configuration(const Rig& rig, std::size_t i, Random& random) {
+JointVector random_configuration(const Rig& rig, std::size_t i, Random& random, double steepest_rad) {
   const Instrument& instrument = rig.instruments[i];
   for (int attempt = 0; attempt < 50000; ++attempt) {
     const double v_px = random.uniform(0, rig.camera.height_px);  // a statement each: arguments have no order
     const Eigen::Vector2d pixel(random.uniform(0, rig.camera.width_px), v_px);
     auto q = configuration_through(*instrument.camera_from_rcm,
                                    rig.camera.ray_from_ideal(pixel) * random.uniform(0.075, 0.115));
-    if (!q || !wholly_in_view(rig, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(*q))) continue;
+    if (!q) continue;
+    const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(*q);
+    if (!wholly_in_view(rig, instrument.marker, pose, steepest_rad)) continue;
     q->psi_rad = random.uniform(-pi, pi);
     return *q;
   }
@@ -73,6 +77,68 @@ JointVector random_configuration(const Rig& rig, std::size_t i, Random& random) 
 
 ShaftPose pose_of(const Rig& rig, std::size_t i, const JointVector& q) {
   return {*rig.instruments[i].camera_from_rcm * rcm_from_unrolled(q), q.psi_rad};
+}
+
+namespace {
+
+// Of the first shaft's axis from the second one's, as lines.
+double apart_m(const Rigid3& a, const Rigid3& b) {
+  const Eigen::Vector3d along_a = a.rotation * Eigen::Vector3d::UnitZ(),
+                        along_b = b.rotation * Eigen::Vector3d::UnitZ();
+  return std::abs(along_a.cross(along_b).normalized().dot(a.translation - b.translation));
+}
+
+// Whether a shaft lies between the camera and a point.
+bool hides(const Rigid3& shaft, double radius_m, const Eigen::Vector3d& point) {
+  const Rigid3 shaft_from_camera = shaft.inverse();
+  const Eigen::Vector2d from = shaft_from_camera.translation.head<2>(), to = (shaft_from_camera * point).head<2>();
+  const Eigen::Vector2d way = to - from;
+  const double nearest = std::clamp(-from.dot(way) / way.squaredNorm(), 0.0, 1.0);
+  return (from + nearest * way).norm() < radius_m;
+}
+
+// Of what shows of a marker without the other shaft, the fractions that it hides: of the surface, and of e1 or e2,
+// whichever is more.
+std::array<double, 2> hidden_fractions(const ShaftPose& pose, const Rigid3& other, const Marker& marker) {
+  constexpr int lines = 16, places = 24;
+  const Rigid3& shaft = pose.camera_from_unrolled;
+  const auto view = view_cylinder(shaft, marker.radius_m()).value();
+  int hidden = 0;
+  std::array<int, 2> hidden_inner{};
+  for (int i = 0; i < lines; ++i) {
+    const double azimuth_rad = view.facing_azimuth_rad + view.half_visible_rad * (2.0 * (i + 0.5) / lines - 1);
+    const auto hides_at = [&](double along_m) {
+      return hides(other, marker.radius_m(), shaft * surface_point(marker.radius_m(), azimuth_rad, along_m));
+    };
+    for (int k = 0; k < places; ++k) hidden += hides_at(marker.length_m() * (k + 0.5) / places);
+    const auto ends_m = boundaries_m(marker, marker_azimuth_rad(marker, azimuth_rad, pose.psi_rad));
+    for (std::size_t k = 0; k < 2; ++k) hidden_inner[k] += hides_at(ends_m[k + 1]);
+  }
+  return {static_cast<double>(hidden) / (lines * places),
+          static_cast<double>(std::max(hidden_inner[0], hidden_inner[1])) / lines};
+}
+
+}  // namespace
+
+CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad) {
+  constexpr double near_px = 110;
+  const Marker& marker = rig.instruments[0].marker;
+  for (;;) {
+    CrossingPair pair;
+    std::array<Rigid3, 2> shafts;
+    std::array<Eigen::Vector2d, 2> middles_px;
+    for (std::size_t i = 0; i < 2; ++i) {
+      pair.q.push_back(random_configuration(rig, i, random, steepest_rad));
+      shafts[i] = pose_of(rig, i, pair.q[i]).camera_from_unrolled;
+      middles_px[i] = rig.camera.ideal_from_point(shafts[i] * Eigen::Vector3d(0, 0, marker.length_m() / 2));
+    }
+    if ((middles_px[0] - middles_px[1]).norm() > near_px || apart_m(shafts[0], shafts[1]) < marker.diameter_m) continue;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const auto fractions = hidden_fractions(pose_of(rig, i, pair.q[i]), shafts[1 - i], marker);
+      pair.hidden[i] = fractions[0], pair.hidden_inner[i] = fractions[1];
+    }
+    return pair;
+  }
 }
 
 cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,

@@ -21,10 +21,21 @@ using namespace internal;
 /// 960x540, up to three instruments through ports left, right and above; their markers share colours in other orders.
 Rig usual_rig(std::size_t instruments = 1);
 
-/// The marker wholly in view (a lens's distortion neglected), at most 0.35 rad from facing the camera.
-JointVector random_configuration(const Rig& rig, std::size_t instrument, Random& random);
+/// The marker wholly in view (a lens's distortion neglected), at most so far from facing the camera.
+JointVector random_configuration(const Rig& rig, std::size_t instrument, Random& random, double steepest_rad = 0.35);
 
 ShaftPose pose_of(const Rig& rig, std::size_t instrument, const JointVector& q);
+
+/// Two instruments whose markers touch or cross in the image, one before the other: their middles less than 110 px
+/// apart there, their axes a diameter and more apart in space.
+struct CrossingPair {
+  std::vector<JointVector> q;
+  std::array<double, 2> hidden{};        ///< of each marker's visible side, the fraction that the other's shaft hides
+  std::array<double, 2> hidden_inner{};  ///< the same of its inner boundaries, of the one that is hidden more
+  /// Whether both inner boundaries show well: where one is left, a print that is off looks like a turn.
+  bool tells_psi(std::size_t instrument) const { return hidden_inner[instrument] < 0.6; }
+};
+CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad = 0.35);
 
 /// All instruments of the rig in front of tissue; `configurations` in the rig's order. The seed is that of the noise.
 cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,

@@ -37,10 +37,12 @@ double agreement(const Scene& scene, const ShaftPose& pose) {
     const Eigen::Vector3d base = base_of(radius_m, azimuth_rad);
     for (int k = -margin; k < places + margin; ++k) {
       const double along_m = length_m * (k + 0.5) / places;
-      const std::uint8_t color = scene.class_at_point(base + along_m * axis);
-      if (color == Scene::outside) continue;
       const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin();
-      if (!printed || band < 1 || band > 3) {
+      const bool empty = !printed || band < 1 || band > 3;
+      const Eigen::Vector3d point = base + along_m * axis;
+      const std::uint8_t color = empty ? scene.class_at_point(point) : scene.class_on_shaft(point);
+      if (color == Scene::outside) continue;
+      if (empty) {
         count_empty(color);
       } else if (color == scene.bands[static_cast<std::size_t>(band - 1)]) {
         score += 1;

@@ -70,7 +70,7 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     classes.clear();
     double hidden_px = 0;  // of the shaft, beyond the image
     for (int i = -reach; i <= reach; ++i) {
-      const std::uint8_t color = scene.class_at(middle + i * step_px * across);
+      const std::uint8_t color = scene.class_beside(middle + i * step_px * across);
       classes.push_back(color);
       if (color == Scene::outside && std::abs(i) * step_px < half_px) hidden_px += step_px;
     }
@@ -115,7 +115,7 @@ SampledSurface sample_surface(const Scene& scene, const ShaftPose& pose, const C
     const Eigen::Vector3d base = point_on(pose, scene.marker, line.azimuth_rad, 0);
     for (int k = 0; k < samples_along; ++k) {
       const Eigen::Vector3d point = base + (surface.first_m + (k + 0.5) * surface.step_m) * axis;
-      line.classes[static_cast<std::size_t>(k)] = scene.class_at_point(point);
+      line.classes[static_cast<std::size_t>(k)] = scene.class_on_shaft(point);
     }
   }
   return surface;

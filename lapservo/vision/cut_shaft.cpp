@@ -14,7 +14,7 @@ int in_image(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
   for (int i = 0; i < places; ++i) {
     const Eigen::Vector3d point =
         surface_point(scene.marker.radius_m(), azimuth_rad, scene.marker.length_m() * (i + 0.5) / places);
-    inside += scene.class_at_point(pose.camera_from_unrolled * point) != Scene::outside;
+    inside += scene.class_on_shaft(pose.camera_from_unrolled * point) != Scene::outside;
   }
   return inside;
 }

@@ -49,10 +49,13 @@ inline constexpr DetectionLimits detection_limits;
 /// bench/hard_frames at that size (a coarse fit's median is 150, a fine fit's 410), so 8000 units take less than 8 ms.
 struct SearchCosts {
   double coarse_fit = 350, fine_fit = 700;
-  double initial_poses = 200;   ///< of one blob
-  double agreement = 20;        ///< of one pose with the frame's colours (median: 13)
-  double fit_to_result = 2200;  ///< some 70 of these and a fine fit (median: 1400)
+  double initial_poses = 200;                     ///< of one blob
+  double bands_in_order = 60, rcm_starts = 1000;  ///< the same, by lines through the RCM
+  double agreement = 20;                          ///< of one pose with the frame's colours (median: 13)
+  double fit_to_result = 2200;                    ///< some 70 of these and a fine fit (median: 1400)
   double blobs_per_px = 1.2e-4;
+  double part_beside = 0.6;  ///< of the budget where every sample is asked whether another instrument hides it
+  double cover = 200;        ///< where one instrument lies, for who looks for another beside or behind it
   double try_start() const { return 2 * (coarse_fit + fine_fit); }
 };
 inline constexpr SearchCosts search_costs;
@@ -206,6 +209,11 @@ struct ValidationLimits {
   /// Each end's, where both are needed: without the RCM they alone fix the depth and with it everything else.
   int min_of_end = 6, end_one_in = 12;
   double mostly_hidden = 0.5, partly_hidden = 0.7;  ///< located fractions, below which more is asked
+  /// Where another instrument hides a part, both ends are asked for unless nearly all of the rest is located: blood or
+  /// a print that is off may be what is missing.
+  double well_located_beside_another = 0.85;
+  /// And where another's colours may lie beside a marker, they are no reason to doubt one that shows so well.
+  double matching_among_others = 0.7, located_among_others = 0.8;
   /// With the RCM an end may be hidden where more than less_hidden is located in all, and of their lines well_located
   /// of each inner boundary and wholly_located of the other end (4 of the 18 that were missed of --blood 0.4, seeds 71
   /// and 72: right by 5 mrad).

@@ -9,6 +9,7 @@
 #include "lapservo/vision/cut_shaft.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/limits.h"
+#include "lapservo/vision/rcm_starts.h"
 #include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
@@ -252,13 +253,68 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   return candidate_ ? Found{Status::ok, std::move(candidate_), {}} : Found{};
 }
 
+// The starts of a shared blob, until one fits. One behind another that was found needs not show all bands.
+Found MarkerSearch::among_others_in(const SearchFrame& frame, const Scene& scene, const Blob& blob,
+                                    WorkBudget& budget) {
+  Found best;
+  budget.spend(costs.bands_in_order);
+  const bool may_show = !scene.others.empty() || shows_bands_in_order(scene, blob, *frame.camera_from_rcm);
+  const std::size_t first = among_others_.blobs.start();
+  if (may_show && !budget.allows(costs.rcm_starts + costs.try_start())) {
+    among_others_.blobs.stop(blob, first);
+    return best;
+  }
+  std::vector<PoseUnknowns> starts;
+  if (may_show) {
+    budget.spend(costs.rcm_starts);
+    starts = starts_through_rcm(scene, blob, *frame.camera_from_rcm);
+  }
+  for (std::size_t i = first; i < starts.size(); ++i) {
+    if (i > first && !budget.allows(costs.try_start())) {
+      among_others_.blobs.stop(blob, i);
+      return best;
+    }
+    Found found = try_start(scene, frame.light, starts[i], budget);
+    if (found.fit || found.status == Status::marker_mismatch) return found;
+    if (found.status != Status::no_marker) best = std::move(found);
+  }
+  among_others_.blobs.finish(blob);
+  return best;
+}
+
+Found MarkerSearch::among_others(const SearchFrame& frame, WorkBudget& budget) {
+  Scene scene = frame.scene;
+  scene.among_others = true;
+  Found best;
+  for (const Blob* blob : among_others_.blobs.rest(frame.shared, reach_px(frame))) {
+    Found found = among_others_in(frame, scene, *blob, budget);
+    if (found.fit || found.status == Status::marker_mismatch) {
+      among_others_.done = found.among_others = true;
+      return found;
+    }
+    if (found.status != Status::no_marker) best = std::move(found);
+    if (among_others_.blobs.stopped()) return best;
+  }
+  among_others_.done = true;
+  return best;
+}
+
 Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget) {
+  Found seen;
+  if (!among_others_.done && !is_mismatch) {
+    seen = among_others(frame, budget);
+    if (seen.fit || !among_others_.done) return seen;
+    mismatch_among_others_ = seen.status == Status::marker_mismatch;
+  }
+  is_mismatch |= mismatch_among_others_;
   if (!free_.done)
     if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
-  if (!free_.done) return {};
+  if (!free_.done) return seen;
   // Such a print is not hidden: this is what the search came to.
   if (is_mismatch) hidden_.done = true;
-  return hidden_.done ? Found{} : hidden(frame, budget);
+  if (hidden_.done) return seen;
+  Found found = hidden(frame, budget);
+  return found.fit ? found : seen;
 }
 
 Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
@@ -284,7 +340,8 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   budget.allow(longs_turn_ ? WorkBudget::Beyond::one : WorkBudget::Beyond::none);
   Found found = look_long(frame, is_mismatch, plain_is_known, budget);
   if (found.fit || hidden_.done) begin_anew(status_);
-  return found.fit ? found : plain;
+  if (found.fit || plain.status == Status::no_marker) return found;
+  return plain;
 }
 
 Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {

@@ -20,6 +20,7 @@ struct Found {
   Status status = Status::no_marker;
   std::optional<FineFit> fit;        ///< when ok
   std::optional<ShaftPose> refused;  ///< to draw, when there was something
+  bool among_others = false;         ///< it touches or crosses another instrument
 };
 
 /// A frame in which one marker is looked for. Borrows everything.
@@ -28,16 +29,17 @@ struct SearchFrame {
   const LightImage& light;
   const std::vector<Blob>& blobs;  ///< of the whole frame, largest first
   const std::optional<Rigid3>& camera_from_rcm;
+  const std::vector<Blob>& shared;  ///< those that may show other instruments as well
 };
 
 /// The marker near where it is expected.
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
              const ExpectedProcessing& processing, WorkBudget& budget);
 
-/// Looks for one marker all over a frame: first where a blob's outline says; with camera_from_rcm then without regard
-/// to it, and at last for markers that are hidden in large parts, which takes tens of milliseconds. What the budget
-/// does not allow is done in the frames to come, from where it stopped. What shows plainly is looked for in each of
-/// them.
+/// Looks for one marker all over a frame: first where a blob's outline says; with camera_from_rcm then along lines
+/// through it in blobs that are shared, without regard to it, and at last for markers that are hidden in large parts,
+/// which takes tens of milliseconds. What the budget does not allow is done in the frames to come, from where it
+/// stopped. What shows plainly is looked for in each of them.
 class MarkerSearch {
  public:
   /// While the search goes on, the status is what it knows so far, or the last whole search came to.
@@ -60,6 +62,8 @@ class MarkerSearch {
   Found look_with_rcm(const SearchFrame& frame, WorkBudget& budget);
   Found look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget);
   Found despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget);
+  Found among_others(const SearchFrame& frame, WorkBudget& budget);
+  Found among_others_in(const SearchFrame& frame, const Scene& scene, const Blob& blob, WorkBudget& budget);
   Found hidden(const SearchFrame& frame, WorkBudget& budget);
   bool finish_agreement(const SearchFrame& frame, WorkBudget& budget);
   bool fit_to_results(const SearchFrame& frame, WorkBudget& budget);
@@ -67,8 +71,9 @@ class MarkerSearch {
   void begin_anew(Status status);
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
-  Walk plain_, free_, hidden_;
-  bool searches_long_ = false;  // what shows plainly was not found
+  Walk plain_, among_others_, free_, hidden_;
+  bool mismatch_among_others_ = false;  // what is there is a print that is off
+  bool searches_long_ = false;          // what shows plainly was not found
   bool longs_turn_ = false;
   std::optional<AgreementSearch> agreement_;
   std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last

@@ -13,6 +13,7 @@
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/marker_pose.h"
+#include "lapservo/vision/verification.h"
 
 namespace lapservo::internal {
 namespace {
@@ -126,14 +127,20 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       channels_(rig.camera),
       memory_(rig.instruments.size()),
       searches_(rig.instruments.size()),
+      searched_beside_(rig.instruments.size()),
       found_(rig.instruments.size()),
+      covers_(rig.instruments.size()),
       observations_(rig.instruments.size()) {
+  others_.reserve(rig.instruments.size());
+  if (rig.instruments.size() > 1)
+    for (ShaftCover& cover : covers_) cover.reserve(rig.camera);
   BlurredEdges::instance();  // takes milliseconds, which no frame should
 }
 
 void SurfaceTracker::forget(std::size_t i) {
   memory_[i].reset();
   searches_[i] = MarkerSearch();
+  searched_beside_[i] = 0;
 }
 
 void SurfaceTracker::forget() {
@@ -141,46 +148,136 @@ void SurfaceTracker::forget() {
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
-  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i)};
+  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_};
 }
 
-void SurfaceTracker::remember(std::size_t i, const FineFit& fit) {
+void SurfaceTracker::remember(std::size_t i, const Found& found) {
+  const FineFit& fit = *found.fit;
   UnknownVector velocity = UnknownVector::Zero(fit.unknowns.size());
   if (memory_[i] && memory_[i]->last.q() && fit.unknowns.q())
     velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
   const int unasked = unasked_after(fit.processing, memory_[i] ? memory_[i]->unasked : ask_every);
-  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px};
+  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px, found.among_others};
 }
 
-ExpectedProcessing SurfaceTracker::Memory::expected() const {
+ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {
   return {unasked >= ask_every, bias_px};
 }
 
-// Those that are followed first: the others share what is left of the budget.
-void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
+// To `others_`.
+void SurfaceTracker::cover(std::size_t i, const ShaftPose& pose, WorkBudget& budget) {
+  if (!covers_[i].drawn()) {
+    budget.spend(search_costs.cover);
+    covers_[i].draw(rig_.camera, rig_.instruments[i].marker, classes_.of_bands(i), pose);
+  }
+  others_.push_back(&covers_[i]);
+}
+
+// Those that may hide or touch the one that is followed: where they were found in this frame, or are expected. Whether
+// there are any.
+bool SurfaceTracker::cover_expected(std::size_t i, WorkBudget& budget) {
+  for (std::size_t j = 0; j < rig_.instruments.size(); ++j) {
+    if (j == i || !memory_[j] || !rig_.instruments[j].camera_from_rcm) continue;
+    const ShaftPose pose = found_[j].fit ? found_[j].fit->unknowns.pose() : memory_[j]->expected_pose().pose();
+    if (may_meet(rig_.camera, rig_.instruments[i].marker, memory_[i]->expected_pose().pose(),
+                 rig_.instruments[j].marker, pose))
+      cover(j, pose, budget);
+  }
+  return !others_.empty();
+}
+
+// Those that were found, under or beside which the one that is looked for may be.
+void SurfaceTracker::cover_found(std::size_t i, const std::vector<Blob>& blobs, WorkBudget& budget) {
+  others_.clear();
+  if (!rig_.instruments[i].camera_from_rcm) return;
+  for (std::size_t j = 0; j < rig_.instruments.size(); ++j) {
+    if (j == i || !found_[j].fit || !rig_.instruments[j].camera_from_rcm) continue;
+    const ShaftPose& pose = found_[j].fit->unknowns.pose();
+    if (std::any_of(blobs.begin(), blobs.end(), [&](const Blob& blob) {
+          return lies_beside(rig_.camera, rig_.instruments[j].marker, pose, blob, classes_.of_bands(i));
+        }))
+      cover(j, pose, budget);
+  }
+}
+
+bool SurfaceTracker::may_touch_another_lost(std::size_t i) const {
+  if (!rig_.instruments[i].camera_from_rcm) return false;
+  for (std::size_t j = 0; j < rig_.instruments.size(); ++j)
+    if (j != i && !found_[j].fit && rig_.instruments[j].camera_from_rcm) return true;
+  return false;
+}
+
+// What others hide of it, or show beside it, matters only where it can't be followed without, or could not last time.
+Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& light, std::size_t i, WorkBudget& budget) {
+  const Memory& memory = *memory_[i];
+  const auto follow_it = [&](bool among_others) {
+    Scene scene = scene_of(image, i);
+    scene.among_others = among_others;
+    Found found = follow(scene, light, memory.expected_pose(), memory.blur, memory.expected_processing(), budget);
+    scene.among_others = false;
+    found.among_others = among_others && found.fit && (!others_.empty() || validate(scene, *found.fit) != Status::ok);
+    return found;
+  };
+  others_.clear();
+  if (memory.among_others) cover_expected(i, budget);
+  Found found = follow_it(memory.among_others);
+  if (!found.fit && !memory.among_others && cover_expected(i, budget)) found = follow_it(true), followed_twice_ = true;
+  if (found.fit) covers_[i].clear();  // where it was expected
+  return found;
+}
+
+Found SurfaceTracker::look_for(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
+                               std::size_t i, WorkBudget& budget) {
+  const std::vector<Blob> none;
+  if (others_.empty()) {
+    const std::vector<Blob>& shared = may_touch_another_lost(i) ? blobs : none;
+    return searches_[i].look({scene_of(image, i), light, blobs, rig_.instruments[i].camera_from_rcm, shared}, budget);
+  }
+  const std::vector<Blob> left = without(blobs, others_);
+  Found found = searches_[i].look({scene_of(image, i), light, left, rig_.instruments[i].camera_from_rcm, left}, budget);
+  found.among_others = found.fit.has_value();
+  return found;
+}
+
+// Whether some were found.
+bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
+                                   WorkBudget& budget, bool again) {
   std::size_t lost = 0;
+  for (const Found& found : found_) lost += !found.fit;
+  bool any = false;
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
+    if (found_[i].fit) continue;
+    cover_found(i, blobs, budget);
+    const bool new_others = others_.size() != searched_beside_[i];
+    searched_beside_[i] = others_.size();
+    if (new_others) searches_[i] = MarkerSearch();
+    if (again && !new_others) continue;
+    // What took twice the work in this frame has all of the next one.
+    const auto beyond = followed_twice_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::one;
+    const double units = budget.left() / static_cast<double>(lost--) * (others_.empty() ? 1 : search_costs.part_beside);
+    found_[i] = budget.share(units, beyond, [&](WorkBudget& part) { return look_for(image, light, blobs, i, part); });
+    any |= found_[i].fit.has_value();
+  }
+  return any;
+}
+
+// Those that are followed first: the others share what is left of the budget. Without a budget they are looked for
+// again beside those that were found after them: else the next frame does that.
+void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
+  for (ShaftCover& cover : covers_) cover.clear();
+  bool lost = followed_twice_ = false;
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
     found_[i] = {};
-    if (memory_[i]) {
-      const Memory& memory = *memory_[i];
-      found_[i] = follow(scene_of(image, i), light, memory.last.changed_by(memory.velocity), memory.blur,
-                         memory.expected(), budget);
-    }
-    if (found_[i].fit) continue;
-    memory_[i].reset();
-    ++lost;
+    if (memory_[i]) found_[i] = follow_known(image, light, i, budget);
+    lost |= !found_[i].fit;
   }
-  if (lost == 0) return;
+  if (!lost) return;
+  for (std::size_t i = 0; i < rig_.instruments.size(); ++i)
+    if (!found_[i].fit) memory_[i].reset(), covers_[i].clear();
   budget.spend(search_costs.blobs_per_px * image.width_px * image.height_px);
   const std::vector<Blob> blobs = largest_blobs(image, classes_);
-  for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
-    if (found_[i].fit) continue;
-    const Scene scene = scene_of(image, i);
-    found_[i] =
-        budget.share(budget.left() / static_cast<double>(lost--), WorkBudget::Beyond::one, [&](WorkBudget& part) {
-          return searches_[i].look({scene, light, blobs, rig_.instruments[i].camera_from_rcm}, part);
-        });
-  }
+  bool more = look_for_lost(image, light, blobs, budget, false);
+  while (more && (single_ || !frame_budget_)) more = look_for_lost(image, light, blobs, budget, true);
 }
 
 const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) {
@@ -200,7 +297,7 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     }
     if (!found.fit) continue;
     observations_[i] = observation_of(scene_of(image, i), *found.fit, rig_.instruments[i].camera_from_rcm);
-    remember(i, *found.fit);
+    remember(i, found);
   }
   return observations_;
 }

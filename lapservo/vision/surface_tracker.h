@@ -11,6 +11,7 @@
 #include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/marker_search.h"
 #include "lapservo/vision/observation.h"
+#include "lapservo/vision/shaft_cover.h"
 
 namespace lapservo::internal {
 
@@ -37,10 +38,21 @@ class SurfaceTracker {
     EdgeBlur blur;
     int unasked = 0;  // frames since the camera was found to do nothing to its pictures
     std::array<double, 4> bias_px{};
-    ExpectedProcessing expected() const;
+    bool among_others = false;  // Found::among_others
+    ExpectedProcessing expected_processing() const;
+    PoseUnknowns expected_pose() const { return last.changed_by(velocity); }
   };
   void find(const ImageView& image, const LightImage& light, WorkBudget& budget);
-  void remember(std::size_t instrument, const FineFit& fit);
+  Found follow_known(const ImageView& image, const LightImage& light, std::size_t instrument, WorkBudget& budget);
+  bool look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
+                     WorkBudget& budget, bool again);
+  Found look_for(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
+                 std::size_t instrument, WorkBudget& budget);
+  bool cover_expected(std::size_t instrument, WorkBudget& budget);
+  void cover_found(std::size_t instrument, const std::vector<Blob>& blobs, WorkBudget& budget);
+  bool may_touch_another_lost(std::size_t instrument) const;
+  void cover(std::size_t instrument, const ShaftPose& pose, WorkBudget& budget);
+  void remember(std::size_t instrument, const Found& found);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;
 
   Rig rig_;
@@ -51,7 +63,11 @@ class SurfaceTracker {
   ChannelGeometry channels_;
   std::vector<std::optional<Memory>> memory_;
   std::vector<MarkerSearch> searches_;
+  bool followed_twice_ = false;               // in this frame, one of them
+  std::vector<std::size_t> searched_beside_;  // so many others the search is among, by instrument
   std::vector<Found> found_;
+  std::vector<ShaftCover> covers_;         // where somebody asked in this frame
+  std::vector<const ShaftCover*> others_;  // that may hide or touch the one that is looked for
   std::vector<Observation> observations_;
 };
 

@@ -539,6 +539,54 @@ TEST(SurfaceTracker, ATurnWithinTheExposureGivesPsiOfItsMiddle) {
   EXPECT_LT(std::sqrt(squares), 1.5);
 }
 
+// One marker before the other, or beside it: one blob of colours.
+TEST(SurfaceTracker, FindsInstrumentsThatCross) {
+  const Rig rig = scenes::usual_rig(2);
+  Random random(3);
+  int tell = 0, found = 0;
+  for (int i = 0; i < 10; ++i) {
+    SCOPED_TRACE("seed 3, pair " + std::to_string(i));
+    const scenes::CrossingPair pair = scenes::crossing_pair(rig, random);
+    const cv::Mat image = scenes::render(rig, pair.q, static_cast<std::uint64_t>(i));
+    const auto observations = SurfaceTracker(rig, true).track(image);
+    for (std::size_t k = 0; k < 2; ++k) {
+      tell += pair.tells_psi(k);
+      if (observations[k].status != Status::ok) continue;
+      found += pair.tells_psi(k);
+      const double error_rad = wrap_pi(observations[k].rcm.value().q.psi_rad - pair.q[k].psi_rad);
+      EXPECT_LT(std::abs(error_rad), 0.05) << k;
+      EXPECT_LT(std::abs(error_rad), 4 * std::sqrt(observations[k].rcm->covariance(3, 3))) << k;
+    }
+  }
+  EXPECT_GE(tell, 12) << "the test's own power";
+  EXPECT_GE(found, 0.9 * tell);
+}
+
+// What the other instrument hides is no boundary that lies elsewhere.
+TEST(SurfaceTracker, FollowsInstrumentsThatCross) {
+  const Rig rig = scenes::usual_rig(2);
+  Random random(4);
+  for (int i = 0; i < 3; ++i) {
+    scenes::CrossingPair pair = scenes::crossing_pair(rig, random);
+    while (std::max(pair.hidden[0], pair.hidden[1]) < 0.1 || std::max(pair.hidden_inner[0], pair.hidden_inner[1]) > 0.4)
+      pair = scenes::crossing_pair(rig, random);
+    Tracker tracker(rig);
+    constexpr int frames = 12, until_found = 6;
+    for (int frame = 0; frame < frames; ++frame) {
+      SCOPED_TRACE("seed 4, pair " + std::to_string(i) + ", frame " + std::to_string(frame));
+      for (JointVector& q : pair.q) q.psi_rad += 0.02, q.rho_m += 0.1e-3;
+      const auto& observations = tracker.track(scenes::render(rig, pair.q, static_cast<std::uint64_t>(frame)));
+      for (std::size_t k = 0; k < 2; ++k) {
+        if (frame >= until_found) {
+          EXPECT_EQ(to_string(observations[k].status), "ok") << k;
+        }
+        if (observations[k].status != Status::ok) continue;
+        EXPECT_LT(std::abs(wrap_pi(observations[k].rcm.value().q.psi_rad - pair.q[k].psi_rad)), 0.03) << k;
+      }
+    }
+  }
+}
+
 // A rig whose instrument comes along the image's lower or right border, and the planes through the camera and it.
 struct BesideBorder {
   Rig rig = scenes::usual_rig();

@@ -1,0 +1,302 @@
+// Two instruments whose markers touch or cross in the image, one before the other. LAPSERVO_PAIRS and
+// LAPSERVO_PAIR_SEED set how many of each kind (4; a fourth of them moving) and which (seed 1); LAPSERVO_PAIR_LIST=1
+// names those that are not found, LAPSERVO_PAIR_KIND looks at the kinds whose name has it only.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "acceptance/frame_sets.h"
+#include "acceptance/random_print.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::acceptance {
+using namespace internal;
+namespace {
+
+constexpr double mm = 1e-3;
+
+struct Tally {
+  int all = 0, tell = 0, found = 0, found_of_those = 0, wrong = 0;
+  double squares = 0, normalised = 0, largest_rad = 0;
+
+  void add(const Observation& o, double true_psi_rad, bool tells_psi, bool swapped) {
+    ++all, tell += tells_psi;
+    if (o.status != Status::ok || !o.rcm) return;
+    ++found, found_of_those += tells_psi;
+    const double error_rad = wrap_pi(o.rcm->q.psi_rad - true_psi_rad);
+    wrong += swapped || std::abs(error_rad) > 0.1;
+    squares += error_rad * error_rad;
+    normalised += error_rad * error_rad / o.rcm->covariance(3, 3);
+    largest_rad = std::max(largest_rad, std::abs(error_rad));
+  }
+  void add(const Tally& other) {
+    all += other.all, tell += other.tell, found += other.found, found_of_those += other.found_of_those;
+    wrong += other.wrong, squares += other.squares, normalised += other.normalised;
+    largest_rad = std::max(largest_rad, other.largest_rad);
+  }
+  double error_by_sigma() const { return std::sqrt(normalised / std::max(1, found)); }
+  void print(const std::string& name) const {
+    std::printf("| %s | %d | %d | %d | %d | %.1f | %.1f | %.2f | %d |\n", name.c_str(), all, found, tell,
+                found_of_those, 1e3 * std::sqrt(squares / std::max(1, found)), 1e3 * largest_rad, error_by_sigma(),
+                wrong);
+    std::fflush(stdout);
+  }
+};
+
+void print_head() {
+  std::printf(
+      "| | markers | found | of which psi can be told | found | psi rms [mrad] | largest | error / sigma | wrong |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
+}
+
+// Patches of all colours, the markers' among them, instead of tissue.
+cv::Mat make_colourful(cv::Size size, Random& random) {
+  cv::Mat light(size, CV_32FC3, cv::Scalar(0.1, 0.1, 0.15));
+  for (int i = 0; i < 60; ++i) {
+    std::array<double, 3> color;
+    for (double& channel : color) channel = random.uniform(0.01, 0.5);
+    const int u = static_cast<int>(random.uniform(0, size.width)), v = static_cast<int>(random.uniform(0, size.height));
+    const int half_u = static_cast<int>(random.uniform(10, 70)), half_v = static_cast<int>(random.uniform(10, 70));
+    cv::ellipse(light, {u, v}, {half_u, half_v}, random.uniform(0, 180), 0, 360,
+                cv::Scalar(color[0], color[1], color[2]), cv::FILLED, cv::LINE_AA);
+  }
+  cv::GaussianBlur(light, light, {}, 1);
+  return light;
+}
+
+// How the instruments of a pair are, and their picture.
+struct Kind {
+  std::string name;
+  bool exact = false;  // the rig is right, and the picture a good one
+  double steepest_rad = 0.35;
+  std::function<void(std::vector<ShaftModel>&, RenderOptions&, Random&)> spoil = [](auto&, auto&, auto&) {};
+  bool colourful = false;
+};
+
+void misprint(std::vector<ShaftModel>& shafts, double least_m, double most_m, Random& random) {
+  for (ShaftModel& shaft : shafts) {
+    const double error_m = random.uniform(least_m, most_m);
+    const bool askew = random.uniform() < 0.2;
+    shaft.marker = random_print(shaft.marker, error_m, askew, random).marker;
+  }
+}
+void misprint_one(std::vector<ShaftModel>& shafts, Random& random) {
+  const double error_m = random.uniform(0.05 * mm, 0.3 * mm);
+  Marker& marker = shafts[random.uniform() < 0.5 ? 0 : 1].marker;
+  marker = random_print(marker, error_m, random.uniform() < 0.2, random).marker;
+}
+void bleed(std::vector<ShaftModel>& shafts, double least, double most, Random& random) {
+  for (ShaftModel& shaft : shafts) {
+    const double fraction = random.uniform(least, most);
+    shaft.blotches = scenes::blood(shaft.marker, fraction, random);
+  }
+}
+void add_noise(RenderOptions& options, double times) {
+  options.sensor.read_noise *= times, options.sensor.shot_noise *= times * times;
+}
+
+std::vector<Kind> kinds() {
+  using Shafts = std::vector<ShaftModel>;
+  std::vector<Kind> all;
+  all.push_back({"as the rig says", true});
+  all.push_back({"colourful surroundings", true});
+  all.back().colourful = true;
+  all.push_back({"steep", true, 0.8});
+  all.push_back({"film of 0 to 0.3 mm", false, 0.35, [](Shafts& shafts, RenderOptions&, Random& random) {
+                   for (ShaftModel& shaft : shafts) shaft.film_m = random.uniform(0, 0.3 * mm);
+                 }});
+  all.push_back({"noise, dark", false, 0.35, [](Shafts&, RenderOptions& options, Random& random) {
+                   add_noise(options, random.uniform(1, 6));
+                   options.lighting.diffuse *= static_cast<float>(random.uniform(0.2, 1));
+                 }});
+  all.push_back(
+      {"blood", false, 0.35, [](Shafts& shafts, RenderOptions&, Random& random) { bleed(shafts, 0.05, 0.5, random); }});
+  all.push_back({"smoke", false, 0.35, [](Shafts&, RenderOptions& options, Random& random) {
+                   options.smoke = static_cast<float>(random.uniform(0.2, 0.7));
+                 }});
+  all.push_back({"out of focus", false, 0.35, [](Shafts&, RenderOptions& options, Random& random) {
+                   options.sensor.blur_px = random.uniform(0.8, 4);
+                 }});
+  all.push_back({"print off by 0.05 to 0.3 mm", false, 0.35, [](Shafts& shafts, RenderOptions&, Random& random) {
+                   misprint(shafts, 0.05 * mm, 0.3 * mm, random);
+                 }});
+  all.push_back({"one print off by 0.05 to 0.3 mm", false, 0.5,
+                 [](Shafts& shafts, RenderOptions&, Random& random) { misprint_one(shafts, random); }});
+  all.push_back(
+      {"one print off, blood, film, noise", false, 0.5, [](Shafts& shafts, RenderOptions& options, Random& random) {
+         misprint_one(shafts, random);
+         bleed(shafts, 0, 0.3, random);
+         for (ShaftModel& shaft : shafts) shaft.film_m = random.uniform(0, 0.3 * mm);
+         add_noise(options, random.uniform(1, 3));
+       }});
+  all.push_back({"print off by 0.01 to 0.06 mm", false, 0.35, [](Shafts& shafts, RenderOptions&, Random& random) {
+                   misprint(shafts, 0.01 * mm, 0.06 * mm, random);
+                 }});
+  all.push_back({"print off, blood", false, 0.35, [](Shafts& shafts, RenderOptions&, Random& random) {
+                   misprint(shafts, 0.05 * mm, 0.3 * mm, random);
+                   bleed(shafts, 0.05, 0.4, random);
+                 }});
+  all.push_back(
+      {"print off, steep, noise, film", false, 0.8, [](Shafts& shafts, RenderOptions& options, Random& random) {
+         misprint(shafts, 0.05 * mm, 0.3 * mm, random);
+         for (ShaftModel& shaft : shafts) shaft.film_m = random.uniform(0, 0.3 * mm);
+         add_noise(options, random.uniform(1, 4));
+       }});
+  return all;
+}
+
+// A pair and what it takes to see it. Where `moving`, its frames are tracked, not looked at each on its own.
+class Pair {
+ public:
+  Pair(const Rig& rig, const Kind& kind, std::uint64_t seed) : rig_(rig), random_(seed), seed_(seed) {
+    pair_ = scenes::crossing_pair(rig, random_, kind.steepest_rad);
+    shafts_ = shafts_of(rig);
+    RenderOptions options;
+    kind.spoil(shafts_, options, random_);
+    const cv::Size size(rig.camera.width_px, rig.camera.height_px);
+    const cv::Mat surroundings =
+        kind.colourful ? make_colourful(size, random_) : make_tissue(size.width, size.height, seed);
+    renderer_.emplace(rig.camera, shafts_, surroundings, options);
+  }
+  cv::Mat frame() {
+    std::vector<ShaftPlacement> placements;
+    for (std::size_t k = 0; k < 2; ++k) placements.push_back(placement_of(rig_.instruments[k], pair_.q[k]));
+    return renderer_->render(placements, ++seed_);
+  }
+  void move() {
+    for (std::size_t k = 0; k < 2; ++k) {
+      JointVector& q = pair_.q[k];
+      const double way = k == 0 ? 1 : -1;
+      q.psi_rad += 0.03, q.rho_m += 0.2 * mm * way, q.theta_rad += 0.004 * way;
+    }
+  }
+  // The seam's error is none that a picture could show.
+  double true_psi_rad(std::size_t k) const {
+    return pair_.q[k].psi_rad + shafts_[k].marker.seam_rad - rig_.instruments[k].marker.seam_rad;
+  }
+  // Whether what is taken for one lies nearer to where the other is.
+  bool swapped(const Observation& o, std::size_t k) const {
+    if (o.status != Status::ok) return false;
+    const auto away_m = [&](std::size_t of) {
+      const Rigid3 there = *rig_.instruments[of].camera_from_rcm * rcm_from_unrolled(pair_.q[of]);
+      return (there.translation - o.camera_from_unrolled.translation).norm();
+    };
+    return away_m(1 - k) < away_m(k);
+  }
+  const scenes::CrossingPair& pair() const { return pair_; }
+
+ private:
+  const Rig& rig_;
+  Random random_;
+  std::uint64_t seed_;
+  scenes::CrossingPair pair_;
+  std::vector<ShaftModel> shafts_;
+  std::optional<Renderer> renderer_;
+};
+
+class Crossing : public ::testing::Test {
+ protected:
+  const int pairs = from_environment("LAPSERVO_PAIRS", 4);
+  const int seed = from_environment("LAPSERVO_PAIR_SEED", 1);
+  const bool lists = from_environment("LAPSERVO_PAIR_LIST", 0) != 0;
+  const Rig rig = scenes::usual_rig(2);
+
+  struct Tallies {
+    Tally front, behind;
+    Tally both() const {
+      Tally sum = front;
+      sum.add(behind);
+      return sum;
+    }
+  };
+
+  void look(Tracker& tracker, Pair& pair, const std::string& name, Tallies& tallies) const {
+    const auto& seen = tracker.track(pair.frame());
+    for (std::size_t k = 0; k < 2; ++k) {
+      const scenes::CrossingPair& of = pair.pair();
+      Tally& part = of.hidden[k] > 0 ? tallies.behind : tallies.front;
+      const int wrong = part.wrong;
+      part.add(seen[k], pair.true_psi_rad(k), of.tells_psi(k), pair.swapped(seen[k], k));
+      if (part.wrong > wrong || (lists && seen[k].status != Status::ok))
+        std::printf("%s, instrument %zu: %s%s, %.2f of it hidden, %.2f of its inner boundaries\n", name.c_str(), k,
+                    std::string(to_string(seen[k].status)).c_str(), part.wrong > wrong ? ", wrong" : "", of.hidden[k],
+                    of.hidden_inner[k]);
+    }
+  }
+
+  // LAPSERVO_PAIR_KIND: only kinds whose name has it.
+  static bool skips(const Kind& kind) {
+    const char* only = std::getenv("LAPSERVO_PAIR_KIND");
+    return only && kind.name.find(only) == std::string::npos;
+  }
+
+  Tallies looked_at(const Kind& kind, int number, bool moving) const {
+    Tallies tallies;
+    for (int i = 0; i < (moving ? (pairs + 3) / 4 : pairs); ++i) {
+      Pair pair(rig, kind, static_cast<std::uint64_t>(1'000'000 * number + 1000 * seed + i));
+      Tracker tracker(rig, {.single = !moving});
+      const int frames = moving ? 8 : 1;
+      for (int frame = 0; frame < frames; ++frame, pair.move())
+        look(tracker, pair, kind.name + ", pair " + std::to_string(i) + ", frame " + std::to_string(frame), tallies);
+    }
+    return tallies;
+  }
+};
+
+// Of one of whose inner boundaries little shows psi can hardly be told, and where a print that is off would not show
+// either, it is refused.
+TEST_F(Crossing, BothInstrumentsAreFound) {
+  Tally exact, exact_in_front, all;
+  int number = 0;
+  print_head();
+  for (const Kind& kind : kinds()) {
+    ++number;
+    if (skips(kind)) continue;
+    const Tallies tallies = looked_at(kind, number, false);
+    tallies.front.print(kind.name + ": nothing before it"), tallies.behind.print("behind the other");
+    all.add(tallies.both());
+    if (!kind.exact) continue;
+    exact.add(tallies.both());
+    if (!kind.colourful) exact_in_front.add(tallies.front);
+  }
+  exact.print("**exact, all**"), all.print("**all**");
+  EXPECT_EQ(all.wrong, 0);
+  EXPECT_LT(all.error_by_sigma(), 1.5);
+  EXPECT_GE(exact_in_front.found, 0.95 * exact_in_front.all);
+  EXPECT_GE(exact.found_of_those, 0.75 * exact.tell);
+  EXPECT_LT(exact.error_by_sigma(), 1.5);
+}
+
+// What is hidden is told as of the first frame.
+TEST_F(Crossing, BothAreFollowed) {
+  Tally all;
+  int number = 0;
+  print_head();
+  for (const Kind& kind : kinds()) {
+    ++number;
+    if (skips(kind)) continue;
+    const Tally tally = looked_at(kind, number, true).both();
+    tally.print(kind.name + ", moving");
+    all.add(tally);
+  }
+  all.print("**all**");
+  EXPECT_EQ(all.wrong, 0);
+}
+
+}  // namespace
+}  // namespace lapservo::acceptance

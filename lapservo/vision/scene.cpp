@@ -1,0 +1,20 @@
+#include "lapservo/vision/scene.h"
+
+#include <algorithm>
+
+namespace lapservo::internal {
+
+std::uint8_t Scene::unless_explained(const Eigen::Vector2d& raw_px, std::uint8_t color) const {
+  const bool explained = std::any_of(others.begin(), others.end(), [&](const ShaftCover* other) {
+    return other->explains(raw_px.x() + 0.5, raw_px.y() + 0.5, color);
+  });
+  return explained ? outside : color;
+}
+
+bool Scene::hidden_by_others(const Eigen::Vector2d& raw_px, double depth_m) const {
+  return std::any_of(others.begin(), others.end(), [&](const ShaftCover* other) {
+    return other->hides(raw_px.x() + 0.5, raw_px.y() + 0.5, depth_m);
+  });
+}
+
+}  // namespace lapservo::internal
