@@ -18,6 +18,18 @@ constexpr std::size_t deviate_count = std::size_t{1} << 17;
 constexpr std::uint64_t deviate_seed = 20240229;
 constexpr double most = 32767;
 
+// Of sigma `deviate_unit`, the same for every sensor: to make them takes as long as a picture.
+const std::vector<std::int16_t>& normal_deviates() {
+  static const std::vector<std::int16_t> all = [] {
+    Random random(deviate_seed);
+    std::vector<std::int16_t> deviates(deviate_count);
+    for (auto& deviate : deviates)
+      deviate = static_cast<std::int16_t>(std::lround(std::clamp(random.normal() * deviate_unit, -most, most)));
+    return deviates;
+  }();
+  return all;
+}
+
 }  // namespace
 
 SensorEncoder::SensorEncoder(const Response& response, const Sensor& sensor) {
@@ -33,10 +45,6 @@ SensorEncoder::SensorEncoder(const Response& response, const Sensor& sensor) {
     by_level_.push_back({static_cast<std::int16_t>(std::lround(255 * value_unit * response.value_from_light(light))),
                          static_cast<std::int16_t>(std::lround(std::min(most, 255 * sigma_unit * slope * noise)))});
   }
-  Random random(deviate_seed);
-  deviates_.resize(deviate_count);
-  for (auto& deviate : deviates_)
-    deviate = static_cast<std::int16_t>(std::lround(std::clamp(random.normal() * deviate_unit, -most, most)));
 }
 
 void SensorEncoder::set_gains(const Light& gains) {
@@ -67,12 +75,13 @@ cv::Mat SensorEncoder::expose(const Encoded& encoded, std::uint64_t seed) const 
   cv::Mat image(encoded.value.size(), CV_8UC3);
   Random random(seed);
   const std::size_t count = 3 * static_cast<std::size_t>(image.cols);
-  const std::size_t room = deviates_.size() - std::min(deviates_.size() - 1, count);
+  const std::vector<std::int16_t>& deviates = normal_deviates();
+  const std::size_t room = deviates.size() - std::min(deviates.size() - 1, count);
   const cv::v_int16x8 half = cv::v_setall_s16(value_unit / 2);
   for (int v = 0; v < image.rows; ++v) {
     const std::int16_t* value = encoded.value.ptr<std::int16_t>(v);
     const std::int16_t* sigma = encoded.sigma.ptr<std::int16_t>(v);
-    const std::int16_t* deviate = deviates_.data() + random.bits() % room;
+    const std::int16_t* deviate = deviates.data() + random.bits() % room;
     std::uint8_t* out = image.ptr<std::uint8_t>(v);
     std::size_t i = 0;
     const auto noisy = [&](std::size_t at) {

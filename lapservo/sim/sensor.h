@@ -36,8 +36,7 @@ class SensorEncoder {
     std::int16_t value, sigma;
   };
   std::vector<Level> by_level_;
-  std::vector<std::int16_t> deviates_;  // of sigma 8192
-  std::array<float, 12> gains_;         // of four pixels
+  std::array<float, 12> gains_;  // of four pixels
   std::vector<std::int32_t> row_;
 };
 

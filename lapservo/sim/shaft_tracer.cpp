@@ -55,6 +55,7 @@ ShaftTracer::ShaftTracer(const ShaftModel& model, const ShaftPlacement& placemen
   e0_slope_m_ = static_cast<float>(slopes[0]);
   e3_slope_m_ = static_cast<float>(slopes[3]);
   covered_rad_ = static_cast<float>(marker.covered_rad());
+  for (Blotch& blotch : blotches_) blotch.azimuth_rad = wrap_two_pi(blotch.azimuth_rad);
   square_ = marker.gap_rad == 0 && slopes[0] == 0 && slopes[3] == 0;
   visible_ = camera_.x() > 1.01F * outer_m_;
 }
@@ -200,7 +201,8 @@ void ShaftTracer::stain(RayRow& rays) const {
     for (const Blotch& blotch : blotches_) {
       const double beside_m = rays.along_m[i] - blotch.along_m;
       if (std::abs(beside_m) > blotch.radius_m) continue;
-      const double around_m = wrap_pi(tau - blotch.azimuth_rad) * outer_m_;
+      const double turn_rad = std::abs(tau - blotch.azimuth_rad);  // of two in [0, 2 pi]
+      const double around_m = std::min(turn_rad, two_pi - turn_rad) * outer_m_;
       if (around_m * around_m + beside_m * beside_m >= blotch.radius_m * blotch.radius_m) continue;
       rays.part[i] = Part::blood;
       break;

@@ -27,8 +27,45 @@ cv::Mat octaves(int width_px, int height_px, int cells, int count, Random& rando
   return sum / total * 2;
 }
 
-cv::Vec3f mix(const cv::Vec3f& a, const cv::Vec3f& b, float t) {
-  return a + (b - a) * std::clamp(t, 0.0F, 1.0F);
+// What a pixel's noises make of it. Rows are coloured by such loops over plain arrays, which compilers vectorise.
+struct NoiseRow {
+  const float *organ, *fold, *grain, *vessel;
+};
+
+float unit(float value) {
+  return std::min(1.0F, std::max(0.0F, value));
+}
+
+void color_row(const NoiseRow& noise, int width_px, float* light) {
+  constexpr float liver[3] = {0.035F, 0.022F, 0.13F}, fat[3] = {0.16F, 0.38F, 0.62F}, pink[3] = {0.22F, 0.2F, 0.5F},
+                  blood[3] = {0.03F, 0.015F, 0.22F};
+  for (int u = 0; u < width_px; ++u) {
+    const float organ = noise.organ[u], thin = std::abs(noise.vessel[u]);
+    const float to_pink = unit(4 * (organ + 0.05F)), to_fat = unit(5 * (organ - 0.35F));
+    const float to_blood = unit(0.7F * std::max(0.0F, 1 - thin / 0.035F));
+    const float shade = std::max(0.05F, 0.75F + 0.45F * noise.fold[u] + 0.08F * noise.grain[u]);
+    for (int c = 0; c < 3; ++c) {
+      float color = liver[c] + (pink[c] - liver[c]) * to_pink;
+      color += (fat[c] - color) * to_fat;
+      color += (blood[c] - color) * to_blood;
+      light[3 * u + c] = color * shade;
+    }
+  }
+}
+
+// Black around the endoscope's round field, darker towards its border.
+void darken_outside_field(cv::Mat& light) {
+  const double field_px = 0.5 * std::max(light.rows * 1.3, light.cols * 0.9);
+  for (int v = 0; v < light.rows; ++v) {
+    const double y = v - 0.5 * light.rows;
+    auto* row = light.ptr<float>(v);
+    for (int u = 0; u < light.cols; ++u) {
+      const double x = u - 0.5 * light.cols, r = std::sqrt(x * x + y * y) / field_px;
+      const double inside = std::min(1.0, std::max(0.0, (1 - r) * field_px / 1.5 + 0.5));
+      const auto left = static_cast<float>(inside * (1 - 0.55 * r * r));
+      for (int c = 0; c < 3; ++c) row[3 * u + c] *= left;
+    }
+  }
 }
 
 void add_highlights(cv::Mat& light, Random& random) {
@@ -61,27 +98,12 @@ cv::Mat make_tissue(int width_px, int height_px, std::uint64_t seed) {
   const cv::Mat organ = octaves(width_px, height_px, 3, 3, random), fold = octaves(width_px, height_px, 5, 6, random);
   const cv::Mat grain = octaves(width_px, height_px, 60, 3, random),
                 vessel = octaves(width_px, height_px, 8, 4, random);
-  const cv::Vec3f liver(0.035F, 0.022F, 0.13F), fat(0.16F, 0.38F, 0.62F), pink(0.22F, 0.2F, 0.5F),
-      blood(0.03F, 0.015F, 0.22F);
   cv::Mat light(height_px, width_px, CV_32FC3);
   for (int v = 0; v < height_px; ++v)
-    for (int u = 0; u < width_px; ++u) {
-      const float o = organ.at<float>(v, u), f = fold.at<float>(v, u);
-      cv::Vec3f color = mix(liver, pink, 4 * (o + 0.05F));
-      color = mix(color, fat, 5 * (o - 0.35F));
-      const float thin = std::abs(vessel.at<float>(v, u));
-      color = mix(color, blood, 0.7F * std::max(0.0F, 1 - thin / 0.035F));
-      const float shade = 0.75F + 0.45F * f + 0.08F * grain.at<float>(v, u);
-      light.at<cv::Vec3f>(v, u) = color * std::max(0.05F, shade);
-    }
+    color_row({organ.ptr<float>(v), fold.ptr<float>(v), grain.ptr<float>(v), vessel.ptr<float>(v)}, width_px,
+              light.ptr<float>(v));
   add_highlights(light, random);
-  const double field_px = 0.5 * std::max(height_px * 1.3, width_px * 0.9);
-  for (int v = 0; v < height_px; ++v)
-    for (int u = 0; u < width_px; ++u) {
-      const double r = std::hypot(u - 0.5 * width_px, v - 0.5 * height_px) / field_px;
-      const double inside = std::clamp((1 - r) * field_px / 1.5 + 0.5, 0.0, 1.0);
-      light.at<cv::Vec3f>(v, u) *= static_cast<float>(inside * (1 - 0.55 * r * r));
-    }
+  darken_outside_field(light);
   return light;
 }
 

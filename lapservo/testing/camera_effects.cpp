@@ -23,10 +23,13 @@ void map_values(cv::Mat& picture, const std::function<double(double)>& function)
   for (int i = 0; i <= levels + 1; ++i)
     table[static_cast<std::size_t>(i)] =
         static_cast<float>(function(std::pow(std::min(1.0, static_cast<double>(i) / levels), 2)));
-  for (auto* value = picture.ptr<float>(); value != picture.ptr<float>() + 3 * picture.total(); ++value) {
-    const float place = std::sqrt(std::clamp(*value, 0.0F, 1.0F)) * levels;
-    const auto i = static_cast<std::size_t>(place);
-    *value = table[i] + (place - static_cast<float>(i)) * (table[i + 1] - table[i]);
+  auto* const values = picture.ptr<float>();
+  const std::size_t count = 3 * picture.total();
+  for (std::size_t at = 0; at < count; ++at) {
+    const float place = std::sqrt(std::clamp(values[at], 0.0F, 1.0F)) * levels;
+    const int i = static_cast<int>(place);
+    const float* const entry = table.data() + i;
+    values[at] = entry[0] + (place - static_cast<float>(i)) * (entry[1] - entry[0]);
   }
 }
 
@@ -134,6 +137,15 @@ cv::Mat compressed(const cv::Mat& picture, int quality) {
   return decode_image(encode_jpeg(picture, quality), "a picture of a test");
 }
 
+// Linear light of an sRGB picture.
+cv::Mat light_of(const cv::Mat& srgb) {
+  cv::Mat table(1, 256, CV_32F), light;
+  for (int value = 0; value < table.cols; ++value)
+    table.at<float>(value) = static_cast<float>(Response{}.light_from_value(value / 255.0));
+  cv::LUT(srgb, table, light);
+  return light;
+}
+
 Response response_of(const CameraEffects& effects) {
   return {effects.rec709 ? Response::Kind::rec709 : Response::Kind::srgb};
 }
@@ -141,9 +153,7 @@ Response response_of(const CameraEffects& effects) {
 }  // namespace
 
 cv::Mat seen_through(const CameraEffects& effects, const cv::Mat& srgb, const Camera& camera) {
-  cv::Mat picture;
-  srgb.convertTo(picture, CV_32F, 1 / 255.0);
-  map_values(picture, [](double value) { return Response{}.light_from_value(value); });
+  cv::Mat picture = light_of(srgb);
   aberrate(picture, effects.aberration, camera);
   vignette(picture, effects.vignette, camera);
   cross_talk(picture, effects.crosstalk);
