@@ -41,12 +41,14 @@ void set_quality(AVCodecContext& codec) {
   }
 }
 
-// What sRGB becomes by Rec. 601's matrix: what swscale makes of BGR unless told otherwise, and reads back as.
+// What sRGB becomes by Rec. 601's matrix: what swscale makes of BGR unless told otherwise, and reads back as. Chroma's
+// samples lie amid four pixels, which is not what a reader takes for granted.
 void set_colors(AVCodecContext& codec) {
   codec.color_range = AVCOL_RANGE_MPEG;
   codec.colorspace = AVCOL_SPC_SMPTE170M;
   codec.color_primaries = AVCOL_PRI_BT709;
   codec.color_trc = AVCOL_TRC_IEC61966_2_1;
+  if (codec.pix_fmt == AV_PIX_FMT_YUV420P) codec.chroma_sample_location = AVCHROMA_LOC_CENTER;
 }
 
 }  // namespace

@@ -13,8 +13,9 @@ namespace lapservo::internal {
 std::string video_remark();
 
 /// A video file while it is written, by FFmpeg's libraries: H.264 (libx264) that browsers play, in Rec. 601's limited
-/// range, as VideoReader reads it back. Pictures of an odd width or height, which 4:2:0 can't hold, are 4:4:4, which
-/// not every browser plays. Without libx264 it is MPEG-4 part 2.
+/// range and with chroma's samples amid four pixels, which the file says, as VideoReader reads it back. Pictures of an
+/// odd width or height, which 4:2:0 can't hold, are 4:4:4, which not every browser plays. Without libx264 it is MPEG-4
+/// part 2.
 class VideoEncoder {
  public:
   /// The container goes by the name's ending. Throws InputError naming `shown` when there is none for it.
