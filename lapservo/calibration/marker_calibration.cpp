@@ -108,8 +108,7 @@ class TurnFit {
       sighting.unknowns = sighting.unknowns.changed_by(adjustment->steps[i].head(pose_numbers));
       sighting.film_m = std::clamp(sighting.film_m + film_sigma_m * adjustment->steps[i][pose_numbers], 0.0,
                                    film_mean_m + 4 * film_sigma_m);
-      sighting.blur = {measured_[i].edges.boundary_blur.improved(sighting.blur.boundaries_px),
-                       measured_[i].edges.side_blur.improved(sighting.blur.sides_px)};
+      sighting.blur = measured_[i].edges.improved(sighting.blur);
     }
     if (free_print) {
       PrintShape shape = changed_by(PrintShape::of(marker_), adjustment->print);

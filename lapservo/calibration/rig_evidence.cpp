@@ -37,13 +37,17 @@ TimedPose::ByFocal slope_of(const Rigid3& before, const Rigid3& after, double fo
 
 }  // namespace
 
+RigEvidence::FreeTrackers::FreeTrackers(const Rig& rig, double tolerance_m)
+    : at(whole_search(free_rig(rig, tolerance_m, 0))),
+      longer(whole_search(free_rig(rig, tolerance_m, focal_step))),
+      shorter(whole_search(free_rig(rig, tolerance_m, -focal_step))) {}
+
 RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument, Cores cores)
     : rig_(rig),
       instrument_(instrument),
       as_it_is_(whole_search(rig)),
-      exact_{whole_search(free_rig(rig, 0, 0)), whole_search(free_rig(rig, 0, focal_step))},
-      tolerant_{whole_search(free_rig(rig, print_tolerance_m, 0)),
-                whole_search(free_rig(rig, print_tolerance_m, focal_step))},
+      exact_(rig, 0),
+      tolerant_(rig, print_tolerance_m),
       key_frames_(rig, instrument),
       response_(rig.camera),
       worker_(cores == Cores::two ? SerialWorker::Thread::own : SerialWorker::Thread::none) {}
@@ -64,10 +68,18 @@ bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, double t
   const Observation& seen = trackers.at.track(bgr)[instrument_];
   if (seen.status != Status::ok) return false;
   look_at_light(bgr, seen, sight);
+  if (!seen.marker) return true;
+  // From the one to the other, as then errors of either matter least; a wrong focal length made more so may find
+  // nothing.
+  const auto pose_of = [](const Observation& o, const Observation& otherwise) {
+    return (o.status == Status::ok && o.marker ? o : otherwise).marker->camera_from_marker;
+  };
   const Observation& longer = trackers.longer.track(bgr)[instrument_];
-  if (longer.status == Status::ok && seen.marker && longer.marker)
-    poses_.push_back({time_s, *seen.marker,
-                      slope_of(seen.marker->camera_from_marker, longer.marker->camera_from_marker, focal_step)});
+  const Observation& shorter = trackers.shorter.track(bgr)[instrument_];
+  const int steps = (longer.status == Status::ok && longer.marker) + (shorter.status == Status::ok && shorter.marker);
+  if (steps > 0)
+    poses_.push_back(
+        {time_s, *seen.marker, slope_of(pose_of(shorter, seen), pose_of(longer, seen), steps * focal_step)});
   return true;
 }
 

@@ -60,9 +60,10 @@ class RigEvidence {
 
  private:
   static constexpr double focal_step = 0.01;
-  // By the image alone, with the rig's focal length and with one that is longer.
+  // By the image alone, with the rig's focal length, with one that is longer and with one that is shorter.
   struct FreeTrackers {
-    Tracker at, longer;
+    FreeTrackers(const Rig& rig, double tolerance_m);
+    Tracker at, longer, shorter;
   };
   // What those see of the marker.
   struct FreeSight {

@@ -9,6 +9,7 @@
 #include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/blurred_boundary.h"
 #include "lapservo/vision/edge_lines.h"
 #include "lapservo/vision/limits.h"
 
@@ -17,10 +18,10 @@ namespace {
 
 constexpr int max_lines = EdgeMeasurements::max_lines, stations = EdgeMeasurements::max_stations;
 
-// A direction around the shaft, in the unrolled frame and in the camera's.
+// A direction around the shaft, in the unrolled frame and in the camera's, and where its line begins.
 struct Generatrix {
   double azimuth_rad;
-  Eigen::Vector3d outwards_unrolled, outwards, around;
+  Eigen::Vector3d outwards_unrolled, outwards, around, begin;
 };
 
 // What a pass measures with.
@@ -46,15 +47,14 @@ struct Frame {
   const Marker& marker() const { return scene.marker; }
   Generatrix generatrix(double azimuth_rad) const {
     const double cosine = std::cos(azimuth_rad), sine = std::sin(azimuth_rad);
+    const Eigen::Vector3d outwards = cosine * axes.col(0) + sine * axes.col(1);
     return {azimuth_rad,
             {cosine, sine, 0},
-            cosine * axes.col(0) + sine * axes.col(1),
-            cosine * axes.col(1) - sine * axes.col(0)};
+            outwards,
+            cosine * axes.col(1) - sine * axes.col(0),
+            unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * outwards};
   }
-  Eigen::Vector3d point(const Generatrix& line, double along_m) const {
-    return unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * line.outwards +
-           along_m * axes.col(2);
-  }
+  Eigen::Vector3d point(const Generatrix& line, double along_m) const { return line.begin + along_m * axes.col(2); }
   // How brightly the film's edge at boundary k, `along_m` from the frame's origin, shows, relative to the outside
   // beside it; 0 when it is not seen.
   double film_light(std::size_t k, const Generatrix& line, double along_m) const {
@@ -69,6 +69,12 @@ struct Frame {
     };
     return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
                     edge_limits.film_most_lit);
+  }
+  double diffuse_light(const Generatrix& line, double along_m) const {
+    Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
+    to_camera.z() -= along_m;
+    const double ambient = edge_limits.blurred_ambient_fraction;
+    return ambient + (1 - ambient) * std::max(0.0, line.outwards_unrolled.dot(to_camera) / to_camera.norm());
   }
   double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
 
@@ -103,12 +109,45 @@ UnknownVector row_of(const PoseUnknowns& unknowns, const Eigen::Vector3d& point,
   return row;
 }
 
+// The course of boundary `k` in the image, in the directions of `along`, by how it goes on around the shaft on either
+// side, `depth_m` below the outside. The light is the camera's, diffuse: so the ends' films are seen, too.
+BoundaryCourse course_of(const Frame& frame, const Generatrix& generatrix, double along_m, double slope_m,
+                         double depth_m, const Eigen::Vector2d& point_px, const Eigen::Vector2d& along) {
+  constexpr double aside_rad = 0.05;
+  const Eigen::Vector2d across(-along.y(), along.x());
+  std::array<Eigen::Vector2d, 2> places_px;
+  std::array<double, 2> light;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double turn_rad = i == 0 ? -aside_rad : aside_rad;
+    const Generatrix aside = frame.generatrix(generatrix.azimuth_rad + turn_rad);
+    const double there_m = along_m + turn_rad * slope_m;
+    const Eigen::Vector2d from_px =
+        frame.scene.camera.raw_from_point(frame.point(aside, there_m) - depth_m * aside.outwards) - point_px;
+    places_px[i] = {from_px.dot(along), from_px.dot(across)};
+    light[i] = frame.diffuse_light(aside, there_m);
+  }
+  const Eigen::Vector2d &a = places_px[0], &b = places_px[1];
+  const double slope_a = a.x() / a.y(), slope_b = b.x() / b.y(), apart_px = b.y() - a.y();
+  BoundaryCourse course;
+  course.curvature_per_px = 2 * (slope_b - slope_a) / apart_px;
+  course.slope = slope_a - 0.5 * course.curvature_per_px * a.y();
+  course.light_change_per_px = std::log(light[1] / light[0]) / apart_px;
+  return course;
+}
+
 // A boundary on a generatrix, where it is expected; all of the measurement but residual and sigma.
 struct BoundaryPlace {
   Measurement measurement;
   Eigen::Vector2d point_px, along;
   double normal_cosine;
   EdgeLine line;
+};
+
+// What a wide blur does to it: `ellipse` is the boundary's.
+struct InWideBlur {
+  BlurEllipse ellipse;
+  Eigen::Vector2d normal;  // its parts along the line and across it
+  double moved_px;         // along the line
 };
 
 // Whether the pixels on both sides have the colours that should be there. A blurred band tints the shaft beyond its
@@ -124,9 +163,10 @@ bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_p
 
 std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
                                             const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
-                                            double blur_px) {
+                                            double blur_px, InWideBlur* wide) {
   const double film_light = frame.film_light(k, generatrix, along_m[k]);
-  const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - film_light * frame.film_m * generatrix.outwards;
+  Eigen::Vector3d point = frame.point(generatrix, along_m[k]);
+  if (film_light > 0) point -= film_light * frame.film_m * generatrix.outwards;
   if (!(point.z() > 1e-3)) return std::nullopt;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
@@ -139,6 +179,13 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   const Eigen::Vector2d normal(-tangent.y(), tangent.x());
   place.normal_cosine = normal.dot(place.along);
   if (!(std::abs(place.normal_cosine) > edge_limits.min_normal_cosine)) return std::nullopt;
+  if (wide) {
+    wide->normal = {place.normal_cosine, normal.dot(Eigen::Vector2d(-place.along.y(), place.along.x()))};
+    blur_px = wide->ellipse.along_normal_px(wide->normal);
+    wide->moved_px = moved_by_blur_px(
+        course_of(frame, generatrix, along_m[k], slope_m, film_light * frame.film_m, image.point_px, place.along),
+        wide->ellipse);
+  }
 
   double gap_px = 1e9;
   if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
@@ -165,13 +212,14 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
 // A boundary point that was located.
 struct Candidate {
   const BoundaryPlace* place;
+  const InWideBlur* wide;  // nullptr in usual blur
   const EdgeFit* edge;
   bool colors_agree;
 };
 
 // Keeps the candidates of one boundary whose change of light is what most see where the colours agree; gives each its
 // sigma from the noise that the lines show.
-void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
+void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeasurements& out) {
   std::array<float, 3> typical{};
   InplaceVector<float, max_lines> values;
   for (std::size_t c = 0; c < 3; ++c) {
@@ -189,7 +237,7 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   };
   const float typical_square = dot(typical, typical);
-  for (const auto& [place, edge, agree] : candidates) {
+  for (const auto& [place, wide, edge, agree] : candidates) {
     const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
     const bool alike = projection > edge_limits.min_step * typical_square &&
                        projection * projection > edge_limits.least_alike * square * typical_square;
@@ -200,6 +248,10 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
     const double cosine = place->normal_cosine;
     Measurement measurement = place->measurement;
     measurement.residual_px = edge->offset_px * cosine;
+    if (wide) {
+      measurement.residual_px -= wide->moved_px * cosine;
+      out.wide_blur.add(*edge, variance, blur, measurement.group, wide->normal);
+    }
     measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
                                      edge_limits.single_floor_px * edge_limits.single_floor_px);
     out.all.push_back(measurement);
@@ -207,26 +259,39 @@ void trust(std::span<const Candidate> candidates, EdgeMeasurements& out) {
   }
 }
 
-void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
+// Of the visible half width: wide blur mixes what lies beside the shaft into what is near its sides.
+double line_reach(const EdgeBlur& blur, double radius_px) {
+  if (!blur.wide()) return edge_limits.line_reach;
+  return std::clamp(1 - edge_limits.blurs_from_side * blur.sides_px / radius_px, edge_limits.least_line_reach,
+                    edge_limits.line_reach);
+}
+
+void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur& blur, EdgeMeasurements& out) {
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
   out.lines = std::max(edge_limits.min_lines, std::min(static_cast<int>(1.2 * radius_px), max_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
+  const bool wide = blur.wide();
   std::array<bool, 4> jumps{};
   for (std::size_t k = 0; k < 4; ++k) jumps[k] = jumps_at_seam(frame.marker(), k);
-  const double sine_of_half = std::sin(frame.view.half_visible_rad);
+  const double sine_of_half = std::sin(frame.view.half_visible_rad), reach = line_reach(blur, radius_px);
   InplaceVector<BoundaryPlace, 4 * max_lines> places;
+  InplaceVector<InWideBlur, 4 * max_lines> in_wide_blur;
   InplaceVector<EdgeLine, 4 * max_lines> lines;
   for (int i = 0; i < out.lines; ++i) {
-    const double sine = edge_limits.line_reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
+    const double sine = reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
     const Generatrix generatrix = frame.generatrix(frame.view.facing_azimuth_rad + std::asin(sine));
     const double tau_rad = frame.tau(generatrix.azimuth_rad);
     const auto along_m = boundaries_m(frame.marker(), tau_rad);
     const double seam_px = distance_to_seam_rad(frame.marker(), tau_rad) * radius_px * std::sqrt(1 - sine * sine);
     for (std::size_t k = 0; k < 4; ++k) {
-      if (jumps[k] && seam_px < edge_limits.seam_blurs * blur_px + edge_limits.seam_px) continue;
-      const auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur_px);
+      if (jumps[k] && seam_px < edge_limits.seam_blurs * blur.boundaries_px + edge_limits.seam_px) continue;
+      InWideBlur blurred;
+      if (wide) blurred.ellipse = blur.ellipse(k);
+      const auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur.boundaries_px,
+                                        wide ? &blurred : nullptr);
       if (!place) continue;
       if (!frame.scene.others.empty() && hidden(frame, place->line, generatrix, along_m[k])) continue;
+      if (wide) in_wide_blur.push_back(blurred);
       ++out.in_image[k];
       places.push_back(*place);
       lines.push_back(place->line);
@@ -237,8 +302,9 @@ void measure_boundaries(const Frame& frame, const Effort& effort, double blur_px
     InplaceVector<Candidate, max_lines> candidates;
     for (std::size_t i = 0; i < places.size(); ++i)
       if (places[i].measurement.group == k && edges[i].converged)
-        candidates.push_back({&places[i], &edges[i], colors_agree(frame, places[i], edges[i].offset_px)});
-    trust(candidates, out);
+        candidates.push_back({&places[i], wide ? &in_wide_blur[i] : nullptr, &edges[i],
+                              colors_agree(frame, places[i], edges[i].offset_px)});
+    trust(candidates, blur, out);
   }
 }
 
@@ -336,11 +402,12 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
 
 }  // namespace
 
-double BlurEvidence::improved(double blur_px) const {
-  if (!(information > 0)) return blur_px;
-  return std::clamp(blur_px + gradient / information,
-                    std::max(edge_limits.min_blur_px, edge_limits.min_blur_change * blur_px),
-                    std::min(edge_limits.max_blur_px, edge_limits.max_blur_change * blur_px));
+EdgeBlur EdgeMeasurements::improved(const EdgeBlur& blur) const {
+  const double sides_px = side_blur.improved(blur.sides_px);
+  if (!blur.wide()) return {boundary_blur.improved(blur.boundaries_px), sides_px};
+  EdgeBlur next = wide_blur.improved(blur);
+  next.sides_px = sides_px;
+  return next.wide() ? next : EdgeBlur{next.boundaries_px, sides_px};
 }
 
 EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,
@@ -349,7 +416,7 @@ EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, cons
   const auto view = view_cylinder(unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
   if (!view) return out;
   const Frame frame(scene, light, unknowns, film_m, *view);
-  measure_boundaries(frame, effort, blur.boundaries_px, out);
+  measure_boundaries(frame, effort, blur, out);
   measure_sides(frame, effort, blur.sides_px, out);
   return out;
 }

@@ -4,18 +4,12 @@
 #include <cstddef>
 
 #include "lapservo/core/inplace_vector.h"
-#include "lapservo/vision/edge_profile.h"
+#include "lapservo/vision/edge_blur.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo::internal {
-
-/// Width of the blur (one sigma) along the boundaries' normals and across the shaft's sides: motion makes them differ.
-/// Carried from frame to frame.
-struct EdgeBlur {
-  double boundaries_px = 1.2, sides_px = 1.2;
-};
 
 /// Thickness of the film that carries the marker and stands out from the shaft, before a fit: mean and standard
 /// deviation. Where an end is seen from beyond, the cut edge of the film is seen too, and the boundary that is measured
@@ -45,17 +39,6 @@ struct Effort {
   int thinning;
 };
 
-/// What the edges say about the blur.
-struct BlurEvidence {
-  double gradient = 0, information = 0;
-  void add(const EdgeFit& edge, double variance) {
-    gradient += edge.blur_gradient / variance;
-    information += edge.blur_information / variance;
-  }
-  /// The blur after a Gauss-Newton step of limited size.
-  double improved(double blur_px) const;
-};
-
 /// Everything that a frame shows of a marker's boundaries and of its shaft's sides near a pose.
 struct EdgeMeasurements {
   static constexpr int max_lines = 64, max_stations = 24;
@@ -64,6 +47,10 @@ struct EdgeMeasurements {
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at
   BlurEvidence boundary_blur, side_blur;
+  WideBlurEvidence wide_blur;  ///< where the blur that they were located with is wide
+
+  /// The blur that they were located with after a step.
+  EdgeBlur improved(const EdgeBlur& blur) const;
 };
 
 /// Looks around `unknowns` in linear light, to a fraction of a pixel. Nothing when the pose shows no shaft.

@@ -15,7 +15,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int max_passes = 3;
+constexpr int max_passes = 3, max_wide_passes = 5;
 
 double robust_weight(const Measurement& m, double residual_px) {
   return cauchy_weight(residual_px / m.sigma_px, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
@@ -56,9 +56,8 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
                            const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px) {
   const FineFitLimits& limits = fine_fit_limits;
   const double motion_blur_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
-  const double beyond_px = std::max(0.0, std::max(blur.boundaries_px, blur.sides_px) - limits.usual_blur_px);
-  const double boundary_px = limits.common_boundary_px +
-                             limits.common_fraction_of_blur * std::max(0.0, blur.boundaries_px - limits.usual_blur_px);
+  const double widest_px = blur.widest_px();
+  const double beyond_px = std::max(0.0, widest_px - limits.usual_blur_px);
   const double side_px = limits.common_side_px +
                          limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
                          limits.side_fraction_of_motion_blur * motion_blur_px;
@@ -69,6 +68,8 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   CommonErrors errors;
   double bias_squares_px2 = 0;
   for (std::size_t k = 0; k < 4; ++k) {
+    const double boundary_px = limits.common_boundary_px +
+                               limits.common_fraction_of_blur * std::max(0.0, blur.along_px[k] - limits.usual_blur_px);
     const bool corrected = processed && processed->bias_px[k];
     const double left_px = (corrected ? left_of_corrected : 1) * bias_px[k];
     errors.px[k] = std::hypot(boundary_px, left_px, unexplained_px);
@@ -78,7 +79,7 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
   errors.noise_scale = std::max(1.0, scatter_sigmas(measurements, lines));
   const double sigma_px = median_sigma_px(measurements);
   const double moved_px = std::sqrt(bias_squares_px2);
-  errors.inner_doubt_scale = doubt_scale(sigma_px, std::max(blur.boundaries_px, blur.sides_px), moved_px);
+  errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
   const double beyond_usual_px = std::max(0.0, sigma_px - limits.usual_sigma_px);
   const double processed_px = left_of_corrected * moved_px;
   errors.doubt.boundary_px = std::hypot(limits.doubted_of_sigma * beyond_usual_px, processed_px);
@@ -93,6 +94,7 @@ struct Change {
   double points_px = 0;       // how far the farthest measured point moved
   double blur_fraction = 0;   // by how much the blur did, of what it was
   double motion_blur_px = 0;  // by how much a blur beyond a lens's did
+  double oblique_px2 = 0;     // by how much its covariance along the shaft and across it did, at most
 
   void add_blur(double before_px, double after_px) {
     blur_fraction = std::max(blur_fraction, std::abs(after_px / before_px - 1));
@@ -103,6 +105,8 @@ struct Change {
   bool settled() const {
     return std::max(points_px, fine_fit_limits.motion_blur_weight * motion_blur_px) < fine_fit_limits.settled_px;
   }
+  // Whether the blur's covariance is known, which moves boundaries.
+  bool ellipse_settled() const { return oblique_px2 < fine_fit_limits.settled_oblique_px2; }
   // Whether edges located with the blur before are good enough for the last pass.
   bool sharp() const { return blur_fraction < fine_fit_limits.settled_blur; }
 };
@@ -151,10 +155,11 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
     pass = measure_edges(scene, light, fit.unknowns, film_m, effort, located_with);
     if (static_cast<int>(pass.all.size()) < 2 * fit.unknowns.size()) return std::nullopt;
     Change change{move()};
-    const EdgeBlur improved{pass.boundary_blur.improved(fit.blur.boundaries_px),
-                            pass.side_blur.improved(fit.blur.sides_px)};
-    change.add_blur(fit.blur.boundaries_px, improved.boundaries_px);
+    const EdgeBlur improved = pass.improved(fit.blur);
+    for (std::size_t k = 0; k < 4; ++k) change.add_blur(fit.blur.along_px[k], improved.along_px[k]);
     change.add_blur(fit.blur.sides_px, improved.sides_px);
+    change.oblique_px2 =
+        fit.blur.widest_px() * fit.blur.widest_px() * std::abs(improved.correlation - fit.blur.correlation);
     fit.blur = improved;
     if (!fit.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
     return change;
@@ -162,10 +167,10 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   auto change = refine(capture);
   if (change && !(change->settled() && change->sharp())) change = refine(approach);
   if (!change) return fit;
-  for (int i = 0; i < max_passes; ++i) {
+  for (int i = 0; i < (fit.blur.wide() ? max_wide_passes : max_passes); ++i) {
     change = refine(measure_all);
     if (!change) return fit;
-    if (change->settled()) break;
+    if (change->settled() && change->ellipse_settled()) break;
   }
   if (!change->settled()) return fit;
   ProcessingEvidence evidence;

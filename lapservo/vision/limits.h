@@ -77,10 +77,20 @@ struct EdgeLimits {
   /// sides.
   double single_floor_px = 0.04;
   double interpolation_noise = 1.6;  ///< of the variance: interpolated samples are smoother than pixels are noisy
-  double min_normal_cosine = 0.3;    ///< between the boundary's normal and the line that is sampled
-  double max_side_sigma_px = 2;      ///< a side less certain says nothing
-  std::size_t min_alike = 3;         ///< points whose colours agree, for what a boundary's change of light is
-  std::size_t min_side_edges = 4;    ///< for how noisy a side is
+  /// Beyond it blur is motion's or defocus', no lens's, and what it does to boundaries is modelled
+  /// (blurred_boundary.h). Misplaced sides look wide, so boundaries must be wide, too, or the sides by more than a pass
+  /// makes of usual ones.
+  double wide_blur_px = 1.5, wide_along_blur_px = 1.3, wide_sides_px = 2.1;
+  /// Of wide blur, what is the sharpest lens's: what a lens does beyond makes the correlation smaller, which is fitted,
+  /// and nothing makes it larger than 1.
+  double lens_blur_px = 0.8;
+  double blurred_ambient_fraction = 0.05;  ///< of the light on the shaft, the even part
+  /// Lines end so many blurs before a side, of which the blur would mix the outside in, and no nearer to the middle.
+  double blurs_from_side = 2.5, least_line_reach = 0.6;
+  double min_normal_cosine = 0.3;  ///< between the boundary's normal and the line that is sampled
+  double max_side_sigma_px = 2;    ///< a side less certain says nothing
+  std::size_t min_alike = 3;       ///< points whose colours agree, for what a boundary's change of light is
+  std::size_t min_side_edges = 4;  ///< for how noisy a side is
 
   /// A change of light is the boundary's when it is at least this fraction of what most have, and its direction in the
   /// three channels this alike (cosine squared).
@@ -131,8 +141,9 @@ struct FineFitLimits {
   double settled_blur = 0.1;  ///< change of the blur, a fraction of it, below which edges need not be located again
   double motion_blur_weight =
       5;  ///< a motion blur's change by that of a point: motion's may be no blur, and never settles
-  double sharp_blur_px = 1.8;    ///< a blur below it may flicker where few sides are left
-  double settled_sigmas = 0.01;  ///< a reweighting that moves the unknowns by less is the last
+  double settled_oblique_px2 = 0.3;  ///< of a blur's covariance, which moves boundaries by a twentieth of it in px
+  double sharp_blur_px = 1.8;        ///< a blur below it may flicker where few sides are left
+  double settled_sigmas = 0.01;      ///< a reweighting that moves the unknowns by less is the last
 };
 inline constexpr FineFitLimits fine_fit_limits;
 
@@ -236,8 +247,8 @@ struct ValidationLimits {
   /// Motion over 15 px in an exposure gave psi off by 0.1 rad and more with sigmas of 5 mrad (6 wrong of 117, moving
   /// frames with --motion 0.4 --seed 9). Beyond motion_blurred_px sides hold the shaft's place no more, and an end that
   /// most lines miss is not hidden: what they found is another. Beyond lost_px the motion blur's form, which nobody
-  /// knows, decides where the edges are taken to be.
-  double motion_blurred_px = 2, lost_px = 4.5;
+  /// knows, decides where the edges are taken to be (an even motion of 14 px is fitted by 4.8 px).
+  double motion_blurred_px = 2, lost_px = 5;
   int min_sides = 8;
   int motion_blurred_end_parts = 3, motion_blurred_end_of = 5;  ///< every boundary on three lines of five
 };

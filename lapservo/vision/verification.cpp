@@ -185,7 +185,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::poor_fit;
 
   // Motion blur.
-  const double motion_blur_px = std::max(fit.blur.boundaries_px, fit.blur.sides_px);
+  const double motion_blur_px = fit.blur.widest_px();
   if (motion_blur_px > limits.lost_px) return Status::uncertain;
   const bool blurred = motion_blur_px > limits.motion_blurred_px;
   const int min_used = *std::min_element(fit.used.begin(), fit.used.end());
