@@ -113,7 +113,11 @@ std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, cons
   if (!options.light.empty())
     simulator->change_light({options.light[0], options.light[0] + options.light[1]},
                             static_cast<float>(std::max(0.0, options.light[2])));
-  if (!options.endoscope_motion.empty()) simulator->move_endoscope(motion_of(options));
+  if (!options.endoscope_motion.empty())
+    simulator->move_endoscope(motion_of(options));
+  else if (options.endoscope_profile != SimulationOptions().endoscope_profile)
+    throw InputError("--endoscope-profile",
+                     "says how the endoscope moves, and --endoscope-motion, which makes it, is not given");
   return simulator;
 }
 

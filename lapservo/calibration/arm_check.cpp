@@ -17,7 +17,7 @@ namespace lapservo::internal {
 namespace {
 
 // Times sigma: what goes with the pose is in no covariance, as in registration.cpp.
-constexpr double unmodelled = 2;
+constexpr double unmodelled_sigmas = 2;
 // Smaller faults than these are not taken out of the others: they would widen them for nothing.
 constexpr double least_focal = 2e-3, least_drift_m = 0.5e-3, least_drift_rad = 2e-3;
 
@@ -37,7 +37,7 @@ std::optional<Fitted> fitted(const Instrument& instrument, const ArmStart& start
 
 Told focal_of(const Fitted& f) {
   const Eigen::Index i = f.model.focal();
-  return {std::abs(f.fit.x[i]), unmodelled * std::sqrt(f.fit.covariance(i, i))};
+  return {std::abs(f.fit.x[i]), unmodelled_sigmas * std::sqrt(f.fit.covariance(i, i))};
 }
 
 // By how much the marker in the middle of its work moves in the camera over the recording.
@@ -51,12 +51,12 @@ Told drift_of_place(const Fitted& f) {
   for (Eigen::Index k = 0; k < 3; ++k)
     by_drift.col(3 + k) = camera_from_rcm.rotation * Eigen::Vector3d::Unit(k).cross(arm);
   const Eigen::Matrix3d covariance = by_drift * f.fit.covariance.block<6, 6>(i, i) * by_drift.transpose();
-  return {(by_drift * f.fit.x.segment<6>(i)).norm(), unmodelled * std::sqrt(std::max(0.0, covariance.trace()))};
+  return {(by_drift * f.fit.x.segment<6>(i)).norm(), unmodelled_sigmas * std::sqrt(std::max(0.0, covariance.trace()))};
 }
 
 Told drift_of_directions(const Fitted& f) {
   const Eigen::Index i = f.model.drift() + 3;
-  return {f.fit.x.segment<3>(i).norm(), unmodelled * std::sqrt(f.fit.covariance.block<3, 3>(i, i).trace())};
+  return {f.fit.x.segment<3>(i).norm(), unmodelled_sigmas * std::sqrt(f.fit.covariance.block<3, 3>(i, i).trace())};
 }
 
 Rigid3 marker_at(const Instrument& instrument, const Rigid3& camera_from_rcm, const Joints& joints,
@@ -107,7 +107,7 @@ Eigen::Vector3d registration_sigmas(const Fitted& f) {
     rho_m += (pose.origin() - rcm).norm() / static_cast<double>(f.model.poses().size());
   // The joint offsets' share goes with the rotation's and the translation's: their sum is known better than each.
   const double place_m = std::hypot(std::sqrt(c.block<3, 3>(3, 3).trace()), 0.2 * turn_rad * rho_m);
-  return unmodelled * Eigen::Vector3d(place_m, turn_rad, std::sqrt(c(8, 8)) + turn_rad);
+  return unmodelled_sigmas * Eigen::Vector3d(place_m, turn_rad, std::sqrt(c(8, 8)) + turn_rad);
 }
 
 }  // namespace
@@ -133,7 +133,7 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
   check.at_best = residuals(instrument, camera, start, recording, camera_from_rcm, joints, check.measured_delay_s);
   if (instrument.image_delay_s)
     check.delay_s = Told{std::abs(*instrument.image_delay_s - check.measured_delay_s),
-                         unmodelled * std::sqrt(best->fit.covariance(ArmModel::delay, ArmModel::delay))};
+                         unmodelled_sigmas * std::sqrt(best->fit.covariance(ArmModel::delay, ArmModel::delay))};
   if (!instrument.camera_from_rcm) return check;
   const double delay_s = instrument.image_delay_s.value_or(check.measured_delay_s);
   check.by_rig =

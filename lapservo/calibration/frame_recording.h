@@ -33,7 +33,7 @@ struct JobWatch {
 /// What became of a recording's frames.
 struct FramesRead {
   int looked_at = 0, flawed = 0;
-  int pictures = 0;       ///< of those looked at, files of their own: no encoder saw the one before
+  int jpegs = 0;          ///< of those looked at: what compressed them saw no frame before
   bool stopped = false;   ///< by the user
   std::string complaint;  ///< what could not be read; empty when all was
 
@@ -45,8 +45,8 @@ struct FramesRead {
 void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
                       const std::string& whose);
 
-/// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` returns what is told
-/// beside the progress. Throws InputError at a frame that is not of the rig's size.
+/// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` may keep it, and returns
+/// what is told beside the progress. Throws InputError at a frame that is not of the rig's size.
 FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int every, const JobWatch& watch,
                        const std::function<std::string(const cv::Mat&, double)>& look);
 

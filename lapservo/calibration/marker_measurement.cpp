@@ -45,7 +45,7 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
   measured.calibration = calibrate_marker(rig, index, key_frames.take(), [&](int round, int most) {
     watch.tell(std::nullopt, round, fmt::format(" of at most {} rounds of fitting", most));
   });
-  if (measured.read.pictures == measured.read.looked_at) measured.calibration.seam_may_lag = false;
+  if (measured.read.jpegs == measured.read.looked_at) measured.calibration.seam_may_lag = false;
   if (joints && measured.calibration.refusal.empty()) add_seam(instrument, *joints, measured.calibration);
   return measured;
 }

@@ -137,6 +137,16 @@ const std::vector<FrameEvidence>& RigEvidence::frames() const {
   return frames_;
 }
 
+const std::vector<TimedPose>& RigEvidence::poses() const {
+  finish_all_but(0);
+  return poses_;
+}
+
+std::optional<MarkerResponse::Result> RigEvidence::response() const {
+  finish_all_but(0);
+  return response_.result();
+}
+
 std::vector<KeyFrame> RigEvidence::take_key_frames() {
   finish_all_but(0);
   return key_frames_.take();
@@ -150,6 +160,7 @@ std::vector<TrackedPsi> RigEvidence::tracked_psi() const {
 }
 
 PictureLight RigEvidence::picture() const {
+  finish_all_but(0);
   if (values_.empty()) return {};
   return {median(std::vector(values_)), median(std::vector(clipped_))};
 }

@@ -49,10 +49,10 @@ class RigEvidence {
   // What follows waits for all frames that were added.
   const std::vector<FrameEvidence>& frames() const;
   /// By the image alone, whatever the print; with TimedPose::by_focal.
-  const std::vector<TimedPose>& poses() const { return poses_; }
+  const std::vector<TimedPose>& poses() const;
   std::vector<TrackedPsi> tracked_psi() const;
   /// Nullopt when the marker's edges are too few to tell.
-  std::optional<MarkerResponse::Result> response() const { return response_.result(); }
+  std::optional<MarkerResponse::Result> response() const;
   PictureLight picture() const;
   int count(Status status) const;
   /// Empties what it takes.

@@ -12,7 +12,8 @@
 
 namespace lapservo::internal {
 
-/// Does tasks one after the other, in the order they came, in a thread of its own. For one caller.
+/// Does tasks one after the other in a thread of its own, in the order they came, or without one, in the order in which
+/// their results are asked for. For one caller.
 class SerialWorker {
  public:
   enum class Thread { none, own };

@@ -35,6 +35,7 @@ bool OffsetSteps::add(const SeenOffset& offset, bool delay_is_known) {
   while (!seen_.empty() && !(offset.stamp_s - seen_.front().at.stamp_s < memory_s)) seen_.pop_front();
   // An earlier stamp, or none, tells nothing.
   if (!seen_.empty() && !(offset.stamp_s > seen_.back().at.stamp_s)) return false;
+  if (!latest_.empty() && !(offset.stamp_s > latest_.back().stamp_s)) latest_.clear();
   const bool usual_before = latest(false) != nullptr;
   const Seen *const last = latest(!usual_before), *const first = oldest(!usual_before);
   if (last) {
