@@ -29,17 +29,6 @@ void widen(std::vector<Span>& bands, const Disc& disc, int width_px) {
 
 }  // namespace
 
-double half_field_rad(const Camera& camera) {
-  double widest = 0;
-  for (const double u : {-0.5, camera.width_px - 0.5})
-    for (const double v : {-0.5, camera.height_px - 0.5}) {
-      const Eigen::Vector2d corner(u, v);
-      const Eigen::Vector3d ray = camera.ray_from_ideal(camera.ideal_from_raw(corner).value_or(corner));
-      widest = std::max(widest, std::atan(ray.head<2>().norm()));
-    }
-  return widest;
-}
-
 Disc disc_around_ball(const Camera& camera, double half_field_rad, const Eigen::Vector3d& centre, double radius_m) {
   if (centre.z() < 1.5 * radius_m) return {};
   const double off_axis_rad = std::atan2(centre.head<2>().norm(), centre.z());

@@ -17,9 +17,6 @@ struct Span {
 
 inline constexpr int band_rows = 16;
 
-/// Angle between the optical axis and the ray through the image's farthest corner.
-double half_field_rad(const Camera& camera);
-
 /// Where in the raw image a shaft can show: a span for every band of `band_rows` rows, generous by `margin_px`.
 std::vector<Span> outline(const Camera& camera, double half_field_rad, const ShaftModel& model,
                           const ShaftPlacement& placement, double margin_px);

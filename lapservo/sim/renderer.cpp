@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "lapservo/geometry/field_of_view.h"
 #include "lapservo/sim/optics.h"
 #include "lapservo/sim/outline.h"
 #include "lapservo/sim/sensor.h"

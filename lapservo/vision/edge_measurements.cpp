@@ -93,7 +93,7 @@ struct Frame {
 };
 
 // Whether another instrument lies before a line through a point of the shaft, or before a part of it.
-bool hidden(const Frame& frame, const EdgeLine& line, const Generatrix& generatrix, double along_m) {
+bool lies_behind_another(const Frame& frame, const EdgeLine& line, const Generatrix& generatrix, double along_m) {
   const double depth_m = frame.point(generatrix, along_m).z();
   const Eigen::Vector2d centre_px(line.u_px, line.v_px), direction(line.du, line.dv);
   return frame.scene.hidden(centre_px, depth_m) || frame.scene.hidden(centre_px - line.before * direction, depth_m) ||
@@ -290,7 +290,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
       const auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur.boundaries_px,
                                         wide ? &blurred : nullptr);
       if (!place) continue;
-      if (!frame.scene.others.empty() && hidden(frame, place->line, generatrix, along_m[k])) continue;
+      if (!frame.scene.others.empty() && lies_behind_another(frame, place->line, generatrix, along_m[k])) continue;
       if (wide) in_wide_blur.push_back(blurred);
       ++out.in_image[k];
       places.push_back(*place);
@@ -375,7 +375,7 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
       const double along_m = frame.marker().length_m() * (station + 0.5) / count;
       const auto place = place_side(frame, side, along_m, effort, blur_px);
       if (!place) continue;
-      if (!frame.scene.others.empty() && hidden(frame, place->line, side.contour, along_m)) continue;
+      if (!frame.scene.others.empty() && lies_behind_another(frame, place->line, side.contour, along_m)) continue;
       places.push_back(*place);
       lines.push_back(place->line);
     }

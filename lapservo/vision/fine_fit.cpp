@@ -170,7 +170,9 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   for (int i = 0; i < (fit.blur.wide() ? max_wide_passes : max_passes); ++i) {
     change = refine(measure_all);
     if (!change) return fit;
-    if (change->settled() && change->ellipse_settled()) break;
+    // Of a blur that has just become wide the ellipse was not asked yet.
+    const bool as_wide = located_with.wide() == fit.blur.wide();
+    if (change->settled() && change->ellipse_settled() && as_wide) break;
   }
   if (!change->settled()) return fit;
   ProcessingEvidence evidence;

@@ -55,7 +55,7 @@ struct SearchCosts {
   double fit_to_result = 2200;                    ///< some 70 of these and a fine fit (median: 1400)
   double blobs_per_px = 1.2e-4;
   double part_beside = 0.6;  ///< of the budget where every sample is asked whether another instrument hides it
-  double cover = 200;        ///< where one instrument lies, for who looks for another beside or behind it
+  double cover = 600;        ///< where one instrument lies, for who looks for another beside or behind it
   double try_start() const { return 2 * (coarse_fit + fine_fit); }
 };
 inline constexpr SearchCosts search_costs;

@@ -15,7 +15,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr std::size_t line_count = 64, samples = 160, most_starts = 3;
+constexpr std::size_t line_count = 64, line_samples = 160, most_starts = 3;
 // Of the middle band's colour (fraction_in_order): another's marker has at most 0.04, and crossing ones' mostly 0.16
 // and more where one of them lies before the other.
 constexpr double least_in_order = 0.1;
@@ -82,7 +82,7 @@ std::optional<Fan> fan_over(const std::vector<Place>& places) {
   const double margin_rad = 0.2 * (last_beta - first_beta) + 0.01;
   first_beta = std::max(0.0, first_beta - margin_rad), last_beta = std::min(pi, last_beta + margin_rad);
   return Fan{first_alpha, std::max(1e-6, (last_alpha - first_alpha) / (line_count - 1)), first_beta,
-             (last_beta - first_beta) / samples};
+             (last_beta - first_beta) / line_samples};
 }
 
 // How much of the middle band's colour lies between the others, as seen from the RCM, as in a marker that nothing hides
@@ -126,15 +126,15 @@ struct Line {
 using Lines = std::array<Line, line_count>;
 
 Line line_at(const Scene& scene, const RaysFromRcm& rays, const Fan& fan, std::size_t i) {
-  std::array<std::uint8_t, samples> classes;
-  for (std::size_t k = 0; k < samples; ++k) {
+  std::array<std::uint8_t, line_samples> classes;
+  for (std::size_t k = 0; k < line_samples; ++k) {
     const Eigen::Vector3d ray =
         rays.ray(fan.alpha_rad(static_cast<double>(i)), fan.beta_rad(static_cast<double>(k) + 0.5));
     classes[k] = ray.z() > 1e-3 ? scene.class_beside(scene.camera.raw_from_point(ray)) : Scene::outside;
   }
   Line line{segment_line(classes, scene.bands)};
   std::size_t state = 0;
-  for (std::size_t k = 0; k < samples; ++k) {
+  for (std::size_t k = 0; k < line_samples; ++k) {
     while (state < 4 && static_cast<double>(k) >= line.split.position[state]) ++state;
     if (state >= 1 && state <= 3) line.score += line_reward(state, classes[k], scene.bands);
   }

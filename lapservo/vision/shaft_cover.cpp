@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/geometry/field_of_view.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/limits.h"
 
@@ -77,14 +78,20 @@ void ShaftCover::draw(const Camera& camera, const Marker& marker, const std::arr
     return pose.camera_from_unrolled *
            surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
   };
+  // Beyond the field of view a lens's distortion is not known: it folds places back into the image.
+  constexpr double beyond_corner = 1.1;
+  const double widest = beyond_corner * std::tan(half_field_rad(camera));
+  const auto in_field = [&](const Eigen::Vector3d& point) {
+    return point.z() > nearest_m && point.head<2>().norm() < widest * point.z();
+  };
   const auto section_at = [&](double along_m) -> std::optional<Section> {
     const Eigen::Vector3d left = generatrix_at(-1, along_m), right = generatrix_at(1, along_m),
                           front = generatrix_at(0, along_m);
     const Eigen::Vector3d axis = on_axis(pose, along_m), next = on_axis(pose, along_m + 1e-4);
-    if (std::min({left.z(), right.z(), front.z(), next.z()}) < nearest_m) return std::nullopt;
+    if (!in_field(left) || !in_field(right) || !in_field(front) || !in_field(next)) return std::nullopt;
     Section section{along_m, 0, axis.z(), camera.raw_from_point(left), camera.raw_from_point(right), {}};
     section.bulge_px = camera.raw_from_point(front) - (section.left_px + section.right_px) / 2;
-    section.px_per_m = (camera.raw_from_point(next) - camera.raw_from_point(axis)).norm() / 1e-4;
+    section.px_per_m = (camera.ideal_from_point(next) - camera.ideal_from_point(axis)).norm() / 1e-4;
     const Eigen::Vector2d out_px = doubt_px * (section.right_px - section.left_px).normalized();
     section.left_px -= out_px, section.right_px += out_px;
     return section;
@@ -148,8 +155,10 @@ bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose,
   const auto marked = axis_in_image(camera, pose, 0, marker.length_m());
   const auto shaft = axis_in_image(camera, other, -before_m, (1 + beyond) * others_marker.length_m());
   if (!marked || !shaft) return false;
-  const double radii_px = camera.fx_px * (marker.radius_m() / marked->nearest_m +
-                                          others_marker.radius_m() / std::max(nearest_m, on_axis(other, 0).z()));
+  // Of the other's shaft what is nearest to the camera may be far from here.
+  const double others_nearest_m = std::max({nearest_m, shaft->nearest_m, on_axis(other, 0).z() / 2});
+  const double radii_px =
+      camera.fx_px * (marker.radius_m() / marked->nearest_m + others_marker.radius_m() / others_nearest_m);
   return distance_px(*marked, *shaft) < radii_px + apart_px;
 }
 
@@ -165,7 +174,9 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
   int samples = 0;
   for (const Blob::Sample& sample : blob.samples) {
     if (std::find(bands.begin(), bands.end(), sample.color) == bands.end()) continue;
-    const Eigen::Vector2d place_px(sample.u, sample.v);
+    const auto ideal_px = camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
+    if (!ideal_px) continue;
+    const Eigen::Vector2d& place_px = *ideal_px;
     const double away_px = distance_px(*shaft, place_px);
     if (away_px > radius_px + beside_px) continue;
     const double at = (place_px - marked->from_px).dot(along_px) / (length_px * length_px);

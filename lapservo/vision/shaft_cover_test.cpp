@@ -1,5 +1,6 @@
 #include "lapservo/vision/shaft_cover.h"
 
+#include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -59,6 +60,34 @@ TEST(ShaftCover, HidesWhatLiesBehindIt) {
     EXPECT_TRUE(it.cover.hides(px.x(), px.y(), 1.1 * point.z())) << along;
     EXPECT_FALSE(it.cover.hides(px.x(), px.y(), 0.9 * point.z())) << along;
     EXPECT_FALSE(it.cover.hides(px.x() + 400, px.y() + 400, 1.1 * point.z())) << along;
+  }
+}
+
+// A lens's distortion is a polynomial that folds far places back into the image.
+TEST(ShaftCover, LiesUnderTheShaftAloneWhateverTheLens) {
+  for (const double k1 : {0.0, -0.1, -0.3, 0.2}) {
+    SCOPED_TRACE(k1);
+    Rig rig = scenes::usual_rig();
+    rig.camera.distortion = {k1, k1 < -0.2 ? 0.1 : 0, 0, 0, 0};
+    Random random(4);
+    const Marker& marker = rig.instruments[0].marker;
+    const ShaftPose pose = scenes::pose_of(rig, 0, scenes::random_configuration(rig, 0, random));
+    ShaftCover cover;
+    cover.draw(rig.camera, marker, {1, 2, 3}, pose);
+    const Rigid3 shaft_from_camera = pose.camera_from_unrolled.inverse();
+    int covered = 0, far = 0;
+    for (int v = 2; v < rig.camera.height_px; v += 4)
+      for (int u = 2; u < rig.camera.width_px; u += 4) {
+        if (!cover.hides(u, v, 10)) continue;
+        ++covered;
+        const Eigen::Vector3d ray = rig.camera.ray_from_ideal(rig.camera.ideal_from_raw(Eigen::Vector2d(u, v)).value());
+        const Eigen::Vector3d eye = shaft_from_camera.translation, way = shaft_from_camera.rotation * ray;
+        const double apart_m =
+            std::abs(way.head<2>().normalized().x() * eye.y() - way.head<2>().normalized().y() * eye.x());
+        far += apart_m > 1.5 * marker.radius_m();
+      }
+    EXPECT_GT(covered, 300);
+    EXPECT_LT(far, covered / 100 + 3);
   }
 }
 

@@ -1,0 +1,13 @@
+#pragma once
+
+namespace lapservo {
+struct Camera;
+}
+
+namespace lapservo::internal {
+
+/// Angle between the optical axis and the ray through the image's farthest corner. A lens's distortion is known, and
+/// can be inverted, up to there.
+double half_field_rad(const Camera& camera);
+
+}  // namespace lapservo::internal
