@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lapservo/geometry/camera.h"
-
 namespace lapservo::internal {
 
 double half_field_rad(const Camera& camera) {

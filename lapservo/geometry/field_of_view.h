@@ -1,8 +1,6 @@
 #pragma once
 
-namespace lapservo {
-struct Camera;
-}
+#include "lapservo/geometry/camera.h"
 
 namespace lapservo::internal {
 
