@@ -12,6 +12,7 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
+#include "lapservo/testing/environment.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::acceptance {
@@ -40,8 +41,7 @@ struct Score {
   double found_fraction() const { return expected ? static_cast<double>(found) / expected : 1; }
 };
 
-/// A whole number from an environment variable, by which a test is made longer.
-int from_environment(const char* name, int otherwise);
+using testing::from_environment;
 
 double mean(const std::vector<double>& values);
 double rms(const std::vector<double>& values);

@@ -16,8 +16,6 @@
 namespace lapservo::internal {
 namespace {
 
-// Times sigma: what goes with the pose is in no covariance, as in registration.cpp.
-constexpr double unmodelled_sigmas = 2;
 // Smaller faults than these are not taken out of the others: they would widen them for nothing.
 constexpr double least_focal = 2e-3, least_drift_m = 0.5e-3, least_drift_rad = 2e-3;
 

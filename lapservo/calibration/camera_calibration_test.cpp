@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 
 #include <Eigen/Geometry>
@@ -15,6 +14,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/rig/rig_writer.h"
 #include "lapservo/testing/boards.h"
+#include "lapservo/testing/environment.h"
 
 namespace lapservo::internal {
 namespace {
@@ -84,14 +84,10 @@ void expect_found(const Camera& camera, const CameraCalibration& found) {
   EXPECT_NEAR(found.camera.chromatic_aberration.red, camera.chromatic_aberration.red, 5e-5);
 }
 
-int number_of(const char* variable, int usual) {
-  const char* text = std::getenv(variable);
-  return text ? std::atoi(text) : usual;
-}
-
 // LAPSERVO_BOARD_CAMERAS cameras, from LAPSERVO_BOARD_SEED on, for docs/calibration.md.
 TEST(CalibrateCamera, FindsLensAberrationAndResponse) {
-  const int cameras = number_of("LAPSERVO_BOARD_CAMERAS", 1), first = number_of("LAPSERVO_BOARD_SEED", 40);
+  const int cameras = testing::from_environment("LAPSERVO_BOARD_CAMERAS", 1),
+            first = testing::from_environment("LAPSERVO_BOARD_SEED", 40);
   for (int seed = first; seed < first + cameras; ++seed) {
     Random random(static_cast<std::uint64_t>(seed));
     Camera camera = small_camera();

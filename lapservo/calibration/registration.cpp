@@ -19,9 +19,7 @@ namespace {
 // What a registration that is worth writing is known to.
 constexpr double max_sigma_m = 3e-3, max_sigma_rad = 0.02;
 
-// What goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor common to all
-// frames. On rendered motions it doubles the errors (docs/calibration.md).
-constexpr double unmodelled = 4;  // times the variance
+constexpr double unmodelled = unmodelled_sigmas * unmodelled_sigmas;  // times the variance
 
 // Of the four numbers x y z w, for a small turn about the frame's own axes.
 Eigen::Vector4d quaternion_sigma(const Eigen::Quaterniond& q, const Eigen::Matrix3d& turn_covariance) {

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <condition_variable>
 #include <cstdio>
-#include <cstdlib>
 #include <mutex>
 #include <string>
 
@@ -25,6 +24,7 @@
 #include "lapservo/servo/replay.h"
 #include "lapservo/servo/servo_log.h"
 #include "lapservo/sim/simulator.h"
+#include "lapservo/testing/environment.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
@@ -413,6 +413,12 @@ void expect_replays(const PastRun& done, const Rig& rig, const ControllerConfig&
   EXPECT_FALSE(difference) << difference->tick << " " << difference->column;
 }
 
+// The task within 5 mrad and so many pixels.
+bool is_right(const PastRun& done, std::size_t k, double max_px) {
+  return done.records[k].truth.features && std::abs(done.error(k)[0]) < 5e-3 &&
+         done.error(k).tail<3>().cwiseAbs().maxCoeff() < max_px;
+}
+
 void expect_measured_anew(const Rig& rig, const Case& c, double max_px) {
   const PastRun done = run_case(c);
   const ControllerConfig controller = config_of(rig, c).controller;
@@ -424,9 +430,7 @@ void expect_measured_anew(const Rig& rig, const Case& c, double max_px) {
     if (since_s < 0) continue;
     if (!held_s && decision.control.action == ControlAction::hold) held_s = since_s;
     if (!measured_s && decision.registration == 2) measured_s = since_s;
-    const bool right = done.records[k].truth.features && std::abs(done.error(k)[0]) < 5e-3 &&
-                       done.error(k).tail<3>().cwiseAbs().maxCoeff() < max_px;
-    if (!right) wrong_s = since_s;
+    if (!is_right(done, k, max_px)) wrong_s = since_s;
   }
   ASSERT_TRUE(held_s && measured_s);
   const Eigen::Vector4d last = done.error(done.records.size() - 1);
@@ -487,11 +491,6 @@ TEST(Run, DISABLED_MeasuresManyMovedEndoscopes) {
   }
 }
 
-int number_of(const char* name, int usual) {
-  const char* said = std::getenv(name);
-  return said ? std::atoi(said) : usual;
-}
-
 // How far the marker lies, in the camera's frame, from where it would if the endoscope had not moved.
 double beside_m(const Rig& rig, const InstrumentTruth& truth, const Rigid3& camera_from_first_camera) {
   const Rigid3& first_camera_from_rcm = *rig.instruments[0].camera_from_rcm;
@@ -522,7 +521,6 @@ std::optional<Eigen::Vector4d> told_wrong(const PastRun& done, std::size_t i, st
 }
 
 HeldMotion held_motion(const PastRun& done, const Case& c, const Rig& rig, double period_s) {
-  const Eigen::Vector4d close(5e-3, 1.5, 1.5, 1.5);
   const auto late = static_cast<std::size_t>(std::lround(c.latency_s / period_s));
   const FeatureModel first_camera = feature_model(rig);
   HeldMotion motion;
@@ -536,7 +534,7 @@ HeldMotion held_motion(const PastRun& done, const Case& c, const Rig& rig, doubl
     const double beside = beside_m(rig, record.truth, record.camera_from_first_camera);
     if (!motion.plain_s && beside > 5e-4) motion.plain_s = since_s;
     if (!motion.measured_s && record.decision.registration == 2) motion.measured_s = since_s;
-    if (!record.truth.features || (done.error(i).cwiseAbs().array() > close.array()).any()) motion.wrong_s = since_s;
+    if (!is_right(done, i, 1.5)) motion.wrong_s = since_s;
     if (!motion.held_s && since_s > c.latency_s - 0.01 && holds) {
       motion.held_s = since_s;
       const InstrumentTruth unmoved = truth_at(first_camera, JointVector::from_vector(record.truth.q));
@@ -587,12 +585,12 @@ TEST(Run, HoldsAnEndoscopeThatMovesSmoothlyWhenThatIsPlain) {
 // --gtest_filter='*MovedEndoscopeIsHeld'.
 TEST(Run, DISABLED_MeasuresWhenAMovedEndoscopeIsHeld) {
   const Rig rig = testing::small_test_rig();
-  const int seed = number_of("LAPSERVO_ENDOSCOPE_SEED", 1);
+  const int seed = testing::from_environment("LAPSERVO_ENDOSCOPE_SEED", 1);
   Random random(static_cast<std::uint64_t>(seed));
   for (const MotionProfile profile : {MotionProfile::even, MotionProfile::smooth})
     for (const double duration_s : {0.0, 0.3, 0.6, 1.0, 2.0, 4.0}) {
       if (profile == MotionProfile::smooth && duration_s == 0) continue;
-      for (int i = 0; i < number_of("LAPSERVO_ENDOSCOPES", 5); ++i) {
+      for (int i = 0; i < testing::from_environment("LAPSERVO_ENDOSCOPES", 5); ++i) {
         Case c;
         c.seed = static_cast<std::uint64_t>(100 * seed + i);
         c.endoscope = random_motion(rig, duration_s, random);
@@ -609,7 +607,7 @@ TEST(Run, DISABLED_MeasuresWhenAMovedEndoscopeIsHeld) {
 // The same with an endoscope that stands still: registrations, arms, cameras and pictures as they may be. In how many
 // ticks, of all, it was taken for one that moves.
 TEST(Run, DISABLED_MeasuresHowOftenARestingEndoscopeIsHeld) {
-  const int seed = number_of("LAPSERVO_ENDOSCOPE_SEED", 1);
+  const int seed = testing::from_environment("LAPSERVO_ENDOSCOPE_SEED", 1);
   std::vector<Case> cases(15);
   cases[1].jitter_s = 0.004;
   cases[2].jitter_s = 0.008;
@@ -625,9 +623,10 @@ TEST(Run, DISABLED_MeasuresHowOftenARestingEndoscopeIsHeld) {
   cases[12].hidden = Interval{2, 2.4};
   cases[13].arm.rcm_offset_m = {0.0005, -0.0005, 0.0005};
   cases[14].arm.rcm_offset_m = {-0.001, 0.001, 0.001};
-  for (std::size_t k = static_cast<std::size_t>(number_of("LAPSERVO_ENDOSCOPE_CASE", 0)); k < cases.size(); ++k) {
+  for (std::size_t k = static_cast<std::size_t>(testing::from_environment("LAPSERVO_ENDOSCOPE_CASE", 0));
+       k < cases.size(); ++k) {
     int ticks = 0, held = 0;
-    for (int i = 0; i < number_of("LAPSERVO_ENDOSCOPES", 2); ++i) {
+    for (int i = 0; i < testing::from_environment("LAPSERVO_ENDOSCOPES", 2); ++i) {
       Case c = cases[k];
       c.seed = static_cast<std::uint64_t>(100 * seed + i);
       c.duration_s = 5;

@@ -32,17 +32,14 @@ struct NoiseRow {
   const float *organ, *fold, *grain, *vessel;
 };
 
-float unit(float value) {
-  return std::min(1.0F, std::max(0.0F, value));
-}
-
 void color_row(const NoiseRow& noise, int width_px, float* light) {
   constexpr float liver[3] = {0.035F, 0.022F, 0.13F}, fat[3] = {0.16F, 0.38F, 0.62F}, pink[3] = {0.22F, 0.2F, 0.5F},
                   blood[3] = {0.03F, 0.015F, 0.22F};
   for (int u = 0; u < width_px; ++u) {
     const float organ = noise.organ[u], thin = std::abs(noise.vessel[u]);
-    const float to_pink = unit(4 * (organ + 0.05F)), to_fat = unit(5 * (organ - 0.35F));
-    const float to_blood = unit(0.7F * std::max(0.0F, 1 - thin / 0.035F));
+    const float to_pink = std::clamp(4 * (organ + 0.05F), 0.0F, 1.0F),
+                to_fat = std::clamp(5 * (organ - 0.35F), 0.0F, 1.0F);
+    const float to_blood = std::clamp(0.7F * (1 - thin / 0.035F), 0.0F, 1.0F);
     const float shade = std::max(0.05F, 0.75F + 0.45F * noise.fold[u] + 0.08F * noise.grain[u]);
     for (int c = 0; c < 3; ++c) {
       float color = liver[c] + (pink[c] - liver[c]) * to_pink;
@@ -61,7 +58,7 @@ void darken_outside_field(cv::Mat& light) {
     auto* row = light.ptr<float>(v);
     for (int u = 0; u < light.cols; ++u) {
       const double x = u - 0.5 * light.cols, r = std::sqrt(x * x + y * y) / field_px;
-      const double inside = std::min(1.0, std::max(0.0, (1 - r) * field_px / 1.5 + 0.5));
+      const double inside = std::clamp((1 - r) * field_px / 1.5 + 0.5, 0.0, 1.0);
       const auto left = static_cast<float>(inside * (1 - 0.55 * r * r));
       for (int c = 0; c < 3; ++c) row[3 * u + c] *= left;
     }

@@ -139,10 +139,9 @@ cv::Mat compressed(const cv::Mat& picture, int quality) {
 
 // Linear light of an sRGB picture.
 cv::Mat light_of(const cv::Mat& srgb) {
-  cv::Mat table(1, 256, CV_32F), light;
-  for (int value = 0; value < table.cols; ++value)
-    table.at<float>(value) = static_cast<float>(Response{}.light_from_value(value / 255.0));
-  cv::LUT(srgb, table, light);
+  std::array<float, 256> table = Response{}.table();
+  cv::Mat light;
+  cv::LUT(srgb, cv::Mat(1, 256, CV_32F, table.data()), light);
   return light;
 }
 

@@ -5,10 +5,7 @@
 namespace lapservo::internal {
 
 std::uint8_t Scene::unless_explained(const Eigen::Vector2d& raw_px, std::uint8_t color) const {
-  const bool explained = std::any_of(others.begin(), others.end(), [&](const ShaftCover* other) {
-    return other->explains(raw_px.x() + 0.5, raw_px.y() + 0.5, color);
-  });
-  return explained ? outside : color;
+  return explained_by(others, raw_px, color) ? outside : color;
 }
 
 bool Scene::hidden_by_others(const Eigen::Vector2d& raw_px, double depth_m) const {

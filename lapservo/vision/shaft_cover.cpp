@@ -37,6 +37,15 @@ std::optional<Segment> axis_in_image(const Camera& camera, const ShaftPose& pose
   return Segment{camera.ideal_from_point(from), camera.ideal_from_point(to), std::min(from.z(), to.z())};
 }
 
+std::optional<Segment> marker_in_image(const Camera& camera, const Marker& marker, const ShaftPose& pose) {
+  return axis_in_image(camera, pose, 0, marker.length_m());
+}
+
+// With what may be seen of the shaft on both sides.
+std::optional<Segment> shaft_in_image(const Camera& camera, const Marker& marker, const ShaftPose& pose) {
+  return axis_in_image(camera, pose, -before_m, (1 + beyond) * marker.length_m());
+}
+
 double distance_px(const Segment& segment, const Eigen::Vector2d& place_px) {
   const Eigen::Vector2d way = segment.to_px - segment.from_px;
   const double at = std::clamp((place_px - segment.from_px).dot(way) / std::max(1.0, way.squaredNorm()), 0.0, 1.0);
@@ -152,8 +161,8 @@ void ShaftCover::fill(const Section& section, const Marker& marker, const EndsOf
 bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose, const Marker& others_marker,
               const ShaftPose& other) {
   constexpr double apart_px = 12;
-  const auto marked = axis_in_image(camera, pose, 0, marker.length_m());
-  const auto shaft = axis_in_image(camera, other, -before_m, (1 + beyond) * others_marker.length_m());
+  const auto marked = marker_in_image(camera, marker, pose);
+  const auto shaft = shaft_in_image(camera, others_marker, other);
   if (!marked || !shaft) return false;
   // Of the other's shaft what is nearest to the camera may be far from here.
   const double others_nearest_m = std::max({nearest_m, shaft->nearest_m, on_axis(other, 0).z() / 2});
@@ -165,8 +174,8 @@ bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose,
 bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftPose& other, const Blob& blob,
                  const std::array<std::uint8_t, 3>& bands) {
   constexpr double beside_px = 24, doubt = 0.12;  // of the length, by which a leaning marker's ends bulge
-  const auto shaft = axis_in_image(camera, other, -before_m, (1 + beyond) * others_marker.length_m());
-  const auto marked = axis_in_image(camera, other, 0, others_marker.length_m());
+  const auto shaft = shaft_in_image(camera, others_marker, other);
+  const auto marked = marker_in_image(camera, others_marker, other);
   if (!shaft || !marked) return false;
   const double radius_px = camera.fx_px * others_marker.radius_m() / marked->nearest_m;
   const Eigen::Vector2d along_px = marked->to_px - marked->from_px;
@@ -186,13 +195,17 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
   return samples >= detection_limits.min_samples;
 }
 
+bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t color) {
+  return std::any_of(others.begin(), others.end(), [&](const ShaftCover* other) {
+    return other->explains(raw_px.x() + 0.5, raw_px.y() + 0.5, color);
+  });
+}
+
 std::vector<Blob> without(const std::vector<Blob>& blobs, std::span<const ShaftCover* const> others) {
   std::vector<Blob> left;
   for (Blob blob : blobs) {
     std::erase_if(blob.samples, [&](const Blob::Sample& sample) {
-      return std::any_of(others.begin(), others.end(), [&](const ShaftCover* other) {
-        return other->explains(sample.u + 0.5, sample.v + 0.5, sample.color);
-      });
+      return explained_by(others, Eigen::Vector2d(sample.u, sample.v), sample.color);
     });
     if (static_cast<int>(blob.samples.size()) >= detection_limits.min_samples) left.push_back(std::move(blob));
   }

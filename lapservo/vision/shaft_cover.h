@@ -82,6 +82,9 @@ bool may_meet(const Camera& camera, const Marker& marker, const ShaftPose& pose,
 bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftPose& other, const Blob& blob,
                  const std::array<std::uint8_t, 3>& bands);
 
+/// Whether the marker of one of them shows in a pixel of this colour class, as far as colours tell.
+bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t color);
+
 /// What the instruments that are known to be in the image leave of them, largest first. The parts of one that lies
 /// behind another stay together.
 std::vector<Blob> without(const std::vector<Blob>& blobs, std::span<const ShaftCover* const> others);
