@@ -42,7 +42,8 @@ struct Effort {
 /// Everything that a frame shows of a marker's boundaries and of its shaft's sides near a pose.
 struct EdgeMeasurements {
   static constexpr int max_lines = 64, max_stations = 24;
-  InplaceVector<Measurement, 4 * max_lines + 2 * max_stations> all;
+  static constexpr std::size_t most = 4 * max_lines + 2 * max_stations;
+  InplaceVector<Measurement, most> all;
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at

@@ -181,8 +181,8 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   if (fit.processing == Processing::unknown) fit.bias_px = expected.bias_px;
   if (evidence.edges) {
     fit.bias_px = bias_magnitudes_px(*evidence.edges);
-    for (Measurement& m : pass.all)
-      if (m.group < 4) m.residual_px -= evidence.edges->bias_px[m.group].value_or(0);
+    for (std::size_t i = 0; i < pass.all.size(); ++i)
+      pass.all[i].residual_px -= static_cast<double>(evidence.edges->measurement_bias_px[i]);
     move();
   }
   fit.lines = pass.lines;

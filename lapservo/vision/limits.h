@@ -158,7 +158,7 @@ struct ProcessingLimits {
   double max_misfit = 0.013, max_misfit_fraction = 0.8;
   /// What no processing explains so well has none: 0.003 to 0.0045 are left of rendered frames without any, 0.008 and
   /// more of those with some (the scenes of picture_processing_test.cpp).
-  double max_misfit_of_none = 0.006;
+  double max_misfit_of_none = 0.0048;
   int min_places = 8;  ///< of a boundary, else it tells more noise than shape
   int min_boundaries = 3;
 };

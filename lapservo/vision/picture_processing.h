@@ -3,46 +3,23 @@
 #include <array>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "lapservo/vision/pooled_edges.h"
+#include "lapservo/vision/processed_edge.h"
 
 namespace lapservo::internal {
 
-/// What a camera does to encoded values after its response, the same everywhere in a frame.
-struct PictureProcessing {
-  double blur_px = 1;              ///< of the light, before all that
-  double chroma_variance_px2 = 0;  ///< of the blur of colour differences: subsampling, compression
-  double saturation = 1;           ///< by which colour differences (Rec. 601) are multiplied
-  double sharpening = 0;           ///< unsharp mask: so much of what the blur takes away is added
-  double sharpening_px = 1.2;      ///< that blur
-};
-
 /// Below 0 luma is blurred after the response: by so much at most.
 inline constexpr double least_sharpening_known = -0.35;
-
-/// The light on both sides of a boundary, as encoded values b, g, r before the processing.
-struct Plateaus {
-  std::array<double, 3> before, after;
-};
-
-/// The encoded values that a camera makes of a step of light at `offset_px` from the middle sample.
-using EdgeValues = std::array<std::array<float, PooledEdge::samples>, 3>;
-EdgeValues processed_edge(const std::array<float, 256>& light_of_value, const PictureProcessing& processing,
-                          const Plateaus& plateaus, double offset_px);
-
-/// Light along a line, a pixel apart, as it looks after blurred colour differences and sharpening. What is even stays
-/// as it is, so light is as the camera shows it: `saturation` has been at work.
-std::vector<std::array<double, 3>> filtered_light(const std::array<float, 256>& light_of_value,
-                                                  const PictureProcessing& processing,
-                                                  std::span<const std::array<double, 3>> light);
 
 /// What is to be known of a frame's processing for its boundaries' sake.
 struct ProcessedEdges {
   PictureProcessing processing;
   std::array<std::optional<double>, 4> bias_px;  ///< by which fit_step mislocates each boundary that was seen well
-  double misfit = 0;                             ///< rms of what the model leaves of the values
-  double misfit_without = 0;                     ///< and of what one without any processing does
+  /// And each measurement of one, by those that are as bright: what the processing does to an edge goes by its light.
+  std::array<float, EdgeMeasurements::most> measurement_bias_px{};
+  double misfit = 0;          ///< rms of what the model leaves of the values
+  double misfit_without = 0;  ///< and of what one without any processing does
 };
 
 /// Whether a first guess is more than nothing seen through noise.

@@ -1,59 +1,142 @@
 #include "lapservo/vision/pooled_edges.h"
 
 #include <algorithm>
-#include <cstdint>
+#include <numeric>
+
+#include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
 namespace {
 
-// Encoded values of some channels at a place, bilinear: as linear as the filters that cameras apply to them.
+// One place of a boundary.
+struct Place {
+  std::array<std::array<float, PooledEdge::samples>, 3> value;
+  float brightness = 0;
+  std::size_t measurement = 0;
+};
+using Places = InplaceVector<Place, EdgeMeasurements::max_lines>;
+
+// Weights of four pixels in a row for a place a fraction of a pixel beyond the second: cubic convolution (Keys, 1981).
+std::array<float, 4> cubic_weights(float f) {
+  const float g = 1 - f;
+  return {-0.5F * f * g * g, 1 + f * f * (1.5F * f - 2.5F), 1 + g * g * (1.5F * g - 2.5F), -0.5F * g * f * f};
+}
+
+// Encoded values of some channels at a place: as linear as the filters that cameras apply to them.
 template <std::size_t First, std::size_t Last>
-void add_values(const ImageView& image, float u, float v, std::size_t sample, PooledEdge& edge) {
+void sample_cubic(const ImageView& image, float u, float v, std::size_t sample, Place& place) {
+  const int iu = static_cast<int>(u), iv = static_cast<int>(v);
+  const auto across = cubic_weights(u - static_cast<float>(iu)), down = cubic_weights(v - static_cast<float>(iv));
+  std::array<float, 3> sum{};
+  for (int y = 0; y < 4; ++y)
+    for (int x = 0; x < 4; ++x) {
+      const std::uint8_t* pixel =
+          image.pixel(std::clamp(iu + x - 1, 0, image.width_px - 1), std::clamp(iv + y - 1, 0, image.height_px - 1));
+      const float weight = across[static_cast<std::size_t>(x)] * down[static_cast<std::size_t>(y)];
+      for (std::size_t c = First; c < Last; ++c) sum[c] += weight * static_cast<float>(pixel[c]);
+    }
+  for (std::size_t c = First; c < Last; ++c) place.value[c][sample] = sum[c];
+}
+
+template <std::size_t First, std::size_t Last>
+void sample_linear(const ImageView& image, float u, float v, std::size_t sample, Place& place) {
   const int iu = static_cast<int>(u), iv = static_cast<int>(v);
   const float fu = u - static_cast<float>(iu), fv = v - static_cast<float>(iv);
   const float w11 = fu * fv, w01 = fu - w11, w10 = fv - w11, w00 = 1 - fu - w10;
   const std::uint8_t* top = image.pixel(iu, iv);
   const std::uint8_t* bottom = top + image.row_bytes;
   for (std::size_t c = First; c < Last; ++c)
-    edge.value[c][sample] += w00 * static_cast<float>(top[c]) + w01 * static_cast<float>(top[c + 3]) +
-                             w10 * static_cast<float>(bottom[c]) + w11 * static_cast<float>(bottom[c + 3]);
+    place.value[c][sample] = (w00 * static_cast<float>(top[c]) + w01 * static_cast<float>(top[c + 3]) +
+                              w10 * static_cast<float>(bottom[c]) + w11 * static_cast<float>(bottom[c + 3]));
 }
 
-void add_values(const LightImage& light, const Eigen::Vector2f& at, std::size_t sample, PooledEdge& edge) {
+template <std::size_t First, std::size_t Last>
+void sample_at(const ImageView& image, float u, float v, bool cubic, std::size_t sample, Place& place) {
+  cubic ? sample_cubic<First, Last>(image, u, v, sample, place)
+        : sample_linear<First, Last>(image, u, v, sample, place);
+}
+
+void sample_at(const LightImage& light, const Eigen::Vector2f& at, bool cubic, std::size_t sample, Place& place) {
   const ImageView& image = light.image();
   const ChannelGeometry& channels = light.channels();
-  if (!channels.differs()) return add_values<0, 3>(image, at.x(), at.y(), sample, edge);
+  if (!channels.differs()) return sample_at<0, 3>(image, at.x(), at.y(), cubic, sample, place);
   const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
   const Eigen::Vector2f blue = centre + channels.magnification[0] * (at - centre);
   const Eigen::Vector2f red = centre + channels.magnification[2] * (at - centre);
-  add_values<0, 1>(image, blue.x(), blue.y(), sample, edge);
-  add_values<1, 2>(image, at.x(), at.y(), sample, edge);
-  add_values<2, 3>(image, red.x(), red.y(), sample, edge);
+  sample_at<0, 1>(image, blue.x(), blue.y(), cubic, sample, place);
+  sample_at<1, 2>(image, at.x(), at.y(), cubic, sample, place);
+  sample_at<2, 3>(image, red.x(), red.y(), cubic, sample, place);
+}
+
+using Located = InplaceVector<std::uint16_t, EdgeMeasurements::max_lines>;
+
+std::array<Located, 4> located_on(std::span<const Measurement> measurements) {
+  std::array<Located, 4> located;
+  for (std::size_t i = 0; i < measurements.size(); ++i)
+    if (measurements[i].group < 4) located[measurements[i].group].push_back(static_cast<std::uint16_t>(i));
+  return located;
+}
+
+// Places of a boundary, spread evenly over all that were located.
+Places places_of(const Located& located, const LightImage& light, std::span<const Measurement> measurements,
+                 const Look& look) {
+  const int count = static_cast<int>(located.size());
+  Places places;
+  int seen = 0;
+  for (const std::size_t i : located) {
+    if (seen++ * look.places % std::max(count, look.places) >= look.places) continue;
+    const Measurement& m = measurements[i];
+    const Eigen::Vector2f reach = static_cast<float>(PooledEdge::reach) * m.normal;
+    const Eigen::Vector2f first = m.expected_px - reach, last = m.expected_px + reach;
+    if (!light.contains(first.cast<double>()) || !light.contains(last.cast<double>())) continue;
+    Place place;
+    place.measurement = i;
+    for (std::size_t k = 0; k < PooledEdge::samples; ++k)
+      sample_at(light, first + static_cast<float>(k) * m.normal, look.cubic, k, place);
+    for (const auto& channel : place.value)
+      if (look.levels > 1) place.brightness = std::accumulate(channel.begin(), channel.end(), place.brightness);
+    places.push_back(place);
+  }
+  return places;
+}
+
+PooledEdge mean_of(std::span<const Place* const> places, std::span<const Measurement> measurements) {
+  PooledEdge edge;
+  edge.places = static_cast<int>(places.size());
+  const float part = 1 / static_cast<float>(255 * edge.places);
+  for (const Place* place : places) {
+    const Measurement& m = measurements[place->measurement];
+    edge.boundary = m.group;
+    edge.residual_px += m.residual_px / edge.places;
+    edge.clear_px = std::clamp(static_cast<int>(m.clear_px), 0, edge.clear_px);
+    for (std::size_t c = 0; c < 3; ++c)
+      for (std::size_t i = 0; i < PooledEdge::samples; ++i) edge.value[c][i] += part * place->value[c][i];
+  }
+  return edge;
 }
 
 }  // namespace
 
-PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, int most) {
+PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, const Look& look) {
   PooledEdges edges;
-  std::array<int, 4> located{}, seen{};
-  for (const Measurement& m : measurements)
-    if (m.group < 4) ++located[m.group];
-  for (const Measurement& m : measurements) {
-    if (m.group >= 4) continue;
-    // Spread evenly over all that were located.
-    if (seen[m.group]++ * most % std::max(located[m.group], most) >= most) continue;
-    const Eigen::Vector2f reach = static_cast<float>(PooledEdge::reach) * m.normal;
-    const Eigen::Vector2f first = m.expected_px - reach, last = m.expected_px + reach;
-    if (!light.contains(first.cast<double>()) || !light.contains(last.cast<double>())) continue;
-    PooledEdge& edge = edges[m.group];
-    edge.clear_px = std::clamp(static_cast<int>(m.clear_px), 0, edge.clear_px);
-    for (std::size_t i = 0; i < PooledEdge::samples; ++i)
-      add_values(light, first + static_cast<float>(i) * m.normal, i, edge);
-    ++edge.places;
+  for (const Located& located : located_on(measurements)) {
+    const Places places = places_of(located, light, measurements, look);
+    InplaceVector<const Place*, EdgeMeasurements::max_lines> darkest_first;
+    for (const Place& place : places) darkest_first.push_back(&place);
+    const std::size_t count =
+        std::clamp<std::size_t>(places.size() / static_cast<std::size_t>(processing_limits.min_places), 1,
+                                static_cast<std::size_t>(look.levels));
+    if (count > 1)
+      std::sort(darkest_first.begin(), darkest_first.end(),
+                [](const Place* a, const Place* b) { return a->brightness < b->brightness; });
+    for (std::size_t level = 0; level < count && !places.empty(); ++level) {
+      const std::size_t first = level * places.size() / count, last = (level + 1) * places.size() / count;
+      const std::span<const Place* const> alike(darkest_first.begin() + first, last - first);
+      for (const Place* place : alike)
+        edges.of_measurement[place->measurement] = static_cast<std::uint8_t>(edges.all.size());
+      edges.all.push_back(mean_of(alike, measurements));
+    }
   }
-  for (PooledEdge& edge : edges)
-    for (auto& channel : edge.value)
-      for (float& value : channel) value /= 255 * static_cast<float>(std::max(1, edge.places));
   return edges;
 }
 

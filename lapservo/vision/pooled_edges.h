@@ -2,24 +2,48 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
+#include "lapservo/core/inplace_vector.h"
 #include "lapservo/vision/edge_measurements.h"
 #include "lapservo/vision/light_image.h"
 
 namespace lapservo::internal {
 
-/// What a frame shows across one boundary, averaged over the places where it was located: encoded values in [0, 1]
-/// along the boundary's normal, a pixel apart, sample `reach` where the pose has the boundary.
+/// What a frame shows across one boundary, averaged over places where it was located: encoded values in [0, 1] along
+/// the boundary's normal, a pixel apart, sample `reach` where the pose has the boundary.
 struct PooledEdge {
   static constexpr int reach = 6, samples = 2 * reach + 1;
+  std::size_t boundary = 0;                           ///< 0 to 3
   std::array<std::array<float, samples>, 3> value{};  ///< b, g, r
-  int places = 0;                                     ///< 0: not seen
-  int clear_px = reach;  ///< so far on either side no other boundary shows, wherever it was located
+  int places = 0;
+  double residual_px = 0;  ///< where the places were located, from where the pose has them: mean
+  int clear_px = reach;    ///< so far on either side no other boundary shows, wherever it was located
 };
-using PooledEdges = std::array<PooledEdge, 4>;
 
-/// Of the boundaries among `measurements`, at most `most` places each.
-PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, int most);
+/// Places are averaged with others that are as bright: what is clipped in the light is not in the shade, and a mean of
+/// both looks like neither. Darker levels come first.
+inline constexpr int max_brightness_levels = 4;
+struct PooledEdges {
+  InplaceVector<PooledEdge, 4 * max_brightness_levels> all;
+  /// Of each measurement, at which of `all` it was averaged.
+  static constexpr std::uint8_t nowhere = 255;
+  std::array<std::uint8_t, EdgeMeasurements::most> of_measurement;
+
+  PooledEdges() { of_measurement.fill(nowhere); }
+};
+
+/// How closely boundaries are looked at: at most so many places of each, in at most so many levels of brightness.
+/// Between pixels along straight lines or cubic: the former darken what is bright beside an edge, where encoded light
+/// bends, for an eighth of the time.
+struct Look {
+  int places;
+  int levels;
+  bool cubic;
+};
+
+/// Of the boundaries among `measurements`.
+PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, const Look& look);
 
 }  // namespace lapservo::internal
