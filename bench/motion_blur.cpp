@@ -55,6 +55,12 @@ Drawn small(double least_radius_px, double most_radius_px, Random& random) {
   return drawn;
 }
 
+Drawn small_and_still(double least_radius_px, double most_radius_px, Random& random) {
+  Drawn drawn = small(least_radius_px, most_radius_px, random);
+  drawn.motion = {};
+  return drawn;
+}
+
 Drawn turning(double turn_rad, bool from_rest, bool subsampled, Random& random) {
   Drawn drawn;
   drawn.motion.turn_rad = random.uniform() < 0.5 ? turn_rad : -turn_rad;
@@ -90,6 +96,9 @@ const std::vector<std::pair<std::string, Draw>>& kinds() {
       {"17-23px_radius", [](Random& r) { return small(17, 23, r); }},
       {"14-17px_radius", [](Random& r) { return small(14, 17, r); }},
       {"11-14px_radius", [](Random& r) { return small(11, 14, r); }},
+      {"17-23px_still", [](Random& r) { return small_and_still(17, 23, r); }},
+      {"14-17px_still", [](Random& r) { return small_and_still(14, 17, r); }},
+      {"11-14px_still", [](Random& r) { return small_and_still(11, 14, r); }},
       {"bands_off", [](Random& r) { return moving_print(Off::bands, r); }},
       {"ink_aside", [](Random& r) { return moving_print(Off::middle_ink, r); }},
       {"turn_0.05", [](Random& r) { return turning(0.05, false, false, r); }},

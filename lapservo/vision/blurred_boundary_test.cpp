@@ -70,5 +70,29 @@ TEST(BlurredBoundary, PsiDoesNotFollowMotionObliqueToTheShaft) {
   EXPECT_LT(std::abs(apart_rad), 0.004);
 }
 
+// Psi's error by its sigma, of fits to motion oblique to the shaft.
+double error_over_sigma(const Rig& rig, double along_px, double across_px) {
+  constexpr int shots = 4;
+  double squares = 0;
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    const Shot shot(seed, {}, rig);
+    for (const double way : {-1.0, 1.0}) {
+      const scenes::Sight sight(shot.rig, render_moving(shot, {along_px, way * across_px}));
+      const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {1.2, 1.2});
+      EXPECT_TRUE(fit.converged) << "seed " << seed;
+      const double error_rad = wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad);
+      squares += error_rad * error_rad / fit.covariance(3, 3) / (2 * shots);
+    }
+  }
+  return std::sqrt(squares);
+}
+
+// Neither surer than they are nor less sure by far.
+TEST(BlurredBoundary, FitsToMotionKnowHowSureTheyAre) {
+  const double sigmas = error_over_sigma(scenes::usual_rig(), 7, 5);
+  EXPECT_GT(sigmas, 0.4);
+  EXPECT_LT(sigmas, 1.5);
+}
+
 }  // namespace
 }  // namespace lapservo::internal

@@ -108,6 +108,7 @@ struct Pull {
 struct Sums {
   Equations equations;
   std::array<Pull, measurement_groups> pulls;
+  InplaceVector<Pull, 2> of_all_boundaries;
 };
 
 // Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two
@@ -177,21 +178,51 @@ Pull gathered(const Products<Unknowns>& products, std::size_t group, Equations& 
   return pull;
 }
 
+double robust_certainty(const Measurement& m, const ResidualLines& lines, double certainty) {
+  const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
+  return certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
+}
+
+// All boundaries moved alike, or leaning alike.
+void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, double certainty,
+                      const CommonErrors& errors, Sums& sums) {
+  const auto unknowns = sums.equations.x.size();
+  Pull whole, leaning;
+  whole.x = leaning.x = UnknownVector::Zero(unknowns);
+  double squares = 0;
+  for (const Measurement& m : measurements) {
+    if (m.group >= errors_of_boundary.size()) continue;
+    const double weight = robust_certainty(m, lines, certainty);
+    const auto& edges = errors_of_boundary[m.group];
+    const Eigen::Vector2d by_print = print_row(m);
+    whole.x += weight * m.row.head(unknowns);
+    leaning.x += weight * m.across * m.row.head(unknowns);
+    for (std::size_t edge = 0; edge < 2; ++edge) {
+      whole.n[edges[edge]] += weight * by_print[static_cast<Eigen::Index>(edge)];
+      leaning.n[edges[edge]] += weight * m.across * by_print[static_cast<Eigen::Index>(edge)];
+    }
+    whole.weight += weight, squares += weight * m.across * m.across;
+  }
+  if (!(squares > 0)) return;
+  const double scale = std::sqrt(1 / certainty);
+  whole.error_px = scale * errors.whole_px;
+  leaning.error_px = scale * errors.leaning_px * std::sqrt(whole.weight / squares);
+  sums.of_all_boundaries.push_back(whole), sums.of_all_boundaries.push_back(leaning);
+}
+
 template <int Unknowns>
 Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
              const CommonErrors& errors) {
   const double certainty = 1 / (errors.noise_scale * errors.noise_scale);
   std::array<Products<Unknowns>, measurement_groups> products;
-  for (const Measurement& m : measurements) {
-    const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
-    products[m.group].add(m, certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px));
-  }
-  Sums sums{Equations(Unknowns), {}};
+  for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, certainty));
+  Sums sums{Equations(Unknowns), {}, {}};
   sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), certainty, film_prior);
   for (std::size_t group = 0; group < measurement_groups; ++group) {
     sums.pulls[group] = gathered(products[group], group, sums.equations);
     sums.pulls[group].error_px = errors.noise_scale * errors.px[group];
   }
+  if (errors.whole_px > 0 || errors.leaning_px > 0) add_pulls_of_all(measurements, lines, certainty, errors, sums);
   return sums;
 }
 
@@ -236,10 +267,12 @@ std::optional<Solution> solved(const Sums& sums, const PrintPrior& prior) {
   solution.step = inverse * (e.x - by_x.transpose() * e.n);
   solution.print_mm = print_covariance * (e.n - e.nx * solution.step);
   solution.covariance = inverse;
-  for (const Pull& pull : sums.pulls) {
+  const auto widen = [&](const Pull& pull) {
     const UnknownVector shift = inverse * (pull.x - by_x.transpose() * pull.n);
     solution.covariance += pull.error_px * pull.error_px * shift * shift.transpose();
-  }
+  };
+  for (const Pull& pull : sums.pulls) widen(pull);
+  for (const Pull& pull : sums.of_all_boundaries) widen(pull);
   const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
 }

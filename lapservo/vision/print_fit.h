@@ -15,6 +15,8 @@ namespace lapservo::internal {
 /// says, and what is doubted before the print is blamed.
 struct CommonErrors {
   std::array<double, measurement_groups> px{};
+  double whole_px = 0,
+         leaning_px = 0;  ///< all boundaries alike: moved along the shaft, leaning from side to side (rms)
   double noise_scale = 1;
   PrintDoubt doubt;
   double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_sigma_m
