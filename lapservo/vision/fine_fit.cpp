@@ -211,10 +211,12 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const double doubt =
       1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit.located_fraction());
   fit.covariance = doubt * doubt * print->covariance;
-  fit.inner_sigma_m = print->inner_sigma_m;
+  fit.inner_off_m = print->inner_off_m;
   fit.print_off_probability = print->off_probability;
-  fit.psi_variance = doubt * doubt * print->psi_variance;
-  fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;
+  // What the print may add goes by how often prints are off, not by what this picture shows.
+  fit.psi_variance_by_print = print->psi_variance_by_print;
+  fit.psi_variance =
+      doubt * doubt * (print->psi_variance - print->psi_variance_by_print) + print->psi_variance_by_print;
   fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;
   fit.converged = true;
   return fit;

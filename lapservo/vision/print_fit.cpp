@@ -237,10 +237,15 @@ std::optional<PrintInformation> information_of(const Sums& sums) {
   return PrintInformation{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
 }
 
-// One sigma of where the less exact of the inner boundaries lies as a whole.
-double inner_sigma_mm(const PrintMatrix& information) {
-  const double inner = std::min(information.block<2, 2>(1, 1).sum(), information.block<2, 2>(3, 3).sum());
-  return 1 / std::sqrt(std::max(inner, 1e-6));
+// How far one of the inner boundaries may lie off as a whole: what the residuals say, and some sigmas more.
+double inner_off_mm(const PrintInformation& print, double doubt_scale) {
+  double off_mm = 0;
+  for (const int at : {1, 3}) {
+    const double certainty = std::max(print.information.block<2, 2>(at, at).sum(), 1e-6);
+    const double shift_mm = print.gradient.segment<2>(at).sum() / certainty;
+    off_mm = std::max(off_mm, std::abs(shift_mm) + print_limits.off_sigmas * doubt_scale / std::sqrt(certainty));
+  }
+  return off_mm;
 }
 
 PrintShapes doubted_shapes_mm(const PrintDoubt& doubt, const Sums& sums, const Marker& marker) {
@@ -384,7 +389,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
-  fit.inner_sigma_m = errors.inner_doubt_scale * inner_sigma_mm(print.information) * mm;
+  fit.inner_off_m = inner_off_mm(print, errors.inner_doubt_scale) * mm;
   fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);
