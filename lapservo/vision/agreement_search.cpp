@@ -6,61 +6,29 @@
 #include <cstddef>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/geometry/cylinder.h"
-#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/explained_colors.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
 namespace {
 
-constexpr double hidden = -0.35, wrong = -1, beside = -1, rightly_empty = 0.15;
-
-// Colours on the marker, beyond its ends and just outside its sides against what should be there.
-double agreement(const Scene& scene, const ShaftPose& pose) {
-  constexpr int lines = 9, places = 36, margin = 6;
-  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
-  if (!view) return -1e9;
-  const double length_m = scene.marker.length_m(), radius_m = scene.marker.radius_m();
-  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
-  const auto base_of = [&](double radius, double azimuth_rad) -> Eigen::Vector3d {
-    return pose.camera_from_unrolled * surface_point(radius, azimuth_rad, 0);
-  };
-  double score = 0;
-  const auto count_empty = [&](std::uint8_t color) {
-    if (color != Scene::outside) score += scene.is_ours(color) ? beside : rightly_empty;
-  };
-  for (int i = 0; i < lines; ++i) {
-    const double azimuth_rad = view->facing_azimuth_rad + 0.85 * view->half_visible_rad * (2.0 * i / (lines - 1) - 1);
-    const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
-    const bool printed = is_printed(scene.marker, tau_rad);
-    const auto ends_m = boundaries_m(scene.marker, tau_rad);
-    const Eigen::Vector3d base = base_of(radius_m, azimuth_rad);
-    for (int k = -margin; k < places + margin; ++k) {
-      const double along_m = length_m * (k + 0.5) / places;
-      const auto band = std::upper_bound(ends_m.begin(), ends_m.end(), along_m) - ends_m.begin();
-      const bool empty = !printed || band < 1 || band > 3;
-      const Eigen::Vector3d point = base + along_m * axis;
-      const std::uint8_t color = empty ? scene.class_at_point(point) : scene.class_on_shaft(point);
-      if (color == Scene::outside) continue;
-      if (empty) {
-        count_empty(color);
-      } else if (color == scene.bands[static_cast<std::size_t>(band - 1)]) {
-        score += 1;
-      } else {
-        score += scene.is_ours(color) ? wrong : hidden;
-      }
-    }
-  }
-  for (const double side : {-1.0, 1.0})
-    for (const double radii : {1.08, 1.2}) {
-      const Eigen::Vector3d base = base_of(radii * radius_m, view->facing_azimuth_rad + side * pi / 2);
-      for (int k = 0; k < places; ++k) count_empty(scene.class_at_point(base + length_m * (k + 0.5) / places * axis));
-    }
-  return score;
-}
-
-constexpr int rotations = 6, halvings = 5, directions = 14, max_moves = 8;
+constexpr int halvings = 5, halvings_of_place = 2, tried_directions = 14, max_moves = 8;
 const Eigen::Vector4d first_steps(0.03, 0.12, 0.006, 0.5);
+const Eigen::Vector4d steps_of_place(0.03, 0.12, 0.006, 0), steps_of_rotation = first_steps / (1 << halvings_of_place);
+constexpr int rotations = 48;  // of a turn
+constexpr std::size_t most_peaks = 4, most_results = 3;
+// Blood along a side makes a shaft look thin, so far away.
+constexpr std::array depth_scales{0.64, 0.8, 1.0};
+
+// What is seen in the middle of the marker, at another depth.
+std::optional<PoseUnknowns> seen_at_depth(const PoseUnknowns& start, double scale, const Rigid3& camera_from_rcm,
+                                          double length_m) {
+  const Rigid3& pose = start.pose().camera_from_unrolled;
+  const Eigen::Vector3d half = Eigen::Vector3d(0, 0, length_m / 2), middle = scale * (pose * half);
+  const Eigen::Vector3d axis = (middle - camera_from_rcm.translation).normalized();
+  const auto q = configuration_through(camera_from_rcm, middle - length_m / 2 * axis);
+  return q ? std::optional(PoseUnknowns::rcm(camera_from_rcm, *q)) : std::nullopt;
+}
 
 }  // namespace
 
@@ -80,26 +48,31 @@ AgreementSearch::ImageTerms AgreementSearch::ImageTerms::of(const Rigid3& camera
   return terms;
 }
 
-AgreementSearch::AgreementSearch(const PoseUnknowns& start, const Rigid3& camera_from_rcm)
-    : camera_from_rcm_(camera_from_rcm), start_(start) {}
-
-double AgreementSearch::score_at(const Scene& scene, const ImageTerms& terms, const Eigen::Vector4d& at,
-                                 WorkBudget& budget) const {
-  budget.spend(search_costs.agreement);
-  const auto unknowns = terms.unknowns(at);
-  return unknowns ? agreement(scene, unknowns->pose()) : -1e9;
+AgreementSearch::AgreementSearch(const PoseUnknowns& start, const Rigid3& camera_from_rcm, double length_m)
+    : camera_from_rcm_(camera_from_rcm) {
+  for (const double scale : depth_scales)
+    if (const auto nearer = seen_at_depth(start, scale, camera_from_rcm, length_m))
+      waiting_.push_back({ImageTerms::of(camera_from_rcm, *nearer), steps_of_place});
 }
 
-// Tries the axes and random directions both ways and keeps what is better; whether anything was.
+double AgreementSearch::score_at(const Scene& scene, const Climb& climb, const Eigen::Vector4d& at,
+                                 WorkBudget& budget) const {
+  budget.spend(search_costs.agreement);
+  const auto unknowns = climb.terms.unknowns(at);
+  return unknowns ? explained_area_px2(scene, unknowns->pose(), climb.with_rotation()) : -1e9;
+}
+
+// Tries the axes and random tried_directions both ways and keeps what is better; whether anything was.
 bool AgreementSearch::move(const Scene& scene, Climb& climb, WorkBudget& budget) {
   bool moved = false;
-  for (int i = 0; i < directions; ++i) {
-    Eigen::Vector4d direction = Eigen::Vector4d::Unit(i % 4);
-    if (i >= 4)
+  const int axes = climb.with_rotation() ? 4 : 3;
+  for (int i = 0; i < tried_directions; ++i) {
+    Eigen::Vector4d direction = Eigen::Vector4d::Unit(i % axes);
+    if (i >= axes)
       for (double& part : direction) part = random_.normal();
     for (const double sign : {1.0, -1.0}) {
       const Eigen::Vector4d trial = climb.terms.values + sign * climb.steps.cwiseProduct(direction);
-      const double score = score_at(scene, climb.terms, trial, budget);
+      const double score = score_at(scene, climb, trial, budget);
       if (score <= climb.score) continue;
       climb.score = score, climb.terms.values = trial, moved = true;
       break;
@@ -111,7 +84,7 @@ bool AgreementSearch::move(const Scene& scene, Climb& climb, WorkBudget& budget)
 // Moves, and halves the steps when nothing is better, until the steps are small. False when the budget ends first.
 bool AgreementSearch::finish(const Scene& scene, Climb& climb, WorkBudget& budget) {
   while (climb.halvings < halvings) {
-    if (!budget.allows(2 * directions * search_costs.agreement)) return false;
+    if (!budget.allows(2 * tried_directions * search_costs.agreement)) return false;
     const bool moved = move(scene, climb, budget);
     if (moved && ++climb.moves < max_moves) continue;
     ++climb.halvings, climb.moves = 0, climb.steps /= 2;
@@ -119,21 +92,50 @@ bool AgreementSearch::finish(const Scene& scene, Climb& climb, WorkBudget& budge
   return true;
 }
 
+// From the best place the rotations that agree better with the colours than those beside them, the best of them last.
+void AgreementSearch::turn(const Scene& scene, WorkBudget& budget) {
+  Climb climb{ImageTerms::of(camera_from_rcm_, place_->unknowns), steps_of_rotation};
+  std::array<double, rotations> scores{};
+  const auto at = [&](int i) { return scores[static_cast<std::size_t>((i + rotations) % rotations)]; };
+  const auto values = [&](int i) -> Eigen::Vector4d { return {0, 0, climb.terms.values[2], two_pi * i / rotations}; };
+  for (int i = 0; i < rotations; ++i) scores[static_cast<std::size_t>(i)] = score_at(scene, climb, values(i), budget);
+  std::vector<Climb> peaks;
+  for (int i = 0; i < rotations; ++i) {
+    if (at(i) < std::max(at(i - 1), at(i + 1))) continue;
+    climb.terms.values = values(i), climb.score = at(i), climb.halvings = halvings_of_place;
+    peaks.push_back(climb);
+  }
+  std::sort(peaks.begin(), peaks.end(), [](const Climb& a, const Climb& b) { return a.score < b.score; });
+  if (peaks.size() > most_peaks) peaks.erase(peaks.begin(), peaks.end() - most_peaks);
+  waiting_ = std::move(peaks);
+  turned_ = true;
+}
+
 bool AgreementSearch::advance(const Scene& scene, WorkBudget& budget) {
   ++frames_;
-  if (climb_) climb_->score = score_at(scene, climb_->terms, climb_->terms.values, budget);
-  for (; rotation_ < rotations; ++rotation_) {
+  if (climb_) climb_->score = score_at(scene, *climb_, climb_->terms.values, budget);
+  while (true) {
+    if (!climb_ && waiting_.empty()) {
+      if (turned_ || !place_) return true;
+      if (!budget.allows(rotations * search_costs.agreement)) return false;
+      turn(scene, budget);
+      continue;
+    }
     if (!climb_) {
-      climb_ = Climb{ImageTerms::of(camera_from_rcm_, start_), first_steps};
-      climb_->terms.values[3] = two_pi * rotation_ / rotations;
-      climb_->score = score_at(scene, climb_->terms, climb_->terms.values, budget);
+      climb_ = waiting_.back();
+      waiting_.pop_back();
+      climb_->score = score_at(scene, *climb_, climb_->terms.values, budget);
     }
     if (!finish(scene, *climb_, budget)) return false;
-    if (const auto unknowns = climb_->terms.unknowns(climb_->terms.values))
-      results_.push_back({climb_->score, *unknowns});
+    if (const auto unknowns = climb_->terms.unknowns(climb_->terms.values)) {
+      const Result result{climb_->score, *unknowns};
+      if (turned_)
+        results_.push_back(result);
+      else if (!place_ || result.score > place_->score)
+        place_ = result;
+    }
     climb_.reset();
   }
-  return true;
 }
 
 std::vector<PoseUnknowns> AgreementSearch::results() const {
@@ -145,7 +147,7 @@ std::vector<PoseUnknowns> AgreementSearch::results() const {
     const bool known = std::any_of(best.begin(), best.end(), [&](const PoseUnknowns& other) {
       return std::abs(wrap_pi(other.pose().psi_rad - result.unknowns.pose().psi_rad)) < same_rad;
     });
-    if (!known && best.size() < 2) best.push_back(result.unknowns);
+    if (!known && best.size() < most_results) best.push_back(result.unknowns);
   }
   std::reverse(best.begin(), best.end());
   return best;
@@ -156,7 +158,7 @@ PoseUnknowns AgreementSearch::in_this_frame(const Scene& scene, const PoseUnknow
   constexpr int halved = 3;
   Climb climb{ImageTerms::of(camera_from_rcm_, result), first_steps / (1 << halved)};
   climb.halvings = halved;
-  climb.score = score_at(scene, climb.terms, climb.terms.values, budget);
+  climb.score = score_at(scene, climb, climb.terms.values, budget);
   WorkBudget whole(std::nullopt);
   finish(scene, climb, whole);
   return climb.terms.unknowns(climb.terms.values).value_or(result);

@@ -1,6 +1,7 @@
 #include "lapservo/vision/blob_search.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <span>
@@ -98,6 +99,27 @@ Blob take_blob(Grid& grid, int seed, std::vector<int>& stack) {
   return blob;
 }
 
+struct Box {
+  int left, right, top, bottom;
+  double diagonal_px() const { return std::hypot(right - left, bottom - top); }
+};
+
+Box box_about(const Blob& blob) {
+  Box box{blob.samples[0].u, blob.samples[0].u, blob.samples[0].v, blob.samples[0].v};
+  for (const Blob::Sample& s : blob.samples) {
+    box.left = std::min(box.left, s.u), box.right = std::max(box.right, s.u);
+    box.top = std::min(box.top, s.v), box.bottom = std::max(box.bottom, s.v);
+  }
+  return box;
+}
+
+bool lie_near(const Box& a, const Box& b) {
+  constexpr double of_length = 0.5;
+  const int aside = std::max({0, b.left - a.right, a.left - b.right});
+  const int above = std::max({0, b.top - a.bottom, a.top - b.bottom});
+  return std::hypot(aside, above) < of_length * std::max(a.diagonal_px(), b.diagonal_px());
+}
+
 }  // namespace
 
 std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int min_samples) {
@@ -121,6 +143,25 @@ std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& clas
   auto blobs = find_blobs(image, classes, grid_px, detection_limits.min_samples);
   if (blobs.size() > detection_limits.max_blobs) blobs.resize(detection_limits.max_blobs);
   return blobs;
+}
+
+std::vector<Blob> joined_blobs(const std::vector<Blob>& blobs) {
+  std::vector<Box> boxes;
+  std::vector<std::size_t> group_of;
+  for (const Blob& blob : blobs) group_of.push_back(group_of.size()), boxes.push_back(box_about(blob));
+  for (std::size_t i = 0; i < blobs.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (group_of[i] != group_of[j] && lie_near(boxes[i], boxes[j]))
+        std::replace(group_of.begin(), group_of.end(), group_of[i], group_of[j]);
+  std::vector<Blob> joined;
+  for (std::size_t group = 0; group < blobs.size(); ++group) {
+    Blob together{{}, blobs[group].grid_px};
+    for (std::size_t i = 0; i < blobs.size(); ++i)
+      if (group_of[i] == group)
+        together.samples.insert(together.samples.end(), blobs[i].samples.begin(), blobs[i].samples.end());
+    if (!together.samples.empty()) joined.push_back(std::move(together));
+  }
+  return joined;
 }
 
 }  // namespace lapservo::internal

@@ -24,4 +24,8 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes
 /// As many of them as detection looks at, on its grid.
 std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& classes);
 
+/// The same, but as one those that blood may have parted: nearer to one another than half of what the larger one
+/// reaches over.
+std::vector<Blob> joined_blobs(const std::vector<Blob>& blobs);
+
 }  // namespace lapservo::internal

@@ -92,6 +92,26 @@ TEST(BlobSearch, SeparatesMarkersLargestFirstAndCountsNoSampleTwice) {
     }
 }
 
+TEST(BlobSearch, JoinsWhatBloodPartedAndNothingElse) {
+  cv::Mat image = blank();
+  const Strip marker{{200, 200}, 0.6, 220, 70}, blood{{200, 200}, 0.6, 50, 80}, another{{540, 400}, -0.9, 110, 45};
+  marker.paint(image);
+  another.paint(image);
+  for (int v = 0; v < image.rows; ++v)
+    for (int u = 0; u < image.cols; ++u)
+      if (blood.along(u, v)) image.at<cv::Vec3b>(v, u) = {20, 20, 90};
+  const auto parts = search(image);
+  ASSERT_EQ(parts.size(), 3U);
+  const auto joined = joined_blobs(parts);
+  ASSERT_EQ(joined.size(), 2U);
+  std::size_t samples = 0;
+  for (const Blob& part : parts) samples += part.samples.size();
+  EXPECT_EQ(joined[0].samples.size() + joined[1].samples.size(), samples);
+  for (const Blob& blob : joined)
+    for (const Blob::Sample& sample : blob.samples)
+      EXPECT_EQ(marker.along(sample.u, sample.v).has_value(), blob.samples.size() > samples / 2);
+}
+
 TEST(BlobSearch, BridgesAHighlightAlongTheShaft) {
   cv::Mat image = blank();
   const Strip marker{{320, 240}, 0.7, 220, 70}, highlight{{320, 240}, 0.7, 240, 8};

@@ -9,6 +9,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
+#include "lapservo/testing/motion.h"
 #include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
@@ -43,34 +44,11 @@ TEST(BlurredBoundary, LiesWhereItsBlurredPictureHasIt) {
       EXPECT_NEAR(moved_by_blur_px(course, blur), blurred_place_px(course, blur), 0.005);
 }
 
-// An exposure during which the marker's middle moves evenly by so many pixels along the shaft and across it.
+// With the marker's middle moving evenly by so many pixels along the shaft and across it.
 cv::Mat render_moving(const Shot& shot, const Eigen::Vector2d& along_and_across_px) {
-  constexpr int moments = 9;
-  const Instrument& instrument = shot.rig.instruments[0];
-  const auto place_px = [&](const Eigen::Vector4d& q, double along_m) {
-    return shot.rig.camera.raw_from_point(placement_of(instrument, JointVector::from_vector(q)).camera_from_unrolled *
-                                          Eigen::Vector3d(0, 0, along_m));
-  };
-  const Eigen::Vector4d q = shot.q.vector();
-  const double middle_m = instrument.marker.length_m() / 2;
-  const Eigen::Vector2d along = (place_px(q, 2 * middle_m) - place_px(q, 0)).normalized();
-  const Eigen::Vector2d motion_px =
-      along_and_across_px.x() * along + along_and_across_px.y() * Eigen::Vector2d(-along.y(), along.x());
-  Eigen::Matrix<double, 2, 3> px_per_step;
-  const Eigen::Vector3d steps(1e-3, 1e-3, 1e-4);
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector4d step = steps[i] * Eigen::Vector4d::Unit(i);
-    px_per_step.col(i) = (place_px(q + step, middle_m) - place_px(q - step, middle_m)) / 2;
-  }
-  const Eigen::Vector3d steps_taken =
-      px_per_step.transpose() * (px_per_step * px_per_step.transpose()).ldlt().solve(motion_px);
-  Eigen::Vector4d motion = Eigen::Vector4d::Zero();
-  motion.head<3>() = steps_taken.cwiseProduct(steps);
-  Exposure exposure;
-  for (int i = 0; i < moments; ++i)
-    exposure.push_back({placement_of(instrument, JointVector::from_vector(q + ((i + 0.5) / moments - 0.5) * motion))});
   const cv::Mat tissue = make_tissue(shot.rig.camera.width_px, shot.rig.camera.height_px, 5);
-  return Renderer(shot.rig.camera, {shaft_of(instrument)}, tissue).render_exposure(exposure, 1);
+  return Renderer(shot.rig.camera, {shaft_of(shot.rig.instruments[0])}, tissue)
+      .render_exposure(scenes::moving_exposure(shot.rig, shot.q, {.along_and_across_px = along_and_across_px}), 1);
 }
 
 // What else psi is off by (the film's thickness) is alike for two motions that are mirrored at the shaft: only what the
@@ -90,6 +68,30 @@ TEST(BlurredBoundary, PsiDoesNotFollowMotionObliqueToTheShaft) {
       apart_rad += (across_px > 0 ? 1 : -1) * error_rad / shots;
     }
   EXPECT_LT(std::abs(apart_rad), 0.004);
+}
+
+// Psi's error by its sigma, of fits to motion oblique to the shaft.
+double error_over_sigma(const Rig& rig, double along_px, double across_px) {
+  constexpr int shots = 4;
+  double squares = 0;
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    const Shot shot(seed, {}, rig);
+    for (const double way : {-1.0, 1.0}) {
+      const scenes::Sight sight(shot.rig, render_moving(shot, {along_px, way * across_px}));
+      const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {1.2, 1.2});
+      EXPECT_TRUE(fit.converged) << "seed " << seed;
+      const double error_rad = wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad);
+      squares += error_rad * error_rad / fit.covariance(3, 3) / (2 * shots);
+    }
+  }
+  return std::sqrt(squares);
+}
+
+// Neither surer than they are nor less sure by far.
+TEST(BlurredBoundary, FitsToMotionKnowHowSureTheyAre) {
+  const double sigmas = error_over_sigma(scenes::usual_rig(), 7, 5);
+  EXPECT_GT(sigmas, 0.4);
+  EXPECT_LT(sigmas, 1.5);
 }
 
 }  // namespace

@@ -196,6 +196,11 @@ std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unkn
 class RotationScore {
  public:
   RotationScore(const Scene& scene, const SampledSurface& surface) : scene_(scene), surface_(surface) {
+    const auto upper_m = boundaries_m(scene.marker, 0), slopes_m = boundary_slopes_m(scene.marker);
+    for (std::size_t k = 0; k < 4; ++k) {
+      upper_[k] = (upper_m[k] - surface.first_m) / surface.step_m + 0.5;
+      slope_[k] = slopes_m[k] / surface.step_m;
+    }
     for (std::size_t i = 0; i < line_count; ++i) {
       std::array<int, 3> sums{};
       sums_[i][0] = sums;
@@ -212,25 +217,23 @@ class RotationScore {
   double at(double psi_rad) const {
     int score = 0;
     for (std::size_t i = 0; i < line_count; ++i) {
-      const double tau_rad = marker_azimuth_rad(scene_.marker, surface_.lines[i].azimuth_rad, psi_rad);
+      const double tau_rad = wrap_two_pi(marker_azimuth_rad(scene_.marker, surface_.lines[i].azimuth_rad, psi_rad));
       if (!is_printed(scene_.marker, tau_rad)) continue;
-      const auto ends_m = boundaries_m(scene_.marker, tau_rad);
       std::array<const std::array<int, 3>*, 4> sums;
-      for (std::size_t k = 0; k < 4; ++k) sums[k] = &sums_[i][index(ends_m[k])];
+      for (std::size_t k = 0; k < 4; ++k) sums[k] = &sums_[i][index(upper_[k] + tau_rad * slope_[k])];
       for (std::size_t band = 0; band < 3; ++band) score += (*sums[band + 1])[band] - (*sums[band])[band];
     }
     return seen_ ? static_cast<double>(score) / seen_ : 0;
   }
 
  private:
-  std::size_t index(double along_m) const {
-    const double k = (along_m - surface_.first_m) * per_m_ + 0.5;
-    return static_cast<std::size_t>(std::clamp(k, 0.0, static_cast<double>(samples_along)));
+  static std::size_t index(double along_steps) {
+    return static_cast<std::size_t>(std::clamp(along_steps, 0.0, static_cast<double>(samples_along)));
   }
 
   const Scene& scene_;
   const SampledSurface& surface_;
-  double per_m_ = 1 / surface_.step_m;
+  std::array<double, 4> upper_, slope_;  // of the boundaries, in steps of the surface: at the seam and per radian
   std::array<std::array<std::array<int, 3>, samples_along + 1>, line_count> sums_;  // over samples before, per band
   int seen_ = 0;
 };

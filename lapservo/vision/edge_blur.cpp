@@ -29,9 +29,15 @@ double BlurEllipse::along_normal_px(const Eigen::Vector2d& normal) const {
 
 bool EdgeBlur::wide() const {
   const double boundary_px = widest_boundary_px(*this);
+  const auto beyond = [&](double blur_px, double of_thick_px) {
+    const double unmoved_px2 = edge_limits.unmoved_blur_px * edge_limits.unmoved_blur_px;
+    const double thickness = std::min(1.0, radius_px / edge_limits.thick_radius_px);
+    return blur_px * blur_px > unmoved_px2 + (of_thick_px * of_thick_px - unmoved_px2) * thickness;
+  };
   // Sides alone look wide where they are misplaced.
-  return sides_px > edge_limits.wide_sides_px ||
-         (boundary_px > edge_limits.wide_along_blur_px && std::max(boundary_px, sides_px) > edge_limits.wide_blur_px);
+  return beyond(sides_px, edge_limits.wide_sides_px) ||
+         (beyond(boundary_px, edge_limits.wide_along_blur_px) &&
+          beyond(std::max(boundary_px, sides_px), edge_limits.wide_blur_px));
 }
 
 double EdgeBlur::widest_px() const {

@@ -27,7 +27,9 @@ struct EdgeBlur {
   std::array<double, 4> along_px{boundaries_px, boundaries_px, boundaries_px, boundaries_px};
   double correlation = 0;  ///< of the motion along the shaft with that across it: 1 or -1 where it is even, oblique
 
-  /// Wider than a lens's.
+  double radius_px = 1e3;  ///< the shaft's: thin ones are moved more
+
+  /// Wider than a lens's, by what it does to boundaries.
   bool wide() const;
   double widest_px() const;
   /// Of wide blur.

@@ -81,6 +81,17 @@ TEST(EdgeBlur, IsWideBeyondALensOnlyAndWhereSidesAreNotMerelyMisplaced) {
   EXPECT_TRUE((EdgeBlur{2, 1.2}.wide()));
 }
 
+TEST(EdgeBlur, OfAThinShaftIsWideSooner) {
+  EdgeBlur blur{1.4, 1.2};
+  blur.radius_px = 40;
+  EXPECT_FALSE(blur.wide());
+  blur.radius_px = 14;
+  EXPECT_TRUE(blur.wide());
+  EdgeBlur usual{1.2, 1.2};
+  usual.radius_px = 14;
+  EXPECT_FALSE(usual.wide());
+}
+
 }  // namespace
 }  // namespace edge_blur_test
 }  // namespace lapservo::internal

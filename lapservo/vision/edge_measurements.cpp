@@ -268,6 +268,7 @@ double line_reach(const EdgeBlur& blur, double radius_px) {
 
 void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur& blur, EdgeMeasurements& out) {
   const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
+  out.radius_px = radius_px;
   out.lines = std::max(edge_limits.min_lines, std::min(static_cast<int>(1.2 * radius_px), max_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
   const bool wide = blur.wide();
@@ -287,12 +288,13 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
       if (jumps[k] && seam_px < edge_limits.seam_blurs * blur.boundaries_px + edge_limits.seam_px) continue;
       InWideBlur blurred;
       if (wide) blurred.ellipse = blur.ellipse(k);
-      const auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur.boundaries_px,
-                                        wide ? &blurred : nullptr);
+      auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur.boundaries_px,
+                                  wide ? &blurred : nullptr);
       if (!place) continue;
       if (!frame.scene.others.empty() && lies_behind_another(frame, place->line, generatrix, along_m[k])) continue;
       if (wide) in_wide_blur.push_back(blurred);
       ++out.in_image[k];
+      place->measurement.across = sine / sine_of_half;
       places.push_back(*place);
       lines.push_back(place->line);
     }
@@ -351,7 +353,7 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
     inwards = -inwards;
   const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
   const int inside = inside_of_side_px(radius_px), outside = outside_of_side_px(blur_px, effort.extra_px);
-  if (inside < 5) return std::nullopt;
+  if (inside < 3) return std::nullopt;
   const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
   if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
   const auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
@@ -404,10 +406,14 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
 
 EdgeBlur EdgeMeasurements::improved(const EdgeBlur& blur) const {
   const double sides_px = side_blur.improved(blur.sides_px);
-  if (!blur.wide()) return {boundary_blur.improved(blur.boundaries_px), sides_px};
-  EdgeBlur next = wide_blur.improved(blur);
+  const bool wide = blur.wide();
+  EdgeBlur next = wide ? wide_blur.improved(blur) : EdgeBlur{boundary_blur.improved(blur.boundaries_px)};
   next.sides_px = sides_px;
-  return next.wide() ? next : EdgeBlur{next.boundaries_px, sides_px};
+  next.radius_px = radius_px;
+  if (!wide || next.wide()) return next;
+  EdgeBlur usual{next.boundaries_px, sides_px};
+  usual.radius_px = radius_px;
+  return usual;
 }
 
 EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,

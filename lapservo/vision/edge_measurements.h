@@ -26,6 +26,7 @@ struct Measurement {
   std::size_t group;          ///< 0..3: the boundary; 4 and 5: the sides
   double turn_fraction = 0;   ///< tau by what the print covers
   double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides
+  double across = 0;          ///< of boundaries: from -1 to 1, from side to side of the shaft
   Eigen::Vector2f expected_px{0, 0}, normal{0, 0};  ///< where the pose has it, and the image normal; of sides inwards
   float clear_px = 0;  ///< of boundaries: how far along the normal no other boundary and its blur reaches
 };
@@ -47,6 +48,7 @@ struct EdgeMeasurements {
   std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at
+  double radius_px = 0;           ///< the shaft's
   BlurEvidence boundary_blur, side_blur;
   WideBlurEvidence wide_blur;  ///< where the blur that they were located with is wide
 

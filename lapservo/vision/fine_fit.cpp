@@ -52,15 +52,16 @@ double median_sigma_px(std::span<const Measurement> measurements) {
 
 // What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
 // processing may have moved each boundary; of those that `processed` tells, it is corrected.
-CommonErrors common_errors(std::span<const Measurement> measurements, const ResidualLines& lines, const EdgeBlur& blur,
+CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& lines, const EdgeBlur& blur,
                            const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px) {
   const FineFitLimits& limits = fine_fit_limits;
-  const double motion_blur_px = std::max(0.0, blur.sides_px - std::max(blur.boundaries_px, limits.usual_blur_px));
   const double widest_px = blur.widest_px();
   const double beyond_px = std::max(0.0, widest_px - limits.usual_blur_px);
+  const auto beyond_px2 = [](double blur_px, double usual_px) {
+    return std::max(0.0, blur_px * blur_px - usual_px * usual_px);
+  };
   const double side_px = limits.common_side_px +
-                         limits.common_fraction_of_blur * std::max(0.0, blur.sides_px - limits.usual_blur_px) +
-                         limits.side_fraction_of_motion_blur * motion_blur_px;
+                         limits.side_of_blur * beyond_px2(blur.sides_px, limits.usual_side_blur_px) / pass.radius_px;
   const double unexplained = processed ? std::max(0.0, processed->misfit - limits.usual_misfit) : 0;
   const double unexplained_px = limits.px_per_misfit * unexplained;
   const double left_of_corrected =
@@ -76,14 +77,18 @@ CommonErrors common_errors(std::span<const Measurement> measurements, const Resi
     bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
   }
   errors.px[4] = errors.px[5] = side_px;
-  errors.noise_scale = std::max(1.0, scatter_sigmas(measurements, lines));
-  const double sigma_px = median_sigma_px(measurements);
+  errors.whole_px = limits.whole_fraction_of_blur * beyond_px;
+  errors.leaning_px = (blur.wide() ? limits.leaning_of_wide_blur : limits.leaning_of_blur) *
+                      beyond_px2(widest_px, limits.usual_blur_px) / pass.radius_px;
+  errors.noise_scale = std::max(1.0, scatter_sigmas(pass.all, lines));
+  const double sigma_px = median_sigma_px(pass.all);
   const double moved_px = std::sqrt(bias_squares_px2);
   errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
   const double beyond_usual_px = std::max(0.0, sigma_px - limits.usual_sigma_px);
   const double processed_px = left_of_corrected * moved_px;
-  errors.doubt.boundary_px = std::hypot(limits.doubted_of_sigma * beyond_usual_px, processed_px);
-  errors.doubt.tilt_px = std::hypot(errors.doubt.boundary_px, limits.doubted_tilt_of_blur * beyond_px);
+  const double moved_or_noisy_px = std::hypot(limits.doubted_of_sigma * beyond_usual_px, processed_px);
+  errors.doubt.boundary_px = std::hypot(moved_or_noisy_px, limits.doubted_boundary_of_blur * beyond_px);
+  errors.doubt.tilt_px = std::hypot(moved_or_noisy_px, limits.doubted_tilt_of_blur * beyond_px);
   errors.doubt.length_fraction =
       std::hypot(limits.doubted_length_of_sigma * beyond_usual_px, limits.doubted_length_of_blur * beyond_px);
   return errors;
@@ -191,7 +196,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
   const ResidualLines lines = residual_lines(pass.all);
   const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker,
-                               common_errors(pass.all, lines, fit.blur, evidence.edges, fit.bias_px));
+                               common_errors(pass, lines, fit.blur, evidence.edges, fit.bias_px));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;
@@ -206,10 +211,12 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const double doubt =
       1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit.located_fraction());
   fit.covariance = doubt * doubt * print->covariance;
-  fit.inner_sigma_m = print->inner_sigma_m;
+  fit.inner_off_m = print->inner_off_m;
   fit.print_off_probability = print->off_probability;
-  fit.psi_variance = doubt * doubt * print->psi_variance;
-  fit.psi_variance_by_print = doubt * doubt * print->psi_variance_by_print;
+  // What the print may add goes by how often prints are off, not by what this picture shows.
+  fit.psi_variance_by_print = print->psi_variance_by_print;
+  fit.psi_variance =
+      doubt * doubt * (print->psi_variance - print->psi_variance_by_print) + print->psi_variance_by_print;
   fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;
   fit.converged = true;
   return fit;

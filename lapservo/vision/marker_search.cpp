@@ -78,6 +78,13 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
   return status == Status::ok ? accepted(scene, light, fit, {}, budget) : refusal(status, fit.unknowns);
 }
 
+// Two fits of one marker that are both ok: of what blood leaves both can't be sure.
+bool are_rivals(const FineFit& fit, const FineFit& other) {
+  constexpr double apart_sigmas = 5;  // of the least certain fit that is ok
+  const double turn_rad = wrap_pi(fit.unknowns.pose().psi_rad - other.unknowns.pose().psi_rad);
+  return std::abs(turn_rad) > apart_sigmas * validation_limits.max_sigma_psi_rad;
+}
+
 // No marker moves farther from frame to frame.
 double reach_px(const SearchFrame& frame) {
   constexpr double of_width = 0.05;
@@ -224,6 +231,7 @@ bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) 
     if (validate(frame.scene, first) != Status::ok) continue;
     const Found found = accepted(frame.scene, frame.light, first, {}, budget);
     if (!found.fit) continue;
+    has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
     if (!candidate_ || found.fit->inlier_rms_sigmas < candidate_->inlier_rms_sigmas) candidate_ = found.fit;
   }
   results_.reset();
@@ -238,19 +246,22 @@ bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget
 
 // The best of all that the blobs' starts lead to.
 Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
-  const auto rest = hidden_.blobs.rest(frame.blobs, reach_px(frame));
+  const std::vector<Blob> blobs = joined_blobs(frame.blobs);
+  const auto rest = hidden_.blobs.rest(blobs, reach_px(frame));
   if (agreement_ && !finish_agreement(frame, budget)) return {};
   for (const Blob* blob : rest) {
     const auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget);
     for (std::size_t i = hidden_.blobs.start(); i < starts.size(); ++i) {
-      agreement_ = AgreementSearch(starts[i], *frame.camera_from_rcm);
+      agreement_ = AgreementSearch(starts[i], *frame.camera_from_rcm, frame.scene.marker.length_m());
       hidden_.blobs.stop(*blob, i + 1);
       if (!finish_agreement(frame, budget)) return {};
     }
     hidden_.blobs.finish(*blob);
   }
   hidden_.done = true;
-  return candidate_ ? Found{Status::ok, std::move(candidate_), {}} : Found{};
+  if (!candidate_) return {};
+  if (has_rivals_) return refusal(Status::ambiguous, candidate_->unknowns);
+  return {Status::ok, std::move(candidate_), {}};
 }
 
 // The starts of a shared blob, until one fits. One behind another that was found needs not show all bands.
@@ -319,7 +330,8 @@ Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool p
 
 Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
   // What other blobs gave was worse than it, and is gone with it.
-  if (candidate_ && lost_candidate(frame, budget)) hidden_ = {}, agreement_.reset(), results_.reset();
+  if (candidate_ && lost_candidate(frame, budget))
+    hidden_ = {}, agreement_.reset(), results_.reset(), has_rivals_ = false;
   const bool from_the_first = !plain_.blobs.begun();
   // Half the budget, or by turns what a start takes, is for what shows plainly.
   longs_turn_ = searches_long_ && !longs_turn_;

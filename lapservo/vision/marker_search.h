@@ -78,6 +78,7 @@ class MarkerSearch {
   std::optional<AgreementSearch> agreement_;
   std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last
   std::optional<FineFit> candidate_;                  // the best so far, while others are looked for
+  bool has_rivals_ = false;                           // another rotation is as ok as the candidate's
 };
 
 }  // namespace lapservo::internal

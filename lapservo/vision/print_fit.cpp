@@ -108,6 +108,7 @@ struct Pull {
 struct Sums {
   Equations equations;
   std::array<Pull, measurement_groups> pulls;
+  InplaceVector<Pull, 2> of_all_boundaries;
 };
 
 // Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two
@@ -177,21 +178,51 @@ Pull gathered(const Products<Unknowns>& products, std::size_t group, Equations& 
   return pull;
 }
 
+double robust_certainty(const Measurement& m, const ResidualLines& lines, double certainty) {
+  const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
+  return certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
+}
+
+// All boundaries moved alike, or leaning alike.
+void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, double certainty,
+                      const CommonErrors& errors, Sums& sums) {
+  const auto unknowns = sums.equations.x.size();
+  Pull whole, leaning;
+  whole.x = leaning.x = UnknownVector::Zero(unknowns);
+  double squares = 0;
+  for (const Measurement& m : measurements) {
+    if (m.group >= errors_of_boundary.size()) continue;
+    const double weight = robust_certainty(m, lines, certainty);
+    const auto& edges = errors_of_boundary[m.group];
+    const Eigen::Vector2d by_print = print_row(m);
+    whole.x += weight * m.row.head(unknowns);
+    leaning.x += weight * m.across * m.row.head(unknowns);
+    for (std::size_t edge = 0; edge < 2; ++edge) {
+      whole.n[edges[edge]] += weight * by_print[static_cast<Eigen::Index>(edge)];
+      leaning.n[edges[edge]] += weight * m.across * by_print[static_cast<Eigen::Index>(edge)];
+    }
+    whole.weight += weight, squares += weight * m.across * m.across;
+  }
+  if (!(squares > 0)) return;
+  const double scale = std::sqrt(1 / certainty);
+  whole.error_px = scale * errors.whole_px;
+  leaning.error_px = scale * errors.leaning_px * std::sqrt(whole.weight / squares);
+  sums.of_all_boundaries.push_back(whole), sums.of_all_boundaries.push_back(leaning);
+}
+
 template <int Unknowns>
 Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
              const CommonErrors& errors) {
   const double certainty = 1 / (errors.noise_scale * errors.noise_scale);
   std::array<Products<Unknowns>, measurement_groups> products;
-  for (const Measurement& m : measurements) {
-    const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
-    products[m.group].add(m, certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px));
-  }
-  Sums sums{Equations(Unknowns), {}};
+  for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, certainty));
+  Sums sums{Equations(Unknowns), {}, {}};
   sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), certainty, film_prior);
   for (std::size_t group = 0; group < measurement_groups; ++group) {
     sums.pulls[group] = gathered(products[group], group, sums.equations);
     sums.pulls[group].error_px = errors.noise_scale * errors.px[group];
   }
+  if (errors.whole_px > 0 || errors.leaning_px > 0) add_pulls_of_all(measurements, lines, certainty, errors, sums);
   return sums;
 }
 
@@ -206,10 +237,15 @@ std::optional<PrintInformation> information_of(const Sums& sums) {
   return PrintInformation{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
 }
 
-// One sigma of where the less exact of the inner boundaries lies as a whole.
-double inner_sigma_mm(const PrintMatrix& information) {
-  const double inner = std::min(information.block<2, 2>(1, 1).sum(), information.block<2, 2>(3, 3).sum());
-  return 1 / std::sqrt(std::max(inner, 1e-6));
+// How far one of the inner boundaries may lie off as a whole: what the residuals say, and some sigmas more.
+double inner_off_mm(const PrintInformation& print, double doubt_scale) {
+  double off_mm = 0;
+  for (const int at : {1, 3}) {
+    const double certainty = std::max(print.information.block<2, 2>(at, at).sum(), 1e-6);
+    const double shift_mm = print.gradient.segment<2>(at).sum() / certainty;
+    off_mm = std::max(off_mm, std::abs(shift_mm) + print_limits.off_sigmas * doubt_scale / std::sqrt(certainty));
+  }
+  return off_mm;
 }
 
 PrintShapes doubted_shapes_mm(const PrintDoubt& doubt, const Sums& sums, const Marker& marker) {
@@ -236,10 +272,12 @@ std::optional<Solution> solved(const Sums& sums, const PrintPrior& prior) {
   solution.step = inverse * (e.x - by_x.transpose() * e.n);
   solution.print_mm = print_covariance * (e.n - e.nx * solution.step);
   solution.covariance = inverse;
-  for (const Pull& pull : sums.pulls) {
+  const auto widen = [&](const Pull& pull) {
     const UnknownVector shift = inverse * (pull.x - by_x.transpose() * pull.n);
     solution.covariance += pull.error_px * pull.error_px * shift * shift.transpose();
-  }
+  };
+  for (const Pull& pull : sums.pulls) widen(pull);
+  for (const Pull& pull : sums.of_all_boundaries) widen(pull);
   const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
 }
@@ -351,7 +389,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
-  fit.inner_sigma_m = errors.inner_doubt_scale * inner_sigma_mm(print.information) * mm;
+  fit.inner_off_m = inner_off_mm(print, errors.inner_doubt_scale) * mm;
   fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);

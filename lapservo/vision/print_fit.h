@@ -15,9 +15,11 @@ namespace lapservo::internal {
 /// says, and what is doubted before the print is blamed.
 struct CommonErrors {
   std::array<double, measurement_groups> px{};
+  double whole_px = 0,
+         leaning_px = 0;  ///< all boundaries alike: moved along the shaft, leaning from side to side (rms)
   double noise_scale = 1;
   PrintDoubt doubt;
-  double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_sigma_m
+  double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_off_m
 };
 
 /// A group's residuals as a straight line over the print: of boundaries in metres along the shaft, of sides a constant
@@ -42,9 +44,10 @@ struct PrintFit {
   double off_probability = 0;            ///< that the print is off by more than the tolerance
   double psi_variance_by_tolerance = 0;  ///< of it, what the rig's tolerance adds to an exact print's
   double psi_variance_by_print = 0;      ///< and what the print adds beyond the tolerance
-  /// How exactly it shows where on the print an inner boundary lies as a whole, were all others where the rig says; of
-  /// both the worse, one sigma. Where one is hidden the other's error is a turn, and nothing shows it: a metre.
-  double inner_sigma_m = 1;
+  /// How far off the rig's place on the print an inner boundary may lie as a whole, were all others where the rig says:
+  /// what the residuals say and three sigma more; of both the worse. Where one is hidden the other's error is a turn,
+  /// and nothing shows it: a metre and more.
+  double inner_off_m = 3;
 };
 
 /// Tells the print's errors from the settled measurements' residuals. How large they usually are is not known, so the

@@ -18,6 +18,7 @@
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/camera_effects.h"
+#include "lapservo/testing/motion.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/blob_search.h"
 #include "lapservo/vision/tracker.h"
@@ -507,16 +508,9 @@ TEST(Tracker, SearchesTheOnlyFrameOfATemporaryWhole) {
 // A frame of a turn while the shutter was open, with psi in its middle; even, or with a constant acceleration from
 // rest.
 cv::Mat render_turning(const Shot& shot, double turn_rad, bool even) {
-  constexpr int moments = 9;
-  const auto part = [&](double time) { return even ? time : time * time; };
-  Exposure exposure;
-  for (int i = 0; i < moments; ++i) {
-    JointVector q = shot.q;
-    q.psi_rad += turn_rad * (part((i + 0.5) / moments) - part(0.5));
-    exposure.push_back({placement_of(shot.rig.instruments[0], q)});
-  }
   const cv::Mat tissue = make_tissue(shot.rig.camera.width_px, shot.rig.camera.height_px, 5);
-  return Renderer(shot.rig.camera, {shaft_of(shot.rig.instruments[0])}, tissue).render_exposure(exposure, 1);
+  return Renderer(shot.rig.camera, {shaft_of(shot.rig.instruments[0])}, tissue)
+      .render_exposure(scenes::moving_exposure(shot.rig, shot.q, {.turn_rad = turn_rad, .from_rest = !even}), 1);
 }
 
 // The picture shows psi's mean over the exposure.

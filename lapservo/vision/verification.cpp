@@ -8,6 +8,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/color_evidence.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -55,15 +56,23 @@ int fewest_lines(const FineFit& fit) {
   return std::max(limits.min_of_end, fit.lines / limits.end_one_in);
 }
 
+// Whether an inner boundary is located on so many lines, or so plainly, that it is the marker's and no edge of blood.
+bool is_the_markers(const Scene& scene, const FineFit& fit, std::size_t boundary) {
+  if (fit.used[boundary] >= fewest_lines(fit)) return true;
+  return fit.used[boundary] >= limits.confirmed_lines &&
+         lines_with_both_colors(scene, fit.unknowns.pose(), boundary, fit.lines) >= limits.confirmed_lines;
+}
+
 // Whether a print that is off would show. Where one inner boundary is left, its error looks like a turn. One whose
 // bands were measured is not off, and a tolerance of that size is in sigma. Where another instrument hides a part,
 // it is asked even if both inner boundaries show: one of 13000 rows, with blood, was 0.13 rad wrong.
 bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool hidden_by_another) {
   if (scene.marker.sigmas.bands_upper_m && scene.marker.sigmas.bands_lower_m) return true;
   if (scene.marker.tolerance_m >= limits.tolerance_of_prints_m) return true;
-  const bool both_show = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.missed_fraction;
+  const bool both_show = fit.located_fraction() > limits.hardly_hidden &&
+                         std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.missed_fraction;
   return (both_show && !hidden_by_another) ||
-         (fit.inner_sigma_m < limits.max_inner_sigma_m && std::min(fit.used[1], fit.used[2]) >= fewest_lines(fit));
+         (fit.inner_off_m < limits.max_inner_off_m && is_the_markers(scene, fit, 1) && is_the_markers(scene, fit, 2));
 }
 
 // Another instrument's colours beside a marker that shows as it should are no reason to doubt it.
@@ -176,12 +185,17 @@ Status validate(const Scene& scene, const FineFit& fit) {
   if (needs_both_ends && std::min(fit.used[0], fit.used[3]) < fewest_lines(fit)) return too_little;
 
   // Boundaries and sides that agree badly.
-  if (fraction < limits.partly_hidden && agreement.spilled > max_spilled(fit)) return Status::poor_fit;
+  if (fraction < limits.partly_hidden && agreement.spilled > max_spilled(fit) &&
+      spilled_in_patches(scene, fit.unknowns.pose()) > max_spilled(fit))
+    return Status::poor_fit;
+  const bool all_show = 4 == std::count_if(fit.used.begin(), fit.used.end(),
+                                           [&](int used) { return used > limits.missed_fraction * fit.lines; });
+  const double max_rms_sigmas = all_show ? limits.max_rms_of_all_sigmas : limits.max_rms_sigmas;
   const bool few_sides = limits.sides_one_in * fit.sides_used < fit.sides_in_image;
   const double more_rms_sigmas = few_sides ? 0
                                            : limits.rms_per_fraction * std::clamp(fraction - limits.rms_from_fraction,
                                                                                   0.0, limits.rms_most_fraction);
-  if (fraction < limits.min_fraction || fit.inlier_rms_sigmas > limits.max_rms_sigmas + more_rms_sigmas)
+  if (fraction < limits.min_fraction || fit.inlier_rms_sigmas > max_rms_sigmas + more_rms_sigmas)
     return Status::poor_fit;
 
   // Motion blur.
