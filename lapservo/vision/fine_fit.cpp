@@ -64,8 +64,7 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
                          limits.side_of_blur * beyond_px2(blur.sides_px, limits.usual_side_blur_px) / pass.radius_px;
   const double unexplained = processed ? std::max(0.0, processed->misfit - limits.usual_misfit) : 0;
   const double unexplained_px = limits.px_per_misfit * unexplained;
-  const double left_of_corrected =
-      processed ? std::hypot(limits.fraction_of_processing, unexplained_share(*processed)) : 1;
+  const double left_of_corrected = processed ? limits.fraction_of_processing : 1;
   CommonErrors errors;
   double bias_squares_px2 = 0;
   for (std::size_t k = 0; k < 4; ++k) {

@@ -294,13 +294,6 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
   return out;
 }
 
-double unexplained_share(const ProcessedEdges& edges) {
-  const double usual = fine_fit_limits.usual_misfit * fine_fit_limits.usual_misfit;
-  const double left = edges.misfit * edges.misfit - usual;
-  const double all = edges.misfit_without * edges.misfit_without - usual;
-  return left > 0 ? std::sqrt(std::min(1.0, left / std::max(all, left))) : 0;
-}
-
 std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges) {
   double largest_px = 0;
   for (const auto& bias_px : edges.bias_px) largest_px = std::max(largest_px, std::abs(bias_px.value_or(0)));

@@ -37,10 +37,6 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
 /// Whether the frame looks like that rather than like none.
 bool is_believed(const ProcessedEdges& edges);
 
-/// Of what there is to explain beyond the usual, the share that is left (rms, 0 to 1): about as much is left of
-/// bias_px.
-double unexplained_share(const ProcessedEdges& edges);
-
 /// How much each boundary may be mislocated: one that was not seen well by as much as the worst of the others.
 std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges);
 

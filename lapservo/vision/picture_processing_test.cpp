@@ -128,21 +128,6 @@ TEST(PictureProcessing, ABoundaryThatWasNotSeenIsInDoubtByAsMuchAsTheWorst) {
   for (const std::size_t k : {0U, 1U, 3U}) EXPECT_LE(magnitudes_px[k], magnitudes_px[2]);
 }
 
-TEST(PictureProcessing, IsDoubtedByTheShareThatItLeavesUnexplained) {
-  const auto share = [](double misfit, double misfit_without) {
-    ProcessedEdges edges;
-    edges.misfit = misfit, edges.misfit_without = misfit_without;
-    return unexplained_share(edges);
-  };
-  const double usual = fine_fit_limits.usual_misfit;
-  EXPECT_EQ(share(usual, 5 * usual), 0);
-  EXPECT_EQ(share(usual / 2, usual / 2), 0);
-  EXPECT_GT(share(3 * usual, 5 * usual), share(2 * usual, 5 * usual));
-  EXPECT_NEAR(share(50 * usual, 100 * usual), 0.5, 0.01);
-  EXPECT_EQ(share(5 * usual, 5 * usual), 1);
-  EXPECT_EQ(share(5 * usual, usual), 1);
-}
-
 // Whatever the number of places located: as many as asked for, or all.
 TEST(PooledEdges, TakesAsManyPlacesAsAskedFor) {
   const scenes::Shot& shot = scenes::usual_shot(1);

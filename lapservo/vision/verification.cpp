@@ -63,13 +63,21 @@ bool is_the_markers(const Scene& scene, const FineFit& fit, std::size_t boundary
          lines_with_both_colors(scene, fit.unknowns.pose(), boundary, fit.lines) >= limits.confirmed_lines;
 }
 
+// Whether points are missed since the camera's processing scatters them, as clipped colours do, and not since blood hides
+// them.
+bool is_scattered(const FineFit& fit) {
+  const auto& moved_px = fit.bias_px;
+  return fit.processing == Processing::found &&
+         *std::max_element(moved_px.begin(), moved_px.end()) > limits.scattering_processing_px;
+}
+
 // Whether a print that is off would show. Where one inner boundary is left, its error looks like a turn. One whose
 // bands were measured is not off, and a tolerance of that size is in sigma. Where another instrument hides a part,
 // it is asked even if both inner boundaries show: one of 13000 rows, with blood, was 0.13 rad wrong.
 bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool hidden_by_another) {
   if (scene.marker.sigmas.bands_upper_m && scene.marker.sigmas.bands_lower_m) return true;
   if (scene.marker.tolerance_m >= limits.tolerance_of_prints_m) return true;
-  const bool both_show = fit.located_fraction() > limits.hardly_hidden &&
+  const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) &&
                          std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.missed_fraction;
   return (both_show && !hidden_by_another) ||
          (fit.inner_off_m < limits.max_inner_off_m && is_the_markers(scene, fit, 1) && is_the_markers(scene, fit, 2));
