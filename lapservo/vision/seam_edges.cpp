@@ -42,9 +42,20 @@ struct Profile {
   std::vector<int> count;
 };
 
+// Highlights lie over print and bare shaft alike (each with its own would pass for the blur of colour differences) and
+// are as narrow as the surface is smooth, which nobody knows: a wide one and a narrow one, powers of the cosine.
+constexpr std::array<double, 2> gloss_exponents{16, 64};
+
+// What a lamp beside the camera makes of a surface that is turned away from it.
+struct LampLight {
+  double matt;
+  std::array<double, gloss_exponents.size()> gloss;
+};
+
 struct Section {
   std::vector<double> x_m;  // around the shaft from where the upper edge is expected
   std::vector<double> px_per_m;
+  std::vector<LampLight> lamp;
   std::vector<Profile> profiles;
   std::array<double, 3> shaft{0.02, 0.02, 0.02};  // light of the bare shaft
 };
@@ -68,6 +79,14 @@ struct SeamView {
            along_m * axes.col(2);
   }
   double azimuth(double x_m) const { return upper_rad + x_m / marker().radius_m(); }
+  LampLight lamp_light(double azimuth_rad, double facing_rad) const {
+    constexpr double least_matt = 0.05;  // so that shading can make up for other lamps
+    const Eigen::Vector3d to_camera = -point(azimuth_rad, marker().length_m() / 2).normalized();
+    LampLight light{std::max(least_matt, outwards(azimuth_rad).dot(to_camera)), {}};
+    const double cosine = std::max(0.0, std::cos(azimuth_rad - facing_rad));
+    for (std::size_t i = 0; i < light.gloss.size(); ++i) light.gloss[i] = std::pow(cosine, gloss_exponents[i]);
+    return light;
+  }
 };
 
 // The band at a place, with some room to its boundaries, else 0.
@@ -105,6 +124,7 @@ std::optional<Section> sample(const SeamView& view, double facing_rad, double bl
     if (std::abs(wrap_pi(view.azimuth(x_m) - facing_rad)) < visible_rad) {
       section.x_m.push_back(x_m);
       section.px_per_m.push_back(px_per_m);
+      section.lamp.push_back(view.lamp_light(view.azimuth(x_m), facing_rad));
     }
     x_m += 1 / px_per_m;
   }
@@ -161,7 +181,9 @@ std::array<double, 3> shaft_light(const SeamView& view, double blur_px) {
   return light;
 }
 
-constexpr int seam_colors = 5;  // left, its shading, right, its shading, the shaft
+// The bands' and, beyond what the lamp does, their shading; the shaft's; the highlights'.
+enum SeamColor : int { left_band, left_shading, right_band, right_shading, bare_shaft, first_gloss };
+constexpr int seam_colors = first_gloss + static_cast<int>(gloss_exponents.size());
 using SeamBasis = Eigen::Matrix<double, Eigen::Dynamic, seam_colors>;
 
 // How much of each colour a sample shows when the upper edge lies at `upper_m` and the other one `gap_m` before it.
@@ -179,7 +201,10 @@ SeamBasis basis_of(const Section& section, double upper_m, double gap_m, double 
   for (Eigen::Index i = 0; i < samples; ++i) {
     const double x = section.x_m[static_cast<std::size_t>(i)], turn = x / radius_m;
     const double left = normal_cdf((lower_m - x) * per_lower), right = normal_cdf((x - upper_m) * per_upper);
-    basis.row(i) << left, left * turn, right, right * turn, 1 - left - right;
+    const LampLight& lamp = section.lamp[static_cast<std::size_t>(i)];
+    basis.row(i).head<first_gloss>() << left * lamp.matt, left * lamp.matt * turn, right * lamp.matt,
+        right * lamp.matt * turn, 1 - left - right;
+    for (std::size_t k = 0; k < lamp.gloss.size(); ++k) basis(i, first_gloss + static_cast<int>(k)) = lamp.gloss[k];
   }
   return basis;
 }
@@ -204,27 +229,29 @@ Eigen::VectorXd light_of(const Profile& profile, std::size_t channel, const Eige
 using SeamColors = Eigen::Matrix<double, seam_colors, 1>;
 
 // The colours that fit a profile's light best. In units of a hundredth of white: shading over a radian is of the
-// light's size, the shaft's light is known to a third.
+// light's size, highlights are up to a third of white, the shaft's light is known to a third.
 class ColorFit {
  public:
   ColorFit(const SeamBasis& basis, const Eigen::VectorXd& used)
       : weighted_(basis.transpose() * used.asDiagonal()), information_(weighted_.lazyProduct(basis)) {
-    information_(1, 1) += unit * unit, information_(3, 3) += unit * unit;
-    information_(0, 0) += 1e-9, information_(2, 2) += 1e-9;
+    for (const int shading : {left_shading, right_shading}) information_(shading, shading) += unit * unit;
+    for (const int band : {left_band, right_band}) information_(band, band) += 1e-9;
+    constexpr double by_gloss = unit / gloss_sigma;
+    for (int gloss = first_gloss; gloss < seam_colors; ++gloss) information_(gloss, gloss) += by_gloss * by_gloss;
   }
 
   SeamColors colors(const Eigen::VectorXd& light, double shaft) const {
     const double shaft_sigma = 0.3 * shaft + 0.005, weight = unit * unit / (shaft_sigma * shaft_sigma);
     SeamInformation information = information_;
     SeamColors gradient = weighted_.lazyProduct(light);
-    information(4, 4) += weight;
-    gradient[4] += shaft * weight;
+    information(bare_shaft, bare_shaft) += weight;
+    gradient[bare_shaft] += shaft * weight;
     return solve_symmetric(information, gradient);
   }
 
  private:
   using SeamInformation = Eigen::Matrix<double, seam_colors, seam_colors>;
-  static constexpr double unit = 0.01;
+  static constexpr double unit = 0.01, gloss_sigma = 0.3;
 
   Eigen::Matrix<double, seam_colors, Eigen::Dynamic> weighted_;
   SeamInformation information_;

@@ -12,19 +12,19 @@
 namespace lapservo::internal {
 namespace {
 
-// A print with a gap whose middle faces the camera.
+// A print with a gap whose middle lies `beside_rad` around the shaft from where it faces the camera.
 struct GapShot {
   Rig rig = scenes::usual_rig();
   JointVector q;
   cv::Mat bgr;
 
-  explicit GapShot(std::uint64_t seed) {
+  explicit GapShot(std::uint64_t seed, double beside_rad = 0, double steepest_rad = 0.35) {
     Marker& marker = rig.instruments[0].marker;
     marker.gap_rad = 1e-3 / marker.radius_m();
     Random random(seed);
-    q = scenes::random_configuration(rig, 0, random);
+    q = scenes::random_configuration(rig, 0, random, steepest_rad);
     const auto view = view_cylinder(scenes::pose_of(rig, 0, q).camera_from_unrolled, marker.radius_m());
-    q.psi_rad = view.value().facing_azimuth_rad - marker.seam_rad + marker.gap_rad / 2;
+    q.psi_rad = view.value().facing_azimuth_rad - marker.seam_rad + marker.gap_rad / 2 + beside_rad;
     bgr = scenes::render(rig, {q}, seed);
   }
   std::optional<SeamEdges> seam(const cv::Mat& picture, const std::optional<PictureProcessing>& processing) const {
@@ -56,6 +56,26 @@ TEST(SeamEdges, LieWhereTheyDoWithoutSharpening) {
   ASSERT_GE(seen, 5);
   EXPECT_LT(moved_rad / seen, -1e-3) << "or sharpening moves nothing";
   EXPECT_LT(std::abs(left_rad), 0.4 * std::abs(moved_rad));
+}
+
+// A highlight is on the generatrix that faces the camera, and bands get darker from there.
+TEST(SeamEdges, LieWhereTheyAreBesideHighlights) {
+  for (const bool upper : {true, false}) {
+    double sum_px = 0;
+    int seen = 0;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      constexpr double glaring_rad = 0.1;
+      const double beside_rad = 0.1 + 0.02 * static_cast<double>(seed);
+      const GapShot shot(seed, upper ? -beside_rad : beside_rad, glaring_rad);
+      const auto seam = shot.seam(shot.bgr, std::nullopt);
+      if (!seam) continue;
+      const auto& edge = upper ? seam->upper : seam->lower;
+      if (!edge) continue;
+      sum_px += edge->row[edge->row.size() - 1] > 0 ? edge->residual_px : -edge->residual_px, ++seen;
+    }
+    ASSERT_GE(seen, 8);
+    EXPECT_LT(std::abs(sum_px / seen), 0.03) << (upper ? "upper" : "lower");
+  }
 }
 
 // What compression does to a seam is alike along the shaft.
