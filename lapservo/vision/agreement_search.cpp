@@ -62,7 +62,7 @@ double AgreementSearch::score_at(const Scene& scene, const Climb& climb, const E
   return unknowns ? explained_area_px2(scene, unknowns->pose(), climb.with_rotation()) : -1e9;
 }
 
-// Tries the axes and random tried_directions both ways and keeps what is better; whether anything was.
+// Tries the axes and random directions both ways and keeps what is better; whether anything was.
 bool AgreementSearch::move(const Scene& scene, Climb& climb, WorkBudget& budget) {
   bool moved = false;
   const int axes = climb.with_rotation() ? 4 : 3;

@@ -84,7 +84,7 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
   const double moved_px = std::sqrt(bias_squares_px2);
   errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
   const double beyond_usual_px = std::max(0.0, sigma_px - limits.usual_sigma_px);
-  const double processed_px = left_of_corrected * moved_px;
+  const double processed_px = (processed ? limits.doubted_of_processing : 1) * moved_px;
   const double moved_or_noisy_px = std::hypot(limits.doubted_of_sigma * beyond_usual_px, processed_px);
   errors.doubt.boundary_px = std::hypot(moved_or_noisy_px, limits.doubted_boundary_of_blur * beyond_px);
   errors.doubt.tilt_px = std::hypot(moved_or_noisy_px, limits.doubted_tilt_of_blur * beyond_px);

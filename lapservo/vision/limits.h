@@ -52,7 +52,7 @@ struct SearchCosts {
   double initial_poses = 200;                     ///< of one blob
   double bands_in_order = 60, rcm_starts = 1000;  ///< the same, by lines through the RCM
   double agreement = 20;                          ///< of one pose with the frame's colours (median: 13)
-  double fit_to_result = 2200;                    ///< some 70 of these and a fine fit (median: 1400)
+  double fit_to_result = 4500;                    ///< some 140 of these (most 270) and a fine fit
   double blobs_per_px = 1.2e-4;
   double part_beside = 0.6;  ///< of the budget where every sample is asked whether another instrument hides it
   double cover = 600;        ///< where one instrument lies, for who looks for another beside or behind it
@@ -130,6 +130,8 @@ struct FineFitLimits {
   /// moves them by doubted_processing_px (rms) doubles the noise where a hidden boundary's print is asked for, and what
   /// `calibrate marker` says.
   double fraction_of_processing = 0.25, doubted_processing_px = 0.1;
+  /// And what of that is doubted before the print is blamed: of exact prints 0 to 0.1 px of 0.3 to 0.7 px are left.
+  double doubted_of_processing = 0.12;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
   double usual_misfit = 0.004, px_per_misfit = 8;
   /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
@@ -165,9 +167,9 @@ struct ProcessingLimits {
   /// Of a value, and of what is left without any processing: blood, highlights and noise are not explained by it (0.87
   /// and more), processing is (0.2 to 0.7).
   double max_misfit = 0.013, max_misfit_fraction = 0.8;
-  /// What no processing explains so well has none: 0.003 to 0.0045 are left of rendered frames without any (a response
-  /// that is Rec. 709's and not the rig's among them, which saturation would explain, wrongly), 0.005 and more of those
-  /// with some.
+  /// What no processing explains so well has none: 0.002 to 0.006 are left of rendered frames without any (a response
+  /// that is Rec. 709's and not the rig's among them, which saturation would explain, wrongly), 0.0035 and
+  /// more of those with some. What is taken for none by this is off by little, and sigma holds (0.3 to 0.9).
   double max_misfit_of_none = 0.0048;
   int min_places = 8;  ///< of a boundary, else it tells more noise than shape
   int min_boundaries = 3;
@@ -244,8 +246,8 @@ struct ValidationLimits {
   int confirmed_lines = 3;
   /// Located fraction above which that is not asked where both inner boundaries show on missed_fraction of their lines.
   double hardly_hidden = 0.75;
-  /// A processing that moves a boundary by more scatters points beyond their sigmas: of clipped colours (moved by 0.4 to
-  /// 0.8 px, JPEG by up to 0.3) 0.55 are located with nothing hidden.
+  /// A processing that moves a boundary by more scatters points beyond their sigmas: of clipped colours (moved by 0.4
+  /// to 0.8 px, JPEG by up to 0.3) 0.55 are located with nothing hidden.
   double scattering_processing_px = 0.35;
   double max_spilled = 0.12;  ///< of the ring beyond an end, with that end's colour: the end is elsewhere
   /// And where both ends are located on so much of their lines (2 of the 18).

@@ -325,7 +325,7 @@ Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool p
   if (is_mismatch) hidden_.done = true;
   if (hidden_.done) return seen;
   Found found = hidden(frame, budget);
-  return found.fit ? found : seen;
+  return found.fit || found.status == Status::ambiguous ? found : seen;
 }
 
 Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {

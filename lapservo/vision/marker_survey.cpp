@@ -22,7 +22,9 @@ namespace {
 constexpr double min_matching = 0.6, max_wrong = 0.15, max_beside = 0.2;
 // Where boundaries are measured, what blurs luma is light's blur: libx264 hardly blurs it after the response, but a fit
 // of its wide and ragged blur of colour differences takes some, and then moves e2 by 0.155 px for 0.1.
-constexpr double least_sharpening = 0;
+// A gradient of light is taken for none: of a turn they cancel, and what a fit of one video picture gives for it moves
+// boundaries by more than it does (psi by -2.5 mrad).
+constexpr ExpectedPicture expected_picture{.least_sharpening = 0, .gradient_sigma_per_px = 0.001};
 
 std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unknowns, const EdgeBlur& blur,
                                     bool settled) {
@@ -152,7 +154,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   measured.edges =
       measure_edges(scene, light, sighting.unknowns, sighting.film_m, {reach.extra_px, iterations, 1}, sighting.blur);
   if (reach.ask_processing)
-    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px, least_sharpening);
+    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px, expected_picture);
   const auto& processed = measured.processing.edges;
   if (const auto cylinder = view_cylinder(sighting.unknowns.pose().camera_from_unrolled, marker.radius_m());
       processed && cylinder)

@@ -45,13 +45,13 @@ ProcessingVector sigmas_of_none() {
   return sigmas;
 }
 // What is clipped hides its plateau, so that these are wide.
-EdgeVector edge_sigmas() {
+EdgeVector edge_sigmas(const ExpectedPicture& picture) {
   EdgeVector sigmas = EdgeVector::Constant(0.3);
-  sigmas[edge_gradient] = 0.01;
+  sigmas[edge_gradient] = picture.gradient_sigma_per_px;
   return sigmas;
 }
 
-State expected(std::span<const PooledEdge> edges, double blur_px) {
+State expected_state(std::span<const PooledEdge> edges, double blur_px) {
   constexpr double sharp_px = 1.1, radius_px = 1.2;
   State state;
   state.processing.setZero();
@@ -60,6 +60,7 @@ State expected(std::span<const PooledEdge> edges, double blur_px) {
   state.processing[at(ProcessingUnknown::log_radius)] = std::log(radius_px);
   for (std::size_t k = 0; k < edges.size(); ++k) {
     state.edges[k].setZero();
+    state.edges[k][edge_offset] = edges[k].residual_px;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto& value = edges[k].value[c];
       const auto first = static_cast<std::size_t>(PooledEdge::reach - edges[k].clear_px);
@@ -84,12 +85,13 @@ using ProcessingMatrix = Eigen::Matrix<double, processing_unknowns, processing_u
 class Problem {
  public:
   Problem(const std::array<float, 256>& light_of_value, std::span<const PooledEdge> edges, double blur_px,
-          const ProcessingVector& sigmas, double least_sharpening = least_sharpening_known)
+          const ProcessingVector& sigmas, const ExpectedPicture& picture)
       : model_(light_of_value),
         edges_(edges),
-        prior_(expected(edges, blur_px)),
+        prior_(expected_state(edges, blur_px)),
         certainty_(sigmas.cwiseAbs2().cwiseInverse()),
-        least_sharpening_(least_sharpening) {
+        edge_certainty_(edge_sigmas(picture).cwiseAbs2().cwiseInverse()),
+        least_sharpening_(picture.least_sharpening) {
     std::array<int, 4> places{};
     for (const PooledEdge& edge : edges)
       if (is_seen(edge)) places[edge.boundary] += edge.places;
@@ -127,7 +129,7 @@ class Problem {
   double cost(const State& state) const {
     double sum = (state.processing - prior_.processing).cwiseAbs2().dot(certainty_);
     for (std::size_t k = 0; k < edges_.size(); ++k)
-      sum += (state.edges[k] - prior_.edges[k]).cwiseQuotient(edge_sigmas()).squaredNorm();
+      sum += (state.edges[k] - prior_.edges[k]).cwiseAbs2().dot(edge_certainty_);
     for_each_missed(state, [&](std::size_t k, const EdgeSamples& missed) {
       sum += weight_[k] / (value_sigma * value_sigma) * static_cast<double>(missed.squaredNorm());
     });
@@ -194,15 +196,14 @@ class Problem {
         square(a, b) = square(b, a) = certainty * static_cast<double>(jacobian.col(a).dot(jacobian.col(b)));
     const Eigen::Matrix<double, both, 1> pull =
         certainty * jacobian.transpose().lazyProduct(miss).template cast<double>();
-    const EdgeVector own_certainty = edge_sigmas().cwiseAbs2().cwiseInverse();
     Eigen::Matrix<double, edge_unknowns, edge_unknowns> of_own =
         square.template bottomRightCorner<edge_unknowns, edge_unknowns>();
     of_own.diagonal() *= 1 + damping;
-    of_own.diagonal() += own_certainty;
+    of_own.diagonal() += edge_certainty_;
     Block block;
     block.inverse = of_own.llt().solve(Eigen::Matrix<double, edge_unknowns, edge_unknowns>::Identity());
     block.cross = square.template topRightCorner<processing_unknowns, edge_unknowns>();
-    block.gradient = pull.template tail<edge_unknowns>() + (prior_.edges[k] - edge).cwiseProduct(own_certainty);
+    block.gradient = pull.template tail<edge_unknowns>() + (prior_.edges[k] - edge).cwiseProduct(edge_certainty_);
     const Eigen::Matrix<double, processing_unknowns, edge_unknowns> through = block.cross * block.inverse;
     information +=
         square.template topLeftCorner<processing_unknowns, processing_unknowns>() - through * block.cross.transpose();
@@ -214,6 +215,7 @@ class Problem {
   std::span<const PooledEdge> edges_;
   State prior_;
   ProcessingVector certainty_;
+  EdgeVector edge_certainty_;
   double least_sharpening_;
   std::array<double, most_edges> weight_;                  // an edge's share of its boundary's places
   std::array<EdgeSamples, most_edges> measured_, usable_;  // usable: 1 or 0
@@ -262,16 +264,16 @@ std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light
                                              double blur_px) {
   const std::span<const PooledEdge> all(edges.all.begin(), edges.all.size());
   if (!is_enough(all)) return std::nullopt;
-  const Problem problem(light_of_value, all, blur_px, expected_sigmas());
+  const Problem problem(light_of_value, all, blur_px, expected_sigmas(), {});
   return processing_of(problem.improved(problem.prior(), 0).processing);
 }
 
 std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
-                                      double blur_px, double least_sharpening) {
+                                      double blur_px, const ExpectedPicture& expected) {
   const std::span<const PooledEdge> all(edges.all.begin(), edges.all.size());
   if (!is_enough(all)) return std::nullopt;
-  const Problem problem(light_of_value, all, blur_px, expected_sigmas(), least_sharpening);
-  const Problem without(light_of_value, all, blur_px, sigmas_of_none());
+  const Problem problem(light_of_value, all, blur_px, expected_sigmas(), expected);
+  const Problem without(light_of_value, all, blur_px, sigmas_of_none(), expected);
   const State state = minimised(problem);
   ProcessedEdges out;
   out.processing = processing_of(state.processing);
@@ -303,7 +305,7 @@ std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges) {
 }
 
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
-                                   double least_sharpening) {
+                                   const ExpectedPicture& expected) {
   constexpr Look glance{12, 1, false}, look{EdgeMeasurements::max_lines, max_brightness_levels, true};
   if (blur_px > processing_limits.max_blur_px) return {};
   const auto& light_of_value = light.light_of_value();
@@ -311,7 +313,7 @@ ProcessingEvidence find_processing(const LightImage& light, std::span<const Meas
   if (!guess) return {};
   if (!is_processed(*guess)) return {Processing::none, std::nullopt};
   const PooledEdges edges = pool_edges(light, measurements, look);
-  auto explained = explain(light_of_value, edges, blur_px, least_sharpening);
+  auto explained = explain(light_of_value, edges, blur_px, expected);
   if (!explained) return {};
   for (std::size_t i = 0; i < measurements.size(); ++i)
     if (measurements[i].group < 4 && edges.of_measurement[i] == PooledEdges::nowhere)

@@ -9,8 +9,12 @@
 
 namespace lapservo::internal {
 
-/// Below 0 luma is blurred after the response: by so much at most.
-inline constexpr double least_sharpening_known = -0.35;
+/// What a picture is expected to be like before it is seen. Below 0 `least_sharpening` is a blur of luma after the
+/// response.
+struct ExpectedPicture {
+  double least_sharpening = -0.35;
+  double gradient_sigma_per_px = 0.01;  ///< of the share by which light grows along a boundary's normal
+};
 
 /// What is to be known of a frame's processing for its boundaries' sake.
 struct ProcessedEdges {
@@ -29,10 +33,10 @@ bool is_processed(const PictureProcessing& processing);
 std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
                                              double blur_px);
 
-/// The likeliest processing, from what all boundaries look like; one that sharpens by `least_sharpening` and more.
+/// The likeliest processing, from what all boundaries look like; such as is expected.
 /// `blur_px` is what fit_step was told. Nullopt when too little was seen.
 std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
-                                      double blur_px, double least_sharpening = least_sharpening_known);
+                                      double blur_px, const ExpectedPicture& expected = {});
 
 /// Whether the frame looks like that rather than like none.
 bool is_believed(const ProcessedEdges& edges);
@@ -50,6 +54,6 @@ struct ProcessingEvidence {
 
 /// Of the boundaries among `measurements`, which fit_step located with `blur_px`.
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
-                                   double least_sharpening = least_sharpening_known);
+                                   const ExpectedPicture& expected = {});
 
 }  // namespace lapservo::internal

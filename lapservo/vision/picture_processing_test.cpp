@@ -101,10 +101,20 @@ TEST(PictureProcessing, MeasurementsAreCorrectedByThoseThatAreAsBright) {
   EXPECT_EQ(explained->measurement_bias_px[8], 0);
 }
 
+// Also where the pose has it elsewhere.
+TEST(PictureProcessing, ABoundaryIsFoundFarFromThePose) {
+  const PictureProcessing processing{.blur_px = 1, .sharpening = 0.7};
+  for (const double offset_px : {-2.0, -1.0, 2.0}) {
+    const auto explained = explain(srgb(), edges_of(processing, offset_px, offset_px + 0.1), 1);
+    ASSERT_TRUE(explained && is_believed(*explained));
+    for (const auto& bias_px : explained->bias_px) EXPECT_NEAR(bias_px.value(), 0.1, 0.02) << offset_px;
+  }
+}
+
 // A blur of luma after the response, where it may be one and where it may not.
 TEST(PictureProcessing, SharpensNoLessThanItMay) {
   const PooledEdges edges = edges_of({.blur_px = 0.9, .chroma_variance_px2 = 2, .sharpening = -0.3}, 0);
-  const auto any = explain(srgb(), edges, 1), none = explain(srgb(), edges, 1, 0);
+  const auto any = explain(srgb(), edges, 1), none = explain(srgb(), edges, 1, {.least_sharpening = 0});
   ASSERT_TRUE(any && none);
   EXPECT_LT(any->processing.sharpening, -0.1);
   EXPECT_GE(none->processing.sharpening, 0);
@@ -150,17 +160,34 @@ TEST(PooledEdges, AverageWhatIsAsBright) {
   std::vector<Measurement> measurements;
   for (const float u : {150.F, 20.F}) {
     Measurement m{};
-    m.group = 2, m.expected_px = {u, 30}, m.normal = {0.6F, 0.8F}, m.clear_px = 6, m.residual_px = u / 100;
+    m.group = 2, m.expected_px = {u, 30}, m.normal = {0.6F, 0.8F}, m.clear_px = 6, m.residual_px = u / 200;
     measurements.insert(measurements.end(), 10, m);
   }
   const PooledEdges edges = pool_edges(light, measurements, {64, 2, false});
   ASSERT_EQ(edges.all.size(), 2U);
   EXPECT_FLOAT_EQ(edges.all[0].value[1][3], 60 / 255.F);
   EXPECT_FLOAT_EQ(edges.all[1].value[1][3], 160 / 255.F);
-  EXPECT_NEAR(edges.all[0].residual_px, 0.2, 1e-6);
+  EXPECT_NEAR(edges.all[0].residual_px, 0.1, 1e-6);
   EXPECT_EQ(edges.of_measurement[0], 1);
   EXPECT_EQ(edges.of_measurement[19], 0);
   EXPECT_EQ(edges.of_measurement[20], PooledEdges::nowhere);
+}
+
+// What was located far from most places is something else, and moves none of them.
+TEST(PooledEdges, LeaveOutWhatLiesElsewhere) {
+  const scenes::Shot& shot = scenes::usual_shot(1);
+  Measurement m{};
+  m.group = 1, m.expected_px = {100, 100}, m.normal = {1, 0}, m.clear_px = 6, m.residual_px = 0.2;
+  std::vector<Measurement> measurements(20, m);
+  for (std::size_t i = 0; i < 5; ++i) measurements[4 * i].residual_px = 3;
+  const PooledEdges edges = pool_edges(shot.sight.light(), measurements, {64, 4, true});
+  int places = 0;
+  for (const PooledEdge& edge : edges.all) {
+    EXPECT_NEAR(edge.residual_px, 0.2, 1e-9);
+    places += edge.places;
+  }
+  EXPECT_EQ(places, 15);
+  EXPECT_EQ(edges.of_measurement[4], PooledEdges::nowhere);
 }
 
 // What is linear exactly.

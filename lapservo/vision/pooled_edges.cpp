@@ -1,8 +1,10 @@
 #include "lapservo/vision/pooled_edges.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 
+#include "lapservo/core/median.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -77,15 +79,27 @@ std::array<Located, 4> located_on(std::span<const Measurement> measurements) {
   return located;
 }
 
+// Beyond this from most of a boundary's places something else was located.
+constexpr double farthest_px = 1;
+
+double median_residual_px(const Located& located, std::span<const Measurement> measurements) {
+  InplaceVector<double, EdgeMeasurements::max_lines> residuals_px;
+  for (const std::size_t i : located) residuals_px.push_back(measurements[i].residual_px);
+  return residuals_px.empty() ? 0 : median(residuals_px);
+}
+
 // Places of a boundary, spread evenly over all that were located.
 Places places_of(const Located& located, const LightImage& light, std::span<const Measurement> measurements,
                  const Look& look) {
   const int count = static_cast<int>(located.size());
+  const bool glances = look.levels == 1;  // which is to cost little
+  const double middle_px = glances ? 0 : median_residual_px(located, measurements);
   Places places;
   int seen = 0;
   for (const std::size_t i : located) {
     if (seen++ * look.places % std::max(count, look.places) >= look.places) continue;
     const Measurement& m = measurements[i];
+    if (!glances && std::abs(m.residual_px - middle_px) > farthest_px) continue;
     const Eigen::Vector2f reach = static_cast<float>(PooledEdge::reach) * m.normal;
     const Eigen::Vector2f first = m.expected_px - reach, last = m.expected_px + reach;
     if (!light.contains(first.cast<double>()) || !light.contains(last.cast<double>())) continue;

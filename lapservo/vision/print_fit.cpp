@@ -243,7 +243,9 @@ double inner_off_mm(const PrintInformation& print, double doubt_scale) {
   for (const int at : {1, 3}) {
     const double certainty = std::max(print.information.block<2, 2>(at, at).sum(), 1e-6);
     const double shift_mm = print.gradient.segment<2>(at).sum() / certainty;
-    off_mm = std::max(off_mm, std::abs(shift_mm) + print_limits.off_sigmas * doubt_scale / std::sqrt(certainty));
+    const double here_mm = std::abs(shift_mm) + print_limits.off_sigmas * doubt_scale / std::sqrt(certainty);
+    if (!std::isfinite(here_mm)) return 1e3;
+    off_mm = std::max(off_mm, here_mm);
   }
   return off_mm;
 }

@@ -82,10 +82,10 @@ struct SeamView {
   LampLight lamp_light(double azimuth_rad, double facing_rad) const {
     constexpr double least_matt = 0.05;  // so that shading can make up for other lamps
     const Eigen::Vector3d to_camera = -point(azimuth_rad, marker().length_m() / 2).normalized();
-    LampLight light{std::max(least_matt, outwards(azimuth_rad).dot(to_camera)), {}};
+    LampLight lamp{std::max(least_matt, outwards(azimuth_rad).dot(to_camera)), {}};
     const double cosine = std::max(0.0, std::cos(azimuth_rad - facing_rad));
-    for (std::size_t i = 0; i < light.gloss.size(); ++i) light.gloss[i] = std::pow(cosine, gloss_exponents[i]);
-    return light;
+    for (std::size_t i = 0; i < lamp.gloss.size(); ++i) lamp.gloss[i] = std::pow(cosine, gloss_exponents[i]);
+    return lamp;
   }
 };
 

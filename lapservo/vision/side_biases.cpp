@@ -81,9 +81,9 @@ EdgeProfile processed_profile(const EdgeProfile& like, const ContourColors& colo
   return profile;
 }
 
-// The light's own blur at the sides, as lines show it: motion may widen it there, the processing widens it as it does at
-// boundaries. Lines are sampled linearly between pixels, which blurs by 1/6 px^2 on average; the processing's blur of
-// light is without that.
+// The light's own blur at the sides, as lines show it: motion may widen it there, the processing widens it as it does
+// at boundaries. Lines are sampled linearly between pixels, which blurs by 1/6 px^2 on average; the processing's blur
+// of light is without that.
 double light_blur_px(const EdgeBlur& blur, const PictureProcessing& processing) {
   constexpr double linear_sampling_px2 = 1.0 / 6;
   const double by_processing_px2 =

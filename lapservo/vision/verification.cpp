@@ -63,8 +63,8 @@ bool is_the_markers(const Scene& scene, const FineFit& fit, std::size_t boundary
          lines_with_both_colors(scene, fit.unknowns.pose(), boundary, fit.lines) >= limits.confirmed_lines;
 }
 
-// Whether points are missed since the camera's processing scatters them, as clipped colours do, and not since blood hides
-// them.
+// Whether points are missed since the camera's processing scatters them, as clipped colours do, and not since blood
+// hides them.
 bool is_scattered(const FineFit& fit) {
   const auto& moved_px = fit.bias_px;
   return fit.processing == Processing::found &&
