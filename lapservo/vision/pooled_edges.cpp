@@ -11,12 +11,12 @@ namespace lapservo::internal {
 namespace {
 
 // One place of a boundary.
-struct Place {
+struct EdgePlace {
   std::array<std::array<float, PooledEdge::samples>, 3> value;
   float brightness = 0;
   std::size_t measurement = 0;
 };
-using Places = InplaceVector<Place, EdgeMeasurements::max_lines>;
+using EdgePlaces = InplaceVector<EdgePlace, EdgeMeasurements::max_lines>;
 
 // Weights of four pixels in a row for a place a fraction of a pixel beyond the second: cubic convolution (Keys, 1981).
 std::array<float, 4> cubic_weights(float f) {
@@ -26,7 +26,7 @@ std::array<float, 4> cubic_weights(float f) {
 
 // Encoded values of some channels at a place: as linear as the filters that cameras apply to them.
 template <std::size_t First, std::size_t Last>
-void sample_cubic(const ImageView& image, float u, float v, std::size_t sample, Place& place) {
+void sample_cubic(const ImageView& image, float u, float v, std::size_t sample, EdgePlace& place) {
   const int iu = static_cast<int>(u), iv = static_cast<int>(v);
   const auto across = cubic_weights(u - static_cast<float>(iu)), down = cubic_weights(v - static_cast<float>(iv));
   std::array<float, 3> sum{};
@@ -41,7 +41,7 @@ void sample_cubic(const ImageView& image, float u, float v, std::size_t sample, 
 }
 
 template <std::size_t First, std::size_t Last>
-void sample_linear(const ImageView& image, float u, float v, std::size_t sample, Place& place) {
+void sample_linear(const ImageView& image, float u, float v, std::size_t sample, EdgePlace& place) {
   const int iu = static_cast<int>(u), iv = static_cast<int>(v);
   const float fu = u - static_cast<float>(iu), fv = v - static_cast<float>(iv);
   const float w11 = fu * fv, w01 = fu - w11, w10 = fv - w11, w00 = 1 - fu - w10;
@@ -53,12 +53,12 @@ void sample_linear(const ImageView& image, float u, float v, std::size_t sample,
 }
 
 template <std::size_t First, std::size_t Last>
-void sample_at(const ImageView& image, float u, float v, bool cubic, std::size_t sample, Place& place) {
+void sample_at(const ImageView& image, float u, float v, bool cubic, std::size_t sample, EdgePlace& place) {
   cubic ? sample_cubic<First, Last>(image, u, v, sample, place)
         : sample_linear<First, Last>(image, u, v, sample, place);
 }
 
-void sample_at(const LightImage& light, const Eigen::Vector2f& at, bool cubic, std::size_t sample, Place& place) {
+void sample_at(const LightImage& light, const Eigen::Vector2f& at, bool cubic, std::size_t sample, EdgePlace& place) {
   const ImageView& image = light.image();
   const ChannelGeometry& channels = light.channels();
   if (!channels.differs()) return sample_at<0, 3>(image, at.x(), at.y(), cubic, sample, place);
@@ -89,12 +89,12 @@ double median_residual_px(const Located& located, std::span<const Measurement> m
 }
 
 // Places of a boundary, spread evenly over all that were located.
-Places places_of(const Located& located, const LightImage& light, std::span<const Measurement> measurements,
-                 const Look& look) {
+EdgePlaces places_of(const Located& located, const LightImage& light, std::span<const Measurement> measurements,
+                     const Look& look) {
   const int count = static_cast<int>(located.size());
   const bool glances = look.levels == 1;  // which is to cost little
   const double middle_px = glances ? 0 : median_residual_px(located, measurements);
-  Places places;
+  EdgePlaces places;
   int seen = 0;
   for (const std::size_t i : located) {
     if (seen++ * look.places % std::max(count, look.places) >= look.places) continue;
@@ -103,7 +103,7 @@ Places places_of(const Located& located, const LightImage& light, std::span<cons
     const Eigen::Vector2f reach = static_cast<float>(PooledEdge::reach) * m.normal;
     const Eigen::Vector2f first = m.expected_px - reach, last = m.expected_px + reach;
     if (!light.contains(first.cast<double>()) || !light.contains(last.cast<double>())) continue;
-    Place place;
+    EdgePlace place;
     place.measurement = i;
     for (std::size_t k = 0; k < PooledEdge::samples; ++k)
       sample_at(light, first + static_cast<float>(k) * m.normal, look.cubic, k, place);
@@ -114,11 +114,11 @@ Places places_of(const Located& located, const LightImage& light, std::span<cons
   return places;
 }
 
-PooledEdge mean_of(std::span<const Place* const> places, std::span<const Measurement> measurements) {
+PooledEdge mean_of(std::span<const EdgePlace* const> places, std::span<const Measurement> measurements) {
   PooledEdge edge;
   edge.places = static_cast<int>(places.size());
   const float part = 1 / static_cast<float>(255 * edge.places);
-  for (const Place* place : places) {
+  for (const EdgePlace* place : places) {
     const Measurement& m = measurements[place->measurement];
     edge.boundary = m.group;
     edge.residual_px += m.residual_px / edge.places;
@@ -134,19 +134,19 @@ PooledEdge mean_of(std::span<const Place* const> places, std::span<const Measure
 PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, const Look& look) {
   PooledEdges edges;
   for (const Located& located : located_on(measurements)) {
-    const Places places = places_of(located, light, measurements, look);
-    InplaceVector<const Place*, EdgeMeasurements::max_lines> darkest_first;
-    for (const Place& place : places) darkest_first.push_back(&place);
+    const EdgePlaces places = places_of(located, light, measurements, look);
+    InplaceVector<const EdgePlace*, EdgeMeasurements::max_lines> darkest_first;
+    for (const EdgePlace& place : places) darkest_first.push_back(&place);
     const std::size_t count =
         std::clamp<std::size_t>(places.size() / static_cast<std::size_t>(processing_limits.min_places), 1,
                                 static_cast<std::size_t>(look.levels));
     if (count > 1)
       std::sort(darkest_first.begin(), darkest_first.end(),
-                [](const Place* a, const Place* b) { return a->brightness < b->brightness; });
+                [](const EdgePlace* a, const EdgePlace* b) { return a->brightness < b->brightness; });
     for (std::size_t level = 0; level < count && !places.empty(); ++level) {
       const std::size_t first = level * places.size() / count, last = (level + 1) * places.size() / count;
-      const std::span<const Place* const> alike(darkest_first.begin() + first, last - first);
-      for (const Place* place : alike)
+      const std::span<const EdgePlace* const> alike(darkest_first.begin() + first, last - first);
+      for (const EdgePlace* place : alike)
         edges.of_measurement[place->measurement] = static_cast<std::uint8_t>(edges.all.size());
       edges.all.push_back(mean_of(alike, measurements));
     }
