@@ -38,7 +38,7 @@ class Pen {
     double along_px = 0;
     for (std::size_t i = 1; i < points.size(); ++i) {
       const Eigen::Vector2d step = points[i] - points[i - 1];
-      const int parts = std::clamp(static_cast<int>(step.norm() / dash_px * 4), 1, max_parts);
+      const int parts = static_cast<int>(std::clamp<double>(step.norm() / dash_px * 4, 1, max_parts));
       for (int part = 0; part < parts; ++part) {
         if (std::fmod(along_px, 2 * dash_px) < dash_px)
           polyline({points[i - 1] + step * part / parts, points[i - 1] + step * (part + 1) / parts}, color);
@@ -69,9 +69,9 @@ class Pen {
     int baseline = 0;
     const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, font_scale, weight, &baseline);
     const int pad = static_cast<int>(5 * scale_);
-    const int x = std::clamp(static_cast<int>(near.x()), pad, std::max(pad, canvas_.cols - size.width - pad));
-    const int y = std::clamp(static_cast<int>(near.y()), size.height + pad,
-                             std::max(size.height + pad, canvas_.rows - baseline - pad));
+    const int right = std::max(pad, canvas_.cols - size.width - pad), top = size.height + pad;
+    const int x = static_cast<int>(std::clamp<double>(near.x(), pad, right));
+    const int y = static_cast<int>(std::clamp<double>(near.y(), top, std::max(top, canvas_.rows - baseline - pad)));
     const cv::Rect box =
         cv::Rect(x - pad, y - size.height - pad, size.width + 2 * pad, size.height + baseline + 2 * pad) &
         cv::Rect(0, 0, canvas_.cols, canvas_.rows);
