@@ -79,5 +79,17 @@ TEST(Overlay, DrawsWhatWasRefused) {
   }
 }
 
+// A pose of which a part lies beside the camera, 1e10 px away.
+TEST(Overlay, DrawsWhatReachesFarBeyondThePicture) {
+  const Rig rig = testing::paper_test_rig();
+  const cv::Mat frame = grey_frame(rig);
+  Observation far;
+  far.status = Status::poor_fit;
+  far.refused.what = What::edges;
+  far.refused.edges_raw_px = seen_at(rig).edges_raw_px;
+  far.refused.edges_raw_px[3] = {3e10, -2e11};
+  EXPECT_GT(drawn_near(frame, draw_overlay(frame, rig, {far}), far.refused.edges_raw_px[0], 12), 10);
+}
+
 }  // namespace
 }  // namespace lapservo::internal
