@@ -52,7 +52,7 @@ struct SearchCosts {
   double initial_poses = 200;                     ///< of one blob
   double bands_in_order = 60, rcm_starts = 1000;  ///< the same, by lines through the RCM
   double agreement = 20;                          ///< of one pose with the frame's colours (median: 13)
-  double fit_to_result = 4500;                    ///< some 140 of these (most 270) and a fine fit
+  double fit_to_result = 7000;                    ///< some 140 of these (at most 270) and a fine fit: the most
   double blobs_per_px = 1.2e-4;
   double part_beside = 0.6;  ///< of the budget where every sample is asked whether another instrument hides it
   double cover = 600;        ///< where one instrument lies, for who looks for another beside or behind it
