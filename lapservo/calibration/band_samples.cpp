@@ -21,8 +21,7 @@ std::vector<BandSample> band_samples(const cv::Mat& bgr, const Camera& camera, c
   const double px_per_m = camera.fx_px / std::max(1e-3, pose.camera_from_unrolled.translation.z());
   const double clear_m = clear_px / px_per_m;
   for (int i = 0; i < azimuths; ++i) {
-    const double azimuth_rad =
-        view->facing_azimuth_rad + reach * view->half_visible_rad * (2.0 * i / (azimuths - 1) - 1);
+    const double azimuth_rad = visible_azimuth_rad(*view, reach, i, azimuths);
     const double tau_rad = marker_azimuth_rad(marker, azimuth_rad, pose.psi_rad);
     if (distance_to_seam_rad(marker, tau_rad) * marker.radius_m() < clear_m) continue;
     const auto ends_m = boundaries_m(marker, tau_rad);

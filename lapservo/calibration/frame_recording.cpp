@@ -1,23 +1,14 @@
 #include "lapservo/calibration/frame_recording.h"
 
 #include <algorithm>
-#include <filesystem>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/core/lower_case.h"
+#include "lapservo/io/image_encoding.h"
 #include "lapservo/vision/interlacing.h"
 
 namespace lapservo::internal {
-namespace {
-
-bool is_jpeg(const std::filesystem::path& file) {
-  const std::string extension = lower_case(file.extension().string());
-  return extension == ".jpg" || extension == ".jpeg";
-}
-
-}  // namespace
 
 std::string FramesRead::damaged() const {
   return flawed ? fmt::format(" ({} are damaged)", flawed) : "";
@@ -48,7 +39,7 @@ FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int ever
       continue;
     }
     ++frames.looked_at;
-    frames.jpegs += is_jpeg(frame->file) ? 1 : 0;
+    frames.jpegs += has_jpeg_extension(frame->file) ? 1 : 0;
     watch.tell(source.frame_count(), read,
                look(deinterlace ? field.of(frame->bgr).clone() : frame->bgr, frame->time_s));
   }

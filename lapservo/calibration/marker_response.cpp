@@ -33,7 +33,7 @@ std::vector<Place> places_of(const Camera& camera, const Marker& marker, const S
   const auto view = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
   if (!view) return places;
   for (int i = 0; i < lines; ++i) {
-    const double azimuth_rad = view->facing_azimuth_rad + reach * view->half_visible_rad * (2.0 * i / (lines - 1) - 1);
+    const double azimuth_rad = visible_azimuth_rad(*view, reach, i, lines);
     const double tau_rad = marker_azimuth_rad(marker, azimuth_rad, pose.psi_rad);
     if (distance_to_seam_rad(marker, tau_rad) * marker.radius_m() < seam_m) continue;
     const auto ends_m = boundaries_m(marker, tau_rad);

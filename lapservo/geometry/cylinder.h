@@ -20,6 +20,12 @@ struct CylinderView {
 /// nullopt when the camera centre lies inside the (infinite) cylinder.
 std::optional<CylinderView> view_cylinder(const Rigid3& camera_from_cylinder, double radius_m);
 
+/// The i-th of `count` azimuths that lie evenly over the fraction `reach` of what is visible, its ends included.
+inline double visible_azimuth_rad(const CylinderView& view, double reach, int i, int count) {
+  const double across = count > 1 ? 2.0 * i / (count - 1) - 1 : -1;
+  return view.facing_azimuth_rad + reach * view.half_visible_rad * across;
+}
+
 /// Point on the surface, in the cylinder's frame.
 inline Eigen::Vector3d surface_point(double radius_m, double azimuth_rad, double along_m) {
   return {radius_m * std::cos(azimuth_rad), radius_m * std::sin(azimuth_rad), along_m};

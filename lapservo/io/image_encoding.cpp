@@ -13,15 +13,23 @@ namespace fs = std::filesystem;
 
 namespace {
 
+bool is_jpeg_extension(const std::string& extension) {
+  return extension == ".jpg" || extension == ".jpeg";
+}
+
 std::vector<std::uint8_t> encoded_as(const std::string& extension, const cv::Mat& image) {
   if (extension == ".png") return encode_png(image);
-  if (extension == ".jpg" || extension == ".jpeg") return encode_jpeg(image);
+  if (is_jpeg_extension(extension)) return encode_jpeg(image);
   const bool takes = !image.empty() && image.depth() == CV_8U;
   if (extension == ".webp" && takes) return encode_webp(bgr8_from(image, "picture"));
   return libav_encode(extension, image);
 }
 
 }  // namespace
+
+bool has_jpeg_extension(const fs::path& name) {
+  return is_jpeg_extension(lower_case(name.extension().string()));
+}
 
 std::vector<std::uint8_t> encode_image(const fs::path& name, const cv::Mat& image) {
   const std::string extension = lower_case(name.extension().string());

@@ -9,11 +9,6 @@
 namespace lapservo::internal {
 namespace {
 
-// The i-th of some azimuths that lie evenly over this fraction of what is visible.
-double visible_azimuth_rad(const CylinderView& view, double reach, int i, int count) {
-  return view.facing_azimuth_rad + reach * view.half_visible_rad * (2.0 * i / std::max(1, count - 1) - 1);
-}
-
 // In the image along the shaft, about where it lies on the marker.
 double along_px_per_m(const Scene& scene, const ShaftPose& pose, double azimuth_rad, double along_m) {
   constexpr double step_m = 0.5e-3;

@@ -109,8 +109,7 @@ double explained_area_px2(const Scene& scene, const ShaftPose& pose, bool turned
   if (!turned) bands = bands_of_whole_turn(scene.marker);
   double gained = 0;
   for (int i = 0; i < lines; ++i) {
-    const double azimuth_rad =
-        view->facing_azimuth_rad + line_reach * view->half_visible_rad * (2.0 * i / (lines - 1) - 1);
+    const double azimuth_rad = visible_azimuth_rad(*view, line_reach, i, lines);
     if (turned) bands = bands_at(scene.marker, marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad));
     const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(radius_m, azimuth_rad, 0);
     for (int k = -beyond; k < places_along + beyond; ++k) {

@@ -64,14 +64,13 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
                          limits.side_of_blur * beyond_px2(blur.sides_px, limits.usual_side_blur_px) / pass.radius_px;
   const double unexplained = processed ? std::max(0.0, processed->misfit - limits.usual_misfit) : 0;
   const double unexplained_px = limits.px_per_misfit * unexplained;
-  const double left_of_corrected = processed ? limits.fraction_of_processing : 1;
   CommonErrors errors;
   double bias_squares_px2 = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     const double boundary_px = limits.common_boundary_px +
                                limits.common_fraction_of_blur * std::max(0.0, blur.along_px[k] - limits.usual_blur_px);
     const bool corrected = processed && processed->bias_px[k];
-    const double left_px = (corrected ? left_of_corrected : 1) * bias_px[k];
+    const double left_px = (corrected ? limits.fraction_of_processing : 1) * bias_px[k];
     errors.px[k] = std::hypot(boundary_px, left_px, unexplained_px);
     bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
   }

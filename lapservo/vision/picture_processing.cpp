@@ -279,19 +279,20 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
   out.processing = processing_of(state.processing);
   out.misfit = problem.misfit(state);
   out.misfit_without = without.misfit(minimised(without));
+  const auto bias_px = [&](std::size_t k) { return all[k].residual_px - state.edges[k][edge_offset]; };
   std::array<double, 4> places{}, sum_px{};
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (!is_seen(all[k])) continue;
     places[all[k].boundary] += all[k].places;
-    sum_px[all[k].boundary] += all[k].places * (all[k].residual_px - state.edges[k][edge_offset]);
+    sum_px[all[k].boundary] += all[k].places * bias_px(k);
   }
   for (std::size_t k = 0; k < 4; ++k)
     if (places[k] > 0) out.bias_px[k] = sum_px[k] / places[k];
   for (std::size_t i = 0; i < edges.of_measurement.size(); ++i) {
     const std::uint8_t k = edges.of_measurement[i];
     if (k == PooledEdges::nowhere) continue;
-    out.measurement_bias_px[i] = static_cast<float>(is_seen(all[k]) ? all[k].residual_px - state.edges[k][edge_offset]
-                                                                    : out.bias_px[all[k].boundary].value_or(0));
+    out.measurement_bias_px[i] =
+        static_cast<float>(is_seen(all[k]) ? bias_px(k) : out.bias_px[all[k].boundary].value_or(0));
   }
   return out;
 }

@@ -119,7 +119,7 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
   std::array<int, 2> ring{}, spilled{};
   const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
   for (int i = 0; i < azimuths; ++i) {
-    const double azimuth_rad = view->facing_azimuth_rad + 0.8 * view->half_visible_rad * (2.0 * i / (azimuths - 1) - 1);
+    const double azimuth_rad = visible_azimuth_rad(*view, 0.8, i, azimuths);
     const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
     if (scene.marker.gap_rad > 0 && distance_to_seam_rad(scene.marker, tau_rad) * scene.marker.radius_m() < guard_m)
       continue;
