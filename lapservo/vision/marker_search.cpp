@@ -312,6 +312,10 @@ Found MarkerSearch::among_others(const SearchFrame& frame, WorkBudget& budget) {
 
 Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget) {
   Found seen;
+  // Instruments part while hidden markers are looked for, so shared blobs are looked at again by turns with that.
+  if (among_others_.done && !frame.shared.empty() && hidden_.blobs.begun() && !mismatch_among_others_ &&
+      (others_turn_ = !others_turn_))
+    among_others_ = {};
   if (!among_others_.done && !is_mismatch) {
     seen = among_others(frame, budget);
     if (seen.fit || !among_others_.done) return seen;

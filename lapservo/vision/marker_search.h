@@ -75,6 +75,7 @@ class MarkerSearch {
   bool mismatch_among_others_ = false;  // what is there is a print that is off
   bool searches_long_ = false;          // what shows plainly was not found
   bool longs_turn_ = false;
+  bool others_turn_ = false;  // of the long search's: shared blobs again
   std::optional<AgreementSearch> agreement_;
   std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last
   std::optional<FineFit> candidate_;                  // the best so far, while others are looked for
