@@ -1,7 +1,8 @@
 // camera_effects [POSES [SEED [CONDITION...]]]: how well and how honestly the tracker does on pictures as cameras give
 // them, rendered; a row of docs/accuracy.md for each condition, with the camera as calibration would have it and as if
 // nobody had calibrated. A condition's strength is drawn anew for every frame. h264 is a marker in motion, tracked, as
-// a recorder keeps it.
+// a recorder keeps it. LAPSERVO_OFF=1: each frame's print is off in its bands, 2: in an ink that lies aside (random_print.h).
+// LAPSERVO_BLOOD: so much of the marker is hidden [%].
 #include "lapservo/testing/camera_effects.h"
 
 #include <cmath>
@@ -12,7 +13,9 @@
 #include <vector>
 
 #include "acceptance/frame_sets.h"
+#include "acceptance/random_print.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/random.h"
 
 namespace {
 using namespace lapservo;
@@ -31,12 +34,32 @@ void print_row(const std::string& name, const Score& s) {
   std::fflush(stdout);
 }
 
+// Of a print each, off as LAPSERVO_OFF says, which the tracker takes for the rig's. Its seam's error shows in no picture.
+std::vector<TrueFrame> frames_of_off_prints(const RenderedSet& all, Off off) {
+  std::vector<TrueFrame> frames;
+  for (const auto& q : all.configurations) {
+    RenderedSet one = all;
+    one.configurations = {q};
+    one.seed = 100'000 * all.seed + frames.size();
+    Random random(one.seed);
+    Marker& marker = one.rig.instruments[0].marker;
+    marker = off_print(marker, off, random);
+    TrueFrame frame = rendered_frames(one)[0];
+    frame.rig = all.rig;
+    frame.truths[0].q.psi_rad += marker.seam_rad - all.rig.instruments[0].marker.seam_rad;
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
 std::vector<TrueFrame> still_frames(int poses, std::uint64_t seed) {
   RenderedSet set;
   set.rig = example_rig();
   set.configurations = random_configurations(set.rig, poses, seed, steepest_rad);
   set.seed = seed;
-  return rendered_frames(set);
+  set.blood = from_environment("LAPSERVO_BLOOD", 0) / 100.0;
+  const auto off = static_cast<Off>(from_environment("LAPSERVO_OFF", 0));
+  return off == Off::nowhere ? rendered_frames(set) : frames_of_off_prints(set, off);
 }
 
 void score_condition(const std::string& condition, const std::vector<TrueFrame>& frames, std::uint64_t seed) {

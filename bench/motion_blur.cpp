@@ -78,6 +78,12 @@ Drawn moving_print(Off off, Random& random) {
   return drawn;
 }
 
+Drawn small_print(Off off, Random& random) {
+  Drawn drawn = small(11, 14, random);
+  drawn.off = off;
+  return drawn;
+}
+
 Drawn lit_from_aside(Random& random) {
   Drawn drawn = moving(2, 10, random);
   drawn.lit_from_aside = true;
@@ -101,6 +107,8 @@ const std::vector<std::pair<std::string, Draw>>& kinds() {
       {"11-14px_still", [](Random& r) { return small_and_still(11, 14, r); }},
       {"bands_off", [](Random& r) { return moving_print(Off::bands, r); }},
       {"ink_aside", [](Random& r) { return moving_print(Off::middle_ink, r); }},
+      {"small_bands_off", [](Random& r) { return small_print(Off::bands, r); }},
+      {"small_ink_aside", [](Random& r) { return small_print(Off::middle_ink, r); }},
       {"turn_0.05", [](Random& r) { return turning(0.05, false, false, r); }},
       {"turn_0.1", [](Random& r) { return turning(0.1, false, false, r); }},
       {"turn_0.25", [](Random& r) { return turning(0.25, false, false, r); }},

@@ -218,6 +218,12 @@ CameraEffects draw(const std::string& condition, std::uint64_t seed) {
          e = all;
          e.aberration = {1 + magnification / 2, 1 - magnification / 2};
          e.contrast = 0, e.saturation = 1, e.sharpening /= 2, e.subsampled = true, e.jpeg_quality = 85;
+       }},
+      {"strong_tone", [&](CameraEffects& e) { e.contrast = 0.3 + 0.2 * more, e.saturation = 1.3 + 0.4 * more; }},
+      {"processed", [&](CameraEffects& e) {
+         e.mosaic = true, e.contrast = 0.3 + 0.2 * more, e.saturation = 1.3 + 0.4 * more;
+         e.sharpening = all.sharpening / 2, e.sharpening_px = radius_px;
+         e.subsampled = true, e.left_sited = left_sited, e.jpeg_quality = 85;
        }}};
   CameraEffects effects;
   parts.at(condition)(effects);

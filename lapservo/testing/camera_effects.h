@@ -39,7 +39,8 @@ Camera calibrated(const CameraEffects& effects, const Camera& camera);
 /// (many at once).
 const std::vector<std::string>& conditions();
 
-/// One of these, of a strength drawn by the seed. Throws std::out_of_range for another name.
+/// One of these, of a strength drawn by the seed; or strong_tone (contrast 0.3 to 0.5, saturation 1.3 to 1.7), or
+/// processed (this, demosaicing, sharpening, 4:2:0 and JPEG at once). Throws std::out_of_range for another name.
 CameraEffects draw(const std::string& condition, std::uint64_t seed);
 
 }  // namespace lapservo::effects
