@@ -213,6 +213,8 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   fit.print_off_probability = print->off_probability;
   // What the print may add goes by how often prints are off, not by what this picture shows.
   fit.psi_variance_by_print = print->psi_variance_by_print;
+  fit.psi_variance_suspected = print->psi_variance_suspected;
+  fit.suspected_probability = print->suspected_probability;
   fit.psi_variance =
       doubt * doubt * (print->psi_variance - print->psi_variance_by_print) + print->psi_variance_by_print;
   fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;

@@ -144,7 +144,7 @@ struct FineFitLimits {
   /// px in JPEG, 0.09 in H.264, 0.007 in defocus (2 to 3.2 px); their tilts 0.03, 0.08, 0.05; the marker looks shorter
   /// by 0.5 % in defocus. In the dark and in noise nothing is left of it.
   double doubted_of_sigma = 0.8, doubted_length_of_sigma = 0.1;
-  double doubted_tilt_of_blur = 0.05, doubted_length_of_blur = 0.002;
+  double doubted_tilt_of_blur = 0.025, doubted_length_of_blur = 0.001;
   /// And what a processing that a blurred picture can't tell moves boundaries by.
   double doubted_boundary_of_blur = 0.04;
 
@@ -187,10 +187,14 @@ struct PrintLimits {
   /// were taken for exact ones (error / sigma 2.06). Blaming the print by these, a focal length that is off by 3 % was
   /// a print that is off.
   std::array<double, 8> told_fractions{0, 0.04, 0.07, 0.03, 0.006, 0.0016, 0.0008, 0.0004};
+  /// And whether the picture shows that the print is the rig's goes by these: a third are off, by any size. By the
+  /// others a print that is off by 0.1 mm is so rare that a picture which tells nothing passed it for exact. Where such
+  /// are excluded, as in usual pictures, it is the same.
+  std::array<double, 8> suspected_fractions{0, 0.05, 0.05, 0.05, 0.05, 0.05, 0.05, 0.02};
   /// From this size on, inks lie aside. With smaller ones exact prints in small pictures had more sigma, and a wrong
   /// registration was no longer seen.
   double least_ink_aside_mm = 0.06;
-  double min_weight = 1e-6;  ///< less is too unlikely to count
+  double min_weight = 1e-6, min_suspected_weight = 1e-4;  ///< less is too unlikely to count
   double off_sigmas = 3;     ///< beyond what shows, for how far an inner boundary may be off
 };
 inline constexpr PrintLimits print_limits;
@@ -209,6 +213,10 @@ struct ValidationLimits {
   double certainly_off = 0.999;           ///< probability
   /// And of psi as it is told, of which prints that are off are more: in defocus and in the dark they show little.
   double max_sigma_told_rad = 0.04;
+  /// And of psi where a third of all prints are off (suspected_fractions), if the picture makes it no less likely that
+  /// this one is, and its bands were not measured: five sigma. Asked of pictures that tell nothing, too, a tenth of small
+  /// exact markers (radius 11 to 14 px) were refused.
+  double max_sigma_suspected_rad = 0.02, suspected = 0.32;
   /// Times what the rig's tolerance_m adds to the variance: who sets it wants to live with it.
   double tolerance_slack = 1.5;
   double well_seen_fraction = 0.7;  ///< of the boundary points, to blame the print

@@ -312,6 +312,22 @@ class Mixture {
   double weight_ = 0;
 };
 
+// The variance of psi among weighted solutions.
+class PsiSpread {
+ public:
+  explicit PsiSpread(Eigen::Index psi) : psi_(psi) {}
+  void add(const Solution& solution, double weight) {
+    const double psi_rad = solution.step[psi_];
+    weight_ += weight, sum_ += weight * psi_rad;
+    squares_ += weight * (solution.covariance(psi_, psi_) + psi_rad * psi_rad);
+  }
+  double variance() const { return squares_ / weight_ - sum_ / weight_ * (sum_ / weight_); }
+
+ private:
+  Eigen::Index psi_;
+  double weight_ = 0, sum_ = 0, squares_ = 0;
+};
+
 constexpr std::size_t sizes = print_sigmas_mm.size();
 using Weights = std::array<double, sizes + 1>;  // of the tolerated print, and of those that are off by print_sigmas_mm
 
@@ -335,6 +351,10 @@ Weights weights_of(const Weights& gains, const std::array<double, sizes>& fracti
   Weights weights{(1 - std::accumulate(fractions.begin(), fractions.end(), 0.0)) * std::exp(gains[0])};
   for (std::size_t i = 0; i < sizes; ++i) weights[i + 1] = fractions[i] * std::exp(gains[i + 1]);
   return weights;
+}
+
+double off_probability(const Weights& weights) {
+  return 1 - weights[0] / std::accumulate(weights.begin(), weights.end(), 0.0);
 }
 
 }  // namespace
@@ -375,26 +395,35 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   const Weights gains = gains_of(doubted(print, doubted_shapes_mm(errors.doubt, sums, marker)), tolerance_mm);
   const Weights judged_by = weights_of(gains, print_limits.fractions);
   const Weights told_by = weights_of(gains, print_limits.told_fractions);
+  const Weights suspected_by = weights_of(gains, print_limits.suspected_fractions);
+  const int psi = pose_unknowns - 1;
   Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
-  judged.add(*tolerated, judged_by[0]), told.add(*tolerated, told_by[0]);
+  PsiSpread suspected(psi);
+  const auto add = [&](const Solution& solution, std::size_t at) {
+    judged.add(solution, judged_by[at]), told.add(solution, told_by[at]), suspected.add(solution, suspected_by[at]);
+  };
+  add(*tolerated, 0);
   for (std::size_t i = 0; i < sizes; ++i) {
-    if (std::max(judged_by[i + 1], told_by[i + 1]) < print_limits.min_weight) continue;
+    if (std::max(judged_by[i + 1], told_by[i + 1]) < print_limits.min_weight &&
+        suspected_by[i + 1] < print_limits.min_suspected_weight)
+      continue;
     const auto off = solved(sums, prior_of(i, tolerance_mm));
     if (!off) return std::nullopt;
-    judged.add(*off, judged_by[i + 1]), told.add(*off, told_by[i + 1]);
+    add(*off, i + 1);
   }
   const Solution mean = judged.mean();
   for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
-  const int psi = pose_unknowns - 1;
   PrintFit fit;
   fit.step = mean.step;
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
   fit.inner_off_m = inner_off_mm(print, errors.inner_doubt_scale) * mm;
-  fit.off_probability = 1 - judged_by[0] / std::accumulate(judged_by.begin(), judged_by.end(), 0.0);
+  fit.off_probability = off_probability(judged_by);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);
+  fit.suspected_probability = off_probability(suspected_by);
+  fit.psi_variance_suspected = suspected.variance() - tolerated->covariance(psi, psi);
   fit.psi_variance_by_tolerance = tolerated->covariance(psi, psi) - exact->covariance(psi, psi);
   return fit;
 }

@@ -71,11 +71,15 @@ bool is_scattered(const FineFit& fit) {
          *std::max_element(moved_px.begin(), moved_px.end()) > limits.scattering_processing_px;
 }
 
+bool bands_are_measured(const Marker& marker) {
+  return marker.sigmas.bands_upper_m && marker.sigmas.bands_lower_m;
+}
+
 // Whether a print that is off would show. Where one inner boundary is left, its error looks like a turn. One whose
 // bands were measured is not off, and a tolerance of that size is in sigma. Where another instrument hides a part,
 // it is asked even if both inner boundaries show: one of 13000 rows, with blood, was 0.13 rad wrong.
 bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool hidden_by_another) {
-  if (scene.marker.sigmas.bands_upper_m && scene.marker.sigmas.bands_lower_m) return true;
+  if (bands_are_measured(scene.marker)) return true;
   if (scene.marker.tolerance_m >= limits.tolerance_of_prints_m) return true;
   const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) &&
                          std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.missed_fraction;
@@ -90,7 +94,7 @@ bool shows_wholly_among_others(const Scene& scene, const ColorAgreement& agreeme
 }
 
 // Sigma of psi, and whom to blame when it is too large: the print or the picture.
-Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
+Status validate_sigma(const Marker& marker, const FineFit& fit, const ColorAgreement& agreement) {
   const auto squared = [](double x) { return x * x; };
   const bool off = fit.print_off_probability > limits.certainly_off;
   const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
@@ -98,9 +102,14 @@ Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
   const double variance = fit.psi_variance, told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
   if (by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
   const double slack = limits.tolerance_slack * by_tolerance;
-  if (variance < limit + slack && told < told_limit + slack) return Status::ok;
   const bool well_seen = fit.located_fraction() > limits.well_seen_fraction;
-  return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
+  if (!(variance < limit + slack && told < told_limit + slack))
+    return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
+  const double suspected = variance - fit.psi_variance_by_print + fit.psi_variance_suspected;
+  if (fit.suspected_probability < limits.suspected || bands_are_measured(marker) ||
+      suspected < squared(limits.max_sigma_suspected_rad) + slack)
+    return Status::ok;
+  return well_seen ? Status::marker_mismatch : Status::uncertain;
 }
 
 }  // namespace
@@ -215,7 +224,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::uncertain;
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
-  const Status status = validate_sigma(fit, agreement);
+  const Status status = validate_sigma(scene.marker, fit, agreement);
   if (status != Status::ok || would_show_a_print_that_is_off(scene, fit, hidden_by_another)) return status;
   return too_little;
 }
