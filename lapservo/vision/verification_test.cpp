@@ -126,6 +126,73 @@ TEST(Verification, AnInnerBoundaryThatIsHiddenLeavesThePrintInDoubt) {
   }
 }
 
+// A fit of which each boundary was located on so much of its lines.
+FineFit with_located(FineFit fit, double fraction) {
+  fit.in_image.fill(fit.lines);
+  fit.used.fill(static_cast<int>(fraction * fit.lines));
+  return fit;
+}
+
+// Clipped colours scatter points, blood hides them: only then nothing shows whether the print is off.
+TEST(Verification, WhatProcessingScattersIsNotHidden) {
+  const Shot& shot = usual_shot(1);
+  const Scene scene = shot.sight.scene();
+  FineFit scattered = with_located(fit_from_truth(shot), 0.6);
+  scattered.inner_off_m = 3e-4;
+  EXPECT_EQ(validate(scene, scattered), Status::occluded);
+  scattered.processing = Processing::found;
+  scattered.bias_px.fill(0.1);
+  EXPECT_EQ(validate(scene, scattered), Status::occluded) << "so little scatters nothing";
+  scattered.bias_px[1] = 0.5;
+  EXPECT_EQ(validate(scene, scattered), Status::ok);
+  scattered.used[1] = scattered.in_image[1] = scattered.lines / 5;
+  EXPECT_EQ(validate(scene, scattered), Status::occluded) << "hidden as well";
+  scattered = with_located(scattered, 0.6);
+  scattered.processing = Processing::unknown;
+  EXPECT_EQ(validate(scene, scattered), Status::occluded) << "nothing tells that it is processing";
+}
+
+// Blood leaves few boundaries, which agree well; translucent blood leaves them all, which agree worse.
+TEST(Verification, BoundariesMayAgreeWorseWhereAllShow) {
+  const Shot& shot = usual_shot(1);
+  const Scene scene = shot.sight.scene();
+  FineFit fit = with_located(fit_from_truth(shot), 0.6);
+  fit.inlier_rms_sigmas = 1.4;
+  EXPECT_EQ(validate(scene, fit), Status::ok);
+  fit.inlier_rms_sigmas = 1.5;
+  EXPECT_EQ(validate(scene, fit), Status::poor_fit);
+  for (const std::size_t boundary : {0U, 3U}) {
+    FineFit hidden = with_located(fit, 0.6);
+    hidden.used[boundary] = hidden.in_image[boundary] = hidden.lines / 5;
+    hidden.inlier_rms_sigmas = 1.25;
+    EXPECT_EQ(validate(scene, hidden), Status::ok) << "boundary " << boundary;
+    hidden.inlier_rms_sigmas = 1.4;
+    EXPECT_EQ(validate(scene, hidden), Status::poor_fit) << "boundary " << boundary;
+  }
+}
+
+// What a picture neither shows nor excludes may be the print's: psi is not told then, unless its bands were measured.
+TEST(Verification, APrintThatMayWellBeOffIsNotTrusted) {
+  const Shot& shot = usual_shot(1);
+  const FineFit right = fit_from_truth(shot);
+  EXPECT_LT(right.suspected_probability, validation_limits.suspected);
+  EXPECT_LT(right.psi_variance_suspected, 1e-6);
+  FineFit fit = right;
+  fit.suspected_probability = 0.5, fit.psi_variance_suspected = 0.03 * 0.03;
+  EXPECT_EQ(validate(shot.sight.scene(), fit), Status::marker_mismatch);
+  Rig measured = shot.rig;
+  MarkerSigmas& sigmas = measured.instruments[0].marker.sigmas;
+  sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
+  EXPECT_EQ(validate(Sight(measured, shot.bgr).scene(), fit), Status::ok);
+  fit.psi_variance_suspected = 0.01 * 0.01;
+  EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "off, it would make little of psi";
+  fit.psi_variance_suspected = 0.03 * 0.03, fit.suspected_probability = 0.1;
+  EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "the picture says that it is the rig's";
+  fit.suspected_probability = 0.5;
+  const FineFit hidden = with_located(fit, 0.6);
+  EXPECT_EQ(validate(shot.sight.scene(), hidden), Status::uncertain) << "blood is as likely as the print";
+}
+
 TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
   const Shot& shot = usual_shot(1);
   FineFit fit = fit_from_truth(shot);
