@@ -178,7 +178,7 @@ TEST(Verification, APrintThatMayWellBeOffIsNotTrusted) {
   EXPECT_LT(right.suspected_probability, validation_limits.suspected);
   EXPECT_LT(right.psi_variance_suspected, 1e-6);
   FineFit fit = right;
-  fit.suspected_probability = 0.5, fit.psi_variance_suspected = 0.03 * 0.03;
+  fit.suspected_probability = 0.5, fit.psi_variance_suspected = 0.04 * 0.04;
   EXPECT_EQ(validate(shot.sight.scene(), fit), Status::marker_mismatch);
   Rig measured = shot.rig;
   MarkerSigmas& sigmas = measured.instruments[0].marker.sigmas;
@@ -186,7 +186,7 @@ TEST(Verification, APrintThatMayWellBeOffIsNotTrusted) {
   EXPECT_EQ(validate(Sight(measured, shot.bgr).scene(), fit), Status::ok);
   fit.psi_variance_suspected = 0.01 * 0.01;
   EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "off, it would make little of psi";
-  fit.psi_variance_suspected = 0.03 * 0.03, fit.suspected_probability = 0.1;
+  fit.psi_variance_suspected = 0.04 * 0.04, fit.suspected_probability = 0.1;
   EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "the picture says that it is the rig's";
   fit.suspected_probability = 0.5;
   const FineFit hidden = with_located(fit, 0.6);
