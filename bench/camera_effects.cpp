@@ -1,8 +1,8 @@
 // camera_effects [POSES [SEED [CONDITION...]]]: how well and how honestly the tracker does on pictures as cameras give
 // them, rendered; a row of docs/accuracy.md for each condition, with the camera as calibration would have it and as if
 // nobody had calibrated. A condition's strength is drawn anew for every frame. h264 is a marker in motion, tracked, as
-// a recorder keeps it. LAPSERVO_OFF=1: each frame's print is off in its bands, 2: in an ink that lies aside (random_print.h).
-// LAPSERVO_BLOOD: so much of the marker is hidden [%].
+// a recorder keeps it. LAPSERVO_OFF=1: each frame's print is off in its bands, 2: in an ink that lies aside
+// (random_print.h). LAPSERVO_BLOOD: so much of the marker is hidden [%].
 #include "lapservo/testing/camera_effects.h"
 
 #include <cmath>
@@ -34,7 +34,8 @@ void print_row(const std::string& name, const Score& s) {
   std::fflush(stdout);
 }
 
-// Of a print each, off as LAPSERVO_OFF says, which the tracker takes for the rig's. Its seam's error shows in no picture.
+// Of a print each, off as LAPSERVO_OFF says, which the tracker takes for the rig's. Its seam's error shows in no
+// picture.
 std::vector<TrueFrame> frames_of_off_prints(const RenderedSet& all, Off off) {
   std::vector<TrueFrame> frames;
   for (const auto& q : all.configurations) {

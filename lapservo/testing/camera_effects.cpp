@@ -214,7 +214,8 @@ CameraEffects draw(const std::string& condition, std::uint64_t seed) {
       {"sharpen", [&](CameraEffects& e) { e.sharpening = all.sharpening, e.sharpening_px = radius_px; }},
       {"chroma420", [&](CameraEffects& e) { e.subsampled = true, e.left_sited = left_sited; }},
       {"jpeg", [&](CameraEffects& e) { e.jpeg_quality = 85; }},
-      {"camera", [&](CameraEffects& e) {
+      {"camera",
+       [&](CameraEffects& e) {
          e = all;
          e.aberration = {1 + magnification / 2, 1 - magnification / 2};
          e.contrast = 0, e.saturation = 1, e.sharpening /= 2, e.subsampled = true, e.jpeg_quality = 85;

@@ -195,7 +195,7 @@ struct PrintLimits {
   /// registration was no longer seen.
   double least_ink_aside_mm = 0.06;
   double min_weight = 1e-6, min_suspected_weight = 1e-4;  ///< less is too unlikely to count
-  double off_sigmas = 3;     ///< beyond what shows, for how far an inner boundary may be off
+  double off_sigmas = 3;  ///< beyond what shows, for how far an inner boundary may be off
 };
 inline constexpr PrintLimits print_limits;
 
@@ -214,8 +214,8 @@ struct ValidationLimits {
   /// And of psi as it is told, of which prints that are off are more: in defocus and in the dark they show little.
   double max_sigma_told_rad = 0.04;
   /// And of psi where a third of all prints are off (suspected_fractions), if the picture makes it no less likely that
-  /// this one is, and its bands were not measured. Exact prints in H.264 have up to 28 mrad. Asked of pictures that tell
-  /// nothing, too, a tenth of small exact markers (radius 11 to 14 px) were refused.
+  /// this one is, and its bands were not measured. Exact prints in H.264 have up to 28 mrad. Asked of pictures that
+  /// tell nothing, too, a tenth of small exact markers (radius 11 to 14 px) were refused.
   double max_sigma_suspected_rad = 0.03, suspected = 0.32;
   /// Times what the rig's tolerance_m adds to the variance: who sets it wants to live with it.
   double tolerance_slack = 1.5;
