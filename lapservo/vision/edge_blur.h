@@ -43,6 +43,7 @@ struct BlurEvidence {
     gradient += edge.blur_gradient / variance;
     information += edge.blur_information / variance;
   }
+  void add(const BlurEvidence& other) { gradient += other.gradient, information += other.information; }
   /// The blur after a Gauss-Newton step of limited size.
   double improved(double blur_px) const;
 };

@@ -255,7 +255,7 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
     measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
                                      edge_limits.single_floor_px * edge_limits.single_floor_px);
     out.all.push_back(measurement);
-    out.boundary_blur.add(*edge, variance);
+    out.boundary_blurs[measurement.group].add(*edge, variance);
   }
 }
 
@@ -405,6 +405,8 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
 }  // namespace
 
 EdgeBlur EdgeMeasurements::improved(const EdgeBlur& blur) const {
+  BlurEvidence boundary_blur;
+  for (const BlurEvidence& each : boundary_blurs) boundary_blur.add(each);
   const double sides_px = side_blur.improved(blur.sides_px);
   const bool wide = blur.wide();
   EdgeBlur next = wide ? wide_blur.improved(blur) : EdgeBlur{boundary_blur.improved(blur.boundaries_px)};

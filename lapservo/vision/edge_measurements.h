@@ -49,7 +49,8 @@ struct EdgeMeasurements {
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at
   double radius_px = 0;           ///< the shaft's
-  BlurEvidence boundary_blur, side_blur;
+  std::array<BlurEvidence, 4> boundary_blurs;
+  BlurEvidence side_blur;
   WideBlurEvidence wide_blur;  ///< where the blur that they were located with is wide
 
   /// The blur that they were located with after a step.

@@ -188,6 +188,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
       pass.all[i].residual_px -= static_cast<double>(evidence.edges->measurement_bias_px[i]);
     move();
   }
+  fit.turn = turn_blur(pass, located_with, fit.processing == Processing::found);
   fit.lines = pass.lines;
   fit.in_image = pass.in_image;
   fit.sides_in_image = pass.sides_in_image;

@@ -8,6 +8,7 @@
 #include "lapservo/vision/print_fit.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
+#include "lapservo/vision/turn_blur.h"
 
 namespace lapservo::internal {
 
@@ -31,6 +32,7 @@ struct FineFit {
   double inner_off_m = 3;                ///< how far off an inner boundary of the print may lie (print_fit.h)
   Processing processing = Processing::unknown;  ///< as far as asked
   std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
+  TurnBlur turn;                                ///< within the exposure, which the covariance knows nothing of
 
   /// Of the boundary points that the image could show, the fraction that was located.
   double located_fraction() const;

@@ -158,6 +158,21 @@ struct FineFitLimits {
 };
 inline constexpr FineFitLimits fine_fit_limits;
 
+/// What the boundaries' blur tells of a turn within the exposure (turn_blur.cpp). By rendered turns of 0.05 to 0.4 rad.
+struct TurnBlurLimits {
+  int min_points = 6;  ///< of a boundary
+  /// By how much boundaries' blurs differ in still pictures: of cameras that do nothing to them, and of 4:2:0, JPEG
+  /// (0.1 to 0.5).
+  double unexplained_px2 = 0.003, of_processing_px2 = 0.3;
+  double told_sigmas = 2.5;  ///< from which on a blur is a turn's and no noise: most frames are still
+  /// Of the misfit (chi^2 a degree of freedom, of which there are two at most), what is not taken for chance.
+  double misfit_fraction = 0.25;
+  /// Of what the turn changed by, the most that the middle may be off: twice what a start from rest within this
+  /// exposure has.
+  double uneven_of_change = 0.5;
+};
+inline constexpr TurnBlurLimits turn_blur_limits;
+
 /// When a camera's processing is believed (picture_processing.cpp).
 struct ProcessingLimits {
   /// By bench/camera_effects 12 3, 69 first guesses of 72 frames without any (none, bayer, ca, crosstalk, rec709,

@@ -151,13 +151,21 @@ Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
   return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_};
 }
 
+// By how much psi's step differs from that before. Nullopt without two frames before.
+std::optional<double> SurfaceTracker::turn_change_rad(std::size_t i, const FineFit& fit) const {
+  if (!memory_[i] || !memory_[i]->followed || !fit.unknowns.q()) return std::nullopt;
+  const Eigen::Index psi = fit.unknowns.size() - 1;
+  const double expected_rad = memory_[i]->last.q()->psi_rad + memory_[i]->velocity[psi];
+  return wrap_pi(fit.unknowns.q()->psi_rad - expected_rad);
+}
+
 void SurfaceTracker::remember(std::size_t i, const Found& found) {
   const FineFit& fit = *found.fit;
   UnknownVector velocity = UnknownVector::Zero(fit.unknowns.size());
-  if (memory_[i] && memory_[i]->last.q() && fit.unknowns.q())
-    velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
+  const bool followed = memory_[i] && memory_[i]->last.q() && fit.unknowns.q();
+  if (followed) velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
   const int unasked = unasked_after(fit.processing, memory_[i] ? memory_[i]->unasked : ask_every);
-  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px, found.among_others};
+  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px, found.among_others, followed};
 }
 
 ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {
@@ -287,7 +295,7 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
   WorkBudget budget(single_ ? std::nullopt : frame_budget_);
   find(image, light, budget);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
-    const Found& found = found_[i];
+    Found& found = found_[i];
     observations_[i] = {};
     observations_[i].status = found.status;
     if (found.refused) {
@@ -296,6 +304,9 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
       observations_[i].refused.psi_rad = found.refused->psi_rad;
     }
     if (!found.fit) continue;
+    // The fit was judged without: a turn that is off by a twelfth of itself at most is no reason to refuse it.
+    const Eigen::Index psi = found.fit->unknowns.size() - 1;
+    found.fit->covariance(psi, psi) += variance_of_uneven_turn(found.fit->turn, turn_change_rad(i, *found.fit));
     observations_[i] = observation_of(scene_of(image, i), *found.fit, rig_.instruments[i].camera_from_rcm);
     remember(i, found);
   }

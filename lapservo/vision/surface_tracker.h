@@ -39,6 +39,7 @@ class SurfaceTracker {
     int unasked = 0;  // frames since the camera was found to do nothing to its pictures
     std::array<double, 4> bias_px{};
     bool among_others = false;  // Found::among_others
+    bool followed = false;      // from a frame before: the velocity is one
     ExpectedProcessing expected_processing() const;
     PoseUnknowns expected_pose() const { return last.changed_by(velocity); }
   };
@@ -52,6 +53,7 @@ class SurfaceTracker {
   void cover_found(std::size_t instrument, const std::vector<Blob>& blobs, WorkBudget& budget);
   bool may_touch_another_lost(std::size_t instrument) const;
   void cover(std::size_t instrument, const ShaftPose& pose, WorkBudget& budget);
+  std::optional<double> turn_change_rad(std::size_t instrument, const FineFit& fit) const;
   void remember(std::size_t instrument, const Found& found);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;
 

@@ -507,30 +507,49 @@ TEST(Tracker, SearchesTheOnlyFrameOfATemporaryWhole) {
 
 // A frame of a turn while the shutter was open, with psi in its middle; even, or with a constant acceleration from
 // rest.
-cv::Mat render_turning(const Shot& shot, double turn_rad, bool even) {
-  const cv::Mat tissue = make_tissue(shot.rig.camera.width_px, shot.rig.camera.height_px, 5);
-  return Renderer(shot.rig.camera, {shaft_of(shot.rig.instruments[0])}, tissue)
-      .render_exposure(scenes::moving_exposure(shot.rig, shot.q, {.turn_rad = turn_rad, .from_rest = !even}), 1);
+cv::Mat render_turning(const Rig& rig, const JointVector& q, double turn_rad, bool even) {
+  const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
+  return Renderer(rig.camera, {shaft_of(rig.instruments[0])}, tissue)
+      .render_exposure(scenes::moving_exposure(rig, q, {.turn_rad = turn_rad, .from_rest = !even}), 1);
 }
 
 // The picture shows psi's mean over the exposure.
 TEST(SurfaceTracker, ATurnWithinTheExposureGivesPsiOfItsMiddle) {
-  double squares = 0;
+  double squares = 0, from_rest_squares = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed)
     for (const double turn_rad : {0.1, -0.25, 0.4}) {
       SCOPED_TRACE("seed " + std::to_string(seed) + ", turn " + std::to_string(turn_rad));
       const Shot& shot = usual_shot(seed);
-      const Observation even = Tracker(shot.rig).track(render_turning(shot, turn_rad, true))[0];
+      const Observation even = Tracker(shot.rig).track(render_turning(shot.rig, shot.q, turn_rad, true))[0];
       expect_right(even, shot.q);
       const double error_rad = wrap_pi(even.rcm.value().q.psi_rad - shot.q.psi_rad);
       squares += error_rad * error_rad / even.rcm->covariance(3, 3) / 9;
       // Its mean is a twelfth of the turn from its middle, and what an edge fit makes of it no farther.
-      const Observation from_rest = Tracker(shot.rig).track(render_turning(shot, turn_rad, false))[0];
+      const Observation from_rest = Tracker(shot.rig).track(render_turning(shot.rig, shot.q, turn_rad, false))[0];
       ASSERT_EQ(to_string(from_rest.status), "ok");
       const double from_rest_rad = wrap_pi(from_rest.rcm.value().q.psi_rad - shot.q.psi_rad);
       EXPECT_LT(std::abs(from_rest_rad), std::abs(turn_rad) / 12 + 0.002);
+      from_rest_squares += from_rest_rad * from_rest_rad / from_rest.rcm->covariance(3, 3) / 9;
     }
   EXPECT_LT(std::sqrt(squares), 1.5);
+  EXPECT_LT(std::sqrt(from_rest_squares), 1.5);
+}
+
+// One that turns on evenly has no more sigma than one that stands still; one that was at rest has.
+TEST(SurfaceTracker, TellsAnEvenTurnFromAStartByTheFramesBefore) {
+  constexpr double turn_rad = 0.1;
+  const Shot& shot = usual_shot(2);
+  const auto sigma_of_third_frame = [&](bool even) {
+    Tracker tracker(shot.rig);
+    for (int before = 2; before > 0; --before) {
+      JointVector q = shot.q;
+      q.psi_rad -= even ? turn_rad * before : turn_rad / 4;  // of which it has come so far in the middle
+      tracker.track(render_turning(shot.rig, q, even ? turn_rad : 0, true));
+    }
+    return std::sqrt(tracker.track(render_turning(shot.rig, shot.q, turn_rad, even))[0].rcm.value().covariance(3, 3));
+  };
+  EXPECT_LT(sigma_of_third_frame(true), 0.003);
+  EXPECT_GT(sigma_of_third_frame(false), 0.005);
 }
 
 // One marker before the other, or beside it: one blob of colours.
