@@ -31,6 +31,12 @@ class InplaceVector {
     ::new (static_cast<void*>(begin() + size_)) T(value);
     ++size_;
   }
+  /// A new last element, to be filled where it is.
+  T& emplace_back() {
+    if (size_ == Capacity) throw std::length_error("InplaceVector is full");
+    return *::new (static_cast<void*>(begin() + size_++)) T();
+  }
+  void pop_back() { --size_; }
   void clear() { size_ = 0; }
 
   std::size_t size() const { return size_; }

@@ -297,7 +297,7 @@ struct Basis {
 // EdgeFit in every lane.
 struct FitLanes {
   V offset, information, residual_variance, blur_gradient, blur_information;
-  std::array<V, 3> step;
+  std::array<V, 3> step, before;
   Mask converged;
 };
 
@@ -324,7 +324,7 @@ FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& pr
     columns[linear + s] = &basis.by_position[s];
     columns[linear + Shapes + s] = &basis.by_blur[s];
   }
-  FitLanes fit{zero, zero, zero, zero, zero, {zero, zero, zero}, basis.independent};
+  FitLanes fit{zero, zero, zero, zero, zero, {zero, zero, zero}, {zero, zero, zero}, basis.independent};
   V position_gradient = zero, squares = seen.squares;
   for (std::size_t c = 0; c < 3; ++c) {
     const auto products = dots(columns, seen.light[c], lines.samples);
@@ -338,6 +338,7 @@ FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& pr
         amplitude[j] = hn::NegMulAdd(basis.triangle[j][k], amplitude[k], amplitude[j]);
       amplitude[j] = hn::Div(amplitude[j], basis.triangle[j][j]);
     }
+    fit.before[c] = amplitude[0];
     for (std::size_t s = 0; s < Shapes; ++s) {
       const V a = amplitude[s + 1];
       V by_position = products[linear + s], by_blur = products[linear + Shapes + s];
@@ -374,7 +375,10 @@ FitLanes select(Mask mask, const FitLanes& yes, const FitLanes& no) {
   out.residual_variance = hn::IfThenElse(mask, yes.residual_variance, no.residual_variance);
   out.blur_gradient = hn::IfThenElse(mask, yes.blur_gradient, no.blur_gradient);
   out.blur_information = hn::IfThenElse(mask, yes.blur_information, no.blur_information);
-  for (std::size_t c = 0; c < 3; ++c) out.step[c] = hn::IfThenElse(mask, yes.step[c], no.step[c]);
+  for (std::size_t c = 0; c < 3; ++c) {
+    out.step[c] = hn::IfThenElse(mask, yes.step[c], no.step[c]);
+    out.before[c] = hn::IfThenElse(mask, yes.before[c], no.before[c]);
+  }
   out.converged = hn::Or(hn::And(mask, yes.converged), hn::AndNot(mask, no.converged));
   return out;
 }
@@ -413,10 +417,10 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
       image.channels().differs() ? sample<true>(image, lanes, present) : sample<false>(image, lanes, present);
   const FitLanes fit = iterate<Shapes>(lanes, LineLight(sampled.light, lanes.samples), present, iterations);
   Lanes offset, information, variance, blur_gradient, blur_information, converged;
-  std::array<Lanes, 3> step;
+  std::array<Lanes, 3> step, before;
   offset.store(fit.offset), information.store(fit.information), variance.store(fit.residual_variance);
   blur_gradient.store(fit.blur_gradient), blur_information.store(fit.blur_information);
-  for (std::size_t c = 0; c < 3; ++c) step[c].store(fit.step[c]);
+  for (std::size_t c = 0; c < 3; ++c) step[c].store(fit.step[c]), before[c].store(fit.before[c]);
   converged.store(hn::IfThenElseZero(fit.converged, hn::Set(d, 1)));
   for (std::size_t j = 0; j < lines.size(); ++j) {
     const auto of = [j](const Lanes& lane) { return lane.value[j]; };
@@ -429,6 +433,7 @@ void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterat
                       of(information),
                       of(variance),
                       {of(step[0]), of(step[1]), of(step[2])},
+                      {of(before[0]), of(before[1]), of(before[2])},
                       of(blur_gradient),
                       of(blur_information)});
     }

@@ -11,6 +11,7 @@
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/blurred_boundary.h"
 #include "lapservo/vision/edge_lines.h"
+#include "lapservo/vision/film_edge.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -55,20 +56,11 @@ struct Frame {
             unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * outwards};
   }
   Eigen::Vector3d point(const Generatrix& line, double along_m) const { return line.begin + along_m * axes.col(2); }
-  // How brightly the film's edge at boundary k, `along_m` from the frame's origin, shows, relative to the outside
-  // beside it; 0 when it is not seen.
-  double film_light(std::size_t k, const Generatrix& line, double along_m) const {
-    if (k == 1 || k == 2) return 0;
+  Facing facing(std::size_t k, const Generatrix& line, double along_m) const {
     Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
     to_camera.z() -= along_m;
-    const double beyond = k == 0 ? -to_camera.z() : to_camera.z();
-    if (beyond <= 0) return 0;
-    const double distance_m = to_camera.norm();
-    const auto lit = [](double cosine) {
-      return edge_limits.film_ambient_fraction + (1 - edge_limits.film_ambient_fraction) * std::max(0.0, cosine);
-    };
-    return std::min(lit(beyond / distance_m) / lit(line.outwards_unrolled.dot(to_camera) / distance_m),
-                    edge_limits.film_most_lit);
+    const double beyond_m = k == 0 ? -to_camera.z() : k == 3 ? to_camera.z() : 0, per_m = 1 / to_camera.norm();
+    return {line.outwards_unrolled.dot(to_camera) * per_m, std::max(0.0, beyond_m * per_m)};
   }
   double diffuse_light(const Generatrix& line, double along_m) const {
     Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
@@ -141,6 +133,13 @@ struct BoundaryPlace {
   Eigen::Vector2d point_px, along;
   double normal_cosine;
   EdgeLine line;
+  Facing facing;
+  double film_shift;         // by which fraction of its projected width the film's edge is expected to move it
+  double film_px_per_m;      // that width by the film's thickness, along the normal
+  double film_moved_px = 0;  // how far it moves it beyond what was expected, and one sigma of that
+  double film_sigma_px = 0;
+
+  bool shows_film() const { return facing.film_edge > 0; }
 };
 
 // What a wide blur does to it: `ellipse` is the boundary's.
@@ -161,29 +160,30 @@ bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_p
   return before == (k == 0 ? 0 : frame.scene.bands[k - 1]) && after == (k == 3 ? 0 : frame.scene.bands[k]);
 }
 
-std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
-                                            const std::array<double, 4>& along_m, double slope_m, const Effort& effort,
-                                            double blur_px, InWideBlur* wide) {
-  const double film_light = frame.film_light(k, generatrix, along_m[k]);
+// False where it can't be looked for.
+bool place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
+                    const std::array<double, 4>& along_m, double slope_m, const Effort& effort, double blur_px,
+                    InWideBlur* wide, BoundaryPlace& place) {
+  place.facing = frame.facing(k, generatrix, along_m[k]);
+  place.film_shift = place.shows_film() ? film_edge_level(place.facing, edge_limits.usual_even_light) : 0;
   Eigen::Vector3d point = frame.point(generatrix, along_m[k]);
-  if (film_light > 0) point -= film_light * frame.film_m * generatrix.outwards;
-  if (!(point.z() > 1e-3)) return std::nullopt;
+  if (place.shows_film()) point -= place.film_shift * frame.film_m * generatrix.outwards;
+  if (!(point.z() > 1e-3)) return false;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
   const double px_per_m = axis_px.norm();
-  BoundaryPlace place;
   place.point_px = image.point_px;
   place.along = axis_px / px_per_m;
   const Eigen::Vector2d tangent =
       (frame.marker().radius_m() * (image.d_px_d_point * generatrix.around) + slope_m * axis_px).normalized();
   const Eigen::Vector2d normal(-tangent.y(), tangent.x());
   place.normal_cosine = normal.dot(place.along);
-  if (!(std::abs(place.normal_cosine) > edge_limits.min_normal_cosine)) return std::nullopt;
+  if (!(std::abs(place.normal_cosine) > edge_limits.min_normal_cosine)) return false;
   if (wide) {
     wide->normal = {place.normal_cosine, normal.dot(Eigen::Vector2d(-place.along.y(), place.along.x()))};
     blur_px = wide->ellipse.along_normal_px(wide->normal);
     wide->moved_px = moved_by_blur_px(
-        course_of(frame, generatrix, along_m[k], slope_m, film_light * frame.film_m, image.point_px, place.along),
+        course_of(frame, generatrix, along_m[k], slope_m, place.film_shift * frame.film_m, image.point_px, place.along),
         wide->ellipse);
   }
 
@@ -193,20 +193,79 @@ std::optional<BoundaryPlace> place_boundary(const Frame& frame, const Generatrix
   const double line_blur_px = blur_px / std::abs(place.normal_cosine);
   const int reach =
       static_cast<int>(std::min({2.5 * line_blur_px + effort.extra_px, 0.6 * gap_px - line_blur_px, 22.0}));
-  if (reach < 3) return std::nullopt;
+  if (reach < 3) return false;
   const auto line = frame.edge_line(image.point_px, place.along, reach, reach, line_blur_px);
-  if (!line) return std::nullopt;
+  if (!line) return false;
   place.line = *line;
   const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
+  place.film_px_per_m = -pull.dot(generatrix.outwards);
   place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
-                                 -film_light * film_sigma_m * pull.dot(generatrix.outwards));
+                                 place.film_shift * film_sigma_m * place.film_px_per_m);
   place.measurement.group = k;
   place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   place.measurement.expected_px = image.point_px.cast<float>();
   place.measurement.normal = normal.cast<float>();
   place.measurement.clear_px = static_cast<float>(0.6 * gap_px * std::abs(place.normal_cosine) - blur_px);
-  return place;
+  return true;
+}
+
+float dot(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// The sum of the steps at a boundary, and the points that were located there; of an end, that show the film.
+struct LocatedSteps {
+  std::array<float, 3> sum{};
+  InplaceVector<std::size_t, max_lines> points;
+
+  LocatedSteps(std::size_t k, std::span<const BoundaryPlace> places, std::span<const EdgeFit> edges) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (places[i].measurement.group != k || !edges[i].converged) continue;
+      if ((k == 0 || k == 3) && !places[i].shows_film()) continue;
+      points.push_back(i);
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += edges[i].step[c];
+    }
+  }
+};
+
+double even_light_in(std::span<const BoundaryPlace> places, std::span<const EdgeFit> edges) {
+  InplaceVector<EvenLight, 2> seen;
+  for (const std::size_t k : {1U, 2U}) {
+    const LocatedSteps steps(k, places, edges);
+    InplaceVector<FadingPoint, max_lines> points;
+    for (std::size_t at = 0; at < steps.points.size(); at += 2) {  // half of them tell enough
+      const std::size_t i = steps.points[at];
+      points.push_back({places[i].facing.outside, dot(edges[i].step, steps.sum)});
+    }
+    seen.push_back(even_light_of(points));
+  }
+  return usual_or_seen(seen);
+}
+
+// Tells from the located points of an end how far the film's edge, where it shows, moves them.
+void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBlur& blur,
+              std::span<BoundaryPlace> places, std::span<const EdgeFit> edges) {
+  const LocatedSteps steps(k, places, edges);
+  if (steps.points.size() < edge_limits.min_alike) return;
+  InplaceVector<EndPoint, max_lines> points;
+  for (const std::size_t i : steps.points) {
+    const float before = dot(edges[i].before, steps.sum), step = dot(edges[i].step, steps.sum);
+    points.push_back(k == 0 ? EndPoint{before, step} : EndPoint{-before - step, step});
+  }
+  const auto gloss = gloss_of(points);
+  for (std::size_t at = 0; at < points.size(); ++at) {
+    BoundaryPlace& place = places[steps.points[at]];
+    const double level = film_edge_level(place.facing, even_light) - gloss.begin()[at];
+    const double width_px = frame.film_m * place.film_px_per_m, blur_px = blur.along_px[k];
+    const FilmShift shift = film_shift(level, std::abs(width_px) / blur_px);
+    const double shift_px = shift.fraction * width_px;
+    Measurement& m = place.measurement;
+    m.row[m.row.size() - 1] += (shift.by_width - place.film_shift) * film_sigma_m * place.film_px_per_m;
+    place.film_moved_px = shift_px - place.film_shift * width_px;
+    place.film_sigma_px = edge_limits.film_doubt * shift_px * shift_px / blur_px;
+    m.expected_px += static_cast<float>(place.film_moved_px) * m.normal;
+  }
 }
 
 // A boundary point that was located.
@@ -233,9 +292,6 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
   for (const Candidate& candidate : candidates)
     if (candidate.colors_agree) values.push_back(candidate.edge->residual_variance);
   const double typical_variance = median(values);
-  const auto dot = [](const std::array<float, 3>& a, const std::array<float, 3>& b) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  };
   const float typical_square = dot(typical, typical);
   for (const auto& [place, wide, edge, agree] : candidates) {
     const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
@@ -246,15 +302,16 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
       continue;
     const double variance = 0.5 * (edge->residual_variance + typical_variance) * edge_limits.interpolation_noise;
     const double cosine = place->normal_cosine;
-    Measurement measurement = place->measurement;
-    measurement.residual_px = edge->offset_px * cosine;
+    out.all.push_back(place->measurement);
+    Measurement& measurement = out.all.end()[-1];
+    measurement.residual_px = edge->offset_px * cosine - place->film_moved_px;
     if (wide) {
       measurement.residual_px -= wide->moved_px * cosine;
       out.wide_blur.add(*edge, variance, blur, measurement.group, wide->normal);
     }
     measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
-                                     edge_limits.single_floor_px * edge_limits.single_floor_px);
-    out.all.push_back(measurement);
+                                     edge_limits.single_floor_px * edge_limits.single_floor_px +
+                                     place->film_sigma_px * place->film_sigma_px);
     out.boundary_blurs[measurement.group].add(*edge, variance);
   }
 }
@@ -288,18 +345,24 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
       if (jumps[k] && seam_px < edge_limits.seam_blurs * blur.boundaries_px + edge_limits.seam_px) continue;
       InWideBlur blurred;
       if (wide) blurred.ellipse = blur.ellipse(k);
-      auto place = place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur.boundaries_px,
-                                  wide ? &blurred : nullptr);
-      if (!place) continue;
-      if (!frame.scene.others.empty() && lies_behind_another(frame, place->line, generatrix, along_m[k])) continue;
+      BoundaryPlace& place = places.emplace_back();
+      if (!place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur.boundaries_px,
+                          wide ? &blurred : nullptr, place) ||
+          (!frame.scene.others.empty() && lies_behind_another(frame, place.line, generatrix, along_m[k]))) {
+        places.pop_back();
+        continue;
+      }
       if (wide) in_wide_blur.push_back(blurred);
       ++out.in_image[k];
-      place->measurement.across = sine / sine_of_half;
-      places.push_back(*place);
-      lines.push_back(place->line);
+      place.measurement.across = sine / sine_of_half;
+      lines.push_back(place.line);
     }
   }
   const EdgeFits edges = locate_steps(frame.light, lines, effort.iterations);
+  if (effort.thinning == 1) {
+    const double even_light = even_light_in(places, edges);
+    for (const std::size_t end : {0U, 3U}) see_film(frame, end, even_light, blur, places, edges);
+  }
   for (std::size_t k = 0; k < 4; ++k) {
     InplaceVector<Candidate, max_lines> candidates;
     for (std::size_t i = 0; i < places.size(); ++i)
@@ -342,10 +405,11 @@ struct SidePlace {
   EdgeLine line;
 };
 
-std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort,
-                                    double blur_px) {
+// False where it can't be looked for.
+bool place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort, double blur_px,
+                SidePlace& place) {
   const Eigen::Vector3d point = frame.point(side.contour, along_m);
-  if (!(point.z() > 1e-3)) return std::nullopt;
+  if (!(point.z() > 1e-3)) return false;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d along = (image.d_px_d_point * frame.axes.col(2)).normalized();
   Eigen::Vector2d inwards(-along.y(), along.x());
@@ -353,18 +417,18 @@ std::optional<SidePlace> place_side(const Frame& frame, const Side& side, double
     inwards = -inwards;
   const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
   const int inside = inside_of_side_px(radius_px), outside = outside_of_side_px(blur_px, effort.extra_px);
-  if (inside < 3) return std::nullopt;
+  if (inside < 3) return false;
   const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
-  if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return std::nullopt;
+  if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return false;
   const auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
-  if (!line) return std::nullopt;
-  SidePlace place{{}, *line};
+  if (!line) return false;
+  place.line = *line;
   place.line.contour_radius_px = static_cast<float>(radius_px);
   place.measurement.row = row_of(frame.unknowns, point, image.d_px_d_point.transpose() * inwards, 0, 0);
   place.measurement.group = side.group;
   place.measurement.expected_px = image.point_px.cast<float>();
   place.measurement.normal = inwards.cast<float>();
-  return place;
+  return true;
 }
 
 void measure_sides(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
@@ -375,11 +439,12 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
   for (int station = 0; station < count; ++station)
     for (const Side& side : sides) {
       const double along_m = frame.marker().length_m() * (station + 0.5) / count;
-      const auto place = place_side(frame, side, along_m, effort, blur_px);
-      if (!place) continue;
-      if (!frame.scene.others.empty() && lies_behind_another(frame, place->line, side.contour, along_m)) continue;
-      places.push_back(*place);
-      lines.push_back(place->line);
+      SidePlace& place = places.emplace_back();
+      if (place_side(frame, side, along_m, effort, blur_px, place) &&
+          (frame.scene.others.empty() || !lies_behind_another(frame, place.line, side.contour, along_m)))
+        lines.push_back(place.line);
+      else
+        places.pop_back();
     }
   out.sides_in_image = static_cast<int>(places.size());
   const EdgeFits edges = locate_contours(frame.light, lines, effort.iterations);
@@ -392,12 +457,13 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
     const EdgeFit& edge = edges[i];
     if (!edge.converged) continue;
     const double variance = 0.5 * (edge.residual_variance + typical_variance) * edge_limits.interpolation_noise;
-    Measurement measurement = places[i].measurement;
-    measurement.residual_px = edge.offset_px;
-    measurement.sigma_px =
+    const double sigma_px =
         std::sqrt(variance / edge.information + 4 * edge_limits.single_floor_px * edge_limits.single_floor_px);
-    if (measurement.sigma_px > edge_limits.max_side_sigma_px) continue;
-    out.all.push_back(measurement);
+    if (sigma_px > edge_limits.max_side_sigma_px) continue;
+    out.all.push_back(places[i].measurement);
+    Measurement& measurement = out.all.end()[-1];
+    measurement.residual_px = edge.offset_px;
+    measurement.sigma_px = sigma_px;
     out.side_blur.add(edge, variance);
   }
 }

@@ -107,6 +107,7 @@ EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
     }
     degrees += used - linear;
     fit.step[c] = amplitude.tail(Shapes).sum();
+    fit.before[c] = amplitude[0];
   }
   if (degrees < 3 || !(fit.information > min_edge_information)) return fit;
   fit.offset_px = position_gradient / fit.information;

@@ -21,6 +21,7 @@ struct EdgeFit {
   float information = 0;                          ///< inverse variance of offset_px for unit noise in the light, 1/px^2
   float residual_variance = 0;                    ///< of the light about the model
   std::array<float, 3> step{};                    ///< change of the light over the edge, per channel
+  std::array<float, 3> before{};                  ///< light before the edge
   float blur_gradient = 0, blur_information = 0;  ///< Gauss-Newton terms of the blur, for unit noise
 };
 

@@ -50,6 +50,14 @@ double median_sigma_px(std::span<const Measurement> measurements) {
   return sigmas_px.empty() ? 0 : median(sigmas_px);
 }
 
+// By which noise is smaller than the measurements say: of what they have beyond the light's, for what single points may
+// be off besides, no more than their scatter shows.
+double told_noise_scale(double scatter_sigmas, double sigma_px) {
+  const double floor = edge_limits.single_floor_px / std::max(sigma_px, edge_limits.single_floor_px);
+  const double of_light = std::sqrt(1 - floor * floor);
+  return std::clamp(scatter_sigmas, std::max(of_light, fine_fit_limits.least_noise_scale), 1.0);
+}
+
 // What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
 // processing may have moved each boundary; of those that `processed` tells, it is corrected.
 CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& lines, const EdgeBlur& blur,
@@ -72,14 +80,17 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
     const bool corrected = processed && processed->bias_px[k];
     const double left_px = (corrected ? limits.fraction_of_processing : 1) * bias_px[k];
     errors.px[k] = std::hypot(boundary_px, left_px, unexplained_px);
+    errors.told_px[k] = std::hypot(boundary_px - limits.untold_boundary_px, left_px, unexplained_px);
     bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
   }
   errors.px[4] = errors.px[5] = side_px;
+  errors.told_px[4] = errors.told_px[5] = side_px - limits.untold_side_px;
   errors.whole_px = limits.whole_fraction_of_blur * beyond_px;
   errors.leaning_px = (blur.wide() ? limits.leaning_of_wide_blur : limits.leaning_of_blur) *
                       beyond_px2(widest_px, limits.usual_blur_px) / pass.radius_px;
-  errors.noise_scale = std::max(1.0, scatter_sigmas(pass.all, lines));
-  const double sigma_px = median_sigma_px(pass.all);
+  const double scatter = scatter_sigmas(pass.all, lines), sigma_px = median_sigma_px(pass.all);
+  errors.noise_scale = std::max(1.0, scatter);
+  errors.told_noise_scale = told_noise_scale(scatter, sigma_px);
   const double moved_px = std::sqrt(bias_squares_px2);
   errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
   const double beyond_usual_px = std::max(0.0, sigma_px - limits.usual_sigma_px);

@@ -102,9 +102,19 @@ struct EdgeLimits {
   float max_residual = 0.05F;
   int max_residual_variances = 9;  ///< of the typical variance: three sigma
 
-  /// Light on the film's edge: the fraction that is even (the rest is diffuse, from the camera), and by that on the
-  /// outside at most.
-  double film_ambient_fraction = 0.18, film_most_lit = 2;
+  /// Light on the film's edge, by that on the outside at most: the even fraction (the rest is diffuse, from the
+  /// camera), what is usual and one sigma of it; one sigma of what a boundary tells of it (lamps fade with the
+  /// distance, and no paper is quite matt), from so many points on.
+  double film_most_lit = 3, usual_even_light = 0.1, even_light_sigma = 0.07, most_even_light = 0.4;
+  double told_even_light_sigma = 0.03;
+  std::size_t min_fading_points = 8;
+  /// Light of the bare shaft by the step of light at an end, gloss and veils aside: black plastic reflects 2 to 5 %, a
+  /// print's bright channels half. And the gloss there that is believed.
+  double bare_shaft_light = 0.04, most_gloss = 0.6;
+  /// One sigma of what the film moves a point by: this fraction of its square, by the blur. At the true pose (60
+  /// frames, leaning by up to 60 degrees) 0.01 px are left where it is 0.3 px, 0.05 where it is 0.5, 0.06 where it is
+  /// 0.9.
+  double film_doubt = 0.3;
   double seam_blurs = 2.5, seam_px = 1.5;  ///< boundaries that jump at the seam, this near to it, are left out
   /// Of a blur, and by how much a pass may change it: wider is no edge, and far steps overshoot.
   double min_blur_px = 0.5, max_blur_px = 8, min_blur_change = 0.6, max_blur_change = 1.7;
@@ -119,6 +129,9 @@ struct FineFitLimits {
   /// What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole: it does not
   /// average over lines. With it error over sigma is 0.7 on the rotation samples, 1.3 on rendered ones (usual).
   double common_boundary_px = 0.007, common_side_px = 0.02;
+  /// Of that, what is doubted of a print but not told of the pose. One pose rendered 25 times (16 poses leaning by up
+  /// to 20 degrees): psi scatters by 0.21 mrad and is 0.25 mrad off (rms), where a picture says 0.4.
+  double untold_boundary_px = 0.004, untold_side_px = 0.01;
   /// And as a fraction of the blur beyond a lens's: defocus and motion do not blur like a Gaussian. All boundaries move
   /// together by more, mostly where the light comes from aside.
   double usual_blur_px = 1.2, common_fraction_of_blur = 0.008, whole_fraction_of_blur = 0.02;
@@ -137,6 +150,10 @@ struct FineFitLimits {
   /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
   /// sigma grows by so much for all that is missing.
   double usual_fraction = 0.7, doubt_of_hidden = 4;
+  /// What single points may be off (EdgeLimits::single_floor_px) is told of the pose as far as their scatter shows it,
+  /// of clean frames 0.4 to 0.5 of a sigma; neighbours share pixels, so no less than this, which psi's scatter has
+  /// there.
+  double least_noise_scale = 0.47;
   double usual_sigma_px = 0.05;  ///< of an edge; compressed ones (--format jpg) have three times that
 
   /// What is doubted before the print is blamed (PrintDoubt): by what is beyond the usual sigma of an edge, by the blur
@@ -204,8 +221,10 @@ struct PrintLimits {
   std::array<double, 8> told_fractions{0, 0.04, 0.07, 0.03, 0.006, 0.0016, 0.0008, 0.0004};
   /// And whether the picture shows that the print is the rig's goes by these: a third are off, by any size. By the
   /// others a print that is off by 0.1 mm is so rare that a picture which tells nothing passed it for exact. Where such
-  /// are excluded, as in usual pictures, it is the same.
+  /// are excluded, as in usual pictures, it is the same. Asked only of pictures whose evidence is doubted by as much:
+  /// exact prints in small clean pictures have up to 35 mrad by these.
   std::array<double, 8> suspected_fractions{0, 0.05, 0.05, 0.05, 0.05, 0.05, 0.05, 0.02};
+  double least_doubt_px = 0.01;
   /// From this size on, inks lie aside. With smaller ones exact prints in small pictures had more sigma, and a wrong
   /// registration was no longer seen.
   double least_ink_aside_mm = 0.06;

@@ -102,11 +102,12 @@ struct Equations {
 struct Pull {
   UnknownVector x;
   PrintVector n = PrintVector::Zero();
-  double weight = 0, residual = 0, error_px = 0;
+  double weight = 0, residual = 0, error_px = 0, told_px = 0;
 };
 
 struct Sums {
   Equations equations;
+  UnknownMatrix of_boundaries;  // what boundaries alone say about pose and film
   std::array<Pull, measurement_groups> pulls;
   InplaceVector<Pull, 2> of_all_boundaries;
 };
@@ -205,8 +206,8 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
   }
   if (!(squares > 0)) return;
   const double scale = std::sqrt(1 / certainty);
-  whole.error_px = scale * errors.whole_px;
-  leaning.error_px = scale * errors.leaning_px * std::sqrt(whole.weight / squares);
+  whole.error_px = whole.told_px = scale * errors.whole_px;
+  leaning.error_px = leaning.told_px = scale * errors.leaning_px * std::sqrt(whole.weight / squares);
   sums.of_all_boundaries.push_back(whole), sums.of_all_boundaries.push_back(leaning);
 }
 
@@ -216,12 +217,14 @@ Sums sums_of(std::span<const Measurement> measurements, const ResidualLines& lin
   const double certainty = 1 / (errors.noise_scale * errors.noise_scale);
   std::array<Products<Unknowns>, measurement_groups> products;
   for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, certainty));
-  Sums sums{Equations(Unknowns), {}, {}};
-  sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), certainty, film_prior);
+  Sums sums{Equations(Unknowns), {}, {}, {}};
   for (std::size_t group = 0; group < measurement_groups; ++group) {
+    if (group == errors_of_boundary.size()) sums.of_boundaries = sums.equations.xx;
     sums.pulls[group] = gathered(products[group], group, sums.equations);
     sums.pulls[group].error_px = errors.noise_scale * errors.px[group];
+    sums.pulls[group].told_px = errors.noise_scale * errors.told_px[group];
   }
+  sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), certainty, film_prior);
   if (errors.whole_px > 0 || errors.leaning_px > 0) add_pulls_of_all(measurements, lines, certainty, errors, sums);
   return sums;
 }
@@ -262,8 +265,13 @@ struct Solution {
   UnknownMatrix covariance;
 };
 
-// The likeliest pose when the print's errors are so, and how sure it is.
-std::optional<Solution> solved(const Sums& sums, const PrintPrior& prior) {
+// A solution's covariance by the common errors that are told, and without any.
+struct Told {
+  UnknownMatrix covariance, without_common;
+};
+
+// The likeliest pose when the print's errors are so, and how sure it is; `told`: by the common errors that are told.
+std::optional<Solution> solved(const Sums& sums, const PrintPrior& prior, Told* told = nullptr) {
   const Equations& e = sums.equations;
   const PrintMatrix print_covariance = covariance_of(e.nn, prior);
   const CrossMatrix by_x = print_covariance.lazyProduct(e.nx);
@@ -277,11 +285,26 @@ std::optional<Solution> solved(const Sums& sums, const PrintPrior& prior) {
   const auto widen = [&](const Pull& pull) {
     const UnknownVector shift = inverse * (pull.x - by_x.transpose() * pull.n);
     solution.covariance += pull.error_px * pull.error_px * shift * shift.transpose();
+    if (told) told->covariance += pull.told_px * pull.told_px * shift * shift.transpose();
   };
+  if (told) told->covariance = told->without_common = inverse;
   for (const Pull& pull : sums.pulls) widen(pull);
   for (const Pull& pull : sums.of_all_boundaries) widen(pull);
   const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
+}
+
+// What is less uncertain of an exact print's pose where noise is smaller by this scale; the film's prior leaves what it
+// does.
+UnknownMatrix covariance_of_less_noise(const UnknownMatrix& all, double noise_scale) {
+  const UnknownVector by_film = all.col(all.cols() - 1);
+  return (1 - noise_scale * noise_scale) * (all - by_film * by_film.transpose());
+}
+
+// The same of the whole pose, by half of what boundaries' noise is smaller: their scatter says less of angles, which
+// neighbours tell, than of places.
+UnknownMatrix covariance_of_less_boundary_noise(const Sums& sums, const UnknownMatrix& all, double noise_scale) {
+  return (1 - noise_scale * noise_scale) / 2 * (all * sums.of_boundaries * all);
 }
 
 // Weighted solutions as one.
@@ -385,44 +408,53 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   const Sums sums = pose_unknowns == 4 ? sums_of<5>(measurements, lines, film_prior, errors)
                                        : sums_of<7>(measurements, lines, film_prior, errors);
   const double tolerance_mm = marker.tolerance_m / mm;
-  const auto exact = solved(sums, {});
-  auto tolerated = tolerance_mm > 0 ? solved(sums, {tolerance_mm}) : exact;
+  Told of_exact, of_tolerated;
+  const auto exact = solved(sums, {}, &of_exact);
+  auto tolerated = tolerance_mm > 0 ? solved(sums, {tolerance_mm}, &of_tolerated) : exact;
   if (!exact || !tolerated) return std::nullopt;
   // The exact print's pose is where the measurements were taken.
   if (tolerance_mm == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
+  const Told& by_told = tolerance_mm > 0 ? of_tolerated : of_exact;
+  Solution told_tolerated = *tolerated;
+  told_tolerated.covariance =
+      by_told.covariance - covariance_of_less_noise(of_exact.without_common, errors.told_noise_scale);
   // Nothing, where the frame tells nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});
   const Weights gains = gains_of(doubted(print, doubted_shapes_mm(errors.doubt, sums, marker)), tolerance_mm);
   const Weights judged_by = weights_of(gains, print_limits.fractions);
   const Weights told_by = weights_of(gains, print_limits.told_fractions);
-  const Weights suspected_by = weights_of(gains, print_limits.suspected_fractions);
+  const bool suspects = errors.doubt.boundary_px > print_limits.least_doubt_px;
+  const Weights suspected_by = weights_of(gains, suspects ? print_limits.suspected_fractions : print_limits.fractions);
   const int psi = pose_unknowns - 1;
   Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
   PsiSpread suspected(psi);
-  const auto add = [&](const Solution& solution, std::size_t at) {
-    judged.add(solution, judged_by[at]), told.add(solution, told_by[at]), suspected.add(solution, suspected_by[at]);
+  const auto add = [&](const Solution& solution, const Solution& as_told, std::size_t at) {
+    judged.add(solution, judged_by[at]), told.add(as_told, told_by[at]), suspected.add(solution, suspected_by[at]);
   };
-  add(*tolerated, 0);
+  add(*tolerated, told_tolerated, 0);
   for (std::size_t i = 0; i < sizes; ++i) {
     if (std::max(judged_by[i + 1], told_by[i + 1]) < print_limits.min_weight &&
         suspected_by[i + 1] < print_limits.min_suspected_weight)
       continue;
     const auto off = solved(sums, prior_of(i, tolerance_mm));
     if (!off) return std::nullopt;
-    add(*off, i + 1);
+    add(*off, *off, i + 1);
   }
   const Solution mean = judged.mean();
   for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
   PrintFit fit;
   fit.step = mean.step;
-  fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
-  const double widened = std::sqrt(told.about(mean.step)(psi, psi) / mean.covariance(psi, psi));
+  const UnknownMatrix less = tolerated->covariance - by_told.covariance +
+                             covariance_of_less_boundary_noise(sums, of_exact.without_common, errors.told_noise_scale);
+  fit.covariance =
+      (mean.covariance - (1 - off_probability(judged_by)) * less).topLeftCorner(pose_unknowns, pose_unknowns);
+  const double widened = std::sqrt(told.about(mean.step)(psi, psi) / fit.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
   fit.inner_off_m = inner_off_mm(print, errors.inner_doubt_scale) * mm;
   fit.off_probability = off_probability(judged_by);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);
-  fit.suspected_probability = off_probability(suspected_by);
+  fit.suspected_probability = suspects ? off_probability(suspected_by) : 0;
   fit.psi_variance_suspected = suspected.variance() - tolerated->covariance(psi, psi);
   fit.psi_variance_by_tolerance = tolerated->covariance(psi, psi) - exact->covariance(psi, psi);
   return fit;

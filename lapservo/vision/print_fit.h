@@ -18,6 +18,10 @@ struct CommonErrors {
   double whole_px = 0,
          leaning_px = 0;  ///< all boundaries alike: moved along the shaft, leaning from side to side (rms)
   double noise_scale = 1;
+  /// And what of all that is told of the pose, once the print was judged: what a group shares, and, 1 or less, by how
+  /// much noise is smaller.
+  std::array<double, measurement_groups> told_px{};
+  double told_noise_scale = 1;
   PrintDoubt doubt;
   double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_off_m
 };
@@ -44,7 +48,8 @@ struct PrintFit {
   double off_probability = 0;            ///< that the print is off by more than the tolerance
   double psi_variance_by_tolerance = 0;  ///< of it, what the rig's tolerance adds to an exact print's
   double psi_variance_by_print = 0;      ///< and what the print adds beyond the tolerance
-  /// Where many prints are off (print_limits.suspected_fractions): what the print adds then, and that this one is off.
+  /// Where many prints are off (print_limits.suspected_fractions): what the print adds then, and that this one is off;
+  /// 0 where the picture's evidence is not doubted.
   double psi_variance_suspected = 0, suspected_probability = 0;
   /// How far off the rig's place on the print an inner boundary may lie as a whole, were all others where the rig says:
   /// what the residuals say and three sigma more; of both the worse. Where one is hidden the other's error is a turn,
