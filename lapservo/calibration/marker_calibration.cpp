@@ -13,6 +13,7 @@
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/vision/edge_measurements.h"
+#include "lapservo/vision/light_image.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -90,7 +91,7 @@ class TurnFit {
       const double px_per_m = frame.view.camera.fx_px / std::max(place.z(), 1e-3);
       const double extra_px = std::clamp(how.reach_m * px_per_m, 2.0, 15.0);
       auto measured = measurer_.measure(frame.view, marker_, frame.sighting,
-                                        {extra_px, how.seam_reach_m, free_gap_, how.ask_processing});
+                                        {extra_px, how.seam_reach_m, free_gap_, how.ask_processing, only_video_});
       if (measured.edges.all.size() < min_edges) return true;  // too few for a pose
       if (with_covariance && !tells_pose(measured.edges)) return true;
       measured.turned_rad = frame.turned_rad;
@@ -116,6 +117,20 @@ class TurnFit {
       marker_ = shape.on(marker_);
     }
     return adjustment;
+  }
+
+  // Asks of some frames, once they are measured, whether their camera is plain but for a video's compression.
+  void judge_video() {
+    constexpr std::size_t asked = 24;
+    if (frames_.empty() || ChannelGeometry(frames_[0].view.camera).differs()) return;
+    std::vector<ViewMeasurements> any, only_video;
+    for (std::size_t i = 0; i < frames_.size(); i += 1 + frames_.size() / asked) {
+      if (measured_[i].processing.processing == Processing::unknown) continue;
+      const KeyFrame& frame = frames_[i];
+      any.push_back(measurer_.measure(frame.view, marker_, frame.sighting, {2, 0.2e-3, free_gap_, true, false}));
+      only_video.push_back(measurer_.measure(frame.view, marker_, frame.sighting, {2, 0.2e-3, free_gap_, true, true}));
+    }
+    only_video_ = shows_only_video(any, only_video);
   }
 
   // Forgets frames whose boundaries agree much worse than others' do: a wrong pose, something in front.
@@ -145,7 +160,7 @@ class TurnFit {
   Marker marker_;
   std::vector<KeyFrame> frames_;
   std::vector<ViewMeasurements> measured_;
-  bool free_gap_ = true;
+  bool free_gap_ = true, only_video_ = false;
 };
 
 // The widest stretch of azimuths from which no frame faces the marker.
@@ -314,6 +329,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     const auto stage = std::min(static_cast<std::size_t>(i), rounds.size() - 1);
     last = fit.round(rounds[stage], true, stage + 1 == rounds.size());
     if (!last) return refused(unsolvable);
+    if (i == 2) fit.judge_video();
     if (i >= 2) fit.drop_misfits(*last);
     if (fit.frames().size() < min_turn_frames) return refused(unsolvable);
     settled = last->covariance && is_settled(*last, nominal.radius_m());

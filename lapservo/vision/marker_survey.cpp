@@ -4,6 +4,8 @@
 #include <cmath>
 #include <iterator>
 
+#include <opencv2/imgproc.hpp>
+
 #include "lapservo/core/angles.h"
 #include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
@@ -25,6 +27,29 @@ constexpr double min_matching = 0.6, max_wrong = 0.15, max_beside = 0.2;
 // A gradient of light is taken for none: of a turn they cancel, and what a fit of one video picture gives for it moves
 // boundaries by more than it does (psi by -2.5 mrad).
 constexpr ExpectedPicture expected_picture{.least_sharpening = 0, .gradient_sigma_per_px = 0.001};
+// Of a video of a plain camera's pictures light's blur and its gradient come out right: 0.85 px for 0.85.
+constexpr ExpectedPicture expected_video{.least_sharpening = 0, .gradient_sigma_per_px = 0.01, .only_video = true};
+
+// Without colour differences, which videos blur far more than luma.
+cv::Mat grey_of(const cv::Mat& bgr) {
+  cv::Mat luma, grey;
+  cv::cvtColor(bgr, luma, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(luma, grey, cv::COLOR_GRAY2BGR);
+  return grey;
+}
+
+// The sides as another picture of the same shows them. Boundaries come first, so what is known of measurements by
+// their place stays true.
+void take_sides(const EdgeMeasurements& from, EdgeMeasurements& edges) {
+  decltype(edges.all) all;
+  for (const Measurement& m : edges.all)
+    if (m.group < 4) all.push_back(m);
+  for (const Measurement& m : from.all)
+    if (m.group >= 4) all.push_back(m);
+  edges.all = all;
+  edges.sides_in_image = from.sides_in_image;
+  edges.side_blur = from.side_blur;
+}
 
 std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unknowns, const EdgeBlur& blur,
                                     bool settled) {
@@ -141,6 +166,20 @@ void take_processing_off(std::vector<ViewMeasurements>& views) {
   }
 }
 
+bool shows_only_video(const std::vector<ViewMeasurements>& any, const std::vector<ViewMeasurements>& only_video) {
+  constexpr double max_misfit = 1.1;  // of the one with every processing
+  // Where they are blurred less (1.2 px^2 by lapservo's own writer, 2.0 by OpenCV's), colours say more than luma alone.
+  constexpr double min_chroma_variance_px2 = 1.6;
+  std::vector<double> misfits, variances_px2;
+  for (std::size_t i = 0; i < std::min(any.size(), only_video.size()); ++i)
+    if (const auto& a = any[i].processing.edges, &b = only_video[i].processing.edges; a) {
+      misfits.push_back(b ? b->misfit / a->misfit : 2 * max_misfit);
+      variances_px2.push_back(b ? b->processing.chroma_variance_px2 : 0);
+    }
+  return 2 * misfits.size() > any.size() && median(misfits) < max_misfit &&
+         median(variances_px2) > min_chroma_variance_px2;
+}
+
 ViewMeasurer::ViewMeasurer(const Rig& rig, std::size_t instrument)
     : classes_(rig.instruments), bands_(classes_.of_bands(instrument)), light_(rig.camera.response.table()) {}
 
@@ -154,14 +193,30 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   measured.edges =
       measure_edges(scene, light, sighting.unknowns, sighting.film_m, {reach.extra_px, iterations, 1}, sighting.blur);
   if (reach.ask_processing)
-    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px, expected_picture);
-  const auto& processed = measured.processing.edges;
-  if (const auto cylinder = view_cylinder(sighting.unknowns.pose().camera_from_unrolled, marker.radius_m());
-      processed && cylinder)
-    measured.side_biases_px = side_biases_px(light, measured.edges.all, processed->processing, sighting.blur,
-                                             marker.radius_m() / cylinder->camera_to_axis_m * view.camera.fx_px);
-  measured.seam = measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px, reach.seam_m,
-                               reach.free_gap, processed ? std::optional(processed->processing) : std::nullopt);
+    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px,
+                                          reach.only_video ? expected_video : expected_picture);
+  const auto& found = measured.processing.edges;
+  const auto processing = found ? std::optional(found->processing) : std::nullopt;
+  const auto seam_by = [&](const LightImage* grey) {
+    return measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px, reach.seam_m, reach.free_gap,
+                        processing, grey);
+  };
+  if (processing && reach.only_video) {
+    const cv::Mat grey = grey_of(view.bgr);
+    const ImageView grey_image(grey);
+    const LightImage grey_light(grey_image, light_);
+    const Scene grey_scene{grey_image, view.camera, classes_, marker, bands_};
+    take_sides(measure_edges(grey_scene, grey_light, sighting.unknowns, sighting.film_m,
+                             {reach.extra_px, iterations, 1}, sighting.blur),
+               measured.edges);
+    measured.seam = seam_by(&grey_light);
+  } else {
+    const auto cylinder = view_cylinder(sighting.unknowns.pose().camera_from_unrolled, marker.radius_m());
+    if (processing && cylinder)
+      measured.side_biases_px = side_biases_px(light, measured.edges.all, *processing, sighting.blur,
+                                               marker.radius_m() / cylinder->camera_to_axis_m * view.camera.fx_px);
+    measured.seam = seam_by(nullptr);
+  }
   measured.blur_px = std::max(sighting.blur.boundaries_px, sighting.blur.sides_px);
   measured.film_m = sighting.film_m;
   return measured;

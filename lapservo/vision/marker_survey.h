@@ -72,6 +72,11 @@ struct ViewMeasurements {
 /// that can't tell get the median of those that can, as it is one camera.
 void take_processing_off(std::vector<ViewMeasurements>& views);
 
+/// Whether colour differences blurred widely, as libx264 leaves them, explain what these views look like as well as any
+/// processing does: `any` and `only_video` measured them with and without Reach::only_video. One camera, so all views
+/// together.
+bool shows_only_video(const std::vector<ViewMeasurements>& any, const std::vector<ViewMeasurements>& only_video);
+
 /// Measures many views of one marker.
 class ViewMeasurer {
  public:
@@ -83,6 +88,7 @@ class ViewMeasurer {
     double extra_px = 3, seam_m = 0.5e-3;
     bool free_gap = true;
     bool ask_processing = false;
+    bool only_video = false;  ///< what was done is nothing but compression: see shows_only_video
   };
   ViewMeasurements measure(const MarkerView& view, const Marker& marker, const Sighting& sighting,
                            const Reach& reach) const;

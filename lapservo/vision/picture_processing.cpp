@@ -32,11 +32,12 @@ struct State {
 };
 
 // One sigma of what is expected before a frame is seen: of any processing, of none but blur, of an edge.
-ProcessingVector expected_sigmas() {
+ProcessingVector expected_sigmas(bool only_video) {
   ProcessingVector sigmas;
   using enum ProcessingUnknown;
   sigmas[at(log_blur)] = 0.3, sigmas[at(log_mosaic)] = 0.2, sigmas[at(chroma_variance)] = 0.7;
   sigmas[at(saturation)] = 0.15, sigmas[at(sharpening)] = 0.5, sigmas[at(log_radius)] = 0.25;
+  if (only_video) sigmas[at(log_mosaic)] = sigmas[at(saturation)] = sigmas[at(sharpening)] = 1e-3;
   return sigmas;
 }
 ProcessingVector sigmas_of_none() {
@@ -264,7 +265,7 @@ std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light
                                              double blur_px) {
   const std::span<const PooledEdge> all(edges.all.begin(), edges.all.size());
   if (!is_enough(all)) return std::nullopt;
-  const Problem problem(light_of_value, all, blur_px, expected_sigmas(), {});
+  const Problem problem(light_of_value, all, blur_px, expected_sigmas(false), {});
   return processing_of(problem.improved(problem.prior(), 0).processing);
 }
 
@@ -272,7 +273,7 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
                                       double blur_px, const ExpectedPicture& expected) {
   const std::span<const PooledEdge> all(edges.all.begin(), edges.all.size());
   if (!is_enough(all)) return std::nullopt;
-  const Problem problem(light_of_value, all, blur_px, expected_sigmas(), expected);
+  const Problem problem(light_of_value, all, blur_px, expected_sigmas(expected.only_video), expected);
   const Problem without(light_of_value, all, blur_px, sigmas_of_none(), expected);
   const State state = minimised(problem);
   ProcessedEdges out;

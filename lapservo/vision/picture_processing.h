@@ -14,6 +14,7 @@ namespace lapservo::internal {
 struct ExpectedPicture {
   double least_sharpening = -0.35;
   double gradient_sigma_per_px = 0.01;  ///< of the share by which light grows along a boundary's normal
+  bool only_video = false;  ///< nothing but blurred colour differences: as demosaiced, as sharp, as colourful
 };
 
 /// What is to be known of a frame's processing for its boundaries' sake.

@@ -58,6 +58,7 @@ struct Section {
   std::vector<LampLight> lamp;
   std::vector<Profile> profiles;
   std::array<double, 3> shaft{0.02, 0.02, 0.02};  // light of the bare shaft
+  std::size_t channels = 3;                       // 1 of a grey picture: all show the same
 };
 
 struct SeamView {
@@ -262,12 +263,12 @@ class ColorFit {
 Eigen::VectorXd residuals(const Section& section, double upper_m, double gap_m, double blur_px, double radius_m) {
   const SeamBasis basis = basis_of(section, upper_m, gap_m, blur_px, radius_m);
   const Eigen::Index samples = basis.rows();
-  Eigen::VectorXd out(samples * 3 * static_cast<Eigen::Index>(section.profiles.size()));
+  Eigen::VectorXd out(samples * static_cast<Eigen::Index>(section.channels * section.profiles.size()));
   Eigen::Index at = 0;
   for (const Profile& profile : section.profiles) {
     const Eigen::VectorXd used = used_samples(profile);
     const ColorFit fit(basis, used);
-    for (std::size_t c = 0; c < 3; ++c, at += samples) {
+    for (std::size_t c = 0; c < section.channels; ++c, at += samples) {
       const Eigen::VectorXd light = light_of(profile, c, used);
       const SeamColors colors = fit.colors(light, section.shaft[c]);
       out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(light - basis.lazyProduct(colors));
@@ -281,10 +282,16 @@ struct SeamFit {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
 };
 
+struct SeamSearch {
+  double expected_gap_m, reach_m, gap_reach_m, radius_m, px_per_m;
+};
+
 // From the best of a grid, Gauss-Newton with differences: two unknowns, residuals with the colours projected out.
-std::optional<SeamFit> fit(const Section& section, double expected_gap_m, double reach_m, double gap_reach_m,
-                           double blur_px, double radius_m, double px_per_m) {
-  const auto at = [&](double upper_m, double gap_m) { return residuals(section, upper_m, gap_m, blur_px, radius_m); };
+std::optional<SeamFit> fit(const Section& section, const SeamSearch& search, double blur_px) {
+  const auto& [expected_gap_m, reach_m, gap_reach_m, radius_m, px_per_m] = search;
+  const auto at = [&](double upper_m, double gap_m) {
+    return residuals(section, upper_m, gap_m, blur_px, search.radius_m);
+  };
   const double pixel_m = 1 / px_per_m, step_m = std::max(0.8 * blur_px, 1.0) * pixel_m;
   SeamFit best{0, expected_gap_m, {}};
   double best_cost = 1e300, worst_cost = 0;
@@ -331,10 +338,22 @@ void take_off(SeamFit& found, const SeamFit& moved) {
   found.covariance.diagonal() += left * left * Eigen::Vector2d(upper_m * upper_m, gap_m * gap_m);
 }
 
-// What the processing makes of light across edges that lie where they were found.
-Section processed(const Section& section, const SeamFit& found, double blur_px, double radius_m,
-                  const PictureProcessing& processing, const std::array<float, 256>& light_of_value) {
-  const SeamBasis seen = basis_of(section, found.upper_m, found.gap_m, blur_px, radius_m);
+// Lines between pixels are sampled linearly, which blurs light by so much on average.
+constexpr double seam_sampling_px2 = 1.0 / 6;
+
+std::vector<std::array<double, 3>> sampled(const std::vector<std::array<double, 3>>& light) {
+  std::vector<std::array<double, 3>> out = light;
+  for (std::size_t i = 1; i + 1 < light.size(); ++i)
+    for (std::size_t c = 0; c < 3; ++c)
+      out[i][c] += seam_sampling_px2 / 2 * (light[i - 1][c] - 2 * light[i][c] + light[i + 1][c]);
+  return out;
+}
+
+// What the processing makes of light across edges that lie where they were found; `seen_px`: what blurs them in the
+// picture whose colours are fitted.
+Section processed(const Section& section, const SeamFit& found, double seen_px, double radius_m,
+                  const PictureProcessing& processing, const std::array<float, 256>& light_of_value, bool grey) {
+  const SeamBasis seen = basis_of(section, found.upper_m, found.gap_m, seen_px, radius_m);
   const SeamBasis true_basis = basis_of(section, found.upper_m, found.gap_m, processing.blur_px, radius_m);
   Section out = section;
   for (Profile& profile : out.profiles) {
@@ -346,11 +365,42 @@ Section processed(const Section& section, const SeamFit& found, double blur_px, 
       for (std::size_t i = 0; i < light.size(); ++i)
         light[i][c] = true_basis.row(static_cast<Eigen::Index>(i)).dot(colors);
     }
-    profile.light = filtered_light(light_of_value, processing, light);
+    FilteredLight filtered = filtered_light(light_of_value, processing, light);
+    if (grey)
+      for (std::size_t i = 0; i < light.size(); ++i) filtered.light[i].fill(filtered.luma[i]);
+    profile.light = grey ? sampled(filtered.light) : std::move(filtered.light);
     for (std::size_t i = 0; i < light.size(); ++i)
       for (double& channel : profile.light[i]) channel *= profile.count[i];
   }
   return out;
+}
+
+// By all channels; what the processing moves the edges by is taken off.
+std::optional<SeamFit> fit_by_colors(const Section& section, const SeamSearch& search, double blur_px,
+                                     const std::optional<PictureProcessing>& processing,
+                                     const std::array<float, 256>& light_of_value) {
+  auto found = fit(section, search, blur_px);
+  if (!found || !processing) return found;
+  const Section seen = processed(section, *found, blur_px, search.radius_m, *processing, light_of_value, false);
+  SeamSearch again = search;
+  again.expected_gap_m = found->gap_m;
+  if (const auto moved = fit(seen, again, blur_px)) take_off(*found, *moved);
+  return found;
+}
+
+// By the grey picture: colour differences are blurred far wider, over the gap and into each other.
+std::optional<SeamFit> fit_by_luma(const Section& colors, const Section& grey, const SeamSearch& search,
+                                   double colors_px, const PictureProcessing& processing,
+                                   const std::array<float, 256>& light_of_value) {
+  const double grey_px = std::sqrt(processing.blur_px * processing.blur_px + seam_sampling_px2);
+  auto found = fit(grey, search, grey_px);
+  if (!found) return std::nullopt;
+  Section made = processed(colors, *found, colors_px, search.radius_m, processing, light_of_value, true);
+  made.channels = grey.channels, made.shaft = grey.shaft;
+  SeamSearch again = search;
+  again.expected_gap_m = found->gap_m;
+  if (const auto moved = fit(made, again, grey_px)) take_off(*found, *moved);
+  return found;
 }
 
 // An edge of the print that was found `beyond_m` around the shaft from where it is expected.
@@ -374,7 +424,7 @@ SeamEdge edge_at(const SeamView& view, double azimuth_rad, double along_m, doubl
 
 std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns,
                                       double blur_px, double reach_m, bool free_gap,
-                                      const std::optional<PictureProcessing>& processing) {
+                                      const std::optional<PictureProcessing>& processing, const LightImage* grey) {
   const Marker& marker = scene.marker;
   const ShaftPose& pose = unknowns.pose();
   const auto cylinder = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
@@ -394,14 +444,19 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
   along_m /= weight;
   const auto middle = scene.camera.raw_with_jacobian(view.point(view.upper_rad, along_m));
   const double px_per_m = (middle.d_px_d_point * view.around(view.upper_rad)).norm();
-  const double radius_m = marker.radius_m(), gap_reach_m = free_gap ? reach_m : 0;
-  auto found = fit(*section, gap_m, reach_m, gap_reach_m, blur_px, radius_m, px_per_m);
-  if (!found) return std::nullopt;
-  if (processing) {
-    const Section seen = processed(*section, *found, blur_px, radius_m, *processing, light.light_of_value());
-    if (const auto moved = fit(seen, found->gap_m, reach_m, gap_reach_m, blur_px, radius_m, px_per_m))
-      take_off(*found, *moved);
+  const double radius_m = marker.radius_m();
+  const SeamSearch search{gap_m, reach_m, free_gap ? reach_m : 0, radius_m, px_per_m};
+  std::optional<SeamFit> found;
+  if (grey != nullptr && processing) {
+    const SeamView grey_view{scene, *grey, unknowns, view.axes, view.upper_rad};
+    auto in_grey = sample(grey_view, cylinder->facing_azimuth_rad, blur_px, reach_m);
+    if (!in_grey) return std::nullopt;
+    in_grey->shaft = shaft_light(grey_view, blur_px), in_grey->channels = 1;
+    found = fit_by_luma(*section, *in_grey, search, blur_px, *processing, light.light_of_value());
+  } else {
+    found = fit_by_colors(*section, search, blur_px, processing, light.light_of_value());
   }
+  if (!found) return std::nullopt;
 
   SeamEdges edges;
   edges.gap_rad = found->gap_m / radius_m;

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/testing/camera_effects.h"
@@ -27,11 +28,24 @@ struct GapShot {
     q.psi_rad = view.value().facing_azimuth_rad - marker.seam_rad + marker.gap_rad / 2 + beside_rad;
     bgr = scenes::render(rig, {q}, seed);
   }
-  std::optional<SeamEdges> seam(const cv::Mat& picture, const std::optional<PictureProcessing>& processing) const {
-    constexpr double blur_px = 0.9, reach_m = 0.4e-3;
+  std::optional<SeamEdges> seam(const cv::Mat& picture, const std::optional<PictureProcessing>& processing,
+                                double blur_px = 0.9) const {
+    constexpr double reach_m = 0.4e-3;
     const scenes::Sight sight(rig, picture);
     const auto unknowns = PoseUnknowns::free(scenes::pose_of(rig, 0, q));
     return measure_seam(sight.scene(), sight.light(), unknowns, blur_px, reach_m, true, processing);
+  }
+  // As a picture without colour differences shows it, which `picture` has blurred.
+  std::optional<SeamEdges> seam_by_luma(const cv::Mat& picture, const PictureProcessing& processing,
+                                        double blur_px) const {
+    constexpr double reach_m = 0.4e-3;
+    cv::Mat luma, grey;
+    cv::cvtColor(picture, luma, cv::COLOR_BGR2GRAY);
+    cv::cvtColor(luma, grey, cv::COLOR_GRAY2BGR);
+    const scenes::Sight sight(rig, picture), grey_sight(rig, grey);
+    const auto unknowns = PoseUnknowns::free(scenes::pose_of(rig, 0, q));
+    return measure_seam(sight.scene(), sight.light(), unknowns, blur_px, reach_m, true, processing,
+                        &grey_sight.light());
   }
 };
 
@@ -56,6 +70,28 @@ TEST(SeamEdges, LieWhereTheyDoWithoutSharpening) {
   ASSERT_GE(seen, 5);
   EXPECT_LT(moved_rad / seen, -1e-3) << "or sharpening moves nothing";
   EXPECT_LT(std::abs(left_rad), 0.4 * std::abs(moved_rad));
+}
+
+// A gap of ten pixels is grey, so that blurred colour differences mix over all of it.
+TEST(SeamEdges, LieWhereTheyDoByLumaWhereColoursAreBlurred) {
+  effects::CameraEffects effects;
+  effects.subsampled = true;
+  PictureProcessing processing;
+  processing.blur_px = 0.85, processing.chroma_variance_px2 = 1.2;
+  constexpr double seen_px = 1.15;
+  double by_colours = 0, by_luma = 0;
+  int seen = 0;
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const GapShot shot(seed);
+    const cv::Mat blurred = effects::seen_through(effects, shot.bgr, shot.rig.camera);
+    const auto plain = shot.seam(shot.bgr, std::nullopt), raw = shot.seam(blurred, std::nullopt, seen_px),
+               luma = shot.seam_by_luma(blurred, processing, seen_px);
+    if (!plain || !raw || !luma) continue;
+    by_colours += std::pow(raw->gap_rad - plain->gap_rad, 2), by_luma += std::pow(luma->gap_rad - plain->gap_rad, 2);
+    ++seen;
+  }
+  ASSERT_GE(seen, 7);
+  EXPECT_LT(by_luma, 0.25 * by_colours) << std::sqrt(by_luma / seen) << " of " << std::sqrt(by_colours / seen);
 }
 
 // A highlight is on the generatrix that faces the camera, and bands get darker from there.

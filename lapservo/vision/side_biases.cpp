@@ -71,7 +71,7 @@ EdgeProfile processed_profile(const EdgeProfile& like, const ContourColors& colo
   for (int i = 0; i < count; ++i)
     for (int c = 0; c < 3; ++c)
       samples[static_cast<std::size_t>(i)][static_cast<std::size_t>(c)] = std::max(0.0, true_light(i, c));
-  const auto filtered = filtered_light(light.light_of_value(), processing, samples);
+  const auto filtered = filtered_light(light.light_of_value(), processing, samples).light;
   EdgeProfile profile = like;
   for (std::size_t c = 0; c < 3; ++c) {
     profile.usable[c].fill(true);
