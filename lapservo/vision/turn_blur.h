@@ -20,8 +20,8 @@ TurnBlur turn_blur(const EdgeMeasurements& pass, const EdgeBlur& located_with, b
 
 /// Variance of psi in the exposure's middle about its mean over the exposure, which is what a picture shows. Psi may
 /// have turned evenly, which moves nothing, but the blur does not tell; it is taken for a start from rest. Of single
-/// frames most are still: a blur that may be noise does not count. By `change_rad`
-/// psi's step from the frame before differs from that before, which bounds it.
+/// frames most are still: a blur that may be noise does not count. By `change_rad` psi's step from the frame before
+/// differs from that before, which bounds it.
 double variance_of_uneven_turn(const TurnBlur& blur, std::optional<double> change_rad);
 
 }  // namespace lapservo::internal
