@@ -284,8 +284,11 @@ std::optional<Solution> solved(const Sums& sums, const PrintPrior& prior, Told* 
   solution.covariance = inverse;
   const auto widen = [&](const Pull& pull) {
     const UnknownVector shift = inverse * (pull.x - by_x.transpose() * pull.n);
-    solution.covariance += pull.error_px * pull.error_px * shift * shift.transpose();
-    if (told) told->covariance += pull.told_px * pull.told_px * shift * shift.transpose();
+    const UnknownVector error = pull.error_px * shift;
+    solution.covariance.noalias() += error * error.transpose();
+    if (!told) return;
+    const UnknownVector told_error = pull.told_px * shift;
+    told->covariance.noalias() += told_error * told_error.transpose();
   };
   if (told) told->covariance = told->without_common = inverse;
   for (const Pull& pull : sums.pulls) widen(pull);
@@ -304,7 +307,10 @@ UnknownMatrix covariance_of_less_noise(const UnknownMatrix& all, double noise_sc
 // The same of the whole pose, by half of what boundaries' noise is smaller: their scatter says less of angles, which
 // neighbours tell, than of places.
 UnknownMatrix covariance_of_less_boundary_noise(const Sums& sums, const UnknownMatrix& all, double noise_scale) {
-  return (1 - noise_scale * noise_scale) / 2 * (all * sums.of_boundaries * all);
+  const UnknownMatrix by_boundaries = all.lazyProduct(sums.of_boundaries);
+  UnknownMatrix less = by_boundaries.lazyProduct(all);
+  less *= (1 - noise_scale * noise_scale) / 2;
+  return less;
 }
 
 // Weighted solutions as one.
@@ -429,7 +435,8 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
   PsiSpread suspected(psi);
   const auto add = [&](const Solution& solution, const Solution& as_told, std::size_t at) {
-    judged.add(solution, judged_by[at]), told.add(as_told, told_by[at]), suspected.add(solution, suspected_by[at]);
+    judged.add(solution, judged_by[at]), told.add(as_told, told_by[at]);
+    if (suspects) suspected.add(solution, suspected_by[at]);
   };
   add(*tolerated, told_tolerated, 0);
   for (std::size_t i = 0; i < sizes; ++i) {
@@ -454,8 +461,10 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   fit.off_probability = off_probability(judged_by);
   fit.psi_variance = mean.covariance(psi, psi);
   fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);
-  fit.suspected_probability = suspects ? off_probability(suspected_by) : 0;
-  fit.psi_variance_suspected = suspected.variance() - tolerated->covariance(psi, psi);
+  if (suspects) {
+    fit.suspected_probability = off_probability(suspected_by);
+    fit.psi_variance_suspected = suspected.variance() - tolerated->covariance(psi, psi);
+  }
   fit.psi_variance_by_tolerance = tolerated->covariance(psi, psi) - exact->covariance(psi, psi);
   return fit;
 }
