@@ -12,10 +12,10 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr double doubt_px = 3;      // of where the shaft and its colours lie
-constexpr double before_m = 0.3;    // of the marker, at most so much of the shaft
-constexpr double beyond = 0.5;      // of the marker's length: nobody knows where the shaft ends
-constexpr double nearest_m = 0.01;  // to the camera
+constexpr double doubt_px = 3;         // of where the shaft and its colours lie
+constexpr double before_m = 0.3;       // of the marker, at most so much of the shaft
+constexpr double reach_lengths = 0.5;  // of the marker's length: nobody knows where the shaft ends
+constexpr double nearest_m = 0.01;     // to the camera
 
 Eigen::Vector3d on_axis(const ShaftPose& pose, double along_m) {
   return pose.camera_from_unrolled * Eigen::Vector3d(0, 0, along_m);
@@ -43,7 +43,7 @@ std::optional<Segment> marker_in_image(const Camera& camera, const Marker& marke
 
 // With what may be seen of the shaft on both sides.
 std::optional<Segment> shaft_in_image(const Camera& camera, const Marker& marker, const ShaftPose& pose) {
-  return axis_in_image(camera, pose, -before_m, (1 + beyond) * marker.length_m());
+  return axis_in_image(camera, pose, -before_m, (1 + reach_lengths) * marker.length_m());
 }
 
 double distance_px(const Segment& segment, const Eigen::Vector2d& place_px) {
@@ -109,7 +109,7 @@ void ShaftCover::draw(const Camera& camera, const Marker& marker, const std::arr
     return camera.contains(section.left_px) || camera.contains(section.right_px) ||
            camera.contains((section.left_px + section.right_px) / 2);
   };
-  double along_m = (1 + beyond) * marker.length_m();
+  double along_m = (1 + reach_lengths) * marker.length_m();
   while (along_m > -before_m) {
     const auto section = section_at(along_m);
     constexpr double largest_step_m = 1e-3;

@@ -10,8 +10,6 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr const TurnBlurLimits& limits = turn_blur_limits;
-
 // With constant acceleration from rest, by psi's variance over the exposure: a turn T has a variance of 4/45 T^2 about
 // its mean, which lies T / 12 from psi in the middle.
 constexpr double square_of_uneven = 45.0 / 4 / 144;
@@ -22,7 +20,7 @@ struct BoundaryBlur {
   double steepness2 = 0;  // mean, [px/rad] squared
   double variance_px2 = 0, information = 0;
 
-  bool seen() const { return points >= limits.min_points && information > 0; }
+  bool seen() const { return points >= turn_blur_limits.min_points && information > 0; }
 };
 
 std::array<BoundaryBlur, 4> blurs_of(const EdgeMeasurements& pass, const EdgeBlur& located_with) {
@@ -51,7 +49,7 @@ double else_px2(const std::array<BoundaryBlur, 4>& blurs, double sides_px, bool 
   for (const std::size_t end : {0, 3})
     if (blurs[end].seen()) ends_px2 = std::max(ends_px2, blurs[end].variance_px2);
   const double moved_px2 = std::max(0.0, ends_px2 - usual_px2) + std::max(0.0, sides_px * sides_px - usual_px2);
-  return std::hypot(limits.unexplained_px2, moved_px2, processed ? limits.of_processing_px2 : 0);
+  return std::hypot(turn_blur_limits.unexplained_px2, moved_px2, processed ? turn_blur_limits.of_processing_px2 : 0);
 }
 
 }  // namespace
@@ -83,17 +81,17 @@ TurnBlur turn_blur(const EdgeMeasurements& pass, const EdgeBlur& located_with, b
   if (!(information > 0)) return {};
   // Where the blurs don't lie on that line, it was something else.
   const double variance = products / information;
-  const double misfit = std::max(1.0, limits.misfit_fraction * (squares - variance * products) / degrees);
+  const double misfit = std::max(1.0, turn_blur_limits.misfit_fraction * (squares - variance * products) / degrees);
   return {variance, std::sqrt(misfit / information)};
 }
 
 double variance_of_uneven_turn(const TurnBlur& blur, std::optional<double> change_rad) {
   if (!(blur.sigma_rad2 > 0)) return 0;
-  if (!(blur.variance_rad2 > limits.told_sigmas * blur.sigma_rad2)) return 0;
+  if (!(blur.variance_rad2 > turn_blur_limits.told_sigmas * blur.sigma_rad2)) return 0;
   const double told = square_of_uneven * blur.variance_rad2;
   if (!change_rad) return told;
   // A start from rest within the exposure is off by a fourth of how far psi has come.
-  const double most_rad = limits.uneven_of_change * *change_rad;
+  const double most_rad = turn_blur_limits.uneven_of_change * *change_rad;
   return std::min(told, most_rad * most_rad);
 }
 
