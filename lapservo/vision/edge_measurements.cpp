@@ -253,17 +253,20 @@ void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBl
     const float before = dot(edges[i].before, steps.sum), step = dot(edges[i].step, steps.sum);
     points.push_back(k == 0 ? EndPoint{before, step} : EndPoint{-before - step, step});
   }
+  static_assert(max_end_points >= max_lines);
   const auto gloss = gloss_of(points);
   for (std::size_t at = 0; at < points.size(); ++at) {
     BoundaryPlace& place = places[steps.points[at]];
-    const double level = film_edge_level(place.facing, even_light) - gloss.begin()[at];
+    const double matt = film_edge_level(place.facing, even_light);
     const double width_px = frame.film_m * place.film_px_per_m, blur_px = blur.along_px[k];
-    const FilmShift shift = film_shift(level, std::abs(width_px) / blur_px);
+    const FilmShift shift = film_shift(matt - gloss.begin()[at], std::abs(width_px) / blur_px);
     const double shift_px = shift.fraction * width_px;
     Measurement& m = place.measurement;
     m.row[m.row.size() - 1] += (shift.by_width - place.film_shift) * film_sigma_m * place.film_px_per_m;
     place.film_moved_px = shift_px - place.film_shift * width_px;
-    place.film_sigma_px = edge_limits.film_doubt * shift_px * shift_px / blur_px;
+    // What gloss takes off is no better known.
+    const double doubted_px = std::max(std::abs(shift_px), std::abs(matt * width_px));
+    place.film_sigma_px = edge_limits.film_doubt * doubted_px * doubted_px / blur_px;
     m.expected_px += static_cast<float>(place.film_moved_px) * m.normal;
   }
 }

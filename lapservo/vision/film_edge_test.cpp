@@ -85,9 +85,17 @@ TEST(FilmShift, IsWhereAStepIsLocated) {
     }
 }
 
+// A thick film from near by: the whole solution has 0.11 at a level of 0.2, 0.92 at 0.8.
+TEST(FilmShift, StaysWithinTheStripWhereItIsWide) {
+  for (const double width : {3.0, 4.0, 6.0, 20.0}) {
+    EXPECT_NEAR(film_shift(0.2, width).fraction, 0.11, 0.04) << width;
+    EXPECT_NEAR(film_shift(0.8, width).fraction, 0.89, 0.04) << width;
+  }
+}
+
 TEST(FilmShift, ChangesWithTheWidthAsItSays) {
   for (const double level : {-0.2, 0.3, 1.6})
-    for (const double width : {0.3, 1.5}) {
+    for (const double width : {0.3, 1.5, 4.0}) {
       constexpr double step = 1e-4;
       const auto moved = [&](double w) { return film_shift(level, w).fraction * w; };
       EXPECT_NEAR(film_shift(level, width).by_width, (moved(width + step) - moved(width - step)) / (2 * step), 1e-6);

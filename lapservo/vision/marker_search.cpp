@@ -33,6 +33,10 @@ bool contradicts_registration(const FineFit& free) {
 Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
   constexpr double doubt = 1.5;
   const Status status = validate(scene, fit);
+  // Of psi what the print is judged by: boundaries, whose scatter it is otherwise told by, say nothing of one side.
+  const Eigen::Index psi = fit.unknowns.size() - 1;
+  const double widened = std::max(1.0, std::sqrt(fit.psi_variance / fit.covariance(psi, psi)));
+  fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
   fit.covariance *= doubt * doubt;
   return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
@@ -49,10 +53,8 @@ Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const E
     budget.spend(costs.fine_fit);
     fit = fit_finely(scene, light, fit.unknowns, fit.blur, processing);
     if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit.unknowns);
-    const Eigen::Index psi = fit.unknowns.size() - 1;
     const double moved_rad = std::abs(wrap_pi(fit.unknowns.pose().psi_rad - before_rad));
-    if (moved_rad < rest_sigmas * std::sqrt(fit.covariance(psi, psi)) &&
-        fit.sides_used >= least_sides * fit.sides_in_image)
+    if (moved_rad < rest_sigmas * std::sqrt(fit.psi_variance) && fit.sides_used >= least_sides * fit.sides_in_image)
       return with_doubt_of_one_side(scene, fit);
   }
   return refusal(Status::uncertain, fit.unknowns);
