@@ -102,6 +102,19 @@ class TurnFit {
     auto adjustment =
         adjust(measured_, marker_, {how.loss_scale_sigmas, free_print, free_gap_ && free_print, with_covariance});
     if (!adjustment) return std::nullopt;
+    if (getenv("D264")) {
+      int wide = 0; std::vector<double> bb, sb, s4, s5, b0, b1, b2, b3, dp, r4, r5;
+      for (std::size_t i = 0; i < frames_.size(); ++i) {
+        const auto& v = measured_[i];
+        wide += frames_[i].sighting.blur.wide(); bb.push_back(frames_[i].sighting.blur.boundaries_px); sb.push_back(frames_[i].sighting.blur.sides_px);
+        b0.push_back(v.bias_px[0]), b1.push_back(v.bias_px[1]), b2.push_back(v.bias_px[2]), b3.push_back(v.bias_px[3]), s4.push_back(v.bias_px[4]), s5.push_back(v.bias_px[5]);
+        std::vector<double> a4, a5; for (std::size_t k = 0; k < v.edges.all.size(); ++k) { if (v.edges.all[k].group == 4) a4.push_back(adjustment->residuals_px[i][k]); if (v.edges.all[k].group == 5) a5.push_back(adjustment->residuals_px[i][k]); }
+        if (!a4.empty()) r4.push_back(median(a4)); if (!a5.empty()) r5.push_back(median(a5));
+      }
+      std::fprintf(stderr, "n %zu wide %d blur %.3f sides %.3f bias %+.3f %+.3f %+.3f %+.3f sides %+.3f %+.3f left %+.3f %+.3f; step um", frames_.size(), wide, median(bb), median(sb), median(b0), median(b1), median(b2), median(b3), median(s4), median(s5), median(r4), median(r5));
+      for (int k = 0; k < 7; ++k) std::fprintf(stderr, " %+.1f", 1e6 * adjustment->print[k]);
+      std::fprintf(stderr, "\n");
+    }
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       Sighting& sighting = frames_[i].sighting;
       const int pose_numbers = sighting.unknowns.size();

@@ -22,7 +22,7 @@ constexpr int frame_numbers = 7, film = 6;
 // After the print's numbers (lengths in mm): what all films are off by, in film_sigma_m, and all sides, the seam's
 // edges and each boundary, in all frames alike [px]; and by how much the seam's edges stay behind their motion [px].
 constexpr int shared_film = print_numbers, sides = shared_film + 1, seam = sides + 1, boundaries = seam + 2;
-constexpr int seam_lag = boundaries + 4, shared_numbers = seam_lag + 1;
+constexpr int seam_lag = boundaries + 4, bulges = seam_lag + 1, leans = bulges + 4, shared_numbers = leans + 4;
 constexpr int gap = print_numbers - 1;
 constexpr std::size_t upper_group = measurement_groups, groups = measurement_groups + 2;
 
@@ -108,6 +108,7 @@ SharedRow shared_row(const Measurement& m, const PrintShape& shape, double cover
   const std::size_t k = m.group;
   const double along = mm * m.along_px_per_m;
   row[boundaries + k] = 1;
+  row[bulges + k] = m.across * m.across - 1.0 / 3, row[leans + k] = m.across;
   if (k > 0) row[k - 1] = along * (1 - m.turn_fraction);
   row[3 + k] = along * m.turn_fraction;
   // A wider gap leaves less around the shaft for the same print.
@@ -182,7 +183,8 @@ bool tells_lag(const std::vector<ViewMeasurements>& frames) {
   return std::min(views(1), views(-1)) >= min_seam_views_each_way;
 }
 
-void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& shared, bool free_lag) {
+void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& shared, bool free_lag,
+                const std::array<double, 4>& uneven_px) {
   const auto add = [&](int index, double sigma) {
     problem.AddResidualBlock(new Prior(shared_numbers, index, 0, sigma), nullptr, shared.data());
   };
@@ -190,6 +192,11 @@ void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& sha
   add(gap, gap_prior_rad);
   for (int i = shared_film; i < seam_lag; ++i) add(i, zero * shared_sigmas[static_cast<std::size_t>(i - shared_film)]);
   add(seam_lag, free_lag ? seam_lag_px : zero * seam_lag_px);
+  for (int k = 0; k < 4; ++k) {
+    static const double fb = getenv("FB") ? atof(getenv("FB")) : 0, fl = getenv("FL") ? atof(getenv("FL")) : 0;
+    add(bulges + k, 1e-4 + fb * uneven_px[static_cast<std::size_t>(k)]);
+    add(leans + k, 1e-4 + fl * uneven_px[static_cast<std::size_t>(k)]);
+  }
 }
 
 double sigma_of_edges_px(const std::vector<ViewMeasurements>& frames) {
@@ -260,7 +267,13 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   ceres::Problem problem;
   problem.AddParameterBlock(shared.data(), shared_numbers);
   const bool free_lag = tells_lag(frames);
-  add_priors(problem, shared, free_lag);
+  std::array<double, 4> uneven_px{};
+  for (std::size_t k = 0; k < 4; ++k) {
+    std::vector<double> biases_px;
+    for (const ViewMeasurements& frame : frames) biases_px.push_back(std::abs(frame.bias_px[k]));
+    if (!biases_px.empty()) uneven_px[k] = median(biases_px);
+  }
+  add_priors(problem, shared, free_lag, uneven_px);
   const PrintShape shape = PrintShape::of(marker);
   for (std::size_t i = 0; i < frames.size(); ++i)
     add_frame(problem, frames[i], shape, marker.covered_rad(), options.loss_scale_sigmas, shared, blocks[i]);
@@ -279,6 +292,7 @@ std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, co
   if (!solve_quietly(solver, problem, summary)) return std::nullopt;
 
   Adjustment result;
+  if (getenv("D264") && options.with_covariance) { std::fprintf(stderr, "bulges"); for (int k = 0; k < 4; ++k) std::fprintf(stderr, " %+.3f", shared[std::size_t(bulges + k)]); std::fprintf(stderr, " leans"); for (int k = 0; k < 4; ++k) std::fprintf(stderr, " %+.3f", shared[std::size_t(leans + k)]); std::fprintf(stderr, "\n"); }
   const double edges_px = sigma_of_edges_px(frames);
   result.lags = !free_lag && noise_beyond_usual(edges_px) > min_noise_of_lag;
   for (int i = 0; i < print_numbers; ++i) result.print[i] = shared[static_cast<std::size_t>(i)] * (i == gap ? 1 : mm);

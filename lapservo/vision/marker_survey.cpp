@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <iterator>
+
+#include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/median.h"
@@ -24,7 +27,7 @@ constexpr double min_matching = 0.6, max_wrong = 0.15, max_beside = 0.2;
 // of its wide and ragged blur of colour differences takes some, and then moves e2 by 0.155 px for 0.1.
 // A gradient of light is taken for none: of a turn they cancel, and what a fit of one video picture gives for it moves
 // boundaries by more than it does (psi by -2.5 mrad).
-constexpr ExpectedPicture expected_picture{.least_sharpening = 0, .gradient_sigma_per_px = 0.001};
+const ExpectedPicture expected_picture{.least_sharpening = 0, .gradient_sigma_per_px = std::getenv("GRAD") ? std::atof(std::getenv("GRAD")) : 0.001};
 
 std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unknowns, const EdgeBlur& blur,
                                     bool settled) {
@@ -46,6 +49,27 @@ std::optional<Sighting> refined(const Scene& scene, const LightImage& light, con
   if (fine.converged)
     if (auto sighting = sighting_of(scene, fine.unknowns, fine.blur, true)) return sighting;
   return sighting_of(scene, coarse.unknowns, blur, false);
+}
+
+// Without colour differences, which cameras and videos blur far more than luma.
+cv::Mat grey_of(const cv::Mat& bgr) {
+  cv::Mat luma, grey;
+  cv::cvtColor(bgr, luma, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(luma, grey, cv::COLOR_GRAY2BGR);
+  return grey;
+}
+
+// The sides as another picture of the same shows them.
+void take_sides(const EdgeMeasurements& from, EdgeMeasurements& edges) {
+  // Boundaries come first, so what is known of measurements by their place stays true.
+  decltype(edges.all) all;
+  for (const Measurement& m : edges.all)
+    if (m.group < 4) all.push_back(m);
+  for (const Measurement& m : from.all)
+    if (m.group >= 4) all.push_back(m);
+  edges.all = all;
+  edges.sides_in_image = from.sides_in_image;
+  edges.side_blur = from.side_blur;
 }
 
 }  // namespace
@@ -134,9 +158,13 @@ void take_processing_off(std::vector<ViewMeasurements>& views) {
   std::array<double, groups> usual_px{};
   for (std::size_t k = 0; k < groups; ++k)
     if (2 * std::ssize(told_px[k]) > asked) usual_px[k] = median(told_px[k]);
+  if (std::getenv("POOL")) {
+    std::vector<double> both = told_px[4]; both.insert(both.end(), told_px[5].begin(), told_px[5].end());
+    if (!both.empty()) usual_px[4] = usual_px[5] = median(both);
+  }
   for (ViewMeasurements& view : views) {
     if (view.processing.processing == Processing::none) continue;
-    for (std::size_t k = 0; k < groups; ++k) view.bias_px[k] = told(view, k).value_or(usual_px[k]);
+    for (std::size_t k = 0; k < groups; ++k) view.bias_px[k] = k >= 4 && std::getenv("POOL") ? usual_px[k] : told(view, k).value_or(usual_px[k]);
     for (Measurement& m : view.edges.all) m.residual_px -= view.bias_px[m.group];
   }
 }
@@ -157,9 +185,16 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
     measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px, expected_picture);
   const auto& processed = measured.processing.edges;
   if (const auto cylinder = view_cylinder(sighting.unknowns.pose().camera_from_unrolled, marker.radius_m());
-      processed && cylinder)
-    measured.side_biases_px = side_biases_px(light, measured.edges.all, processed->processing, sighting.blur,
+      processed && cylinder) {
+    const cv::Mat grey = grey_of(view.bgr);
+    const ImageView grey_image(grey);
+    const LightImage grey_light(grey_image, light_, ChannelGeometry(view.camera));
+    const Scene grey_scene{grey_image, view.camera, classes_, marker, bands_};
+    take_sides(measure_edges(grey_scene, grey_light, sighting.unknowns, sighting.film_m,
+                             {reach.extra_px, iterations, 1}, sighting.blur), measured.edges);
+    if (!std::getenv("NOSB")) measured.side_biases_px = side_biases_px(light, measured.edges.all, processed->processing, sighting.blur,
                                              marker.radius_m() / cylinder->camera_to_axis_m * view.camera.fx_px);
+  }
   measured.seam = measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px, reach.seam_m,
                                reach.free_gap, processed ? std::optional(processed->processing) : std::nullopt);
   measured.blur_px = std::max(sighting.blur.boundaries_px, sighting.blur.sides_px);

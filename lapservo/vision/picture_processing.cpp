@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
+#include <cstdio>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -14,6 +16,19 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double max_chroma_variance_px2 = 3.5;
+
+double env_or(const char* n, double v) { const char* e = std::getenv(n); return e ? std::atof(e) : v; }
+const bool lumed = std::getenv("WC") != nullptr;
+const float wc = static_cast<float>(env_or("WC", 1)), wy = static_cast<float>(env_or("WY", 1.7));
+// rows b, g, r to w (b - y), y, w (r - y)
+template <typename M> void to_luma(M& m) {
+  if (!lumed) return;
+  for (int i = 0; i < edge_rows; ++i)
+    for (int j = 0; j < m.cols(); ++j) {
+      const float b = m(i, j), g = m(edge_rows + i, j), r = m(2 * edge_rows + i, j), y = 0.114F * b + 0.587F * g + 0.299F * r;
+      m(i, j) = wc * (b - y), m(edge_rows + i, j) = wy * y, m(2 * edge_rows + i, j) = wc * (r - y);
+    }
+}
 
 bool is_seen(const PooledEdge& edge) {
   constexpr int least_clear_px = 3;
@@ -35,8 +50,8 @@ struct State {
 ProcessingVector expected_sigmas() {
   ProcessingVector sigmas;
   using enum ProcessingUnknown;
-  sigmas[at(log_blur)] = 0.3, sigmas[at(log_mosaic)] = 0.2, sigmas[at(chroma_variance)] = 0.7;
-  sigmas[at(saturation)] = 0.15, sigmas[at(sharpening)] = 0.5, sigmas[at(log_radius)] = 0.25;
+  sigmas[at(log_blur)] = 0.3, sigmas[at(log_mosaic)] = env_or("MOS", 0.2), sigmas[at(chroma_variance)] = 0.7;
+  sigmas[at(saturation)] = env_or("SAT", 0.15), sigmas[at(sharpening)] = env_or("SHARP", 0.5), sigmas[at(log_radius)] = 0.25;
   return sigmas;
 }
 ProcessingVector sigmas_of_none() {
@@ -102,7 +117,7 @@ class Problem {
         for (int i = 0; i < PooledEdge::samples; ++i) {
           const int row = edge_rows * static_cast<int>(c) + i;
           measured_[k][row] = edges[k].value[c][static_cast<std::size_t>(i)];
-          usable_[k][row] = std::abs(i - PooledEdge::reach) <= edges[k].clear_px ? 1.0F : 0.0F;
+          usable_[k][row] = std::abs(i - PooledEdge::reach) <= std::min(int(env_or("REACH", 6)), edges[k].clear_px) ? 1.0F : 0.0F;
         }
     }
   }
@@ -130,7 +145,8 @@ class Problem {
     double sum = (state.processing - prior_.processing).cwiseAbs2().dot(certainty_);
     for (std::size_t k = 0; k < edges_.size(); ++k)
       sum += (state.edges[k] - prior_.edges[k]).cwiseAbs2().dot(edge_certainty_);
-    for_each_missed(state, [&](std::size_t k, const EdgeSamples& missed) {
+    for_each_missed(state, [&](std::size_t k, EdgeSamples missed) {
+      to_luma(missed);
       sum += weight_[k] / (value_sigma * value_sigma) * static_cast<double>(missed.squaredNorm());
     });
     return sum;
@@ -186,9 +202,11 @@ class Problem {
   Block eliminated(std::size_t k, const EdgeVector& edge, const ProcessedEdge::Linearised& model, double damping,
                    ProcessingMatrix& information, ProcessingVector& gradient) const {
     constexpr int both = processing_unknowns + edge_unknowns;
-    const EdgeSamples miss = missed(k, model.values);
+    EdgeSamples miss = missed(k, model.values);
+    to_luma(miss);
     auto jacobian = model.jacobian;
     for (auto by_unknown : jacobian.colwise()) by_unknown = by_unknown.cwiseProduct(usable_[k]).eval();
+    to_luma(jacobian);
     const double certainty = weight_[k] / (value_sigma * value_sigma);
     Eigen::Matrix<double, both, both> square;
     for (int a = 0; a < both; ++a)
@@ -279,6 +297,17 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
   out.processing = processing_of(state.processing);
   out.misfit = problem.misfit(state);
   out.misfit_without = without.misfit(minimised(without));
+  if (std::getenv("PROFILES")) {
+    const ProcessingFilters filters(out.processing, false);
+    ProcessedEdge model(light_of_value);
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      if (!is_seen(all[k])) continue;
+      const EdgeSamples v = model.values(filters, out.processing, state.edges[k]);
+      std::fprintf(stderr, "E %zu %d %d %g", all[k].boundary, all[k].places, all[k].clear_px, state.edges[k][0]);
+      for (int c = 0; c < 3; ++c) for (int i = 0; i < PooledEdge::samples; ++i) std::fprintf(stderr, " %.5f %.5f", double(all[k].value[static_cast<std::size_t>(c)][static_cast<std::size_t>(i)]), double(v[edge_rows * c + i]));
+      std::fprintf(stderr, "\n");
+    }
+  }
   const auto bias_px = [&](std::size_t k) { return all[k].residual_px - state.edges[k][edge_offset]; };
   std::array<double, 4> places{}, sum_px{};
   for (std::size_t k = 0; k < all.size(); ++k) {
@@ -312,13 +341,14 @@ ProcessingEvidence find_processing(const LightImage& light, std::span<const Meas
   const auto& light_of_value = light.light_of_value();
   const auto guess = first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px);
   if (!guess) return {};
-  if (!is_processed(*guess)) return {Processing::none, std::nullopt};
+  if (!std::getenv("FORCE") && !is_processed(*guess)) return {Processing::none, std::nullopt};
   const PooledEdges edges = pool_edges(light, measurements, look);
   auto explained = explain(light_of_value, edges, blur_px, expected);
   if (!explained) return {};
   for (std::size_t i = 0; i < measurements.size(); ++i)
     if (measurements[i].group < 4 && edges.of_measurement[i] == PooledEdges::nowhere)
       explained->measurement_bias_px[i] = static_cast<float>(explained->bias_px[measurements[i].group].value_or(0));
+  if (std::getenv("FORCE")) return {Processing::found, std::move(explained)};
   if (explained->misfit_without < processing_limits.max_misfit_of_none) return {Processing::none, std::nullopt};
   if (is_believed(*explained)) return {Processing::found, std::move(explained)};
   return {};

@@ -283,14 +283,14 @@ ProcessedEdge::Linearised ProcessedEdge::linearised(const ProcessingFilters& fil
   return out;
 }
 
-std::vector<std::array<double, 3>> filtered_light(const std::array<float, 256>& light_of_value,
-                                                  const PictureProcessing& processing,
-                                                  std::span<const std::array<double, 3>> light) {
+FilteredLight filtered_light(const std::array<float, 256>& light_of_value, const PictureProcessing& processing,
+                             std::span<const std::array<double, 3>> light) {
   PictureProcessing unsaturated = processing;
   unsaturated.saturation = 1;
   const ProcessingFilters filters(unsaturated, false);
   const Encoding encoding(light_of_value);
-  std::vector<std::array<double, 3>> differences(light.size()), out(light.size());  // to luma
+  std::vector<std::array<double, 3>> differences(light.size());  // to luma
+  FilteredLight out{std::vector<std::array<double, 3>>(light.size()), std::vector<double>(light.size())};
   std::vector<double> luma(light.size());
   std::size_t near = 128;
   for (std::size_t i = 0; i < light.size(); ++i) {
@@ -303,14 +303,17 @@ std::vector<std::array<double, 3>> filtered_light(const std::array<float, 256>& 
   const auto last = static_cast<std::ptrdiff_t>(light.size()) - 1;
   for (std::ptrdiff_t i = 0; i <= last; ++i) {
     std::array<double, 3> value{};
+    double grey = 0;
     for (std::ptrdiff_t k = -both_filters_reach; k <= both_filters_reach; ++k) {
       const auto at = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(i + k, 0, last));
       const auto tap = static_cast<std::size_t>(std::abs(k));
-      for (std::size_t c = 0; c < 3; ++c)
-        value[c] += (tap <= filter_reach ? filters.luma[tap] * luma[at] : 0) + filters.chroma[tap] * differences[at][c];
+      if (tap <= filter_reach) grey += filters.luma[tap] * luma[at];
+      for (std::size_t c = 0; c < 3; ++c) value[c] += filters.chroma[tap] * differences[at][c];
     }
+    const auto place = static_cast<std::size_t>(i);
     for (std::size_t c = 0; c < 3; ++c)
-      out[static_cast<std::size_t>(i)][c] = static_cast<double>(encoding.light(value[c]).y);
+      out.light[place][c] = static_cast<double>(encoding.light(grey + value[c]).y);
+    out.luma[place] = static_cast<double>(encoding.light(grey).y);
   }
   return out;
 }

@@ -73,9 +73,13 @@ class ProcessedEdge {
 };
 
 /// Light along a line, a pixel apart, as it looks after blurred colour differences and sharpening. What is even stays
-/// as it is, so light is as the camera shows it: `saturation` has been at work.
-std::vector<std::array<double, 3>> filtered_light(const std::array<float, 256>& light_of_value,
-                                                  const PictureProcessing& processing,
-                                                  std::span<const std::array<double, 3>> light);
+/// as it is, so light is as the camera shows it: `saturation` has been at work. `luma` is the same without colour
+/// differences: what a grey picture made of it shows, in all channels alike.
+struct FilteredLight {
+  std::vector<std::array<double, 3>> light;
+  std::vector<double> luma;
+};
+FilteredLight filtered_light(const std::array<float, 256>& light_of_value, const PictureProcessing& processing,
+                             std::span<const std::array<double, 3>> light);
 
 }  // namespace lapservo::internal

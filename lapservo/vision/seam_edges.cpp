@@ -346,7 +346,7 @@ Section processed(const Section& section, const SeamFit& found, double blur_px, 
       for (std::size_t i = 0; i < light.size(); ++i)
         light[i][c] = true_basis.row(static_cast<Eigen::Index>(i)).dot(colors);
     }
-    profile.light = filtered_light(light_of_value, processing, light);
+    profile.light = filtered_light(light_of_value, processing, light).light;
     for (std::size_t i = 0; i < light.size(); ++i)
       for (double& channel : profile.light[i]) channel *= profile.count[i];
   }

@@ -60,8 +60,11 @@ std::optional<ContourColors> colors_of(const EdgeProfile& profile, double contou
   return colors;
 }
 
-// The profile that the processing makes of a contour of these colours at 0.
-EdgeProfile processed_profile(const EdgeProfile& like, const ContourColors& colors, const LightImage& light,
+// What the processing makes of a contour of these colours at 0, and what a grey picture of that shows.
+struct ProcessedProfiles {
+  EdgeProfile colors, grey;
+};
+ProcessedProfiles processed_profiles(const EdgeProfile& like, const ContourColors& colors, const LightImage& light,
                               const PictureProcessing& processing, double blur_px, double radius_px) {
   const int first_px = static_cast<int>(like.first_px) - filters_reach_px;
   const int count = static_cast<int>(like.count) + 2 * filters_reach_px;
@@ -72,22 +75,25 @@ EdgeProfile processed_profile(const EdgeProfile& like, const ContourColors& colo
     for (int c = 0; c < 3; ++c)
       samples[static_cast<std::size_t>(i)][static_cast<std::size_t>(c)] = std::max(0.0, true_light(i, c));
   const auto filtered = filtered_light(light.light_of_value(), processing, samples);
-  EdgeProfile profile = like;
+  ProcessedProfiles profiles{like, like};
   for (std::size_t c = 0; c < 3; ++c) {
-    profile.usable[c].fill(true);
-    for (std::size_t i = 0; i < like.count; ++i)
-      profile.light[c][i] = static_cast<float>(filtered[i + filters_reach_px][c]);
+    profiles.colors.usable[c].fill(true), profiles.grey.usable[c].fill(true);
+    for (std::size_t i = 0; i < like.count; ++i) {
+      profiles.colors.light[c][i] = static_cast<float>(filtered.light[i + filters_reach_px][c]);
+      profiles.grey.light[c][i] = static_cast<float>(filtered.luma[i + filters_reach_px]);
+    }
   }
-  return profile;
+  return profiles;
 }
 
-// The light's own blur at the sides, as lines show it: motion may widen it there, the processing widens it as it does
-// at boundaries. Lines are sampled linearly between pixels, which blurs by 1/6 px^2 on average; the processing's blur
-// of light is without that.
+// The light's own blur at the sides, as lines of a grey picture show it: motion may widen it there. Lines are sampled
+// linearly between pixels, which blurs by 1/6 px^2 on average, and what sharpens luma makes it narrower.
 double light_blur_px(const EdgeBlur& blur, const PictureProcessing& processing) {
   constexpr double linear_sampling_px2 = 1.0 / 6;
-  const double by_processing_px2 =
-      blur.boundaries_px * blur.boundaries_px - processing.blur_px * processing.blur_px - linear_sampling_px2;
+  const ProcessingFilters filters(processing, false);
+  double by_processing_px2 = linear_sampling_px2;
+  for (std::size_t k = 1; k < filters.luma.size(); ++k)
+    by_processing_px2 += 2 * static_cast<double>(k * k) * filters.luma[k];
   return std::sqrt(
       std::max(edge_limits.min_blur_px * edge_limits.min_blur_px, blur.sides_px * blur.sides_px - by_processing_px2));
 }
@@ -111,13 +117,13 @@ std::optional<double> bias_on_line(const LightImage& light, const Measurement& m
   ContourColors colors = *seen_colors;
   double bias_px = 0;
   for (int round = 0; round < rounds_of_colors; ++round) {
-    const EdgeProfile made =
-        processed_profile(seen, colors, light, processing, light_blur_px(blur, processing), radius_px);
+    const ProcessedProfiles made =
+        processed_profiles(seen, colors, light, processing, light_blur_px(blur, processing), radius_px);
     const EdgeFit fit =
-        fit_contour(made, static_cast<float>(blur.sides_px), static_cast<float>(radius_px), contour_iterations);
+        fit_contour(made.grey, static_cast<float>(blur.sides_px), static_cast<float>(radius_px), contour_iterations);
     if (!fit.converged) return std::nullopt;
     bias_px = static_cast<double>(fit.offset_px);
-    colors += *seen_colors - colors_of(made, bias_px, blur.sides_px, radius_px).value();
+    colors += *seen_colors - colors_of(made.colors, bias_px, blur.sides_px, radius_px).value();
   }
   return bias_px;
 }
