@@ -4,7 +4,6 @@
 #include <ceres/ceres.h>
 #include <cmath>
 #include <cstddef>
-#include <functional>
 #include <limits>
 #include <numeric>
 #include <tuple>
@@ -14,19 +13,17 @@
 #include <Eigen/Core>
 #include <fmt/format.h>
 
+#include "lapservo/calibration/response_curve.h"
 #include "lapservo/calibration/solve_quietly.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/median.h"
 #include "lapservo/core/rounded_sigma.h"
 
 namespace lapservo::internal {
 namespace {
 
-// The response is value = s + sum of c_k B_k(s), s the light as sRGB encodes it, B_k cubic B-splines over equal parts
-// of [0, 1] without those that move the ends.
-constexpr int parts = 8, curve_numbers = parts + 1;
-// All edges share: c_k; the logarithm of dark over bright reflectance; sharpening's strength and log blur.
+// All edges share: the curve's numbers; the logarithm of dark over bright reflectance; sharpening's strength and log
+// blur.
 constexpr int ratio = curve_numbers, strength = ratio + 1, common_numbers = strength + 2;
 // Those at like angles to the rows of pixels: how blurred edges differ from a normal distribution's at so many steps on
 // either side. What filters on pixels make of a lens' blur is symmetric and no more.
@@ -37,46 +34,9 @@ constexpr std::array shape_angles_rad{rad_from_deg(6), rad_from_deg(12), rad_fro
 constexpr int edge_numbers = 4;
 
 constexpr double max_sharpening_reach_px = 7;
-// Before the fit, one sigma: reflectances at different places of the board (gloss, veil), edges about the geometry's,
-// the curve beyond what others are like.
+// Before the fit, one sigma: reflectances at different places of the board (gloss, veil), edges about the geometry's.
 constexpr double ratio_sigma = 0.03, offset_sigma_px = 0.02, log_blur_sigma = 0.3;
-constexpr double other_curve_sigma = 0.01, strength_sigma = 0.5, usual_mask_px = 1.5, log_mask_sigma = 0.3,
-                 shape_sigma = 0.02;
-
-double srgb_of(double light) {
-  return light <= 0.0031308 ? light * 12.92 : 1.055 * std::pow(light, 1 / 2.4) - 0.055;
-}
-template <typename T>
-T srgb_of(const T& light) {
-  if (light <= 0.0031308) return light * 12.92;
-  return T(1.055) * pow(light, 1 / 2.4) - T(0.055);
-}
-
-template <typename T>
-T encoded(const T* curve, const T& light) {
-  const T s = srgb_of(light);
-  if (s <= 0.0 || s >= 1.0) return s;
-  // de Boor on the clamped knots: four splines differ from zero.
-  double at;
-  if constexpr (std::is_same_v<T, double>)
-    at = s;
-  else
-    at = s.a;
-  const int part = std::min(parts - 1, static_cast<int>(at * parts));
-  const auto knot = [](int i) { return static_cast<double>(std::clamp(i, 0, parts)) / parts; };
-  T d[4];
-  for (int j = 0; j < 4; ++j) {
-    const int k = part + j - 1;  // the first and the last spline of all are left out
-    d[j] = k < 0 || k >= curve_numbers ? T(0) : curve[k];
-  }
-  for (int r = 1; r <= 3; ++r)
-    for (int j = 3; j >= r; --j) {
-      const double low = knot(part - 3 + j), high = knot(part + 1 + j - r);
-      const T alpha = (s - low) / (high - low);
-      d[j] = (T(1) - alpha) * d[j - 1] + alpha * d[j];
-    }
-  return s + d[3];
-}
+constexpr double strength_sigma = 0.5, usual_mask_px = 1.5, log_mask_sigma = 0.3, shape_sigma = 0.02;
 
 // Value at a light, by a response that is known.
 template <typename T>
@@ -118,7 +78,7 @@ struct ProfileCost {
       if (const int from = std::abs(i); from > 0 && from <= shape_numbers)
         part += static_cast<double>(i > 0 ? 1 : -1) * shape[from - 1];
       const T light = dark + (bright - dark) * part;
-      plain.push_back(given->response ? encoded_by(*given->response, light) : encoded(shared, light));
+      plain.push_back(given->response ? encoded_by(*given->response, light) : value_by_curve(shared, light));
     }
     if (!given->sharpened) return plain;
     const T mask_px = exp(shared[strength + 1]);
@@ -150,60 +110,14 @@ struct ProfileCost {
   }
 };
 
-using Curve = Eigen::Matrix<double, curve_numbers, 1>;
-using CurveMatrix = Eigen::Matrix<double, curve_numbers, curve_numbers>;
-
-// The curve of which value = value_of(s) comes nearest.
-Curve curve_of(const std::function<double(double)>& value_of) {
-  constexpr int places = 64;
-  Eigen::Matrix<double, places, curve_numbers> splines;
-  Eigen::Matrix<double, places, 1> beyond;
-  for (int i = 0; i < places; ++i) {
-    const double s = (i + 0.5) / places, light = Response{}.light_from_value(s);
-    beyond[i] = value_of(s) - s;
-    for (int k = 0; k < curve_numbers; ++k) {
-      std::array<double, curve_numbers> unit{};
-      unit[static_cast<std::size_t>(k)] = 1;
-      splines(i, k) = encoded(unit.data(), light) - s;
-    }
-  }
-  const Eigen::MatrixXd across = splines.transpose();
-  return solve_symmetric(product(across, splines), product(across, beyond));
-}
-
-// What cameras' curves are like, where the pictures leave it open: standard ones, with contrast (a logistic curve about
-// a middle) and shoulders of several strengths; and what differs from all of these.
 struct CurvePrior {
-  Curve mean = Curve::Zero();
-  CurveMatrix whitening;
-
-  CurvePrior() {
-    std::vector<Curve> family;
-    for (const Response& base : {Response{}, Response{Response::Kind::rec709}, Response{Response::Kind::power, 1.9},
-                                 Response{Response::Kind::power, 2.2}})
-      for (const double contrast : {0.1, 2.0, 4.0, 6.0})
-        for (const double middle : {0.35, 0.45, 0.55})
-          for (const double shoulder : {0.0, 0.3, 0.6}) family.push_back(member(base, contrast, middle, shoulder));
-    for (const Curve& curve : family) mean += curve / static_cast<double>(family.size());
-    CurveMatrix covariance = CurveMatrix::Identity() * other_curve_sigma * other_curve_sigma;
-    for (const Curve& curve : family)
-      covariance += (curve - mean) * (curve - mean).transpose() / static_cast<double>(family.size());
-    whitening = whitening_of(covariance);
-  }
-  static Curve member(const Response& base, double contrast, double middle, double shoulder) {
-    const auto logistic = [&](double x) { return 1 / (1 + std::exp(-contrast * (x - middle))); };
-    return curve_of([&](double s) {
-      const double value = base.value_from_light(Response{}.light_from_value(s));
-      const double bent = (logistic(value) - logistic(0)) / (logistic(1) - logistic(0));
-      return bent * (1 + shoulder) / (1 + shoulder * bent);
-    });
-  }
+  UsualCurves usual = usual_curves();
 
   template <typename T>
   bool operator()(const T* shared, T* residuals) const {
     for (int i = 0; i < curve_numbers; ++i) {
       residuals[i] = T(0);
-      for (int k = i; k < curve_numbers; ++k) residuals[i] += whitening(i, k) * (shared[k] - mean[k]);
+      for (int k = i; k < curve_numbers; ++k) residuals[i] += usual.whitening(i, k) * (shared[k] - usual.mean[k]);
     }
     residuals[curve_numbers] = shared[strength] / strength_sigma;
     residuals[curve_numbers + 1] = (shared[strength + 1] - std::log(usual_mask_px)) / log_mask_sigma;
@@ -229,28 +143,14 @@ std::size_t shape_of(const BoardEdgeProfile& profile) {
   return i;
 }
 
-// The curve as a table, even in what sRGB makes of light: fine in the dark.
-Response table_of(const Shared& shared) {
-  constexpr int steps = 64;
-  Response table{Response::Kind::table, 1, {0}, {0}};
-  const Response srgb;
-  for (int i = 1; i <= steps; ++i) {
-    const double light = i == steps ? 1 : srgb.light_from_value(static_cast<double>(i) / steps);
-    const double value = i == steps ? 1 : encoded(shared.data(), light);
-    // Noise may bend it back where it is nearly flat.
-    table.table_light.push_back(light);
-    table.table_value.push_back(std::max(value, table.table_value.back() + 1e-5));
-  }
-  table.table_value.back() = 1;  // where those before it went beyond
-  for (int i = steps - 1; i > 0 && table.table_value[static_cast<std::size_t>(i)] >= 1 - 1e-5 * (steps - i); --i)
-    table.table_value[static_cast<std::size_t>(i)] = 1 - 1e-5 * (steps - i);
-  return table;
+ResponseCurve curve_of(const Shared& shared) {
+  return ResponseCurve::Map(shared.data());
 }
 
 Shared start_of(const Response& response) {
-  const Curve curve = curve_of([&](double s) { return response.value_from_light(Response{}.light_from_value(s)); });
   Shared shared{};
-  std::copy(curve.begin(), curve.end(), shared.begin());
+  ResponseCurve::Map(shared.data()) =
+      nearest_curve([&](double s) { return response.value_from_light(Response{}.light_from_value(s)); });
   return shared;
 }
 
@@ -296,46 +196,27 @@ double curve_sigma_of(ceres::Problem& problem, const Shared& shared, double scal
   Eigen::Matrix<double, places, 1> by_exposure;
   for (int i = 0; i < places; ++i) {
     const double s = low + (high - low) * i / (places - 1), light = Response{}.light_from_value(s);
-    for (int k = 0; k < curve_numbers; ++k) {
-      std::array<double, curve_numbers> unit{};
-      unit[static_cast<std::size_t>(k)] = 1;
-      rows(i, k) = encoded(unit.data(), light) - srgb_of(light);
-    }
+    rows.row(i) = splines_at(light).transpose();
     constexpr double step = 1e-3;
-    by_exposure[i] = encoded(shared.data(), light * (1 + step)) - encoded(shared.data(), light);
+    by_exposure[i] = value_by_curve(shared.data(), light * (1 + step)) - value_by_curve(shared.data(), light);
   }
   rows -= by_exposure * (by_exposure.transpose() * rows) / by_exposure.squaredNorm();
   const double most = (rows * c.topLeftCorner<curve_numbers, curve_numbers>() * rows.transpose()).diagonal().maxCoeff();
   return scale * std::sqrt(most);
 }
 
-// Sums over the pixels of a part of a profile.
-struct Bin {
-  int count = 0;
-  double distance = 0, light = 0, value = 0, squares = 0;
-
-  void add(double at, double pixel_light, double pixel_value) {
-    ++count, distance += at, light += pixel_light, value += pixel_value, squares += pixel_value * pixel_value;
-  }
-  void add(const Bin& other) {
-    count += other.count, distance += other.distance, light += other.light, value += other.value,
-        squares += other.squares;
-  }
-  double variance() const { return std::max(0.0, squares / count - value / count * value / count); }
-};
 // A named response is tried where values differ by less, and taken where the cost is no more times that of the fit.
 constexpr double max_named_distance = 0.04, named_cost = 1.03;
 // Sharpening is looked for where profiles miss by more sigmas without.
 constexpr double max_plain_misfit = 1.1;
-constexpr double least_strength = 0.15;           // of sharpening: less is a detail of the blur
-constexpr double least_variance = 0.002 * 0.002;  // rounding to 8 bits, and more
+constexpr double least_strength = 0.15;  // of sharpening: less is a detail of the blur
 
 // Profiles, what explains them, and the problem that holds both together.
 class ProfileFit {
  public:
   ProfileFit(const std::vector<BoardEdgeProfile>& profiles, const Response& start)
       : profiles_(profiles), shared_(start_of(start)) {
-    const Response from = table_of(shared_);
+    const Response from = table_of(curve_of(shared_));
     std::vector<double> ratios;
     for (const BoardEdgeProfile& p : profiles_) {
       const double bright = from.light_from_value(std::min(1.0, p.bright));
@@ -463,52 +344,6 @@ void name_response(ProfileFit& profiles, ResponseFit& fit) {
 
 }  // namespace
 
-std::optional<BoardEdgeProfile> profile_of(const EdgePixels& edge, int towards_bright, int channel, double blur_px,
-                                           const Response& response) {
-  const std::array<float, 256> light = response.table();
-  const auto c = static_cast<std::size_t>(channel);
-  const int half = static_cast<int>(edge.reach_px / profile_step_px);
-  const auto size = static_cast<std::size_t>(2 * half + 1);
-  std::vector<Bin> bins(size);
-  for (const EdgePixel& pixel : edge.pixels) {
-    if (pixel.value[c] >= 252) return std::nullopt;
-    const double towards = towards_bright * pixel.distance_px / profile_step_px;
-    const long bin = std::lround(towards);
-    if (std::abs(bin) > half) continue;
-    bins[static_cast<std::size_t>(bin + half)].add(towards - static_cast<double>(bin), light[pixel.value[c]],
-                                                   pixel.value[c] / 255.0);
-  }
-  BoardEdgeProfile profile;
-  profile.blur_px = blur_px;
-  const Eigen::Vector2d along = edge.path.along.cwiseAbs();
-  profile.angle_rad = std::atan2(along.minCoeff(), along.maxCoeff());
-  constexpr int least = 4;
-  std::vector<double> means(size, std::numeric_limits<double>::quiet_NaN());
-  for (std::size_t i = 0; i < size; ++i)
-    if (bins[i].count >= least) means[i] = bins[i].light / bins[i].count;
-  profile.value = means, profile.sigma.assign(size, 0);
-  // A bin's pixels need not lie evenly about its middle.
-  for (std::size_t i = 1; i + 1 < size; ++i) {
-    const double slope = (means[i + 1] - means[i - 1]) / 2;
-    if (std::isfinite(slope) && std::isfinite(means[i])) profile.value[i] -= slope * bins[i].distance / bins[i].count;
-  }
-  for (double& value : profile.value)
-    if (std::isfinite(value)) value = response.value_from_light(std::clamp(value, 0.0, 1.0));
-  Bin dark, bright;
-  for (std::size_t i = 0; i < size / 5; ++i) dark.add(bins[i]), bright.add(bins[size - 1 - i]);
-  if (dark.count < 3 * least || bright.count < 3 * least) return std::nullopt;
-  profile.dark = response.value_from_light(dark.light / dark.count);
-  profile.bright = response.value_from_light(bright.light / bright.count);
-  if (profile.bright - profile.dark < 0.05) return std::nullopt;
-  for (std::size_t i = 0; i < size; ++i) {
-    if (!std::isfinite(profile.value[i])) continue;
-    const double part = std::clamp((profile.value[i] - profile.dark) / (profile.bright - profile.dark), 0.0, 1.0);
-    profile.sigma[i] =
-        std::sqrt(((1 - part) * dark.variance() + part * bright.variance() + least_variance) / bins[i].count);
-  }
-  return profile;
-}
-
 std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& profiles, const Response& start,
                                         bool try_named) {
   constexpr std::size_t least_profiles = 50;
@@ -525,7 +360,7 @@ std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& pro
   fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);
   fit.sigma = curve_sigma_of(fitted.problem(), fitted.shared(), std::max(1.0, fit.misfit[1]), fit.low, fit.high);
   if (!std::isfinite(fit.sigma)) return std::nullopt;
-  fit.table = fit.response = rounded_by_sigma(table_of(fitted.shared()), fit.sigma);
+  fit.table = fit.response = rounded_by_sigma(table_of(curve_of(fitted.shared())), fit.sigma);
   if (try_named) name_response(fitted, fit);
   return fit;
 }
