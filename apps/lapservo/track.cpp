@@ -181,86 +181,122 @@ void wait_on_page(WebView& web, std::optional<double> until_s) {
     clock.sleep_until(std::min(until_s.value_or(INFINITY), clock.now_s() + 0.05));
 }
 
+// One run of either command: where frames come from, and where what was seen in them goes.
+class TrackRun {
+ public:
+  explicit TrackRun(const TrackOptions& options)
+      : options_(options),
+        rigs_(options),
+        live_(open_live(options)),
+        file_(live_ ? nullptr : open_frames(options.input, options.fps, options.image_topic)),
+        source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
+    if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
+      rigs_.expect_pictures();
+    if (options.view) view_.emplace("track", "use --overlay to write pictures instead");
+    if (options.web.port) web_.emplace(options.web, page_config_of(options, source_));
+    if (!options.page_only) csv_.emplace(options.out);
+    if (!options.overlay.empty()) overlay_ = open_overlay_writer(options.overlay, source_);
+  }
+
+  /// The command's exit code.
+  int run() {
+    watch_for_interrupts();
+    begin_s_ = clock_.now_s();
+    track_all();
+    if (plays_a_file() && !stopped_) {
+      std::fprintf(stderr, "lapservo: %s has ended; the page stays until Ctrl-C\n", options_.input.c_str());
+      wait_on_page(*web_, std::nullopt);
+    }
+    if (csv_) csv_->commit();
+    if (overlay_) overlay_->commit();
+    tell_results();
+    return tell_complaints();
+  }
+
+ private:
+  // On a page alone, at the speed of the recording.
+  bool plays_a_file() const { return options_.page_only && source_.kind() != FrameSource::Kind::live; }
+
+  void track_all() {
+    Progress progress(source_.frame_count());
+    while (!(stopped_ = interrupted()) && (options_.frames == 0 || tally_.frames < options_.frames)) {
+      const auto frame = source_.next();
+      if (!frame) {
+        stopped_ = interrupted();
+        read_to_the_end_ = true;
+        return;
+      }
+      const double came_s = clock_.now_s() - (live_ ? live_->age_s() : 0);
+      Tracker& tracker = rigs_.tracker_for(*frame);
+      try {
+        const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
+        tally_.add(observations);
+        if (registration_.add(observations)) say_moved(options_, *frame);
+        if ((stopped_ = !pass_on(*frame, observations, came_s))) return;
+      } catch (const InputError& error) {
+        rethrow_with_frame(error, options_, *frame);
+      }
+      progress.show(tally_.frames, tally_.text());
+      if (plays_a_file()) wait_on_page(*web_, begin_s_ + frame->time_s + 1 / source_.frames_per_second());
+    }
+  }
+
+  // To all that want it; false when somebody who looks wants the end.
+  bool pass_on(const Frame& frame, const std::vector<Observation>& observations, double came_s) {
+    for (const Observation& observation : observations)
+      if (csv_) csv_->add(frame.index, frame.time_s, frame.file.filename().string(), observation);
+    if (overlay_ || view_) {
+      const cv::Mat picture = draw_overlay(frame.bgr, *rigs_.rig(), observations);
+      if (overlay_) overlay_->add(frame, picture);
+      if (view_ && !view_->show(picture)) return false;
+    }
+    if (!web_) return true;
+    web_->show({frame.bgr, rigs_.rig(), observations, clock_.now_s() - came_s});
+    return !web_->wishes().stop;
+  }
+
+  void tell_results() const {
+    std::printf("%s%d frames%s\n", stopped_ ? "stopped after " : "", tally_.frames, tally_.text().c_str());
+    if (csv_) std::printf("observations: %s\n", options_.out.c_str());
+    if (overlay_) std::printf("overlay: %s\n", options_.overlay.c_str());
+    if (overlay_ && overlay_->is_video() && !video_remark().empty())
+      std::printf("overlay: %s\n", video_remark().c_str());
+    if (live_ && !live_->dropped().empty()) std::printf("no frames: %s\n", live_->dropped().c_str());
+  }
+
+  int tell_complaints() const {
+    if (const std::string complaint = read_to_the_end_ && !stopped_ ? source_.complaint() : ""; !complaint.empty()) {
+      std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options_.input.c_str(),
+                   complaint.c_str());
+      return 1;
+    }
+    if (tally_.anything()) return 0;
+    std::fprintf(stderr,
+                 "lapservo: no instrument was found: look at the status column, and whether the rig's hues_deg are the "
+                 "print's\n");
+    return 1;
+  }
+
+  const TrackOptions& options_;
+  RigByFrame rigs_;
+  std::unique_ptr<LiveFrames> live_;
+  std::unique_ptr<FrameSource> file_;
+  FrameSource& source_;
+  std::optional<LiveView> view_;
+  std::optional<WebView> web_;
+  std::optional<ObservationCsv> csv_;
+  std::unique_ptr<OverlayWriter> overlay_;
+  SteadyClock clock_;
+  double begin_s_ = 0;
+  Tally tally_;
+  RegistrationWatch registration_;
+  bool stopped_ = false, read_to_the_end_ = false;
+};
+
 int run(const TrackOptions& options) {
   options.web.check();
   refuse_outputs(options, inputs_of(options));
-  RigByFrame rigs(options);
-  const auto live = open_live(options);
-  const auto file = live ? nullptr : open_frames(options.input, options.fps, options.image_topic);
-  FrameSource* const source = live ? live.get() : file.get();
-  if (source->kind() == FrameSource::Kind::image || source->kind() == FrameSource::Kind::folder) rigs.expect_pictures();
-  std::optional<LiveView> view;
-  if (options.view) view.emplace("track", "use --overlay to write pictures instead");
-  std::optional<WebView> web;
-  if (options.web.port) web.emplace(options.web, page_config_of(options, *source));
-  std::optional<ObservationCsv> csv;
-  if (!options.page_only) csv.emplace(options.out);
-  const auto overlay = options.overlay.empty() ? nullptr : open_overlay_writer(options.overlay, *source);
-  watch_for_interrupts();
-
-  SteadyClock clock;
-  const double begin_s = clock.now_s();
-  Tally tally;
-  RegistrationWatch registration;
-  bool stopped = false, read_to_the_end = false;
-  {
-    Progress progress(source->frame_count());
-    while (!(stopped = interrupted()) && (options.frames == 0 || tally.frames < options.frames)) {
-      const auto frame = source->next();
-      if (!frame) {
-        stopped = interrupted();
-        read_to_the_end = true;
-        break;
-      }
-      const double came_s = clock.now_s() - (live ? live->age_s() : 0);
-      Tracker& tracker = rigs.tracker_for(*frame);
-      try {
-        const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
-        tally.add(observations);
-        if (registration.add(observations)) say_moved(options, *frame);
-        for (const Observation& observation : observations)
-          if (csv) csv->add(frame->index, frame->time_s, frame->file.filename().string(), observation);
-        if (overlay || view) {
-          const cv::Mat picture = draw_overlay(frame->bgr, *rigs.rig(), observations);
-          if (overlay) overlay->add(*frame, picture);
-          if (view && !view->show(picture)) {
-            stopped = true;
-            break;
-          }
-        }
-        if (web) {
-          web->show({frame->bgr, rigs.rig(), observations, clock.now_s() - came_s});
-          if ((stopped = web->wishes().stop)) break;
-        }
-      } catch (const InputError& error) {
-        rethrow_with_frame(error, options, *frame);
-      }
-      progress.show(tally.frames, tally.text());
-      if (options.page_only && source->kind() != FrameSource::Kind::live)
-        wait_on_page(*web, begin_s + frame->time_s + 1 / source->frames_per_second());
-    }
-  }
-  if (options.page_only && !stopped && source->kind() != FrameSource::Kind::live) {
-    std::fprintf(stderr, "lapservo: %s has ended; the page stays until Ctrl-C\n", options.input.c_str());
-    wait_on_page(*web, std::nullopt);
-  }
-  if (csv) csv->commit();
-  if (overlay) overlay->commit();
-  std::printf("%s%d frames%s\n", stopped ? "stopped after " : "", tally.frames, tally.text().c_str());
-  if (csv) std::printf("observations: %s\n", options.out.c_str());
-  if (overlay) std::printf("overlay: %s\n", options.overlay.c_str());
-  if (overlay && overlay->is_video() && !video_remark().empty()) std::printf("overlay: %s\n", video_remark().c_str());
-  if (live && !live->dropped().empty()) std::printf("no frames: %s\n", live->dropped().c_str());
-  if (const std::string complaint = read_to_the_end && !stopped ? source->complaint() : ""; !complaint.empty()) {
-    std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options.input.c_str(),
-                 complaint.c_str());
-    return 1;
-  }
-  if (tally.anything()) return 0;
-  std::fprintf(
-      stderr,
-      "lapservo: no instrument was found: look at the status column, and whether the rig's hues_deg are the print's\n");
-  return 1;
+  return TrackRun(options).run();
 }
 
 // What both commands take.
