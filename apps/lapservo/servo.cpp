@@ -174,90 +174,114 @@ int run(const ServoOptions& options) {
   throw InputError("--robot", (options.robot.empty() ? "is missing" : "is " + options.robot) + expected);
 }
 
-}  // namespace
-
-void add_servo(Command app, Run& run_later) {
-  auto options = std::make_shared<ServoOptions>();
-  Command command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
-  command.add_option("--rig", options->rig, "Camera, marker and camera_from_rcm");
+void add_arm_options(Command command, ServoOptions& options) {
+  command.add_option("--rig", options.rig, "Camera, marker and camera_from_rcm");
   command.add_option(
-      "--robot", options->robot,
+      "--robot", options.robot,
       "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/robots.md");
   command.add_option(
-      "--camera", options->camera,
+      "--camera", options.camera,
       "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
       "/dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
-  command.add_flag("--enable-motion", options->enable_motion,
+  command.add_flag("--enable-motion", options.enable_motion,
                    "Move a real arm; without it nothing is sent, and what would be is said");
-  command.add_option("--joint-limits", options->joint_limits,
+  command.add_option("--joint-limits", options.joint_limits,
                      "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
+}
+
+void add_trajectory_options(Command command, ServoOptions& options) {
   command
-      .add_option("--trajectory", options->trajectory,
+      .add_option("--trajectory", options.trajectory,
                   "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
       .shows_default();
-  command.add_option("--set-point", options->set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
+  command.add_option("--set-point", options.set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
       .finite_number()
       .delimiter(',')
       .expected(4);
   command
-      .add_option("--via", options->via,
+      .add_option("--via", options.via,
                   "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
       .finite_number()
       .delimiter(',');
-  command.add_option("--duration", options->duration, "Seconds, else 20, or all of a recording")
+  command.add_option("--duration", options.duration, "Seconds, else 20, or all of a recording")
       .number_between(0.1, 36000.0);
+}
+
+void add_control_options(Command command, ServoOptions& options) {
   command
-      .add_option("--method", options->method,
+      .add_option("--method", options.method,
                   "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
                   "uncalibrated: learns "
                   "the Jacobian")
       .shows_default();
   command
-      .add_option("--tracker", options->tracker,
+      .add_option("--tracker", options.tracker,
                   "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
                   "--method paper, else surface")
       .one_of({"surface", "centerline"});
-  command.add_option("--controller", options->controller, "YAML: gains_per_s, limits, window, delay_s ...");
-  command.add_option("--delay-ms", options->delay, "The images' age, or `estimate`").shows_default();
+  command.add_option("--controller", options.controller, "YAML: gains_per_s, limits, window, delay_s ...");
+  command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`").shows_default();
   command
-      .add_option("--endoscope-attempts", options->endoscope_attempts,
+      .add_option("--endoscope-attempts", options.endoscope_attempts,
                   "How often the arm may move a little by itself to measure where an endoscope that moved now stands, "
                   "else 3; 0: it holds instead")
       .whole_number_between(0, 100);
-  command.add_option("--rcm-px", options->rcm_px, "Image of the RCM u,v, for --method uncalibrated")
+  command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated")
       .finite_number()
       .delimiter(',')
       .expected(2);
-  command.add_option("--out", options->out,
+}
+
+void add_result_options(Command command, ServoOptions& options) {
+  command.add_option("--out", options.out,
                      std::string("Folder for log.csv, rig.yaml and controller.yaml") + OutputFolder::help);
-  command.add_flag("--force", options->force, OutputFolder::force_help);
-  command.add_flag("--strict", options->strict,
+  command.add_flag("--force", options.force, OutputFolder::force_help);
+  command.add_flag("--strict", options.strict,
                    "End with exit code 1 when the images contradict the rig's camera_from_rcm or lens");
-  command.add_flag("--view", options->view, "Show it live");
-  add_web_options(command, options->web);
+  command.add_flag("--view", options.view, "Show it live");
+  add_web_options(command, options.web);
+}
+
+void add_replay_options(Command command, ServoOptions& options) {
   command.add_option(
-      "--replay", options->replay,
+      "--replay", options.replay,
       "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2: decide on the "
       "recorded images and joints as without --enable-motion");
-  add_image_topic_option(command, options->image_topic);
-  add_joint_topic_option(command, options->joint_topic);
-  command.add_option("--start", options->start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
+  add_image_topic_option(command, options.image_topic);
+  add_joint_topic_option(command, options.joint_topic);
+}
+
+void add_simulator_options(Command command, ServoOptions& options) {
+  command.add_option("--start", options.start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
       .finite_number()
       .delimiter(',')
       .expected(4);
-  command.add_option("--seed", options->seed, "sim: of start, tissue, noise, jitter").shows_default().seed_number();
-  command.add_option("--latency-ms", options->latency_ms, "sim: from exposure to arrival")
+  command.add_option("--seed", options.seed, "sim: of start, tissue, noise, jitter").shows_default().seed_number();
+  command.add_option("--latency-ms", options.latency_ms, "sim: from exposure to arrival")
       .shows_default()
       .number_between(0.0, 1000.0);
   command
-      .add_option("--fps", options->fps,
+      .add_option("--fps", options.fps,
                   "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
       .number_between(6.0, 500.0);
-  add_simulation_options(command, options->simulation, "sim: ");
-  command.add_option("--hide", options->hide, "sim: cover the marker from,to seconds")
+  add_simulation_options(command, options.simulation, "sim: ");
+  command.add_option("--hide", options.hide, "sim: cover the marker from,to seconds")
       .finite_number()
       .delimiter(',')
       .expected(2);
+}
+
+}  // namespace
+
+void add_servo(Command app, Run& run_later) {
+  auto options = std::make_shared<ServoOptions>();
+  Command command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
+  add_arm_options(command, *options);
+  add_trajectory_options(command, *options);
+  add_control_options(command, *options);
+  add_result_options(command, *options);
+  add_replay_options(command, *options);
+  add_simulator_options(command, *options);
   command.footer(
       "The paper's gains K = 0.032, 0.008, 0.0008, 0.01 (s, r, l, d) and omega = 0.5 have no unit of time in it. Here "
       "K\n"
