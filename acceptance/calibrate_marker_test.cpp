@@ -1,10 +1,9 @@
 // Prints as hands make them (bands off by 0.3 mm, 3 degrees of wrap, 1 mm of gap), rendered over a slow turn,
 // calibrated, and tracked in other places with the calibrated rig. LAPSERVO_PRINTS, LAPSERVO_PRINT_SEED and
 // LAPSERVO_TURN_FRAMES set how many (1), which, and of how many frames (90). LAPSERVO_TURN_WAY is there, back, or both
-// one after the other. LAPSERVO_PRINT_CAMERA names what the
-// camera does to all pictures (camera_effects.h; none), or h264 or video: then the turn is a video, by OpenCV's encoder
-// or by lapservo's, and the other places are not compressed. Also told is what the tracker makes of these places by the
-// true print.
+// one after the other. LAPSERVO_PRINT_CAMERA names what the camera does to all pictures (camera_effects.h; none), or is
+// h264, video or recorder: then the turn is a video, by OpenCV's encoder, by lapservo's or by the command ffmpeg, and
+// the other places are not compressed. Also told is what the tracker makes of these places by the true print.
 
 #include <cmath>
 #include <cstdio>
@@ -124,9 +123,14 @@ class CalibrateMarker : public ::testing::TestWithParam<Errors> {
   const char* const chosen_way = std::getenv("LAPSERVO_TURN_WAY");
   const std::string way = chosen_way != nullptr ? chosen_way : "there";
 
+  std::optional<Encoder> encoder() const {
+    static const std::map<std::string, Encoder> encoders{
+        {"h264", Encoder::opencv}, {"video", Encoder::lapservo}, {"recorder", Encoder::ffmpeg}};
+    const auto chosen = encoders.find(camera);
+    return chosen == encoders.end() ? std::nullopt : std::optional(chosen->second);
+  }
   effects::CameraEffects effects_of(int print) const {
-    return effects::draw(camera == "h264" || camera == "video" ? "none" : camera,
-                         static_cast<std::uint64_t>(100 * seed + print));
+    return effects::draw(encoder() ? "none" : camera, static_cast<std::uint64_t>(100 * seed + print));
   }
   std::vector<TrueFrame> rendered(const Marker& print, std::vector<std::vector<JointVector>> places,
                                   std::uint64_t of_seed, const effects::CameraEffects& effects) const {
@@ -155,8 +159,7 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
     const auto own_seed = static_cast<std::uint64_t>(100 * seed + i);
     KeyFrames key_frames(nominal, 0);
     auto turned = rendered(print, turn_of_way(nominal, turn_frames, own_seed, way), own_seed, effects);
-    if (camera == "h264") compress(turned, Encoder::opencv);
-    if (camera == "video") compress(turned, Encoder::lapservo);
+    if (encoder()) compress(turned, *encoder());
     for (const TrueFrame& frame : turned) key_frames.add(frame.bgr, 0);
     const int found = key_frames.found();
     const MarkerCalibration calibration = calibrate_marker(nominal, 0, key_frames.take());

@@ -75,8 +75,9 @@ struct RenderedSet {
 };
 std::vector<TrueFrame> rendered_frames(const RenderedSet& set);
 
-/// The frames as a video of theirs gives them back: libx264, 30 frames/s, as OpenCV sets it up or as lapservo does.
-enum class Encoder { opencv, lapservo };
+/// The frames as a video of theirs gives them back: libx264, 30 frames/s, as OpenCV sets it up (preset medium, crf 23),
+/// as lapservo does (ultrafast, 22), or as recorded by the command ffmpeg (medium, 16, as in shared/frames/video).
+enum class Encoder { opencv, lapservo, ffmpeg };
 void compress(std::vector<TrueFrame>& frames, Encoder encoder = Encoder::opencv);
 
 /// The rig of configs/example.yaml.
