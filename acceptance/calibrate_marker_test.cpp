@@ -247,6 +247,7 @@ INSTANTIATE_TEST_SUITE_P(
     Prints, CalibrateMarker,
     ::testing::Values(Errors{"WithAGap"}, Errors{.name = "WithoutAGap", .gap_m = 0}, Errors{"Exact", 0, 0, 0},
                       Errors{.name = "Skewed", .skew_m = 0.3 * mm},
+                      Errors{.name = "RecordedAsH264", .camera = "recorder"},
                       Errors{.name = "WithSubsampledChroma", .camera = "chroma420", .max_psi_rms_rad = 3e-3}),
     [](const auto& chosen) { return chosen.param.name; });
 
