@@ -204,6 +204,7 @@ DepartedLight::DepartedLight(const LightImage& light, const CameraDeparture& dep
 }
 
 std::optional<CameraDeparture> find_departure(const LightImage& light, const PooledEdges& glance, double blur_px) {
+  if (!(light.channels().corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody told
   SeenBoundaries seen = seen_in(light, glance, blur_px);
   double squares = 0;
   int degrees = 0;

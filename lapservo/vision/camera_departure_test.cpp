@@ -23,6 +23,18 @@ using scenes::usual_shot;
 
 constexpr std::uint64_t frames = 12;
 
+CameraEffects aberrated(const ChromaticAberration& aberration) {
+  CameraEffects camera;
+  camera.aberration = aberration;
+  return camera;
+}
+
+CameraEffects rec709() {
+  CameraEffects camera;
+  camera.rec709 = true;
+  return camera;
+}
+
 FineFit fit_to(const Shot& shot, const cv::Mat& bgr, const ExpectedProcessing& expected = {}) {
   const Sight sight(shot.rig, bgr);
   return fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, expected);
@@ -50,7 +62,7 @@ TEST(CameraDeparture, MagnificationsThatTheRigDoesNotKnowAreFound) {
   for (std::uint64_t seed = 1; seed <= frames; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
-    const cv::Mat seen = effects::seen_through({.aberration = aberration}, shot.bgr, shot.rig.camera);
+    const cv::Mat seen = effects::seen_through(aberrated(aberration), shot.bgr, shot.rig.camera);
     const FineFit fit = fit_to(shot, seen);
     ASSERT_TRUE(fit.converged);
     errors.add(shot, seen, fit);
@@ -69,7 +81,7 @@ TEST(CameraDeparture, AResponseThatIsNotTheRigsIsFound) {
   for (std::uint64_t seed = 1; seed <= frames; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
-    const cv::Mat seen = effects::seen_through({.rec709 = true}, shot.bgr, shot.rig.camera);
+    const cv::Mat seen = effects::seen_through(rec709(), shot.bgr, shot.rig.camera);
     const FineFit fit = fit_to(shot, seen);
     ASSERT_TRUE(fit.converged);
     errors.add(shot, seen, fit);
@@ -95,8 +107,7 @@ TEST(CameraDeparture, CamerasAsTheRigSaysShowNone) {
 
 TEST(CameraDeparture, IsKeptByFramesThatAreNotAsked) {
   const Shot& shot = usual_shot(3);
-  const CameraEffects camera{.aberration = {1.0015, 0.9985}};
-  const cv::Mat seen = effects::seen_through(camera, shot.bgr, shot.rig.camera);
+  const cv::Mat seen = effects::seen_through(aberrated({1.0015, 0.9985}), shot.bgr, shot.rig.camera);
   const FineFit first = fit_to(shot, seen);
   ASSERT_TRUE(first.departure.any());
   const FineFit next = fit_to(shot, seen, {.ask = false, .departure = first.departure});

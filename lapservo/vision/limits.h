@@ -221,8 +221,8 @@ struct DepartureLimits {
   /// Squared sigmas, of all by which channels disagree (clean pictures have 0 to 4), and left of each (0 to 0.6).
   double least_squares = 4, least_scatter = 0.3;
   /// What one number explains, by the scatter: of magnifications and of a response, which must be another besides
-  /// (clean ones look like one by an exponent of 0.05).
-  double least_gain = 3.5, least_response_gain = 5, least_exponent = 0.07;
+  /// (clean ones look like one by an exponent of up to 0.08).
+  double least_gain = 3.5, least_response_gain = 5, least_exponent = 0.09;
   double doubted_of_response = 0.15;  ///< of what it moves boundaries by: a weak saturation looks like one
 };
 inline constexpr DepartureLimits departure_limits;
