@@ -191,7 +191,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   if (!change->settled()) return fit;
   ProcessingEvidence evidence;
   if (expected.ask) evidence = find_processing(light, pass.all, located_with.boundaries_px);
-  fit.processing = evidence.processing;
+  fit.processing = evidence.processing, fit.processing_explained = evidence.explained;
   if (fit.processing == Processing::unknown) fit.bias_px = expected.bias_px;
   if (evidence.edges) {
     fit.bias_px = bias_magnitudes_px(*evidence.edges);
