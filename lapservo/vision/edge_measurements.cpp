@@ -315,6 +315,7 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
     measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
                                      edge_limits.single_floor_px * edge_limits.single_floor_px +
                                      place->film_sigma_px * place->film_sigma_px);
+    measurement.film_sigma_px = place->film_sigma_px;
     out.boundary_blurs[measurement.group].add(*edge, variance);
   }
 }

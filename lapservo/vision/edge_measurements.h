@@ -23,6 +23,7 @@ struct Measurement {
   UnknownVector row;   ///< d(position along the image normal)/d(unknowns, then film thickness in film_sigma_m) [px]
   double residual_px;  ///< along the normal
   double sigma_px;
+  double film_sigma_px = 0;  ///< of it, what the film's edge leaves in doubt: alike for all of an end
   std::size_t group;          ///< 0..3: the boundary; 4 and 5: the sides
   double turn_fraction = 0;   ///< tau by what the print covers
   double along_px_per_m = 0;  ///< how it moves with the boundary's place along the shaft; 0 of sides

@@ -43,11 +43,24 @@ UnknownVector solve(std::span<const Measurement> measurements, double film_prior
   return step;
 }
 
+// Of boundaries, without what is doubted of the film.
 double median_sigma_px(std::span<const Measurement> measurements) {
-  InplaceVector<double, 4 * EdgeMeasurements::max_lines> sigmas_px;
+  InplaceVector<double, 4 * EdgeMeasurements::max_lines> variances_px2;
   for (const Measurement& m : measurements)
-    if (m.group < 4) sigmas_px.push_back(m.sigma_px);
-  return sigmas_px.empty() ? 0 : median(sigmas_px);
+    if (m.group < 4) variances_px2.push_back(m.sigma_px * m.sigma_px - m.film_sigma_px * m.film_sigma_px);
+  return variances_px2.empty() ? 0 : std::sqrt(median(variances_px2));
+}
+
+// Of each boundary as a whole, what the film leaves in doubt: the weighted mean over its points.
+std::array<double, 4> film_doubts_px(std::span<const Measurement> measurements) {
+  std::array<double, 4> sums{}, weights{};
+  for (const Measurement& m : measurements) {
+    if (m.group >= 4) continue;
+    const double weight = 1 / (m.sigma_px * m.sigma_px);
+    sums[m.group] += weight * m.film_sigma_px, weights[m.group] += weight;
+  }
+  for (std::size_t k = 0; k < 4; ++k) sums[k] /= std::max(weights[k], 1e-9);
+  return sums;
 }
 
 // By which noise is smaller than the measurements say: of what they have beyond the light's, for what single points may
@@ -72,6 +85,7 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
                          limits.side_of_blur * beyond_px2(blur.sides_px, limits.usual_side_blur_px) / pass.radius_px;
   const double unexplained = processed ? std::max(0.0, processed->misfit - limits.usual_misfit) : 0;
   const double unexplained_px = limits.px_per_misfit * unexplained;
+  const auto films_px = film_doubts_px(pass.all);
   CommonErrors errors;
   double bias_squares_px2 = 0;
   for (std::size_t k = 0; k < 4; ++k) {
@@ -79,8 +93,9 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
                                limits.common_fraction_of_blur * std::max(0.0, blur.along_px[k] - limits.usual_blur_px);
     const bool corrected = processed && processed->bias_px[k];
     const double left_px = (corrected ? limits.fraction_of_processing : 1) * bias_px[k];
-    errors.px[k] = std::hypot(boundary_px, left_px, unexplained_px);
-    errors.told_px[k] = std::hypot(boundary_px - limits.untold_boundary_px, left_px, unexplained_px);
+    const double more_px = std::hypot(left_px, unexplained_px, films_px[k]);
+    errors.px[k] = std::hypot(boundary_px, more_px);
+    errors.told_px[k] = std::hypot(boundary_px - limits.untold_boundary_px, more_px);
     bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
   }
   errors.px[4] = errors.px[5] = side_px;
