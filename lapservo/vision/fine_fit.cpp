@@ -71,6 +71,17 @@ double told_noise_scale(double scatter_sigmas, double sigma_px) {
   return std::clamp(scatter_sigmas, std::max(of_light, fine_fit_limits.least_noise_scale), 1.0);
 }
 
+// `alike_px`: what neighbours' residuals have in common; `moved_px`: by what the camera's processing moved boundaries,
+// which is `corrected` where the picture told it.
+PrintDoubt print_doubt(double alike_px, double blur_beyond_px, double moved_px, bool corrected) {
+  const FineFitLimits& limits = fine_fit_limits;
+  const double whole_px = (corrected ? limits.doubted_of_processing : 1) * moved_px;
+  return {std::hypot(limits.doubted_of_alike * alike_px, whole_px, limits.doubted_boundary_of_blur * blur_beyond_px),
+          std::hypot(limits.doubted_tilt_of_alike * alike_px, corrected ? 0 : moved_px),
+          std::hypot(limits.doubted_length_of_alike * alike_px, limits.doubted_length_of_blur * blur_beyond_px,
+                     limits.doubted_length_of_processing * moved_px)};
+}
+
 // What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
 // processing may have moved each boundary; of those that `processed` tells, it is corrected.
 CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& lines, const EdgeBlur& blur,
@@ -108,14 +119,26 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
   errors.told_noise_scale = told_noise_scale(scatter, sigma_px);
   const double moved_px = std::sqrt(bias_squares_px2);
   errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
-  const double beyond_usual_px = std::max(0.0, sigma_px - limits.usual_sigma_px);
-  const double processed_px = (processed ? limits.doubted_of_processing : 1) * moved_px;
-  const double moved_or_noisy_px = std::hypot(limits.doubted_of_sigma * beyond_usual_px, processed_px);
-  errors.doubt.boundary_px = std::hypot(moved_or_noisy_px, limits.doubted_boundary_of_blur * beyond_px);
-  errors.doubt.tilt_px = std::hypot(moved_or_noisy_px, limits.doubted_tilt_of_blur * beyond_px);
-  errors.doubt.length_fraction =
-      std::hypot(limits.doubted_length_of_sigma * beyond_usual_px, limits.doubted_length_of_blur * beyond_px);
+  errors.doubt = print_doubt(sigma_px * alike_sigmas(pass.all, lines), beyond_px, moved_px, processed.has_value());
   return errors;
+}
+
+// By what the pose and the print's errors leave.
+void count_inliers(std::span<const Measurement> measurements, FineFit& fit) {
+  std::array<double, 4> squares{};
+  for (const Measurement& m : measurements) {
+    const double sigmas = std::abs(m.residual_px) / m.sigma_px;
+    if (sigmas > inlier_sigmas) continue;
+    m.group < 4 ? ++fit.used[m.group] : ++fit.sides_used;
+    if (m.group < 4) squares[m.group] += sigmas * sigmas;
+  }
+  double all = 0;
+  int inliers = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    fit.rms_sigmas[k] = std::sqrt(squares[k] / std::max(1, fit.used[k]));
+    all += squares[k], inliers += fit.used[k];
+  }
+  fit.inlier_rms_sigmas = std::sqrt(all / std::max(1, inliers));
 }
 
 // What a pass changed.
@@ -224,15 +247,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
                                common_errors(pass, lines, fit.blur, evidence.edges, fit.bias_px));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
-  double squares = 0;
-  int inliers = 0;
-  for (const Measurement& m : pass.all) {
-    const double sigmas = std::abs(m.residual_px) / m.sigma_px;
-    if (sigmas > inlier_sigmas) continue;
-    m.group < 4 ? ++fit.used[m.group] : ++fit.sides_used;
-    if (m.group < 4) squares += sigmas * sigmas, ++inliers;
-  }
-  fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
+  count_inliers(pass.all, fit);
   const double doubt =
       1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit.located_fraction());
   fit.covariance = doubt * doubt * print->covariance;

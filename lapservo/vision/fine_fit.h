@@ -23,6 +23,7 @@ struct FineFit {
   int sides_in_image = 0;                ///< places at which the shaft's sides were looked for
   int sides_used = 0;                    ///< of them, those at which the side was located and agrees with the fit
   double inlier_rms_sigmas = 0;          ///< of the boundaries' residuals, print errors taken out
+  std::array<double, 4> rms_sigmas{};    ///< the same of each boundary
   double print_off_probability = 0;      ///< that the print is off by more than the rig's tolerance
   double psi_variance = 0;               ///< by which picture and print are judged (print_fit.h)
   double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds

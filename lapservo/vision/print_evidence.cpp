@@ -46,6 +46,17 @@ PrintInformation doubted(PrintInformation print, const PrintShapes& shapes_mm) {
   return print;
 }
 
+InkAside ink_aside(const PrintInformation& print, double sigma_mm) {
+  const double certainty = inner_shift().dot(print.information.lazyProduct(inner_shift()));
+  const double pull = inner_shift().dot(print.gradient), variance = sigma_mm * sigma_mm;
+  const double left = variance / (1 + variance * std::max(0.0, certainty));
+  return {0.5 * (left * pull * pull + std::log(left / variance)), left * pull, left};
+}
+
+double by_ink_aside(const PrintVector& by_errors) {
+  return inner_shift().dot(by_errors);
+}
+
 PrintMatrix covariance_of(const PrintMatrix& information_by_boundary, const PrintPrior& prior) {
   const double variance = std::max(prior.sigma_mm * prior.sigma_mm, 1e-18);
   PrintMatrix covariance = inverse_by_boundary(information_by_boundary + PrintMatrix::Identity() / variance);

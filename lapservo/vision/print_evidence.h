@@ -23,6 +23,15 @@ struct PrintPrior {
   bool ink_aside = false;
 };
 
+/// What a picture says of an ink that lies aside while all else is as the rig says, by the usual size of such errors:
+/// the logarithm of the likelihood, compared with an exact print's, and how far aside it lies then.
+struct InkAside {
+  double gain = 0, shift_mm = 0, variance_mm2 = 0;
+};
+InkAside ink_aside(const PrintInformation& print, double sigma_mm);
+/// Of something that the print's errors change by so much [per mm], its change by an ink that lies aside [per mm].
+double by_ink_aside(const PrintVector& by_errors);
+
 /// The covariance of the print's errors that a prior and the information, in which no boundary has to do with another,
 /// leave [mm^2].
 PrintMatrix covariance_of(const PrintMatrix& information_by_boundary, const PrintPrior& prior);

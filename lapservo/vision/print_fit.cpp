@@ -346,11 +346,18 @@ class PsiSpread {
  public:
   explicit PsiSpread(Eigen::Index psi) : psi_(psi) {}
   void add(const Solution& solution, double weight) {
-    const double psi_rad = solution.step[psi_];
-    weight_ += weight, sum_ += weight * psi_rad;
-    squares_ += weight * (solution.covariance(psi_, psi_) + psi_rad * psi_rad);
+    add(solution.step[psi_], solution.covariance(psi_, psi_), weight);
   }
-  double variance() const { return squares_ / weight_ - sum_ / weight_ * (sum_ / weight_); }
+  void add(double psi_rad, double variance, double weight) {
+    weight_ += weight, sum_ += weight * psi_rad;
+    squares_ += weight * (variance + psi_rad * psi_rad);
+  }
+  double weight() const { return weight_; }
+  double variance() const { return about(sum_ / weight_); }
+  // Mean square of what lies beside that.
+  double about(double psi_rad) const {
+    return squares_ / weight_ - psi_rad * (2 * sum_ / weight_ - psi_rad);
+  }
 
  private:
   Eigen::Index psi_;
@@ -386,6 +393,26 @@ double off_probability(const Weights& weights) {
   return 1 - weights[0] / std::accumulate(weights.begin(), weights.end(), 0.0);
 }
 
+// Of prints that are the rig's but for an ink that lies aside. `psi_by_mm`: what such an ink turns psi by; `psi_variance`
+// is an exact print's, whose psi is 0.
+void add_inks(const PrintInformation& print, double exact_gain, double psi_by_mm, double psi_variance,
+              PsiSpread& suspected) {
+  constexpr double certain = 50;
+  for (const double sigma_mm : print_limits.ink_sigmas_mm) {
+    const InkAside ink = ink_aside(print, sigma_mm);
+    suspected.add(psi_by_mm * ink.shift_mm, psi_variance + psi_by_mm * psi_by_mm * ink.variance_mm2,
+                  print_limits.suspected_ink_fraction * std::exp(std::min(exact_gain + ink.gain, certain)));
+  }
+}
+
+bool suspects_the_print(const PrintDoubt& doubt) {
+  return doubt.boundary_px > print_limits.least_doubt_px || doubt.length_fraction > print_limits.least_doubted_length;
+}
+
+bool has_measured_bands(const Marker& marker) {
+  return marker.sigmas.bands_upper_m && marker.sigmas.bands_lower_m;
+}
+
 }  // namespace
 
 double ResidualLine::residual_px(const Measurement& m) const {
@@ -409,6 +436,25 @@ double scatter_sigmas(std::span<const Measurement> measurements, const ResidualL
   return inliers ? std::sqrt(squares / inliers) : 0;
 }
 
+double alike_sigmas(std::span<const Measurement> measurements, const ResidualLines& lines) {
+  constexpr int run = 6;
+  double squares = 0, run_squares = 0, sum = 0;
+  int inliers = 0, runs = 0, in_run = 0;
+  std::size_t group = measurement_groups;
+  for (const Measurement& m : measurements) {
+    const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
+    if (m.group >= 4 || std::abs(sigmas) > inlier_sigmas) continue;
+    if (m.group != group) group = m.group, in_run = 0, sum = 0;
+    squares += sigmas * sigmas, ++inliers;
+    sum += sigmas;
+    if (++in_run < run) continue;
+    run_squares += sum * sum / run, ++runs;
+    in_run = 0, sum = 0;
+  }
+  if (runs == 0) return 0;
+  return std::sqrt(std::max(0.0, (run_squares / runs - squares / inliers) / (run - 1)));
+}
+
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
                                   double film_prior, const Marker& marker, const CommonErrors& errors) {
   const Sums sums = pose_unknowns == 4 ? sums_of<5>(measurements, lines, film_prior, errors)
@@ -426,10 +472,11 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
       by_told.covariance - covariance_of_less_noise(of_exact.without_common, errors.told_noise_scale);
   // Nothing, where the frame tells nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});
-  const Weights gains = gains_of(doubted(print, doubted_shapes_mm(errors.doubt, sums, marker)), tolerance_mm);
+  const PrintInformation left = doubted(print, doubted_shapes_mm(errors.doubt, sums, marker));
+  const Weights gains = gains_of(left, tolerance_mm);
   const Weights judged_by = weights_of(gains, print_limits.fractions);
   const Weights told_by = weights_of(gains, print_limits.told_fractions);
-  const bool suspects = errors.doubt.boundary_px > print_limits.least_doubt_px;
+  const bool suspects = suspects_the_print(errors.doubt);
   const Weights suspected_by = weights_of(gains, suspects ? print_limits.suspected_fractions : print_limits.fractions);
   const int psi = pose_unknowns - 1;
   Mixture judged(pose_unknowns + 1), told(pose_unknowns + 1);
@@ -455,17 +502,25 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
                              covariance_of_less_boundary_noise(sums, of_exact.without_common, errors.told_noise_scale);
   fit.covariance =
       (mean.covariance - (1 - off_probability(judged_by)) * less).topLeftCorner(pose_unknowns, pose_unknowns);
-  const double widened = std::sqrt(told.about(mean.step)(psi, psi) / fit.covariance(psi, psi));
+  double told_variance = told.about(mean.step)(psi, psi);
+  const double exact_variance = tolerated->covariance(psi, psi);
+  if (suspects) {
+    const double psi_by_ink = -by_ink_aside(sums.equations.nx * of_exact.without_common.col(psi));
+    add_inks(left, gains[0], psi_by_ink, exact_variance, suspected);
+    fit.suspected_probability = 1 - suspected_by[0] / suspected.weight();
+    fit.psi_variance_suspected = suspected.variance() - exact_variance;
+    const double less_of_exact = exact_variance - told_tolerated.covariance(psi, psi);
+    if (!has_measured_bands(marker))
+      told_variance = std::max(told_variance,
+                               suspected.about(mean.step[psi]) - (1 - fit.suspected_probability) * less_of_exact);
+  }
+  const double widened = std::sqrt(told_variance / fit.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
   fit.inner_off_m = inner_off_mm(print, errors.inner_doubt_scale) * mm;
   fit.off_probability = off_probability(judged_by);
   fit.psi_variance = mean.covariance(psi, psi);
-  fit.psi_variance_by_print = mean.covariance(psi, psi) - tolerated->covariance(psi, psi);
-  if (suspects) {
-    fit.suspected_probability = off_probability(suspected_by);
-    fit.psi_variance_suspected = suspected.variance() - tolerated->covariance(psi, psi);
-  }
-  fit.psi_variance_by_tolerance = tolerated->covariance(psi, psi) - exact->covariance(psi, psi);
+  fit.psi_variance_by_print = mean.covariance(psi, psi) - exact_variance;
+  fit.psi_variance_by_tolerance = exact_variance - exact->covariance(psi, psi);
   return fit;
 }
 

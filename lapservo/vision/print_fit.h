@@ -67,4 +67,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
 /// Root mean square of the boundaries' residuals in sigmas, each about its own line; outliers do not count.
 double scatter_sigmas(std::span<const Measurement> measurements, const ResidualLines& lines);
 
+/// And of it what neighbours have in common: compression and processing move six neighbours alike, noise does not.
+double alike_sigmas(std::span<const Measurement> measurements, const ResidualLines& lines);
+
 }  // namespace lapservo::internal

@@ -56,11 +56,15 @@ int fewest_lines(const FineFit& fit) {
   return std::max(limits.min_of_end, fit.lines / limits.end_one_in);
 }
 
-// Whether an inner boundary is located on so many lines, or so plainly, that it is the marker's and no edge of blood.
+// Whether an inner boundary is located on so many lines, or on so many of those beside which its colours show and in so
+// straight a line, that it is the marker's and no edge of blood.
 bool is_the_markers(const Scene& scene, const FineFit& fit, std::size_t boundary) {
-  if (fit.used[boundary] >= fewest_lines(fit)) return true;
-  return fit.used[boundary] >= limits.confirmed_lines &&
-         lines_with_both_colors(scene, fit.unknowns.pose(), boundary, fit.lines) >= limits.confirmed_lines;
+  if (located_of_lines(fit, boundary) >= limits.missed_fraction) return true;
+  const int used = fit.used[boundary];
+  if (used < limits.confirmed_lines || fit.rms_sigmas[boundary] > limits.max_rms_of_few_sigmas) return false;
+  const int shown = lines_with_both_colors(scene, fit.unknowns.pose(), boundary, fit.lines);
+  return used <= limits.most_of_shown * shown &&
+         used > limits.least_of_shown * std::min(shown, fit.in_image[boundary]);
 }
 
 // Whether points are missed since the camera's processing scatters them, as clipped colours do, and not since blood
