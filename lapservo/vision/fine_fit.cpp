@@ -73,12 +73,15 @@ double told_noise_scale(double scatter_sigmas, double sigma_px) {
 
 // `alike_px`: what neighbours' residuals have in common; `moved_px`: by what the camera's processing moved boundaries,
 // which is `corrected` where the picture told it.
-PrintDoubt print_doubt(double alike_px, double blur_beyond_px, double moved_px, bool corrected) {
+PrintDoubt print_doubt(double alike_px, double sigma_px, double blur_beyond_px, double moved_px, bool corrected) {
   const FineFitLimits& limits = fine_fit_limits;
+  const double sigma_beyond_px = std::max(0.0, sigma_px - limits.usual_sigma_px);
   const double whole_px = (corrected ? limits.doubted_of_processing : 1) * moved_px;
   return {std::hypot(limits.doubted_of_alike * alike_px, whole_px, limits.doubted_boundary_of_blur * blur_beyond_px),
-          std::hypot(limits.doubted_tilt_of_alike * alike_px, corrected ? 0 : moved_px),
-          std::hypot(limits.doubted_length_of_alike * alike_px, limits.doubted_length_of_blur * blur_beyond_px,
+          std::hypot(limits.doubted_tilt_of_alike * alike_px, limits.doubted_tilt_of_sigma * sigma_beyond_px,
+                     corrected ? 0 : moved_px),
+          std::hypot(std::hypot(limits.doubted_length_of_alike * alike_px, limits.doubted_length_of_blur * blur_beyond_px),
+                     limits.doubted_length_of_sigma * sigma_beyond_px,
                      limits.doubted_length_of_processing * moved_px)};
 }
 
@@ -119,7 +122,7 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
   errors.told_noise_scale = told_noise_scale(scatter, sigma_px);
   const double moved_px = std::sqrt(bias_squares_px2);
   errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
-  errors.doubt = print_doubt(sigma_px * alike_sigmas(pass.all, lines), beyond_px, moved_px, processed.has_value());
+  errors.doubt = print_doubt(sigma_px * alike_sigmas(pass.all, lines), sigma_px, beyond_px, moved_px, processed.has_value());
   return errors;
 }
 

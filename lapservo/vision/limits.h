@@ -162,6 +162,8 @@ struct FineFitLimits {
   /// The likeliest of 1121 exact prints (`camera_effects 120 1301`, eleven kinds of pictures): compression moves
   /// boundaries as it moves neighbours, noise and darkness do neither.
   double doubted_of_alike = 0.86, doubted_tilt_of_alike = 0.28, doubted_length_of_alike = 0.017;
+  /// And a little of what is beyond the usual sigma of an edge, as few neighbours tell no better.
+  double doubted_tilt_of_sigma = 0.3, doubted_length_of_sigma = 0.02;
   /// And what a processing that a blurred picture can't tell moves boundaries by.
   double doubted_boundary_of_blur = 0.04;
   double doubted_length_of_blur = 0.0012, doubted_length_of_processing = 0.01;
