@@ -162,7 +162,11 @@ void take_processing_off(std::vector<ViewMeasurements>& views) {
   for (ViewMeasurements& view : views) {
     if (view.processing.processing == Processing::none) continue;
     for (std::size_t k = 0; k < groups; ++k) view.bias_px[k] = told(view, k).value_or(usual_px[k]);
-    for (Measurement& m : view.edges.all) m.residual_px -= view.bias_px[m.group];
+    for (std::size_t i = 0; i < view.edges.all.size(); ++i) {
+      Measurement& m = view.edges.all[i];
+      const bool own = view.each_by_its_own && view.processing.edges && m.group < 4;
+      m.residual_px -= own ? static_cast<double>(view.processing.edges->measurement_bias_px[i]) : view.bias_px[m.group];
+    }
   }
 }
 
@@ -209,6 +213,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
     take_sides(measure_edges(grey_scene, grey_light, sighting.unknowns, sighting.film_m,
                              {reach.extra_px, iterations, 1}, sighting.blur),
                measured.edges);
+    measured.each_by_its_own = true;
     measured.seam = seam_by(&grey_light);
   } else {
     const auto cylinder = view_cylinder(sighting.unknowns.pose().camera_from_unrolled, marker.radius_m());

@@ -64,7 +64,8 @@ struct ViewMeasurements {
   ProcessingEvidence processing;               ///< unknown when not asked
   /// What it moves the sides by, where it is found and they tell.
   std::array<std::optional<double>, 2> side_biases_px{};
-  /// Taken off the boundaries and the sides.
+  bool each_by_its_own = false;  ///< boundaries' measurements by those as far from the sides, not by a mean
+  /// Taken off the boundaries and the sides; of boundaries whose measurements have their own, the mean.
   std::array<double, measurement_groups> bias_px{};
 };
 

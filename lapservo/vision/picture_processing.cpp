@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "lapservo/vision/limits.h"
+#include "lapservo/vision/luma_offset.h"
 
 namespace lapservo::internal {
 namespace {
@@ -125,6 +126,13 @@ class Problem {
         values += 1;
       }
     return std::sqrt(static_cast<double>(squares / std::max(1.0F, values)));
+  }
+  // How far an edge lies from where the state has it.
+  double offset_by_luma_px(const State& state, std::size_t k) const {
+    const PictureProcessing processing = processing_of(state.processing);
+    return internal::offset_by_luma_px(
+        model_.linearised(ProcessingFilters(processing, true), processing, state.edges[k]), measured_[k],
+        edges_[k].clear_px);
   }
   // Of the values and of what was expected, in sigmas.
   double cost(const State& state) const {
@@ -275,11 +283,13 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
   if (!is_enough(all)) return std::nullopt;
   const Problem problem(light_of_value, all, blur_px, expected_sigmas(expected.only_video), expected);
   const Problem without(light_of_value, all, blur_px, sigmas_of_none(), expected);
-  const State state = minimised(problem);
+  State state = minimised(problem);
   ProcessedEdges out;
   out.processing = processing_of(state.processing);
   out.misfit = problem.misfit(state);
   out.misfit_without = without.misfit(minimised(without));
+  for (std::size_t k = 0; expected.only_video && k < all.size(); ++k)
+    if (is_seen(all[k])) state.edges[k][edge_offset] += problem.offset_by_luma_px(state, k);
   const auto bias_px = [&](std::size_t k) { return all[k].residual_px - state.edges[k][edge_offset]; };
   std::array<double, 4> places{}, sum_px{};
   for (std::size_t k = 0; k < all.size(); ++k) {
@@ -308,7 +318,8 @@ std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges) {
 
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
                                    const ExpectedPicture& expected) {
-  constexpr Look glance{12, 1, false}, look{EdgeMeasurements::max_lines, max_brightness_levels, true};
+  constexpr Look glance{12, 1, false};
+  const Look look{EdgeMeasurements::max_lines, max_brightness_levels, true, expected.only_video};
   if (blur_px > processing_limits.max_blur_px) return {};
   const auto& light_of_value = light.light_of_value();
   const auto guess = first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px);

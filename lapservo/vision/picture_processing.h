@@ -14,14 +14,17 @@ namespace lapservo::internal {
 struct ExpectedPicture {
   double least_sharpening = -0.35;
   double gradient_sigma_per_px = 0.01;  ///< of the share by which light grows along a boundary's normal
-  bool only_video = false;  ///< nothing but blurred colour differences: as demosaiced, as sharp, as colourful
+  /// Nothing but blurred colour differences: as demosaiced, as sharp, as colourful. Then luma says where edges are, in
+  /// each part of the shaft's width by itself.
+  bool only_video = false;
 };
 
 /// What is to be known of a frame's processing for its boundaries' sake.
 struct ProcessedEdges {
   PictureProcessing processing;
   std::array<std::optional<double>, 4> bias_px;  ///< by which fit_step mislocates each boundary that was seen well
-  /// And each measurement of one, by those that are as bright: what the processing does to an edge goes by its light.
+  /// And each measurement of one, by those that are as bright, or of a video as far from the sides: what the processing
+  /// does to an edge goes by its light.
   std::array<float, EdgeMeasurements::most> measurement_bias_px{};
   double misfit = 0;          ///< rms of what the model leaves of the values
   double misfit_without = 0;  ///< and of what one without any processing does

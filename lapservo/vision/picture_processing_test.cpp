@@ -101,6 +101,26 @@ TEST(PictureProcessing, MeasurementsAreCorrectedByThoseThatAreAsBright) {
   EXPECT_EQ(explained->measurement_bias_px[8], 0);
 }
 
+// Of a video whose colour differences lie aside of where they were, as compression leaves them.
+TEST(PictureProcessing, LumaSaysWhereAVideosBoundariesAre) {
+  const PictureProcessing processing{.blur_px = 0.9, .chroma_variance_px2 = 2};
+  constexpr ExpectedPicture video{.least_sharpening = 0, .only_video = true};
+  const PooledEdges luma = edges_of(processing, 0.1, 0.3), colors = edges_of(processing, 0.35, 0.3);
+  PooledEdges edges = colors;
+  for (std::size_t k = 0; k < edges.all.size(); ++k)
+    for (std::size_t i = 0; i < PooledEdge::samples; ++i) {
+      float moved = 0;
+      for (std::size_t c = 0; c < 3; ++c)
+        moved += luma_of_bgr[c] * (luma.all[k].value[c][i] - colors.all[k].value[c][i]);
+      for (std::size_t c = 0; c < 3; ++c) edges.all[k].value[c][i] += moved;
+    }
+  edges.of_measurement[3] = 2;
+  const auto explained = explain(srgb(), edges, 1, video);
+  ASSERT_TRUE(explained);
+  for (const std::size_t k : {0U, 2U, 3U}) EXPECT_NEAR(0.3 - explained->bias_px[k].value(), 0.1, 0.03) << k;
+  EXPECT_NEAR(explained->measurement_bias_px[3], explained->bias_px[2].value(), 1e-6);
+}
+
 // Also where the pose has it elsewhere.
 TEST(PictureProcessing, ABoundaryIsFoundFarFromThePose) {
   const PictureProcessing processing{.blur_px = 1, .sharpening = 0.7};
@@ -171,6 +191,24 @@ TEST(PooledEdges, AverageWhatIsAsBright) {
   EXPECT_EQ(edges.of_measurement[0], 1);
   EXPECT_EQ(edges.of_measurement[19], 0);
   EXPECT_EQ(edges.of_measurement[20], PooledEdges::nowhere);
+}
+
+// However bright: of a video the light's change along the normal counts, which is another on either side.
+TEST(PooledEdges, AverageWhatIsAsFarAcross) {
+  const scenes::Shot& shot = scenes::usual_shot(1);
+  std::vector<Measurement> measurements;
+  for (int i = 0; i < 20; ++i) {
+    Measurement m{};
+    m.group = 1, m.expected_px = {100, 100}, m.normal = {1, 0}, m.clear_px = 6;
+    m.across = i % 2 == 0 ? 0.6 : -0.6, m.residual_px = m.across / 2;
+    measurements.push_back(m);
+  }
+  const PooledEdges edges = pool_edges(shot.sight.light(), measurements, {64, 2, true, true});
+  ASSERT_EQ(edges.all.size(), 2U);
+  EXPECT_NEAR(edges.all[0].residual_px, -0.3, 1e-9);
+  EXPECT_NEAR(edges.all[1].residual_px, 0.3, 1e-9);
+  EXPECT_EQ(edges.of_measurement[0], 1);
+  EXPECT_EQ(edges.of_measurement[1], 0);
 }
 
 // What was located far from most places is something else, and moves none of them.

@@ -13,7 +13,7 @@ namespace {
 // One place of a boundary.
 struct EdgePlace {
   std::array<std::array<float, PooledEdge::samples>, 3> value;
-  float brightness = 0;
+  float brightness = 0;  // or across
   std::size_t measurement = 0;
 };
 using EdgePlaces = InplaceVector<EdgePlace, EdgeMeasurements::max_lines>;
@@ -107,8 +107,10 @@ EdgePlaces places_of(const Located& located, const LightImage& light, std::span<
     place.measurement = i;
     for (std::size_t k = 0; k < PooledEdge::samples; ++k)
       sample_at(light, first + static_cast<float>(k) * m.normal, look.cubic, k, place);
+    if (look.by_across) place.brightness = static_cast<float>(m.across);
     for (const auto& channel : place.value)
-      if (look.levels > 1) place.brightness = std::accumulate(channel.begin(), channel.end(), place.brightness);
+      if (look.levels > 1 && !look.by_across)
+        place.brightness = std::accumulate(channel.begin(), channel.end(), place.brightness);
     places.push_back(place);
   }
   return places;

@@ -36,11 +36,13 @@ struct PooledEdges {
 
 /// How closely boundaries are looked at: at most so many places of each, in at most so many levels of brightness.
 /// Between pixels along straight lines or cubic: the former darken what is bright beside an edge, where encoded light
-/// bends, for an eighth of the time.
+/// bends, for an eighth of the time. `by_across`: levels are parts of the shaft's width instead, in which the light
+/// changes along the normal alike.
 struct Look {
   int places;
   int levels;
   bool cubic;
+  bool by_across = false;
 };
 
 /// Of the boundaries among `measurements`.

@@ -71,13 +71,11 @@ SamplesBgr filtered(const std::array<double, Size>& taps, const OnGrid& values) 
   return out;
 }
 
-// Rec. 601's luma of b, g, r. A colour difference is a channel less luma, so a processed channel is
+// A colour difference is a channel less luma, so a processed channel is
 // luma(filtered for luma) + channel(filtered for chroma) - luma(filtered for chroma).
-constexpr std::array<float, 3> luma_of{0.114F, 0.587F, 0.299F};
-
 double luma(const Eigen::Vector3d& bgr) {
   double sum = 0;
-  for (int c = 0; c < 3; ++c) sum += static_cast<double>(luma_of[static_cast<std::size_t>(c)]) * bgr[c];
+  for (int c = 0; c < 3; ++c) sum += static_cast<double>(luma_of_bgr[static_cast<std::size_t>(c)]) * bgr[c];
   return sum;
 }
 
@@ -156,7 +154,7 @@ Encoded encode(const Encoding& encoding, const PictureProcessing& processing, co
 // Filtered samples of all channels from what is filtered for luma and for chroma, a column a channel.
 EdgeSamples mixed(const SamplesBgr& for_luma, const SamplesBgr& for_chroma) {
   ChannelSamples common = ChannelSamples::Zero();
-  for (int c = 0; c < 3; ++c) common += luma_of[static_cast<std::size_t>(c)] * (for_luma.col(c) - for_chroma.col(c));
+  for (int c = 0; c < 3; ++c) common += luma_of_bgr[static_cast<std::size_t>(c)] * (for_luma.col(c) - for_chroma.col(c));
   EdgeSamples out;
   for (int c = 0; c < 3; ++c) out.segment<edge_rows>(edge_rows * c) = common + for_chroma.col(c);
   return out;
@@ -206,7 +204,7 @@ void add_plateau(const ProcessingFilters& filters, const OnGrid& by, double satu
     out.col(static_cast<int>(ProcessingUnknown::saturation)) -=
         static_cast<float>((shown[c] - grey) * inverse * inverse) * by_channel.col(c);
     out.col(first + c) = static_cast<float>(inverse) * by_channel.col(c) +
-                         static_cast<float>(1 - inverse) * luma_of[static_cast<std::size_t>(c)] * by_grey;
+                         static_cast<float>(1 - inverse) * luma_of_bgr[static_cast<std::size_t>(c)] * by_grey;
   }
 }
 
@@ -296,7 +294,7 @@ FilteredLight filtered_light(const std::array<float, 256>& light_of_value, const
   for (std::size_t i = 0; i < light.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
       differences[i][c] = static_cast<double>(encoding.value(static_cast<float>(light[i][c]), near).y);
-      luma[i] += static_cast<double>(luma_of[c]) * differences[i][c];
+      luma[i] += static_cast<double>(luma_of_bgr[c]) * differences[i][c];
     }
     for (double& difference : differences[i]) difference -= luma[i];
   }

@@ -35,6 +35,9 @@ inline constexpr int edge_offset = 0, edge_before = 1, edge_after = 4, edge_grad
 EdgeVector edge_of(const PictureProcessing& processing, const Eigen::Vector3d& before, const Eigen::Vector3d& after,
                    double offset_px);
 
+/// Rec. 601's luma of encoded b, g, r.
+inline constexpr std::array<float, 3> luma_of_bgr{0.114F, 0.587F, 0.299F};
+
 /// Samples of a channel, a pixel apart, then those of the next; rows beyond the samples fill a register.
 inline constexpr int edge_rows = 16, all_edge_rows = 3 * edge_rows;
 using EdgeSamples = Eigen::Matrix<float, all_edge_rows, 1>;
