@@ -187,7 +187,7 @@ Sight::Sight(const Rig& rig, const cv::Mat& bgr)
       view_(bgr_),
       classes_(rig_.instruments),
       table_(rig_.camera.response.table()),
-      light_(view_, table_) {}
+      light_(view_, table_, ChannelGeometry(rig.camera)) {}
 
 Scene Sight::scene(std::size_t i) const {
   return {view_, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i)};

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "lapservo/core/inplace_vector.h"
 #include "lapservo/core/median.h"
@@ -15,7 +16,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int max_passes = 3, max_wide_passes = 5;
+constexpr int max_passes = 3, max_wide_passes = 5, most_departures = 2, passes_of_departure = 2;
 
 double robust_weight(const Measurement& m, double residual_px) {
   return cauchy_weight(residual_px / m.sigma_px, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
@@ -61,7 +62,8 @@ double told_noise_scale(double scatter_sigmas, double sigma_px) {
 // What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
 // processing may have moved each boundary; of those that `processed` tells, it is corrected.
 CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& lines, const EdgeBlur& blur,
-                           const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px) {
+                           const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px,
+                           const CameraDeparture& departure) {
   const FineFitLimits& limits = fine_fit_limits;
   const double widest_px = blur.widest_px();
   const double beyond_px = std::max(0.0, widest_px - limits.usual_blur_px);
@@ -78,9 +80,11 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
     const double boundary_px = limits.common_boundary_px +
                                limits.common_fraction_of_blur * std::max(0.0, blur.along_px[k] - limits.usual_blur_px);
     const bool corrected = processed && processed->bias_px[k];
-    const double left_px = (corrected ? limits.fraction_of_processing : 1) * bias_px[k];
-    errors.px[k] = std::hypot(boundary_px, left_px, unexplained_px);
-    errors.told_px[k] = std::hypot(boundary_px - limits.untold_boundary_px, left_px, unexplained_px);
+    const double fraction = processed && processed->clips ? limits.fraction_of_clipped : limits.fraction_of_processing;
+    const double left_px = (corrected ? fraction : 1) * bias_px[k];
+    const double camera_px = std::hypot(left_px, unexplained_px, departure.doubt_px[k]);
+    errors.px[k] = std::hypot(boundary_px, camera_px);
+    errors.told_px[k] = std::hypot(boundary_px - limits.untold_boundary_px, camera_px);
     bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
   }
   errors.px[4] = errors.px[5] = side_px;
@@ -125,6 +129,30 @@ struct Change {
   bool sharp() const { return blur_fraction < fine_fit_limits.settled_blur; }
 };
 
+// What the camera did to the picture, as it looks when what is known of the camera is undone; and all of its departure
+// from the rig's, where that is more than was known.
+struct SeenCamera {
+  ProcessingEvidence evidence;
+  std::optional<CameraDeparture> departure;
+};
+
+// A departure is believed if the picture looks unprocessed without it: processing moves channels apart, too.
+SeenCamera look_at_camera(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
+                          const CameraDeparture& known) {
+  SeenCamera out;
+  if (blur_px > processing_limits.max_blur_px) return out;
+  const DepartedLight seen(light, known);
+  const PooledEdges glance = glance_at(seen.light(), measurements);
+  out.evidence = find_processing(seen.light(), measurements, glance, blur_px);
+  if (out.evidence.processing == Processing::found) return out;
+  const auto more = find_departure(seen.light(), glance, blur_px);
+  if (!more) return out;
+  const CameraDeparture all = known.then(*more);
+  const DepartedLight without(light, all);
+  if (find_processing(without.light(), measurements, blur_px).processing == Processing::none) out.departure = all;
+  return out;
+}
+
 }  // namespace
 
 double FineFit::located_fraction() const {
@@ -144,6 +172,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   FineFit fit;
   fit.unknowns = start;
   fit.blur = blur;
+  fit.departure = expected.departure;
   const int unknowns = start.size();
   double film_m = film_mean_m;
   EdgeMeasurements pass;
@@ -166,7 +195,8 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   // Nullopt when too little was seen.
   const auto refine = [&](const Effort& effort) -> std::optional<Change> {
     located_with = fit.blur;
-    pass = measure_edges(scene, light, fit.unknowns, film_m, effort, located_with);
+    const DepartedLight seen(light, fit.departure);
+    pass = measure_edges(scene, seen.light(), fit.unknowns, film_m, effort, located_with);
     if (static_cast<int>(pass.all.size()) < 2 * fit.unknowns.size()) return std::nullopt;
     Change change{move()};
     const EdgeBlur improved = pass.improved(fit.blur);
@@ -190,7 +220,14 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   }
   if (!change->settled()) return fit;
   ProcessingEvidence evidence;
-  if (expected.ask) evidence = find_processing(light, pass.all, located_with.boundaries_px);
+  for (int i = 0; expected.ask; ++i) {
+    SeenCamera camera = look_at_camera(light, pass.all, located_with.boundaries_px, fit.departure);
+    evidence = std::move(camera.evidence);
+    if (!camera.departure || i == most_departures) break;
+    fit.departure = *camera.departure;
+    for (int k = 0; k < passes_of_departure; ++k)
+      if (change = refine(measure_all); !change) return fit;
+  }
   fit.processing = evidence.processing;
   if (fit.processing == Processing::unknown) fit.bias_px = expected.bias_px;
   if (evidence.edges) {
@@ -206,7 +243,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   const double film_prior = (film_mean_m - film_m) / film_sigma_m;
   const ResidualLines lines = residual_lines(pass.all);
   const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker,
-                               common_errors(pass, lines, fit.blur, evidence.edges, fit.bias_px));
+                               common_errors(pass, lines, fit.blur, evidence.edges, fit.bias_px, fit.departure));
   if (!print) return fit;
   fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
   double squares = 0;

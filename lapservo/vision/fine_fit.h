@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "lapservo/vision/camera_departure.h"
 #include "lapservo/vision/edge_measurements.h"
 #include "lapservo/vision/light_image.h"
 #include "lapservo/vision/picture_processing.h"
@@ -32,6 +33,7 @@ struct FineFit {
   double inner_off_m = 3;                ///< how far off an inner boundary of the print may lie (print_fit.h)
   Processing processing = Processing::unknown;  ///< as far as asked
   std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
+  CameraDeparture departure;                    ///< from the rig's camera, as far as known
   TurnBlur turn;                                ///< within the exposure, which the covariance knows nothing of
 
   /// Of the boundary points that the image could show, the fraction that was located.
@@ -40,10 +42,12 @@ struct FineFit {
 
 /// Whether to ask what the camera did to the picture beyond its response (picture_processing.h), which costs a tenth of
 /// a tracked frame's time where it did nothing. It does the same in all frames: bias_px, an earlier frame's, is what a
-/// frame that can't tell is in doubt by.
+/// frame that can't tell is in doubt by. `departure` is what earlier frames showed of the
+/// camera.
 struct ExpectedProcessing {
   bool ask = true;
   std::array<double, 4> bias_px{};
+  CameraDeparture departure = {};
 };
 
 /// By how much noise is to be taken larger before a print is blamed: compression, motion blur and a camera's processing

@@ -17,16 +17,19 @@ struct ChannelGeometry {
   float centre_u = 0, centre_v = 0;
   std::array<float, 3> magnification{1, 1, 1};  ///< b, g, r, about the centre
   float reach_px = 0;                           ///< how far a channel's place lies from green's, at most
+  float corner_px = 0;                          ///< from the centre
 
   ChannelGeometry() = default;
   explicit ChannelGeometry(const Camera& camera)
       : centre_u(static_cast<float>(camera.cx_px)), centre_v(static_cast<float>(camera.cy_px)) {
-    const ChromaticAberration& aberration = camera.chromatic_aberration;
-    if (aberration == ChromaticAberration{}) return;
-    magnification = {static_cast<float>(aberration.blue), 1, static_cast<float>(aberration.red)};
-    const double corner_px = std::hypot(std::max(camera.cx_px, camera.width_px - camera.cx_px),
-                                        std::max(camera.cy_px, camera.height_px - camera.cy_px));
-    reach_px = static_cast<float>(corner_px * std::max(std::abs(aberration.blue - 1), std::abs(aberration.red - 1)));
+    corner_px = static_cast<float>(std::hypot(std::max(camera.cx_px, camera.width_px - camera.cx_px),
+                                              std::max(camera.cy_px, camera.height_px - camera.cy_px)));
+    if (camera.chromatic_aberration != ChromaticAberration{}) magnify(camera.chromatic_aberration);
+  }
+  /// By so much more.
+  void magnify(const ChromaticAberration& more) {
+    magnification[0] *= static_cast<float>(more.blue), magnification[2] *= static_cast<float>(more.red);
+    reach_px = corner_px * std::max(std::abs(magnification[0] - 1), std::abs(magnification[2] - 1));
   }
   bool differs() const { return reach_px > 0; }
 };
@@ -36,11 +39,18 @@ struct ChannelGeometry {
 class LightImage {
  public:
   LightImage(const ImageView& image, const std::array<float, 256>& light_of_value, const ChannelGeometry& channels = {})
-      : image_(image), light_(light_of_value), channels_(channels) {}
+      : image_(&image), light_(&light_of_value), channels_(channels) {}
 
-  const ImageView& image() const { return image_; }
+  /// The same frame where channels are magnified by so much more.
+  LightImage magnified(const ChromaticAberration& more) const {
+    LightImage out = *this;
+    out.channels_.magnify(more);
+    return out;
+  }
+
+  const ImageView& image() const { return *image_; }
   const ChannelGeometry& channels() const { return channels_; }
-  const std::array<float, 256>& light_of_value() const { return light_; }
+  const std::array<float, 256>& light_of_value() const { return *light_; }
 
   /// Encoded values at and above this are taken for saturated: the light there is unknown.
   static constexpr std::uint8_t saturated_value = 252;
@@ -70,8 +80,8 @@ class LightImage {
     constexpr double rounding_px = 0.01;
     const double border_px = channels_.reach_px;
     return raw_px.x() >= border_px && raw_px.y() >= border_px &&
-           raw_px.x() < image_.width_px - 1 - border_px - rounding_px &&
-           raw_px.y() < image_.height_px - 1 - border_px - rounding_px;
+           raw_px.x() < image_->width_px - 1 - border_px - rounding_px &&
+           raw_px.y() < image_->height_px - 1 - border_px - rounding_px;
   }
 
  private:
@@ -80,19 +90,20 @@ class LightImage {
   void read(float u, float v, Sample& sample) const {
     const int iu = static_cast<int>(u), iv = static_cast<int>(v);
     const float fu = u - static_cast<float>(iu), fv = v - static_cast<float>(iv);
-    const std::uint8_t* top = image_.pixel(iu, iv);
-    const std::uint8_t* bottom = top + image_.row_bytes;
+    const std::uint8_t* top = image_->pixel(iu, iv);
+    const std::uint8_t* bottom = top + image_->row_bytes;
+    const std::array<float, 256>& light = *light_;
     const float w00 = (1 - fu) * (1 - fv), w01 = fu * (1 - fv), w10 = (1 - fu) * fv, w11 = fu * fv;
     for (std::size_t c = First; c < Last; ++c) {
       sample.light[c] =
-          w00 * light_[top[c]] + w01 * light_[top[c + 3]] + w10 * light_[bottom[c]] + w11 * light_[bottom[c + 3]];
+          w00 * light[top[c]] + w01 * light[top[c + 3]] + w10 * light[bottom[c]] + w11 * light[bottom[c + 3]];
       sample.saturated[c] = (top[c] >= saturated_value) | (top[c + 3] >= saturated_value) |
                             (bottom[c] >= saturated_value) | (bottom[c + 3] >= saturated_value);
     }
   }
 
-  const ImageView& image_;
-  const std::array<float, 256>& light_;
+  const ImageView* image_;
+  const std::array<float, 256>* light_;
   ChannelGeometry channels_;
 };
 

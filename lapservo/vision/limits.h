@@ -139,10 +139,10 @@ struct FineFitLimits {
   /// by how much all boundaries lean alike: what blur does to them where it is not modelled (blurred_boundary.h), and
   /// what the model leaves. Of sharp pictures sides have a blur of usual_side_blur_px.
   double usual_side_blur_px = 1.05, side_of_blur = 1.4, leaning_of_blur = 0.4, leaning_of_wide_blur = 0.035;
-  /// And as a fraction of what the camera's processing moves a boundary by, which is known so well. A processing that
-  /// moves them by doubted_processing_px (rms) doubles the noise where a hidden boundary's print is asked for, and what
-  /// `calibrate marker` says.
-  double fraction_of_processing = 0.25, doubted_processing_px = 0.1;
+  /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are
+  /// clipped beside boundaries, the larger one. A processing that moves them by doubted_processing_px (rms) doubles the
+  /// noise where a hidden boundary's print is asked for, and what `calibrate marker` says.
+  double fraction_of_processing = 0.2, fraction_of_clipped = 0.3, doubted_processing_px = 0.1;
   /// And what of that is doubted before the print is blamed: of exact prints 0 to 0.1 px of 0.3 to 0.7 px are left.
   double doubted_of_processing = 0.12;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
@@ -207,6 +207,25 @@ struct ProcessingLimits {
   int min_boundaries = 3;
 };
 inline constexpr ProcessingLimits processing_limits;
+
+/// When a camera is believed to differ from the rig's (camera_departure.cpp).
+struct DepartureLimits {
+  int reach_px = 4, least_clear_px = 3;  ///< across a boundary
+  /// One sigma of where a channel shows a boundary, by its share of the largest change of light: shading and ink move
+  /// weak channels, which are left out below a tenth; and of any.
+  double sigma_px = 0.02, floor_px = 0.01, least_step = 0.1;
+  double farthest_px = 1;  ///< what is farther from the others is no boundary
+  /// Magnifications of lenses, beside 1; exponents of responses, too, and by how much the latter are tried.
+  double usual_aberration = 2e-3, usual_exponent = 0.3, exponent_step = -0.1;
+  int least_degrees = 4;
+  /// Squared sigmas, of all by which channels disagree (clean pictures have 0 to 4), and left of each (0 to 0.6).
+  double least_squares = 4, least_scatter = 0.3;
+  /// What one number explains, by the scatter: of magnifications and of a response, which must be another besides
+  /// (clean ones look like one by an exponent of up to 0.08).
+  double least_gain = 3.5, least_response_gain = 5, least_exponent = 0.09;
+  double doubted_of_response = 0.15;  ///< of what it moves boundaries by: a weak saturation looks like one
+};
+inline constexpr DepartureLimits departure_limits;
 
 /// What is assumed of prints that are not the rig's (print_fit.cpp).
 struct PrintLimits {

@@ -76,7 +76,7 @@ State expected_state(std::span<const PooledEdge> edges, double blur_px) {
 
 // Of an edge's normal equations what concerns itself, and its part in the shared ones.
 struct Block {
-  Eigen::Matrix<double, edge_unknowns, edge_unknowns> inverse;
+  Eigen::LLT<Eigen::Matrix<double, edge_unknowns, edge_unknowns>> factor;
   Eigen::Matrix<double, processing_unknowns, edge_unknowns> cross;
   EdgeVector gradient;
 };
@@ -137,29 +137,38 @@ class Problem {
     return sum;
   }
   State improved(const State& state, double damping) const {
-    ProcessingMatrix information = certainty_.asDiagonal();
-    ProcessingVector gradient = (prior_.processing - state.processing).cwiseProduct(certainty_);
-    const PictureProcessing processing = processing_of(state.processing);
-    const ProcessingFilters filters(processing, true);
     std::array<Block, most_edges> blocks;
-    for (std::size_t k = 0; k < edges_.size(); ++k)
-      if (is_seen(edges_[k]))
-        blocks[k] = eliminated(k, state.edges[k], model_.linearised(filters, processing, state.edges[k]), damping,
-                               information, gradient);
-    ProcessingMatrix damped = information;
-    damped.diagonal() *= 1 + damping;
     State next = state;
-    next.processing = bounded(state.processing + damped.llt().solve(gradient));
+    next.processing = improved_processing(state, damping, blocks);
     const ProcessingVector taken = next.processing - state.processing;
     for (std::size_t k = 0; k < edges_.size(); ++k)
       if (is_seen(edges_[k]))
-        next.edges[k] += (blocks[k].inverse * (blocks[k].gradient - blocks[k].cross.transpose() * taken))
+        next.edges[k] += blocks[k]
+                             .factor.solve(blocks[k].gradient - blocks[k].cross.transpose() * taken)
                              .cwiseMax(-longest_step)
                              .cwiseMin(longest_step);
     return next;
   }
+  // The first step from what was expected, of the processing only.
+  ProcessingVector first_processing() const {
+    std::array<Block, most_edges> blocks;
+    return improved_processing(prior_, 0, blocks);
+  }
 
  private:
+  ProcessingVector improved_processing(const State& state, double damping,
+                                       std::array<Block, most_edges>& blocks) const {
+    ProcessingMatrix information = certainty_.asDiagonal();
+    ProcessingVector gradient = (prior_.processing - state.processing).cwiseProduct(certainty_);
+    const PictureProcessing processing = processing_of(state.processing);
+    const ProcessingFilters filters(processing, true);
+    for (std::size_t k = 0; k < edges_.size(); ++k)
+      if (is_seen(edges_[k]))
+        eliminate(k, state.edges[k], model_.linearised(filters, processing, state.edges[k]), damping, information,
+                  gradient, blocks[k]);
+    information.diagonal() *= 1 + damping;
+    return bounded(state.processing + information.llt().solve(gradient));
+  }
   static constexpr double value_sigma = 0.0025;  // of one value: noise and what the model leaves out
   // Of a place [px] and of a plateau: what is clipped tells of neither how far it goes on.
   static constexpr double longest_step = 0.2;
@@ -184,8 +193,8 @@ class Problem {
     bound(ProcessingUnknown::sharpening, least_sharpening_, 2);
     return out;
   }
-  Block eliminated(std::size_t k, const EdgeVector& edge, const ProcessedEdge::Linearised& model, double damping,
-                   ProcessingMatrix& information, ProcessingVector& gradient) const {
+  void eliminate(std::size_t k, const EdgeVector& edge, const ProcessedEdge::Linearised& model, double damping,
+                 ProcessingMatrix& information, ProcessingVector& gradient, Block& block) const {
     constexpr int both = processing_unknowns + edge_unknowns;
     const EdgeSamples miss = missed(k, model.values);
     auto jacobian = model.jacobian;
@@ -201,15 +210,13 @@ class Problem {
         square.template bottomRightCorner<edge_unknowns, edge_unknowns>();
     of_own.diagonal() *= 1 + damping;
     of_own.diagonal() += edge_certainty_;
-    Block block;
-    block.inverse = of_own.llt().solve(Eigen::Matrix<double, edge_unknowns, edge_unknowns>::Identity());
+    block.factor.compute(of_own);
     block.cross = square.template topRightCorner<processing_unknowns, edge_unknowns>();
     block.gradient = pull.template tail<edge_unknowns>() + (prior_.edges[k] - edge).cwiseProduct(edge_certainty_);
-    const Eigen::Matrix<double, processing_unknowns, edge_unknowns> through = block.cross * block.inverse;
-    information +=
-        square.template topLeftCorner<processing_unknowns, processing_unknowns>() - through * block.cross.transpose();
-    gradient += pull.template head<processing_unknowns>() - through * block.gradient;
-    return block;
+    const Eigen::Matrix<double, edge_unknowns, processing_unknowns> through =
+        block.factor.solve(block.cross.transpose());
+    information += square.template topLeftCorner<processing_unknowns, processing_unknowns>() - block.cross * through;
+    gradient += pull.template head<processing_unknowns>() - through.transpose() * block.gradient;
   }
 
   ProcessedEdge model_;
@@ -226,6 +233,11 @@ bool is_enough(std::span<const PooledEdge> edges) {
   std::array<bool, 4> seen{};
   for (const PooledEdge& edge : edges) seen[edge.boundary] = seen[edge.boundary] || is_seen(edge);
   return std::count(seen.begin(), seen.end(), true) >= processing_limits.min_boundaries;
+}
+
+bool clips(const EdgeVector& edge) {
+  const auto colors = edge.segment<6>(edge_before);
+  return colors.minCoeff() < 0 || colors.maxCoeff() > 1;
 }
 
 // Levenberg and Marquardt's way.
@@ -266,7 +278,7 @@ std::optional<PictureProcessing> first_guess(const std::array<float, 256>& light
   const std::span<const PooledEdge> all(edges.all.begin(), edges.all.size());
   if (!is_enough(all)) return std::nullopt;
   const Problem problem(light_of_value, all, blur_px, expected_sigmas(false), {});
-  return processing_of(problem.improved(problem.prior(), 0).processing);
+  return processing_of(problem.first_processing());
 }
 
 std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_value, const PooledEdges& edges,
@@ -286,6 +298,7 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
     if (!is_seen(all[k])) continue;
     places[all[k].boundary] += all[k].places;
     sum_px[all[k].boundary] += all[k].places * bias_px(k);
+    out.clips = out.clips || clips(state.edges[k]);
   }
   for (std::size_t k = 0; k < 4; ++k)
     if (places[k] > 0) out.bias_px[k] = sum_px[k] / places[k];
@@ -306,12 +319,22 @@ std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges) {
   return magnitudes_px;
 }
 
+PooledEdges glance_at(const LightImage& light, std::span<const Measurement> measurements) {
+  constexpr Look glance{12, 1, false};
+  return pool_edges(light, measurements, glance);
+}
+
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
                                    const ExpectedPicture& expected) {
-  constexpr Look glance{12, 1, false}, look{EdgeMeasurements::max_lines, max_brightness_levels, true};
   if (blur_px > processing_limits.max_blur_px) return {};
+  return find_processing(light, measurements, glance_at(light, measurements), blur_px, expected);
+}
+
+ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements,
+                                   const PooledEdges& glance, double blur_px, const ExpectedPicture& expected) {
+  constexpr Look look{EdgeMeasurements::max_lines, max_brightness_levels, true};
   const auto& light_of_value = light.light_of_value();
-  const auto guess = first_guess(light_of_value, pool_edges(light, measurements, glance), blur_px);
+  const auto guess = first_guess(light_of_value, glance, blur_px);
   if (!guess) return {};
   if (!is_processed(*guess)) return {Processing::none, std::nullopt};
   const PooledEdges edges = pool_edges(light, measurements, look);

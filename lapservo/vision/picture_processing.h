@@ -23,6 +23,7 @@ struct ProcessedEdges {
   std::array<std::optional<double>, 4> bias_px;  ///< by which fit_step mislocates each boundary that was seen well
   /// And each measurement of one, by those that are as bright: what the processing does to an edge goes by its light.
   std::array<float, EdgeMeasurements::most> measurement_bias_px{};
+  bool clips = false;         ///< colours beside a boundary lie beyond black or white: what shows of them tells less
   double misfit = 0;          ///< rms of what the model leaves of the values
   double misfit_without = 0;  ///< and of what one without any processing does
 };
@@ -56,5 +57,10 @@ struct ProcessingEvidence {
 /// Of the boundaries among `measurements`, which fit_step located with `blur_px`.
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
                                    const ExpectedPicture& expected = {});
+
+/// What a first guess is made of; and the same by that of these measurements.
+PooledEdges glance_at(const LightImage& light, std::span<const Measurement> measurements);
+ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements,
+                                   const PooledEdges& glance, double blur_px, const ExpectedPicture& expected = {});
 
 }  // namespace lapservo::internal

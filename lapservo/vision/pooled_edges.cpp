@@ -15,6 +15,8 @@ struct EdgePlace {
   std::array<std::array<float, PooledEdge::samples>, 3> value;
   float brightness = 0;
   std::size_t measurement = 0;
+
+  EdgePlace() {}  // NOLINT(modernize-use-equals-default): the values are left as they are
 };
 using EdgePlaces = InplaceVector<EdgePlace, EdgeMeasurements::max_lines>;
 
@@ -103,13 +105,12 @@ EdgePlaces places_of(const Located& located, const LightImage& light, std::span<
     const Eigen::Vector2f reach = static_cast<float>(PooledEdge::reach) * m.normal;
     const Eigen::Vector2f first = m.expected_px - reach, last = m.expected_px + reach;
     if (!light.contains(first.cast<double>()) || !light.contains(last.cast<double>())) continue;
-    EdgePlace place;
+    EdgePlace& place = places.emplace_back();
     place.measurement = i;
     for (std::size_t k = 0; k < PooledEdge::samples; ++k)
       sample_at(light, first + static_cast<float>(k) * m.normal, look.cubic, k, place);
     for (const auto& channel : place.value)
       if (look.levels > 1) place.brightness = std::accumulate(channel.begin(), channel.end(), place.brightness);
-    places.push_back(place);
   }
   return places;
 }
@@ -122,10 +123,12 @@ PooledEdge mean_of(std::span<const EdgePlace* const> places, std::span<const Mea
     const Measurement& m = measurements[place->measurement];
     edge.boundary = m.group;
     edge.residual_px += m.residual_px / edge.places;
+    edge.place_px += m.expected_px, edge.normal += m.normal;
     edge.clear_px = std::clamp(static_cast<int>(m.clear_px), 0, edge.clear_px);
     for (std::size_t c = 0; c < 3; ++c)
       for (std::size_t i = 0; i < PooledEdge::samples; ++i) edge.value[c][i] += part * place->value[c][i];
   }
+  edge.place_px /= static_cast<float>(edge.places), edge.normal /= static_cast<float>(edge.places);
   return edge;
 }
 

@@ -18,8 +18,9 @@ struct PooledEdge {
   std::size_t boundary = 0;                           ///< 0 to 3
   std::array<std::array<float, samples>, 3> value{};  ///< b, g, r
   int places = 0;
-  double residual_px = 0;  ///< where the places were located, from where the pose has them: mean
-  int clear_px = reach;    ///< so far on either side no other boundary shows, wherever it was located
+  Eigen::Vector2f place_px{0, 0}, normal{0, 0};  ///< of the places, their means
+  double residual_px = 0;                        ///< where the places were located, from where the pose has them: mean
+  int clear_px = reach;  ///< so far on either side no other boundary shows, wherever it was located
 };
 
 /// Places are averaged with others that are as bright: what is clipped in the light is not in the shade, and a mean of

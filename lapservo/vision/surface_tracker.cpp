@@ -165,11 +165,12 @@ void SurfaceTracker::remember(std::size_t i, const Found& found) {
   const bool followed = memory_[i] && memory_[i]->last.q() && fit.unknowns.q();
   if (followed) velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
   const int unasked = unasked_after(fit.processing, memory_[i] ? memory_[i]->unasked : ask_every);
-  memory_[i] = Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px, found.among_others, followed};
+  memory_[i] =
+      Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px, fit.departure, found.among_others, followed};
 }
 
 ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {
-  return {unasked >= ask_every, bias_px};
+  return {unasked >= ask_every, bias_px, departure};
 }
 
 // To `others_`.

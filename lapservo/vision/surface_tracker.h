@@ -38,6 +38,7 @@ class SurfaceTracker {
     EdgeBlur blur;
     int unasked = 0;  // frames since the camera was found to do nothing to its pictures
     std::array<double, 4> bias_px{};
+    CameraDeparture departure;
     bool among_others = false;  // Found::among_others
     bool followed = false;      // from a frame before: the velocity is one
     ExpectedProcessing expected_processing() const;

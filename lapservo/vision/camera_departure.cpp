@@ -1,0 +1,227 @@
+#include "lapservo/vision/camera_departure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+#include <Eigen/LU>
+
+#include "lapservo/vision/blurred_edges.h"
+#include "lapservo/vision/limits.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr auto& limits = departure_limits;
+
+std::array<float, 256> raised(const std::array<float, 256>& light_of_value, double exponent) {
+  std::array<float, 256> out;
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::pow(light_of_value[i], static_cast<float>(exponent));
+  return out;
+}
+
+// A step at the samples of an edge, about its mean; and its density, which moves it, apart from step and mean.
+struct StepColumns {
+  std::array<float, PooledEdge::samples> step, density;
+  std::size_t first, last;
+  float step_square = 0, density_square = 0;
+
+  StepColumns(const PooledEdge& edge, float blur_px) {
+    const int reach = std::min(edge.clear_px, limits.reach_px);
+    first = static_cast<std::size_t>(PooledEdge::reach - reach);
+    last = static_cast<std::size_t>(PooledEdge::reach + reach);
+    const BlurredEdges& edges = BlurredEdges::instance();
+    const float from_edge = static_cast<float>(-PooledEdge::reach) - static_cast<float>(edge.residual_px);
+    float step_sum = 0, density_sum = 0, both = 0;
+    for (std::size_t i = first; i <= last; ++i) {
+      const BlurredEdge at = edges.at((from_edge + static_cast<float>(i)) / blur_px);
+      step[i] = at.step, density[i] = at.density;
+      step_sum += at.step, density_sum += at.density;
+    }
+    const float per_sample = 1 / static_cast<float>(last - first + 1);
+    for (std::size_t i = first; i <= last; ++i) {
+      step[i] -= per_sample * step_sum, density[i] -= per_sample * density_sum;
+      step_square += step[i] * step[i], both += step[i] * density[i];
+    }
+    for (std::size_t i = first; i <= last; ++i) {
+      density[i] -= both / step_square * step[i];
+      density_square += density[i] * density[i];
+    }
+  }
+};
+
+float light_between(const std::array<float, 256>& light_of_value, float value) {
+  const float place = std::clamp(255 * value, 0.0F, 254.99F);
+  const auto i = static_cast<std::size_t>(place);
+  return light_of_value[i] + (place - static_cast<float>(i)) * (light_of_value[i + 1] - light_of_value[i]);
+}
+
+using Channels = Eigen::Array3d;  // b, g, r
+
+// Where each channel shows an edge, from where all of them do, and how much its light changes there.
+struct ChannelSteps {
+  Channels offset_px, step;
+};
+
+ChannelSteps channel_steps(const StepColumns& columns, const std::array<float, 256>& light_of_value,
+                           const PooledEdge& edge, float blur_px) {
+  ChannelSteps out;
+  for (std::size_t c = 0; c < 3; ++c) {
+    float by_step = 0, by_density = 0;
+    for (std::size_t i = columns.first; i <= columns.last; ++i) {
+      const float light = light_between(light_of_value, edge.value[c][i]);
+      by_step += columns.step[i] * light, by_density += columns.density[i] * light;
+    }
+    const float step = by_step / columns.step_square;
+    const auto channel = static_cast<Eigen::Index>(c);
+    out.step[channel] = static_cast<double>(step);
+    out.offset_px[channel] = static_cast<double>(-by_density / columns.density_square * blur_px / step);
+  }
+  return out;
+}
+
+struct SeenBoundary {
+  const PooledEdge* edge;
+  double radial_px;                            // how far from the principal point it lies along its normal
+  Channels offset_px, weight, share;           // share: of what fit_step sees there
+  Channels by_exponent_px = Channels::Zero();  // d(offset)/d(exponent)
+  int channels;                                // that show it
+
+  SeenBoundary(const PooledEdge& of_edge, double of_radial_px, const ChannelSteps& steps)
+      : edge(&of_edge), radial_px(of_radial_px), offset_px(steps.offset_px) {
+    const Channels of_most = steps.step.abs() / steps.step.abs().maxCoeff();
+    const auto shown = of_most > limits.least_step && offset_px.abs() < limits.farthest_px;
+    const Channels variance_px2 = limits.floor_px * limits.floor_px + (limits.sigma_px / of_most).square();
+    weight = shown.select(variance_px2.inverse(), 0);
+    offset_px = shown.select(offset_px, 0);
+    share = of_most.square() / of_most.square().sum();
+    channels = static_cast<int>(shown.count());
+  }
+  // A pattern of offsets less its mean.
+  Channels apart(const Channels& pattern) const { return pattern - (weight * pattern).sum() / weight.sum(); }
+};
+using SeenBoundaries = InplaceVector<SeenBoundary, 4>;
+
+// What a few numbers explain of the offsets.
+template <int Numbers>
+struct Explanation {
+  using Vector = Eigen::Matrix<double, Numbers, 1>;
+  Vector found, sigma;
+  double scatter = 0;  // of what is left, in squared sigmas
+  double gain = 0;     // of a number, by the scatter
+};
+
+// `pattern(boundary, number)`: the offsets by one of it; `usual`: one sigma of it before the frame is seen.
+template <int Numbers, typename Pattern>
+Explanation<Numbers> explained(const SeenBoundaries& seen, double squares, int degrees, double usual,
+                               const Pattern& pattern) {
+  using Explained = Explanation<Numbers>;
+  Eigen::Matrix<double, Numbers, Numbers> information = decltype(information)::Identity() / (usual * usual);
+  typename Explained::Vector gradient = Explained::Vector::Zero();
+  for (const SeenBoundary& boundary : seen)
+    for (int i = 0; i < Numbers; ++i) {
+      const Channels apart = boundary.weight * boundary.apart(pattern(boundary, i));
+      for (int j = 0; j < Numbers; ++j) information(i, j) += (apart * pattern(boundary, j)).sum();
+      gradient[i] += (apart * boundary.offset_px).sum();
+    }
+  const Eigen::Matrix<double, Numbers, Numbers> covariance = information.inverse();
+  Explained out;
+  out.found = covariance * gradient;
+  const double of_all = out.found.dot(gradient);
+  out.scatter = std::max((squares - of_all) / (degrees - Numbers), limits.least_scatter);
+  out.sigma = (out.scatter * covariance.diagonal()).cwiseSqrt();
+  out.gain = of_all / Numbers / out.scatter;
+  return out;
+}
+
+Channels by_aberration_px(const SeenBoundary& boundary, int number) {
+  return boundary.radial_px * Eigen::Vector3d::Unit(number == 0 ? 0 : 2).array();
+}
+
+CameraDeparture by_aberration(const SeenBoundaries& seen, const Explanation<2>& explanation) {
+  CameraDeparture out;
+  out.aberration = {1 + explanation.found[0], 1 + explanation.found[1]};
+  out.sigma_aberration = {explanation.sigma[0], explanation.sigma[1]};
+  for (const SeenBoundary& boundary : seen) {
+    const auto moved_px = [&](int number) {
+      return explanation.sigma[number] * (boundary.share * by_aberration_px(boundary, number)).sum();
+    };
+    out.doubt_px[boundary.edge->boundary] = std::hypot(moved_px(0), moved_px(1));
+  }
+  return out;
+}
+
+CameraDeparture by_exponent(const SeenBoundaries& seen, const Explanation<1>& explanation) {
+  CameraDeparture out;
+  // The offsets are what an exponent of less than 1 left: they vanish with the opposite.
+  out.exponent = 1 - explanation.found[0];
+  out.sigma_exponent = std::hypot(explanation.sigma[0], limits.doubted_of_response * explanation.found[0]);
+  for (const SeenBoundary& boundary : seen)
+    out.doubt_px[boundary.edge->boundary] =
+        std::abs(out.sigma_exponent * (boundary.share * boundary.by_exponent_px).sum());
+  return out;
+}
+
+SeenBoundaries seen_in(const LightImage& light, const PooledEdges& glance, double blur_px) {
+  const Eigen::Vector2f centre(light.channels().centre_u, light.channels().centre_v);
+  const auto blur = static_cast<float>(blur_px);
+  SeenBoundaries seen;
+  for (const PooledEdge& edge : glance.all) {
+    if (edge.places < processing_limits.min_places || edge.clear_px < limits.least_clear_px) continue;
+    const double radial_px = static_cast<double>((edge.place_px - centre).dot(edge.normal));
+    const SeenBoundary boundary(edge, radial_px,
+                                channel_steps(StepColumns(edge, blur), light.light_of_value(), edge, blur));
+    if (boundary.channels > 1) seen.push_back(boundary);
+  }
+  return seen;
+}
+
+void differ_by_exponent(const LightImage& light, double blur_px, SeenBoundaries& seen) {
+  const auto blur = static_cast<float>(blur_px);
+  const auto light_of_value = raised(light.light_of_value(), 1 + limits.exponent_step);
+  for (SeenBoundary& boundary : seen) {
+    const PooledEdge& edge = *boundary.edge;
+    const Channels there_px = channel_steps(StepColumns(edge, blur), light_of_value, edge, blur).offset_px;
+    boundary.by_exponent_px = (boundary.weight > 0).select((there_px - boundary.offset_px) / limits.exponent_step, 0);
+  }
+}
+
+}  // namespace
+
+CameraDeparture CameraDeparture::then(const CameraDeparture& more) const {
+  CameraDeparture out = more;
+  out.aberration.blue *= aberration.blue, out.aberration.red *= aberration.red;
+  out.exponent *= exponent;
+  return out;
+}
+
+DepartedLight::DepartedLight(const LightImage& light, const CameraDeparture& departure) : light_(light) {
+  if (departure.aberration != ChromaticAberration{}) light_ = light_.magnified(departure.aberration);
+  if (departure.exponent == 1) return;
+  light_of_value_ = raised(light.light_of_value(), departure.exponent);
+  light_ = LightImage(light.image(), light_of_value_, light_.channels());
+}
+
+std::optional<CameraDeparture> find_departure(const LightImage& light, const PooledEdges& glance, double blur_px) {
+  if (!(light.channels().corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody told
+  SeenBoundaries seen = seen_in(light, glance, blur_px);
+  double squares = 0;
+  int degrees = 0;
+  for (const SeenBoundary& boundary : seen) {
+    squares += (boundary.weight * boundary.apart(boundary.offset_px).square()).sum();
+    degrees += boundary.channels - 1;
+  }
+  if (degrees < limits.least_degrees || !(squares > limits.least_squares)) return std::nullopt;
+  differ_by_exponent(light, blur_px, seen);
+  const auto aberration = explained<2>(seen, squares, degrees, limits.usual_aberration, by_aberration_px);
+  const auto response = explained<1>(seen, squares, degrees, limits.usual_exponent,
+                                     [](const SeenBoundary& boundary, int) { return boundary.by_exponent_px; });
+  const bool is_response =
+      response.gain > limits.least_response_gain && std::abs(response.found[0]) > limits.least_exponent;
+  if (is_response && response.scatter < aberration.scatter) return by_exponent(seen, response);
+  if (aberration.gain > limits.least_gain) return by_aberration(seen, aberration);
+  return std::nullopt;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/pooled_edges.h"
+
+namespace lapservo::internal {
+
+/// What a camera does to its pictures that the rig's camera does not say, as frames show it.
+struct CameraDeparture {
+  ChromaticAberration aberration, sigma_aberration{0, 0};  ///< times the rig's
+  double exponent = 1, sigma_exponent = 0;                 ///< light is the rig's to this power
+  std::array<double, 4> doubt_px{};                        ///< what is left of it moves each boundary by: one sigma
+
+  bool any() const { return exponent != 1 || aberration != ChromaticAberration{}; }
+  /// After this one, as a frame that was seen through it shows.
+  CameraDeparture then(const CameraDeparture& more) const;
+};
+
+/// A frame's light as a camera that departs from the rig's shows it.
+class DepartedLight {
+ public:
+  DepartedLight(const LightImage& light, const CameraDeparture& departure);
+  DepartedLight(const DepartedLight&) = delete;
+  DepartedLight& operator=(const DepartedLight&) = delete;
+  const LightImage& light() const { return light_; }
+
+ private:
+  std::array<float, 256> light_of_value_;  // where it is not the rig's
+  LightImage light_;
+};
+
+/// What is plainly there beyond what `light` undoes already: of lateral chromatic aberration and a response that is not
+/// the rig's, the one that explains where the three channels show the boundaries. `glance` was looked at with `light`,
+/// `blur_px` is what fit_step was told. Of pictures that were processed (picture_processing.h) it may say anything.
+std::optional<CameraDeparture> find_departure(const LightImage& light, const PooledEdges& glance, double blur_px);
+
+}  // namespace lapservo::internal
