@@ -14,6 +14,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr auto& limits = departure_limits;
+constexpr Look in_light{24, 1, Between::light};
 
 std::array<float, 256> raised(const std::array<float, 256>& light_of_value, double exponent) {
   std::array<float, 256> out;
@@ -51,33 +52,32 @@ struct StepColumns {
   }
 };
 
-float light_between(const std::array<float, 256>& light_of_value, float value) {
-  const float place = std::clamp(255 * value, 0.0F, 254.99F);
-  const auto i = static_cast<std::size_t>(place);
-  return light_of_value[i] + (place - static_cast<float>(i)) * (light_of_value[i + 1] - light_of_value[i]);
-}
-
 using Channels = Eigen::Array3d;  // b, g, r
 
 // Where each channel shows an edge, from where all of them do, and how much its light changes there.
 struct ChannelSteps {
   Channels offset_px, step;
+  Channels gloss_px = Channels::Zero();  // by how much gloss and shading may move each
 };
 
-ChannelSteps channel_steps(const StepColumns& columns, const std::array<float, 256>& light_of_value,
-                           const PooledEdge& edge, float blur_px) {
-  ChannelSteps out;
+template <typename LightOf>
+ChannelSteps channel_steps(const StepColumns& columns, const PooledEdge& edge, float blur_px, const LightOf& light_of) {
+  Channels step, density;
   for (std::size_t c = 0; c < 3; ++c) {
     float by_step = 0, by_density = 0;
     for (std::size_t i = columns.first; i <= columns.last; ++i) {
-      const float light = light_between(light_of_value, edge.value[c][i]);
+      const float light = light_of(edge.value[c][i]);
       by_step += columns.step[i] * light, by_density += columns.density[i] * light;
     }
-    const float step = by_step / columns.step_square;
     const auto channel = static_cast<Eigen::Index>(c);
-    out.step[channel] = static_cast<double>(step);
-    out.offset_px[channel] = static_cast<double>(-by_density / columns.density_square * blur_px / step);
+    step[channel] = static_cast<double>(by_step / columns.step_square);
+    density[channel] = static_cast<double>(by_density / columns.density_square);
   }
+  ChannelSteps out{-static_cast<double>(blur_px) * density / step, step};
+  // Gloss is white: it shows alone in a channel in which both sides of the edge look alike.
+  Eigen::Index alike = 0;
+  if (step.abs().minCoeff(&alike) < limits.least_step * step.abs().maxCoeff())
+    out.gloss_px = static_cast<double>(blur_px) * std::abs(density[alike]) / step.abs();
   return out;
 }
 
@@ -92,7 +92,8 @@ struct SeenBoundary {
       : edge(&of_edge), radial_px(of_radial_px), offset_px(steps.offset_px) {
     const Channels of_most = steps.step.abs() / steps.step.abs().maxCoeff();
     const auto shown = of_most > limits.least_step && offset_px.abs() < limits.farthest_px;
-    const Channels variance_px2 = limits.floor_px * limits.floor_px + (limits.sigma_px / of_most).square();
+    const Channels variance_px2 =
+        limits.floor_px * limits.floor_px + (limits.sigma_px / of_most).square() + steps.gloss_px.square();
     weight = shown.select(variance_px2.inverse(), 0);
     offset_px = shown.select(offset_px, 0);
     share = of_most.square() / of_most.square().sum();
@@ -102,6 +103,19 @@ struct SeenBoundary {
   Channels apart(const Channels& pattern) const { return pattern - (weight * pattern).sum() / weight.sum(); }
 };
 using SeenBoundaries = InplaceVector<SeenBoundary, 4>;
+
+struct Disagreement {
+  double squares = 0;  // of channels about each boundary's mean, in squared sigmas
+  int degrees = 0;
+
+  explicit Disagreement(const SeenBoundaries& seen) {
+    for (const SeenBoundary& boundary : seen) {
+      squares += (boundary.weight * boundary.apart(boundary.offset_px).square()).sum();
+      degrees += boundary.channels - 1;
+    }
+  }
+  bool is_plain() const { return degrees >= limits.least_degrees && squares > limits.least_squares; }
+};
 
 // What a few numbers explain of the offsets.
 template <int Numbers>
@@ -114,7 +128,7 @@ struct Explanation {
 
 // `pattern(boundary, number)`: the offsets by one of it; `usual`: one sigma of it before the frame is seen.
 template <int Numbers, typename Pattern>
-Explanation<Numbers> explained(const SeenBoundaries& seen, double squares, int degrees, double usual,
+Explanation<Numbers> explained(const SeenBoundaries& seen, const Disagreement& all, double usual,
                                const Pattern& pattern) {
   using Explained = Explanation<Numbers>;
   Eigen::Matrix<double, Numbers, Numbers> information = decltype(information)::Identity() / (usual * usual);
@@ -129,8 +143,9 @@ Explanation<Numbers> explained(const SeenBoundaries& seen, double squares, int d
   Explained out;
   out.found = covariance * gradient;
   const double of_all = out.found.dot(gradient);
-  out.scatter = std::max((squares - of_all) / (degrees - Numbers), limits.least_scatter);
-  out.sigma = (out.scatter * covariance.diagonal()).cwiseSqrt();
+  const double scatter = (all.squares - of_all) / (all.degrees - Numbers);
+  out.sigma = (limits.told_of_scatter * std::max(scatter, 0.0) * covariance.diagonal()).cwiseSqrt();
+  out.scatter = std::max(scatter, limits.least_scatter);
   out.gain = of_all / Numbers / out.scatter;
   return out;
 }
@@ -163,26 +178,38 @@ CameraDeparture by_exponent(const SeenBoundaries& seen, const Explanation<1>& ex
   return out;
 }
 
-SeenBoundaries seen_in(const LightImage& light, const PooledEdges& glance, double blur_px) {
-  const Eigen::Vector2f centre(light.channels().centre_u, light.channels().centre_v);
+template <typename LightOf>
+SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges, double blur_px,
+                       const LightOf& light_of) {
+  const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
   const auto blur = static_cast<float>(blur_px);
   SeenBoundaries seen;
-  for (const PooledEdge& edge : glance.all) {
+  for (const PooledEdge& edge : edges.all) {
     if (edge.places < processing_limits.min_places || edge.clear_px < limits.least_clear_px) continue;
     const double radial_px = static_cast<double>((edge.place_px - centre).dot(edge.normal));
-    const SeenBoundary boundary(edge, radial_px,
-                                channel_steps(StepColumns(edge, blur), light.light_of_value(), edge, blur));
+    const SeenBoundary boundary(edge, radial_px, channel_steps(StepColumns(edge, blur), edge, blur, light_of));
     if (boundary.channels > 1) seen.push_back(boundary);
   }
   return seen;
 }
 
-void differ_by_exponent(const LightImage& light, double blur_px, SeenBoundaries& seen) {
+// Of values on the way between two pixels: along straight lines, too.
+float light_between(const std::array<float, 256>& light_of_value, float value) {
+  const float place = std::clamp(255 * value, 0.0F, 254.99F);
+  const auto i = static_cast<std::size_t>(place);
+  return light_of_value[i] + (place - static_cast<float>(i)) * (light_of_value[i + 1] - light_of_value[i]);
+}
+
+float as_it_is(float light) {
+  return light;
+}
+
+void differ_by_exponent(double blur_px, SeenBoundaries& seen) {
   const auto blur = static_cast<float>(blur_px);
-  const auto light_of_value = raised(light.light_of_value(), 1 + limits.exponent_step);
+  const auto raised = [](float light) { return std::pow(light, 1 + limits.exponent_step); };
   for (SeenBoundary& boundary : seen) {
     const PooledEdge& edge = *boundary.edge;
-    const Channels there_px = channel_steps(StepColumns(edge, blur), light_of_value, edge, blur).offset_px;
+    const Channels there_px = channel_steps(StepColumns(edge, blur), edge, blur, raised).offset_px;
     boundary.by_exponent_px = (boundary.weight > 0).select((there_px - boundary.offset_px) / limits.exponent_step, 0);
   }
 }
@@ -203,23 +230,25 @@ DepartedLight::DepartedLight(const LightImage& light, const CameraDeparture& dep
   light_ = LightImage(light.image(), light_of_value_, light_.channels());
 }
 
-std::optional<CameraDeparture> find_departure(const LightImage& light, const PooledEdges& glance, double blur_px) {
-  if (!(light.channels().corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody told
-  SeenBoundaries seen = seen_in(light, glance, blur_px);
-  double squares = 0;
-  int degrees = 0;
-  for (const SeenBoundary& boundary : seen) {
-    squares += (boundary.weight * boundary.apart(boundary.offset_px).square()).sum();
-    degrees += boundary.channels - 1;
-  }
-  if (degrees < limits.least_degrees || !(squares > limits.least_squares)) return std::nullopt;
-  differ_by_exponent(light, blur_px, seen);
-  const auto aberration = explained<2>(seen, squares, degrees, limits.usual_aberration, by_aberration_px);
-  const auto response = explained<1>(seen, squares, degrees, limits.usual_exponent,
+std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
+                                              const PooledEdges& glance, double blur_px) {
+  const ChannelGeometry& channels = light.channels();
+  if (!(channels.corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody told
+  const auto light_of = [&](float value) { return light_between(light.light_of_value(), value); };
+  if (!Disagreement(seen_in(channels, glance, blur_px, light_of)).is_plain()) return std::nullopt;
+  // Means of values have dark edges, which look like another response.
+  const PooledEdges edges = pool_edges(light, measurements, in_light);
+  SeenBoundaries seen = seen_in(channels, edges, blur_px, as_it_is);
+  const Disagreement all(seen);
+  if (!all.is_plain()) return std::nullopt;
+  differ_by_exponent(blur_px, seen);
+  const auto aberration = explained<2>(seen, all, limits.usual_aberration, by_aberration_px);
+  const auto response = explained<1>(seen, all, limits.usual_exponent,
                                      [](const SeenBoundary& boundary, int) { return boundary.by_exponent_px; });
-  const bool is_response =
-      response.gain > limits.least_response_gain && std::abs(response.found[0]) > limits.least_exponent;
-  if (is_response && response.scatter < aberration.scatter) return by_exponent(seen, response);
+  const bool is_response = response.gain > limits.least_response_gain &&
+                           response.scatter < std::min(limits.most_response_scatter, aberration.scatter) &&
+                           std::abs(response.found[0]) > limits.least_exponent;
+  if (is_response) return by_exponent(seen, response);
   if (aberration.gain > limits.least_gain) return by_aberration(seen, aberration);
   return std::nullopt;
 }

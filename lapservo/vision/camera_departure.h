@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/vision/light_image.h"
@@ -34,8 +35,10 @@ class DepartedLight {
 };
 
 /// What is plainly there beyond what `light` undoes already: of lateral chromatic aberration and a response that is not
-/// the rig's, the one that explains where the three channels show the boundaries. `glance` was looked at with `light`,
-/// `blur_px` is what fit_step was told. Of pictures that were processed (picture_processing.h) it may say anything.
-std::optional<CameraDeparture> find_departure(const LightImage& light, const PooledEdges& glance, double blur_px);
+/// the rig's, the one that explains where the three channels show the boundaries. `glance` is what glance_at() makes of
+/// `light` and `measurements`, `blur_px` what fit_step was told. Of pictures that were processed (picture_processing.h)
+/// it may say anything.
+std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
+                                              const PooledEdges& glance, double blur_px);
 
 }  // namespace lapservo::internal

@@ -145,7 +145,7 @@ SeenCamera look_at_camera(const LightImage& light, std::span<const Measurement> 
   const PooledEdges glance = glance_at(seen.light(), measurements);
   out.evidence = find_processing(seen.light(), measurements, glance, blur_px);
   if (out.evidence.processing == Processing::found) return out;
-  const auto more = find_departure(seen.light(), glance, blur_px);
+  const auto more = find_departure(seen.light(), measurements, glance, blur_px);
   if (!more) return out;
   const CameraDeparture all = known.then(*more);
   const DepartedLight without(light, all);

@@ -218,12 +218,15 @@ struct DepartureLimits {
   /// Magnifications of lenses, beside 1; exponents of responses, too, and by how much the latter are tried.
   double usual_aberration = 2e-3, usual_exponent = 0.3, exponent_step = -0.1;
   int least_degrees = 4;
-  /// Squared sigmas, of all by which channels disagree (clean pictures have 0 to 4), and left of each (0 to 0.6).
-  double least_squares = 4, least_scatter = 0.3;
-  /// What one number explains, by the scatter: of magnifications and of a response, which must be another besides
-  /// (clean ones look like one by an exponent of up to 0.08).
-  double least_gain = 3.5, least_response_gain = 5, least_exponent = 0.09;
-  double doubted_of_response = 0.15;  ///< of what it moves boundaries by: a weak saturation looks like one
+  /// Squared sigmas: of all by which channels disagree, and left a degree where that is explained (at least, by which
+  /// gains are told; of a response at most, or it is gloss).
+  double least_squares = 2.5, least_scatter = 0.3, most_response_scatter = 0.8;
+  /// What one number explains, by the scatter; and of a response, which must be another besides. Of clean pictures with
+  /// highlights magnifications gain up to 6.3, real ones mostly 15 and more.
+  double least_gain = 7, least_response_gain = 5.5, least_exponent = 0.06;
+  /// A departure's sigma takes in a part of what is left, most of which is common to all frames (exponents of 53 frames
+  /// had a standard deviation of 0.008, for 0.028 by all of it), and of a response a part of itself: it is no power.
+  double told_of_scatter = 0.2, doubted_of_response = 0.03;
 };
 inline constexpr DepartureLimits departure_limits;
 

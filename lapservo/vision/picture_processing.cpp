@@ -320,7 +320,7 @@ std::array<double, 4> bias_magnitudes_px(const ProcessedEdges& edges) {
 }
 
 PooledEdges glance_at(const LightImage& light, std::span<const Measurement> measurements) {
-  constexpr Look glance{12, 1, false};
+  constexpr Look glance{12, 1, Between::values};
   return pool_edges(light, measurements, glance);
 }
 
@@ -332,7 +332,7 @@ ProcessingEvidence find_processing(const LightImage& light, std::span<const Meas
 
 ProcessingEvidence find_processing(const LightImage& light, std::span<const Measurement> measurements,
                                    const PooledEdges& glance, double blur_px, const ExpectedPicture& expected) {
-  constexpr Look look{EdgeMeasurements::max_lines, max_brightness_levels, true};
+  constexpr Look look{EdgeMeasurements::max_lines, max_brightness_levels, Between::values_cubic};
   const auto& light_of_value = light.light_of_value();
   const auto guess = first_guess(light_of_value, glance, blur_px);
   if (!guess) return {};

@@ -146,7 +146,8 @@ TEST(PooledEdges, TakesAsManyPlacesAsAskedFor) {
     Measurement m{};
     m.group = 1, m.expected_px = {100, 100}, m.normal = {1, 0}, m.clear_px = 6;
     const std::vector<Measurement> measurements(static_cast<std::size_t>(located), m);
-    EXPECT_EQ(pool_edges(shot.sight.light(), measurements, {most, 1, false}).all[0].places, std::min(located, most))
+    EXPECT_EQ(pool_edges(shot.sight.light(), measurements, {most, 1, Between::values}).all[0].places,
+              std::min(located, most))
         << located;
   }
 }
@@ -163,7 +164,7 @@ TEST(PooledEdges, AverageWhatIsAsBright) {
     m.group = 2, m.expected_px = {u, 30}, m.normal = {0.6F, 0.8F}, m.clear_px = 6, m.residual_px = u / 200;
     measurements.insert(measurements.end(), 10, m);
   }
-  const PooledEdges edges = pool_edges(light, measurements, {64, 2, false});
+  const PooledEdges edges = pool_edges(light, measurements, {64, 2, Between::values});
   ASSERT_EQ(edges.all.size(), 2U);
   EXPECT_FLOAT_EQ(edges.all[0].value[1][3], 60 / 255.F);
   EXPECT_FLOAT_EQ(edges.all[1].value[1][3], 160 / 255.F);
@@ -180,7 +181,7 @@ TEST(PooledEdges, LeaveOutWhatLiesElsewhere) {
   m.group = 1, m.expected_px = {100, 100}, m.normal = {1, 0}, m.clear_px = 6, m.residual_px = 0.2;
   std::vector<Measurement> measurements(20, m);
   for (std::size_t i = 0; i < 5; ++i) measurements[4 * i].residual_px = 3;
-  const PooledEdges edges = pool_edges(shot.sight.light(), measurements, {64, 4, true});
+  const PooledEdges edges = pool_edges(shot.sight.light(), measurements, {64, 4, Between::values_cubic});
   int places = 0;
   for (const PooledEdge& edge : edges.all) {
     EXPECT_NEAR(edge.residual_px, 0.2, 1e-9);
@@ -200,9 +201,9 @@ TEST(PooledEdges, SampleBetweenPixels) {
   const LightImage light(view, srgb());
   Measurement m{};
   m.group = 0, m.expected_px = {25.3F, 18.6F}, m.normal = {0.6F, 0.8F}, m.clear_px = 6;
-  for (const bool cubic : {false, true})
+  for (const Between between : {Between::values, Between::values_cubic})
     for (int i = 0; i < PooledEdge::samples; ++i) {
-      const PooledEdge edge = pool_edges(light, std::vector<Measurement>(8, m), {64, 4, cubic}).all[0];
+      const PooledEdge edge = pool_edges(light, std::vector<Measurement>(8, m), {64, 4, between}).all[0];
       const float t = static_cast<float>(i - PooledEdge::reach), u = 25.3F + 0.6F * t, v = 18.6F + 0.8F * t;
       EXPECT_NEAR(255 * edge.value[0][static_cast<std::size_t>(i)], 2 * u + v, 1e-3);
       EXPECT_NEAR(255 * edge.value[1][static_cast<std::size_t>(i)], 3 * v, 1e-3);

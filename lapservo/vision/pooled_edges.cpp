@@ -55,21 +55,28 @@ void sample_linear(const ImageView& image, float u, float v, std::size_t sample,
 }
 
 template <std::size_t First, std::size_t Last>
-void sample_at(const ImageView& image, float u, float v, bool cubic, std::size_t sample, EdgePlace& place) {
-  cubic ? sample_cubic<First, Last>(image, u, v, sample, place)
-        : sample_linear<First, Last>(image, u, v, sample, place);
+void sample_at(const ImageView& image, float u, float v, Between between, std::size_t sample, EdgePlace& place) {
+  between == Between::values_cubic ? sample_cubic<First, Last>(image, u, v, sample, place)
+                                   : sample_linear<First, Last>(image, u, v, sample, place);
 }
 
-void sample_at(const LightImage& light, const Eigen::Vector2f& at, bool cubic, std::size_t sample, EdgePlace& place) {
+void sample_light(const LightImage& light, const Eigen::Vector2f& at, std::size_t sample, EdgePlace& place) {
+  const LightImage::Sample seen = light.at(at.x(), at.y());
+  for (std::size_t c = 0; c < 3; ++c) place.value[c][sample] = 255 * seen.light[c];
+}
+
+void sample_at(const LightImage& light, const Eigen::Vector2f& at, Between between, std::size_t sample,
+               EdgePlace& place) {
+  if (between == Between::light) return sample_light(light, at, sample, place);
   const ImageView& image = light.image();
   const ChannelGeometry& channels = light.channels();
-  if (!channels.differs()) return sample_at<0, 3>(image, at.x(), at.y(), cubic, sample, place);
+  if (!channels.differs()) return sample_at<0, 3>(image, at.x(), at.y(), between, sample, place);
   const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
   const Eigen::Vector2f blue = centre + channels.magnification[0] * (at - centre);
   const Eigen::Vector2f red = centre + channels.magnification[2] * (at - centre);
-  sample_at<0, 1>(image, blue.x(), blue.y(), cubic, sample, place);
-  sample_at<1, 2>(image, at.x(), at.y(), cubic, sample, place);
-  sample_at<2, 3>(image, red.x(), red.y(), cubic, sample, place);
+  sample_at<0, 1>(image, blue.x(), blue.y(), between, sample, place);
+  sample_at<1, 2>(image, at.x(), at.y(), between, sample, place);
+  sample_at<2, 3>(image, red.x(), red.y(), between, sample, place);
 }
 
 using Located = InplaceVector<std::uint16_t, EdgeMeasurements::max_lines>;
@@ -108,7 +115,7 @@ EdgePlaces places_of(const Located& located, const LightImage& light, std::span<
     EdgePlace& place = places.emplace_back();
     place.measurement = i;
     for (std::size_t k = 0; k < PooledEdge::samples; ++k)
-      sample_at(light, first + static_cast<float>(k) * m.normal, look.cubic, k, place);
+      sample_at(light, first + static_cast<float>(k) * m.normal, look.between, k, place);
     for (const auto& channel : place.value)
       if (look.levels > 1) place.brightness = std::accumulate(channel.begin(), channel.end(), place.brightness);
   }

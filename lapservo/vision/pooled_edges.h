@@ -11,8 +11,8 @@
 
 namespace lapservo::internal {
 
-/// What a frame shows across one boundary, averaged over places where it was located: encoded values in [0, 1] along
-/// the boundary's normal, a pixel apart, sample `reach` where the pose has the boundary.
+/// What a frame shows across one boundary, averaged over places where it was located: encoded values (or light: Look)
+/// in [0, 1] along the boundary's normal, a pixel apart, sample `reach` where the pose has the boundary.
 struct PooledEdge {
   static constexpr int reach = 6, samples = 2 * reach + 1;
   std::size_t boundary = 0;                           ///< 0 to 3
@@ -35,13 +35,16 @@ struct PooledEdges {
   PooledEdges() { of_measurement.fill(nowhere); }
 };
 
+/// What is taken between pixels, and averaged: encoded values, along straight lines or cubic (the former darken what is
+/// bright beside an edge, where encoded light bends, for an eighth of the time); or light along straight lines, as
+/// fit_step does, which averages without a bias but is no value that a camera's filters worked on.
+enum class Between { values, values_cubic, light };
+
 /// How closely boundaries are looked at: at most so many places of each, in at most so many levels of brightness.
-/// Between pixels along straight lines or cubic: the former darken what is bright beside an edge, where encoded light
-/// bends, for an eighth of the time.
 struct Look {
   int places;
   int levels;
-  bool cubic;
+  Between between;
 };
 
 /// Of the boundaries among `measurements`.
