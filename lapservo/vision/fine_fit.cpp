@@ -223,6 +223,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   for (int i = 0; expected.ask; ++i) {
     SeenCamera camera = look_at_camera(light, pass.all, located_with.boundaries_px, fit.departure);
     evidence = std::move(camera.evidence);
+    fit.processing_explained |= evidence.explained;
     if (!camera.departure || i == most_departures) break;
     fit.departure = *camera.departure;
     for (int k = 0; k < passes_of_departure; ++k)

@@ -44,19 +44,21 @@ struct DetectionLimits {
 };
 inline constexpr DetectionLimits detection_limits;
 
-/// What the steps of a search cost, in units of work (work_budget.h). A unit is a microsecond of a core that copies a
-/// frame of 1920x1080 in 0.26 ms; these are about the 99th percentiles of a step's CPU time in the sequences of
-/// bench/hard_frames at that size (a coarse fit's median is 150, a fine fit's 410), so 8000 units take less than 8 ms.
+/// What the steps of a search cost, in units of work (work_budget.h). A unit is at most a microsecond of a core that
+/// copies a frame of 1920x1080 in 0.16 ms; these are in proportion to the 99th percentiles of a step's CPU time in the
+/// sequences of bench/hard_frames at that size (medians are a third of them).
 struct SearchCosts {
-  double coarse_fit = 350, fine_fit = 700;
-  double initial_poses = 200;                     ///< of one blob
-  double bands_in_order = 60, rcm_starts = 1000;  ///< the same, by lines through the RCM
-  double agreement = 20;                          ///< of one pose with the frame's colours (median: 13)
-  double fit_to_result = 7000;                    ///< some 140 of these (at most 270) and a fine fit: the most
+  double coarse_fit = 300, fine_fit = 620;
+  double processing = 1150;                      ///< where the first guess at a camera's processing is not enough
+  double initial_poses = 220;                    ///< of one blob
+  double bands_in_order = 60, rcm_starts = 900;  ///< the same, by lines through the RCM
+  double agreement = 8;                          ///< of one pose with the frame's colours, in the mean over a frame's
   double blobs_per_px = 1.2e-4;
   double part_beside = 0.6;  ///< of the budget where every sample is asked whether another instrument hides it
-  double cover = 600;        ///< where one instrument lies, for who looks for another beside or behind it
-  double try_start() const { return 2 * (coarse_fit + fine_fit); }
+  double cover = 900;        ///< where one instrument lies, for who looks for another beside or behind it
+  /// What must be left for one to begin: what most take. What they took is spent.
+  double try_start() const { return coarse_fit + fine_fit; }
+  double fit_to_result() const { return 150 * agreement + fine_fit; }
 };
 inline constexpr SearchCosts search_costs;
 

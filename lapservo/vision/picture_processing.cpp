@@ -343,9 +343,9 @@ ProcessingEvidence find_processing(const LightImage& light, std::span<const Meas
   for (std::size_t i = 0; i < measurements.size(); ++i)
     if (measurements[i].group < 4 && edges.of_measurement[i] == PooledEdges::nowhere)
       explained->measurement_bias_px[i] = static_cast<float>(explained->bias_px[measurements[i].group].value_or(0));
-  if (explained->misfit_without < processing_limits.max_misfit_of_none) return {Processing::none, std::nullopt};
-  if (is_believed(*explained)) return {Processing::found, std::move(explained)};
-  return {};
+  if (explained->misfit_without < processing_limits.max_misfit_of_none) return {Processing::none, std::nullopt, true};
+  if (is_believed(*explained)) return {Processing::found, std::move(explained), true};
+  return {Processing::unknown, std::nullopt, true};
 }
 
 }  // namespace lapservo::internal
