@@ -194,6 +194,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   };
   // Nullopt when too little was seen.
   const auto refine = [&](const Effort& effort) -> std::optional<Change> {
+    ++fit.passes;
     located_with = fit.blur;
     const DepartedLight seen(light, fit.departure);
     pass = measure_edges(scene, seen.light(), fit.unknowns, film_m, effort, located_with);

@@ -33,6 +33,7 @@ struct FineFit {
   double inner_off_m = 3;                ///< how far off an inner boundary of the print may lie (print_fit.h)
   Processing processing = Processing::unknown;  ///< as far as asked
   bool processing_explained = false;            ///< ProcessingEvidence::explained
+  int passes = 0;                               ///< in which edges were located
   std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
   CameraDeparture departure;                    ///< from the rig's camera, as far as known
   TurnBlur turn;                                ///< within the exposure, which the covariance knows nothing of

@@ -41,10 +41,18 @@ Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
   return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
 
+CoarseFit fitted_coarsely(const Scene& scene, const PoseUnknowns& start, const CoarseFitOptions& options,
+                          WorkBudget& budget) {
+  const CoarseFit fit = fit_coarsely(scene, start, options);
+  budget.spend(fit.found ? costs.coarse_fit : costs.no_coarse_fit);
+  return fit;
+}
+
 FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
                const ExpectedProcessing& processing, WorkBudget& budget) {
   FineFit fit = fit_finely(scene, light, start, blur, processing);
-  budget.spend(costs.fine_fit + (fit.processing_explained ? costs.processing : 0));
+  budget.spend(fit.passes * costs.fine_pass + (fit.converged ? costs.fine_end : 0) +
+               (fit.processing_explained ? costs.processing : 0));
   return fit;
 }
 
@@ -67,8 +75,7 @@ Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const E
 }
 
 Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
-  budget.spend(costs.coarse_fit);
-  const CoarseFit coarse = fit_coarsely(scene, start, {});
+  const CoarseFit coarse = fitted_coarsely(scene, start, {}, budget);
   if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score) return {};
   if (coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
     return refusal(Status::ambiguous, coarse.unknowns);
@@ -76,8 +83,7 @@ Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns&
   const Status validated = validate(scene, first);
   if (validated == Status::ok) return accepted(scene, light, first, {}, budget);
   if (validated == Status::marker_mismatch) return refusal(validated, first.unknowns);
-  budget.spend(costs.coarse_fit);
-  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, detection_limits.near_by);
+  const CoarseFit nearer = fitted_coarsely(scene, coarse.unknowns, detection_limits.near_by, budget);
   if (!nearer.found) return {};
   const FineFit fit = fitted(scene, light, nearer.unknowns, {}, {}, budget);
   const Status status = validate(scene, fit);
@@ -99,8 +105,9 @@ double reach_px(const SearchFrame& frame) {
 
 std::vector<PoseUnknowns> starts_in(const SearchFrame& frame, const Blob& blob,
                                     const std::optional<Rigid3>& camera_from_rcm, WorkBudget& budget) {
-  budget.spend(costs.initial_poses);
-  return initial_poses(frame.scene, blob, camera_from_rcm);
+  auto starts = initial_poses(frame.scene, blob, camera_from_rcm);
+  budget.spend(starts.empty() ? costs.no_initial_poses : costs.initial_poses);
+  return starts;
 }
 
 }  // namespace
@@ -110,8 +117,7 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
   const FineFit near = fitted(scene, light, expected, blur, processing, budget);
   const Status nearby = validate(scene, near);
   if (nearby == Status::ok) return accepted(scene, light, near, processing, budget);
-  budget.spend(costs.coarse_fit);
-  const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
+  const CoarseFit coarse = fitted_coarsely(scene, expected, detection_limits.from_memory, budget);
   if (!coarse.found) return {};
   const FineFit fit = fitted(scene, light, coarse.unknowns, blur, processing, budget);
   const Status status = validate(scene, fit);
