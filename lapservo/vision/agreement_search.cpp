@@ -55,11 +55,11 @@ AgreementSearch::AgreementSearch(const PoseUnknowns& start, const Rigid3& camera
       waiting_.push_back({ImageTerms::of(camera_from_rcm, *nearer), steps_of_place});
 }
 
-double AgreementSearch::score_at(const Scene& scene, const Climb& climb, const Eigen::Vector4d& at,
-                                 WorkBudget& budget) const {
+double AgreementSearch::score_at(const Scene& scene, const Climb& climb, const Eigen::Vector4d& at, WorkBudget& budget,
+                                 double above_px2) const {
   budget.spend(search_costs.agreement);
   const auto unknowns = climb.terms.unknowns(at);
-  return unknowns ? explained_area_px2(scene, unknowns->pose(), climb.with_rotation()) : -1e9;
+  return unknowns ? explained_area_px2(scene, unknowns->pose(), climb.with_rotation(), above_px2) : no_area_px2;
 }
 
 // Tries the axes and random directions both ways and keeps what is better; whether anything was.
@@ -72,7 +72,7 @@ bool AgreementSearch::move(const Scene& scene, Climb& climb, WorkBudget& budget)
       for (double& part : direction) part = random_.normal();
     for (const double sign : {1.0, -1.0}) {
       const Eigen::Vector4d trial = climb.terms.values + sign * climb.steps.cwiseProduct(direction);
-      const double score = score_at(scene, climb, trial, budget);
+      const double score = score_at(scene, climb, trial, budget, climb.score);
       if (score <= climb.score) continue;
       climb.score = score, climb.terms.values = trial, moved = true;
       break;
@@ -159,8 +159,10 @@ PoseUnknowns AgreementSearch::in_this_frame(const Scene& scene, const PoseUnknow
   Climb climb{ImageTerms::of(camera_from_rcm_, result), first_steps / (1 << halved)};
   climb.halvings = halved;
   climb.score = score_at(scene, climb, climb.terms.values, budget);
-  WorkBudget whole(std::nullopt);
-  finish(scene, climb, whole);
+  // To its end.
+  budget.allow(WorkBudget::Beyond::all);
+  finish(scene, climb, budget);
+  budget.allow(WorkBudget::Beyond::none);
   return climb.terms.unknowns(climb.terms.values).value_or(result);
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "lapservo/core/random.h"
+#include "lapservo/vision/explained_colors.h"
 #include "lapservo/vision/scene.h"
 #include "lapservo/vision/shaft_pose.h"
 #include "lapservo/vision/work_budget.h"
@@ -49,7 +50,8 @@ class AgreementSearch {
     double score;
     PoseUnknowns unknowns;
   };
-  double score_at(const Scene& scene, const Climb& climb, const Eigen::Vector4d& at, WorkBudget& budget) const;
+  double score_at(const Scene& scene, const Climb& climb, const Eigen::Vector4d& at, WorkBudget& budget,
+                  double above_px2 = no_area_px2) const;
   bool move(const Scene& scene, Climb& climb, WorkBudget& budget);
   bool finish(const Scene& scene, Climb& climb, WorkBudget& budget);
 

@@ -112,6 +112,39 @@ TEST(ExplainedColors, OfAnyRotationAreAtLeastThoseOfEach) {
   }
 }
 
+// A search keeps only what is better: of anything else it may be told that it is nothing.
+TEST(ExplainedColors, AreTheSameWhereOnlyMoreThanOthersAreAskedFor) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const BloodyShot shot(seed);
+    const Scene scene = shot.sight.scene();
+    for (const bool turned : {false, true})
+      for (const double depth_scale : {0.7, 0.9, 1.0, 1.2}) {
+        const ShaftPose pose = shot.start(depth_scale).with_psi(shot.q.psi_rad).pose();
+        const double area_px2 = explained_area_px2(scene, pose, turned);
+        for (const double less_px2 : {1e4, 100.0, 1e-3})
+          EXPECT_EQ(explained_area_px2(scene, pose, turned, area_px2 - less_px2), area_px2);
+        for (const double more_px2 : {1e-3, 100.0, 1e4})
+          EXPECT_LE(explained_area_px2(scene, pose, turned, area_px2 + more_px2), area_px2);
+      }
+  }
+}
+
+TEST(WorkBudget, AllowsTheFirstStepOrAllBeyondWhatIsLeft) {
+  WorkBudget budget(100.0);
+  EXPECT_FALSE(budget.allows(101));
+  budget.allow(WorkBudget::Beyond::first);
+  EXPECT_TRUE(budget.allows(101));
+  EXPECT_FALSE(budget.allows(101));
+  budget.allow(WorkBudget::Beyond::first);
+  EXPECT_TRUE(budget.allows(1));  // the first, whatever it takes
+  EXPECT_FALSE(budget.allows(101));
+  EXPECT_TRUE(budget.allows(100));
+  budget.allow(WorkBudget::Beyond::all);
+  budget.spend(200);
+  EXPECT_TRUE(budget.allows(1));
+  EXPECT_TRUE(budget.allows(1));
+}
+
 }  // namespace
 }  // namespace agreement_search_test
 }  // namespace lapservo::internal

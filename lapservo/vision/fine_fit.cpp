@@ -194,6 +194,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   };
   // Nullopt when too little was seen.
   const auto refine = [&](const Effort& effort) -> std::optional<Change> {
+    ++fit.passes;
     located_with = fit.blur;
     const DepartedLight seen(light, fit.departure);
     pass = measure_edges(scene, seen.light(), fit.unknowns, film_m, effort, located_with);
@@ -223,6 +224,7 @@ FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknow
   for (int i = 0; expected.ask; ++i) {
     SeenCamera camera = look_at_camera(light, pass.all, located_with.boundaries_px, fit.departure);
     evidence = std::move(camera.evidence);
+    fit.processing_explained |= evidence.explained;
     if (!camera.departure || i == most_departures) break;
     fit.departure = *camera.departure;
     for (int k = 0; k < passes_of_departure; ++k)

@@ -44,19 +44,24 @@ struct DetectionLimits {
 };
 inline constexpr DetectionLimits detection_limits;
 
-/// What the steps of a search cost, in units of work (work_budget.h). A unit is a microsecond of a core that copies a
-/// frame of 1920x1080 in 0.26 ms; these are about the 99th percentiles of a step's CPU time in the sequences of
-/// bench/hard_frames at that size (a coarse fit's median is 150, a fine fit's 410), so 8000 units take less than 8 ms.
+/// What the steps of a search cost, in units of work (work_budget.h). A unit is 0.44 us of a core that copies a frame
+/// of 1920x1080 in 0.125 ms. Measured in the sequences of bench/hard_frames at that size, each step the least of four
+/// replays: of what a frame has few of, the 90th percentile; of what it has hundreds of, the mean of the frames with
+/// most of them. What a step took is spent; what must be left for it to begin is what most take.
 struct SearchCosts {
-  double coarse_fit = 350, fine_fit = 700;
-  double initial_poses = 200;                     ///< of one blob
-  double bands_in_order = 60, rcm_starts = 1000;  ///< the same, by lines through the RCM
-  double agreement = 20;                          ///< of one pose with the frame's colours (median: 13)
-  double fit_to_result = 7000;                    ///< some 140 of these (at most 270) and a fine fit: the most
-  double blobs_per_px = 1.2e-4;
+  double coarse_fit = 320, no_coarse_fit = 160;  ///< one that found the shaft; one that did not
+  double fine_pass = 180, fine_end = 160;        ///< of a fine fit; when it converged, the print and its validation
+  double processing = 2400;                      ///< where the first guess at a camera's processing is not enough
+  double initial_poses = 330;                    ///< of one blob
+  double no_initial_poses = 15;                  ///< of one in which there are none
+  double bands_in_order = 90, rcm_starts = 900;  ///< the same, by lines through the RCM
+  double agreement = 12;                         ///< of one pose with the frame's colours
+  double blobs_per_px = 2.2e-4;
   double part_beside = 0.6;  ///< of the budget where every sample is asked whether another instrument hides it
-  double cover = 600;        ///< where one instrument lies, for who looks for another beside or behind it
-  double try_start() const { return 2 * (coarse_fit + fine_fit); }
+  double cover = 1300;       ///< where one instrument lies, for who looks for another beside or behind it
+  double fine_fit() const { return 3 * fine_pass + fine_end; }
+  double try_start() const { return coarse_fit + fine_fit(); }
+  double fit_to_result() const { return 150 * agreement + fine_fit(); }
 };
 inline constexpr SearchCosts search_costs;
 

@@ -41,6 +41,21 @@ Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
   return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
 }
 
+CoarseFit fitted_coarsely(const Scene& scene, const PoseUnknowns& start, const CoarseFitOptions& options,
+                          WorkBudget& budget) {
+  const CoarseFit fit = fit_coarsely(scene, start, options);
+  budget.spend(fit.found ? costs.coarse_fit : costs.no_coarse_fit);
+  return fit;
+}
+
+FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
+               const ExpectedProcessing& processing, WorkBudget& budget) {
+  FineFit fit = fit_finely(scene, light, start, blur, processing);
+  budget.spend(fit.passes * costs.fine_pass + (fit.converged ? costs.fine_end : 0) +
+               (fit.processing_explained ? costs.processing : 0));
+  return fit;
+}
+
 // A fit that is ok. One side alone holds the place of a shaft that is cut along, and where the robust loss takes that
 // for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on until psi rests and the side agrees.
 Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
@@ -50,8 +65,7 @@ Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const E
   constexpr double rest_sigmas = 0.2, least_sides = 0.8;
   for (int i = 0; i < most; ++i) {
     const double before_rad = fit.unknowns.pose().psi_rad;
-    budget.spend(costs.fine_fit);
-    fit = fit_finely(scene, light, fit.unknowns, fit.blur, processing);
+    fit = fitted(scene, light, fit.unknowns, fit.blur, processing, budget);
     if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit.unknowns);
     const double moved_rad = std::abs(wrap_pi(fit.unknowns.pose().psi_rad - before_rad));
     if (moved_rad < rest_sigmas * std::sqrt(fit.psi_variance) && fit.sides_used >= least_sides * fit.sides_in_image)
@@ -61,21 +75,17 @@ Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const E
 }
 
 Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
-  budget.spend(costs.coarse_fit);
-  const CoarseFit coarse = fit_coarsely(scene, start, {});
+  const CoarseFit coarse = fitted_coarsely(scene, start, {}, budget);
   if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score) return {};
   if (coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
     return refusal(Status::ambiguous, coarse.unknowns);
-  budget.spend(costs.fine_fit);
-  const FineFit first = fit_finely(scene, light, coarse.unknowns, {});
+  const FineFit first = fitted(scene, light, coarse.unknowns, {}, {}, budget);
   const Status validated = validate(scene, first);
   if (validated == Status::ok) return accepted(scene, light, first, {}, budget);
   if (validated == Status::marker_mismatch) return refusal(validated, first.unknowns);
-  budget.spend(costs.coarse_fit);
-  const CoarseFit nearer = fit_coarsely(scene, coarse.unknowns, detection_limits.near_by);
+  const CoarseFit nearer = fitted_coarsely(scene, coarse.unknowns, detection_limits.near_by, budget);
   if (!nearer.found) return {};
-  budget.spend(costs.fine_fit);
-  const FineFit fit = fit_finely(scene, light, nearer.unknowns, {});
+  const FineFit fit = fitted(scene, light, nearer.unknowns, {}, {}, budget);
   const Status status = validate(scene, fit);
   return status == Status::ok ? accepted(scene, light, fit, {}, budget) : refusal(status, fit.unknowns);
 }
@@ -95,23 +105,21 @@ double reach_px(const SearchFrame& frame) {
 
 std::vector<PoseUnknowns> starts_in(const SearchFrame& frame, const Blob& blob,
                                     const std::optional<Rigid3>& camera_from_rcm, WorkBudget& budget) {
-  budget.spend(costs.initial_poses);
-  return initial_poses(frame.scene, blob, camera_from_rcm);
+  auto starts = initial_poses(frame.scene, blob, camera_from_rcm);
+  budget.spend(starts.empty() ? costs.no_initial_poses : costs.initial_poses);
+  return starts;
 }
 
 }  // namespace
 
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
              const ExpectedProcessing& processing, WorkBudget& budget) {
-  budget.spend(costs.fine_fit);
-  const FineFit near = fit_finely(scene, light, expected, blur, processing);
+  const FineFit near = fitted(scene, light, expected, blur, processing, budget);
   const Status nearby = validate(scene, near);
   if (nearby == Status::ok) return accepted(scene, light, near, processing, budget);
-  budget.spend(costs.coarse_fit);
-  const CoarseFit coarse = fit_coarsely(scene, expected, detection_limits.from_memory);
+  const CoarseFit coarse = fitted_coarsely(scene, expected, detection_limits.from_memory, budget);
   if (!coarse.found) return {};
-  budget.spend(costs.fine_fit);
-  const FineFit fit = fit_finely(scene, light, coarse.unknowns, blur, processing);
+  const FineFit fit = fitted(scene, light, coarse.unknowns, blur, processing, budget);
   const Status status = validate(scene, fit);
   return status == Status::ok ? accepted(scene, light, fit, processing, budget) : refusal(status, fit.unknowns);
 }
@@ -226,10 +234,9 @@ Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is
 bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) {
   if (!results_) results_ = agreement_->results();
   for (; !results_->empty(); results_->pop_back()) {
-    if (!budget.allows(costs.fit_to_result)) return false;
-    budget.spend(costs.fit_to_result);
+    if (!budget.allows(costs.fit_to_result())) return false;
     const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
-    const FineFit first = fit_finely(frame.scene, frame.light, start, {});
+    const FineFit first = fitted(frame.scene, frame.light, start, {}, {}, budget);
     if (validate(frame.scene, first) != Status::ok) continue;
     const Found found = accepted(frame.scene, frame.light, first, {}, budget);
     if (!found.fit) continue;
@@ -339,11 +346,12 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   if (candidate_ && lost_candidate(frame, budget))
     hidden_ = {}, agreement_.reset(), results_.reset(), has_rivals_ = false;
   const bool from_the_first = !plain_.blobs.begun();
+  const WorkBudget::Beyond step = budget.allowed();
   // Half the budget, or by turns what a start takes, is for what shows plainly.
   longs_turn_ = searches_long_ && !longs_turn_;
   const double half = budget.left() / 2, one_start = costs.initial_poses + costs.try_start();
   const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
-  Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::one,
+  Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : step,
                              [&](WorkBudget& part) { return detect(frame, frame.camera_from_rcm, plain_, part); });
   if (plain.fit) {
     begin_anew(Status::no_marker);
@@ -355,7 +363,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   plain.status = status_;
   if (plain_.done) plain_ = {}, searches_long_ = true;
   if (!searches_long_) return plain;
-  budget.allow(longs_turn_ ? WorkBudget::Beyond::one : WorkBudget::Beyond::none);
+  budget.allow(longs_turn_ ? step : WorkBudget::Beyond::none);
   Found found = look_long(frame, is_mismatch, plain_is_known, budget);
   if (found.fit || hidden_.done) begin_anew(status_);
   if (found.fit || plain.status == Status::no_marker) return found;

@@ -80,6 +80,13 @@ struct Block {
   Eigen::Matrix<double, processing_unknowns, edge_unknowns> cross;
   EdgeVector gradient;
 };
+// An edge's normal equations: of the processing and of itself. What is expected of them is not in.
+struct EdgeEquations {
+  static constexpr int unknowns = processing_unknowns + edge_unknowns;
+  Eigen::Matrix<double, unknowns, unknowns> square;
+  Eigen::Matrix<double, unknowns, 1> pull;
+};
+using Equations = std::array<EdgeEquations, most_edges>;  // of those that are seen
 using ProcessingMatrix = Eigen::Matrix<double, processing_unknowns, processing_unknowns>;
 
 // Gauss-Newton with edges eliminated.
@@ -136,10 +143,17 @@ class Problem {
     });
     return sum;
   }
-  State improved(const State& state, double damping) const {
+  void linearise(const State& state, Equations& equations) const {
+    const PictureProcessing processing = processing_of(state.processing);
+    const ProcessingFilters filters(processing, true);
+    for (std::size_t k = 0; k < edges_.size(); ++k)
+      if (is_seen(edges_[k])) equations_of(k, model_.linearised(filters, processing, state.edges[k]), equations[k]);
+  }
+  // `equations`: the state's.
+  State improved(const State& state, const Equations& equations, double damping) const {
     std::array<Block, most_edges> blocks;
     State next = state;
-    next.processing = improved_processing(state, damping, blocks);
+    next.processing = improved_processing(state, equations, damping, blocks);
     const ProcessingVector taken = next.processing - state.processing;
     for (std::size_t k = 0; k < edges_.size(); ++k)
       if (is_seen(edges_[k]))
@@ -151,21 +165,19 @@ class Problem {
   }
   // The first step from what was expected, of the processing only.
   ProcessingVector first_processing() const {
+    Equations equations;
+    linearise(prior_, equations);
     std::array<Block, most_edges> blocks;
-    return improved_processing(prior_, 0, blocks);
+    return improved_processing(prior_, equations, 0, blocks);
   }
 
  private:
-  ProcessingVector improved_processing(const State& state, double damping,
+  ProcessingVector improved_processing(const State& state, const Equations& equations, double damping,
                                        std::array<Block, most_edges>& blocks) const {
     ProcessingMatrix information = certainty_.asDiagonal();
     ProcessingVector gradient = (prior_.processing - state.processing).cwiseProduct(certainty_);
-    const PictureProcessing processing = processing_of(state.processing);
-    const ProcessingFilters filters(processing, true);
     for (std::size_t k = 0; k < edges_.size(); ++k)
-      if (is_seen(edges_[k]))
-        eliminate(k, state.edges[k], model_.linearised(filters, processing, state.edges[k]), damping, information,
-                  gradient, blocks[k]);
+      if (is_seen(edges_[k])) eliminate(k, state.edges[k], equations[k], damping, information, gradient, blocks[k]);
     information.diagonal() *= 1 + damping;
     return bounded(state.processing + information.llt().solve(gradient));
   }
@@ -193,19 +205,20 @@ class Problem {
     bound(ProcessingUnknown::sharpening, least_sharpening_, 2);
     return out;
   }
-  void eliminate(std::size_t k, const EdgeVector& edge, const ProcessedEdge::Linearised& model, double damping,
-                 ProcessingMatrix& information, ProcessingVector& gradient, Block& block) const {
-    constexpr int both = processing_unknowns + edge_unknowns;
+  void equations_of(std::size_t k, const ProcessedEdge::Linearised& model, EdgeEquations& equations) const {
     const EdgeSamples miss = missed(k, model.values);
     auto jacobian = model.jacobian;
     for (auto by_unknown : jacobian.colwise()) by_unknown = by_unknown.cwiseProduct(usable_[k]).eval();
     const double certainty = weight_[k] / (value_sigma * value_sigma);
-    Eigen::Matrix<double, both, both> square;
-    for (int a = 0; a < both; ++a)
+    for (int a = 0; a < EdgeEquations::unknowns; ++a)
       for (int b = 0; b <= a; ++b)
-        square(a, b) = square(b, a) = certainty * static_cast<double>(jacobian.col(a).dot(jacobian.col(b)));
-    const Eigen::Matrix<double, both, 1> pull =
-        certainty * jacobian.transpose().lazyProduct(miss).template cast<double>();
+        equations.square(a, b) = equations.square(b, a) =
+            certainty * static_cast<double>(jacobian.col(a).dot(jacobian.col(b)));
+    equations.pull = certainty * jacobian.transpose().lazyProduct(miss).template cast<double>();
+  }
+  void eliminate(std::size_t k, const EdgeVector& edge, const EdgeEquations& equations, double damping,
+                 ProcessingMatrix& information, ProcessingVector& gradient, Block& block) const {
+    const auto& [square, pull] = equations;
     Eigen::Matrix<double, edge_unknowns, edge_unknowns> of_own =
         square.template bottomRightCorner<edge_unknowns, edge_unknowns>();
     of_own.diagonal() *= 1 + damping;
@@ -245,16 +258,19 @@ State minimised(const Problem& problem) {
   constexpr int max_steps = 15;
   constexpr double settled = 0.005;  // of the cost
   State state = problem.prior();
+  Equations equations;
+  bool is_new = true;
   double cost = problem.cost(state), damping = 1e-3;
   for (int i = 0; i < max_steps; ++i) {
-    const State next = problem.improved(state, damping);
+    if (std::exchange(is_new, false)) problem.linearise(state, equations);
+    const State next = problem.improved(state, equations, damping);
     const double next_cost = problem.cost(next);
     if (!(next_cost < cost)) {
       damping *= 10;
       continue;
     }
     const bool small = next_cost > (1 - settled) * cost;
-    state = next, cost = next_cost, damping /= 10;
+    state = next, cost = next_cost, damping /= 10, is_new = true;
     if (small) break;
   }
   return state;
@@ -343,9 +359,9 @@ ProcessingEvidence find_processing(const LightImage& light, std::span<const Meas
   for (std::size_t i = 0; i < measurements.size(); ++i)
     if (measurements[i].group < 4 && edges.of_measurement[i] == PooledEdges::nowhere)
       explained->measurement_bias_px[i] = static_cast<float>(explained->bias_px[measurements[i].group].value_or(0));
-  if (explained->misfit_without < processing_limits.max_misfit_of_none) return {Processing::none, std::nullopt};
-  if (is_believed(*explained)) return {Processing::found, std::move(explained)};
-  return {};
+  if (explained->misfit_without < processing_limits.max_misfit_of_none) return {Processing::none, std::nullopt, true};
+  if (is_believed(*explained)) return {Processing::found, std::move(explained), true};
+  return {Processing::unknown, std::nullopt, true};
 }
 
 }  // namespace lapservo::internal

@@ -52,6 +52,7 @@ enum class Processing { unknown, none, found };
 struct ProcessingEvidence {
   Processing processing = Processing::unknown;
   std::optional<ProcessedEdges> edges;  ///< when found
+  bool explained = false;               ///< it took more than a first guess
 };
 
 /// Of the boundaries among `measurements`, which fit_step located with `blur_px`.

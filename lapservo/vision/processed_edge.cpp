@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 
 #include "lapservo/vision/blurred_edges.h"
 
@@ -120,13 +121,19 @@ struct Encoded {
          by_after = OnGrid::Zero(), by_gradient = OnGrid::Zero();
 };
 
-Encoded encode(const Encoding& encoding, const PictureProcessing& processing, const EdgeVector& edge) {
+// Nothing but the values.
+struct EncodedValues {
+  OnGrid value = OnGrid::Zero();
+};
+
+template <typename What>
+What encode(const Encoding& encoding, const PictureProcessing& processing, const EdgeVector& edge) {
   const BlurredEdges& edges = BlurredEdges::instance();
   std::array<BlurredEdge, edge_grid> blurred;
   const auto offset_px = static_cast<float>(edge[edge_offset]), gradient = static_cast<float>(edge[edge_gradient]);
   const Eigen::Vector3d value_before = saturated_by(1 / processing.saturation, edge.segment<3>(edge_before));
   const Eigen::Vector3d value_after = saturated_by(1 / processing.saturation, edge.segment<3>(edge_after));
-  Encoded out;
+  What out;
   for (int c = 0; c < 3; ++c) {
     const double blur_px = c == 1 ? processing.blur_px : processing.blur_px * std::exp(processing.log_mosaic);
     const auto inverse_blur = static_cast<float>(1 / blur_px);
@@ -141,13 +148,15 @@ Encoded encode(const Encoding& encoding, const PictureProcessing& processing, co
       const auto distance_px = static_cast<float>(i - half_grid);
       const float shade = std::max(0.1F, 1 + gradient * distance_px), even = before.y + here.step * step;
       const auto at = encoding.value(shade * even, near);
-      const float moved = -shade * at.slope * step * here.density;
       out.value(i, c) = at.y;
-      out.by_offset(i, c) = moved * inverse_blur;
-      out.by_blur(i, c) = moved * place(i);
-      out.by_before(i, c) = shade * at.slope * (1 - here.step) * before.slope;
-      out.by_after(i, c) = shade * at.slope * here.step * after.slope;
-      out.by_gradient(i, c) = at.slope * distance_px * even;
+      if constexpr (std::is_same_v<What, Encoded>) {
+        const float moved = -shade * at.slope * step * here.density;
+        out.by_offset(i, c) = moved * inverse_blur;
+        out.by_blur(i, c) = moved * place(i);
+        out.by_before(i, c) = shade * at.slope * (1 - here.step) * before.slope;
+        out.by_after(i, c) = shade * at.slope * here.step * after.slope;
+        out.by_gradient(i, c) = at.slope * distance_px * even;
+      }
     }
   }
   return out;
@@ -251,12 +260,12 @@ ProcessingFilters::ProcessingFilters(const PictureProcessing& p, bool derivative
 
 EdgeSamples ProcessedEdge::values(const ProcessingFilters& filters, const PictureProcessing& processing,
                                   const EdgeVector& edge) const {
-  return clipped(mixed(filters, encode(Encoding(light_of_value_), processing, edge).value)).value;
+  return clipped(mixed(filters, encode<EncodedValues>(Encoding(light_of_value_), processing, edge).value)).value;
 }
 
 ProcessedEdge::Linearised ProcessedEdge::linearised(const ProcessingFilters& filters,
                                                     const PictureProcessing& processing, const EdgeVector& edge) const {
-  const Encoded encoded = encode(Encoding(light_of_value_), processing, edge);
+  const auto encoded = encode<Encoded>(Encoding(light_of_value_), processing, edge);
   const SamplesBgr none = SamplesBgr::Zero(), chroma = filtered(filters.chroma, encoded.value);
   OnGrid by_mosaic = encoded.by_blur;
   by_mosaic.col(1).setZero();

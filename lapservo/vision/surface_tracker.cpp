@@ -261,8 +261,8 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
     searched_beside_[i] = others_.size();
     if (new_others) searches_[i] = MarkerSearch();
     if (again && !new_others) continue;
-    // What took twice the work in this frame has all of the next one.
-    const auto beyond = followed_twice_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::one;
+    // Who was followed in vain, or took twice the work for it, has all of the next frame.
+    const auto beyond = followed_twice_ || followed_in_vain_ ? WorkBudget::Beyond::none : WorkBudget::Beyond::first;
     const double units = budget.left() / static_cast<double>(lost--) * (others_.empty() ? 1 : search_costs.part_beside);
     found_[i] = budget.share(units, beyond, [&](WorkBudget& part) { return look_for(image, light, blobs, i, part); });
     any |= found_[i].fit.has_value();
@@ -274,11 +274,12 @@ bool SurfaceTracker::look_for_lost(const ImageView& image, const LightImage& lig
 // again beside those that were found after them: else the next frame does that.
 void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkBudget& budget) {
   for (ShaftCover& cover : covers_) cover.clear();
-  bool lost = followed_twice_ = false;
+  bool lost = followed_twice_ = followed_in_vain_ = false;
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
     found_[i] = {};
     if (memory_[i]) found_[i] = follow_known(image, light, i, budget);
     lost |= !found_[i].fit;
+    followed_in_vain_ |= memory_[i] && !found_[i].fit;
   }
   if (!lost) return;
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i)

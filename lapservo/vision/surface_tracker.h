@@ -66,8 +66,8 @@ class SurfaceTracker {
   ChannelGeometry channels_;
   std::vector<std::optional<Memory>> memory_;
   std::vector<MarkerSearch> searches_;
-  bool followed_twice_ = false;               // in this frame, one of them
-  std::vector<std::size_t> searched_beside_;  // so many others the search is among, by instrument
+  bool followed_twice_ = false, followed_in_vain_ = false;  // in this frame, one of them
+  std::vector<std::size_t> searched_beside_;                // so many others the search is among, by instrument
   std::vector<Found> found_;
   std::vector<ShaftCover> covers_;         // where somebody asked in this frame
   std::vector<const ShaftCover*> others_;  // that may hide or touch the one that is looked for

@@ -17,15 +17,16 @@ class WorkBudget {
   double left() const { return left_; }
   void spend(double units) { left_ -= units; }
 
-  /// Whatever is left: no step, one (without, a search that gets too little would never get anywhere), or all, where
-  /// what is begun must end in this frame.
-  enum class Beyond { none, one, all };
+  /// Whatever is left: no step, the first (without, a search that gets too little would never get anywhere), or all,
+  /// where what is begun must end in this frame.
+  enum class Beyond { none, first, all };
   void allow(Beyond steps) { beyond_ = steps; }
+  Beyond allowed() const { return beyond_; }
 
   /// Whether enough is left for a step of so many units, or it is allowed whatever is left.
   bool allows(double units) {
-    if (left_ >= units || beyond_ == Beyond::all) return true;
-    return std::exchange(beyond_, Beyond::none) == Beyond::one;
+    if (beyond_ == Beyond::all) return true;
+    return std::exchange(beyond_, Beyond::none) == Beyond::first || left_ >= units;
   }
 
   /// Lets `work` spend from this budget, at most so many units; returns what it returns.
