@@ -25,12 +25,12 @@ struct TrackerOptions {
   bool single = false;       ///< treat every frame on its own instead of starting from the frame before
   bool deinterlace = false;  ///< track the field of the even rows; also when the rig's camera says so
   /// Method::surface: what looking at a frame may cost, in units of work; nullopt: as much as it takes. A unit is about
-  /// a microsecond of one core of 2.3 GHz, but counted, not measured by a clock: the same frames give the same
-  /// results whatever else the machine does. Instruments that are followed cost less than 1000 each; a search for one
-  /// that is hidden, a hundred times that, goes on in the frames to come where it stopped. Until it comes to its end
-  /// the status is what is known so far. Pictures that don't follow one another need nullopt. Frames of `single` are
-  /// always searched whole. What can't wait for the next frame goes beyond the budget: a second print's place, a
-  /// registration that is contradicted, a shaft that the border cuts.
+  /// half a microsecond of a core of 2.3 GHz, but counted, not measured by a clock: the same frames give the same
+  /// results whatever else the machine does. An instrument that is followed takes 500 to 700, 3000 where the camera's
+  /// processing shows; a search for one that is hidden, a hundred times that, goes on in the frames to come where it
+  /// stopped. Until it comes to its end the status is what is known so far. Pictures that don't follow one another need
+  /// nullopt. Frames of `single` are always searched whole. What can't wait for the next frame goes beyond the budget:
+  /// who is followed, a second print's place, a registration that is contradicted, a shaft that the border cuts.
   std::optional<double> frame_budget = 8000;
 };
 

@@ -315,7 +315,7 @@ Holds what it learnt from the frame before. Threads may share it; frames are the
            py::arg("deinterlace") = false, py::arg("frame_budget") = TrackerOptions().frame_budget,
            "method: 'surface', or the paper's 'centerline'; single: every frame on its own, searched whole; "
            "deinterlace: track the field of the even rows; frame_budget: what a frame may cost, in counted units of "
-           "about a microsecond (a longer search goes on in the next frame), or None: as much as it takes, which "
+           "about half a microsecond (a longer search goes on in the next frame), or None: as much as it takes, which "
            "pictures that don't follow one another need.")
       .def("track", &SafeTracker::track, py::arg("image").noconvert(), py::arg("stamp_s") = py::none(),
            R"(list[Observation], one per instrument, of uint8[H, W, 3] in blue green red, of the rig's size.
