@@ -325,6 +325,9 @@ struct ValidationLimits {
   /// How far each inner boundary may lie from where on the print the rig says, three sigma included, unless its bands
   /// were measured. Prints made by hand are off by 0.05 to 0.3 mm; 0.1 mm is a turn of 0.05 to 0.1 rad.
   double max_inner_off_m = 0.09e-3, tolerance_of_prints_m = 0.1e-3;
+  /// Where blood leaves an inner boundary less than missed_fraction of its lines, an edge of the blood may be taken for
+  /// it: inks that lay aside were `ok` and 0.1 to 0.3 rad wrong with 46 to 88 um; exact prints have 7 to 30, few more.
+  double max_inner_off_of_few_m = 0.04e-3;
 
   /// Wrong fits agree with few boundaries or sides, and badly; blood leaves few, which agree well; compression leaves
   /// many, noisy. So the boundaries' rms may grow with the located fraction, where more than a quarter of the sides

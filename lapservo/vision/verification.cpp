@@ -75,16 +75,18 @@ bool bands_are_measured(const Marker& marker) {
   return marker.sigmas.bands_upper_m && marker.sigmas.bands_lower_m;
 }
 
-// Whether a print that is off would show. Where one inner boundary is left, its error looks like a turn. One whose
-// bands were measured is not off, and a tolerance of that size is in sigma. Where another instrument hides a part,
-// it is asked even if both inner boundaries show: one of 13000 rows, with blood, was 0.13 rad wrong.
+// Whether a print that is off would show. Where one inner boundary is left, or few lines of the other that may as well
+// be an edge of blood, its error looks like a turn. One whose bands were measured is not off, and a tolerance of that
+// size is in sigma. Where another instrument hides a part, it is asked even if both inner boundaries show: one of 13000
+// rows, with blood, was 0.13 rad wrong.
 bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool hidden_by_another) {
   if (bands_are_measured(scene.marker)) return true;
   if (scene.marker.tolerance_m >= limits.tolerance_of_prints_m) return true;
-  const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) &&
-                         std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.missed_fraction;
-  return (both_show && !hidden_by_another) ||
-         (fit.inner_off_m < limits.max_inner_off_m && is_the_markers(scene, fit, 1) && is_the_markers(scene, fit, 2));
+  const bool few = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) <= limits.missed_fraction;
+  const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) && !few;
+  if (both_show && !hidden_by_another) return true;
+  return fit.inner_off_m < (few ? limits.max_inner_off_of_few_m : limits.max_inner_off_m) &&
+         is_the_markers(scene, fit, 1) && is_the_markers(scene, fit, 2);
 }
 
 // Another instrument's colours beside a marker that shows as it should are no reason to doubt it.

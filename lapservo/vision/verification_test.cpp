@@ -126,6 +126,22 @@ TEST(Verification, AnInnerBoundaryThatIsHiddenLeavesThePrintInDoubt) {
   }
 }
 
+// Where few lines of one show, they may be an edge of blood, with which a print that is off looks nearly exact.
+TEST(Verification, FewLinesOfAnInnerBoundaryMustHoldItsPlace) {
+  const Shot& shot = usual_shot(1);
+  const Scene scene = shot.sight.scene();
+  for (const std::size_t boundary : {1U, 2U}) {
+    FineFit fit = fit_from_truth(shot);
+    fit.inner_off_m = 6e-5;
+    fit.in_image.fill(fit.lines), fit.used.fill(fit.lines / 2);
+    EXPECT_EQ(validate(scene, fit), Status::ok) << "half of each shows";
+    fit.used[boundary] = fit.in_image[boundary] = fit.lines / 5;
+    EXPECT_EQ(validate(scene, fit), Status::occluded);
+    fit.inner_off_m = 3e-5;
+    EXPECT_EQ(validate(scene, fit), Status::ok);
+  }
+}
+
 // A fit of which each boundary was located on so much of its lines.
 FineFit with_located(FineFit fit, double fraction) {
   fit.in_image.fill(fit.lines);
