@@ -126,10 +126,11 @@ struct Explanation {
   double gain = 0;     // of a number, by the scatter
 };
 
-// `pattern(boundary, number)`: the offsets by one of it; `usual`: one sigma of it before the frame is seen.
+// `pattern(boundary, number)`: the offsets by one of it; `usual`: one sigma of it before the frame is seen;
+// `told_of_scatter`: what part of the scatter its sigma takes in.
 template <int Numbers, typename Pattern>
 Explanation<Numbers> explained(const SeenBoundaries& seen, const Disagreement& all, double usual,
-                               const Pattern& pattern) {
+                               double told_of_scatter, const Pattern& pattern) {
   using Explained = Explanation<Numbers>;
   Eigen::Matrix<double, Numbers, Numbers> information = decltype(information)::Identity() / (usual * usual);
   typename Explained::Vector gradient = Explained::Vector::Zero();
@@ -144,7 +145,7 @@ Explanation<Numbers> explained(const SeenBoundaries& seen, const Disagreement& a
   out.found = covariance * gradient;
   const double of_all = out.found.dot(gradient);
   const double scatter = (all.squares - of_all) / (all.degrees - Numbers);
-  out.sigma = (limits.told_of_scatter * std::max(scatter, 0.0) * covariance.diagonal()).cwiseSqrt();
+  out.sigma = (told_of_scatter * std::max(scatter, 0.0) * covariance.diagonal()).cwiseSqrt();
   out.scatter = std::max(scatter, limits.least_scatter);
   out.gain = of_all / Numbers / out.scatter;
   return out;
@@ -214,6 +215,28 @@ void differ_by_exponent(double blur_px, SeenBoundaries& seen) {
   }
 }
 
+// Gloss beside one boundary looks like another response there; a camera's shows at all: most of it without any of them.
+bool is_at_more_than_one(const SeenBoundaries& seen, double exponent) {
+  double information = 1 / (limits.usual_exponent * limits.usual_exponent), gradient = 0;
+  const auto add = [&](const SeenBoundary& boundary, double sign) {
+    const Channels apart = boundary.weight * boundary.apart(boundary.by_exponent_px);
+    information += sign * (apart * boundary.by_exponent_px).sum();
+    gradient += sign * (apart * boundary.offset_px).sum();
+  };
+  for (const SeenBoundary& boundary : seen) add(boundary, 1);
+  return std::all_of(seen.begin(), seen.end(), [&](const SeenBoundary& boundary) {
+    add(boundary, -1);
+    const double of_others = gradient / information;
+    add(boundary, 1);
+    return of_others / exponent > limits.least_of_others;
+  });
+}
+
+bool is_response(const SeenBoundaries& seen, const Explanation<1>& response) {
+  return response.gain > limits.least_response_gain && response.scatter < limits.most_response_scatter &&
+         std::abs(response.found[0]) > limits.least_exponent && is_at_more_than_one(seen, response.found[0]);
+}
+
 }  // namespace
 
 CameraDeparture CameraDeparture::then(const CameraDeparture& more) const {
@@ -242,13 +265,10 @@ std::optional<CameraDeparture> find_departure(const LightImage& light, std::span
   const Disagreement all(seen);
   if (!all.is_plain()) return std::nullopt;
   differ_by_exponent(blur_px, seen);
-  const auto aberration = explained<2>(seen, all, limits.usual_aberration, by_aberration_px);
-  const auto response = explained<1>(seen, all, limits.usual_exponent,
+  const auto aberration = explained<2>(seen, all, limits.usual_aberration, limits.told_of_scatter, by_aberration_px);
+  const auto response = explained<1>(seen, all, limits.usual_exponent, limits.told_of_response_scatter,
                                      [](const SeenBoundary& boundary, int) { return boundary.by_exponent_px; });
-  const bool is_response = response.gain > limits.least_response_gain &&
-                           response.scatter < std::min(limits.most_response_scatter, aberration.scatter) &&
-                           std::abs(response.found[0]) > limits.least_exponent;
-  if (is_response) return by_exponent(seen, response);
+  if (response.scatter < aberration.scatter && is_response(seen, response)) return by_exponent(seen, response);
   if (aberration.gain > limits.least_gain) return by_aberration(seen, aberration);
   return std::nullopt;
 }

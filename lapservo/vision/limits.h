@@ -229,9 +229,10 @@ struct DepartureLimits {
   /// What one number explains, by the scatter; and of a response, which must be another besides. Of clean pictures with
   /// highlights magnifications gain up to 6.3, real ones mostly 15 and more.
   double least_gain = 7, least_response_gain = 5.5, least_exponent = 0.06;
+  double least_of_others = 0.5;  ///< of an exponent, told without any one of the boundaries
   /// A departure's sigma takes in a part of what is left, most of which is common to all frames (exponents of 53 frames
   /// had a standard deviation of 0.008, for 0.028 by all of it), and of a response a part of itself: it is no power.
-  double told_of_scatter = 0.2, doubted_of_response = 0.03;
+  double told_of_scatter = 0.5, told_of_response_scatter = 0.2, doubted_of_response = 0.03;
 };
 inline constexpr DepartureLimits departure_limits;
 
