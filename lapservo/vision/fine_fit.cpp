@@ -134,6 +134,7 @@ struct Change {
 struct SeenCamera {
   ProcessingEvidence evidence;
   std::optional<CameraDeparture> departure;
+  int explained = 0, asked_for_departure = 0;  // so often
 };
 
 // A departure is believed if the picture looks unprocessed without it: processing moves channels apart, too.
@@ -144,13 +145,165 @@ SeenCamera look_at_camera(const LightImage& light, std::span<const Measurement> 
   const DepartedLight seen(light, known);
   const PooledEdges glance = glance_at(seen.light(), measurements);
   out.evidence = find_processing(seen.light(), measurements, glance, blur_px);
+  out.explained += out.evidence.explained;
   if (out.evidence.processing == Processing::found) return out;
+  ++out.asked_for_departure;
   const auto more = find_departure(seen.light(), measurements, glance, blur_px);
   if (!more) return out;
   const CameraDeparture all = known.then(*more);
   const DepartedLight without(light, all);
-  if (find_processing(without.light(), measurements, blur_px).processing == Processing::none) out.departure = all;
+  const ProcessingEvidence left = find_processing(without.light(), measurements, blur_px);
+  out.explained += left.explained;
+  if (left.processing == Processing::none) out.departure = all;
   return out;
+}
+
+// One fit: passes of locating edges and moving there, a look at what the camera did, and the print.
+class Fitter {
+ public:
+  // `fit` holds what it starts from, and the result.
+  Fitter(const Scene& scene, const LightImage& light, FineFit& fit) : scene_(scene), light_(light), fit_(fit) {}
+  // Each returns whether to go on; what is known by then is in the result.
+  bool settle();
+  bool see_camera(const ExpectedProcessing& expected);
+  void judge();
+
+ private:
+  static constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
+
+  int unknowns() const { return fit_.unknowns.size(); }
+  double film_prior() const { return (film_mean_m - film_m_) / film_sigma_m; }
+  double move();
+  Change take_blur(const EdgeBlur& improved);
+  std::optional<Change> refine(const Effort& effort);
+  void take_processing_off(const ProcessedEdges& edges);
+  void count_inliers();
+  void tell(const PrintFit& print);
+
+  const Scene& scene_;
+  const LightImage& light_;
+  FineFit& fit_;
+  double film_m_ = film_mean_m;
+  EdgeMeasurements pass_;
+  EdgeBlur located_with_;
+  std::optional<ProcessedEdges> processed_;
+};
+
+// To where the measurements are; how far the farthest of them moved [px].
+double Fitter::move() {
+  const UnknownVector step = unknowns() == 4 ? solve<5>(pass_.all, film_prior()) : solve<7>(pass_.all, film_prior());
+  double farthest_px = 0;
+  for (Measurement& m : pass_.all) {
+    const double shift_px = m.row.dot(step);
+    m.residual_px -= shift_px;
+    m.expected_px += static_cast<float>(shift_px) * m.normal;
+    farthest_px = std::max(farthest_px, std::abs(shift_px));
+  }
+  fit_.unknowns = fit_.unknowns.changed_by(step.head(unknowns()));
+  film_m_ = std::clamp(film_m_ + step[unknowns()] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
+  return farthest_px;
+}
+
+Change Fitter::take_blur(const EdgeBlur& improved) {
+  Change change;
+  const EdgeBlur& before = fit_.blur;
+  for (std::size_t k = 0; k < 4; ++k) change.add_blur(before.along_px[k], improved.along_px[k]);
+  change.add_blur(before.sides_px, improved.sides_px);
+  change.oblique_px2 = before.widest_px() * before.widest_px() * std::abs(improved.correlation - before.correlation);
+  fit_.blur = improved;
+  return change;
+}
+
+// Nullopt when too little was seen.
+std::optional<Change> Fitter::refine(const Effort& effort) {
+  ++fit_.passes;
+  located_with_ = fit_.blur;
+  const DepartedLight seen(light_, fit_.departure);
+  pass_ = measure_edges(scene_, seen.light(), fit_.unknowns, film_m_, effort, located_with_);
+  if (static_cast<int>(pass_.all.size()) < 2 * unknowns()) return std::nullopt;
+  const double moved_px = move();
+  Change change = take_blur(pass_.improved(fit_.blur));
+  change.points_px = moved_px;
+  if (!fit_.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
+  return change;
+}
+
+bool Fitter::settle() {
+  auto change = refine(capture);
+  if (change && !(change->settled() && change->sharp())) change = refine(approach);
+  if (!change) return false;
+  for (int i = 0; i < (fit_.blur.wide() ? max_wide_passes : max_passes); ++i) {
+    change = refine(measure_all);
+    if (!change) return false;
+    // Of a blur that has just become wide the ellipse was not asked yet.
+    const bool as_wide = located_with_.wide() == fit_.blur.wide();
+    if (change->settled() && change->ellipse_settled() && as_wide) break;
+  }
+  return change->settled();
+}
+
+bool Fitter::see_camera(const ExpectedProcessing& expected) {
+  for (int i = 0; expected.ask; ++i) {
+    SeenCamera camera = look_at_camera(light_, pass_.all, located_with_.boundaries_px, fit_.departure);
+    fit_.processing = camera.evidence.processing;
+    processed_ = std::move(camera.evidence.edges);
+    fit_.processing_explained += camera.explained, fit_.asked_for_departure += camera.asked_for_departure;
+    if (!camera.departure || i == most_departures) break;
+    fit_.departure = *camera.departure;
+    for (int k = 0; k < passes_of_departure; ++k)
+      if (!refine(measure_all)) return false;
+  }
+  if (fit_.processing == Processing::unknown) fit_.bias_px = expected.bias_px;
+  if (processed_) take_processing_off(*processed_);
+  return true;
+}
+
+void Fitter::take_processing_off(const ProcessedEdges& edges) {
+  fit_.bias_px = bias_magnitudes_px(edges);
+  for (std::size_t i = 0; i < pass_.all.size(); ++i)
+    pass_.all[i].residual_px -= static_cast<double>(edges.measurement_bias_px[i]);
+  move();
+}
+
+void Fitter::judge() {
+  fit_.turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
+  fit_.lines = pass_.lines;
+  fit_.in_image = pass_.in_image;
+  fit_.sides_in_image = pass_.sides_in_image;
+  const ResidualLines lines = residual_lines(pass_.all);
+  const auto print = fit_print(pass_.all, lines, unknowns(), film_prior(), scene_.marker,
+                               common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, fit_.departure));
+  if (!print) return;
+  fit_.unknowns = fit_.unknowns.changed_by(print->step.head(unknowns()));
+  count_inliers();
+  tell(*print);
+}
+
+void Fitter::count_inliers() {
+  double squares = 0;
+  int inliers = 0;
+  for (const Measurement& m : pass_.all) {
+    const double sigmas = std::abs(m.residual_px) / m.sigma_px;
+    if (sigmas > inlier_sigmas) continue;
+    m.group < 4 ? ++fit_.used[m.group] : ++fit_.sides_used;
+    if (m.group < 4) squares += sigmas * sigmas, ++inliers;
+  }
+  fit_.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
+}
+
+void Fitter::tell(const PrintFit& print) {
+  const double doubt =
+      1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit_.located_fraction());
+  fit_.covariance = doubt * doubt * print.covariance;
+  fit_.inner_off_m = print.inner_off_m;
+  fit_.print_off_probability = print.off_probability;
+  // What the print may add goes by how often prints are off, not by what this picture shows.
+  fit_.psi_variance_by_print = print.psi_variance_by_print;
+  fit_.psi_variance_suspected = print.psi_variance_suspected;
+  fit_.suspected_probability = print.suspected_probability;
+  fit_.psi_variance = doubt * doubt * (print.psi_variance - print.psi_variance_by_print) + print.psi_variance_by_print;
+  fit_.psi_variance_by_tolerance = doubt * doubt * print.psi_variance_by_tolerance;
+  fit_.converged = true;
 }
 
 }  // namespace
@@ -168,108 +321,12 @@ double doubt_scale(double sigma_px, double blur_px, double bias_px) {
 
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
                    const ExpectedProcessing& expected) {
-  constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
   FineFit fit;
   fit.unknowns = start;
   fit.blur = blur;
   fit.departure = expected.departure;
-  const int unknowns = start.size();
-  double film_m = film_mean_m;
-  EdgeMeasurements pass;
-  EdgeBlur located_with = blur;
-  // To where the measurements are; how far the farthest of them moved [px].
-  const auto move = [&] {
-    const double film_prior = (film_mean_m - film_m) / film_sigma_m;
-    const UnknownVector step = unknowns == 4 ? solve<5>(pass.all, film_prior) : solve<7>(pass.all, film_prior);
-    double farthest_px = 0;
-    for (Measurement& m : pass.all) {
-      const double shift_px = m.row.dot(step);
-      m.residual_px -= shift_px;
-      m.expected_px += static_cast<float>(shift_px) * m.normal;
-      farthest_px = std::max(farthest_px, std::abs(shift_px));
-    }
-    fit.unknowns = fit.unknowns.changed_by(step.head(unknowns));
-    film_m = std::clamp(film_m + step[unknowns] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
-    return farthest_px;
-  };
-  // Nullopt when too little was seen.
-  const auto refine = [&](const Effort& effort) -> std::optional<Change> {
-    ++fit.passes;
-    located_with = fit.blur;
-    const DepartedLight seen(light, fit.departure);
-    pass = measure_edges(scene, seen.light(), fit.unknowns, film_m, effort, located_with);
-    if (static_cast<int>(pass.all.size()) < 2 * fit.unknowns.size()) return std::nullopt;
-    Change change{move()};
-    const EdgeBlur improved = pass.improved(fit.blur);
-    for (std::size_t k = 0; k < 4; ++k) change.add_blur(fit.blur.along_px[k], improved.along_px[k]);
-    change.add_blur(fit.blur.sides_px, improved.sides_px);
-    change.oblique_px2 =
-        fit.blur.widest_px() * fit.blur.widest_px() * std::abs(improved.correlation - fit.blur.correlation);
-    fit.blur = improved;
-    if (!fit.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
-    return change;
-  };
-  auto change = refine(capture);
-  if (change && !(change->settled() && change->sharp())) change = refine(approach);
-  if (!change) return fit;
-  for (int i = 0; i < (fit.blur.wide() ? max_wide_passes : max_passes); ++i) {
-    change = refine(measure_all);
-    if (!change) return fit;
-    // Of a blur that has just become wide the ellipse was not asked yet.
-    const bool as_wide = located_with.wide() == fit.blur.wide();
-    if (change->settled() && change->ellipse_settled() && as_wide) break;
-  }
-  if (!change->settled()) return fit;
-  ProcessingEvidence evidence;
-  for (int i = 0; expected.ask; ++i) {
-    SeenCamera camera = look_at_camera(light, pass.all, located_with.boundaries_px, fit.departure);
-    evidence = std::move(camera.evidence);
-    fit.processing_explained |= evidence.explained;
-    if (!camera.departure || i == most_departures) break;
-    fit.departure = *camera.departure;
-    for (int k = 0; k < passes_of_departure; ++k)
-      if (change = refine(measure_all); !change) return fit;
-  }
-  fit.processing = evidence.processing;
-  if (fit.processing == Processing::unknown) fit.bias_px = expected.bias_px;
-  if (evidence.edges) {
-    fit.bias_px = bias_magnitudes_px(*evidence.edges);
-    for (std::size_t i = 0; i < pass.all.size(); ++i)
-      pass.all[i].residual_px -= static_cast<double>(evidence.edges->measurement_bias_px[i]);
-    move();
-  }
-  fit.turn = turn_blur(pass, located_with, fit.processing == Processing::found);
-  fit.lines = pass.lines;
-  fit.in_image = pass.in_image;
-  fit.sides_in_image = pass.sides_in_image;
-  const double film_prior = (film_mean_m - film_m) / film_sigma_m;
-  const ResidualLines lines = residual_lines(pass.all);
-  const auto print = fit_print(pass.all, lines, unknowns, film_prior, scene.marker,
-                               common_errors(pass, lines, fit.blur, evidence.edges, fit.bias_px, fit.departure));
-  if (!print) return fit;
-  fit.unknowns = fit.unknowns.changed_by(print->step.head(unknowns));
-  double squares = 0;
-  int inliers = 0;
-  for (const Measurement& m : pass.all) {
-    const double sigmas = std::abs(m.residual_px) / m.sigma_px;
-    if (sigmas > inlier_sigmas) continue;
-    m.group < 4 ? ++fit.used[m.group] : ++fit.sides_used;
-    if (m.group < 4) squares += sigmas * sigmas, ++inliers;
-  }
-  fit.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
-  const double doubt =
-      1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit.located_fraction());
-  fit.covariance = doubt * doubt * print->covariance;
-  fit.inner_off_m = print->inner_off_m;
-  fit.print_off_probability = print->off_probability;
-  // What the print may add goes by how often prints are off, not by what this picture shows.
-  fit.psi_variance_by_print = print->psi_variance_by_print;
-  fit.psi_variance_suspected = print->psi_variance_suspected;
-  fit.suspected_probability = print->suspected_probability;
-  fit.psi_variance =
-      doubt * doubt * (print->psi_variance - print->psi_variance_by_print) + print->psi_variance_by_print;
-  fit.psi_variance_by_tolerance = doubt * doubt * print->psi_variance_by_tolerance;
-  fit.converged = true;
+  Fitter fitter(scene, light, fit);
+  if (fitter.settle() && fitter.see_camera(expected)) fitter.judge();
   return fit;
 }
 

@@ -32,7 +32,8 @@ struct FineFit {
   double suspected_probability = 0;      ///< and that this one is off by more than the tolerance then
   double inner_off_m = 3;                ///< how far off an inner boundary of the print may lie (print_fit.h)
   Processing processing = Processing::unknown;  ///< as far as asked
-  bool processing_explained = false;            ///< ProcessingEvidence::explained
+  int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
+  int asked_for_departure = 0;                  ///< how often find_departure() was
   int passes = 0;                               ///< in which edges were located
   std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
   CameraDeparture departure;                    ///< from the rig's camera, as far as known

@@ -52,6 +52,7 @@ struct SearchCosts {
   double coarse_fit = 320, no_coarse_fit = 160;  ///< one that found the shaft; one that did not
   double fine_pass = 180, fine_end = 160;        ///< of a fine fit; when it converged, the print and its validation
   double processing = 2400;                      ///< where the first guess at a camera's processing is not enough
+  double departure = 150;                        ///< whether the camera departs from the rig's
   double initial_poses = 330;                    ///< of one blob
   double no_initial_poses = 15;                  ///< of one in which there are none
   double bands_in_order = 90, rcm_starts = 900;  ///< the same, by lines through the RCM

@@ -52,7 +52,7 @@ FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& 
                const ExpectedProcessing& processing, WorkBudget& budget) {
   FineFit fit = fit_finely(scene, light, start, blur, processing);
   budget.spend(fit.passes * costs.fine_pass + (fit.converged ? costs.fine_end : 0) +
-               (fit.processing_explained ? costs.processing : 0));
+               fit.processing_explained * costs.processing + fit.asked_for_departure * costs.departure);
   return fit;
 }
 

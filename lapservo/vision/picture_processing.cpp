@@ -86,7 +86,7 @@ struct EdgeEquations {
   Eigen::Matrix<double, unknowns, unknowns> square;
   Eigen::Matrix<double, unknowns, 1> pull;
 };
-using Equations = std::array<EdgeEquations, most_edges>;  // of those that are seen
+using AllEdgeEquations = std::array<EdgeEquations, most_edges>;  // of those that are seen
 using ProcessingMatrix = Eigen::Matrix<double, processing_unknowns, processing_unknowns>;
 
 // Gauss-Newton with edges eliminated.
@@ -143,14 +143,14 @@ class Problem {
     });
     return sum;
   }
-  void linearise(const State& state, Equations& equations) const {
+  void linearise(const State& state, AllEdgeEquations& equations) const {
     const PictureProcessing processing = processing_of(state.processing);
     const ProcessingFilters filters(processing, true);
     for (std::size_t k = 0; k < edges_.size(); ++k)
       if (is_seen(edges_[k])) equations_of(k, model_.linearised(filters, processing, state.edges[k]), equations[k]);
   }
   // `equations`: the state's.
-  State improved(const State& state, const Equations& equations, double damping) const {
+  State improved(const State& state, const AllEdgeEquations& equations, double damping) const {
     std::array<Block, most_edges> blocks;
     State next = state;
     next.processing = improved_processing(state, equations, damping, blocks);
@@ -165,14 +165,14 @@ class Problem {
   }
   // The first step from what was expected, of the processing only.
   ProcessingVector first_processing() const {
-    Equations equations;
+    AllEdgeEquations equations;
     linearise(prior_, equations);
     std::array<Block, most_edges> blocks;
     return improved_processing(prior_, equations, 0, blocks);
   }
 
  private:
-  ProcessingVector improved_processing(const State& state, const Equations& equations, double damping,
+  ProcessingVector improved_processing(const State& state, const AllEdgeEquations& equations, double damping,
                                        std::array<Block, most_edges>& blocks) const {
     ProcessingMatrix information = certainty_.asDiagonal();
     ProcessingVector gradient = (prior_.processing - state.processing).cwiseProduct(certainty_);
@@ -258,7 +258,7 @@ State minimised(const Problem& problem) {
   constexpr int max_steps = 15;
   constexpr double settled = 0.005;  // of the cost
   State state = problem.prior();
-  Equations equations;
+  AllEdgeEquations equations;
   bool is_new = true;
   double cost = problem.cost(state), damping = 1e-3;
   for (int i = 0; i < max_steps; ++i) {

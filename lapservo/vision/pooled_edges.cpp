@@ -69,11 +69,11 @@ void sample_at(const LightImage& light, const Eigen::Vector2f& at, Between betwe
                EdgePlace& place) {
   if (between == Between::light) return sample_light(light, at, sample, place);
   const ImageView& image = light.image();
-  const ChannelGeometry& channels = light.channels();
-  if (!channels.differs()) return sample_at<0, 3>(image, at.x(), at.y(), between, sample, place);
-  const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
-  const Eigen::Vector2f blue = centre + channels.magnification[0] * (at - centre);
-  const Eigen::Vector2f red = centre + channels.magnification[2] * (at - centre);
+  const ChannelGeometry& geometry = light.channels();
+  if (!geometry.differs()) return sample_at<0, 3>(image, at.x(), at.y(), between, sample, place);
+  const Eigen::Vector2f centre(geometry.centre_u, geometry.centre_v);
+  const Eigen::Vector2f blue = centre + geometry.magnification[0] * (at - centre);
+  const Eigen::Vector2f red = centre + geometry.magnification[2] * (at - centre);
   sample_at<0, 1>(image, blue.x(), blue.y(), between, sample, place);
   sample_at<1, 2>(image, at.x(), at.y(), between, sample, place);
   sample_at<2, 3>(image, red.x(), red.y(), between, sample, place);

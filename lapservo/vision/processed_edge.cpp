@@ -63,11 +63,11 @@ using SamplesBgr = Eigen::Matrix<float, edge_rows, 3>;
 using OnGrid = Eigen::Matrix<float, padded_grid, 3>;
 
 template <std::size_t Size>
-SamplesBgr filtered(const std::array<double, Size>& taps, const OnGrid& values) {
-  SamplesBgr out = static_cast<float>(taps[0]) * values.middleRows<edge_rows>(both_filters_reach);
+SamplesBgr filtered(const std::array<double, Size>& weights, const OnGrid& values) {
+  SamplesBgr out = static_cast<float>(weights[0]) * values.middleRows<edge_rows>(both_filters_reach);
   for (int k = 1; k < static_cast<int>(Size); ++k)
     out +=
-        static_cast<float>(taps[static_cast<std::size_t>(k)]) *
+        static_cast<float>(weights[static_cast<std::size_t>(k)]) *
         (values.middleRows<edge_rows>(both_filters_reach - k) + values.middleRows<edge_rows>(both_filters_reach + k));
   return out;
 }
