@@ -66,7 +66,7 @@ void fit(benchmark::State& state) {
   const Instrument& instrument = rig.instruments[0];
   const ImageView image(moving_frames(rig)[0]);
   const auto table = rig.camera.response.table();
-  const LightImage light(image, table);
+  const LightImage light(image, table, ChannelGeometry(rig.camera));
   const ColorClasses classes(rig.instruments);
   const Scene scene{image, rig.camera, classes, instrument.marker, classes.of_bands(0)};
   JointVector q = configurations(rig, 0)[0];

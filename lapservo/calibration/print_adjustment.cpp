@@ -10,7 +10,7 @@
 #include "lapservo/calibration/robust_scale.h"
 #include "lapservo/calibration/solve_quietly.h"
 #include "lapservo/core/dense_matrix.h"
-#include "lapservo/vision/fine_fit.h"
+#include "lapservo/vision/common_errors.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {

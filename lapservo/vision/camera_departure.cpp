@@ -13,7 +13,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr auto& limits = departure_limits;
+constexpr const DepartureLimits& believed = departure_limits;
 constexpr Look in_light{24, 1, Between::light};
 
 std::array<float, 256> raised(const std::array<float, 256>& light_of_value, double exponent) {
@@ -29,7 +29,7 @@ struct StepColumns {
   float step_square = 0, density_square = 0;
 
   StepColumns(const PooledEdge& edge, float blur_px) {
-    const int reach = std::min(edge.clear_px, limits.reach_px);
+    const int reach = std::min(edge.clear_px, believed.reach_px);
     first = static_cast<std::size_t>(PooledEdge::reach - reach);
     last = static_cast<std::size_t>(PooledEdge::reach + reach);
     const BlurredEdges& edges = BlurredEdges::instance();
@@ -76,7 +76,7 @@ ChannelSteps channel_steps(const StepColumns& columns, const PooledEdge& edge, f
   ChannelSteps out{-static_cast<double>(blur_px) * density / step, step};
   // Gloss is white: it shows alone in a channel in which both sides of the edge look alike.
   Eigen::Index alike = 0;
-  if (step.abs().minCoeff(&alike) < limits.least_step * step.abs().maxCoeff())
+  if (step.abs().minCoeff(&alike) < believed.least_step * step.abs().maxCoeff())
     out.gloss_px = static_cast<double>(blur_px) * std::abs(density[alike]) / step.abs();
   return out;
 }
@@ -91,9 +91,9 @@ struct SeenBoundary {
   SeenBoundary(const PooledEdge& of_edge, double of_radial_px, const ChannelSteps& steps)
       : edge(&of_edge), radial_px(of_radial_px), offset_px(steps.offset_px) {
     const Channels of_most = steps.step.abs() / steps.step.abs().maxCoeff();
-    const auto shown = of_most > limits.least_step && offset_px.abs() < limits.farthest_px;
+    const Eigen::Array<bool, 3, 1> shown = of_most > believed.least_step && offset_px.abs() < believed.farthest_px;
     const Channels variance_px2 =
-        limits.floor_px * limits.floor_px + (limits.sigma_px / of_most).square() + steps.gloss_px.square();
+        believed.floor_px * believed.floor_px + (believed.sigma_px / of_most).square() + steps.gloss_px.square();
     weight = shown.select(variance_px2.inverse(), 0);
     offset_px = shown.select(offset_px, 0);
     share = of_most.square() / of_most.square().sum();
@@ -114,7 +114,7 @@ struct Disagreement {
       degrees += boundary.channels - 1;
     }
   }
-  bool is_plain() const { return degrees >= limits.least_degrees && squares > limits.least_squares; }
+  bool is_plain() const { return degrees >= believed.least_degrees && squares > believed.least_squares; }
 };
 
 // What a few numbers explain of the offsets.
@@ -122,7 +122,7 @@ template <int Numbers>
 struct Explanation {
   using Vector = Eigen::Matrix<double, Numbers, 1>;
   Vector found, sigma;
-  double scatter = 0;  // of what is left, in squared sigmas
+  double scatter = 0;  // of what is left a degree, in squared sigmas
   double gain = 0;     // of a number, by the scatter
 };
 
@@ -144,10 +144,10 @@ Explanation<Numbers> explained(const SeenBoundaries& seen, const Disagreement& a
   Explained out;
   out.found = covariance * gradient;
   const double of_all = out.found.dot(gradient);
-  const double scatter = (all.squares - of_all) / (all.degrees - Numbers);
-  out.sigma = (told_of_scatter * std::max(scatter, 0.0) * covariance.diagonal()).cwiseSqrt();
-  out.scatter = std::max(scatter, limits.least_scatter);
-  out.gain = of_all / Numbers / out.scatter;
+  out.scatter = (all.squares - of_all) / (all.degrees - Numbers);
+  const double told_scatter = std::max(told_of_scatter * out.scatter, believed.least_told_scatter);
+  out.sigma = (told_scatter * covariance.diagonal()).cwiseSqrt();
+  out.gain = of_all / Numbers / std::max(out.scatter, believed.least_scatter);
   return out;
 }
 
@@ -155,27 +155,42 @@ Channels by_aberration_px(const SeenBoundary& boundary, int number) {
   return boundary.radial_px * Eigen::Vector3d::Unit(number == 0 ? 0 : 2).array();
 }
 
+// One that is not seen has what the worst of the others has.
+template <typename DoubtOf>
+std::array<double, 4> of_each_boundary(const SeenBoundaries& seen, const DoubtOf& doubt_of) {
+  double worst = 0;
+  for (const SeenBoundary& boundary : seen) worst = std::max(worst, doubt_of(boundary));
+  std::array<double, 4> doubts;
+  doubts.fill(worst);
+  for (const SeenBoundary& boundary : seen) doubts[boundary.edge->boundary] = doubt_of(boundary);
+  return doubts;
+}
+
 CameraDeparture by_aberration(const SeenBoundaries& seen, const Explanation<2>& explanation) {
   CameraDeparture out;
   out.aberration = {1 + explanation.found[0], 1 + explanation.found[1]};
   out.sigma_aberration = {explanation.sigma[0], explanation.sigma[1]};
-  for (const SeenBoundary& boundary : seen) {
-    const auto moved_px = [&](int number) {
-      return explanation.sigma[number] * (boundary.share * by_aberration_px(boundary, number)).sum();
-    };
-    out.doubt_px[boundary.edge->boundary] = std::hypot(moved_px(0), moved_px(1));
-  }
+  out.doubt_of_radial = of_each_boundary(seen, [&](const SeenBoundary& boundary) {
+    return std::hypot(explanation.sigma[0] * boundary.share[0], explanation.sigma[1] * boundary.share[2]);
+  });
   return out;
+}
+
+// It may be gloss or shading as well.
+CameraDeparture doubted_aberration(const SeenBoundaries& seen, Explanation<2> explanation) {
+  explanation.sigma = explanation.sigma.cwiseMax(explanation.found.cwiseAbs());
+  explanation.found.setZero();
+  return by_aberration(seen, explanation);
 }
 
 CameraDeparture by_exponent(const SeenBoundaries& seen, const Explanation<1>& explanation) {
   CameraDeparture out;
   // The offsets are what an exponent of less than 1 left: they vanish with the opposite.
   out.exponent = 1 - explanation.found[0];
-  out.sigma_exponent = std::hypot(explanation.sigma[0], limits.doubted_of_response * explanation.found[0]);
-  for (const SeenBoundary& boundary : seen)
-    out.doubt_px[boundary.edge->boundary] =
-        std::abs(out.sigma_exponent * (boundary.share * boundary.by_exponent_px).sum());
+  out.sigma_exponent = std::hypot(explanation.sigma[0], believed.doubted_of_response * explanation.found[0]);
+  out.doubt_of_response_px = of_each_boundary(seen, [&](const SeenBoundary& boundary) {
+    return std::abs(out.sigma_exponent * (boundary.share * boundary.by_exponent_px).sum());
+  });
   return out;
 }
 
@@ -186,7 +201,7 @@ SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges
   const auto blur = static_cast<float>(blur_px);
   SeenBoundaries seen;
   for (const PooledEdge& edge : edges.all) {
-    if (edge.places < processing_limits.min_places || edge.clear_px < limits.least_clear_px) continue;
+    if (edge.places < processing_limits.min_places || edge.clear_px < believed.least_clear_px) continue;
     const double radial_px = static_cast<double>((edge.place_px - centre).dot(edge.normal));
     const SeenBoundary boundary(edge, radial_px, channel_steps(StepColumns(edge, blur), edge, blur, light_of));
     if (boundary.channels > 1) seen.push_back(boundary);
@@ -207,17 +222,17 @@ float as_it_is(float light) {
 
 void differ_by_exponent(double blur_px, SeenBoundaries& seen) {
   const auto blur = static_cast<float>(blur_px);
-  const auto raised = [](float light) { return std::pow(light, 1 + limits.exponent_step); };
+  const auto raised = [](float light) { return std::pow(light, 1 + believed.exponent_step); };
   for (SeenBoundary& boundary : seen) {
     const PooledEdge& edge = *boundary.edge;
     const Channels there_px = channel_steps(StepColumns(edge, blur), edge, blur, raised).offset_px;
-    boundary.by_exponent_px = (boundary.weight > 0).select((there_px - boundary.offset_px) / limits.exponent_step, 0);
+    boundary.by_exponent_px = (boundary.weight > 0).select((there_px - boundary.offset_px) / believed.exponent_step, 0);
   }
 }
 
 // Gloss beside one boundary looks like another response there; a camera's shows at all: most of it without any of them.
 bool is_at_more_than_one(const SeenBoundaries& seen, double exponent) {
-  double information = 1 / (limits.usual_exponent * limits.usual_exponent), gradient = 0;
+  double information = 1 / (believed.usual_exponent * believed.usual_exponent), gradient = 0;
   const auto add = [&](const SeenBoundary& boundary, double sign) {
     const Channels apart = boundary.weight * boundary.apart(boundary.by_exponent_px);
     information += sign * (apart * boundary.by_exponent_px).sum();
@@ -228,21 +243,32 @@ bool is_at_more_than_one(const SeenBoundaries& seen, double exponent) {
     add(boundary, -1);
     const double of_others = gradient / information;
     add(boundary, 1);
-    return of_others / exponent > limits.least_of_others;
+    return of_others / exponent > believed.least_of_others;
   });
 }
 
 bool is_response(const SeenBoundaries& seen, const Explanation<1>& response) {
-  return response.gain > limits.least_response_gain && response.scatter < limits.most_response_scatter &&
-         std::abs(response.found[0]) > limits.least_exponent && is_at_more_than_one(seen, response.found[0]);
+  return response.gain > believed.least_response_gain && response.scatter < believed.most_response_scatter &&
+         std::abs(response.found[0]) > believed.least_exponent && is_at_more_than_one(seen, response.found[0]);
 }
 
 }  // namespace
 
-CameraDeparture CameraDeparture::then(const CameraDeparture& more) const {
-  CameraDeparture out = more;
-  out.aberration.blue *= aberration.blue, out.aberration.red *= aberration.red;
-  out.exponent *= exponent;
+std::optional<CameraDeparture> CameraDeparture::then(const CameraDeparture& more) const {
+  CameraDeparture out = *this;
+  if (more.aberration != ChromaticAberration{} || more.sigma_aberration != ChromaticAberration{0, 0}) {
+    out.aberration.blue *= more.aberration.blue, out.aberration.red *= more.aberration.red;
+    out.sigma_aberration = more.sigma_aberration, out.doubt_of_radial = more.doubt_of_radial;
+  }
+  if (more.exponent != 1) {
+    out.exponent *= more.exponent;
+    out.sigma_exponent = more.sigma_exponent, out.doubt_of_response_px = more.doubt_of_response_px;
+  }
+  // So near to the rig's response nothing would have been believed.
+  if (std::abs(out.exponent - 1) < believed.least_exponent)
+    out.exponent = 1, out.sigma_exponent = 0, out.doubt_of_response_px = {};
+  const double magnified = std::max(std::abs(out.aberration.blue - 1), std::abs(out.aberration.red - 1));
+  if (magnified > believed.most_aberration || std::abs(out.exponent - 1) > believed.most_exponent) return std::nullopt;
   return out;
 }
 
@@ -265,11 +291,14 @@ std::optional<CameraDeparture> find_departure(const LightImage& light, std::span
   const Disagreement all(seen);
   if (!all.is_plain()) return std::nullopt;
   differ_by_exponent(blur_px, seen);
-  const auto aberration = explained<2>(seen, all, limits.usual_aberration, limits.told_of_scatter, by_aberration_px);
-  const auto response = explained<1>(seen, all, limits.usual_exponent, limits.told_of_response_scatter,
+  const auto aberration =
+      explained<2>(seen, all, believed.usual_aberration, believed.told_of_scatter, by_aberration_px);
+  const auto response = explained<1>(seen, all, believed.usual_exponent, believed.told_of_response_scatter,
                                      [](const SeenBoundary& boundary, int) { return boundary.by_exponent_px; });
   if (response.scatter < aberration.scatter && is_response(seen, response)) return by_exponent(seen, response);
-  if (aberration.gain > limits.least_gain) return by_aberration(seen, aberration);
+  if (aberration.gain > believed.least_gain) return by_aberration(seen, aberration);
+  if (aberration.gain > believed.least_doubted_gain && aberration.scatter < believed.most_doubted_scatter)
+    return doubted_aberration(seen, aberration);
   return std::nullopt;
 }
 

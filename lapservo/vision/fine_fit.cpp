@@ -7,11 +7,11 @@
 #include <span>
 #include <utility>
 
-#include "lapservo/core/inplace_vector.h"
-#include "lapservo/core/median.h"
+#include "lapservo/vision/camera_look.h"
+#include "lapservo/vision/common_errors.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
-#include "lapservo/vision/picture_processing.h"
+#include "lapservo/vision/residual_lines.h"
 
 namespace lapservo::internal {
 namespace {
@@ -44,69 +44,6 @@ UnknownVector solve(std::span<const Measurement> measurements, double film_prior
   return step;
 }
 
-double median_sigma_px(std::span<const Measurement> measurements) {
-  InplaceVector<double, 4 * EdgeMeasurements::max_lines> sigmas_px;
-  for (const Measurement& m : measurements)
-    if (m.group < 4) sigmas_px.push_back(m.sigma_px);
-  return sigmas_px.empty() ? 0 : median(sigmas_px);
-}
-
-// By which noise is smaller than the measurements say: of what they have beyond the light's, for what single points may
-// be off besides, no more than their scatter shows.
-double told_noise_scale(double scatter_sigmas, double sigma_px) {
-  const double floor = edge_limits.single_floor_px / std::max(sigma_px, edge_limits.single_floor_px);
-  const double of_light = std::sqrt(1 - floor * floor);
-  return std::clamp(scatter_sigmas, std::max(of_light, fine_fit_limits.least_noise_scale), 1.0);
-}
-
-// What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
-// processing may have moved each boundary; of those that `processed` tells, it is corrected.
-CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& lines, const EdgeBlur& blur,
-                           const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px,
-                           const CameraDeparture& departure) {
-  const FineFitLimits& limits = fine_fit_limits;
-  const double widest_px = blur.widest_px();
-  const double beyond_px = std::max(0.0, widest_px - limits.usual_blur_px);
-  const auto beyond_px2 = [](double blur_px, double usual_px) {
-    return std::max(0.0, blur_px * blur_px - usual_px * usual_px);
-  };
-  const double side_px = limits.common_side_px +
-                         limits.side_of_blur * beyond_px2(blur.sides_px, limits.usual_side_blur_px) / pass.radius_px;
-  const double unexplained = processed ? std::max(0.0, processed->misfit - limits.usual_misfit) : 0;
-  const double unexplained_px = limits.px_per_misfit * unexplained;
-  CommonErrors errors;
-  double bias_squares_px2 = 0;
-  for (std::size_t k = 0; k < 4; ++k) {
-    const double boundary_px = limits.common_boundary_px +
-                               limits.common_fraction_of_blur * std::max(0.0, blur.along_px[k] - limits.usual_blur_px);
-    const bool corrected = processed && processed->bias_px[k];
-    const double fraction = processed && processed->clips ? limits.fraction_of_clipped : limits.fraction_of_processing;
-    const double left_px = (corrected ? fraction : 1) * bias_px[k];
-    const double camera_px = std::hypot(left_px, unexplained_px, departure.doubt_px[k]);
-    errors.px[k] = std::hypot(boundary_px, camera_px);
-    errors.told_px[k] = std::hypot(boundary_px - limits.untold_boundary_px, camera_px);
-    bias_squares_px2 += bias_px[k] * bias_px[k] / 4;
-  }
-  errors.px[4] = errors.px[5] = side_px;
-  errors.told_px[4] = errors.told_px[5] = side_px - limits.untold_side_px;
-  errors.whole_px = limits.whole_fraction_of_blur * beyond_px;
-  errors.leaning_px = (blur.wide() ? limits.leaning_of_wide_blur : limits.leaning_of_blur) *
-                      beyond_px2(widest_px, limits.usual_blur_px) / pass.radius_px;
-  const double scatter = scatter_sigmas(pass.all, lines), sigma_px = median_sigma_px(pass.all);
-  errors.noise_scale = std::max(1.0, scatter);
-  errors.told_noise_scale = told_noise_scale(scatter, sigma_px);
-  const double moved_px = std::sqrt(bias_squares_px2);
-  errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
-  const double beyond_usual_px = std::max(0.0, sigma_px - limits.usual_sigma_px);
-  const double processed_px = (processed ? limits.doubted_of_processing : 1) * moved_px;
-  const double moved_or_noisy_px = std::hypot(limits.doubted_of_sigma * beyond_usual_px, processed_px);
-  errors.doubt.boundary_px = std::hypot(moved_or_noisy_px, limits.doubted_boundary_of_blur * beyond_px);
-  errors.doubt.tilt_px = std::hypot(moved_or_noisy_px, limits.doubted_tilt_of_blur * beyond_px);
-  errors.doubt.length_fraction =
-      std::hypot(limits.doubted_length_of_sigma * beyond_usual_px, limits.doubted_length_of_blur * beyond_px);
-  return errors;
-}
-
 // What a pass changed.
 struct Change {
   double points_px = 0;       // how far the farthest measured point moved
@@ -129,35 +66,6 @@ struct Change {
   bool sharp() const { return blur_fraction < fine_fit_limits.settled_blur; }
 };
 
-// What the camera did to the picture, as it looks when what is known of the camera is undone; and all of its departure
-// from the rig's, where that is more than was known.
-struct SeenCamera {
-  ProcessingEvidence evidence;
-  std::optional<CameraDeparture> departure;
-  int explained = 0, asked_for_departure = 0;  // so often
-};
-
-// A departure is believed if the picture looks unprocessed without it: processing moves channels apart, too.
-SeenCamera look_at_camera(const LightImage& light, std::span<const Measurement> measurements, double blur_px,
-                          const CameraDeparture& known) {
-  SeenCamera out;
-  if (blur_px > processing_limits.max_blur_px) return out;
-  const DepartedLight seen(light, known);
-  const PooledEdges glance = glance_at(seen.light(), measurements);
-  out.evidence = find_processing(seen.light(), measurements, glance, blur_px);
-  out.explained += out.evidence.explained;
-  if (out.evidence.processing == Processing::found) return out;
-  ++out.asked_for_departure;
-  const auto more = find_departure(seen.light(), measurements, glance, blur_px);
-  if (!more) return out;
-  const CameraDeparture all = known.then(*more);
-  const DepartedLight without(light, all);
-  const ProcessingEvidence left = find_processing(without.light(), measurements, blur_px);
-  out.explained += left.explained;
-  if (left.processing == Processing::none) out.departure = all;
-  return out;
-}
-
 // One fit: passes of locating edges and moving there, a look at what the camera did, and the print.
 class Fitter {
  public:
@@ -176,7 +84,9 @@ class Fitter {
   double move();
   Change take_blur(const EdgeBlur& improved);
   std::optional<Change> refine(const Effort& effort);
+  bool refine_until_settled(int least_passes);
   void take_processing_off(const ProcessedEdges& edges);
+  std::array<double, 4> departure_px() const;
   void count_inliers();
   void tell(const PrintFit& print);
 
@@ -231,15 +141,20 @@ std::optional<Change> Fitter::refine(const Effort& effort) {
 bool Fitter::settle() {
   auto change = refine(capture);
   if (change && !(change->settled() && change->sharp())) change = refine(approach);
-  if (!change) return false;
-  for (int i = 0; i < (fit_.blur.wide() ? max_wide_passes : max_passes); ++i) {
-    change = refine(measure_all);
+  return change && refine_until_settled(1);
+}
+
+bool Fitter::refine_until_settled(int least_passes) {
+  bool settled = false;
+  for (int i = 1; i <= (fit_.blur.wide() ? max_wide_passes : max_passes); ++i) {
+    const auto change = refine(measure_all);
     if (!change) return false;
+    settled = change->settled();
     // Of a blur that has just become wide the ellipse was not asked yet.
     const bool as_wide = located_with_.wide() == fit_.blur.wide();
-    if (change->settled() && change->ellipse_settled() && as_wide) break;
+    if (i >= least_passes && settled && change->ellipse_settled() && as_wide) break;
   }
-  return change->settled();
+  return settled;
 }
 
 bool Fitter::see_camera(const ExpectedProcessing& expected) {
@@ -248,10 +163,10 @@ bool Fitter::see_camera(const ExpectedProcessing& expected) {
     fit_.processing = camera.evidence.processing;
     processed_ = std::move(camera.evidence.edges);
     fit_.processing_explained += camera.explained, fit_.asked_for_departure += camera.asked_for_departure;
-    if (!camera.departure || i == most_departures) break;
-    fit_.departure = *camera.departure;
-    for (int k = 0; k < passes_of_departure; ++k)
-      if (!refine(measure_all)) return false;
+    const bool as_known = camera.departure.moves_alike(fit_.departure);
+    if (as_known || i < most_departures) fit_.departure = camera.departure;
+    if (as_known || i == most_departures) break;
+    if (!refine_until_settled(passes_of_departure)) return false;
   }
   if (fit_.processing == Processing::unknown) fit_.bias_px = expected.bias_px;
   if (processed_) take_processing_off(*processed_);
@@ -272,11 +187,26 @@ void Fitter::judge() {
   fit_.sides_in_image = pass_.sides_in_image;
   const ResidualLines lines = residual_lines(pass_.all);
   const auto print = fit_print(pass_.all, lines, unknowns(), film_prior(), scene_.marker,
-                               common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, fit_.departure));
+                               common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px()));
   if (!print) return;
   fit_.unknowns = fit_.unknowns.changed_by(print->step.head(unknowns()));
   count_inliers();
   tell(*print);
+}
+
+// By how much what is left of the departure may move each boundary.
+std::array<double, 4> Fitter::departure_px() const {
+  std::array<double, 4> radial_px{}, doubt_px{};
+  if (!fit_.departure.doubted()) return doubt_px;
+  const ChannelGeometry& channels = light_.channels();
+  const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
+  std::array<int, 4> places{};
+  for (const Measurement& m : pass_.all) {
+    if (m.group >= 4) continue;
+    radial_px[m.group] += static_cast<double>((m.expected_px - centre).dot(m.normal)), ++places[m.group];
+  }
+  for (std::size_t k = 0; k < 4; ++k) doubt_px[k] = fit_.departure.doubt_px(k, radial_px[k] / std::max(1, places[k]));
+  return doubt_px;
 }
 
 void Fitter::count_inliers() {
@@ -311,12 +241,6 @@ void Fitter::tell(const PrintFit& print) {
 double FineFit::located_fraction() const {
   const int located = used[0] + used[1] + used[2] + used[3];
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
-}
-
-double doubt_scale(double sigma_px, double blur_px, double bias_px) {
-  const FineFitLimits& limits = fine_fit_limits;
-  return std::max(1.0, sigma_px / limits.usual_sigma_px) + std::max(0.0, blur_px - limits.usual_blur_px) +
-         bias_px / limits.doubted_processing_px;
 }
 
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,

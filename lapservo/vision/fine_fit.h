@@ -53,10 +53,6 @@ struct ExpectedProcessing {
   CameraDeparture departure = {};
 };
 
-/// By how much noise is to be taken larger before a print is blamed: compression, motion blur and a camera's processing
-/// move edges of this sigma, which were blurred by this and moved by this.
-double doubt_scale(double sigma_px, double blur_px, double bias_px);
-
 /// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
 /// pixel in linear light, with a robust loss. `start` must be good to some pixels.
 FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,

@@ -223,6 +223,8 @@ struct DepartureLimits {
   double farthest_px = 1;  ///< what is farther from the others is no boundary
   /// Magnifications of lenses, beside 1; exponents of responses, too, and by how much the latter are tried.
   double usual_aberration = 2e-3, usual_exponent = 0.3, exponent_step = -0.1;
+  /// What no camera has: the border's red and blue 10 px apart, light to the power of 0.5.
+  double most_aberration = 0.01, most_exponent = 0.5;
   int least_degrees = 4;
   /// Squared sigmas: of all by which channels disagree, and left a degree where that is explained (at least, by which
   /// gains are told; of a response at most, or it is gloss).
@@ -230,10 +232,14 @@ struct DepartureLimits {
   /// What one number explains, by the scatter; and of a response, which must be another besides. Of clean pictures with
   /// highlights magnifications gain up to 6.3, real ones mostly 15 and more.
   double least_gain = 7, least_response_gain = 5.5, least_exponent = 0.06;
+  /// From where on a magnification may be there: highlights gain as much, but leave 0.6 and more (a swing of 72 frames;
+  /// magnifications that were not believed 0.1 to 0.25).
+  double least_doubted_gain = 4, most_doubted_scatter = 0.4;
   double least_of_others = 0.5;  ///< of an exponent, told without any one of the boundaries
   /// A departure's sigma takes in a part of what is left, most of which is common to all frames (exponents of 53 frames
   /// had a standard deviation of 0.008, for 0.028 by all of it), and of a response a part of itself: it is no power.
   double told_of_scatter = 0.5, told_of_response_scatter = 0.2, doubted_of_response = 0.03;
+  double least_told_scatter = 0.1;  ///< what two degrees leave may be less by chance
 };
 inline constexpr DepartureLimits departure_limits;
 

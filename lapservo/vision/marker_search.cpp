@@ -65,7 +65,7 @@ Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const E
   constexpr double rest_sigmas = 0.2, least_sides = 0.8;
   for (int i = 0; i < most; ++i) {
     const double before_rad = fit.unknowns.pose().psi_rad;
-    fit = fitted(scene, light, fit.unknowns, fit.blur, processing, budget);
+    fit = fitted(scene, light, fit.unknowns, fit.blur, {processing.ask, fit.bias_px, fit.departure}, budget);
     if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit.unknowns);
     const double moved_rad = std::abs(wrap_pi(fit.unknowns.pose().psi_rad - before_rad));
     if (moved_rad < rest_sigmas * std::sqrt(fit.psi_variance) && fit.sides_used >= least_sides * fit.sides_in_image)
@@ -188,7 +188,9 @@ MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const
 // The candidate as it shows in this frame; whether it doesn't.
 bool MarkerSearch::lost_candidate(const SearchFrame& frame, WorkBudget& budget) {
   const FineFit before = *candidate_;
-  candidate_ = follow(frame.scene, frame.light, before.unknowns, before.blur, {}, budget).fit;
+  candidate_ =
+      follow(frame.scene, frame.light, before.unknowns, before.blur, {true, before.bias_px, before.departure}, budget)
+          .fit;
   return !candidate_;
 }
 

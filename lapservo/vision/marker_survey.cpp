@@ -52,7 +52,7 @@ void take_sides(const EdgeMeasurements& from, EdgeMeasurements& edges) {
 }
 
 std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unknowns, const EdgeBlur& blur,
-                                    bool settled) {
+                                    bool settled, const CameraDeparture& departure) {
   const ShaftPose& pose = unknowns.pose();
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return std::nullopt;
@@ -60,17 +60,18 @@ std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unkn
   if (agreement.in_image < 0.9 || agreement.matching < min_matching || agreement.wrong > max_wrong ||
       agreement.beside > max_beside)
     return std::nullopt;
-  return Sighting{unknowns, blur, film_mean_m,
-                  wrap_two_pi(marker_azimuth_rad(scene.marker, view->facing_azimuth_rad, pose.psi_rad)), settled};
+  return Sighting{unknowns,    blur,
+                  film_mean_m, wrap_two_pi(marker_azimuth_rad(scene.marker, view->facing_azimuth_rad, pose.psi_rad)),
+                  settled,     departure};
 }
 
 // The fine fit where it settles, else the coarse one.
 std::optional<Sighting> refined(const Scene& scene, const LightImage& light, const CoarseFit& coarse,
-                                const EdgeBlur& blur) {
-  const FineFit fine = fit_finely(scene, light, coarse.unknowns, blur);
+                                const EdgeBlur& blur, const CameraDeparture& departure) {
+  const FineFit fine = fit_finely(scene, light, coarse.unknowns, blur, {.departure = departure});
   if (fine.converged)
-    if (auto sighting = sighting_of(scene, fine.unknowns, fine.blur, true)) return sighting;
-  return sighting_of(scene, coarse.unknowns, blur, false);
+    if (auto sighting = sighting_of(scene, fine.unknowns, fine.blur, true, fine.departure)) return sighting;
+  return sighting_of(scene, coarse.unknowns, blur, false, departure);
 }
 
 }  // namespace
@@ -81,7 +82,7 @@ MarkerSurvey::MarkerSurvey(const Rig& rig, std::size_t instrument)
 std::optional<Sighting> MarkerSurvey::follow(const Scene& scene, const LightImage& light) const {
   const CoarseFit coarse = fit_coarsely(scene, last_->unknowns, detection_limits.from_memory);
   if (!coarse.found) return std::nullopt;
-  auto sighting = refined(scene, light, coarse, last_->blur);
+  auto sighting = refined(scene, light, coarse, last_->blur, last_->departure);
   return sighting && sighting->settled ? sighting : std::nullopt;
 }
 
@@ -94,7 +95,7 @@ std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImag
     if (!coarse.found || coarse.rotation_score < detection_limits.min_rotation_score ||
         coarse.rival_score > detection_limits.rival_ratio * coarse.rotation_score)
       return;
-    const auto sighting = refined(scene, light, coarse, {});
+    const auto sighting = refined(scene, light, coarse, {}, {});
     if (!sighting) return;
     const double score = color_agreement(scene, sighting->unknowns.pose()).matching + sighting->settled;
     if (score > best_score) best_score = score, best = sighting;
@@ -187,7 +188,9 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
                                        const Reach& reach) const {
   constexpr int iterations = 6;
   const ImageView image(view.bgr);
-  const LightImage light(image, light_, ChannelGeometry(view.camera));
+  const LightImage as_the_rig_says(image, light_, ChannelGeometry(view.camera));
+  const DepartedLight seen(as_the_rig_says, sighting.departure);
+  const LightImage& light = seen.light();
   const Scene scene{image, view.camera, classes_, marker, bands_};
   ViewMeasurements measured;
   measured.edges =
@@ -204,7 +207,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   if (processing && reach.only_video) {
     const cv::Mat grey = grey_of(view.bgr);
     const ImageView grey_image(grey);
-    const LightImage grey_light(grey_image, light_);
+    const LightImage grey_light(grey_image, light.light_of_value());
     const Scene grey_scene{grey_image, view.camera, classes_, marker, bands_};
     take_sides(measure_edges(grey_scene, grey_light, sighting.unknowns, sighting.film_m,
                              {reach.extra_px, iterations, 1}, sighting.blur),
@@ -227,8 +230,8 @@ std::optional<Sighting> ViewMeasurer::settled(const MarkerView& view, const Mark
   const ImageView image(view.bgr);
   const LightImage light(image, light_, ChannelGeometry(view.camera));
   const Scene scene{image, view.camera, classes_, marker, bands_};
-  const FineFit fine = fit_finely(scene, light, sighting.unknowns, sighting.blur);
-  return fine.converged ? sighting_of(scene, fine.unknowns, fine.blur, true) : std::nullopt;
+  const FineFit fine = fit_finely(scene, light, sighting.unknowns, sighting.blur, {.departure = sighting.departure});
+  return fine.converged ? sighting_of(scene, fine.unknowns, fine.blur, true, fine.departure) : std::nullopt;
 }
 
 }  // namespace lapservo::internal

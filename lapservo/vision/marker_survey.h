@@ -9,6 +9,7 @@
 
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/blob_search.h"
+#include "lapservo/vision/camera_departure.h"
 #include "lapservo/vision/color_classes.h"
 #include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/seam_edges.h"
@@ -21,8 +22,9 @@ struct Sighting {
   PoseUnknowns unknowns;
   EdgeBlur blur;
   double film_m = film_mean_m;
-  double tau_rad = 0;    ///< on the generatrix that faces the camera
-  bool settled = false;  ///< the fine fit agrees with itself; else the pose is good to a few pixels
+  double tau_rad = 0;         ///< on the generatrix that faces the camera
+  bool settled = false;       ///< the fine fit agrees with itself; else the pose is good to a few pixels
+  CameraDeparture departure;  ///< from the rig's camera, as far as the fine fit shows it
 };
 
 /// Finds a marker whose print is not quite as the rig says (boundaries off by half a millimetre, wrapped askew, a gap

@@ -101,7 +101,7 @@ double median_residual_px(const Located& located, std::span<const Measurement> m
 EdgePlaces places_of(const Located& located, const LightImage& light, std::span<const Measurement> measurements,
                      const Look& look) {
   const int count = static_cast<int>(located.size());
-  const bool glances = look.levels == 1;  // which is to cost little
+  const bool glances = look.between == Between::values && look.levels == 1;  // which is to cost little
   const double middle_px = glances ? 0 : median_residual_px(located, measurements);
   EdgePlaces places;
   int seen = 0;

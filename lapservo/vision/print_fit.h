@@ -1,42 +1,15 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <span>
 
 #include "lapservo/marker/marker.h"
+#include "lapservo/vision/common_errors.h"
 #include "lapservo/vision/edge_measurements.h"
-#include "lapservo/vision/print_doubt.h"
+#include "lapservo/vision/residual_lines.h"
 #include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo::internal {
-
-/// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
-/// says, and what is doubted before the print is blamed.
-struct CommonErrors {
-  std::array<double, measurement_groups> px{};
-  double whole_px = 0,
-         leaning_px = 0;  ///< all boundaries alike: moved along the shaft, leaning from side to side (rms)
-  double noise_scale = 1;
-  /// And what of all that is told of the pose, once the print was judged: what a group shares, and, 1 or less, by how
-  /// much noise is smaller.
-  std::array<double, measurement_groups> told_px{};
-  double told_noise_scale = 1;
-  PrintDoubt doubt;
-  double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_off_m
-};
-
-/// A group's residuals as a straight line over the print: of boundaries in metres along the shaft, of sides a constant
-/// in pixels. Zero where a group has too few points for one of its own.
-struct ResidualLine {
-  double at_start = 0, slope = 0;  ///< at tau = 0; a turn
-
-  /// What the line leaves of a residual.
-  double residual_px(const Measurement& m) const;
-};
-using ResidualLines = std::array<ResidualLine, measurement_groups>;
-
-ResidualLines residual_lines(std::span<const Measurement> measurements);
 
 /// A pose, given that the print may lie elsewhere than the rig says: each boundary at either edge of the print (tau = 0
 /// and tau -> 2 pi, linear between; the ends are circles). These six errors are normal, independent and alike; large
@@ -63,8 +36,5 @@ struct PrintFit {
 /// `lines` are those of these residuals, `film_prior` as the fit has it. Nullopt when a direction is not seen at all.
 std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
                                   double film_prior, const Marker& marker, const CommonErrors& errors);
-
-/// Root mean square of the boundaries' residuals in sigmas, each about its own line; outliers do not count.
-double scatter_sigmas(std::span<const Measurement> measurements, const ResidualLines& lines);
 
 }  // namespace lapservo::internal
