@@ -139,6 +139,20 @@ PooledEdge mean_of(std::span<const EdgePlace* const> places, std::span<const Mea
   return edge;
 }
 
+// What cubic convolution between pixels took away, in the mean over all places between them: of its kernel the second
+// moment is 0, the fourth -0.3, and fourth differences have 24.
+void undo_cubic(PooledEdge& edge) {
+  constexpr float fourth_moment = -0.3F;
+  const Eigen::Array2f squares = edge.normal.array().square();
+  const float part = -fourth_moment / 24 * squares.square().sum() / (squares.sum() * squares.sum());
+  for (auto& value : edge.value) {
+    const auto v = value;
+    // At the ends it is even.
+    for (std::size_t i = 2; i + 2 < v.size(); ++i)
+      value[i] += part * (v[i - 2] - 4 * v[i - 1] + 6 * v[i] - 4 * v[i + 1] + v[i + 2]);
+  }
+}
+
 }  // namespace
 
 PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> measurements, const Look& look) {
@@ -158,7 +172,9 @@ PooledEdges pool_edges(const LightImage& light, std::span<const Measurement> mea
       const std::span<const EdgePlace* const> alike(darkest_first.begin() + first, last - first);
       for (const EdgePlace* place : alike)
         edges.of_measurement[place->measurement] = static_cast<std::uint8_t>(edges.all.size());
-      edges.all.push_back(mean_of(alike, measurements));
+      PooledEdge edge = mean_of(alike, measurements);
+      if (look.between == Between::values_cubic) undo_cubic(edge);
+      edges.all.push_back(edge);
     }
   }
   return edges;
