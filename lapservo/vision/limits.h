@@ -148,7 +148,7 @@ struct FineFitLimits {
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are
   /// clipped beside boundaries, the larger one. A processing that moves them by doubted_processing_px (rms) doubles the
   /// noise where a hidden boundary's print is asked for, and what `calibrate marker` says.
-  double fraction_of_processing = 0.2, fraction_of_clipped = 0.3, doubted_processing_px = 0.1;
+  double fraction_of_processing = 0.17, fraction_of_clipped = 0.3, doubted_processing_px = 0.1;
   /// And what of that is doubted before the print is blamed: of exact prints 0 to 0.1 px of 0.3 to 0.7 px are left.
   double doubted_of_processing = 0.12;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.

@@ -210,6 +210,48 @@ TEST(PooledEdges, SampleBetweenPixels) {
     }
 }
 
+// A blurred step of light, encoded, so far on its bright side.
+double encoded_step(double distance_px) {
+  constexpr double blur_px = 0.8;
+  const Response srgb;
+  const double dark = srgb.light_from_value(25 / 255.0), bright = srgb.light_from_value(170 / 255.0);
+  return srgb.value_from_light(dark + (bright - dark) * std::erfc(-distance_px / (blur_px * std::sqrt(2.0))) / 2);
+}
+
+cv::Mat picture_of_step(const Eigen::Vector2d& middle_px, const Eigen::Vector2d& normal) {
+  cv::Mat bgr(60, 60, CV_8UC3);
+  for (int v = 0; v < bgr.rows; ++v)
+    for (int u = 0; u < bgr.cols; ++u) {
+      const double value = encoded_step((Eigen::Vector2d(u, v) - middle_px).dot(normal));
+      bgr.at<cv::Vec3b>(v, u) = cv::Vec3b::all(static_cast<std::uint8_t>(std::lround(255 * value)));
+    }
+  return bgr;
+}
+
+// What pixels show, sampled between them wherever the step lies among them: in the mean what the camera encodes there.
+TEST(PooledEdges, CubicSamplesHaveTheMeanOfWhatIsEncoded) {
+  constexpr int phases = 8;
+  for (const double angle_rad : {0.0, 0.4, 0.785}) {
+    const Eigen::Vector2d normal(std::cos(angle_rad), std::sin(angle_rad)), along(-normal.y(), normal.x());
+    std::array<double, PooledEdge::samples> mean{};
+    for (int phase = 0; phase < phases; ++phase) {
+      const Eigen::Vector2d middle_px(30 + static_cast<double>(phase) / phases, 30);
+      const cv::Mat bgr = picture_of_step(middle_px, normal);
+      const ImageView view(bgr);
+      std::vector<Measurement> measurements(40);
+      for (std::size_t i = 0; i < measurements.size(); ++i) {
+        measurements[i].normal = normal.cast<float>(), measurements[i].clear_px = 6;
+        measurements[i].expected_px = (middle_px + (0.47 * static_cast<double>(i) - 9) * along).cast<float>();
+      }
+      const PooledEdges edges = pool_edges(LightImage(view, srgb()), measurements, {64, 1, Between::values_cubic});
+      for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += edges.all[0].value[0][i] / phases;
+    }
+    for (int i = 0; i < PooledEdge::samples; ++i)
+      EXPECT_NEAR(mean[static_cast<std::size_t>(i)], encoded_step(i - PooledEdge::reach), 1.5e-3)
+          << angle_rad << ", " << i;
+  }
+}
+
 constexpr std::uint64_t shots = 6;
 
 FineFit fit_through(const effects::CameraEffects& effects, std::uint64_t seed, bool ask = true) {
