@@ -58,7 +58,11 @@ void Score::add(const TrueFrame& frame, const std::vector<Observation>& observat
     theta_rad.push_back(wrap_pi(o.rcm->q.theta_rad - truth.q.theta_rad));
     phi_rad.push_back(o.rcm->q.phi_rad - truth.q.phi_rad);
     rho_m.push_back(o.rcm->q.rho_m - truth.q.rho_m);
-    psi_sigmas.push_back(error_rad / std::sqrt(o.rcm->covariance(3, 3)));
+    const Eigen::Vector4d sigmas = o.rcm->covariance.diagonal().cwiseSqrt();
+    theta_sigmas.push_back(theta_rad.back() / sigmas[0]);
+    phi_sigmas.push_back(phi_rad.back() / sigmas[1]);
+    rho_sigmas.push_back(rho_m.back() / sigmas[2]);
+    psi_sigmas.push_back(error_rad / sigmas[3]);
     for (std::size_t k = 0; k < 4; ++k) edge_px.push_back((o.edges_raw_px[k] - truth.edges_raw_px[k]).norm());
     edges.push_back(o.edges_raw_px);
   }

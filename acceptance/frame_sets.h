@@ -34,7 +34,8 @@ struct TrueFrame {
 /// Errors of observations against truth, over a set.
 struct Score {
   int expected = 0, found = 0, wrong = 0;  ///< wrong: ok, and psi off by more than 0.1 rad
-  std::vector<double> psi_rad, theta_rad, phi_rad, rho_m, edge_px, psi_sigmas;
+  std::vector<double> psi_rad, theta_rad, phi_rad, rho_m, edge_px;
+  std::vector<double> psi_sigmas, theta_sigmas, phi_sigmas, rho_sigmas;
   std::vector<std::array<Eigen::Vector2d, 4>> edges;  ///< of found ones, in order
 
   void add(const TrueFrame& frame, const std::vector<Observation>& observations);

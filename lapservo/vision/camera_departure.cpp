@@ -145,7 +145,7 @@ Explanation<Numbers> explained(const SeenBoundaries& seen, const Disagreement& a
   out.found = covariance * gradient;
   const double of_all = out.found.dot(gradient);
   out.scatter = (all.squares - of_all) / (all.degrees - Numbers);
-  const double told_scatter = std::max(told_of_scatter * out.scatter, believed.least_told_scatter);
+  const double told_scatter = told_of_scatter * std::max(out.scatter, believed.least_told_scatter);
   out.sigma = (told_scatter * covariance.diagonal()).cwiseSqrt();
   out.gain = of_all / Numbers / std::max(out.scatter, believed.least_scatter);
   return out;

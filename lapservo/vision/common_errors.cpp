@@ -51,12 +51,25 @@ void add_boundaries(const EdgeBlur& blur, const std::optional<ProcessedEdges>& p
   }
 }
 
-void add_sides(const EdgeBlur& blur, double radius_px, CommonErrors& errors) {
+// `moved_px`: by the camera's processing, boundaries; sides are moved, too, and nobody corrects that.
+void add_sides(const EdgeBlur& blur, double radius_px, double moved_px, CommonErrors& errors) {
   const FineFitLimits& usual = fine_fit_limits;
   const double side_px =
       usual.common_side_px + usual.side_of_blur * beyond_px2(blur.sides_px, usual.usual_side_blur_px) / radius_px;
-  errors.px[4] = errors.px[5] = side_px;
-  errors.told_px[4] = errors.told_px[5] = side_px - usual.untold_side_px;
+  const double camera_px = usual.side_fraction_of_processing * moved_px;
+  errors.px[4] = errors.px[5] = std::hypot(side_px, camera_px);
+  errors.told_px[4] = errors.told_px[5] = std::hypot(side_px - usual.untold_side_px, camera_px);
+}
+
+void add_patterns(const EdgeBlur& blur, double radius_px, double moved_px, CommonErrors& errors) {
+  const FineFitLimits& usual = fine_fit_limits;
+  const double widest_px = blur.widest_px();
+  const double whole_px = usual.whole_fraction_of_blur * std::max(0.0, widest_px - usual.usual_blur_px);
+  const double leaning_px = (blur.wide() ? usual.leaning_of_wide_blur : usual.leaning_of_blur) *
+                            beyond_px2(widest_px, usual.usual_blur_px) / radius_px;
+  errors.whole_px = std::hypot(whole_px, usual.whole_fraction_of_processing * moved_px);
+  errors.leaning_px = std::hypot(leaning_px, usual.leaning_fraction_of_processing * moved_px);
+  errors.bowed_px = usual.bowed_fraction_of_processing * moved_px;
 }
 
 // `moved_px`: by the camera's processing, root mean square of the boundaries; so much of it is doubted.
@@ -86,14 +99,12 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
   const double widest_px = blur.widest_px(), beyond_usual_blur_px = std::max(0.0, widest_px - usual.usual_blur_px);
   CommonErrors errors;
   add_boundaries(blur, processed, bias_px, departure_px, errors);
-  add_sides(blur, pass.radius_px, errors);
-  errors.whole_px = usual.whole_fraction_of_blur * beyond_usual_blur_px;
-  errors.leaning_px = (blur.wide() ? usual.leaning_of_wide_blur : usual.leaning_of_blur) *
-                      beyond_px2(widest_px, usual.usual_blur_px) / pass.radius_px;
+  const double moved_px = std::sqrt(Eigen::Map<const Eigen::Array4d>(bias_px.data()).square().mean());
+  add_sides(blur, pass.radius_px, moved_px, errors);
+  add_patterns(blur, pass.radius_px, moved_px, errors);
   const double scatter = scatter_sigmas(pass.all, lines), sigma_px = median_sigma_px(pass.all);
   errors.noise_scale = std::max(1.0, scatter);
   errors.told_noise_scale = told_noise_scale(scatter, sigma_px);
-  const double moved_px = std::sqrt(Eigen::Map<const Eigen::Array4d>(bias_px.data()).square().mean());
   errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
   errors.doubt = doubt_of(sigma_px, beyond_usual_blur_px, moved_px, processed ? usual.doubted_of_processing : 1);
   return errors;

@@ -15,8 +15,8 @@ namespace lapservo::internal {
 /// says, and what is doubted before the print is blamed.
 struct CommonErrors {
   std::array<double, measurement_groups> px{};
-  double whole_px = 0,
-         leaning_px = 0;  ///< all boundaries alike: moved along the shaft, leaning from side to side (rms)
+  /// Of all boundaries alike (rms): moved along the shaft, leaning from side to side, bowed.
+  double whole_px = 0, leaning_px = 0, bowed_px = 0;
   double noise_scale = 1;
   /// And what of all that is told of the pose, once the print was judged: what a group shares, and, 1 or less, by how
   /// much noise is smaller.

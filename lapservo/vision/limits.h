@@ -148,7 +148,11 @@ struct FineFitLimits {
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are
   /// clipped beside boundaries, the larger one. A processing that moves them by doubted_processing_px (rms) doubles the
   /// noise where a hidden boundary's print is asked for, and what `calibrate marker` says.
-  double fraction_of_processing = 0.17, fraction_of_clipped = 0.3, doubted_processing_px = 0.1;
+  double fraction_of_processing = 0.13, fraction_of_clipped = 0.3, doubted_processing_px = 0.1;
+  /// By so much of it (rms) sides are off, too, and what is left of all boundaries is moved, leaning and bowed alike,
+  /// of which psi feels little: without, phi had up to 2.5 of its sigmas in pictures with 4:2:0, and theta 2.2.
+  double side_fraction_of_processing = 0.5, whole_fraction_of_processing = 0.4, leaning_fraction_of_processing = 0.1,
+         bowed_fraction_of_processing = 0.3;
   /// And what of that is doubted before the print is blamed: of exact prints 0 to 0.1 px of 0.3 to 0.7 px are left.
   double doubted_of_processing = 0.12;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
@@ -230,8 +234,8 @@ struct DepartureLimits {
   /// gains are told; of a response at most, or it is gloss).
   double least_squares = 2.5, least_scatter = 0.3, most_response_scatter = 0.8;
   /// What one number explains, by the scatter; and of a response, which must be another besides. Of clean pictures with
-  /// highlights magnifications gain up to 6.3, real ones mostly 15 and more.
-  double least_gain = 7, least_response_gain = 5.5, least_exponent = 0.06;
+  /// highlights magnifications gain up to 6.3, of a steep marker with crosstalk 9.6; real ones mostly 15 and more.
+  double least_gain = 11, least_response_gain = 5.5, least_exponent = 0.06;
   /// From where on a magnification may be there: highlights gain as much, but leave 0.6 and more (a swing of 72 frames;
   /// magnifications that were not believed 0.1 to 0.25).
   double least_doubted_gain = 4, most_doubted_scatter = 0.4;
@@ -239,7 +243,7 @@ struct DepartureLimits {
   /// A departure's sigma takes in a part of what is left, most of which is common to all frames (exponents of 53 frames
   /// had a standard deviation of 0.008, for 0.028 by all of it), and of a response a part of itself: it is no power.
   double told_of_scatter = 0.5, told_of_response_scatter = 0.2, doubted_of_response = 0.03;
-  double least_told_scatter = 0.1;  ///< what two degrees leave may be less by chance
+  double least_told_scatter = 0.2;  ///< of the whole: what two degrees leave may be less by chance
 };
 inline constexpr DepartureLimits departure_limits;
 

@@ -83,31 +83,35 @@ double robust_certainty(const Measurement& m, const ResidualLines& lines, double
   return certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
 }
 
-// All boundaries moved alike, or leaning alike.
+// All boundaries moved alike, leaning alike, or bowed alike.
 void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, double certainty,
                       const CommonErrors& errors, PrintSums& sums) {
   const auto unknowns = sums.equations.x.size();
-  GroupPull whole, leaning;
-  whole.x = leaning.x = UnknownVector::Zero(unknowns);
-  double squares = 0;
+  const std::array<double, 3> patterns_px{errors.whole_px, errors.leaning_px, errors.bowed_px};
+  std::array<GroupPull, 3> pulls;
+  std::array<double, 3> squares{};
+  for (GroupPull& pull : pulls) pull.x = UnknownVector::Zero(unknowns);
+  double all = 0;
   for (const Measurement& m : measurements) {
     if (m.group >= errors_of_boundary.size()) continue;
     const double weight = robust_certainty(m, lines, certainty);
     const auto& edges = errors_of_boundary[m.group];
     const Eigen::Vector2d by_print = print_row(m);
-    whole.x += weight * m.row.head(unknowns);
-    leaning.x += weight * m.across * m.row.head(unknowns);
-    for (std::size_t edge = 0; edge < 2; ++edge) {
-      whole.n[edges[edge]] += weight * by_print[static_cast<Eigen::Index>(edge)];
-      leaning.n[edges[edge]] += weight * m.across * by_print[static_cast<Eigen::Index>(edge)];
+    const std::array<double, 3> moved{1, m.across, m.across * m.across - 1.0 / 3};
+    for (std::size_t i = 0; i < pulls.size(); ++i) {
+      const double part = weight * moved[i];
+      pulls[i].x += part * m.row.head(unknowns);
+      for (std::size_t edge = 0; edge < 2; ++edge)
+        pulls[i].n[edges[edge]] += part * by_print[static_cast<Eigen::Index>(edge)];
+      squares[i] += part * moved[i];
     }
-    whole.weight += weight, squares += weight * m.across * m.across;
+    all += weight;
   }
-  if (!(squares > 0)) return;
-  const double scale = std::sqrt(1 / certainty);
-  whole.error_px = whole.told_px = scale * errors.whole_px;
-  leaning.error_px = leaning.told_px = scale * errors.leaning_px * std::sqrt(whole.weight / squares);
-  sums.of_all_boundaries.push_back(whole), sums.of_all_boundaries.push_back(leaning);
+  for (std::size_t i = 0; i < pulls.size(); ++i) {
+    if (!(squares[i] > 0 && patterns_px[i] > 0)) continue;
+    pulls[i].error_px = pulls[i].told_px = std::sqrt(1 / certainty) * patterns_px[i] * std::sqrt(all / squares[i]);
+    sums.of_all_boundaries.push_back(pulls[i]);
+  }
 }
 
 template <int Unknowns>
@@ -124,7 +128,8 @@ PrintSums print_sums_of(std::span<const Measurement> measurements, const Residua
     sums.pulls[group].told_px = errors.noise_scale * errors.told_px[group];
   }
   sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), certainty, film_prior);
-  if (errors.whole_px > 0 || errors.leaning_px > 0) add_pulls_of_all(measurements, lines, certainty, errors, sums);
+  if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0)
+    add_pulls_of_all(measurements, lines, certainty, errors, sums);
   return sums;
 }
 

@@ -61,7 +61,7 @@ struct PrintSums {
   PrintEquations equations;
   UnknownMatrix of_boundaries;  ///< what boundaries alone say about pose and film
   std::array<GroupPull, measurement_groups> pulls;
-  InplaceVector<GroupPull, 2> of_all_boundaries;
+  InplaceVector<GroupPull, 3> of_all_boundaries;
 };
 
 /// Weighted robustly about `lines`. `film_prior` as the fit has it.
