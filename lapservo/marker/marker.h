@@ -34,6 +34,7 @@ struct Marker {
 
   double radius_m() const { return diameter_m / 2; }
   double covered_rad() const { return 2 * std::numbers::pi - gap_rad; }
+  bool bands_are_measured() const { return sigmas.bands_upper_m && sigmas.bands_lower_m; }
   double length_m() const { return bands_upper_m[0] + bands_upper_m[1] + bands_upper_m[2]; }
 };
 

@@ -230,7 +230,6 @@ void Fitter::tell(const PrintFit& print) {
   // What the print may add goes by how often prints are off, not by what this picture shows.
   fit_.psi_variance_by_print = print.psi_variance_by_print;
   fit_.psi_variance_suspected = print.psi_variance_suspected;
-  fit_.suspected_probability = print.suspected_probability;
   fit_.psi_variance = doubt * doubt * (print.psi_variance - print.psi_variance_by_print) + print.psi_variance_by_print;
   fit_.psi_variance_by_tolerance = doubt * doubt * print.psi_variance_by_tolerance;
   fit_.converged = true;

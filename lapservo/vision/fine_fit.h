@@ -28,8 +28,7 @@ struct FineFit {
   double psi_variance = 0;               ///< by which picture and print are judged (print_fit.h)
   double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
   double psi_variance_by_print = 0;      ///< and what the print adds beyond that
-  double psi_variance_suspected = 0;     ///< and what it adds where many prints are off (print_fit.h)
-  double suspected_probability = 0;      ///< and that this one is off by more than the tolerance then
+  double psi_variance_suspected = 0;     ///< and what one that is suspicious adds (print_fit.h)
   double inner_off_m = 3;                ///< how far off an inner boundary of the print may lie (print_fit.h)
   Processing processing = Processing::unknown;  ///< as far as asked
   int processing_explained = 0;                 ///< how often ProcessingEvidence::explained

@@ -62,22 +62,6 @@ class Mixture {
   double weight_ = 0;
 };
 
-// The variance of psi among weighted solutions.
-class PsiSpread {
- public:
-  explicit PsiSpread(Eigen::Index psi) : psi_(psi) {}
-  void add(const PrintSolution& solution, double weight) {
-    const double psi_rad = solution.step[psi_];
-    weight_ += weight, sum_ += weight * psi_rad;
-    squares_ += weight * (solution.covariance(psi_, psi_) + psi_rad * psi_rad);
-  }
-  double variance() const { return squares_ / weight_ - sum_ / weight_ * (sum_ / weight_); }
-
- private:
-  Eigen::Index psi_;
-  double weight_ = 0, sum_ = 0, squares_ = 0;
-};
-
 constexpr std::size_t sizes = print_sigmas_mm.size();
 using Weights = std::array<double, sizes + 1>;  // of the tolerated print, and of those that are off by print_sigmas_mm
 
@@ -107,6 +91,14 @@ double off_probability(const Weights& weights) {
   return 1 - weights[0] / std::accumulate(weights.begin(), weights.end(), 0.0);
 }
 
+// That it is off by far_off_mm and more.
+double far_off(const Weights& weights) {
+  double far = 0;
+  for (std::size_t i = 0; i < sizes; ++i)
+    if (print_sigmas_mm[i] >= print_limits.far_off_mm) far += weights[i + 1];
+  return far / std::accumulate(weights.begin(), weights.end(), 0.0);
+}
+
 // Solutions for a print as the rig says, exactly and but for its tolerance; of the latter also as it is to be told.
 struct AsTheRigSays {
   PrintSolution exact, tolerated, told;
@@ -131,29 +123,36 @@ std::optional<AsTheRigSays> solved_as_the_rig_says(const PrintSums& sums, double
 
 // How likely each size is, by what is believed of prints when a frame is judged, told and suspected (limits.h).
 struct Beliefs {
-  Weights judged, told;
-  std::optional<Weights> suspected;
+  Weights judged, told, suspected;
+  bool suspicious = false;
 
-  Beliefs(const Weights& gains, bool suspects)
-      : judged(weights_of(gains, print_limits.fractions)), told(weights_of(gains, print_limits.told_fractions)) {
-    if (suspects) suspected = weights_of(gains, print_limits.suspected_fractions);
+  Beliefs(const PrintInformation& evidence, const Marker& marker) {
+    const double tolerance_mm = marker.tolerance_m / mm_in_m;
+    const Weights gains = gains_of(evidence, tolerance_mm);
+    judged = weights_of(gains, print_limits.fractions);
+    told = weights_of(gains, print_limits.told_fractions);
+    suspected = weights_of(gains, print_limits.suspected_fractions);
+    const double far_off_probability = far_off(suspected);
+    if (marker.bands_are_measured() || far_off_probability < print_limits.suspicious) return;
+    const PrintInformation of_exact{evidence.information, PrintVector::Zero()};
+    const Weights usual = weights_of(gains_of(of_exact, tolerance_mm), print_limits.suspected_fractions);
+    suspicious = far_off_probability > print_limits.suspicious_of_usual * far_off(usual);
   }
   bool counts(std::size_t at) const {
     return std::max(judged[at], told[at]) >= print_limits.min_weight ||
-           (suspected && (*suspected)[at] >= print_limits.min_suspected_weight);
+           (suspicious && suspected[at] >= print_limits.min_suspected_weight);
   }
 };
 
 // The pose, whatever the print is, by each of these.
 struct Mixtures {
-  Mixture judged, told;
-  PsiSpread suspected;
+  Mixture judged, told, suspected;
 
   explicit Mixtures(int pose_unknowns)
-      : judged(pose_unknowns + 1), told(pose_unknowns + 1), suspected(pose_unknowns - 1) {}
+      : judged(pose_unknowns + 1), told(pose_unknowns + 1), suspected(pose_unknowns + 1) {}
   void add(const PrintSolution& solution, const PrintSolution& as_told, const Beliefs& beliefs, std::size_t at) {
     judged.add(solution, beliefs.judged[at]), told.add(as_told, beliefs.told[at]);
-    if (beliefs.suspected) suspected.add(solution, (*beliefs.suspected)[at]);
+    if (beliefs.suspicious) suspected.add(solution, beliefs.suspected[at]);
   }
 };
 
@@ -179,15 +178,17 @@ PrintFit told_fit(const AsTheRigSays& as_the_rig_says, const Beliefs& beliefs, c
   fit.off_probability = off_probability(beliefs.judged);
   fit.covariance =
       (mean.covariance - (1 - fit.off_probability) * as_the_rig_says.less).topLeftCorner(pose_unknowns, pose_unknowns);
-  const double widened = std::sqrt(mixtures.told.about(mean.step)(psi, psi) / fit.covariance(psi, psi));
+  double told = mixtures.told.about(mean.step)(psi, psi);
+  if (beliefs.suspicious) {
+    const double suspected = mixtures.suspected.about(mean.step)(psi, psi);
+    fit.psi_variance_suspected = suspected - tolerated;
+    told = std::max(told, suspected);
+  }
+  const double widened = std::sqrt(told / fit.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
   fit.psi_variance = judged;
   fit.psi_variance_by_print = judged - tolerated;
   fit.psi_variance_by_tolerance = tolerated - as_the_rig_says.exact.covariance(psi, psi);
-  if (beliefs.suspected) {
-    fit.suspected_probability = off_probability(*beliefs.suspected);
-    fit.psi_variance_suspected = mixtures.suspected.variance() - tolerated;
-  }
   return fit;
 }
 
@@ -202,7 +203,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   // Nothing, where the frame tells nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});
   const PrintInformation evidence = doubted(print, doubted_shapes_mm(errors.doubt, sums, marker));
-  const Beliefs beliefs(gains_of(evidence, tolerance_mm), errors.doubt.boundary_px > print_limits.least_doubt_px);
+  const Beliefs beliefs(evidence, marker);
   const auto mixtures = mixed(sums, *as_the_rig_says, beliefs, pose_unknowns, tolerance_mm);
   if (!mixtures) return std::nullopt;
   const PrintSolution mean = mixtures->judged.mean();

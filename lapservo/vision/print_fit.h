@@ -21,9 +21,9 @@ struct PrintFit {
   double off_probability = 0;            ///< that the print is off by more than the tolerance
   double psi_variance_by_tolerance = 0;  ///< of it, what the rig's tolerance adds to an exact print's
   double psi_variance_by_print = 0;      ///< and what the print adds beyond the tolerance
-  /// Where many prints are off (print_limits.suspected_fractions): what the print adds then, and that this one is off;
-  /// 0 where the picture's evidence is not doubted.
-  double psi_variance_suspected = 0, suspected_probability = 0;
+  /// And of one that is suspicious (print_limits), what it adds where many prints are off; else, and of measured bands,
+  /// 0.
+  double psi_variance_suspected = 0;
   /// How far off the rig's place on the print an inner boundary may lie as a whole, were all others where the rig says:
   /// what the residuals say and three sigma more; of both the worse. Where one is hidden the other's error is a turn,
   /// and nothing shows it: a metre and more.

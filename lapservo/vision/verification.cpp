@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
@@ -71,16 +72,12 @@ bool is_scattered(const FineFit& fit) {
          *std::max_element(moved_px.begin(), moved_px.end()) > limits.scattering_processing_px;
 }
 
-bool bands_are_measured(const Marker& marker) {
-  return marker.sigmas.bands_upper_m && marker.sigmas.bands_lower_m;
-}
-
 // Whether a print that is off would show. Where one inner boundary is left, or few lines of the other that may as well
 // be an edge of blood, its error looks like a turn. One whose bands were measured is not off, and a tolerance of that
 // size is in sigma. Where another instrument hides a part, it is asked even if both inner boundaries show: one of 13000
 // rows, with blood, was 0.13 rad wrong.
 bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool hidden_by_another) {
-  if (bands_are_measured(scene.marker)) return true;
+  if (scene.marker.bands_are_measured()) return true;
   if (scene.marker.tolerance_m >= limits.tolerance_of_prints_m) return true;
   const bool few = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) <= limits.missed_fraction;
   const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) && !few;
@@ -95,8 +92,25 @@ bool shows_wholly_among_others(const Scene& scene, const ColorAgreement& agreeme
          fit.located_fraction() > limits.located_among_others;
 }
 
+// Motion and turns move boundaries as a print's errors would; defocus is alike along the shaft and across it.
+bool has_moved(const FineFit& fit) {
+  if (variance_of_uneven_turn(fit.turn, std::nullopt) > 0) return true;
+  const auto [narrower_px, wider_px] = std::minmax(fit.blur.boundaries_px, fit.blur.sides_px);
+  const bool even =
+      wider_px < limits.even_blur * narrower_px && std::abs(fit.blur.correlation) < limits.even_correlation;
+  return fit.blur.widest_px() > limits.unblurred_px && !even;
+}
+
+// How far a print that is suspicious may let psi be off, one sigma. The smaller the marker, the less a picture tells.
+double max_sigma_suspected_rad(const FineFit& fit) {
+  if (fit.located_fraction() <= limits.well_seen_fraction || has_moved(fit))
+    return limits.max_sigma_suspected_of_hidden_rad;
+  const double scale = std::max(1.0, limits.usual_radius_px / fit.blur.radius_px);
+  return std::min(scale * limits.max_sigma_suspected_rad, limits.max_sigma_suspected_of_hidden_rad);
+}
+
 // Sigma of psi, and whom to blame when it is too large: the print or the picture.
-Status validate_sigma(const Marker& marker, const FineFit& fit, const ColorAgreement& agreement) {
+Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
   const auto squared = [](double x) { return x * x; };
   const bool off = fit.print_off_probability > limits.certainly_off;
   const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
@@ -108,8 +122,8 @@ Status validate_sigma(const Marker& marker, const FineFit& fit, const ColorAgree
   if (!(variance < limit + slack && told < told_limit + slack))
     return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
   const double suspected = variance - fit.psi_variance_by_print + fit.psi_variance_suspected;
-  if (fit.suspected_probability < limits.suspected || bands_are_measured(marker) ||
-      suspected < squared(limits.max_sigma_suspected_rad) + slack)
+  if (!fit.unknowns.q() || !(fit.psi_variance_suspected > 0) ||
+      suspected < squared(max_sigma_suspected_rad(fit)) + slack)
     return Status::ok;
   return well_seen ? Status::marker_mismatch : Status::uncertain;
 }
@@ -226,7 +240,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::uncertain;
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
-  const Status status = validate_sigma(scene.marker, fit, agreement);
+  const Status status = validate_sigma(fit, agreement);
   if (status != Status::ok || would_show_a_print_that_is_off(scene, fit, hidden_by_another)) return status;
   return too_little;
 }
