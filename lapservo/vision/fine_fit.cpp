@@ -229,6 +229,7 @@ void Fitter::tell(const PrintFit& print) {
   fit_.print_off_probability = print.off_probability;
   // What the print may add goes by how often prints are off, not by what this picture shows.
   fit_.psi_variance_by_print = print.psi_variance_by_print;
+  fit_.far_off_probability = print.far_off_probability;
   fit_.psi_variance_suspected = print.psi_variance_suspected;
   fit_.psi_variance = doubt * doubt * (print.psi_variance - print.psi_variance_by_print) + print.psi_variance_by_print;
   fit_.psi_variance_by_tolerance = doubt * doubt * print.psi_variance_by_tolerance;

@@ -28,6 +28,7 @@ struct FineFit {
   double psi_variance = 0;               ///< by which picture and print are judged (print_fit.h)
   double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
   double psi_variance_by_print = 0;      ///< and what the print adds beyond that
+  double far_off_probability = 1;        ///< where many prints are off (print_fit.h)
   double psi_variance_suspected = 0;     ///< and what one that is suspicious adds (print_fit.h)
   double inner_off_m = 3;                ///< how far off an inner boundary of the print may lie (print_fit.h)
   Processing processing = Processing::unknown;  ///< as far as asked

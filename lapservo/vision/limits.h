@@ -275,6 +275,17 @@ struct PrintLimits {
 };
 inline constexpr PrintLimits print_limits;
 
+/// What frames of a run tell of a print (print_record.cpp).
+struct PrintRecordLimits {
+  /// The rig's, of which an exact print in a usual picture falls short by far: all boundaries on nearly all lines, by
+  /// PrintFit::far_off_probability and inner_off_m.
+  double wholly_located = 0.8, most_far_off = 0.005, most_inner_off_m = 0.03e-3;
+  /// From one side that is so near, and two that show much of the same (a camera sees 1 rad to either side).
+  double near_rad = 0.6, in_view_rad = 1.2;
+  int least_off_sides = 3, off_for_the_rigs = 2;  ///< and so many times those that are the rig's
+};
+inline constexpr PrintRecordLimits print_record_limits;
+
 /// When a fit is good enough to move a robot by (verification.cpp). How far the limits are from what is found: 340 fits
 /// taken for ok in 340 rendered frames (usual, dark, blood, smoke, defocus, noise and JPEG of docs/accuracy.md, and
 /// --blood 0.4 --seed 71) have, but for one in a hundred each,

@@ -124,6 +124,7 @@ std::optional<AsTheRigSays> solved_as_the_rig_says(const PrintSums& sums, double
 // How likely each size is, by what is believed of prints when a frame is judged, told and suspected (limits.h).
 struct Beliefs {
   Weights judged, told, suspected;
+  double far_off_probability;
   bool suspicious = false;
 
   Beliefs(const PrintInformation& evidence, const Marker& marker) {
@@ -132,7 +133,7 @@ struct Beliefs {
     judged = weights_of(gains, print_limits.fractions);
     told = weights_of(gains, print_limits.told_fractions);
     suspected = weights_of(gains, print_limits.suspected_fractions);
-    const double far_off_probability = far_off(suspected);
+    far_off_probability = far_off(suspected);
     if (marker.bands_are_measured() || far_off_probability < print_limits.suspicious) return;
     const PrintInformation of_exact{evidence.information, PrintVector::Zero()};
     const Weights usual = weights_of(gains_of(of_exact, tolerance_mm), print_limits.suspected_fractions);
@@ -179,6 +180,7 @@ PrintFit told_fit(const AsTheRigSays& as_the_rig_says, const Beliefs& beliefs, c
   fit.covariance =
       (mean.covariance - (1 - fit.off_probability) * as_the_rig_says.less).topLeftCorner(pose_unknowns, pose_unknowns);
   double told = mixtures.told.about(mean.step)(psi, psi);
+  fit.far_off_probability = beliefs.far_off_probability;
   if (beliefs.suspicious) {
     const double suspected = mixtures.suspected.about(mean.step)(psi, psi);
     fit.psi_variance_suspected = suspected - tolerated;

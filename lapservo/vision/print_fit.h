@@ -21,6 +21,8 @@ struct PrintFit {
   double off_probability = 0;            ///< that the print is off by more than the tolerance
   double psi_variance_by_tolerance = 0;  ///< of it, what the rig's tolerance adds to an exact print's
   double psi_variance_by_print = 0;      ///< and what the print adds beyond the tolerance
+  /// That it is off by print_limits.far_off_mm and more, where many prints are.
+  double far_off_probability = 1;
   /// And of one that is suspicious (print_limits), what it adds where many prints are off; else, and of measured bands,
   /// 0.
   double psi_variance_suspected = 0;

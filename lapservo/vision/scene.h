@@ -12,6 +12,8 @@
 
 namespace lapservo::internal {
 
+class PrintRecord;
+
 /// One frame and the one instrument that is looked for in it. Borrows everything.
 struct Scene {
   const ImageView& image;
@@ -20,6 +22,7 @@ struct Scene {
   const Marker& marker;
   std::array<std::uint8_t, 3> bands;            ///< colour class of each band
   std::span<const ShaftCover* const> others{};  ///< that were found, near enough to hide it or to touch it
+  const PrintRecord* print = nullptr;           ///< what earlier frames showed of it, if any did
   bool among_others = false;                    ///< the colours of one that was not found may touch it
 
   /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.

@@ -116,6 +116,15 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
   return observation;
 }
 
+Observation refused(Status why, const ShaftPose& pose) {
+  Observation observation;
+  observation.status = why;
+  observation.refused.what = Observation::Refused::What::pose;
+  observation.refused.camera_from_unrolled = pose.camera_from_unrolled;
+  observation.refused.psi_rad = pose.psi_rad;
+  return observation;
+}
+
 }  // namespace
 
 SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget)
@@ -126,6 +135,7 @@ SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double
       light_(rig.camera.response.table()),
       channels_(rig.camera),
       memory_(rig.instruments.size()),
+      prints_(rig.instruments.size()),
       searches_(rig.instruments.size()),
       searched_beside_(rig.instruments.size()),
       found_(rig.instruments.size()),
@@ -145,10 +155,11 @@ void SurfaceTracker::forget(std::size_t i) {
 
 void SurfaceTracker::forget() {
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) forget(i);
+  std::fill(prints_.begin(), prints_.end(), PrintRecord());
 }
 
 Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
-  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_};
+  return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_, &prints_[i]};
 }
 
 // By how much psi's step differs from that before. Nullopt without two frames before.
@@ -167,6 +178,16 @@ void SurfaceTracker::remember(std::size_t i, const Found& found) {
   const int unasked = unasked_after(fit.processing, memory_[i] ? memory_[i]->unasked : ask_every);
   memory_[i] =
       Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px, fit.departure, found.among_others, followed};
+}
+
+// What this frame shows of the print.
+void SurfaceTracker::learn_print(std::size_t i) {
+  const Found& found = found_[i];
+  const bool off = found.status == Status::marker_mismatch && found.refused;
+  if (!off && !(found.fit && shows_the_rigs_print(*found.fit))) return;
+  const ShaftPose& pose = off ? *found.refused : found.fit->unknowns.pose();
+  if (const auto tau_rad = facing_tau_rad(rig_.instruments[i].marker, pose))
+    prints_[i].add(*tau_rad, off ? PrintRecord::View::off : PrintRecord::View::the_rigs);
 }
 
 ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {
@@ -298,19 +319,20 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
   find(image, light, budget);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
     Found& found = found_[i];
+    learn_print(i);
     observations_[i] = {};
     observations_[i].status = found.status;
-    if (found.refused) {
-      observations_[i].refused.what = Observation::Refused::What::pose;
-      observations_[i].refused.camera_from_unrolled = found.refused->camera_from_unrolled;
-      observations_[i].refused.psi_rad = found.refused->psi_rad;
-    }
+    if (found.refused) observations_[i] = refused(found.status, *found.refused);
     if (!found.fit) continue;
     // The fit was judged without: a turn that is off by a twelfth of itself at most is no reason to refuse it.
     const Eigen::Index psi = found.fit->unknowns.size() - 1;
     found.fit->covariance(psi, psi) += variance_of_uneven_turn(found.fit->turn, turn_change_rad(i, *found.fit));
-    observations_[i] = observation_of(scene_of(image, i), *found.fit, rig_.instruments[i].camera_from_rcm);
     remember(i, found);
+    if (!rig_.instruments[i].marker.bands_are_measured() && prints_[i].is_off()) {
+      observations_[i] = refused(Status::marker_mismatch, found.fit->unknowns.pose());
+      continue;
+    }
+    observations_[i] = observation_of(scene_of(image, i), *found.fit, rig_.instruments[i].camera_from_rcm);
   }
   return observations_;
 }

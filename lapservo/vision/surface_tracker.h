@@ -11,6 +11,7 @@
 #include "lapservo/vision/fine_fit.h"
 #include "lapservo/vision/marker_search.h"
 #include "lapservo/vision/observation.h"
+#include "lapservo/vision/print_record.h"
 #include "lapservo/vision/shaft_cover.h"
 
 namespace lapservo::internal {
@@ -56,6 +57,7 @@ class SurfaceTracker {
   void cover(std::size_t instrument, const ShaftPose& pose, WorkBudget& budget);
   std::optional<double> turn_change_rad(std::size_t instrument, const FineFit& fit) const;
   void remember(std::size_t instrument, const Found& found);
+  void learn_print(std::size_t instrument);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;
 
   Rig rig_;
@@ -65,6 +67,7 @@ class SurfaceTracker {
   std::array<float, 256> light_;
   ChannelGeometry channels_;
   std::vector<std::optional<Memory>> memory_;
+  std::vector<PrintRecord> prints_;
   std::vector<MarkerSearch> searches_;
   bool followed_twice_ = false, followed_in_vain_ = false;  // in this frame, one of them
   std::vector<std::size_t> searched_beside_;                // so many others the search is among, by instrument

@@ -406,6 +406,72 @@ Rig measured_rig() {
   return rig;
 }
 
+// An instrument that turns before a tracker of the rig's, with a print of its own.
+class TurningInstrument {
+ public:
+  TurningInstrument(const Rig& rig, std::uint64_t seed) : rig_(rig), tracker_(rig), random_(seed) {
+    q_ = scenes::random_configuration(rig, 0, random_);
+  }
+  // Frames that are ok, of so many, while it turns by as much each time.
+  int found(const ShaftModel& shaft, int frames, double step_rad) {
+    Renderer renderer(rig_.camera, {shaft}, make_tissue(rig_.camera.width_px, rig_.camera.height_px, 5));
+    int found = 0;
+    for (int i = 0; i < frames; ++i, q_.psi_rad += step_rad) {
+      seen_ = tracker_.track(renderer.render({placement_of(rig_.instruments[0], q_)}, random_.bits()))[0];
+      if (seen_.status != Status::ok) continue;
+      ++found;
+      expect_right(seen_, q_);
+    }
+    return found;
+  }
+  ShaftModel bloody(double fraction) {
+    ShaftModel shaft = shaft_of(rig_.instruments[0]);
+    shaft.blotches = scenes::blood(shaft.marker, fraction, random_);
+    return shaft;
+  }
+  Status status() const { return seen_.status; }
+
+ private:
+  Rig rig_;
+  Tracker tracker_;
+  Random random_;
+  JointVector q_;
+  Observation seen_;
+};
+
+// Where blood hides an inner boundary, a print that is off would look like a turn: not one that was seen before.
+TEST(SurfaceTracker, APrintThatWasSeenIsTrustedUnderBlood) {
+  constexpr int markers = 8, frames = 4;
+  constexpr double step_rad = 0.1, blood = 0.4;
+  const Rig rig = scenes::usual_rig();
+  int found = 0, found_after = 0;
+  for (std::uint64_t seed = 1; seed <= markers; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    TurningInstrument unseen(rig, seed), seen(rig, seed);
+    found += unseen.found(unseen.bloody(blood), frames, step_rad);
+    const ShaftModel bloody = seen.bloody(blood);
+    EXPECT_EQ(seen.found(shaft_of(rig.instruments[0]), frames, step_rad), frames);
+    found_after += seen.found(bloody, frames, step_rad);
+  }
+  EXPECT_EQ(found_after, markers * frames);
+  EXPECT_LT(found, 0.9 * markers * frames) << "the test's own power";
+}
+
+// A turn of such a print looks like the rig's from a side or two.
+TEST(SurfaceTracker, APrintThatIsOffFromSeveralSidesIsNotTrustedFromAnother) {
+  constexpr double step_rad = 0.35;
+  const Rig rig = scenes::usual_rig();
+  const ShaftModel exact = shaft_of(rig.instruments[0]);
+  ShaftModel off = exact;
+  for (auto* bands : {&off.marker.bands_upper_m, &off.marker.bands_lower_m}) (*bands)[0] += 2e-4, (*bands)[2] -= 2e-4;
+  TurningInstrument instrument(rig, 3);
+  EXPECT_EQ(instrument.found(off, 4, step_rad), 0);
+  EXPECT_EQ(instrument.found(exact, 1, step_rad), 0);
+  EXPECT_EQ(to_string(instrument.status()), "marker_mismatch");
+  EXPECT_GE(instrument.found(exact, 8, step_rad), 4) << "another was put in its place";
+  EXPECT_EQ(to_string(instrument.status()), "ok");
+}
+
 // Strips of two of the marker's colours, as many as it takes for a search to outlast its budget.
 cv::Mat with_strips(cv::Mat image, const Marker& marker) {
   constexpr int width = 160, height = 26;

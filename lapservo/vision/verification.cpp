@@ -11,6 +11,7 @@
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/color_evidence.h"
 #include "lapservo/vision/limits.h"
+#include "lapservo/vision/print_record.h"
 
 namespace lapservo::internal {
 namespace {
@@ -72,6 +73,13 @@ bool is_scattered(const FineFit& fit) {
          *std::max_element(moved_px.begin(), moved_px.end()) > limits.scattering_processing_px;
 }
 
+// Whether earlier frames showed that the print is the rig's from there.
+bool is_known(const Scene& scene, const FineFit& fit) {
+  if (!scene.print) return false;
+  const auto tau_rad = facing_tau_rad(scene.marker, fit.unknowns.pose());
+  return tau_rad && scene.print->is_the_rigs(*tau_rad);
+}
+
 // Whether a print that is off would show. Where one inner boundary is left, or few lines of the other that may as well
 // be an edge of blood, its error looks like a turn. One whose bands were measured is not off, and a tolerance of that
 // size is in sigma. Where another instrument hides a part, it is asked even if both inner boundaries show: one of 13000
@@ -82,6 +90,7 @@ bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool
   const bool few = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) <= limits.missed_fraction;
   const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) && !few;
   if (both_show && !hidden_by_another) return true;
+  if (is_known(scene, fit)) return true;
   return fit.inner_off_m < (few ? limits.max_inner_off_of_few_m : limits.max_inner_off_m) &&
          is_the_markers(scene, fit, 1) && is_the_markers(scene, fit, 2);
 }

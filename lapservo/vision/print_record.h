@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "lapservo/marker/marker.h"
+#include "lapservo/vision/fine_fit.h"
+#include "lapservo/vision/shaft_pose.h"
+
+namespace lapservo::internal {
+
+/// Whether a frame showed that the print is the rig's: wholly seen, its inner boundaries in their places and no print
+/// that is far off as likely.
+bool shows_the_rigs_print(const FineFit& fit);
+
+/// What a run's frames showed of one instrument's print, from each side. A print that is off looks like the rig's, but
+/// turned, from few sides; and where blood hides an inner boundary a single frame can't tell.
+class PrintRecord {
+ public:
+  enum class View : std::uint8_t { unseen, the_rigs, off };
+
+  /// The latest from there counts. `tau_rad`: of the generatrix that faces the camera, any angle.
+  void add(double tau_rad, View view);
+  /// Whether what shows from there was seen from two sides to be the rig's, and from none to be off.
+  bool is_the_rigs(double tau_rad) const;
+  /// Whether it is off from several sides, and from far more than it is the rig's.
+  bool is_off() const;
+
+ private:
+  static constexpr std::size_t sides = 24;
+  std::array<View, sides> views_{};
+};
+
+/// Which side of the print faces the camera. Nullopt where the camera is inside of the shaft.
+std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose);
+
+}  // namespace lapservo::internal
