@@ -70,20 +70,20 @@ PrintPrior prior_of(std::size_t size, double tolerance_mm) {
   return {std::hypot(print_sigmas_mm[size], tolerance_mm), print_sigmas_mm[size] >= print_limits.least_ink_aside_mm};
 }
 
-// The likelihoods' logarithms, the largest 0.
-Weights gains_of(const PrintInformation& print, double tolerance_mm) {
+// The largest 1.
+Weights likelihoods_of(const PrintInformation& print, double tolerance_mm) {
   const PrintEvidence evidence(print);
   Weights gains{evidence.gain({tolerance_mm})};
   for (std::size_t i = 0; i < sizes; ++i) gains[i + 1] = evidence.gain(prior_of(i, tolerance_mm));
   const double best = *std::max_element(gains.begin(), gains.end());
-  for (double& gain : gains) gain -= best;
+  for (double& gain : gains) gain = std::exp(gain - best);
   return gains;
 }
 
 // `fractions`: how often prints are off by print_sigmas_mm.
-Weights weights_of(const Weights& gains, const std::array<double, sizes>& fractions) {
-  Weights weights{(1 - std::accumulate(fractions.begin(), fractions.end(), 0.0)) * std::exp(gains[0])};
-  for (std::size_t i = 0; i < sizes; ++i) weights[i + 1] = fractions[i] * std::exp(gains[i + 1]);
+Weights weights_of(const Weights& likelihoods, const std::array<double, sizes>& fractions) {
+  Weights weights{(1 - std::accumulate(fractions.begin(), fractions.end(), 0.0)) * likelihoods[0]};
+  for (std::size_t i = 0; i < sizes; ++i) weights[i + 1] = fractions[i] * likelihoods[i + 1];
   return weights;
 }
 
@@ -124,19 +124,19 @@ std::optional<AsTheRigSays> solved_as_the_rig_says(const PrintSums& sums, double
 // How likely each size is, by what is believed of prints when a frame is judged, told and suspected (limits.h).
 struct Beliefs {
   Weights judged, told, suspected;
-  double far_off_probability;
+  double far_off_probability = 1;
   bool suspicious = false;
 
   Beliefs(const PrintInformation& evidence, const Marker& marker) {
     const double tolerance_mm = marker.tolerance_m / mm_in_m;
-    const Weights gains = gains_of(evidence, tolerance_mm);
-    judged = weights_of(gains, print_limits.fractions);
-    told = weights_of(gains, print_limits.told_fractions);
-    suspected = weights_of(gains, print_limits.suspected_fractions);
+    const Weights likelihoods = likelihoods_of(evidence, tolerance_mm);
+    judged = weights_of(likelihoods, print_limits.fractions);
+    told = weights_of(likelihoods, print_limits.told_fractions);
+    suspected = weights_of(likelihoods, print_limits.suspected_fractions);
     far_off_probability = far_off(suspected);
     if (marker.bands_are_measured() || far_off_probability < print_limits.suspicious) return;
     const PrintInformation of_exact{evidence.information, PrintVector::Zero()};
-    const Weights usual = weights_of(gains_of(of_exact, tolerance_mm), print_limits.suspected_fractions);
+    const Weights usual = weights_of(likelihoods_of(of_exact, tolerance_mm), print_limits.suspected_fractions);
     suspicious = far_off_probability > print_limits.suspicious_of_usual * far_off(usual);
   }
   bool counts(std::size_t at) const {
