@@ -163,6 +163,25 @@ TEST_F(CommandLine, RenderThenTrack) {
   }
 }
 
+// Of such a print nothing is told but what to do.
+TEST_F(CommandLine, SaysWhatToDoAboutAPrintThatIsOff) {
+  std::string printed = read(rig_);
+  for (const auto& [of_rig, off] :
+       {std::pair<std::string, std::string>{"[0.0035, 0.0035, 0.017]", "[0.0037, 0.0035, 0.0168]"},
+        {"[0.0095, 0.0095, 0.005]", "[0.0097, 0.0095, 0.0048]"}}) {
+    ASSERT_NE(printed.find(of_rig), std::string::npos);
+    printed.replace(printed.find(of_rig), of_rig.size(), off);
+  }
+  std::ofstream(out("printed.yaml")) << printed;
+  ASSERT_EQ(run("render --rig " + out("printed.yaml") + " --out " + out("frames") + " --count 2 --seed 5"), 0)
+      << errors();
+  EXPECT_EQ(run("track " + out("frames") + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
+  EXPECT_NE(errors().find("in 2 of 2 frames the print is not as the rig says (marker_mismatch)"), std::string::npos)
+      << errors();
+  EXPECT_NE(errors().find("lapservo calibrate marker"), std::string::npos) << errors();
+  EXPECT_EQ(CsvTable::read(out("obs.csv")).text(0, "status"), "marker_mismatch");
+}
+
 TEST_F(CommandLine, VideosAndTheBaseline) {
   ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("film") + " --count 6 --moving --video"), 0) << errors();
   ASSERT_EQ(run("track " + out("film") + "/video.mp4 --out " + out("obs.csv") + " --overlay " + out("overlay.mp4")), 0)

@@ -124,12 +124,14 @@ class RigByFrame {
 
 struct Tally {
   int frames = 0;
-  std::map<std::string, int> found;
+  std::map<std::string, int> found, mismatched;
 
   void add(const std::vector<Observation>& observations) {
     ++frames;
-    for (const Observation& observation : observations)
+    for (const Observation& observation : observations) {
       found[observation.instrument] += observation.status == Status::ok;
+      mismatched[observation.instrument] += observation.status == Status::marker_mismatch;
+    }
   }
   std::string text() const {
     std::string line;
@@ -140,6 +142,21 @@ struct Tally {
     return std::any_of(found.begin(), found.end(), [](const auto& entry) { return entry.second > 0; });
   }
 };
+
+// Whether there was something to say.
+bool say_mismatched(const Tally& tally) {
+  bool any = false;
+  for (const auto& [name, count] : tally.mismatched) {
+    if (count == 0) continue;
+    any = true;
+    std::fprintf(
+        stderr,
+        "lapservo: %s: in %d of %d frames the print is not as the rig says (marker_mismatch); lapservo calibrate "
+        "marker measures it from a slow turn\n",
+        name.c_str(), count, tally.frames);
+  }
+  return any;
+}
 
 void say_moved(const TrackOptions& options, const Frame& frame) {
   std::fprintf(
@@ -270,7 +287,9 @@ class TrackRun {
                    complaint.c_str());
       return 1;
     }
+    const bool said = say_mismatched(tally_);
     if (tally_.anything()) return 0;
+    if (said) return 1;
     std::fprintf(stderr,
                  "lapservo: no instrument was found: look at the status column, and whether the rig's hues_deg are the "
                  "print's\n");

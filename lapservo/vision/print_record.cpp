@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
@@ -28,7 +29,8 @@ bool shows_the_rigs_print(const FineFit& fit) {
 }
 
 void PrintRecord::add(double tau_rad, View view) {
-  views_[side_of(tau_rad, sides)] = view;
+  View& known = views_[side_of(tau_rad, sides)];
+  if (!(view == View::possible && known == View::the_rigs)) known = view;
 }
 
 bool PrintRecord::is_the_rigs(double tau_rad) const {
@@ -45,8 +47,9 @@ bool PrintRecord::is_the_rigs(double tau_rad) const {
 
 bool PrintRecord::is_off() const {
   const auto off = std::count(views_.begin(), views_.end(), View::off);
-  const auto the_rigs = std::count(views_.begin(), views_.end(), View::the_rigs);
-  return off >= limits.least_off_sides && off > limits.off_for_the_rigs * the_rigs;
+  const auto unseen = std::count(views_.begin(), views_.end(), View::unseen);
+  const auto others = static_cast<std::ptrdiff_t>(sides) - unseen - off;
+  return off >= limits.least_off_sides && off > limits.off_for_others * others;
 }
 
 std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose) {

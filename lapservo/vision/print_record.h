@@ -19,13 +19,15 @@ bool shows_the_rigs_print(const FineFit& fit);
 /// turned, from few sides; and where blood hides an inner boundary a single frame can't tell.
 class PrintRecord {
  public:
-  enum class View : std::uint8_t { unseen, the_rigs, off };
+  /// `possible`: nothing speaks against the rig's print, but the picture could not tell.
+  enum class View : std::uint8_t { unseen, possible, the_rigs, off };
 
-  /// The latest from there counts. `tau_rad`: of the generatrix that faces the camera, any angle.
+  /// The latest from there counts, but what is possible is no news of what was the rig's. `tau_rad`: of the generatrix
+  /// that faces the camera, any angle.
   void add(double tau_rad, View view);
   /// Whether what shows from there was seen from two sides to be the rig's, and from none to be off.
   bool is_the_rigs(double tau_rad) const;
-  /// Whether it is off from several sides, and from far more than it is the rig's.
+  /// Whether it is off from several sides, and from far more than it may be the rig's.
   bool is_off() const;
 
  private:

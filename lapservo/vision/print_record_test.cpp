@@ -52,8 +52,16 @@ TEST(PrintRecord, IsOffFromSeveralSidesUnlessItMostlyIsTheRigs) {
   EXPECT_TRUE(record.is_off());
   record.add(4, View::the_rigs);
   EXPECT_TRUE(record.is_off()) << "a turn looks like it from there";
-  record.add(5, View::the_rigs);
+  record.add(5, View::possible);
   EXPECT_FALSE(record.is_off()) << "who knows";
+}
+
+TEST(PrintRecord, APictureThatCanNotTellIsNoNews) {
+  PrintRecord record;
+  record.add(1, View::the_rigs), record.add(1.6, View::the_rigs);
+  for (const double tau_rad : {1.0, 1.6, 2.2}) record.add(tau_rad, View::possible);
+  EXPECT_TRUE(record.is_the_rigs(1.3));
+  EXPECT_FALSE(record.is_the_rigs(2.8)) << "near what could not tell, and one other";
 }
 
 // tau of the centre line, which lies on that generatrix.

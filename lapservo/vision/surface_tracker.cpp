@@ -183,11 +183,12 @@ void SurfaceTracker::remember(std::size_t i, const Found& found) {
 // What this frame shows of the print.
 void SurfaceTracker::learn_print(std::size_t i) {
   const Found& found = found_[i];
+  using View = PrintRecord::View;
   const bool off = found.status == Status::marker_mismatch && found.refused;
-  if (!off && !(found.fit && shows_the_rigs_print(*found.fit))) return;
+  if (!off && !found.fit) return;
   const ShaftPose& pose = off ? *found.refused : found.fit->unknowns.pose();
   if (const auto tau_rad = facing_tau_rad(rig_.instruments[i].marker, pose))
-    prints_[i].add(*tau_rad, off ? PrintRecord::View::off : PrintRecord::View::the_rigs);
+    prints_[i].add(*tau_rad, off ? View::off : shows_the_rigs_print(*found.fit) ? View::the_rigs : View::possible);
 }
 
 ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {

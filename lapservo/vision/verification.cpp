@@ -110,12 +110,14 @@ bool has_moved(const FineFit& fit) {
   return fit.blur.widest_px() > limits.unblurred_px && !even;
 }
 
-// How far a print that is suspicious may let psi be off, one sigma. The smaller the marker, the less a picture tells.
+// How far a print that is suspicious may let psi be off, one sigma. The smaller the marker, the less a picture tells;
+// and what compression does to boundaries scatters their points, too.
 double max_sigma_suspected_rad(const FineFit& fit) {
-  if (fit.located_fraction() <= limits.well_seen_fraction || has_moved(fit))
-    return limits.max_sigma_suspected_of_hidden_rad;
+  const bool well_seen = fit.located_fraction() > limits.well_seen_fraction;
+  if (!well_seen || has_moved(fit) || fit.inlier_rms_sigmas > limits.scattered_rms_sigmas)
+    return limits.max_sigma_suspected_of_poor_rad;
   const double scale = std::max(1.0, limits.usual_radius_px / fit.blur.radius_px);
-  return std::min(scale * limits.max_sigma_suspected_rad, limits.max_sigma_suspected_of_hidden_rad);
+  return std::min(scale * limits.max_sigma_suspected_rad, limits.max_sigma_suspected_of_poor_rad);
 }
 
 // Sigma of psi, and whom to blame when it is too large: the print or the picture.
