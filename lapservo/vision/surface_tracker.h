@@ -27,8 +27,9 @@ class SurfaceTracker {
 
   /// `image_bgr` is 8-bit BGR of the rig's size. One observation per instrument.
   const std::vector<Observation>& track(const cv::Mat& image_bgr);
-  /// Forgets what is known from the frames before, of one instrument or of all.
+  /// Forgets where an instrument was in the frames before.
   void forget(std::size_t instrument);
+  /// Forgets all of the frames before, what they showed of the prints as well.
   void forget();
   void set_frame_budget(std::optional<double> units) { frame_budget_ = units; }
 

@@ -429,6 +429,8 @@ class TurningInstrument {
     shaft.blotches = scenes::blood(shaft.marker, fraction, random_);
     return shaft;
   }
+  void is_damaged() { tracker_.refuse(Status::damaged); }
+  void is_reset() { tracker_.reset(); }
   Status status() const { return seen_.status; }
 
  private:
@@ -455,6 +457,20 @@ TEST(SurfaceTracker, APrintThatWasSeenIsTrustedUnderBlood) {
   }
   EXPECT_EQ(found_after, markers * frames);
   EXPECT_LT(found, 0.9 * markers * frames) << "the test's own power";
+}
+
+TEST(SurfaceTracker, ADamagedFrameSaysNothingOfThePrint) {
+  constexpr double step_rad = 0.35;
+  const Rig rig = scenes::usual_rig();
+  const ShaftModel exact = shaft_of(rig.instruments[0]);
+  ShaftModel off = exact;
+  off.marker.bands_upper_m[0] += 3e-4, off.marker.bands_upper_m[2] -= 3e-4;
+  TurningInstrument instrument(rig, 3);
+  EXPECT_EQ(instrument.found(off, 4, step_rad), 0);
+  instrument.is_damaged();
+  EXPECT_EQ(instrument.found(exact, 1, step_rad), 0);
+  instrument.is_reset();
+  EXPECT_EQ(instrument.found(exact, 1, step_rad), 1);
 }
 
 // A turn of such a print looks like the rig's from a side or two.

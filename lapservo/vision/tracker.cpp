@@ -117,7 +117,7 @@ std::vector<Observation> Tracker::track(const cv::Mat& image_bgr) && {
 }
 
 const std::vector<Observation>& Tracker::refuse(Status why) & {
-  reset();
+  for (std::size_t i = 0; i < state_->rig.instruments.size(); ++i) state_->surface.forget(i);
   Observation refused;
   refused.status = why;
   state_->observations.assign(state_->rig.instruments.size(), refused);

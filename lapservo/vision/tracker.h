@@ -34,7 +34,8 @@ struct TrackerOptions {
   std::optional<double> frame_budget = 8000;
 };
 
-/// Finds all instruments of a rig in the frames of one camera. Holds what it learnt from the frame before.
+/// Finds all instruments of a rig in the frames of one camera. Holds what it learnt from the frames before: where they
+/// were, what the camera does to its pictures, and whether each print is the rig's.
 class Tracker {
  public:
   explicit Tracker(const Rig& rig, TrackerOptions options = {});
@@ -53,7 +54,7 @@ class Tracker {
   /// Forgets the frame before.
   const std::vector<Observation>& refuse(Status why) &;
 
-  /// Forgets the frame before: the next one is searched anew.
+  /// Forgets all frames before: the next one is searched anew.
   void reset();
 
  private:
