@@ -277,8 +277,8 @@ inline constexpr PrintLimits print_limits;
 
 /// What frames of a run tell of a print (print_record.cpp).
 struct PrintRecordLimits {
-  /// The rig's, of which an exact print in a usual picture falls short by far: all boundaries on nearly all lines, by
-  /// PrintFit::far_off_probability and inner_off_m.
+  /// The rig's: all boundaries on nearly all lines, and at most these of PrintFit::far_off_probability and inner_off_m,
+  /// of which exact prints have 1e-5 and 10 um in usual pictures.
   double wholly_located = 0.8, most_far_off = 0.005, most_inner_off_m = 0.03e-3;
   /// From one side that is so near, and two that show much of the same (a camera sees 1 rad to either side).
   double near_rad = 0.6, in_view_rad = 1.2;
@@ -301,8 +301,8 @@ struct ValidationLimits {
   /// And of psi as it is told, of which prints that are off are more: in defocus and in the dark they show little.
   double max_sigma_told_rad = 0.04;
   /// And of psi where a third of all prints are off (suspected_fractions), if this one is suspicious: an ink that lies
-  /// 0.05 mm aside has 12.2 mrad in shafts of the usual radius. Of hidden, moved or strongly compressed markers a picture tells less:
-  /// exact prints in H.264 have 29 mrad, mostly with residuals of 1.25 to 1.6 sigma.
+  /// 0.05 mm aside has 12.2 mrad in shafts of the usual radius. Of hidden, moved or strongly compressed markers a
+  /// picture tells less: exact prints in H.264 have up to 29 mrad, mostly with residuals of 1.25 to 1.6 sigma.
   double max_sigma_suspected_rad = 0.012, usual_radius_px = 46, max_sigma_suspected_of_poor_rad = 0.03;
   double scattered_rms_sigmas = 1.25, even_blur = 1.3, even_correlation = 0.5;  ///< the latter of defocus
   /// Times what the rig's tolerance_m adds to the variance: who sets it wants to live with it.
