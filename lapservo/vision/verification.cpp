@@ -91,7 +91,9 @@ bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool
   const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) && !few;
   if (both_show && !hidden_by_another) return true;
   if (is_known(scene, fit)) return true;
-  return fit.inner_off_m < (few ? limits.max_inner_off_of_few_m : limits.max_inner_off_m) &&
+  // What another instrument hides is known: no edge of it is taken for a boundary, as one of blood may be.
+  const bool may_be_bloods = few && !hidden_by_another;
+  return fit.inner_off_m < (may_be_bloods ? limits.max_inner_off_of_few_m : limits.max_inner_off_m) &&
          is_the_markers(scene, fit, 1) && is_the_markers(scene, fit, 2);
 }
 
