@@ -133,7 +133,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> conditions(argv + std::min(argc, 3), argv + argc);
   if (conditions.empty()) {
     conditions = effects::conditions();
-    conditions.push_back("h264");
+    if (poses > 0) conditions.push_back("h264");
   }
   std::puts(
       "| set | instruments | found | psi mean [mrad] | std | rms | largest | theta, phi rms [mrad] | rho rms [mm] | "

@@ -51,6 +51,10 @@ void add_boundaries(const EdgeBlur& blur, const std::optional<ProcessedEdges>& p
   }
 }
 
+double beyond_usual_px(const EdgeBlur& blur) {
+  return std::max(0.0, blur.widest_px() - fine_fit_limits.usual_blur_px);
+}
+
 // `moved_px`: by the camera's processing, boundaries; sides are moved, too, and nobody corrects that.
 void add_sides(const EdgeBlur& blur, double radius_px, double moved_px, CommonErrors& errors) {
   const FineFitLimits& usual = fine_fit_limits;
@@ -63,10 +67,9 @@ void add_sides(const EdgeBlur& blur, double radius_px, double moved_px, CommonEr
 
 void add_patterns(const EdgeBlur& blur, double radius_px, double moved_px, CommonErrors& errors) {
   const FineFitLimits& usual = fine_fit_limits;
-  const double widest_px = blur.widest_px();
-  const double whole_px = usual.whole_fraction_of_blur * std::max(0.0, widest_px - usual.usual_blur_px);
+  const double whole_px = usual.whole_fraction_of_blur * beyond_usual_px(blur);
   const double leaning_px = (blur.wide() ? usual.leaning_of_wide_blur : usual.leaning_of_blur) *
-                            beyond_px2(widest_px, usual.usual_blur_px) / radius_px;
+                            beyond_px2(blur.widest_px(), usual.usual_blur_px) / radius_px;
   errors.whole_px = std::hypot(whole_px, usual.whole_fraction_of_processing * moved_px);
   errors.leaning_px = std::hypot(leaning_px, usual.leaning_fraction_of_processing * moved_px);
   errors.bowed_px = usual.bowed_fraction_of_processing * moved_px;
@@ -96,7 +99,6 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
                            const std::optional<ProcessedEdges>& processed, const Boundaries& bias_px,
                            const Boundaries& departure_px) {
   const FineFitLimits& usual = fine_fit_limits;
-  const double widest_px = blur.widest_px(), beyond_usual_blur_px = std::max(0.0, widest_px - usual.usual_blur_px);
   CommonErrors errors;
   add_boundaries(blur, processed, bias_px, departure_px, errors);
   const double moved_px = std::sqrt(Eigen::Map<const Eigen::Array4d>(bias_px.data()).square().mean());
@@ -105,8 +107,8 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
   const double scatter = scatter_sigmas(pass.all, lines), sigma_px = median_sigma_px(pass.all);
   errors.noise_scale = std::max(1.0, scatter);
   errors.told_noise_scale = told_noise_scale(scatter, sigma_px);
-  errors.inner_doubt_scale = doubt_scale(sigma_px, widest_px, moved_px);
-  errors.doubt = doubt_of(sigma_px, beyond_usual_blur_px, moved_px, processed ? usual.doubted_of_processing : 1);
+  errors.inner_doubt_scale = doubt_scale(sigma_px, blur.widest_px(), moved_px);
+  errors.doubt = doubt_of(sigma_px, beyond_usual_px(blur), moved_px, processed ? usual.doubted_of_processing : 1);
   return errors;
 }
 

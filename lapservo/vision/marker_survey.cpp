@@ -6,10 +6,8 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/core/angles.h"
 #include "lapservo/core/median.h"
 #include "lapservo/geometry/cylinder.h"
-#include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/light_image.h"
@@ -54,15 +52,13 @@ void take_sides(const EdgeMeasurements& from, EdgeMeasurements& edges) {
 std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unknowns, const EdgeBlur& blur,
                                     bool settled, const CameraDeparture& departure) {
   const ShaftPose& pose = unknowns.pose();
-  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
-  if (!view) return std::nullopt;
+  const auto tau_rad = facing_tau_rad(scene.marker, pose);
+  if (!tau_rad) return std::nullopt;
   const ColorAgreement agreement = color_agreement(scene, pose);
   if (agreement.in_image < 0.9 || agreement.matching < min_matching || agreement.wrong > max_wrong ||
       agreement.beside > max_beside)
     return std::nullopt;
-  return Sighting{unknowns,    blur,
-                  film_mean_m, wrap_two_pi(marker_azimuth_rad(scene.marker, view->facing_azimuth_rad, pose.psi_rad)),
-                  settled,     departure};
+  return Sighting{unknowns, blur, film_mean_m, *tau_rad, settled, departure};
 }
 
 // The fine fit where it settles, else the coarse one.

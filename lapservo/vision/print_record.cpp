@@ -5,8 +5,6 @@
 #include <cstddef>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/geometry/cylinder.h"
-#include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -50,12 +48,6 @@ bool PrintRecord::is_off() const {
   const auto unseen = std::count(views_.begin(), views_.end(), View::unseen);
   const auto others = static_cast<std::ptrdiff_t>(sides) - unseen - off;
   return off >= limits.least_off_sides && off > limits.off_for_others * others;
-}
-
-std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose) {
-  const auto view = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
-  if (!view) return std::nullopt;
-  return wrap_two_pi(marker_azimuth_rad(marker, view->facing_azimuth_rad, pose.psi_rad));
 }
 
 }  // namespace lapservo::internal

@@ -3,11 +3,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 
-#include "lapservo/marker/marker.h"
 #include "lapservo/vision/fine_fit.h"
-#include "lapservo/vision/shaft_pose.h"
 
 namespace lapservo::internal {
 
@@ -34,8 +31,5 @@ class PrintRecord {
   static constexpr std::size_t sides = 24;
   std::array<View, sides> views_{};
 };
-
-/// Which side of the print faces the camera. Nullopt where the camera is inside of the shaft.
-std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose);
 
 }  // namespace lapservo::internal

@@ -3,9 +3,6 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/random.h"
-#include "lapservo/kinematics/centre_line.h"
-#include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
 namespace print_record_test {
@@ -62,16 +59,6 @@ TEST(PrintRecord, APictureThatCanNotTellIsNoNews) {
   for (const double tau_rad : {1.0, 1.6, 2.2}) record.add(tau_rad, View::possible);
   EXPECT_TRUE(record.is_the_rigs(1.3));
   EXPECT_FALSE(record.is_the_rigs(2.8)) << "near what could not tell, and one other";
-}
-
-// tau of the centre line, which lies on that generatrix.
-TEST(PrintRecord, TheSideIsThatOfTheCentreLine) {
-  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
-    const scenes::Shot& shot = scenes::usual_shot(seed);
-    const auto tau_rad = facing_tau_rad(shot.rig.instruments[0].marker, scenes::pose_of(shot.rig, 0, shot.q));
-    ASSERT_TRUE(tau_rad);
-    EXPECT_NEAR(wrap_pi(*tau_rad - shot.line().tau_rad), 0, 1e-9) << "seed " << seed;
-  }
 }
 
 }  // namespace print_record_test

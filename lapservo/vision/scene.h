@@ -22,7 +22,7 @@ struct Scene {
   const Marker& marker;
   std::array<std::uint8_t, 3> bands;            ///< colour class of each band
   std::span<const ShaftCover* const> others{};  ///< that were found, near enough to hide it or to touch it
-  const PrintRecord* print = nullptr;           ///< what earlier frames showed of it, if any did
+  const PrintRecord* print = nullptr;           ///< what earlier frames showed of its print
   bool among_others = false;                    ///< the colours of one that was not found may touch it
 
   /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.

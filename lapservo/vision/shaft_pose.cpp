@@ -1,6 +1,16 @@
 #include "lapservo/vision/shaft_pose.h"
 
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+
 namespace lapservo::internal {
+
+std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose) {
+  const auto view = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
+  if (!view) return std::nullopt;
+  return wrap_two_pi(marker_azimuth_rad(marker, view->facing_azimuth_rad, pose.psi_rad));
+}
 
 PoseUnknowns PoseUnknowns::rcm(const Rigid3& camera_from_rcm, const JointVector& q) {
   PoseUnknowns unknowns;

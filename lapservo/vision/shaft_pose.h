@@ -7,6 +7,7 @@
 
 #include "lapservo/geometry/rigid3.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/marker/marker.h"
 
 namespace lapservo::internal {
 
@@ -16,6 +17,10 @@ struct ShaftPose {
   Rigid3 camera_from_unrolled;
   double psi_rad = 0;
 };
+
+/// Azimuth on the marker of the generatrix that faces the camera, [0, 2 pi). Nullopt where the camera is inside of the
+/// shaft.
+std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose);
 
 /// Most unknowns of a fit: a pose's six, psi included, and one of the marker.
 inline constexpr int max_unknowns = 7;

@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/geometry/cylinder.h"
+#include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {
 namespace {
@@ -84,6 +86,16 @@ TEST(PoseUnknowns, ThroughTheRcmTheyAreQ) {
   EXPECT_TRUE(moved.pose().camera_from_unrolled.translation.isApprox(expected.translation));
   EXPECT_LT(moved.pose().camera_from_unrolled.rotation.angularDistance(expected.rotation), 1e-7);
   EXPECT_FALSE(PoseUnknowns::free(unknowns.pose()).q());
+}
+
+// tau of the centre line, which lies on that generatrix.
+TEST(FacingTau, IsThatOfTheCentreLine) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const scenes::Shot& shot = scenes::usual_shot(seed);
+    const auto tau_rad = facing_tau_rad(shot.rig.instruments[0].marker, scenes::pose_of(shot.rig, 0, shot.q));
+    ASSERT_TRUE(tau_rad);
+    EXPECT_NEAR(wrap_pi(*tau_rad - shot.line().tau_rad), 0, 1e-9) << "seed " << seed;
+  }
 }
 
 }  // namespace

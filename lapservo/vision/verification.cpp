@@ -103,6 +103,10 @@ bool shows_wholly_among_others(const Scene& scene, const ColorAgreement& agreeme
          fit.located_fraction() > limits.located_among_others;
 }
 
+bool is_well_seen(const FineFit& fit) {
+  return fit.located_fraction() > limits.well_seen_fraction;
+}
+
 // Motion and turns move boundaries as a print's errors would; defocus is alike along the shaft and across it.
 bool has_moved(const FineFit& fit) {
   if (variance_of_uneven_turn(fit.turn, std::nullopt) > 0) return true;
@@ -115,8 +119,7 @@ bool has_moved(const FineFit& fit) {
 // How far a print that is suspicious may let psi be off, one sigma. The smaller the marker, the less a picture tells;
 // and what compression does to boundaries scatters their points, too.
 double max_sigma_suspected_rad(const FineFit& fit) {
-  const bool well_seen = fit.located_fraction() > limits.well_seen_fraction;
-  if (!well_seen || has_moved(fit) || fit.inlier_rms_sigmas > limits.scattered_rms_sigmas)
+  if (!is_well_seen(fit) || has_moved(fit) || fit.inlier_rms_sigmas > limits.scattered_rms_sigmas)
     return limits.max_sigma_suspected_of_poor_rad;
   const double scale = std::max(1.0, limits.usual_radius_px / fit.blur.radius_px);
   return std::min(scale * limits.max_sigma_suspected_rad, limits.max_sigma_suspected_of_poor_rad);
@@ -131,10 +134,11 @@ Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
   const double variance = fit.psi_variance, told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
   if (by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
   const double slack = limits.tolerance_slack * by_tolerance;
-  const bool well_seen = fit.located_fraction() > limits.well_seen_fraction;
+  const bool well_seen = is_well_seen(fit);
   if (!(variance < limit + slack && told < told_limit + slack))
     return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
   const double suspected = variance - fit.psi_variance_by_print + fit.psi_variance_suspected;
+  // Without the RCM it is in sigma only: there a picture tells less of the print, and no psi.
   if (!fit.unknowns.q() || !(fit.psi_variance_suspected > 0) ||
       suspected < squared(max_sigma_suspected_rad(fit)) + slack)
     return Status::ok;

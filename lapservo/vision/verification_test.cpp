@@ -202,6 +202,26 @@ TEST(Verification, APrintThatMayWellBeOffIsNotTrusted) {
   EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "off, it would make little of psi";
 }
 
+// The same picture says more to one who measured the print: who did knows where its boundaries lie.
+TEST(Verification, ThePrintIsNeverSuspiciousWhereItsBandsWereMeasured) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Rig printed = scenes::usual_rig();
+    Marker& print = printed.instruments[0].marker;
+    for (auto* bands : {&print.bands_upper_m, &print.bands_lower_m}) (*bands)[0] += 1e-4, (*bands)[2] -= 1e-4;
+    const Shot shot(seed, {}, printed);
+    const auto fit_with = [&](const Rig& rig) {
+      const Sight sight(rig, shot.bgr);
+      return fit_finely(sight.scene(), sight.light(), shot.truth(true), {});
+    };
+    Rig rig = scenes::usual_rig();
+    EXPECT_GT(fit_with(rig).psi_variance_suspected, 0);
+    MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;
+    sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
+    EXPECT_EQ(fit_with(rig).psi_variance_suspected, 0);
+  }
+}
+
 TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
   const Shot& shot = usual_shot(1);
   FineFit fit = fit_from_truth(shot);

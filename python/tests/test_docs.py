@@ -44,7 +44,7 @@ SHOWN = {"examples/cpp/": "cmake/test_install.cmake", "examples/own_robot/": "cm
 
 RUN = ("sh", "python", "cpp", "yaml")
 WIRE = re.compile(r"ros[12]:|sim-robot")  # in real time
-FRAMES, FPS = 72, 30
+FRAMES, FPS = 72, 30  # as the calibration's tests have: of 50 the registration is known just to its limit
 
 
 def reason_not_run(command):
