@@ -110,6 +110,11 @@ std::vector<PoseUnknowns> starts_in(const SearchFrame& frame, const Blob& blob,
   return starts;
 }
 
+std::vector<PoseUnknowns> rcm_starts_in(const SearchFrame& frame, const Blob& blob, WorkBudget& budget) {
+  budget.spend(costs.starts_through_rcm(!frame.scene.others.empty()));
+  return starts_through_rcm(frame.scene, blob, *frame.camera_from_rcm);
+}
+
 }  // namespace
 
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
@@ -261,7 +266,11 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   const auto rest = hidden_.blobs.rest(blobs, reach_px(frame));
   if (agreement_ && !finish_agreement(frame, budget)) return {};
   for (const Blob* blob : rest) {
-    const auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget);
+    auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget);
+    if (!frame.scene.others.empty()) {
+      const auto more = rcm_starts_in(frame, *blob, budget);
+      starts.insert(starts.end(), more.begin(), more.end());
+    }
     for (std::size_t i = hidden_.blobs.start(); i < starts.size(); ++i) {
       agreement_ = AgreementSearch(starts[i], *frame.camera_from_rcm, frame.scene.marker.length_m());
       hidden_.blobs.stop(*blob, i + 1);
@@ -282,15 +291,12 @@ Found MarkerSearch::among_others_in(const SearchFrame& frame, const Scene& scene
   budget.spend(costs.bands_in_order);
   const bool may_show = !scene.others.empty() || shows_bands_in_order(scene, blob, *frame.camera_from_rcm);
   const std::size_t first = among_others_.blobs.start();
-  if (may_show && !budget.allows(costs.rcm_starts + costs.try_start())) {
+  if (may_show && !budget.allows(costs.starts_through_rcm(!scene.others.empty()) + costs.try_start())) {
     among_others_.blobs.stop(blob, first);
     return best;
   }
   std::vector<PoseUnknowns> starts;
-  if (may_show) {
-    budget.spend(costs.rcm_starts);
-    starts = starts_through_rcm(scene, blob, *frame.camera_from_rcm);
-  }
+  if (may_show) starts = rcm_starts_in(frame, blob, budget);
   for (std::size_t i = first; i < starts.size(); ++i) {
     if (i > first && !budget.allows(costs.try_start())) {
       among_others_.blobs.stop(blob, i);

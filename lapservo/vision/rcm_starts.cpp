@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/median.h"
+#include "lapservo/vision/explained_colors.h"
 #include "lapservo/vision/line_reward.h"
 #include "lapservo/vision/line_segmentation.h"
 
@@ -241,17 +243,8 @@ std::optional<PoseUnknowns> start_of(const Scene& scene, const RaysFromRcm& rays
   return q ? std::optional(PoseUnknowns::rcm(camera_from_rcm, *q)) : std::nullopt;
 }
 
-}  // namespace
-
-bool shows_bands_in_order(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
-  if (!(camera_from_rcm.translation.norm() > 1e-3)) return false;
-  const std::vector<Place> places = places_of(scene, blob, RaysFromRcm(camera_from_rcm));
-  const auto fan = fan_over(places);
-  return fan && fraction_in_order(scene, *fan, places) >= least_in_order;
-}
-
-std::vector<PoseUnknowns> starts_through_rcm(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
-  if (!(camera_from_rcm.translation.norm() > 1e-3)) return {};
+// Of lines that are split as the scene shows them.
+std::vector<PoseUnknowns> starts_on_lines(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
   const RaysFromRcm rays(camera_from_rcm);
   const std::vector<Place> places = places_of(scene, blob, rays);
   const auto fan = fan_over(places);
@@ -263,6 +256,37 @@ std::vector<PoseUnknowns> starts_through_rcm(const Scene& scene, const Blob& blo
     if (auto start = start_of(scene, rays, extent_of(*fan, lines, window), camera_from_rcm))
       starts.push_back(std::move(*start));
   return starts;
+}
+
+// By the area of colours that they explain, most first.
+std::vector<PoseUnknowns> best_first(const Scene& scene, const std::vector<PoseUnknowns>& starts) {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    order.emplace_back(-explained_area_px2(scene, starts[i].pose(), false), i);
+  std::sort(order.begin(), order.end());
+  std::vector<PoseUnknowns> sorted;
+  for (const auto& place : order) sorted.push_back(starts[place.second]);
+  return sorted;
+}
+
+}  // namespace
+
+bool shows_bands_in_order(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
+  if (!(camera_from_rcm.translation.norm() > 1e-3)) return false;
+  const std::vector<Place> places = places_of(scene, blob, RaysFromRcm(camera_from_rcm));
+  const auto fan = fan_over(places);
+  return fan && fraction_in_order(scene, *fan, places) >= least_in_order;
+}
+
+std::vector<PoseUnknowns> starts_through_rcm(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
+  if (!(camera_from_rcm.translation.norm() > 1e-3)) return {};
+  auto starts = starts_on_lines(scene, blob, camera_from_rcm);
+  if (scene.others.empty()) return starts;
+  Scene alone = scene;
+  alone.others = {};
+  const auto more = starts_on_lines(alone, blob, camera_from_rcm);
+  starts.insert(starts.end(), more.begin(), more.end());
+  return best_first(scene, starts);
 }
 
 }  // namespace lapservo::internal
