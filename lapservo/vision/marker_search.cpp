@@ -7,6 +7,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/cut_shaft.h"
+#include "lapservo/vision/displaced_boundary.h"
 #include "lapservo/vision/initial_pose.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/rcm_starts.h"
@@ -56,10 +57,14 @@ FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& 
   return fit;
 }
 
-// A fit that is ok. One side alone holds the place of a shaft that is cut along, and where the robust loss takes that
+// A fit that is ok, unless a boundary shows elsewhere. One side alone holds the place of a shaft that is cut along, and where the robust loss takes that
 // for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on until psi rests and the side agrees.
 Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
                WorkBudget& budget) {
+  if (may_be_displaced(fit)) {
+    budget.spend(costs.fine_pass);
+    if (is_displaced(scene, light, fit)) return refusal(Status::marker_mismatch, fit.unknowns);
+  }
   if (!cut_along(scene, fit.unknowns.pose())) return {Status::ok, std::move(fit), {}};
   constexpr int most = 4;
   constexpr double rest_sigmas = 0.2, least_sides = 0.8;

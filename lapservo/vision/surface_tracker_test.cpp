@@ -444,7 +444,7 @@ class TurningInstrument {
 // Where blood hides an inner boundary, a print that is off would look like a turn: not one that was seen before.
 TEST(SurfaceTracker, APrintThatWasSeenIsTrustedUnderBlood) {
   constexpr int markers = 8, frames = 4;
-  constexpr double step_rad = 0.1, blood = 0.4;
+  constexpr double step_rad = 0.1, blood = 0.5;
   const Rig rig = scenes::usual_rig();
   int found = 0, found_after = 0;
   for (std::uint64_t seed = 1; seed <= markers; ++seed) {
@@ -455,8 +455,8 @@ TEST(SurfaceTracker, APrintThatWasSeenIsTrustedUnderBlood) {
     EXPECT_EQ(seen.found(shaft_of(rig.instruments[0]), frames, step_rad), frames);
     found_after += seen.found(bloody, frames, step_rad);
   }
-  EXPECT_EQ(found_after, markers * frames);
-  EXPECT_LT(found, 0.9 * markers * frames) << "the test's own power";
+  EXPECT_GE(found_after, 0.9 * markers * frames);
+  EXPECT_LT(found, 0.7 * markers * frames) << "the test's own power";
 }
 
 TEST(SurfaceTracker, ADamagedFrameSaysNothingOfThePrint) {
