@@ -48,7 +48,8 @@ bool is_displaced(std::span<const Measurement> measurements, std::size_t boundar
     if (m.sigma_px < limits.clear_sigma_px) clearly_px.push_back(m.residual_px);
   }
   const int displaced = most_alike(elsewhere_px);
-  return (displaced >= limits.least_lines && displaced > agreeing) || most_alike(clearly_px) >= limits.least_clear_lines;
+  return (displaced >= limits.least_lines && displaced > agreeing) ||
+         most_alike(clearly_px) >= limits.least_clear_lines;
 }
 
 }  // namespace

@@ -268,6 +268,8 @@ struct PrintLimits {
   /// `ok` without this (of 5400) 74 have more than 0.05. And by how many times that of residuals that are zero it is
   /// so: what a small or compressed picture can't tell is no suspicion.
   double far_off_mm = 0.04, suspicious = 0.02, suspicious_of_usual = 6;
+  /// Of such a print's psi sigma is told to be so many times the mean over all sizes': either it is exact or far off.
+  double suspected_told = 1.33;
   /// From this size on, inks lie aside. With smaller ones exact prints in small pictures had more sigma, and a wrong
   /// registration was no longer seen.
   double least_ink_aside_mm = 0.06;
@@ -287,13 +289,13 @@ struct PrintRecordLimits {
 };
 inline constexpr PrintRecordLimits print_record_limits;
 
-/// When an inner boundary shows elsewhere than a fit has it (displaced_boundary.cpp). Of 1186 exact prints under 40 % of
-/// blood none has a line that says so beyond those that agree; of 771 inks aside that were wrong by 0.1 rad and ok but
-/// for the rule about inner boundaries it tells 663.
+/// When an inner boundary shows elsewhere than a fit has it (displaced_boundary.cpp). Of 1186 exact prints under 40 %
+/// of blood none has a line that says so beyond those that agree; of 771 inks aside that were wrong by 0.1 rad and ok
+/// but for the rule about inner boundaries it tells 663.
 struct DisplacedLimits {
-  double located = 0.7;  ///< of the lines: on as many a fit has what shows
+  double located = 0.7;                                           ///< of the lines: on as many a fit has what shows
   double agreeing_px = 0.5, agreeing_sigmas = 4, tolerances = 3;  ///< at most so far from the fit, it agrees
-  double max_sigma_px = 0.5, alike_px = 0.4;  ///< of points that may show it elsewhere
+  double max_sigma_px = 0.5, alike_px = 0.4;                      ///< of points that may show it elsewhere
   int least_lines = 3;
   /// However many agree: exact prints have one such line at most, two of 1200 prints with bands off that were 0.2 rad
   /// wrong, over the seam, have six.

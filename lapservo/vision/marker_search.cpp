@@ -57,8 +57,9 @@ FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& 
   return fit;
 }
 
-// A fit that is ok, unless a boundary shows elsewhere. One side alone holds the place of a shaft that is cut along, and where the robust loss takes that
-// for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on until psi rests and the side agrees.
+// A fit that is ok, unless a boundary shows elsewhere. One side alone holds the place of a shaft that is cut along, and
+// where the robust loss takes that for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on
+// until psi rests and the side agrees.
 Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
                WorkBudget& budget) {
   if (may_be_displaced(fit)) {

@@ -184,7 +184,7 @@ PrintFit told_fit(const AsTheRigSays& as_the_rig_says, const Beliefs& beliefs, c
   if (beliefs.suspicious) {
     const double suspected = mixtures.suspected.about(mean.step)(psi, psi);
     fit.psi_variance_suspected = suspected - tolerated;
-    told = std::max(told, suspected);
+    told = std::max(told, print_limits.suspected_told * print_limits.suspected_told * suspected);
   }
   const double widened = std::sqrt(told / fit.covariance(psi, psi));
   fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
