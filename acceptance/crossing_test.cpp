@@ -20,6 +20,7 @@
 #include "acceptance/random_print.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
+#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/scenes.h"
@@ -105,7 +106,7 @@ void misprint_one(std::vector<ShaftModel>& shafts, Random& random) {
 void bleed(std::vector<ShaftModel>& shafts, double least, double most, Random& random) {
   for (ShaftModel& shaft : shafts) {
     const double fraction = random.uniform(least, most);
-    shaft.blotches = scenes::blood(shaft.marker, fraction, random);
+    shaft.blotches = blood_over(shaft.marker, fraction, random);
   }
 }
 void add_noise(RenderOptions& options, double times) {

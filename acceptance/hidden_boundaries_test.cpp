@@ -15,6 +15,7 @@
 #include "acceptance/tally.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
+#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/scenes.h"
@@ -63,7 +64,7 @@ void bleed_over(const Marker& print, std::size_t boundary, double of_turn, std::
 }
 
 std::vector<Blotch> blood_of(const Kind& kind, const Marker& print, Random& random) {
-  std::vector<Blotch> blood = scenes::blood(print, random.uniform(0.7, 1) * kind.beside, random);
+  std::vector<Blotch> blood = blood_over(print, random.uniform(0.7, 1) * kind.beside, random);
   for (const std::size_t boundary : kind.hidden) bleed_over(print, boundary, kind.of_turn, blood, random);
   if (kind.partly >= 0) bleed_over(print, static_cast<std::size_t>(kind.partly), 0.5, blood, random);
   return blood;

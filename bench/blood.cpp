@@ -2,6 +2,8 @@
 // pictures of an exact print, near as the samples of heavy blood are or anywhere in view, leaning little or much; then,
 // tracked, ten frames with blood of an instrument that turned in clear view before, of exact prints and of those that
 // are off (random_print.h).
+#include "lapservo/sim/blood.h"
+
 #include <array>
 #include <cstdint>
 #include <cstdlib>
@@ -46,7 +48,7 @@ class Sequence {
     clear_ = shaft_of(instrument);
     clear_.marker = off_print(instrument.marker, off, random_);
     bloody_ = clear_;
-    bloody_.blotches = scenes::blood(clear_.marker, blood, random_);
+    bloody_.blotches = blood_over(clear_.marker, blood, random_);
     tissue_ = make_tissue(rig.camera.width_px, rig.camera.height_px, random_.bits());
     step_rad_ = random_.uniform(0.02, 0.12);
   }

@@ -2,8 +2,8 @@
 // them, rendered; a row of docs/accuracy.md for each condition, with the camera as calibration would have it and as if
 // nobody had calibrated. A condition's strength is drawn anew for every frame. h264 is a marker in motion, tracked, as
 // a recorder keeps it. LAPSERVO_OFF=1: each frame's print is off in its bands, 2: in an ink that lies aside
-// (random_print.h). LAPSERVO_BLOOD: so much of the marker is hidden [%]. With POSES 0 it looks at the ray-traced
-// samples of rotation, illumination and tilt instead, where they are there (frame_sets.h).
+// (random_print.h). LAPSERVO_BLOOD: so much of the marker is hidden [%]. With "samples" for POSES it looks at the
+// ray-traced samples of rotation, illumination and tilt, where they are there (frame_sets.h).
 #include "lapservo/testing/camera_effects.h"
 
 #include <cmath>
@@ -128,18 +128,19 @@ void score_video(int poses, std::uint64_t seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const bool of_samples = argc > 1 && std::string(argv[1]) == "samples";
   const int poses = argc > 1 ? std::atoi(argv[1]) : 30;
   const auto seed = static_cast<std::uint64_t>(argc > 2 ? std::atoll(argv[2]) : 1);
   std::vector<std::string> conditions(argv + std::min(argc, 3), argv + argc);
   if (conditions.empty()) {
     conditions = effects::conditions();
-    if (poses > 0) conditions.push_back("h264");
+    if (!of_samples) conditions.push_back("h264");
   }
   std::puts(
       "| set | instruments | found | psi mean [mrad] | std | rms | largest | theta, phi rms [mrad] | rho rms [mm] | "
       "e0..e3 rms [px] | z | z of theta, phi, rho | wrong |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-  const auto frames = poses ? still_frames(poses, seed) : ray_traced_frames(seed);
+  const auto frames = of_samples ? ray_traced_frames(seed) : still_frames(poses, seed);
   for (const std::string& condition : conditions)
     condition == "h264" ? score_video(poses, seed) : score_condition(condition, frames, seed);
 }

@@ -24,6 +24,7 @@
 #include "lapservo/io/video_writer.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/kinematics/visibility.h"
+#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
@@ -90,25 +91,13 @@ cv::Mat background_light(const Camera& camera, const RenderArguments& options) {
   return light;
 }
 
-std::vector<Blotch> blotches(const Marker& marker, double fraction, Random& random) {
-  std::vector<Blotch> discs;
-  const double surface_m2 = pi * marker.diameter_m * marker.length_m();
-  double covered_m2 = 0;
-  while (covered_m2 < fraction * surface_m2) {
-    const double radius_m = random.uniform(0.08, 0.25) * marker.diameter_m;
-    discs.push_back({random.uniform(0, two_pi), random.uniform(0, marker.length_m()), radius_m});
-    covered_m2 += 0.8 * pi * radius_m * radius_m;
-  }
-  return discs;
-}
-
 Renderer make_renderer(const Rig& rig, const RenderArguments& options) {
   Random random(options.seed + 1);
   std::vector<ShaftModel> shafts;
   for (const Instrument& instrument : rig.instruments) {
     ShaftModel shaft = shaft_of(instrument);
     shaft.film_m = 1e-3 * options.film_mm;
-    shaft.blotches = blotches(instrument.marker, options.blood, random);
+    shaft.blotches = blood_over(instrument.marker, options.blood, random);
     shafts.push_back(std::move(shaft));
   }
   RenderOptions render;

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
@@ -103,7 +104,7 @@ TEST(RigEvidence, SearchesEachPictureWhole) {
   Random random(5);
   const JointVector q = scenes::random_configuration(rig, 0, random);
   ShaftModel shaft = shaft_of(rig.instruments[0]);
-  shaft.blotches = scenes::blood(shaft.marker, 0.6, random);
+  shaft.blotches = blood_over(shaft.marker, 0.6, random);
   Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
   RigEvidence evidence(rig, 0);
   evidence.add(renderer.render({placement_of(rig.instruments[0], q)}, 5), 0);

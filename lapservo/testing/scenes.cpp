@@ -167,16 +167,6 @@ cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t see
   return picture;
 }
 
-std::vector<Blotch> blood(const Marker& marker, double fraction, Random& random) {
-  std::vector<Blotch> discs;
-  for (double covered = 0; covered < fraction;) {
-    const double radius_m = random.uniform(0.08, 0.25) * marker.diameter_m, azimuth_rad = random.uniform(0, two_pi);
-    discs.push_back({azimuth_rad, random.uniform(0, marker.length_m()), radius_m});
-    covered += 0.8 * radius_m * radius_m / (marker.diameter_m * marker.length_m());
-  }
-  return discs;
-}
-
 cv::Mat render_nothing(const Rig& rig, std::uint64_t seed) {
   return Renderer(rig.camera, {}, make_tissue(rig.camera.width_px, rig.camera.height_px, seed)).render({}, seed);
 }

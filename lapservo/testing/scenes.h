@@ -41,9 +41,6 @@ CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad =
 cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,
                const RenderOptions& options = {});
 
-/// Discs of blood over about a fraction of what shows of a print.
-std::vector<Blotch> blood(const Marker& marker, double fraction, Random& random);
-
 /// Tissue alone.
 cv::Mat render_nothing(const Rig& rig, std::uint64_t seed);
 

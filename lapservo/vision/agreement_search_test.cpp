@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/scenes.h"
@@ -40,7 +41,7 @@ struct BloodyShot {
   cv::Mat picture(std::uint64_t seed, Random& random) const {
     static const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
     ShaftModel shaft = shaft_of(rig.instruments[0]);
-    shaft.blotches = scenes::blood(shaft.marker, 0.5, random);
+    shaft.blotches = blood_over(shaft.marker, 0.5, random);
     return Renderer(rig.camera, {shaft}, tissue).render({placement_of(rig.instruments[0], q)}, seed);
   }
 };

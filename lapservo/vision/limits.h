@@ -269,7 +269,7 @@ struct PrintLimits {
   /// so: what a small or compressed picture can't tell is no suspicion.
   double far_off_mm = 0.04, suspicious = 0.02, suspicious_of_usual = 6;
   /// Of such a print's psi sigma is told to be so many times the mean over all sizes': either it is exact or far off.
-  double suspected_told = 1.33;
+  double suspected_told = 1.2;
   /// From this size on, inks lie aside. With smaller ones exact prints in small pictures had more sigma, and a wrong
   /// registration was no longer seen.
   double least_ink_aside_mm = 0.06;

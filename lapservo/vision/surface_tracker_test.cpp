@@ -15,6 +15,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/camera_effects.h"
@@ -388,7 +389,7 @@ struct BloodyMotion {
     Random random(seed);
     const JointVector start = scenes::random_configuration(rig, 0, random);
     ShaftModel shaft = shaft_of(rig.instruments[0]);
-    shaft.blotches = scenes::blood(shaft.marker, fraction, random);
+    shaft.blotches = blood_over(shaft.marker, fraction, random);
     Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
     for (int i = 0; i < count; ++i) {
       q.push_back(start);
@@ -426,7 +427,7 @@ class TurningInstrument {
   }
   ShaftModel bloody(double fraction) {
     ShaftModel shaft = shaft_of(rig_.instruments[0]);
-    shaft.blotches = scenes::blood(shaft.marker, fraction, random_);
+    shaft.blotches = blood_over(shaft.marker, fraction, random_);
     return shaft;
   }
   void is_damaged() { tracker_.refuse(Status::damaged); }
