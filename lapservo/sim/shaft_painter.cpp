@@ -196,7 +196,7 @@ bool ShaftPainter::silhouette(const Corners& at, Part inner, Paint& paint) {
     outside[i] = tracer_.outside_silhouette(at.x[i], at.y[i], inner);
     if ((outside[i] < 0) != (at.part[i] == inner)) return false;
   }
-  const Coverage covered = negative_part(outside);
+  const PixelCoverage covered = negative_part(outside);
   single_.x[0] = within(at.x, covered.centre_x, covered.centre_y);
   single_.y[0] = within(at.y, covered.centre_x, covered.centre_y);
   tracer_.trace(single_, false);

@@ -5,14 +5,14 @@
 namespace lapservo::internal {
 
 /// The part of a pixel where a function is negative.
-struct Coverage {
+struct PixelCoverage {
   float fraction = 0;                ///< of the pixel's area
   float centre_x = 0, centre_y = 0;  ///< centroid, from the pixel's first corner, in [0, 1]; the middle when empty
 };
 
 /// From the function's values at the corners (0,0), (1,0), (1,1), (0,1), linear along the pixel's sides: exact for
 /// straight edges.
-inline Coverage negative_part(const std::array<float, 4>& f) {
+inline PixelCoverage negative_part(const std::array<float, 4>& f) {
   constexpr std::array<std::array<float, 2>, 4> corner{{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
   std::array<std::array<float, 2>, 8> polygon{};
   std::size_t n = 0;
