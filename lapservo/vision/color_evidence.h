@@ -13,6 +13,9 @@ namespace lapservo::internal {
 /// has one of them at most.
 int lines_with_both_colors(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
 
+/// And on how many nothing hides a boundary: colours of the marker, whichever, show on both sides, of an end inside.
+int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
+
 /// Of the ring beyond an end, the fraction with that end's colour, of both ends the larger; what shows it in patches,
 /// since noise in the dark does in single pixels.
 double spilled_in_patches(const Scene& scene, const ShaftPose& pose);

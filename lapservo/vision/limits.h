@@ -328,7 +328,7 @@ struct ValidationLimits {
   double well_seen_fraction = 0.7;  ///< of the boundary points, to blame the print
 
   /// A boundary that lies too far from its place is not located at all; where nothing hides the marker, that is the
-  /// print. Missed: below this fraction of its lines, of which there are enough.
+  /// print. Missed: below this fraction of its lines in clear view, of which there are enough.
   double unhidden_matching = 0.85, missed_fraction = 0.3, unblurred_px = 1.8;
   int enough_lines = 10;
 

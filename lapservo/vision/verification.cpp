@@ -28,12 +28,15 @@ double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azim
   return std::isfinite(length_px) ? std::max(1.0, length_px) : 1.0;
 }
 
-// The print's fault, not the scene's: nothing hides a boundary that is not where it should be.
-bool misses_a_boundary(const FineFit& fit, const ColorAgreement& agreement) {
-  bool missing = false;
-  for (std::size_t k = 0; k < 4; ++k)
-    missing |= fit.in_image[k] >= limits.enough_lines && fit.used[k] < limits.missed_fraction * fit.in_image[k];
-  return missing && agreement.matching > limits.unhidden_matching && fit.blur.boundaries_px < limits.unblurred_px;
+// The print's fault, not the scene's: a boundary is not where it should be on lines on which nothing hides it.
+bool misses_a_boundary(const Scene& scene, const FineFit& fit, const ColorAgreement& agreement) {
+  if (agreement.matching <= limits.unhidden_matching || fit.blur.boundaries_px >= limits.unblurred_px) return false;
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (fit.in_image[k] < limits.enough_lines || fit.used[k] >= limits.missed_fraction * fit.in_image[k]) continue;
+    const int clear = lines_in_clear_view(scene, fit.unknowns.pose(), k, fit.lines);
+    if (clear >= limits.enough_lines && fit.used[k] < limits.missed_fraction * clear) return true;
+  }
+  return false;
 }
 
 // Of how many of its lines a boundary is located.
@@ -126,7 +129,7 @@ double max_sigma_suspected_rad(const FineFit& fit) {
 }
 
 // Sigma of psi, and whom to blame when it is too large: the print or the picture.
-Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
+Status validate_sigma(const Scene& scene, const FineFit& fit, const ColorAgreement& agreement) {
   const auto squared = [](double x) { return x * x; };
   const bool off = fit.print_off_probability > limits.certainly_off;
   const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
@@ -134,7 +137,7 @@ Status validate_sigma(const FineFit& fit, const ColorAgreement& agreement) {
   const double told_limit = squared(told_times * limits.max_sigma_told_rad),
                by_tolerance = fit.psi_variance_by_tolerance;
   const double variance = fit.psi_variance, told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
-  if (by_tolerance < limit && misses_a_boundary(fit, agreement)) return Status::marker_mismatch;
+  if (by_tolerance < limit && misses_a_boundary(scene, fit, agreement)) return Status::marker_mismatch;
   const double slack = limits.tolerance_slack * by_tolerance;
   const bool well_seen = is_well_seen(fit);
   if (!(variance < limit + slack && told < told_limit + slack))
@@ -259,7 +262,7 @@ Status validate(const Scene& scene, const FineFit& fit) {
     return Status::uncertain;
   // Few boundaries need the sides beside them.
   if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
-  const Status status = validate_sigma(fit, agreement);
+  const Status status = validate_sigma(scene, fit, agreement);
   if (status != Status::ok || would_show_a_print_that_is_off(scene, fit, hidden_by_another)) return status;
   return too_little;
 }
