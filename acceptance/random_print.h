@@ -2,6 +2,7 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/marker/marker.h"
+#include "lapservo/testing/ink_aside.h"
 
 namespace lapservo::acceptance {
 
@@ -34,10 +35,7 @@ inline Marker off_print(const Marker& nominal, Off off, internal::Random& random
   const bool askew = random.uniform() < 0.2;
   if (off == Off::nowhere) return nominal;
   if (off == Off::bands) return random_print(nominal, error_m, askew, random).marker;
-  Marker marker = nominal;
-  const double aside_m = random.uniform() < 0.5 ? error_m : -error_m;
-  for (auto* bands : {&marker.bands_upper_m, &marker.bands_lower_m}) (*bands)[0] += aside_m, (*bands)[2] -= aside_m;
-  return marker;
+  return scenes::with_ink_aside(nominal, random.uniform() < 0.5 ? error_m : -error_m);
 }
 
 }  // namespace lapservo::acceptance

@@ -6,8 +6,8 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/geometry/camera.h"
-#include "lapservo/sim/pixel_coverage.h"
 #include "lapservo/sim/outline.h"
+#include "lapservo/sim/pixel_coverage.h"
 #include "lapservo/sim/shaft_lighting.h"
 #include "lapservo/sim/shaft_tracer.h"
 

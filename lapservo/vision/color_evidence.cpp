@@ -51,8 +51,8 @@ double spilled_beyond(const Scene& scene, const ShaftPose& pose, const CylinderV
   return seen ? static_cast<double>(spilled) / seen : 0;
 }
 
-// On how many of so many lines along the marker it is so; `holds` is given the colour class so many pixels beyond the
-// boundary.
+// On how many of so many lines along the marker it holds; `holds` is given what tells the colour class so many pixels
+// beyond the boundary.
 template <class Holds>
 int count_lines(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines, const Holds& holds) {
   constexpr double reach = 0.9;

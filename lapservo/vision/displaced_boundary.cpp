@@ -62,9 +62,9 @@ bool is_displaced(const Scene& scene, const LightImage& light, const FineFit& fi
   constexpr Effort farther{8, 3, 1};
   const DepartedLight seen(light, fit.departure);
   const EdgeMeasurements edges = measure_edges(scene, seen.light(), fit.unknowns, film_mean_m, farther, fit.blur);
-  const std::span<const Measurement> all(edges.all.begin(), edges.all.end());
   for (const std::size_t boundary : {1U, 2U})
-    if (is_doubtful(fit, boundary) && is_displaced(all, boundary, fit.bias_px[boundary], scene.marker.tolerance_m))
+    if (is_doubtful(fit, boundary) &&
+        is_displaced(edges.all, boundary, fit.bias_px[boundary], scene.marker.tolerance_m))
       return true;
   return false;
 }

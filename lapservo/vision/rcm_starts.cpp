@@ -244,16 +244,13 @@ std::optional<PoseUnknowns> start_of(const Scene& scene, const RaysFromRcm& rays
 }
 
 // Of lines that are split as the scene shows them.
-std::vector<PoseUnknowns> starts_on_lines(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
-  const RaysFromRcm rays(camera_from_rcm);
-  const std::vector<Place> places = places_of(scene, blob, rays);
-  const auto fan = fan_over(places);
-  if (!fan) return {};
+std::vector<PoseUnknowns> starts_on_lines(const Scene& scene, const RaysFromRcm& rays, const Fan& fan,
+                                          const Rigid3& camera_from_rcm) {
   Lines lines;
-  for (std::size_t i = 0; i < line_count; ++i) lines[i] = line_at(scene, rays, *fan, i);
+  for (std::size_t i = 0; i < line_count; ++i) lines[i] = line_at(scene, rays, fan, i);
   std::vector<PoseUnknowns> starts;
-  for (const Window& window : best_windows(scene, *fan, lines))
-    if (auto start = start_of(scene, rays, extent_of(*fan, lines, window), camera_from_rcm))
+  for (const Window& window : best_windows(scene, fan, lines))
+    if (auto start = start_of(scene, rays, extent_of(fan, lines, window), camera_from_rcm))
       starts.push_back(std::move(*start));
   return starts;
 }
@@ -280,11 +277,14 @@ bool shows_bands_in_order(const Scene& scene, const Blob& blob, const Rigid3& ca
 
 std::vector<PoseUnknowns> starts_through_rcm(const Scene& scene, const Blob& blob, const Rigid3& camera_from_rcm) {
   if (!(camera_from_rcm.translation.norm() > 1e-3)) return {};
-  auto starts = starts_on_lines(scene, blob, camera_from_rcm);
+  const RaysFromRcm rays(camera_from_rcm);
+  const auto fan = fan_over(places_of(scene, blob, rays));
+  if (!fan) return {};
+  auto starts = starts_on_lines(scene, rays, *fan, camera_from_rcm);
   if (scene.others.empty()) return starts;
   Scene alone = scene;
   alone.others = {};
-  const auto more = starts_on_lines(alone, blob, camera_from_rcm);
+  const auto more = starts_on_lines(alone, rays, *fan, camera_from_rcm);
   starts.insert(starts.end(), more.begin(), more.end());
   return best_first(scene, starts);
 }

@@ -19,6 +19,7 @@
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/camera_effects.h"
+#include "lapservo/testing/ink_aside.h"
 #include "lapservo/testing/motion.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/blob_search.h"
@@ -480,7 +481,7 @@ TEST(SurfaceTracker, APrintThatIsOffFromSeveralSidesIsNotTrustedFromAnother) {
   const Rig rig = scenes::usual_rig();
   const ShaftModel exact = shaft_of(rig.instruments[0]);
   ShaftModel off = exact;
-  for (auto* bands : {&off.marker.bands_upper_m, &off.marker.bands_lower_m}) (*bands)[0] += 2e-4, (*bands)[2] -= 2e-4;
+  off.marker = scenes::with_ink_aside(exact.marker, 2e-4);
   TurningInstrument instrument(rig, 3);
   EXPECT_EQ(instrument.found(off, 4, step_rad), 0);
   EXPECT_EQ(instrument.found(exact, 1, step_rad), 0);

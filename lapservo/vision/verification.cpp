@@ -134,8 +134,8 @@ Status validate_sigma(const Scene& scene, const FineFit& fit, const ColorAgreeme
   const bool off = fit.print_off_probability > limits.certainly_off;
   const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
   const double told_times = fit.psi_variance_suspected > 0 ? print_limits.suspected_told : 1;
-  const double told_limit = squared(told_times * limits.max_sigma_told_rad),
-               by_tolerance = fit.psi_variance_by_tolerance;
+  const double told_limit = squared(told_times * limits.max_sigma_told_rad);
+  const double by_tolerance = fit.psi_variance_by_tolerance;
   const double variance = fit.psi_variance, told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
   if (by_tolerance < limit && misses_a_boundary(scene, fit, agreement)) return Status::marker_mismatch;
   const double slack = limits.tolerance_slack * by_tolerance;

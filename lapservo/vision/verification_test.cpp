@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/testing/ink_aside.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/limits.h"
 
@@ -208,7 +209,7 @@ TEST(Verification, ThePrintIsNeverSuspiciousWhereItsBandsWereMeasured) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Rig printed = scenes::usual_rig();
     Marker& print = printed.instruments[0].marker;
-    for (auto* bands : {&print.bands_upper_m, &print.bands_lower_m}) (*bands)[0] += 1e-4, (*bands)[2] -= 1e-4;
+    print = scenes::with_ink_aside(print, 1e-4);
     const Shot shot(seed, {}, printed);
     const auto fit_with = [&](const Rig& rig) {
       const Sight sight(rig, shot.bgr);
