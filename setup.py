@@ -17,15 +17,14 @@ class CMakeBuild(build_ext):
     def build_extension(self, ext):
         build = pathlib.Path(os.environ.get("LAPSERVO_BUILD", SOURCE / "build" / "pip"))
         if "LAPSERVO_BUILD" not in os.environ:
-            settings = ["-DCMAKE_BUILD_TYPE=Release", "-DLAPSERVO_BUILD_TESTS=OFF", "-DLAPSERVO_BUILD_BENCH=OFF",
-                        "-DLAPSERVO_FROM_NOTHING=ON"]
+            settings = ["-DCMAKE_BUILD_TYPE=Release", "-DLAPSERVO_BUILD_TESTS=OFF", "-DLAPSERVO_BUILD_BENCH=OFF"]
             subprocess.run(["cmake", "-G", "Ninja", "-S", SOURCE, "-B", build, f"-DPython_EXECUTABLE={sys.executable}",
                             *settings], check=True)
             subprocess.run(["cmake", "--build", build, "--target", "lapservo_python"], check=True)
         built = list((build / "python" / "lapservo").glob("_lapservo.*.so"))
         if len(built) != 1:
-            sys.exit(f"{build}: has no Python extension: install what cmake/debian-packages.txt names, python3-dev and "
-                     "pybind11-dev among them")
+            sys.exit(f"{build}: has no Python extension: install the packages of the groups tool and python "
+                     "in cmake/debian-packages.txt")
         target = pathlib.Path(self.get_ext_fullpath(ext.name))
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(built[0], target)

@@ -109,12 +109,11 @@ std::vector<ShaftPlacement> placements(const Rig& rig, int index) {
 }
 
 const std::vector<cv::Mat>& moving_frames(const Rig& rig) {
-  constexpr int count = 8;
   static std::map<Key, std::vector<cv::Mat>> rendered;
   std::vector<cv::Mat>& frames = rendered[key_of(rig)];
   if (frames.empty()) {
     Renderer renderer = make_renderer(rig);
-    for (int i = 0; i < count; ++i) {
+    for (int i = 0; i < static_cast<int>(moving_frame_count); ++i) {
       frames.push_back(renderer.render(placements(rig, i), static_cast<std::uint64_t>(i)));
       paint_tag(frames.back(), 15.0 / 1100 * rig.camera.fx_px);
     }

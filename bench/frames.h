@@ -26,6 +26,7 @@ std::vector<ShaftPlacement> placements(const Rig& rig, int index);
 
 /// Frames of that motion. Each also shows a printed tag of AprilTag's family 36h11 about as large as a marker, so that
 /// detectors of tags work on the same frames. Rendered once for each rig.
+inline constexpr std::size_t moving_frame_count = 8;
 const std::vector<cv::Mat>& moving_frames(const Rig& rig);
 
 /// moving_frames back and forth without end: no jump for a tracker.

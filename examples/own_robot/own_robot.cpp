@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
-
 #include <lapservo/lapservo.h>
 
 #include "second_order_arm.h"

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <optional>
-
 #include <lapservo/robot/robot.h>
+#include <optional>
 
 // An arm of one's own: every joint is a mass on a damped spring whose other end the set-points move.
 class SecondOrderArm : public lapservo::Robot {

@@ -2,7 +2,7 @@
 
 #include <array>
 #include <cstddef>
-#include <utility>
+#include <optional>
 
 #include <fmt/format.h>
 #include <opencv2/aruco/charuco.hpp>
@@ -12,29 +12,36 @@
 namespace lapservo::internal {
 namespace {
 
-using Names = std::array<std::pair<const char*, cv::aruco::PREDEFINED_DICTIONARY_NAME>, 17>;
-constexpr Names dictionaries{{{"DICT_4X4_50", cv::aruco::DICT_4X4_50},
-                              {"DICT_4X4_100", cv::aruco::DICT_4X4_100},
-                              {"DICT_4X4_250", cv::aruco::DICT_4X4_250},
-                              {"DICT_4X4_1000", cv::aruco::DICT_4X4_1000},
-                              {"DICT_5X5_50", cv::aruco::DICT_5X5_50},
-                              {"DICT_5X5_100", cv::aruco::DICT_5X5_100},
-                              {"DICT_5X5_250", cv::aruco::DICT_5X5_250},
-                              {"DICT_5X5_1000", cv::aruco::DICT_5X5_1000},
-                              {"DICT_6X6_50", cv::aruco::DICT_6X6_50},
-                              {"DICT_6X6_100", cv::aruco::DICT_6X6_100},
-                              {"DICT_6X6_250", cv::aruco::DICT_6X6_250},
-                              {"DICT_6X6_1000", cv::aruco::DICT_6X6_1000},
-                              {"DICT_7X7_50", cv::aruco::DICT_7X7_50},
-                              {"DICT_7X7_100", cv::aruco::DICT_7X7_100},
-                              {"DICT_7X7_250", cv::aruco::DICT_7X7_250},
-                              {"DICT_7X7_1000", cv::aruco::DICT_7X7_1000},
-                              {"DICT_ARUCO_ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL}}};
+struct NamedDictionary {
+  const char* name;
+  int number;
+};
+constexpr std::array<NamedDictionary, 17> dictionaries{{{"DICT_4X4_50", cv::aruco::DICT_4X4_50},
+                                                        {"DICT_4X4_100", cv::aruco::DICT_4X4_100},
+                                                        {"DICT_4X4_250", cv::aruco::DICT_4X4_250},
+                                                        {"DICT_4X4_1000", cv::aruco::DICT_4X4_1000},
+                                                        {"DICT_5X5_50", cv::aruco::DICT_5X5_50},
+                                                        {"DICT_5X5_100", cv::aruco::DICT_5X5_100},
+                                                        {"DICT_5X5_250", cv::aruco::DICT_5X5_250},
+                                                        {"DICT_5X5_1000", cv::aruco::DICT_5X5_1000},
+                                                        {"DICT_6X6_50", cv::aruco::DICT_6X6_50},
+                                                        {"DICT_6X6_100", cv::aruco::DICT_6X6_100},
+                                                        {"DICT_6X6_250", cv::aruco::DICT_6X6_250},
+                                                        {"DICT_6X6_1000", cv::aruco::DICT_6X6_1000},
+                                                        {"DICT_7X7_50", cv::aruco::DICT_7X7_50},
+                                                        {"DICT_7X7_100", cv::aruco::DICT_7X7_100},
+                                                        {"DICT_7X7_250", cv::aruco::DICT_7X7_250},
+                                                        {"DICT_7X7_1000", cv::aruco::DICT_7X7_1000},
+                                                        {"DICT_ARUCO_ORIGINAL", cv::aruco::DICT_ARUCO_ORIGINAL}}};
 
-cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
+std::optional<cv::aruco::Dictionary> dictionary_of(const Board& board) {
   for (const auto& [name, number] : dictionaries)
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 7)
     if (board.dictionary == name) return cv::aruco::getPredefinedDictionary(number);
-  return nullptr;
+#else
+    if (board.dictionary == name) return *cv::aruco::getPredefinedDictionary(number);
+#endif
+  return {};
 }
 
 // OpenCV's search for a chessboard draws from its thread's random numbers: each picture from the same ones, whatever
@@ -82,16 +89,22 @@ std::vector<BoardCorner> find_chessboard(const Board& board, const cv::Mat& grey
 }
 
 std::vector<BoardCorner> find_charuco(const Board& board, const cv::Mat& grey) {
-  const auto dictionary = dictionary_of(board);
-  const auto charuco =
-      cv::aruco::CharucoBoard::create(board.columns + 1, board.rows + 1, static_cast<float>(board.square_m),
-                                      static_cast<float>(board.marker_m), dictionary);
+  const auto square_m = static_cast<float>(board.square_m), marker_m = static_cast<float>(board.marker_m);
   std::vector<std::vector<cv::Point2f>> markers;
   std::vector<int> marker_numbers, numbers;
+  std::vector<cv::Point2f> points;
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 7)
+  const cv::aruco::CharucoBoard charuco({board.columns + 1, board.rows + 1}, square_m, marker_m,
+                                        dictionary_of(board).value());
+  cv::aruco::CharucoDetector(charuco).detectBoard(grey, points, numbers, markers, marker_numbers);
+#else
+  const auto dictionary = cv::makePtr<cv::aruco::Dictionary>(dictionary_of(board).value());
+  const auto charuco =
+      cv::aruco::CharucoBoard::create(board.columns + 1, board.rows + 1, square_m, marker_m, dictionary);
   cv::aruco::detectMarkers(grey, dictionary, markers, marker_numbers);
   if (marker_numbers.empty()) return {};
-  std::vector<cv::Point2f> points;
   cv::aruco::interpolateCornersCharuco(markers, marker_numbers, grey, charuco, points, numbers);
+#endif
   std::vector<BoardCorner> corners;
   for (std::size_t i = 0; i < points.size(); ++i)
     corners.push_back({numbers[i] % board.columns, numbers[i] / board.columns, {points[i].x, points[i].y}});

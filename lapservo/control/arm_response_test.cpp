@@ -81,8 +81,8 @@ TEST(ArmResponse, LearnsNothingFromABlockedJoint) {
   EXPECT_TRUE(response.drive().friction.isZero());
 }
 
-// Nor what its motor winds up of the transmission, an eighth of the way and 40 ms late, when the set-point slows down at
-// the end of its leash.
+// Nor what its motor winds up of the transmission, an eighth of the way and 40 ms late, when the set-point slows down
+// at the end of its leash.
 TEST(ArmResponse, AWoundTransmissionIsNoLoad) {
   constexpr double lag_s = 0.04, wound = 0.125;
   ArmResponse response{Scales{}};

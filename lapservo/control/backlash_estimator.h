@@ -6,9 +6,9 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/robot/backlash.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/feature_model.h"
+#include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
 

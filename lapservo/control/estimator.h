@@ -32,8 +32,8 @@ class Estimator {
   /// False while it is a guess that motion will tell better.
   virtual bool delay_is_known() const { return true; }
 
-  /// Another camera_from_rcm: what was learnt of delay and backlash holds. Where the instrument is the next image tells,
-  /// if `anew`.
+  /// Another camera_from_rcm: what was learnt of delay and backlash holds. Where the instrument is the next image
+  /// tells, if `anew`.
   virtual void set_model(const FeatureModel& model, bool anew);
 
   /// The measured joints jumped: nothing is to be learnt across.

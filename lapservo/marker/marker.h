@@ -61,8 +61,8 @@ double distance_to_seam_rad(const Marker& marker, double tau_rad);
 /// Whether the print is there at all.
 bool is_printed(const Marker& marker, double tau_rad);
 
-/// nullopt when lengths, hues and sums make a marker; else what is wrong with the first field that doesn't. Does not ask
-/// whether the cross-ratio can be decoded: see CrossRatioDecoder.
+/// nullopt when lengths, hues and sums make a marker; else what is wrong with the first field that doesn't. Does not
+/// ask whether the cross-ratio can be decoded: see CrossRatioDecoder.
 std::optional<FieldProblem> marker_problem(const Marker& marker);
 
 /// Two markers whose bands have the same hues in the same places can't be told apart by colour.

@@ -18,8 +18,8 @@ struct PairwiseMean {
   std::size_t pairs = 0;
 };
 
-/// The projected RCM as the paper has it (eq. 9, section II-C): the mean of the intersections of all pairs of lines. Every pair
-/// counts the same, also one that is nearly parallel and meets anywhere: kept as the baseline, use
+/// The projected RCM as the paper has it (eq. 9, section II-C): the mean of the intersections of all pairs of lines.
+/// Every pair counts the same, also one that is nearly parallel and meets anywhere: kept as the baseline, use
 /// estimate_projected_rcm(). nullopt when no two usable lines meet. Takes time with the square of the lines.
 std::optional<PairwiseMean> mean_of_intersections(std::span<const LineObservation> lines);
 

@@ -6,7 +6,9 @@ namespace fs = std::filesystem;
 
 namespace lapservo::testing {
 
-fs::path source_folder() { return LAPSERVO_SOURCE_DIR; }
+fs::path source_folder() {
+  return LAPSERVO_SOURCE_DIR;
+}
 
 std::optional<fs::path> sample_frames(std::string_view folder) {
   const char* const given = std::getenv("LAPSERVO_FRAMES");

@@ -18,14 +18,13 @@
 namespace lapservo::internal {
 namespace {
 
-// A camera that did nothing to its pictures is asked again after so many frames; one that does, in every frame. A frame
-// that can't tell changes neither.
-constexpr int ask_every = 16;
-
-int unasked_after(Processing processing, int before) {
-  if (processing == Processing::found) return ask_every;
-  if (processing == Processing::none) return 1;
-  return std::min(before + 1, ask_every);
+// Whether or not the frame's fit looked at the camera.
+LookSchedule schedule_after(const FineFit& fit, LookSchedule schedule) {
+  if (schedule.is_due())
+    schedule.looked(fit.processing, fit.processing_explained > 0);
+  else
+    schedule.passed();
+  return schedule;
 }
 
 // How sure the fit is of what the centre line shows.
@@ -175,9 +174,9 @@ void SurfaceTracker::remember(std::size_t i, const Found& found) {
   UnknownVector velocity = UnknownVector::Zero(fit.unknowns.size());
   const bool followed = memory_[i] && memory_[i]->last.q() && fit.unknowns.q();
   if (followed) velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
-  const int unasked = unasked_after(fit.processing, memory_[i] ? memory_[i]->unasked : ask_every);
+  const LookSchedule looks = schedule_after(fit, memory_[i] ? memory_[i]->looks : LookSchedule{});
   memory_[i] =
-      Memory{fit.unknowns, velocity, fit.blur, unasked, fit.bias_px, fit.departure, found.among_others, followed};
+      Memory{fit.unknowns, velocity, fit.blur, looks, fit.bias_px, fit.departure, found.among_others, followed};
 }
 
 // What this frame shows of the print.
@@ -192,7 +191,7 @@ void SurfaceTracker::learn_print(std::size_t i) {
 }
 
 ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {
-  return {unasked >= ask_every, bias_px, departure};
+  return {looks.is_due(), bias_px, departure};
 }
 
 // To `others_`.

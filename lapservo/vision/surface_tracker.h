@@ -9,6 +9,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/color_classes.h"
 #include "lapservo/vision/fine_fit.h"
+#include "lapservo/vision/look_schedule.h"
 #include "lapservo/vision/marker_search.h"
 #include "lapservo/vision/observation.h"
 #include "lapservo/vision/print_record.h"
@@ -38,7 +39,7 @@ class SurfaceTracker {
     PoseUnknowns last;
     UnknownVector velocity;  // per frame
     EdgeBlur blur;
-    int unasked = 0;  // frames since the camera was found to do nothing to its pictures
+    LookSchedule looks;
     std::array<double, 4> bias_px{};
     CameraDeparture departure;
     bool among_others = false;  // Found::among_others

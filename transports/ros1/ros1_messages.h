@@ -2,6 +2,7 @@
 
 #include <crtk_msgs/OperatingState.h>
 #include <crtk_msgs/StringStamped.h>
+#include <cstddef>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <lapservo_msgs/Observation.h>
@@ -17,7 +18,8 @@
 
 namespace lapservo::internal {
 
-/// ROS's headers ask allocators for what C++20 took away from std::allocator. Text stays std::string.
+/// ROS's headers use rebind, which std::allocator lost in C++20. Text stays std::string: the messages' own allocator is
+/// not one of char, since C++'s library requires that an allocator rebound to its own type is itself.
 template <typename T>
 struct Ros1Allocator : std::allocator<T> {
   template <typename Other>
@@ -26,16 +28,16 @@ struct Ros1Allocator : std::allocator<T> {
   };
 };
 namespace ros1 {
-using JointState = sensor_msgs::JointState_<Ros1Allocator<char>>;
-using JointTrajectory = trajectory_msgs::JointTrajectory_<Ros1Allocator<char>>;
-using OperatingState = crtk_msgs::OperatingState_<Ros1Allocator<char>>;
-using StringStamped = crtk_msgs::StringStamped_<Ros1Allocator<char>>;
-using Image = sensor_msgs::Image_<Ros1Allocator<char>>;
-using CompressedImage = sensor_msgs::CompressedImage_<Ros1Allocator<char>>;
-using CameraInfo = sensor_msgs::CameraInfo_<Ros1Allocator<char>>;
-using PoseWithCovarianceStamped = geometry_msgs::PoseWithCovarianceStamped_<Ros1Allocator<char>>;
-using DiagnosticArray = diagnostic_msgs::DiagnosticArray_<Ros1Allocator<char>>;
-using Observation = lapservo_msgs::Observation_<Ros1Allocator<char>>;
+using JointState = sensor_msgs::JointState_<Ros1Allocator<std::byte>>;
+using JointTrajectory = trajectory_msgs::JointTrajectory_<Ros1Allocator<std::byte>>;
+using OperatingState = crtk_msgs::OperatingState_<Ros1Allocator<std::byte>>;
+using StringStamped = crtk_msgs::StringStamped_<Ros1Allocator<std::byte>>;
+using Image = sensor_msgs::Image_<Ros1Allocator<std::byte>>;
+using CompressedImage = sensor_msgs::CompressedImage_<Ros1Allocator<std::byte>>;
+using CameraInfo = sensor_msgs::CameraInfo_<Ros1Allocator<std::byte>>;
+using PoseWithCovarianceStamped = geometry_msgs::PoseWithCovarianceStamped_<Ros1Allocator<std::byte>>;
+using DiagnosticArray = diagnostic_msgs::DiagnosticArray_<Ros1Allocator<std::byte>>;
+using Observation = lapservo_msgs::Observation_<Ros1Allocator<std::byte>>;
 }  // namespace ros1
 
 // A message as ROS 1's type.
