@@ -53,12 +53,13 @@ JointRecording joint_recording_of(const CsvTable& table, const std::string& sour
   JointRecording recording;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const double time_s = table.number(row, "time_s");
+    std::array<double, 4> at;
+    for (std::size_t i = 0; i < at.size(); ++i) at[i] = table.number(row, joints.names[i]);
+    if (!recording.time_s.empty() && time_s == recording.time_s.back() && at == recording.joints.back()) continue;
     if (!recording.time_s.empty() && !(time_s > recording.time_s.back()))
       throw InputError(source, "row " + std::to_string(row + 1) + ": time_s", table.text(row, "time_s"),
                        "later than the row before: the clock jumps");
-    recording.time_s.push_back(time_s);
-    auto& at = recording.joints.emplace_back();
-    for (std::size_t i = 0; i < at.size(); ++i) at[i] = table.number(row, joints.names[i]);
+    recording.time_s.push_back(time_s), recording.joints.push_back(at);
   }
   if (recording.time_s.size() < 2) throw InputError(source, "has fewer than two rows");
   return recording;

@@ -21,7 +21,8 @@ struct JointRecording {
 };
 
 /// A CSV of `time_s` and a column a joint (docs/conventions.md). Throws InputError for columns that are missing,
-/// numbers that are none, fewer than two rows and times that do not rise.
+/// numbers that are none, fewer than two rows and times that do not rise. A row that repeats the one before is passed
+/// over.
 JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints);
 
 /// The same of a table that was read already; `source` is named in complaints.

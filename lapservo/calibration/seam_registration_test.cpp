@@ -92,5 +92,17 @@ TEST(JointRecording, NamesWhatIsWrong) {
   EXPECT_EQ(recording.joints[1], (std::array<double, 4>{5, 6, 7, 8}));
 }
 
+TEST(JointRecording, PassesOverARowThatRepeatsTheOneBefore) {
+  const lapservo::testing::TemporaryFolder folder;
+  const auto path = folder / "joints.csv";
+  const Joints joints = instrument_with_joints().joints.value();
+  const std::string begin = "time_s,yaw,pitch,insertion,roll\n0,1,2,3,4\n0,1,2,3,4\n";
+  write_file(path, begin + "1,5,6,7,8\n1,5,6,7,8\n");
+  EXPECT_EQ(read_joint_recording(path, joints).time_s, (std::vector<double>{0, 1}));
+  write_file(path, begin + "0,1,2,3,5\n1,5,6,7,8\n");
+  EXPECT_NE(lapservo::testing::input_error([&] { read_joint_recording(path, joints); }).find("clock jumps"),
+            std::string::npos);
+}
+
 }  // namespace seam_registration_test
 }  // namespace lapservo::internal

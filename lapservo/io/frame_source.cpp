@@ -48,8 +48,7 @@ class VideoSource : public FrameSource {
   std::optional<Frame> next() override {
     auto image = first_ ? std::exchange(first_, std::nullopt) : video_.next();
     if (!image) return std::nullopt;
-    Frame frame{std::move(image->bgr), index_, index_ / frames_per_second(), {}, {}};
-    ++index_;
+    Frame frame{std::move(image->bgr), index_++, image->time_s, {}, {}};
     if (image->damaged) {
       frame.flaw = Status::damaged;
     } else if (has_few_colors(frame.bgr)) {
@@ -78,7 +77,9 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
     const bool hidden = entry.path().filename().string().starts_with(".");
     if (!hidden && entry.is_regular_file(error) && has_image_extension(entry.path())) files.push_back(entry.path());
   }
-  std::sort(files.begin(), files.end());
+  // frame9.png comes before frame10.png.
+  std::sort(files.begin(), files.end(),
+            [](const fs::path& a, const fs::path& b) { return strverscmp(a.c_str(), b.c_str()) < 0; });
   if (files.empty())
     throw InputError(folder.string(), "has no pictures, expected some (png, jpg, bmp, tif, webp, ppm)");
   return files;

@@ -19,7 +19,8 @@ struct Frame {
   std::optional<Status> flaw;  ///< why nothing is to be measured in it
 };
 
-/// Frames of a picture, a folder of pictures (sorted by name), a video file, a camera ("0", "/dev/video0") or a stream
+/// Frames of a picture, a folder of pictures (sorted by name, numbers in names by value), a video file, a camera ("0",
+/// "/dev/video0") or a stream
 /// ("rtsp://...").
 class FrameSource {
  public:

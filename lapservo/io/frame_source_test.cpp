@@ -14,6 +14,7 @@ extern "C" {
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"
+#include "lapservo/io/image_file.h"
 #include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/io/libav.h"
 #include "lapservo/io/video_reader.h"
@@ -60,6 +61,18 @@ TEST(VideoReader, IsPatientOnceItIsOpen) {
   while (reader.next()) ++count;
   EXPECT_EQ(count, frames);
   EXPECT_EQ(reader.complaint(), "");
+}
+
+TEST(FolderSource, OrdersNumbersInNamesByValue) {
+  const testing::TemporaryFolder folder;
+  for (const int number : {10, 9, 100, 1, 0}) {
+    cv::Mat picture(16, 16, CV_8UC3, cv::Scalar::all(number));
+    write_image(folder / ("frame" + std::to_string(number) + ".png"), picture);
+  }
+  const auto source = open_frame_source(folder.path().string(), 30);
+  std::vector<int> order;
+  while (const auto frame = source->next()) order.push_back(frame->bgr.at<cv::Vec3b>(0, 0)[0]);
+  EXPECT_EQ(order, (std::vector<int>{0, 1, 9, 10, 100}));
 }
 
 TEST(VideoSource, SaysThatAVideoEndsEarly) {

@@ -194,7 +194,8 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
   if (bytes.empty()) throw InputError(source, "is empty, expected a picture");
   check_whole(bytes, source);
   refuse_unread(bytes, source);
-  if (const auto orientation = exif_orientation(bytes); orientation && *orientation != 1)
+  // 0 and numbers above 8 have no meaning in EXIF; they are shown upright everywhere.
+  if (const auto orientation = exif_orientation(bytes); orientation && *orientation >= 2 && *orientation <= 8)
     throw InputError(source, "EXIF orientation", std::to_string(*orientation),
                      "1: the pixels as the calibrated camera has them, not to be turned");
   DecodedPicture decoded = decode(bytes);

@@ -9,11 +9,15 @@
 
 extern "C" {
 #include <libavutil/display.h>
+#include <libavutil/pixdesc.h>
 }
+
+#include <fmt/format.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/jpeg_picture.h"
 #include "lapservo/io/libav.h"
+#include "lapservo/io/yuv_colors.h"
 
 namespace lapservo::internal {
 namespace {
@@ -69,9 +73,8 @@ class VideoReader::State {
   }
 
   std::string complaint() const {
-    constexpr double slack = 0.01;  // durations are rounded, and sound may last longer
-    if (const auto announced = frame_count(); announced && frames_ < *announced - 2 - slack * *announced)
-      return "ends early, after " + std::to_string(frames_) + " of " + std::to_string(*announced) + " frames";
+    if (const auto announced_s = duration_s(); announced_s && end_s_ < *announced_s)
+      return fmt::format("ends early, after {:.2f} of {:.2f} s", end_s_, *announced_s);
     const bool transport = std::string_view(format_->iformat->name) == "mpegts";
     if (transport && format_->pb && avio_size(format_->pb) % transport_packet_bytes != 0) return "ends within a frame";
     return damaged_ > 0 ? "is damaged in " + std::to_string(damaged_) + " of " + std::to_string(frames_) + " frames"
@@ -143,6 +146,7 @@ class VideoReader::State {
     const bool packet_flawed = std::exchange(tainted_, false);
     spoiled_ = flawed || packet_flawed || (spoiled_ && frame_->key_frame == 0);
     convert();
+    advance(frame_->best_effort_timestamp, frame_->pkt_duration);
     av_frame_unref(frame_.get());
     return counted(spoiled_);
   }
@@ -150,24 +154,75 @@ class VideoReader::State {
     spoiled_ = true;
     if (last_.empty())
       last_ = cv::Mat::zeros(std::max(1, stream_->codecpar->height), std::max(1, stream_->codecpar->width), CV_8UC3);
+    advance(AV_NOPTS_VALUE, 0);
     return counted(true);
   }
   Image counted(bool damaged) {
     ++frames_;
     damaged_ += damaged ? 1 : 0;
-    return {last_.clone(), damaged};
+    return {last_.clone(), damaged, time_s_.value_or(0)};
+  }
+
+  // Frames that the container gives no time, or none later than the frame before, follow at the stream's rate.
+  void advance(std::int64_t stamp, std::int64_t duration) {
+    const double unit_s = av_q2d(stream_->time_base), period_s = 1 / frames_per_second();
+    const double by_rate_s = time_s_ ? *time_s_ + period_s : 0;
+    const double at_s = stamp == AV_NOPTS_VALUE ? by_rate_s : static_cast<double>(stamp) * unit_s - first_s_;
+    if (stamp != AV_NOPTS_VALUE && !std::exchange(stamped_, true)) {
+      first_s_ = at_s - by_rate_s;
+      time_s_ = by_rate_s;
+    } else {
+      time_s_ = time_s_ && !(at_s > *time_s_) ? by_rate_s : at_s;
+    }
+    end_s_ = *time_s_ + std::max(period_s, static_cast<double>(duration) * unit_s);
+  }
+
+  // Of the video alone where the container knows it; less what rounding and sound may add.
+  std::optional<double> duration_s() const {
+    double announced_s = 0;
+    if (stream_->duration != AV_NOPTS_VALUE && stream_->duration > 0)
+      announced_s = static_cast<double>(stream_->duration) * av_q2d(stream_->time_base);
+    else if (format_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM && format_->duration > 0)
+      announced_s = static_cast<double>(format_->duration) / AV_TIME_BASE;
+    if (!(announced_s > 0)) return std::nullopt;
+    constexpr double slack = 0.01;
+    return (1 - slack) * announced_s - 2 / frames_per_second();
+  }
+
+  // The scaler that reads such frames, by each frame's own tags: a stream's may change.
+  void update_scaler() {
+    const AVPixelFormat format = pixel_format_of(*frame_);
+    const AVPixFmtDescriptor* const description = av_pix_fmt_desc_get(format);
+    const bool is_rgb = description && (description->flags & AV_PIX_FMT_FLAG_RGB) != 0;
+    const auto colors = is_rgb ? YuvColors() : yuv_colors_of(*frame_);
+    if (!colors)
+      throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
+                       "bt709, smpte170m, bt470bg, bt2020nc, fcc or smpte240m (convert it: ffmpeg -i IN -vf "
+                       "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
+    const Scaled scaled{frame_->width, frame_->height, format, *colors};
+    if (scaler_ && scaled == scaled_) return;
+    scaler_.reset(sws_getContext(frame_->width, frame_->height, format, frame_->width, frame_->height, AV_PIX_FMT_BGR24,
+                                 SWS_BICUBIC, nullptr, nullptr, nullptr));
+    if (!scaler_) throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
+    if (!is_rgb) set_colors(*scaler_, *colors);
+    scaled_ = scaled;
   }
 
   void convert() {
-    const int width = frame_->width, height = frame_->height;
-    scaler_.reset(sws_getCachedContext(scaler_.release(), width, height, static_cast<AVPixelFormat>(frame_->format),
-                                       width, height, AV_PIX_FMT_BGR24, SWS_BICUBIC, nullptr, nullptr, nullptr));
-    if (!scaler_) throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
+    const int height = frame_->height, width = frame_->width;
+    update_scaler();
     last_.create(height, width, CV_8UC3);
     std::uint8_t* rows[4] = {last_.data};
     const int steps[4] = {static_cast<int>(last_.step)};
     sws_scale(scaler_.get(), frame_->data, frame_->linesize, 0, height, rows, steps);
   }
+
+  struct Scaled {
+    int width_px = 0, height_px = 0;
+    AVPixelFormat format = AV_PIX_FMT_NONE;
+    YuvColors colors;
+    bool operator==(const Scaled&) const = default;
+  };
 
   std::string source_;
   Kind kind_;
@@ -178,8 +233,13 @@ class VideoReader::State {
   libav::Packet packet_{av_packet_alloc()};
   libav::Frame frame_{av_frame_alloc()};
   libav::Scaler scaler_;
+  Scaled scaled_;  // what scaler_ reads
   AVStream* stream_ = nullptr;
   cv::Mat last_;
+  std::optional<double> time_s_;  // of the last frame, since the first
+  double end_s_ = 0;              // of the last frame
+  double first_s_ = 0;            // the first frame's stamp
+  bool stamped_ = false;          // a frame had a stamp
   int frames_ = 0, damaged_ = 0;
   bool tainted_ = false;  // a packet since the last frame was damaged on its way
   bool spoiled_ = false;  // the last frame is damaged

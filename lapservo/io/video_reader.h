@@ -16,6 +16,7 @@ class VideoReader {
   struct Image {
     cv::Mat bgr;           ///< 8-bit; of a frame that can't be decoded at all, the one before (or black)
     bool damaged = false;  ///< the decoder complained of it, or of one that it was predicted from
+    double time_s = 0;     ///< since the first frame, by the container's time stamps; where it has none, by the rate
   };
 
   /// A stream (rtsp://...) is waited for as long when it falls silent, and has ended then.
@@ -33,7 +34,7 @@ class VideoReader {
   /// As the file announces it; nullopt when it doesn't.
   std::optional<int> frame_count() const;
   double frames_per_second() const;
-  /// After the end: that fewer frames came than the file announces or that it ends within one, else empty.
+  /// After the end: that the frames end before the duration that the container announces or within a frame, else empty.
   std::string complaint() const;
 
  private:

@@ -49,6 +49,46 @@ std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns
   return numbers;
 }
 
+// ROS's plumb_bob: k1 k2 p1 p2 k3. Drivers leave k3 out, or all of them where there is no distortion, and write it as
+// rational_polynomial with k4 k5 k6 of 0.
+std::array<double, 5> parse_distortion(const YamlField& field) {
+  constexpr auto expected = "k1 k2 p1 p2 k3, of which k3 or all may be left out, or k4 k5 k6 of 0 follow";
+  expect_keys(field, {{"rows", "cols"}, {"data"}});
+  const YamlField data = field["data"];
+  const auto rows_of = [&]<std::size_t N>(std::array<double, N>) {
+    return parse_matrix<N>(field, 1, static_cast<int>(N), expected);
+  };
+  std::array<double, 5> distortion{};
+  switch (data.list(expected).size()) {
+    case 0:
+      return distortion;
+    case 4: {
+      const auto four = rows_of(std::array<double, 4>{});
+      std::copy(four.begin(), four.end(), distortion.begin());
+      return distortion;
+    }
+    case 8: {
+      const auto eight = rows_of(std::array<double, 8>{});
+      if (eight[5] != 0 || eight[6] != 0 || eight[7] != 0)
+        data.fail(data.value_text(),
+                  "k4 k5 k6 of 0: a rational lens is not modelled (lapservo calibrate camera fits plumb_bob)");
+      std::copy_n(eight.begin(), distortion.size(), distortion.begin());
+      return distortion;
+    }
+    default:
+      return rows_of(distortion);
+  }
+}
+
+void check_distortion_model(const YamlField& field) {
+  for (const char* key : {"distortion_model", "camera_model"}) {
+    const YamlField model = field[key];
+    if (!model.present() || model.text("plumb_bob") == "plumb_bob") continue;
+    if (model.text("plumb_bob") != "rational_polynomial")
+      model.fail(model.value_text(), "plumb_bob, which lapservo calibrate camera fits");
+  }
+}
+
 // What belongs to rectified images is not used, but must be what it says; parts and bins of the sensor would be other
 // pixels than those of camera_matrix.
 void check_unused(const YamlField& field) {
@@ -84,15 +124,14 @@ ChromaticAberration parse_chromatic_aberration(const YamlField& field) {
 }
 
 Camera parse_camera_fields(const YamlField& field) {
-  expect_keys(field, {{"header", "camera_name", "distortion_model", "rectification_matrix", "projection_matrix",
-                       "binning_x", "binning_y", "roi", "deinterlace"},
+  expect_keys(field, {{"header", "camera_name", "distortion_model", "camera_model", "rectification_matrix",
+                       "projection_matrix", "binning_x", "binning_y", "roi", "deinterlace"},
                       {"image_width", "image_height", "camera_matrix", "distortion_coefficients", "response",
                        "lateral_chromatic_aberration"}});
   Camera camera;
   camera.width_px = parse_image_size(field["image_width"]);
   camera.height_px = parse_image_size(field["image_height"]);
-  if (const YamlField model = field["distortion_model"]; model.present() && model.text("plumb_bob") != "plumb_bob")
-    model.fail(model.value_text(), "plumb_bob");
+  check_distortion_model(field);
 
   const auto k = parse_matrix<9>(field["camera_matrix"], 3, 3, "nine numbers, fx 0 cx 0 fy cy 0 0 1");
   const bool pinhole = k[0] > 0 && k[4] > 0 && k[1] == 0 && k[3] == 0 && k[6] == 0 && k[7] == 0 && k[8] == 1;
@@ -103,7 +142,7 @@ Camera parse_camera_fields(const YamlField& field) {
   }
   camera.fx_px = k[0], camera.cx_px = k[2], camera.fy_px = k[4], camera.cy_px = k[5];
   if (const YamlField coefficients = field["distortion_coefficients"]; coefficients.present()) {
-    camera.distortion = parse_matrix<5>(coefficients, 1, 5, "five numbers, k1 k2 p1 p2 k3");
+    camera.distortion = parse_distortion(coefficients);
     check_invertible(camera, coefficients["data"]);
   }
   camera.response = parse_response(field["response"]);

@@ -229,8 +229,14 @@ std::vector<Complaint> wrong_types() {
        "camera.camera_matrix.data[2]: is centre, expected a finite number"},
       {"MatrixTooShort", with("0, 0, 1]}", "0, 0]}"),
        "camera.camera_matrix.data: is a list of 8, expected nine numbers, fx 0 cx 0 fy cy 0 0 1"},
-      {"DistortionTooShort", with("[-0.1, ", "["),
-       "camera.distortion_coefficients.data: is a list of 4, expected five numbers, k1 k2 p1 p2 k3"},
+      {"DistortionTooShort", with("[-0.1, 0.02, ", "["),
+       "camera.distortion_coefficients.data: is a list of 3, expected k1 k2 p1 p2 k3, of which k3 or all may be left "
+       "out, or k4 k5 k6 of 0 follow"},
+      {"DistortionRational",
+       with("cols: 5, data: [-0.1, 0.02, 0.001, -0.002, 0]",
+            "cols: 8, data: [-0.1, 0.02, 0.001, -0.002, 0, 0.1, 0, 0]"),
+       "camera.distortion_coefficients.data: is a list of 8, expected k4 k5 k6 of 0: a rational lens is not modelled "
+       "(lapservo calibrate camera fits plumb_bob)"},
       {"ResponseIsAWord", with("gamma:2.2", "log"),
        "camera.response: is log, expected srgb, rec709, linear, gamma:VALUE with a value of 0.2 to 5, or a table of "
        "light and value"},
@@ -282,7 +288,8 @@ std::vector<Complaint> impossible_cameras() {
       {"HeightHuge", with("720", "1e6"), "camera.image_height: is 1e6, expected a whole number of pixels, 16 to 16384"},
       {"HeightNegative", with("720", "-720"),
        "camera.image_height: is -720, expected a whole number of pixels, 16 to 16384"},
-      {"Fisheye", with("plumb_bob", "equidistant"), "camera.distortion_model: is equidistant, expected plumb_bob"},
+      {"Fisheye", with("plumb_bob", "equidistant"),
+       "camera.distortion_model: is equidistant, expected plumb_bob, which lapservo calibrate camera fits"},
       {"FocalNegative", with("[1100", "[-1100"),
        "camera.camera_matrix.data: is -1100 0 639.5 0 1090 359.5 0 0 1 , expected fx 0 cx 0 fy cy 0 0 1 with fx and fy "
        "above 0 (pixels)"},
@@ -507,6 +514,19 @@ TEST(LoadRig, TakesTheExamplesThatWeShip) {
     ++rigs;
   }
   EXPECT_GE(rigs, 2);
+}
+
+// As older drivers of ROS write plumb_bob.
+TEST(Rig, ReadsPlumbBobOfFourFiveEightAndNoNumbers) {
+  const std::string five = "cols: 5, data: [-0.1, 0.02, 0.001, -0.002, 0]";
+  const auto distortion = [&](const std::string& yaml) { return parse_rig(yaml, "rig").camera.distortion; };
+  const std::array<double, 5> expected{-0.1, 0.02, 0.001, -0.002, 0};
+  EXPECT_EQ(distortion(good), expected);
+  EXPECT_EQ(distortion(with(five, "cols: 4, data: [-0.1, 0.02, 0.001, -0.002]")), expected);
+  EXPECT_EQ(distortion(with(five, "cols: 8, data: [-0.1, 0.02, 0.001, -0.002, 0, 0, 0, 0]")), expected);
+  EXPECT_EQ(distortion(with(five, "cols: 0, data: []")), (std::array<double, 5>{}));
+  EXPECT_EQ(distortion(with("distortion_model: plumb_bob", "camera_model: plumb_bob")), expected);
+  EXPECT_EQ(distortion(with("distortion_model: plumb_bob", "distortion_model: rational_polynomial")), expected);
 }
 
 }  // namespace

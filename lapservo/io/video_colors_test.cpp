@@ -1,0 +1,82 @@
+// Pure colours through the videos that FFmpeg writes, by matrix, range, codec and sampling of chroma.
+#include <array>
+#include <cstddef>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <tuple>
+
+#include <gtest/gtest.h>
+#include <opencv2/core.hpp>
+
+#include "lapservo/io/frame_source.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+
+constexpr int patch_px = 64;
+const std::array<cv::Vec3b, 4> patches{cv::Vec3b{0, 0, 255}, {0, 255, 0}, {255, 0, 0}, {128, 128, 128}};
+
+struct Colors {
+  const char* matrix;  // as FFmpeg's scale names it, and as its option -colorspace does
+  const char* tag;
+  const char* range;
+};
+struct Coding {
+  const char* options;
+  const char* ending;
+};
+
+class VideoColors : public ::testing::TestWithParam<std::tuple<Colors, Coding>> {};
+
+// Four patches side by side. False where FFmpeg or the encoder is missing.
+bool write_patches(const std::filesystem::path& path, const Colors& colors, const Coding& coding,
+                   const std::filesystem::path& scratch) {
+  cv::Mat picture(patch_px, 4 * patch_px, CV_8UC3);
+  for (int i = 0; i < 4; ++i)
+    picture.colRange(i * patch_px, (i + 1) * patch_px).setTo(patches[static_cast<std::size_t>(i)]);
+  testing::write_file(scratch, std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
+  const std::string command =
+      "ffmpeg -v quiet -y -stream_loop 2 -f rawvideo -pix_fmt bgr24 -s 256x64 -r 25 -i '" + scratch.string() +
+      "' -vf scale=out_color_matrix=" + colors.matrix + ":out_range=" + colors.range +
+      ":flags=accurate_rnd+full_chroma_int,setparams=colorspace=" + colors.tag + ":range=" + colors.range + " " +
+      coding.options + " -colorspace " + colors.tag + " -color_range " + colors.range + " '" + path.string() + "'";
+  return std::system(command.c_str()) == 0;
+}
+
+TEST_P(VideoColors, ReadAsTheirTagsSay) {
+  const auto& [colors, coding] = GetParam();
+  const testing::TemporaryFolder folder;
+  const auto path = folder / (std::string("a.") + coding.ending);
+  if (!write_patches(path, colors, coding, folder / "raw"))
+    GTEST_SKIP() << "FFmpeg here can't write " << coding.options;
+  const auto source = open_frame_source(path.string(), 30);
+  int frames = 0;
+  while (const auto frame = source->next()) {
+    ++frames;
+    for (int i = 0; i < 4; ++i) {
+      const cv::Vec3b seen = frame->bgr.at<cv::Vec3b>(patch_px / 2, i * patch_px + patch_px / 2);
+      for (int channel = 0; channel < 3; ++channel)
+        EXPECT_NEAR(seen[channel], patches[static_cast<std::size_t>(i)][channel], 2)
+            << "patch " << i << ", " << channel;
+    }
+  }
+  EXPECT_EQ(frames, 3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Tags, VideoColors,
+    ::testing::Combine(::testing::Values(Colors{"bt709", "bt709", "tv"}, Colors{"bt709", "bt709", "pc"},
+                                         Colors{"bt601", "smpte170m", "tv"}, Colors{"bt601", "bt470bg", "pc"},
+                                         Colors{"bt2020", "bt2020nc", "tv"}, Colors{"smpte240m", "smpte240m", "tv"}),
+                       ::testing::Values(Coding{"-c:v libx264 -qp 0 -pix_fmt yuv444p", "mp4"},
+                                         Coding{"-c:v libx264 -crf 2 -pix_fmt yuv420p", "mkv"},
+                                         Coding{"-c:v libx265 -x265-params lossless=1:log-level=-1 -pix_fmt yuv444p",
+                                                "mp4"},
+                                         Coding{"-c:v libvpx-vp9 -lossless 1 -pix_fmt yuv444p", "webm"},
+                                         Coding{"-c:v ffv1 -pix_fmt yuv422p", "mkv"},
+                                         Coding{"-c:v prores_ks -profile:v 4444 -pix_fmt yuv444p10le", "mov"})));
+
+}  // namespace
+}  // namespace lapservo
