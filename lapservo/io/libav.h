@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 extern "C" {
@@ -26,5 +27,14 @@ using Codec = std::unique_ptr<AVCodecContext, Freed<avcodec_free_context>>;
 using Frame = std::unique_ptr<AVFrame, Freed<av_frame_free>>;
 using Packet = std::unique_ptr<AVPacket, Freed<av_packet_free>>;
 using Scaler = std::unique_ptr<SwsContext, FreedScaler>;
+
+/// In the stream's time base; 0 where it is not known.
+inline std::int64_t duration_of(const AVFrame& frame) {
+#if LIBAVUTIL_VERSION_INT >= AV_VERSION_INT(57, 30, 100)
+  return frame.duration;
+#else
+  return frame.pkt_duration;
+#endif
+}
 
 }  // namespace lapservo::internal::libav

@@ -146,7 +146,7 @@ class VideoReader::State {
     const bool packet_flawed = std::exchange(tainted_, false);
     spoiled_ = flawed || packet_flawed || (spoiled_ && frame_->key_frame == 0);
     convert();
-    advance(frame_->best_effort_timestamp, frame_->pkt_duration);
+    advance(frame_->best_effort_timestamp, libav::duration_of(*frame_));
     av_frame_unref(frame_.get());
     return counted(spoiled_);
   }
