@@ -195,8 +195,13 @@ TEST(CalibrateCamera, ReadsCharucoBoards) {
   EXPECT_NE(board_problem({20, 20, 0.005, "DICT_5X5_50", 0.0035}).find("220"), std::string::npos);
   constexpr int square_px = 60;
   cv::Mat pattern;
-  cv::aruco::CharucoBoard::create(8, 6, 0.005F, 0.0035F, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_50))
-      ->draw(cv::Size(8 * square_px, 6 * square_px), pattern);
+  const cv::Size pattern_px(8 * square_px, 6 * square_px);
+  const auto dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_50);
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 7)
+  cv::aruco::CharucoBoard({8, 6}, 0.005F, 0.0035F, dictionary).generateImage(pattern_px, pattern);
+#else
+  cv::aruco::CharucoBoard::create(8, 6, 0.005F, 0.0035F, dictionary)->draw(pattern_px, pattern);
+#endif
   Camera camera = small_camera();
   camera.distortion = {};
   BoardScene scene;
