@@ -73,7 +73,9 @@ class VideoReader::State {
   }
 
   std::string complaint() const {
-    if (const auto announced_s = duration_s(); announced_s && end_s_ < *announced_s)
+    constexpr double slack = 0.01;  // durations are rounded, and sound may last longer
+    const double frames_s = 2 / frames_per_second();
+    if (const auto announced_s = duration_s(); announced_s && end_s_ < (1 - slack) * *announced_s - frames_s)
       return fmt::format("ends early, after {:.2f} of {:.2f} s", end_s_, *announced_s);
     const bool transport = std::string_view(format_->iformat->name) == "mpegts";
     if (transport && format_->pb && avio_size(format_->pb) % transport_packet_bytes != 0) return "ends within a frame";
@@ -177,16 +179,12 @@ class VideoReader::State {
     end_s_ = *time_s_ + std::max(period_s, static_cast<double>(duration) * unit_s);
   }
 
-  // Of the video alone where the container knows it; less what rounding and sound may add.
+  // As the container announces it, of the video alone where it knows that.
   std::optional<double> duration_s() const {
-    double announced_s = 0;
-    if (stream_->duration != AV_NOPTS_VALUE && stream_->duration > 0)
-      announced_s = static_cast<double>(stream_->duration) * av_q2d(stream_->time_base);
-    else if (format_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM && format_->duration > 0)
-      announced_s = static_cast<double>(format_->duration) / AV_TIME_BASE;
-    if (!(announced_s > 0)) return std::nullopt;
-    constexpr double slack = 0.01;
-    return (1 - slack) * announced_s - 2 / frames_per_second();
+    if (stream_->duration > 0) return static_cast<double>(stream_->duration) * av_q2d(stream_->time_base);
+    if (format_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM && format_->duration > 0)
+      return static_cast<double>(format_->duration) / AV_TIME_BASE;
+    return std::nullopt;
   }
 
   // The scaler that reads such frames, by each frame's own tags: a stream's may change.

@@ -7,11 +7,6 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 
-bool is_full_by_format(int format) {
-  return format == AV_PIX_FMT_YUVJ420P || format == AV_PIX_FMT_YUVJ422P || format == AV_PIX_FMT_YUVJ444P ||
-         format == AV_PIX_FMT_YUVJ440P || format == AV_PIX_FMT_YUVJ411P;
-}
-
 std::optional<int> matrix_of(AVColorSpace tag) {
   switch (tag) {
     case AVCOL_SPC_UNSPECIFIED:
@@ -38,7 +33,7 @@ std::optional<int> matrix_of(AVColorSpace tag) {
 std::optional<YuvColors> yuv_colors_of(const AVFrame& frame) {
   const auto matrix = matrix_of(frame.colorspace);
   if (!matrix) return std::nullopt;
-  return YuvColors{*matrix, is_full_by_format(frame.format) || frame.color_range == AVCOL_RANGE_JPEG};
+  return YuvColors{*matrix, pixel_format_of(frame) != frame.format || frame.color_range == AVCOL_RANGE_JPEG};
 }
 
 AVPixelFormat pixel_format_of(const AVFrame& frame) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -37,15 +38,18 @@ void check_invertible(const Camera& camera, const YamlField& coefficients) {
 
 constexpr double rotation_tolerance = 2e-4;  // what four typed digits leave
 
-// A ROS matrix: rows and cols say how the N numbers of data lie.
-template <std::size_t N>
-std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns, std::string_view expected) {
-  expect_keys(field, {{"rows", "cols"}, {"data"}});
-  const YamlField data = field["data"];
-  const auto numbers = data.numbers<N>(expected);
+// A ROS matrix: rows and cols say how the numbers of data lie.
+void check_shape(const YamlField& field, int rows, int columns) {
   for (const auto& [key, size] : {std::pair{"rows", rows}, {"cols", columns}})
     if (const YamlField given = field[key]; given.present() && given.number("a whole number") != size)
       given.fail(given.value_text(), std::to_string(size));
+}
+
+template <std::size_t N>
+std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns, std::string_view expected) {
+  expect_keys(field, {{"rows", "cols"}, {"data"}});
+  const auto numbers = field["data"].numbers<N>(expected);
+  check_shape(field, rows, columns);
   return numbers;
 }
 
@@ -55,29 +59,17 @@ std::array<double, 5> parse_distortion(const YamlField& field) {
   constexpr auto expected = "k1 k2 p1 p2 k3, of which k3 or all may be left out, or k4 k5 k6 of 0 follow";
   expect_keys(field, {{"rows", "cols"}, {"data"}});
   const YamlField data = field["data"];
-  const auto rows_of = [&]<std::size_t N>(std::array<double, N>) {
-    return parse_matrix<N>(field, 1, static_cast<int>(N), expected);
-  };
-  std::array<double, 5> distortion{};
-  switch (data.list(expected).size()) {
-    case 0:
-      return distortion;
-    case 4: {
-      const auto four = rows_of(std::array<double, 4>{});
-      std::copy(four.begin(), four.end(), distortion.begin());
-      return distortion;
-    }
-    case 8: {
-      const auto eight = rows_of(std::array<double, 8>{});
-      if (eight[5] != 0 || eight[6] != 0 || eight[7] != 0)
-        data.fail(data.value_text(),
-                  "k4 k5 k6 of 0: a rational lens is not modelled (lapservo calibrate camera fits plumb_bob)");
-      std::copy_n(eight.begin(), distortion.size(), distortion.begin());
-      return distortion;
-    }
-    default:
-      return rows_of(distortion);
-  }
+  const auto items = data.list(expected);
+  if (items.size() != 0 && items.size() != 4 && items.size() != 5 && items.size() != 8)
+    data.fail(data.value_text(), expected);
+  std::array<double, 8> numbers{};
+  constexpr double any = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < items.size(); ++i) numbers[i] = items[i].number_between(-any, any, "a finite number");
+  if (!items.empty()) check_shape(field, 1, static_cast<int>(items.size()));
+  if (numbers[5] != 0 || numbers[6] != 0 || numbers[7] != 0)
+    data.fail(data.value_text(),
+              "k4 k5 k6 of 0: a rational lens is not modelled (lapservo calibrate camera fits plumb_bob)");
+  return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]};
 }
 
 void check_distortion_model(const YamlField& field) {
