@@ -20,6 +20,7 @@
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "apps/lapservo/web_view.h"
+#include "lapservo/calibration/frame_diagnosis.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/observation_csv.h"
@@ -249,6 +250,7 @@ class TrackRun {
         const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
         tally_.add(observations);
         if (registration_.add(observations)) say_moved(options_, *frame);
+        diagnosis().add(frame->bgr, observations);
         if ((stopped_ = !pass_on(*frame, observations, came_s))) return;
       } catch (const InputError& error) {
         rethrow_with_frame(error, options_, *frame);
@@ -287,13 +289,20 @@ class TrackRun {
                    complaint.c_str());
       return 1;
     }
-    const bool said = say_mismatched(tally_);
-    if (tally_.anything()) return 0;
-    if (said) return 1;
-    std::fprintf(stderr,
-                 "lapservo: no instrument was found: look at the status column, and whether the rig's hues_deg are the "
-                 "print's\n");
-    return 1;
+    const std::string diagnosis = diagnosis_ ? diagnosis_->text() : "no frame came";
+    const bool misses_rcm = tally_.anything() && !diagnosis.empty();
+    const bool mismatched = !misses_rcm && say_mismatched(tally_);
+    if (!diagnosis.empty() && !mismatched)
+      std::fprintf(stderr, "lapservo: %s: %s\n", options_.input.c_str(), diagnosis.c_str());
+    return tally_.anything() ? 0 : 1;
+  }
+
+  FrameDiagnosis& diagnosis() {
+    if (!diagnosis_ || diagnosed_ != rigs_.rig()) {
+      diagnosed_ = rigs_.rig();
+      diagnosis_.emplace(*diagnosed_, options_.deinterlace || diagnosed_->camera.deinterlace);
+    }
+    return *diagnosis_;
   }
 
   const TrackOptions& options_;
@@ -309,6 +318,8 @@ class TrackRun {
   double begin_s_ = 0;
   Tally tally_;
   RegistrationWatch registration_;
+  std::shared_ptr<const Rig> diagnosed_;
+  std::optional<FrameDiagnosis> diagnosis_;  // of frames with that rig
   bool stopped_ = false, read_to_the_end_ = false;
 };
 

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/observation.h"
+
+namespace lapservo::internal {
+
+/// Why frames of a recording show no instrument of a rig, or an instrument that misses the rig's RCM. Frames are added
+/// as they are tracked; a few of those without a result are kept and tried again in other readings (red and blue
+/// exchanged, mirrored, without distortion) when text() is called.
+class FrameDiagnosis {
+ public:
+  /// `deinterlaced`: one field of each frame is tracked.
+  explicit FrameDiagnosis(const Rig& rig, bool deinterlaced = false);
+
+  /// A frame, 8-bit BGR of the rig's size, and what the tracker returns for it.
+  void add(const cv::Mat& bgr, const std::vector<Observation>& observations);
+
+  /// One line that names the most probable cause and its remedy, without a full stop; empty where at least half of the
+  /// frames that show an instrument give q, or give features where the rig has no camera_from_rcm.
+  std::string text() const;
+
+ private:
+  struct Seen {
+    int ok = 0, with_q = 0;
+    std::vector<double> misses_m;  ///< distances of the shaft's axis from the rig's RCM, where q is missing
+  };
+  void keep(const cv::Mat& bgr);
+  std::string text_without_instrument() const;
+  std::string text_of_missed_rcm() const;
+
+  Rig rig_;
+  bool deinterlaced_;
+  int frames_ = 0, interlaced_ = 0;
+  std::map<std::string, Seen> seen_;
+  std::vector<cv::Mat> kept_;
+  int next_kept_ = 0;
+};
+
+}  // namespace lapservo::internal
