@@ -1,6 +1,7 @@
 #include "lapservo/core/known_keys.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <string>
@@ -57,15 +58,31 @@ bool is_sigma_of(const std::string& key, const KnownKeys& known) {
                                                     key.substr(sigma_prefix.size())) != known.measured.end();
 }
 
+// Names the first unknown key with the nearest known one, and the next few.
+void refuse_unknown(const std::vector<std::pair<std::string, YamlField>>& entries,
+                    const std::vector<std::string>& names) {
+  const auto is_unknown = [&](const auto& entry) {
+    return std::find(names.begin(), names.end(), entry.first) == names.end();
+  };
+  const auto first = std::find_if(entries.begin(), entries.end(), is_unknown);
+  if (first == entries.end()) return;
+  constexpr int most_others = 8;
+  std::string others;
+  int count = 0;
+  for (auto entry = std::next(first); entry != entries.end() && count < most_others; ++entry)
+    if (is_unknown(*entry)) others += (count++ == 0 ? "; unknown too: " : ", ") + entry->first;
+  first->second.fail("unknown", "a known key, of which " + nearest(first->first, names) + " is the nearest" + others);
+}
+
 }  // namespace
 
 void expect_keys(const YamlField& map, const KnownKeys& known) {
   if (!map.is_map()) return;
   const std::vector<std::string> names = all_names(known);
+  const auto entries = map.entries("a map");
+  refuse_unknown(entries, names);
   std::vector<std::string> seen;
-  for (const auto& [key, value] : map.entries("a map")) {
-    if (std::find(names.begin(), names.end(), key) == names.end())
-      value.fail("unknown", "a known key, of which " + nearest(key, names) + " is the nearest");
+  for (const auto& [key, value] : entries) {
     if (std::find(seen.begin(), seen.end(), key) != seen.end()) value.fail("there twice", "every key once");
     if (!value.present()) value.fail("empty", "a value, or no such key");
     if (is_sigma_of(key, known)) {

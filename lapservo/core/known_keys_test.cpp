@@ -31,6 +31,8 @@ TEST(KnownKeys, NamesTheNearest) {
             "a.yaml: sigma_hues: is unknown, expected a known key, of which sigma_hues_deg is the nearest");
   EXPECT_EQ(complaint("sigma_name: 1"),
             "a.yaml: sigma_name: is unknown, expected a known key, of which name is the nearest");
+  EXPECT_EQ(complaint("nme: x\nseam_rad: 1\nhues: 2\ngap: 3"),
+            "a.yaml: nme: is unknown, expected a known key, of which name is the nearest; unknown too: hues, gap");
   EXPECT_EQ(complaint(std::string(100000, 'a') + ": 1").substr(0, 10), "a.yaml: is");  // YAML's keys are shorter
 }
 

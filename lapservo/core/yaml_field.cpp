@@ -68,10 +68,14 @@ std::string syntax_problem(const YAML::Exception& error) {
 
 }  // namespace
 
-YamlField YamlField::read(const fs::path& path, std::string_view kind) {
+std::string read_yaml(const fs::path& path) {
   const std::string text = read_input(path, max_file_bytes, "a YAML file");
   if (text.empty()) throw InputError(path.string(), "is empty, expected a YAML file");
-  return parse(text, path.string(), kind);
+  return text;
+}
+
+YamlField YamlField::read(const fs::path& path, std::string_view kind) {
+  return parse(read_yaml(path), path.string(), kind);
 }
 
 YamlField YamlField::parse(std::string_view yaml, const std::string& source, std::string_view kind) {

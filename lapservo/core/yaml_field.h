@@ -18,6 +18,9 @@ class Node;
 
 namespace lapservo::internal {
 
+/// The text of a YAML file. Throws InputError when it can't be opened, is empty or larger than 1 MiB.
+std::string read_yaml(const std::filesystem::path& path);
+
 /// A value in a YAML file, or the place where one is missing. It knows where it stands, so every complaint is an
 /// InputError that names file, field, value and what was expected.
 class YamlField {

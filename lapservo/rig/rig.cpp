@@ -13,6 +13,7 @@
 #include "lapservo/core/yaml_field.h"
 #include "lapservo/geometry/invertible.h"
 #include "lapservo/marker/decoder.h"
+#include "lapservo/rig/camera_formats.h"
 #include "lapservo/rig/response_field.h"
 
 namespace lapservo {
@@ -148,7 +149,7 @@ Camera parse_camera_fields(const YamlField& field) {
 Camera parse_camera(const YamlField& field, const fs::path& folder) {
   if (!field.is_scalar()) return parse_camera_fields(field);
   const fs::path path = folder / field.text("a map or the path of a camera file");
-  return parse_camera_fields(YamlField::read(path, file_kind));
+  return parse_camera_fields(YamlField::parse(with_rig_keys(read_yaml(path), path.string()), path.string(), file_kind));
 }
 
 MarkerSigmas parse_sigmas(const YamlField& marker) {

@@ -1,0 +1,155 @@
+#include "lapservo/rig/camera_formats.h"
+
+#include <algorithm>
+#include <initializer_list>
+#include <optional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/core/yaml_field.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr auto file_kind = "camera file";
+constexpr std::string_view opencv_header = "%YAML:1.0";
+
+// The texts of a rig's keys.
+struct CameraTexts {
+  std::string width, height, model = "plumb_bob";
+  std::vector<std::string> matrix, distortion;
+};
+
+// Of a file: its fields, and the names of those that are missing.
+class Fields {
+ public:
+  Fields(YamlField map, std::string source, std::string format)
+      : map_(std::move(map)), source_(std::move(source)), format_(std::move(format)) {}
+
+  // The first of these keys that is there.
+  std::optional<YamlField> find(std::initializer_list<const char*> keys) const {
+    for (const char* key : keys)
+      if (const YamlField field = map_[key]; field.present()) return field;
+    return std::nullopt;
+  }
+  std::string text(std::initializer_list<const char*> keys) {
+    const auto field = find(keys);
+    if (!field) missing_.emplace_back(*keys.begin());
+    return field ? field->text("a number") : "";
+  }
+  // Of a list, or of an OpenCV matrix's data.
+  std::vector<std::string> texts(std::initializer_list<const char*> keys) {
+    auto field = find(keys);
+    if (field && field->is_map()) field = (*field)["data"];
+    std::vector<std::string> all;
+    if (!field || !field->present()) {
+      missing_.emplace_back(*keys.begin());
+    } else {
+      for (const YamlField& item : field->list("numbers")) all.push_back(item.text("a number"));
+    }
+    return all;
+  }
+  void refuse_missing() const {
+    if (!missing_.empty())
+      throw InputError(source_, fmt::format("is {} without {}: add what is missing, or let lapservo calibrate camera "
+                                            "write a file",
+                                            format_, fmt::join(missing_, ", ")));
+  }
+  [[noreturn]] void refuse(const std::string& why) const {
+    throw InputError(source_,
+                     fmt::format("is {} {}: lapservo calibrate camera measures a plumb_bob camera", format_, why));
+  }
+
+ private:
+  YamlField map_;
+  std::string source_, format_;
+  std::vector<std::string> missing_;
+};
+
+bool is_zero(const std::string& number) {
+  return number.find_first_not_of("+-0.") == std::string::npos;
+}
+
+CameraTexts read_opencv(Fields fields) {
+  if (const auto fisheye = fields.find({"fisheye_model"}); fisheye && !is_zero(fisheye->text("0 or 1")))
+    fields.refuse("of a fisheye lens");
+  CameraTexts camera;
+  camera.width = fields.text({"image_width", "image_Width"});
+  camera.height = fields.text({"image_height", "image_Height"});
+  camera.matrix = fields.texts({"camera_matrix", "Camera_Matrix", "cameraMatrix", "K"});
+  camera.distortion = fields.texts({"distortion_coefficients", "Distortion_Coefficients", "distCoeffs", "D"});
+  fields.refuse_missing();
+  return camera;
+}
+
+CameraTexts read_camera_info(Fields fields) {
+  CameraTexts camera;
+  camera.width = fields.text({"width"});
+  camera.height = fields.text({"height"});
+  camera.matrix = fields.texts({"K", "k"});
+  camera.distortion = fields.texts({"D", "d"});
+  fields.refuse_missing();
+  if (std::all_of(camera.matrix.begin(), camera.matrix.end(), is_zero))
+    fields.refuse("of a camera that is not calibrated (K is zero)");
+  if (const auto model = fields.find({"distortion_model"}); model && model->value_text() != "''")
+    camera.model = model->text("a distortion model");
+  return camera;
+}
+
+CameraTexts read_kalibr(Fields fields) {
+  const auto model = fields.find({"camera_model"}), distortion = fields.find({"distortion_model"});
+  if (model && model->value_text() != "pinhole") fields.refuse("of the camera model " + model->value_text());
+  const std::string lens = distortion ? distortion->value_text() : "none";
+  if (lens != "radtan" && lens != "none") fields.refuse("of the distortion model " + lens);
+  CameraTexts camera;
+  const auto size = fields.texts({"resolution"});
+  const auto k = fields.texts({"intrinsics"});
+  if (lens == "radtan") camera.distortion = fields.texts({"distortion_coeffs"});
+  fields.refuse_missing();
+  if (size.size() != 2 || k.size() != 4) fields.refuse("without two numbers of resolution and four of intrinsics");
+  camera.width = size[0], camera.height = size[1];
+  camera.matrix = {k[0], "0", k[2], "0", k[1], k[3], "0", "0", "1"};
+  return camera;
+}
+
+std::string yaml_of(CameraTexts camera) {
+  // Models of more coefficients begin with plumb_bob's; those that are zero say nothing.
+  auto& d = camera.distortion;
+  while (d.size() > 5 && is_zero(d.back())) d.pop_back();
+  if (d.size() > 5) d.resize(std::max<std::size_t>(8, d.size()), "0");
+  return fmt::format(
+      "image_width: {}\nimage_height: {}\ndistortion_model: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}]}}\n"
+      "distortion_coefficients: {{rows: 1, cols: {}, data: [{}]}}\n",
+      camera.width, camera.height, camera.model, fmt::join(camera.matrix, ", "), d.size(), fmt::join(d, ", "));
+}
+
+// Without OpenCV's header, which YAML has as "%YAML 1.0", and without the documents after the first, as of
+// `rostopic echo`.
+std::string first_document(std::string text) {
+  if (text.starts_with(opencv_header)) text.erase(0, text.find('\n'));
+  const std::size_t begin = text.find_first_not_of(" \n\r-");
+  const std::size_t end = begin == std::string::npos ? begin : text.find("\n---", begin);
+  return text.substr(0, end);
+}
+
+}  // namespace
+
+std::string with_rig_keys(const std::string& text, const std::string& source) {
+  const bool opencv = text.starts_with(opencv_header) || text.find("!!opencv-matrix") != std::string::npos;
+  const YamlField root = YamlField::parse(first_document(text), source, file_kind);
+  if (!root.is_map()) return text;
+  if (opencv) return yaml_of(read_opencv({root, source, "an OpenCV calibration"}));
+  if (root["K"].present() || root["k"].present())
+    return yaml_of(read_camera_info({root, source, "a CameraInfo message"}));
+  if (root["cam1"].present())
+    throw InputError(source, "is a Kalibr camchain of several cameras, expected one: keep the rig's as cam0");
+  if (root["cam0"].present()) return yaml_of(read_kalibr({root["cam0"], source, "a Kalibr camchain"}));
+  return text;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,161 @@
+#include "lapservo/rig/camera_formats.h"
+
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/rig/rig.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr auto opencv = R"(%YAML:1.0
+---
+calibration_time: "Wed 25 Nov 2026"
+image_width: 640
+image_height: 480
+board_width: 9
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 500., 0., 320.5, 0., 510., 240.25, 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 5
+   cols: 1
+   dt: d
+   data: [ -1.5e-01, 0.02, 0.001, -0.002, 0. ]
+avg_reprojection_error: 0.2
+)";
+
+constexpr auto ros1 = R"(header: 
+  seq: 12
+  stamp: 
+    secs: 3
+    nsecs: 5
+  frame_id: "endoscope"
+height: 480
+width: 640
+distortion_model: "plumb_bob"
+D: [-0.15, 0.02, 0.001, -0.002, 0.0]
+K: [500.0, 0.0, 320.5, 0.0, 510.0, 240.25, 0.0, 0.0, 1.0]
+R: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+P: [500.0, 0.0, 320.5, 0.0, 0.0, 510.0, 240.25, 0.0, 0.0, 0.0, 1.0, 0.0]
+binning_x: 0
+binning_y: 0
+---
+header:
+  seq: 13
+---
+)";
+
+constexpr auto ros2 = R"(header:
+  stamp:
+    sec: 3
+    nanosec: 5
+  frame_id: endoscope
+height: 480
+width: 640
+distortion_model: rational_polynomial
+d:
+- -0.15
+- 0.02
+- 0.001
+- -0.002
+- 0.0
+- 0.0
+- 0.0
+- 0.0
+k:
+- 500.0
+- 0.0
+- 320.5
+- 0.0
+- 510.0
+- 240.25
+- 0.0
+- 0.0
+- 1.0
+---
+)";
+
+constexpr auto kalibr = R"(cam0:
+  cam_overlaps: []
+  camera_model: pinhole
+  distortion_coeffs: [-0.15, 0.02, 0.001, -0.002]
+  distortion_model: radtan
+  intrinsics: [500.0, 510.0, 320.5, 240.25]
+  resolution: [640, 480]
+  rostopic: /endoscope/image_raw
+)";
+
+constexpr auto rig = R"(camera: camera.yaml
+instruments:
+  - name: PSM1
+    marker:
+      diameter_m: 0.0084
+      bands_upper_m: [0.0035, 0.0035, 0.017]
+      bands_lower_m: [0.0095, 0.0095, 0.005]
+)";
+
+Camera camera_of(const std::string& text) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "camera.yaml", text);
+  return parse_rig(rig, "rig.yaml", folder.path()).camera;
+}
+
+std::string replaced(std::string text, const std::string& part, const std::string& by) {
+  return text.replace(text.find(part), part.size(), by);
+}
+
+TEST(CameraFormats, OfOtherProgramsGiveTheSameCamera) {
+  for (const char* text : {opencv, ros1, ros2, kalibr}) {
+    SCOPED_TRACE(text);
+    const Camera camera = camera_of(text);
+    EXPECT_EQ(camera.width_px, 640);
+    EXPECT_EQ(camera.height_px, 480);
+    EXPECT_EQ(camera.fx_px, 500);
+    EXPECT_EQ(camera.fy_px, 510);
+    EXPECT_EQ(camera.cx_px, 320.5);
+    EXPECT_EQ(camera.cy_px, 240.25);
+    EXPECT_EQ(camera.distortion, (std::array<double, 5>{-0.15, 0.02, 0.001, -0.002, 0}));
+  }
+}
+
+TEST(CameraFormats, OfOurOwnStayAsTheyAre) {
+  const std::string own = "image_width: 640\nimage_height: 480\n";
+  EXPECT_EQ(with_rig_keys(own, "camera.yaml"), own);
+}
+
+TEST(CameraFormats, ThatLackNumbersNameAllThatIsMissing) {
+  std::string text = replaced(opencv, "image_width: 640\n", "");
+  text = replaced(text, "image_height: 480\n", "");
+  const std::string error = testing::input_error([&] { camera_of(text); });
+  EXPECT_NE(error.find("an OpenCV calibration without image_width, image_height"), std::string::npos) << error;
+}
+
+TEST(CameraFormats, OfCamerasThatAreNotModelledAreRefused) {
+  const auto expect_refused = [](const std::string& text, const std::string& why) {
+    const std::string error = testing::input_error([&] { camera_of(text); });
+    EXPECT_NE(error.find(why), std::string::npos) << error;
+    EXPECT_NE(error.find("lapservo calibrate camera"), std::string::npos) << error;
+  };
+  expect_refused(replaced(ros1, "500.0, 0.0, 320.5, 0.0, 510.0, 240.25, 0.0, 0.0, 1.0",
+                          "0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0"),
+                 "not calibrated");
+  expect_refused(replaced(ros1, "\"plumb_bob\"", "equidistant"), "equidistant");
+  expect_refused(replaced(kalibr, "radtan", "equidistant"), "equidistant");
+  expect_refused(replaced(kalibr, "pinhole", "omni"), "omni");
+  expect_refused(replaced(opencv, "board_width: 9", "fisheye_model: 1"), "fisheye");
+  expect_refused(replaced(ros2, "- 0.0\nk:", "- 0.3\nk:"), "rational");
+}
+
+TEST(CameraFormats, OfSeveralCamerasAreRefused) {
+  const std::string error = testing::input_error([&] { camera_of(std::string(kalibr) + "cam1: {}\n"); });
+  EXPECT_NE(error.find("several cameras"), std::string::npos) << error;
+}
+
+}  // namespace
+}  // namespace lapservo::internal
