@@ -97,28 +97,40 @@ class BagOfJoints {
 
 TEST(BagJoints, AreThoseOfTheRigInItsOrder) {
   const std::vector<std::string> names{"a", "b", "c", "d", "wrist"};
-  const BagOfJoints bag({{100, names, {1, 2, 3, 4, 5}},
+  const BagOfJoints bag({{100, names, {1, 2, 3, 0.4, 5}},
                          {100, names, {9, 9, 9, 9, 9}},  // the same stamp again
-                         {100.5, names, {NAN, 2, 3, 4, 5}},
+                         {100.5, names, {NAN, 2, 3, 0.4, 5}},
                          {0, names, {9, 9, 9, 9, 9}},
-                         {101, names, {1.5, 2, 3, 4, 5}}});
+                         {101, names, {1.5, 2, 3, 0.4, 5}}});
   const JointRecording recording = bag.read();
   EXPECT_EQ(recording.time_s, (std::vector<double>{1, 2}));
-  EXPECT_EQ(recording.joints[1], (std::array<double, 4>{2, 1.5, 4, 3}));
+  EXPECT_EQ(recording.joints[1], (std::array<double, 4>{2, 1.5, 0.4, 3}));
   EXPECT_EQ(bag.names(), names);
+}
+
+TEST(BagJoints, OfAnotherArmOnTheSameTopicArePassedOver) {
+  const std::vector<std::string> names{"a", "b", "c", "d"}, others{"e", "f", "g", "h"};
+  const JointRecording recording = BagOfJoints({{100, names, {1, 2, 3, 0.4}},
+                                                {100.1, others, {9, 9, 9, 9}},
+                                                {100.2, others, {9, 9, 9, 9}},
+                                                {101, names, {1.5, 2, 3, 0.4}}})
+                                       .read();
+  EXPECT_EQ(recording.time_s, (std::vector<double>{1, 2}));
+  EXPECT_EQ(recording.of_other_arms, 2);
 }
 
 TEST(BagJoints, ThatAreNotThereAreMissed) {
   const std::string error = input_error([] { BagOfJoints({{100, {"a", "b", "c"}, {1, 2, 3}}}).read(); });
-  EXPECT_NE(error.find("/PSM1/measured_js: has no position of d, expected"), std::string::npos) << error;
-  EXPECT_NE(error.find("it names a, b, c"), std::string::npos) << error;
+  EXPECT_NE(error.find("/PSM1/measured_js: has no positions of the rig's joints b, a, d, c: it names a, b, c"),
+            std::string::npos)
+      << error;
   const std::vector<std::string> names{"a", "b", "c", "d"};
   EXPECT_NE(input_error([&] {
               BagOfJoints({{100, names, {1, 2, 3}}}).read();
-            }).find("has no position of d"),
+            }).find("has no positions of the rig's joints"),
             std::string::npos);
   EXPECT_NE(input_error([&] {
-              BagOfJoints({{100, names, {1, 2, 3, 4}}}).read();
+              BagOfJoints({{100, names, {1, 2, 3, 0.4}}}).read();
             }).find("has 1 readings"),
             std::string::npos);
 }

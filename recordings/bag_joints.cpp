@@ -14,15 +14,13 @@
 namespace lapservo::internal {
 namespace {
 
-std::array<double, 4> chosen(const JointMessage& message, const Joints& joints, const std::string& source) {
+// Nullopt where the message lacks one of them: several arms may share a topic.
+std::optional<std::array<double, 4>> chosen(const JointMessage& message, const Joints& joints) {
   std::array<double, 4> values{};
   for (std::size_t i = 0; i < values.size(); ++i) {
     const auto found = std::find(message.names.begin(), message.names.end(), joints.names[i]);
     const auto place = static_cast<std::size_t>(found - message.names.begin());
-    if (place >= std::min(message.names.size(), message.positions.size()))
-      throw InputError(source,
-                       fmt::format("has no position of {}, expected one of each of the rig's joints: it names {}",
-                                   joints.names[i], fmt::join(message.names, ", ")));
+    if (place >= std::min(message.names.size(), message.positions.size())) return std::nullopt;
     values[i] = message.positions[place];
   }
   return values;
@@ -41,20 +39,31 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
   const std::string source = bag.path() + ": " + topic.name;
   const auto messages = bag.messages(topic);
   JointRecording recording;
+  std::vector<std::string> other_names;  // of the latest message of another arm
   while (const auto message = messages->next()) {
     const auto* reading = std::get_if<JointMessage>(&*message);
     if (!reading || !(reading->stamp_s > 0)) continue;
-    const auto values = chosen(*reading, joints, source);
+    const auto values = chosen(*reading, joints);
+    if (!values) {
+      ++recording.of_other_arms;
+      other_names = reading->names;
+      continue;
+    }
     const double time_s = reading->stamp_s - begin_s;
     const bool later = recording.time_s.empty() || time_s > recording.time_s.back();
-    if (!later || !std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); }))
+    recording.repeated += !recording.time_s.empty() && time_s == recording.time_s.back();
+    if (!later || !std::all_of(values->begin(), values->end(), [](double value) { return std::isfinite(value); }))
       continue;
     recording.time_s.push_back(time_s);
-    recording.joints.push_back(values);
+    recording.joints.push_back(*values);
   }
+  if (recording.time_s.empty() && recording.of_other_arms > 0)
+    throw InputError(source, fmt::format("has no positions of the rig's joints {}: it names {}",
+                                         fmt::join(joints.names, ", "), fmt::join(other_names, ", ")));
   if (recording.time_s.size() < 2)
     throw InputError(source, fmt::format("has {} readings that are numbers with a stamp, expected two or more",
                                          recording.time_s.size()));
+  check_units(recording, joints, source);
   return recording;
 }
 

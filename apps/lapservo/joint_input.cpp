@@ -1,5 +1,6 @@
 #include "apps/lapservo/joint_input.h"
 
+#include <cstdio>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -21,12 +22,21 @@ std::vector<std::string> columns_of(const std::string& path) {
   return names;
 }
 
+// Reports on stderr how many readings are passed over.
+JointInput reported(JointInput input) {
+  const auto& [repeated, of_other_arms] = std::pair{input.recording.repeated, input.recording.of_other_arms};
+  if (repeated > 0 || of_other_arms > 0)
+    std::fprintf(stderr, "lapservo: %s: %d repeated readings and %d of other arms' joints are passed over\n",
+                 input.source.c_str(), repeated, of_other_arms);
+  return input;
+}
+
 JointInput read_table(const CalibrateOptions& options, const Instrument& instrument) {
   refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.joints);
   const Joints joints =
       joints_of(instrument, instrument.joints ? std::vector<std::string>() : columns_of(options.joints), options.joints,
                 options.rig);
-  return {joints, read_joint_recording(options.joints, joints), options.joints};
+  return reported({joints, read_joint_recording(options.joints, joints), options.joints});
 }
 
 JointInput read_topic(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames,
@@ -37,7 +47,7 @@ JointInput read_topic(const CalibrateOptions& options, const Instrument& instrum
                                      " is no bag, and so has no stamps that would go with a bag's");
   const Joints joints =
       joints_of(instrument, joint_names_in_bag(bag, topic), bag.path() + ": " + topic.name, options.rig);
-  return {joints, joints_in_bag(bag, topic, joints, *begin_s), bag.path()};
+  return reported({joints, joints_in_bag(bag, topic, joints, *begin_s), bag.path()});
 }
 
 }  // namespace

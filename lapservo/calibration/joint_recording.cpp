@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -55,14 +56,30 @@ JointRecording joint_recording_of(const CsvTable& table, const std::string& sour
     const double time_s = table.number(row, "time_s");
     std::array<double, 4> at;
     for (std::size_t i = 0; i < at.size(); ++i) at[i] = table.number(row, joints.names[i]);
-    if (!recording.time_s.empty() && time_s == recording.time_s.back() && at == recording.joints.back()) continue;
+    if (!recording.time_s.empty() && time_s == recording.time_s.back() && at == recording.joints.back()) {
+      ++recording.repeated;
+      continue;
+    }
     if (!recording.time_s.empty() && !(time_s > recording.time_s.back()))
       throw InputError(source, "row " + std::to_string(row + 1) + ": time_s", table.text(row, "time_s"),
                        "later than the row before: the clock jumps");
     recording.time_s.push_back(time_s), recording.joints.push_back(at);
   }
   if (recording.time_s.size() < 2) throw InputError(source, "has fewer than two rows");
+  check_units(recording, joints, source);
   return recording;
+}
+
+void check_units(const JointRecording& recording, const Joints& joints, const std::string& source) {
+  constexpr double turn_rad = 2 * std::numbers::pi;
+  constexpr std::array<double, 4> largest{2 * turn_rad, 2 * turn_rad, 2, 16 * turn_rad};  // rad rad m rad
+  for (std::size_t i = 0; i < joints.names.size(); ++i) {
+    const bool is_length = i == 2;
+    for (const auto& at : recording.joints)
+      if (std::abs(at[i]) > largest[i])
+        throw InputError(source, joints.names[i], fmt::format("{:.6g}", at[i]),
+                         is_length ? "metres: it looks like millimetres" : "radians: it looks like degrees");
+  }
 }
 
 Joints joints_of(const Instrument& instrument, const std::vector<std::string>& recorded, const std::string& source,

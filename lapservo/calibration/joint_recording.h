@@ -15,6 +15,8 @@ namespace lapservo::internal {
 struct JointRecording {
   std::vector<double> time_s;                 ///< rises
   std::vector<std::array<double, 4>> joints;  ///< as Joints::names has them; rad, rad, m, rad
+  int repeated = 0;                           ///< readings passed over: the one before has the same stamp
+  int of_other_arms = 0;                      ///< messages passed over: they lack a joint of the rig
 
   /// Between two rows, linearly; nullopt before the first and after the last one, and across pauses of half a second.
   std::optional<std::array<double, 4>> at(double time_s) const;
@@ -27,6 +29,10 @@ JointRecording read_joint_recording(const std::filesystem::path& path, const Joi
 
 /// The same of a table that was read already; `source` is named in complaints.
 JointRecording joint_recording_of(const CsvTable& table, const std::string& source, const Joints& joints);
+
+/// Throws InputError naming `source` and the joint where numbers are too large for radians and metres, as degrees and
+/// millimetres are.
+void check_units(const JointRecording& recording, const Joints& joints, const std::string& source);
 
 /// The instrument's joints; where it has none, the recording's own four in the order theta, phi, rho, psi. Throws
 /// InputError naming `source` when there are not four, and the rig that would name them.

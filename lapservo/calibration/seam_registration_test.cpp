@@ -87,19 +87,23 @@ TEST(JointRecording, NamesWhatIsWrong) {
   EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n1,0,0,0,0\n0.5,0,0,0,0\n").find("clock jumps"),
             std::string::npos);
   EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n1,0,0,0,0\n").find("two rows"), std::string::npos);
-  write_file(path, "time_s,roll,yaw,pitch,insertion\n0,4,1,2,3\n1,8,5,6,7\n");
+  EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n0,0,0,0,0\n1,20,0,0,0\n").find("looks like degrees"),
+            std::string::npos);
+  EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n0,0,0,0,0\n1,0,0,90,0\n").find("looks like millimetres"),
+            std::string::npos);
+  write_file(path, "time_s,roll,yaw,pitch,insertion\n0,4,1,2,0.3\n1,8,5,6,0.7\n");
   const JointRecording recording = read_joint_recording(path, joints);
-  EXPECT_EQ(recording.joints[1], (std::array<double, 4>{5, 6, 7, 8}));
+  EXPECT_EQ(recording.joints[1], (std::array<double, 4>{5, 6, 0.7, 8}));
 }
 
 TEST(JointRecording, PassesOverARowThatRepeatsTheOneBefore) {
   const lapservo::testing::TemporaryFolder folder;
   const auto path = folder / "joints.csv";
   const Joints joints = instrument_with_joints().joints.value();
-  const std::string begin = "time_s,yaw,pitch,insertion,roll\n0,1,2,3,4\n0,1,2,3,4\n";
-  write_file(path, begin + "1,5,6,7,8\n1,5,6,7,8\n");
+  const std::string begin = "time_s,yaw,pitch,insertion,roll\n0,1,2,0.3,4\n0,1,2,0.3,4\n";
+  write_file(path, begin + "1,5,6,0.7,8\n1,5,6,0.7,8\n");
   EXPECT_EQ(read_joint_recording(path, joints).time_s, (std::vector<double>{0, 1}));
-  write_file(path, begin + "0,1,2,3,5\n1,5,6,7,8\n");
+  write_file(path, begin + "0,1,2,0.3,5\n1,5,6,0.7,8\n");
   EXPECT_NE(lapservo::testing::input_error([&] { read_joint_recording(path, joints); }).find("clock jumps"),
             std::string::npos);
 }

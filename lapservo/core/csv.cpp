@@ -124,6 +124,9 @@ CsvTable CsvTable::parse(std::string_view text, std::string source) {
     if (!split) throw InputError(at_line(table.source_, line_number), "has a quote that does not end with its field");
     std::vector<std::string> fields = std::move(*split);
     if (table.header_.empty()) {
+      if (fields.size() == 1 && fields[0].find_first_of(";\t") != std::string::npos)
+        throw InputError(at_line(table.source_, line_number),
+                         "separates columns by semicolons or tabs, expected commas, and decimal points in numbers");
       table.header_ = std::move(fields);
       continue;
     }

@@ -93,6 +93,14 @@ TEST(CsvTable, AQuoteEndsWithItsField) {
         << row;
 }
 
+TEST(CsvTable, NamesOtherSeparators) {
+  for (const char* text : {"time_s;yaw\n0,5;1,2\n", "time_s\tyaw\n0.5\t1.2\n"})
+    EXPECT_NE(
+        testing::input_error([&] { CsvTable::parse(text, "a.csv"); }).find("a.csv:1: separates columns by semicolons"),
+        std::string::npos)
+        << text;
+}
+
 TEST(CsvTable, AnEmptyFieldIsUnknownNotZero) {
   const CsvTable table = CsvTable::parse("a,b,c\n1,,\n", "t.csv");
   EXPECT_EQ(table.number_or_empty(0, "a"), 1);
