@@ -1,5 +1,6 @@
 #include "lapservo/io/overlay_writer.h"
 
+#include <optional>
 #include <system_error>
 
 #include "lapservo/core/atomic_file.h"
@@ -39,12 +40,16 @@ class FolderOverlay : public OverlayWriter {
 class VideoOverlay : public OverlayWriter {
  public:
   VideoOverlay(const fs::path& path, double fps) : video_(path, fps) {}
-  void add(const Frame&, const cv::Mat& overlay) override { video_.add(overlay); }
+  void add(const Frame& frame, const cv::Mat& overlay) override {
+    if (!start_s_) start_s_ = frame.time_s;
+    video_.add(overlay, frame.time_s - *start_s_);
+  }
   void commit() override { video_.commit(); }
   bool is_video() const override { return true; }
 
  private:
   VideoWriter video_;
+  std::optional<double> start_s_;  // the first frame's time
 };
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 extern "C" {
 #include <libavutil/opt.h>
@@ -14,6 +15,9 @@ namespace {
 
 // Tried on rendered frames with a sensor's noise (docs/design.md): as large, as near to the picture and as fast to read
 // as MPEG-4 part 2 was.
+constexpr int ticks_per_second =
+    60'000;  // whole periods of 24, 25, 30, 50 and 60 frames a second; MPEG-4's largest: 65535
+
 constexpr const char *preset = "ultrafast", *crf = "22";
 
 // Not containers of several files, as playlists are. Those that list no codecs (MPEG-TS) take it, unless they are
@@ -72,7 +76,6 @@ VideoEncoder::VideoEncoder(const std::filesystem::path& path, const std::string&
   avformat_alloc_output_context2(&file, nullptr, nullptr, path.c_str());
   if (!file) refuse();
   file_.reset(file);
-  frame_->pts = 0;
   open_codec(size, frames_per_second);
   open_file(path);
 }
@@ -97,6 +100,10 @@ void VideoEncoder::open_codec(const cv::Size& size, double frames_per_second) {
   codec_->pix_fmt = even || encoder->id != AV_CODEC_ID_H264 ? AV_PIX_FMT_YUV420P : AV_PIX_FMT_YUV444P;
   codec_->framerate = av_d2q(frames_per_second, finest);
   codec_->time_base = av_inv_q(codec_->framerate);
+  if (!constant_rate()) {
+    codec_->time_base = {1, ticks_per_second};
+    period_ = std::max<std::int64_t>(1, std::llround(ticks_per_second / frames_per_second));
+  }
   codec_->gop_size = std::max(1, static_cast<int>(std::lround(frames_per_second)));  // a second, to be stepped to
   codec_->max_b_frames = 0;  // so that times are in order in containers that know no other
   if (file_->oformat->flags & AVFMT_GLOBALHEADER) codec_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
@@ -135,17 +142,25 @@ void VideoEncoder::convert(const cv::Mat& bgr) {
   sws_scale(scaler_.get(), rows, steps, 0, codec_->height, frame_->data, frame_->linesize);
 }
 
-void VideoEncoder::add(const cv::Mat& bgr) {
+bool VideoEncoder::constant_rate() const {
+  return std::string_view(file_->oformat->name) == "avi";
+}
+
+void VideoEncoder::add(const cv::Mat& bgr, std::optional<double> time_s) {
   convert(bgr);
+  const double unit_s = av_q2d(codec_->time_base);
+  const std::int64_t at = time_s ? std::llround(*time_s / unit_s) : 0;
+  frame_->pts = at > last_ ? at : last_ + period_;
+  if (last_ < 0) frame_->pts = std::max<std::int64_t>(0, at);
+  last_ = frame_->pts;
   need(avcodec_send_frame(codec_.get(), frame_.get()));
-  ++frame_->pts;
   write_packets();
 }
 
 void VideoEncoder::write_packets() {
   AVStream* const stream = file_->streams[0];
   while (avcodec_receive_packet(codec_.get(), packet_.get()) == 0) {
-    packet_->duration = 1;
+    packet_->duration = period_;
     av_packet_rescale_ts(packet_.get(), codec_->time_base, stream->time_base);
     packet_->stream_index = stream->index;
     need(av_interleaved_write_frame(file_.get(), packet_.get()));

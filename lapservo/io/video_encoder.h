@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include <opencv2/core.hpp>
@@ -23,8 +25,10 @@ class VideoEncoder {
                double frames_per_second);
 
   cv::Size size() const { return {codec_->width, codec_->height}; }
-  /// 8-bit BGR of that size, a frame's time after the one before. Throws InputError when it can't be written.
-  void add(const cv::Mat& bgr);
+  /// 8-bit BGR of that size, shown `time_s` seconds after the video's start; without a time, or with one that is not
+  /// later than the frame before, a period after that. Containers of constant rate (.avi) round the times to periods.
+  /// Throws InputError when it can't be written.
+  void add(const cv::Mat& bgr, std::optional<double> time_s = std::nullopt);
   /// Writes what is left, and the container's index.
   void finish();
 
@@ -33,6 +37,7 @@ class VideoEncoder {
     void operator()(AVFormatContext* file) const;
   };
 
+  bool constant_rate() const;
   void open_codec(const cv::Size& size, double frames_per_second);
   void open_file(const std::filesystem::path& path);
   void convert(const cv::Mat& bgr);
@@ -46,6 +51,8 @@ class VideoEncoder {
   libav::Scaler scaler_;
   libav::Frame frame_{av_frame_alloc()};
   libav::Packet packet_{av_packet_alloc()};
+  std::int64_t period_ = 1;  ///< between frames, in units of the encoder's time base
+  std::int64_t last_ = -1;   ///< the latest frame's time, in the same units
 };
 
 }  // namespace lapservo::internal

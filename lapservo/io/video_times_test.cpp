@@ -3,11 +3,13 @@
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "lapservo/io/frame_source.h"
+#include "lapservo/io/video_writer.h"
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo {
@@ -42,6 +44,23 @@ TEST(VideoTimes, AreTheContainersWhereFramesWereDropped) {
     for (std::size_t i = 0; i < times.s.size(); ++i)
       EXPECT_NEAR(times.s[i], static_cast<double>(i < 30 ? i : i + 45) / fps, 1.01e-3) << name << ", frame " << i;
     EXPECT_EQ(times.complaint, "") << name;
+  }
+}
+
+TEST(VideoTimes, AreWrittenAsTheyAreRead) {
+  const testing::TemporaryFolder folder;
+  const std::vector<double> times{0, 0.04, 0.5, 0.533, 2};
+  const cv::Mat frame(48, 64, CV_8UC3, cv::Scalar(40, 90, 200));
+  for (const auto& [name, within_s] : {std::pair{"a.mp4", 1e-3}, {"a.mkv", 1e-3}, {"a.mov", 1e-3}, {"a.avi", 0.04}}) {
+    const auto path = folder / name;
+    internal::VideoWriter video(path, 25);
+    for (const double time_s : times) video.add(frame, time_s);
+    video.commit();
+    const TimesRead read = read_times(path);
+    ASSERT_EQ(read.s.size(), times.size()) << name;
+    for (std::size_t i = 0; i < times.size(); ++i)
+      EXPECT_NEAR(read.s[i], times[i], within_s + 1e-9) << name << ", frame " << i;
+    EXPECT_EQ(read.complaint, "") << name;
   }
 }
 

@@ -31,7 +31,7 @@ VideoWriter::VideoWriter(const fs::path& path, double frames_per_second)
   temporary_.emplace(target_, TemporaryFile::Name::always);
 }
 
-void VideoWriter::add(const cv::Mat& frame) {
+void VideoWriter::add(const cv::Mat& frame, std::optional<double> time_s) {
   const std::string name = target_.name.string();
   if (!encoder_) encoder_ = std::make_unique<VideoEncoder>(temporary_->path(), name, frame.size(), frames_per_second_);
   if (frame.type() != CV_8UC3 || frame.size() != encoder_->size())
@@ -39,7 +39,7 @@ void VideoWriter::add(const cv::Mat& frame) {
   ++frames_;
   if (failed_) return;
   try {
-    encoder_->add(frame);
+    encoder_->add(frame, time_s);
   } catch (const InputError&) {  // commit() tells, once whoever writes other results has written them
     failed_ = true;
   }

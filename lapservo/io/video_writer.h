@@ -19,9 +19,9 @@ class VideoWriter {
   /// Throws InputError at once when it can't be written.
   VideoWriter(const std::filesystem::path& path, double frames_per_second);
 
-  /// 8-bit BGR, all of one size. Throws InputError when there is no encoder for the name's ending; commit()
-  /// tells of a full disk.
-  void add(const cv::Mat& frame);
+  /// 8-bit BGR, all of one size, at VideoEncoder::add()'s times. Throws InputError when there is no encoder for the
+  /// name's ending; commit() reports a full disk.
+  void add(const cv::Mat& frame, std::optional<double> time_s = std::nullopt);
   /// Throws InputError when the file does not hold every frame in the end. Without frames there is no video.
   void commit();
 
