@@ -5,6 +5,7 @@ Ends with 77 and the reason where Chromium is not installed.
 import base64
 import json
 import os
+import pathlib
 import re
 import shutil
 import signal
@@ -153,10 +154,18 @@ def see_no_stray_start(browser):
         state(browser, "track")
 
 
+def stop_process(process):
+    """Returns when none of its threads runs any more."""
+    process.send_signal(signal.SIGSTOP)
+    tasks = pathlib.Path(f"/proc/{process.pid}/task")
+    while any(stat.read_text().rpartition(")")[2].split()[0] != "T" for stat in tasks.glob("*/stat")):
+        time.sleep(0.01)
+
+
 def see_no_late_start(browser, lapservo):
     browser.key("h")
     state(browser, "hold: held")
-    lapservo.send_signal(signal.SIGSTOP)
+    stop_process(lapservo)
     browser.click("start")
     browser.wait_for("document.getElementById('note').textContent === 'start: no answer, it may have arrived'")
     lapservo.send_signal(signal.SIGCONT)
