@@ -29,6 +29,8 @@ Canvas::Canvas(const std::filesystem::path& path, double width_mm, double height
   } else if (extension == ".pdf") {
     unit = points_per_mm;
     surface_ = cairo_pdf_surface_create_for_stream(write_to_stream, &file_.stream(), width_mm * unit, height_mm * unit);
+    cairo_pdf_surface_set_metadata(surface_, CAIRO_PDF_METADATA_CREATE_DATE,
+                                   nullptr);  // the same marker, the same bytes
   } else if (extension == ".png") {
     unit = png_px_per_mm;
     png_ = true;
