@@ -1,7 +1,6 @@
 #include "lapservo/io/observation_csv.h"
 
 #include <cmath>
-#include <iterator>
 #include <optional>
 
 #include <fmt/format.h>
@@ -13,12 +12,12 @@ namespace {
 
 void append(std::string& row, std::optional<double> value, int decimals) {
   row += ',';
-  if (value && std::isfinite(*value)) fmt::format_to(std::back_inserter(row), "{:.{}f}", *value, decimals);
+  if (value && std::isfinite(*value)) row += fmt::format("{:.{}f}", *value, decimals);
 }
 
 void append_sigma(std::string& row, std::optional<double> value) {
   row += ',';
-  if (value && std::isfinite(*value)) fmt::format_to(std::back_inserter(row), "{:.4g}", *value);
+  if (value && std::isfinite(*value)) row += fmt::format("{:.4g}", *value);
 }
 
 void append_marker(std::string& row, const std::optional<Observation::MarkerPose>& marker) {
