@@ -4,7 +4,6 @@
 #include <exception>
 #include <fcntl.h>
 #include <filesystem>
-#include <iostream>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -20,16 +19,7 @@ constexpr int bad_input = 2;
 // The libraries beneath print their own complaints; ours is one line that names the file.
 void silence_libraries() {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
-  setenv("OPENCV_VIDEOIO_DEBUG", "0", 0);
   setenv("GST_DEBUG", "none", 0);
-}
-
-// Formats whose size we don't ask for beforehand: a few bytes must not ask for gigabytes.
-void limit_pictures() {
-  setenv("OPENCV_IO_MAX_IMAGE_WIDTH", "16384", 0);
-  setenv("OPENCV_IO_MAX_IMAGE_HEIGHT", "16384", 0);
-  setenv("OPENCV_IO_MAX_IMAGE_PIXELS", "268435456", 0);
 }
 
 // A closed one would give its number to a result's file, and our messages would go there. A limit on files' sizes is an
@@ -78,7 +68,6 @@ int parse_and_run(int argc, char** argv) {
     std::fprintf(stderr, "lapservo: %s (try --help)\n", error.what());
     return bad_input;
   }
-  std::cerr.setstate(std::ios::failbit);  // OpenCV's decoders write to it what an exception says better
   return run();
 }
 
@@ -87,7 +76,6 @@ int parse_and_run(int argc, char** argv) {
 int main(int argc, char** argv) {
   silence_libraries();
   prepare_standard_streams();
-  limit_pictures();
   try {
     return flushed(parse_and_run(argc, argv));
   } catch (const std::filesystem::filesystem_error& error) {

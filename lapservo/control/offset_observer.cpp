@@ -199,11 +199,6 @@ void OffsetObserver::follow_backlash(double interval_s) {
   offset_ -= instrument(backlashes_, backlash_) - before;
 }
 
-std::optional<DelayEstimate> OffsetObserver::delay_estimate() const {
-  if (config_.delay_s) return std::nullopt;
-  return delay_estimator_.estimate();
-}
-
 std::optional<Estimate> OffsetObserver::estimate(const FeatureModel& model, const Eigen::Vector4d& q_joint,
                                                  double time_s) const {
   if (!started_ || anew_) return std::nullopt;

@@ -58,12 +58,9 @@ class OffsetObserver {
   double delay_s() const { return delay_s_; }
   /// Given, or estimated once.
   bool delay_is_known() const { return config_.delay_s || delay_seen_; }
-  /// What the data say; nullopt when the delay is given or there was too little motion.
-  std::optional<DelayEstimate> delay_estimate() const;
   const Eigen::Vector4d& offset() const { return offset_; }
   /// Full backlash between measured joints and instrument, joint by joint, as far as it has been learnt.
   const Eigen::Vector4d& backlash() const { return backlash_; }
-  bool started() const { return started_; }
 
  private:
   using Backlashes = std::array<Backlash, 4>;

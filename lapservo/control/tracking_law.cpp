@@ -13,10 +13,6 @@ TrackingGains paper_gains(double control_period_s) {
   return {Eigen::Vector4d(0.032, 0.008, 0.0008, 0.01) / control_period_s};
 }
 
-double exact_gain_held(double decay_per_s, double period_s) {
-  return -std::expm1(-decay_per_s * period_s) / period_s;
-}
-
 double exact_gain_ramped(double decay_per_s, double period_s) {
   const double decay_per_period = decay_per_s * period_s;
   return 2 / period_s * std::exp(-decay_per_period) * std::tanh(decay_per_period / 2);

@@ -12,12 +12,9 @@ namespace lapservo::internal {
 /// period.
 TrackingGains paper_gains(double control_period_s);
 
-/// The gain that makes an error sampled every `period_s` decay exactly as exp(-decay t) when the velocity is held over
-/// each period: (1 - exp(-decay T)) / T. Tends to `decay` for small periods.
-double exact_gain_held(double decay_per_s, double period_s);
-/// The same when the velocity ramps linearly from the last one to the new one over each period, as
-/// JointPath does: e' = e + T (v + v')/2 with v' = -K e has the solution exp(-decay t) for
-/// K = (2/T) exp(-decay T) tanh(decay T / 2).
+/// The gain that makes an error sampled every `period_s` decay exactly as exp(-decay t) when the velocity ramps
+/// linearly from the last one to the new one over each period, as JointPath does: e' = e + T (v + v')/2 with v' = -K e
+/// has the solution exp(-decay t) for K = (2/T) exp(-decay T) tanh(decay T / 2). Tends to `decay` for small periods.
 double exact_gain_ramped(double decay_per_s, double period_s);
 
 /// f - f_d with the angle s (an angle of a directed line: period 2 pi) wrapped to [-pi, pi).

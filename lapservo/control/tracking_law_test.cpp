@@ -19,17 +19,6 @@ Eigen::Matrix4d random_matrix(Random& random) {
   return matrix;
 }
 
-TEST(TrackingLaw, SampledErrorDecaysExactlyWithVelocityHeld) {
-  for (const double decay_per_s : {0.05, 1.0, 20.0}) {
-    constexpr double period_s = 0.05;
-    double error = 1;
-    for (int k = 1; k <= 40; ++k) {
-      error -= period_s * exact_gain_held(decay_per_s, period_s) * error;
-      EXPECT_NEAR(error, std::exp(-decay_per_s * period_s * k), 1e-12);
-    }
-  }
-}
-
 TEST(TrackingLaw, SampledErrorDecaysExactlyWithVelocityRamped) {
   for (const double decay_per_s : {0.05, 1.0, 20.0}) {
     constexpr double period_s = 0.05;
@@ -44,8 +33,7 @@ TEST(TrackingLaw, SampledErrorDecaysExactlyWithVelocityRamped) {
   }
 }
 
-TEST(TrackingLaw, ExactGainsTendToTheDecayRate) {
-  EXPECT_NEAR(exact_gain_held(3, 1e-6), 3, 1e-4);
+TEST(TrackingLaw, TheExactGainTendsToTheDecayRate) {
   EXPECT_NEAR(exact_gain_ramped(3, 1e-6), 3, 1e-4);
 }
 

@@ -73,7 +73,6 @@ class VisualController {
   double delay_s() const { return estimator_->delay_s(); }
   /// Whether it is more than a guess.
   bool delay_is_known() const { return estimator_->delay_is_known(); }
-  double arm_lag_s() const { return arm_response_.lag_s(); }
 
  private:
   struct Law {

@@ -27,10 +27,6 @@ JointVector random_position(const Rig& rig, Random& random) {
 
 }  // namespace
 
-bool marker_well_in_view(const Camera& camera, const Instrument& instrument, const JointVector& q) {
-  return marker_in_view(camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), well_in_view);
-}
-
 Eigen::Vector2d marker_middle_px(const Camera& camera, const Instrument& instrument, const JointVector& q) {
   const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(q);
   return camera.raw_from_point(pose * Eigen::Vector3d(0, 0, instrument.marker.length_m() / 2));

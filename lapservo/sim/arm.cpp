@@ -52,7 +52,6 @@ void Arm::servo_jp(const Eigen::Vector4d& setpoint) {
   if (!setpoint.allFinite()) fault();
   if (faulted_) return;
   setpoint_ = setpoint.cwiseMax(config_.lower).cwiseMin(config_.upper);
-  beyond_limits_ += setpoint_ != setpoint;
 }
 
 void Arm::step(double dt_s) {

@@ -38,12 +38,9 @@ class Arm : public SimulatedArm {
   void fault() override;
   void recover() override;
 
-  long setpoints_beyond_limits() const { return beyond_limits_; }
-
  private:
   ArmConfig config_;
   Eigen::Vector4d setpoint_, motor_, q_driven_;
-  long beyond_limits_ = 0;
   bool faulted_ = false;
 };
 
