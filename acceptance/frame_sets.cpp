@@ -29,11 +29,6 @@ namespace fs = std::filesystem;
 double mean(const std::vector<double>& values) {
   return values.empty() ? 0 : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
-double rms(const std::vector<double>& values) {
-  double squares = 0;
-  for (const double value : values) squares += value * value;
-  return values.empty() ? 0 : std::sqrt(squares / static_cast<double>(values.size()));
-}
 double standard_deviation(const std::vector<double>& values) {
   const double middle = mean(values), square = rms(values);
   return std::sqrt(std::max(0.0, square * square - middle * middle));

@@ -9,6 +9,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/core/statistics.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
@@ -42,10 +43,10 @@ struct Score {
   double found_fraction() const { return expected ? static_cast<double>(found) / expected : 1; }
 };
 
+using internal::rms;
 using testing::from_environment;
 
 double mean(const std::vector<double>& values);
-double rms(const std::vector<double>& values);
 double standard_deviation(const std::vector<double>& values);
 double largest(const std::vector<double>& values);
 

@@ -16,6 +16,7 @@
 
 #include "bench/frames.h"
 #include "lapservo/core/random.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/vision/tracker.h"
@@ -126,20 +127,15 @@ void for_each_run(cv::Size size_px, const Sequence& sequence, int frames, std::u
   }
 }
 
-double quantile(const std::vector<double>& sorted, double fraction) {
-  return sorted[static_cast<std::size_t>(fraction * static_cast<double>(sorted.size() - 1) + 0.5)];
-}
-
 struct Times {
   std::vector<double> ms;
   int found = 0, looked_for = 0;
 
   void print(const std::string& name, double memcpy_ms) {
-    std::sort(ms.begin(), ms.end());
     const double worst = quantile(ms, 0.999);
     std::printf("| %s | %zu | %.0f %% | %.2f | %.2f | %.2f | %.2f | %.1f |\n", name.c_str(), ms.size(),
-                100.0 * found / std::max(1, looked_for), quantile(ms, 0.5), quantile(ms, 0.99), worst, ms.back(),
-                worst / memcpy_ms);
+                100.0 * found / std::max(1, looked_for), median(ms), quantile(ms, 0.99), worst,
+                *std::max_element(ms.begin(), ms.end()), worst / memcpy_ms);
   }
 };
 
@@ -152,8 +148,7 @@ double memcpy_ms(cv::Size size_px) {
     std::memcpy(to.data, from.data, from.total() * from.elemSize());
     ms.push_back(cpu_ms() - before);
   }
-  std::sort(ms.begin(), ms.end());
-  return quantile(ms, 0.5);
+  return median(ms);
 }
 
 // Of a run's frames, by trackers that know the runs before it.

@@ -18,6 +18,7 @@
 #include "lapservo/calibration/registration_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/rig/rig_updater.h"
 
 namespace lapservo::app {
@@ -42,7 +43,7 @@ void print_numbers(const Instrument& before, const Registration& registration) {
 }
 
 void print_residuals(const Registration& registration) {
-  const double position_mm = 1e3 * rms(registration, &RegistrationResidual::position_m);
+  const double position_mm = 1e3 * rms(registration.residuals, &RegistrationResidual::position_m);
   if (!registration.arm) {
     std::printf("\naxes miss the RCM by %.2f mm rms in %zu frames\n", position_mm, registration.residuals.size());
     return;
@@ -50,8 +51,8 @@ void print_residuals(const Registration& registration) {
   std::printf(
       "\nmarkers are %.2f mm, %.2f mrad (axis), %.2f mrad (about it) rms from where the joints have them, in "
       "%zu frames\n",
-      position_mm, 1e3 * rms(registration, &RegistrationResidual::axis_rad),
-      1e3 * rms(registration, &RegistrationResidual::roll_rad), registration.residuals.size());
+      position_mm, 1e3 * rms(registration.residuals, &RegistrationResidual::axis_rad),
+      1e3 * rms(registration.residuals, &RegistrationResidual::roll_rad), registration.residuals.size());
 }
 
 int run_registration(const CalibrateOptions& options) {

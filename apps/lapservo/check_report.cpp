@@ -2,25 +2,18 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
 #include "apps/lapservo/print_residual_plot.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/experiments/html_report.h"
 
 namespace lapservo::app {
 using namespace internal;
 namespace {
-
-template <typename Items, typename Value>
-double rms(const Items& items, Value value) {
-  double squares = 0;
-  for (const auto& item : items) squares += value(item) * value(item);
-  return items.empty() ? 0 : std::sqrt(squares / static_cast<double>(items.size()));
-}
 
 Series points(const std::string& name, int color) {
   return {.name = name, .x = {}, .y = {}, .sigma = {}, .draw = Draw::points, .color = color};

@@ -9,6 +9,7 @@
 #include "lapservo/calibration/arm_start.h"
 #include "lapservo/calibration/frame_fit.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
@@ -87,12 +88,6 @@ std::vector<ArmResidual> residuals(const Instrument& instrument, const Camera& c
       all.push_back(difference(camera, instrument.marker, pose.time_s,
                                marker_at(instrument, camera_from_rcm, joints, *at), pose.marker.camera_from_marker));
   return all;
-}
-
-double rms(const std::vector<ArmResidual>& all, double ArmResidual::*what) {
-  double squares = 0;
-  for (const ArmResidual& r : all) squares += r.*what * (r.*what);
-  return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, all.size())));
 }
 
 // By how much the fit's registration may be off at the markers: place, direction and turn.

@@ -8,7 +8,7 @@
 #include <Eigen/SVD>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
 

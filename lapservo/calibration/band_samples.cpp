@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/color_classes.h"

@@ -11,6 +11,7 @@
 #include "lapservo/calibration/board_edges.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/rounded_sigma.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/invertible.h"
 #include "lapservo/geometry/rotation.h"
 
@@ -130,12 +131,6 @@ std::vector<BoardEdgeProfile> some_of(std::vector<BoardEdgeProfile> profiles, st
   return some;
 }
 
-double rms_of(const std::vector<double>& values) {
-  double squares = 0;
-  for (const double value : values) squares += value * value;
-  return values.empty() ? 0 : std::sqrt(squares / static_cast<double>(values.size()));
-}
-
 struct Refined {
   LensFit fit;
   CameraAdjustment adjustment;
@@ -169,9 +164,9 @@ void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edge
       of_view.push_back(residual_px), all.push_back(residual_px);
       calibration.residuals.push_back({i, point.raw_px, residual_px * point.normal});
     }
-    calibration.view_rms_px.push_back(rms_of(of_view));
+    calibration.view_rms_px.push_back(rms(of_view));
   }
-  calibration.rms_px = rms_of(all);
+  calibration.rms_px = rms(all);
 }
 
 // The same from the same pictures: what the last digits of sums are hangs on where in memory the numbers lie.

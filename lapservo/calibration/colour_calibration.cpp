@@ -10,7 +10,7 @@
 #include "lapservo/calibration/band_samples.h"
 #include "lapservo/calibration/marker_response.h"
 #include "lapservo/calibration/robust_scale.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/vision/color_classes.h"
 #include "lapservo/vision/tracker.h"
 

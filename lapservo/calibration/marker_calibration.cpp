@@ -8,7 +8,7 @@
 
 #include "lapservo/calibration/print_adjustment.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/marker/decoder.h"

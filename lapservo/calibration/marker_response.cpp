@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "lapservo/calibration/robust_scale.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/edge_profile.h"

@@ -11,7 +11,7 @@
 #include "lapservo/calibration/arm_start.h"
 #include "lapservo/calibration/axes_meeting_point.h"
 #include "lapservo/calibration/frame_fit.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 namespace {

@@ -1,8 +1,6 @@
 #include "lapservo/calibration/registration_measurement.h"
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -90,12 +88,6 @@ std::vector<CalibratedNumber> registered_numbers(const Instrument& before, const
     add(fmt::format("offset of {}", units[i]), before.joints->offset[i], arm.joints.offset[i], arm.sigma_offset[i]);
   add("image_delay_s [ms]", before.image_delay_s.value_or(unknown), arm.image_delay_s, arm.sigma_image_delay_s);
   return numbers;
-}
-
-double rms(const Registration& registration, double RegistrationResidual::*what) {
-  double squares = 0;
-  for (const RegistrationResidual& r : registration.residuals) squares += r.*what * (r.*what);
-  return std::sqrt(squares / static_cast<double>(std::max<std::size_t>(1, registration.residuals.size())));
 }
 
 }  // namespace lapservo::internal

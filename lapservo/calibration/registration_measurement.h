@@ -35,7 +35,4 @@ MeasuredRegistration measured(const Registration& registration);
 /// registration was made with.
 std::vector<CalibratedNumber> registered_numbers(const Instrument& before, const Registration& registration);
 
-/// Root mean square of one of what is left at each frame.
-double rms(const Registration& registration, double RegistrationResidual::*what);
-
 }  // namespace lapservo::internal

@@ -16,8 +16,8 @@
 #include "lapservo/calibration/response_curve.h"
 #include "lapservo/calibration/solve_quietly.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
 #include "lapservo/core/rounded_sigma.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 namespace {
@@ -314,12 +314,6 @@ class ProfileFit {
   ceres::Solver::Options solver_;
   ceres::Solver::Summary summary_;
 };
-
-// The value below which so many of all lie.
-double quantile(std::vector<double> values, double fraction) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1))];
-}
 
 // As other measured numbers are, but to digits by which the values still rise.
 Response rounded_by_sigma(Response table, double sigma) {

@@ -9,7 +9,7 @@
 #include "lapservo/calibration/axes_meeting_point.h"
 #include "lapservo/calibration/registration.h"
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/marker/sensitivity.h"
 #include "lapservo/vision/color_classes.h"
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/vision/light_image.h"
 
@@ -95,9 +95,7 @@ void RigEvidence::look_at_picture(const cv::Mat& bgr) {
     }
   if (brightest.empty()) return;
   clipped_.push_back(static_cast<double>(clipped) / static_cast<double>(brightest.size()));
-  const auto tenth = brightest.begin() + static_cast<std::ptrdiff_t>(brightest.size() * 9 / 10);
-  std::nth_element(brightest.begin(), tenth, brightest.end());
-  values_.push_back(*tenth);
+  values_.push_back(quantile(brightest, 0.9));
 }
 
 FrameEvidence RigEvidence::tracked_as_it_is(const cv::Mat& bgr, double time_s) {

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/sim/instrument_shaft.h"

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/core/statistics.h"
+
 namespace lapservo::internal {
 
 Spread spread_of(std::vector<double> values) {
@@ -13,13 +15,11 @@ Spread spread_of(std::vector<double> values) {
   spread.count = values.size();
   if (values.empty()) return spread;
   const auto n = static_cast<double>(values.size());
-  double squares = 0;
   for (const double value : values) {
     spread.mean += value / n;
-    squares += value * value;
     spread.largest = std::max(spread.largest, std::abs(value));
   }
-  spread.rms = std::sqrt(squares / n);
+  spread.rms = rms(values);
   double about_mean = 0;
   for (const double value : values) about_mean += (value - spread.mean) * (value - spread.mean);
   if (values.size() > 1) spread.deviation = std::sqrt(about_mean / (n - 1));

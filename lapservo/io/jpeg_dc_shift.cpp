@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 namespace {
@@ -30,9 +30,7 @@ Steps part(const JpegBlocks& blocks, int begin, int end) {
 // Of three borders in four; the others may be those of blocks that were misread.
 float spread_about(Steps steps, float from) {
   for (float& step : steps) step = std::abs(step - from);
-  const auto quartile = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() * 3 / 4);
-  std::nth_element(steps.begin(), quartile, steps.end());
-  return *quartile + rounding_spread;
+  return quantile(steps, 0.75) + rounding_spread;
 }
 
 // Of the borders around those that a shift from block `first` on would show in.

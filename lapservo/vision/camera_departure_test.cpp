@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/testing/camera_effects.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/fine_fit.h"

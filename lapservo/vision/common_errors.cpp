@@ -6,7 +6,7 @@
 #include <span>
 
 #include "lapservo/core/inplace_vector.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/blurred_boundary.h"

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <limits>
 
+#include "lapservo/core/statistics.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {
@@ -68,11 +68,11 @@ InplaceVector<double, max_end_points> gloss_of(std::span<const EndPoint> points)
   constexpr double veil_quantile = 0.2;
   InplaceVector<float, max_end_points> shafts;
   for (const EndPoint& point : points) shafts.push_back(point.shaft);
-  const auto veil = shafts.begin() + static_cast<std::ptrdiff_t>(veil_quantile * static_cast<double>(shafts.size()));
-  std::nth_element(shafts.begin(), veil, shafts.end());
   InplaceVector<double, max_end_points> gloss;
+  if (points.empty()) return gloss;
+  const float veil = quantile(shafts, veil_quantile);
   for (const EndPoint& point : points) {
-    const double beyond = std::max(0.0F, point.shaft - *veil) / std::max(point.step, 1e-9F);
+    const double beyond = std::max(0.0F, point.shaft - veil) / std::max(point.step, 1e-9F);
     gloss.push_back(std::min(beyond, edge_limits.most_gloss));
   }
   return gloss;

@@ -7,7 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/vision/heaviest_stretch.h"

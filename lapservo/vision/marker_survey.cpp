@@ -6,7 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/vision/coarse_fit.h"
 #include "lapservo/vision/initial_pose.h"

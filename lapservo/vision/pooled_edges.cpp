@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/vision/limits.h"
 
 namespace lapservo::internal {

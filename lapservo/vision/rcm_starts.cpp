@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/vision/explained_colors.h"
 #include "lapservo/vision/line_reward.h"
 #include "lapservo/vision/line_segmentation.h"

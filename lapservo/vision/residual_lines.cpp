@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "lapservo/core/inplace_vector.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/vision/limits.h"
 #include "lapservo/vision/normal_equations.h"
 

@@ -10,7 +10,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/dense_matrix.h"
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/limits.h"

@@ -7,7 +7,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/vision/blurred_edges.h"
 #include "lapservo/vision/edge_lines.h"
 #include "lapservo/vision/limits.h"

@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
 
-#include "lapservo/core/median.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/testing/scenes.h"
 #include "lapservo/vision/marker_survey.h"
 

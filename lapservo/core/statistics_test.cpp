@@ -1,0 +1,34 @@
+#include "lapservo/core/statistics.h"
+
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace lapservo::internal {
+namespace statistics_test {
+
+TEST(Statistics, AQuantileIsOneOfTheValues) {
+  std::vector<int> values{9, 3, 5, 1, 7};
+  for (const auto& [fraction, value] : {std::pair(0.0, 1), std::pair(0.2, 3), std::pair(0.79, 7), std::pair(0.99, 9)})
+    EXPECT_EQ(quantile(values, fraction), value) << fraction;
+  EXPECT_EQ(quantile(std::vector{4.0F}, 0.9), 4.0F);
+}
+
+TEST(Statistics, TheMedianOfAnEvenNumberIsTheUpperOne) {
+  EXPECT_EQ(median(std::vector{3, 1, 2}), 2);
+  EXPECT_EQ(median(std::vector{4, 1, 3, 2}), 3);
+}
+
+TEST(Statistics, TheRootMeanSquareIsOfValuesMembersAndFunctions) {
+  struct Item {
+    double error;
+  };
+  EXPECT_DOUBLE_EQ(rms(std::vector<double>{3, -4, 0, 0}), 2.5);
+  EXPECT_DOUBLE_EQ(rms(std::vector<Item>{{1}, {7}}, &Item::error), 5);
+  EXPECT_DOUBLE_EQ(rms(std::vector<Item>{{1}, {7}}, [](const Item& item) { return 2 * item.error; }), 10);
+  EXPECT_EQ(rms(std::vector<double>{}), 0);
+}
+
+}  // namespace statistics_test
+}  // namespace lapservo::internal
