@@ -18,6 +18,9 @@ template <typename Image>
 std::size_t bytes_of(const Image& message) {
   return message.data.size();
 }
+std::size_t bytes_of(const BagRecorder::Message& message) {
+  return std::visit([](const auto& one) { return bytes_of(one); }, message);
+}
 
 }  // namespace
 
@@ -28,7 +31,7 @@ BagRecorder::~BagRecorder() {
 }
 
 void BagRecorder::add(const std::string& topic, Message message) {
-  const std::size_t bytes = std::visit([](const auto& m) { return bytes_of(m); }, message);
+  const std::size_t bytes = bytes_of(message);
   const double stamp_s = std::visit([](const auto& m) { return m.stamp_s; }, message);
   const std::lock_guard lock(mutex_);
   if (!(stamp_s > 0 && stamp_s < std::numeric_limits<std::int32_t>::max())) {
@@ -42,29 +45,19 @@ void BagRecorder::add(const std::string& topic, Message message) {
     return;
   }
   waiting_bytes_ += bytes;
-  waiting_.push_back({topic, since_1970_s(), std::move(message)});
-  changed_.notify_all();
+  waiting_.push({topic, since_1970_s(), std::move(message)});
 }
 
 void BagRecorder::write(const Entry& entry) {
   std::visit([&](const auto& message) { writer_.write(entry.topic, entry.time_s, message); }, entry.message);
   const std::lock_guard lock(mutex_);
+  waiting_bytes_ -= bytes_of(entry.message);
   ++(std::holds_alternative<JointMessage>(entry.message) ? counts_.joints : counts_.images);
-}
-
-std::optional<BagRecorder::Entry> BagRecorder::take() {
-  std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return ending_ || !waiting_.empty(); });
-  if (waiting_.empty()) return std::nullopt;
-  Entry entry = std::move(waiting_.front());
-  waiting_.pop_front();
-  waiting_bytes_ -= std::visit([](const auto& message) { return bytes_of(message); }, entry.message);
-  return entry;
 }
 
 void BagRecorder::write_all() {
   try {
-    while (auto entry = take()) write(*entry);
+    while (const auto entry = waiting_.pop()) write(*entry);
   } catch (...) {
     const std::lock_guard lock(mutex_);
     failure_ = std::current_exception();
@@ -82,11 +75,7 @@ void BagRecorder::check() const {
 }
 
 void BagRecorder::end() {
-  {
-    const std::lock_guard lock(mutex_);
-    ending_ = true;
-  }
-  changed_.notify_all();
+  waiting_.close();
   if (thread_.joinable()) thread_.join();
 }
 

@@ -1,16 +1,14 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstddef>
-#include <deque>
 #include <exception>
 #include <filesystem>
 #include <mutex>
-#include <optional>
 #include <string>
 #include <thread>
 #include <variant>
 
+#include "lapservo/core/bounded_queue.h"
 #include "lapservo/crtk/messages.h"
 #include "recordings/ros2_bag_writer.h"
 
@@ -49,19 +47,16 @@ class BagRecorder {
     Message message;
   };
 
-  std::optional<Entry> take();
   void write_all();
   void end();
   void write(const Entry& entry);
 
   Ros2BagWriter writer_;
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Entry> waiting_;
+  BoundedQueue<Entry> waiting_;
   std::size_t waiting_bytes_ = 0;
   RecordedCounts counts_;
   std::exception_ptr failure_;
-  bool ending_ = false;
   std::thread thread_;  // last: it uses the others
 };
 

@@ -1,14 +1,13 @@
 #pragma once
 
-#include <condition_variable>
-#include <deque>
 #include <functional>
 #include <future>
 #include <memory>
-#include <mutex>
 #include <thread>
 #include <type_traits>
 #include <utility>
+
+#include "lapservo/core/bounded_queue.h"
 
 namespace lapservo::internal {
 
@@ -18,9 +17,14 @@ class SerialWorker {
  public:
   enum class Thread { none, own };
   /// Without a thread a task is done when its result is asked for.
-  explicit SerialWorker(Thread thread);
+  explicit SerialWorker(Thread thread) {
+    if (thread == Thread::own) thread_ = std::thread([this] { work(); });
+  }
   /// Waits for the task that is being done; of the others, which nobody may wait for any more, none is begun.
-  ~SerialWorker();
+  ~SerialWorker() {
+    tasks_.cancel();
+    if (thread_.joinable()) thread_.join();
+  }
   SerialWorker(const SerialWorker&) = delete;
   SerialWorker& operator=(const SerialWorker&) = delete;
 
@@ -30,18 +34,16 @@ class SerialWorker {
     if (!thread_.joinable()) return std::async(std::launch::deferred, std::move(task));
     const auto packaged = std::make_shared<std::packaged_task<std::invoke_result_t<Task>()>>(std::move(task));
     auto result = packaged->get_future();
-    post([packaged] { (*packaged)(); });
+    tasks_.push([packaged] { (*packaged)(); });
     return result;
   }
 
  private:
-  void post(std::function<void()> task);
-  void work();
+  void work() {
+    while (const auto task = tasks_.pop()) (*task)();
+  }
 
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<std::function<void()>> tasks_;
-  bool closing_ = false;
+  BoundedQueue<std::function<void()>> tasks_;
   std::thread thread_;
 };
 

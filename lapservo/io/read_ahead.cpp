@@ -1,11 +1,10 @@
 #include "lapservo/io/read_ahead.h"
 
-#include <condition_variable>
-#include <deque>
 #include <exception>
-#include <mutex>
 #include <thread>
 #include <utility>
+
+#include "lapservo/core/bounded_queue.h"
 
 namespace lapservo::internal {
 namespace {
@@ -26,15 +25,8 @@ class ReadAhead : public FrameSource {
 
   std::optional<Frame> next() override {
     if (!thread_.joinable() && !stopped_) thread_ = std::thread([this] { read(); });
-    std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return !frames_.empty() || ended_; });
-    if (frames_.empty()) {
-      if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
-      return std::nullopt;
-    }
-    Frame frame = std::move(frames_.front());
-    frames_.pop_front();
-    changed_.notify_all();
+    auto frame = frames_.pop();
+    if (!frame && failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     return frame;
   }
   Kind kind() const override { return kind_; }
@@ -50,28 +42,16 @@ class ReadAhead : public FrameSource {
  private:
   void read() {
     try {
-      while (auto frame = source_->next()) {
-        std::unique_lock lock(mutex_);
-        changed_.wait(lock, [this] { return frames_.size() < most_ahead || stopped_; });
-        if (stopped_) break;
-        frames_.push_back(std::move(*frame));
-        changed_.notify_all();
-      }
+      while (auto frame = source_->next())
+        if (!frames_.push(std::move(*frame))) break;
     } catch (...) {
-      const std::lock_guard lock(mutex_);
       failure_ = std::current_exception();
     }
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-    changed_.notify_all();
+    frames_.close();
   }
   void stop() const {
-    {
-      const std::lock_guard lock(mutex_);
-      stopped_ = true;
-      ended_ = ended_ || !thread_.joinable();
-      changed_.notify_all();
-    }
+    stopped_ = true;
+    frames_.close();
     if (thread_.joinable()) thread_.join();
   }
 
@@ -80,11 +60,9 @@ class ReadAhead : public FrameSource {
   std::optional<int> frame_count_;
   double frames_per_second_;
   std::optional<double> first_stamp_s_;
-  mutable std::mutex mutex_;
-  mutable std::condition_variable changed_;
-  std::deque<Frame> frames_;
-  std::exception_ptr failure_;
-  mutable bool ended_ = false, stopped_ = false;
+  mutable BoundedQueue<Frame> frames_{most_ahead};
+  std::exception_ptr failure_;  // the thread's, until frames_ is closed
+  mutable bool stopped_ = false;
   mutable std::thread thread_;
 };
 

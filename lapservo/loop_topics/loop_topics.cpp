@@ -102,11 +102,7 @@ LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const std::string& 
 
 LoopTopics::~LoopTopics() {
   subscriptions_.clear();
-  {
-    const std::lock_guard lock(mutex_);
-    ended_ = true;
-  }
-  changed_.notify_all();
+  to_draw_.cancel();
   thread_.join();
 }
 
@@ -120,9 +116,7 @@ void LoopTopics::publish(const ControlTick& tick, const std::string& state) {
   publish_observation(tick, seen_s);
   if (stamp_s < next_drawing_s_) return;
   next_drawing_s_ = stamp_s + between_drawings_s;
-  const std::lock_guard lock(mutex_);
-  to_draw_ = Drawing{seen_s, tick.seen->image.bgr, tick.seen->observations, tick.decision.camera_from_rcm};
-  changed_.notify_all();
+  to_draw_.push_over_oldest({seen_s, tick.seen->image.bgr, tick.seen->observations, tick.decision.camera_from_rcm});
 }
 
 void LoopTopics::publish_numbers(const ControlTick& tick, double stamp_s) {
@@ -235,14 +229,7 @@ long LoopTopics::malformed() const {
 }
 
 void LoopTopics::draw() {
-  while (true) {
-    std::optional<Drawing> drawing;
-    {
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return ended_ || to_draw_; });
-      if (ended_) return;
-      drawing = std::exchange(to_draw_, std::nullopt);
-    }
+  while (const auto drawing = to_draw_.pop()) {
     CompressedImageMessage message;
     message.stamp_s = drawing->stamp_s;
     message.format = "bgr8; jpeg compressed bgr8";

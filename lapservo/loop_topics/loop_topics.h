@@ -1,6 +1,5 @@
 #pragma once
 
-#include <condition_variable>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/trajectory.h"
+#include "lapservo/core/bounded_queue.h"
 #include "lapservo/crtk/transport.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/servo/run.h"
@@ -70,12 +70,10 @@ class LoopTopics {
   Transport::Publisher<CompressedImageMessage> overlay_;
 
   mutable std::mutex mutex_;
-  std::condition_variable changed_;
   LoopWishes wishes_;
   long malformed_ = 0;
-  std::optional<Drawing> to_draw_;
+  BoundedQueue<Drawing> to_draw_{1};
   double next_drawing_s_ = 0;
-  bool ended_ = false;
   std::vector<Transport::Subscription> subscriptions_;
   std::thread thread_;  // last: it uses the others
 };

@@ -1,6 +1,5 @@
 #include "lapservo/sim/render_queue.h"
 
-#include <algorithm>
 #include <cstddef>
 #include <utility>
 
@@ -21,12 +20,7 @@ RenderQueue::RenderQueue(Renderer renderer, int threads) {
 }
 
 RenderQueue::~RenderQueue() {
-  {
-    const std::lock_guard lock(mutex_);
-    closing_ = true;
-    tasks_.clear();
-  }
-  changed_.notify_all();
+  tasks_.cancel();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -35,26 +29,12 @@ std::future<cv::Mat> RenderQueue::render(RenderJob job) {
     return std::async(std::launch::deferred, [this, job = std::move(job)] { return done(renderers_.front(), job); });
   Task task([job = std::move(job)](Renderer& renderer) { return done(renderer, job); });
   std::future<cv::Mat> result = task.get_future();
-  {
-    const std::lock_guard lock(mutex_);
-    tasks_.push_back(std::move(task));
-  }
-  changed_.notify_one();
+  tasks_.push(std::move(task));
   return result;
 }
 
 void RenderQueue::work(Renderer& renderer) {
-  while (true) {
-    Task task;
-    {
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return closing_ || !tasks_.empty(); });
-      if (closing_) return;
-      task = std::move(tasks_.front());
-      tasks_.pop_front();
-    }
-    task(renderer);
-  }
+  while (auto task = tasks_.pop()) (*task)(renderer);
 }
 
 }  // namespace lapservo::internal

@@ -1,15 +1,13 @@
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
-#include <deque>
 #include <future>
-#include <mutex>
 #include <thread>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/core/bounded_queue.h"
 #include "lapservo/sim/renderer.h"
 
 namespace lapservo::internal {
@@ -37,10 +35,7 @@ class RenderQueue {
   void work(Renderer& renderer);
 
   std::vector<Renderer> renderers_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Task> tasks_;
-  bool closing_ = false;
+  BoundedQueue<Task> tasks_;
   std::vector<std::thread> threads_;
 };
 
