@@ -13,8 +13,6 @@
 #include <sstream>
 #include <string>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #include <utility>
 #include <vector>
 
@@ -22,9 +20,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "acceptance/tool_test.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/testing/boards.h"
-#include "lapservo/testing/sample_frames.h"
 #ifdef LAPSERVO_TEST_BAGS
 #include <fmt/format.h>
 
@@ -35,52 +33,35 @@ namespace lapservo {
 using namespace internal;
 namespace {
 namespace fs = std::filesystem;
+using lapservo::testing::read_file;
+using lapservo::testing::write_file;
 
-std::string read(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
-class CommandLine : public ::testing::Test {
+class CommandLine : public acceptance::ToolTest {
  protected:
   void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("lapservo_cli_" + std::to_string(::getpid()) +
-                                           ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    // OpenCV's video backends, loaded for a try and unloaded again, keep what they allocated.
-    ::setenv("ASAN_OPTIONS", "detect_leaks=0", 1);
-    fs::create_directories(folder_ / "in");
-    fs::create_directories(folder_ / "out");
+    ToolTest::SetUp();
+    fs::create_directory("in");
+    fs::create_directory("out");
   }
-  void TearDown() override { fs::remove_all(folder_); }
 
-  int run(const std::string& arguments) {
-    const std::string command = std::string(LAPSERVO_TOOL) + " " + arguments + " >" + (folder_ / "stdout").string() +
-                                " 2>" + (folder_ / "stderr").string() + " </dev/null";
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  // Nothing is left in out/.
+  static void expect_refused(const std::string& arguments, const std::vector<std::string>& words) {
+    ToolTest::expect_refused(arguments, words);
+    EXPECT_TRUE(fs::is_empty("out")) << arguments << " left something behind";
   }
-  std::string errors() const { return read(folder_ / "stderr"); }
-  std::string output() const { return read(folder_ / "stdout"); }
-
-  // Exit code 2, one line that holds all the words, nothing in out/.
-  void expect_refused(const std::string& arguments, std::initializer_list<const char*> words) {
-    SCOPED_TRACE(arguments);
-    EXPECT_EQ(run(arguments), 2);
-    const std::string text = errors();
-    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
-    for (const char* word : words) EXPECT_NE(text.find(word), std::string::npos) << "no '" << word << "' in: " << text;
-    EXPECT_TRUE(fs::is_empty(folder_ / "out")) << "left something behind";
+  static void empty_out() {
+    fs::remove_all("out");
+    fs::create_directory("out");
   }
-  std::string in(const std::string& name, const std::string& content = "") {
-    const fs::path path = folder_ / "in" / name;
-    if (!content.empty()) std::ofstream(path, std::ios::binary) << content;
-    return path.string();
+  static std::string in(const std::string& name, const std::string& content) {
+    write_file("in/" + name, content);
+    return "in/" + name;
   }
-  std::string out(const std::string& name) const { return (folder_ / "out" / name).string(); }
-  std::string track(const std::string& input) const {
-    return "track " + input + " --rig " + rig_ + " --out " + out("obs.csv") + " --overlay " + out("overlay");
+  static void write_grey(const std::string& name) {
+    cv::imwrite(name, cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
+  }
+  static std::string track(const std::string& input) {
+    return "track " + input + " --rig configs/example.yaml --out out/obs.csv --overlay out/overlay";
   }
 
 #ifdef LAPSERVO_TEST_BAGS
@@ -102,20 +83,20 @@ class CommandLine : public ::testing::Test {
         reading.positions.push_back(joints.number(row, reading.names[i]));
       add("/PSM1/measured_js", "sensor_msgs/JointState", reading);
     }
-    for (int i = 0; fs::exists(in(pictures) + fmt::format("/{:04}.png", i)); ++i) {
-      const std::string png = read(in(pictures) + fmt::format("/{:04}.png", i));
+    for (int i = 0; fs::exists(fmt::format("in/{}/{:04}.png", pictures, i)); ++i) {
+      const std::string png = read_file(fmt::format("in/{}/{:04}.png", pictures, i));
       add("/endoscope/image_raw/compressed", "sensor_msgs/CompressedImage",
           CompressedImageMessage{begin_s + i / fps, "png", {png.begin(), png.end()}});
     }
-    lapservo::testing::write_ros1_bag(in("run.bag"), ros1, "lz4");
-    fs::create_directories(in("run"));
-    lapservo::testing::write_ros2_bag(in("run") + "/run_0.db3", ros2);
-    lapservo::testing::write_ros2_metadata(in("run"), {"run_0.db3"});
+    lapservo::testing::write_ros1_bag("in/run.bag", ros1, "lz4");
+    fs::create_directories("in/run");
+    lapservo::testing::write_ros2_bag("in/run/run_0.db3", ros2);
+    lapservo::testing::write_ros2_metadata("in/run", {"run_0.db3"});
   }
   // Every number as in a run on the pictures themselves, but for the last digits of times.
   void expect_tracked_as(const std::string& observations, const std::string& bag, const std::string& rig) {
-    ASSERT_EQ(run("track " + bag + " --fps 8 --rig " + rig + " --out " + out("bag.csv")), 0) << errors();
-    const CsvTable expected = CsvTable::read(observations), found = CsvTable::read(out("bag.csv"));
+    expect_done("track " + bag + " --fps 8 --rig " + rig + " --out out/bag.csv");
+    const CsvTable expected = CsvTable::read(observations), found = CsvTable::read("out/bag.csv");
     ASSERT_EQ(found.rows(), expected.rows());
     for (std::size_t row = 0; row < found.rows(); ++row)
       for (const std::string& column : expected.columns())
@@ -143,79 +124,72 @@ class CommandLine : public ::testing::Test {
     }
   }
 #endif
-
-  fs::path folder_;
-  const std::string rig_ = lapservo::testing::source_folder().string() + "/configs/example.yaml";
 };
 
 TEST_F(CommandLine, RenderThenTrack) {
-  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("frames") + " --count 3 --seed 5"), 0) << errors();
+  expect_done("render --rig configs/example.yaml --out out/frames --count 3 --seed 5");
   for (const char* name : {"0000.png", "0002.png", "truth.csv", "rig.yaml"})
-    EXPECT_TRUE(fs::exists(out("frames") + "/" + name));
-  ASSERT_EQ(run("track " + out("frames") + " --out " + out("obs.csv") + " --overlay " + out("overlay")), 0) << errors();
-  const CsvTable observed = CsvTable::read(out("obs.csv")), truth = CsvTable::read(out("frames") + "/truth.csv");
+    EXPECT_TRUE(fs::exists(fs::path("out/frames") / name));
+  expect_done("track out/frames --out out/obs.csv --overlay out/overlay");
+  const CsvTable observed = CsvTable::read("out/obs.csv"), truth = CsvTable::read("out/frames/truth.csv");
   ASSERT_EQ(observed.rows(), 3U);
   for (std::size_t row = 0; row < 3; ++row) {
     EXPECT_EQ(observed.text(row, "status"), "ok");
     EXPECT_EQ(observed.text(row, "file"), truth.text(row, "file"));
     EXPECT_NEAR(observed.number(row, "l_px"), truth.number(row, "l_px"), 0.2);
-    EXPECT_TRUE(fs::exists(out("overlay") + "/" + truth.text(row, "file")));
+    EXPECT_TRUE(fs::exists("out/overlay/" + truth.text(row, "file")));
   }
 }
 
 // Of such a print nothing is told but what to do.
 TEST_F(CommandLine, SaysWhatToDoAboutAPrintThatIsOff) {
-  std::string printed = read(rig_);
+  std::string printed = read_file("configs/example.yaml");
   for (const auto& [of_rig, off] :
        {std::pair<std::string, std::string>{"[0.0035, 0.0035, 0.017]", "[0.0037, 0.0035, 0.0168]"},
         {"[0.0095, 0.0095, 0.005]", "[0.0097, 0.0095, 0.0048]"}}) {
     ASSERT_NE(printed.find(of_rig), std::string::npos);
     printed.replace(printed.find(of_rig), of_rig.size(), off);
   }
-  std::ofstream(out("printed.yaml")) << printed;
-  ASSERT_EQ(run("render --rig " + out("printed.yaml") + " --out " + out("frames") + " --count 2 --seed 5"), 0)
-      << errors();
-  EXPECT_EQ(run("track " + out("frames") + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
-  EXPECT_NE(errors().find("in 2 of 2 frames the print is not as the rig says (marker_mismatch)"), std::string::npos)
-      << errors();
-  EXPECT_NE(errors().find("lapservo calibrate marker"), std::string::npos) << errors();
-  EXPECT_EQ(CsvTable::read(out("obs.csv")).text(0, "status"), "marker_mismatch");
+  write_file("out/printed.yaml", printed);
+  expect_done("render --rig out/printed.yaml --out out/frames --count 2 --seed 5");
+  EXPECT_EQ(run("track out/frames --rig configs/example.yaml --out out/obs.csv"), 1);
+  expect_in(errors(), "in 2 of 2 frames the print is not as the rig says (marker_mismatch)");
+  expect_in(errors(), "lapservo calibrate marker");
+  EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "status"), "marker_mismatch");
 }
 
 TEST_F(CommandLine, VideosAndTheBaseline) {
-  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("film") + " --count 6 --moving --video"), 0) << errors();
-  ASSERT_EQ(run("track " + out("film") + "/video.mp4 --out " + out("obs.csv") + " --overlay " + out("overlay.mp4")), 0)
-      << errors();
-  EXPECT_EQ(CsvTable::read(out("obs.csv")).rows(), 6U);
-  EXPECT_GT(fs::file_size(out("overlay.mp4")), 1000U);
-  ASSERT_EQ(run("track " + out("film") + "/video.mp4 --method centerline --out " + out("c.csv")), 0) << errors();
+  expect_done("render --rig configs/example.yaml --out out/film --count 6 --moving --video");
+  expect_done("track out/film/video.mp4 --out out/obs.csv --overlay out/overlay.mp4");
+  EXPECT_EQ(CsvTable::read("out/obs.csv").rows(), 6U);
+  EXPECT_GT(fs::file_size("out/overlay.mp4"), 1000U);
+  expect_done("track out/film/video.mp4 --method centerline --out out/c.csv");
 }
 
 #ifdef LAPSERVO_GST
 // Live, they are measured as from files; each frame that is not taken is counted.
 TEST_F(CommandLine, GStreamersPipelinesAreTracked) {
-  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("frames") + " --count 3 --seed 5"), 0) << errors();
+  expect_done("render --rig configs/example.yaml --out out/frames --count 3 --seed 5");
   std::string raw;
-  for (const char* name : {"/0000.png", "/0001.png", "/0002.png"}) {
-    const cv::Mat picture = cv::imread(out("frames") + name);
+  for (const char* name : {"0000.png", "0001.png", "0002.png"}) {
+    const cv::Mat picture = cv::imread(std::string("out/frames/") + name);
     raw.append(reinterpret_cast<const char*>(picture.data), picture.total() * picture.elemSize());
   }
   const std::string pipeline = "'gst:filesrc location=" + in("frames.raw", raw) +
                                " ! rawvideoparse format=bgr width=1280 height=720 framerate=1/1'";
-  ASSERT_EQ(run("track " + out("frames") + " --rig " + rig_ + " --single --out " + out("files.csv")), 0) << errors();
-  ASSERT_EQ(run("track " + pipeline + " --rig " + rig_ + " --single --out " + out("live.csv")), 0) << errors();
-  const CsvTable files = CsvTable::read(out("files.csv")), live = CsvTable::read(out("live.csv"));
+  expect_done("track out/frames --rig configs/example.yaml --single --out out/files.csv");
+  expect_done("track " + pipeline + " --rig configs/example.yaml --single --out out/live.csv");
+  const CsvTable files = CsvTable::read("out/files.csv"), live = CsvTable::read("out/live.csv");
   ASSERT_EQ(live.rows(), 3U) << output();
   for (std::size_t row = 0; row < 3; ++row) {
     EXPECT_NEAR(live.number(row, "time_s"), static_cast<double>(row), 1e-4);
     EXPECT_EQ(live.text(row, "psi_rad"), files.text(row, "psi_rad"));
   }
-  EXPECT_EQ(run("track " + pipeline + " --rig " + rig_ + " --frames 1 --out " + out("live.csv")), 0) << errors();
-  EXPECT_EQ(CsvTable::read(out("live.csv")).rows(), 1U);
-  fs::remove_all(folder_ / "out");
-  fs::create_directories(folder_ / "out");
+  expect_done("track " + pipeline + " --rig configs/example.yaml --frames 1 --out out/live.csv");
+  EXPECT_EQ(CsvTable::read("out/live.csv").rows(), 1U);
+  empty_out();
   expect_refused(track("gst:nosuchelement"), {"gst:nosuchelement", "nosuchelement", "expected a pipeline"});
-  expect_refused("track gst:videotestsrc --out " + out("obs.csv"), {"--rig", "is missing"});
+  expect_refused("track gst:videotestsrc --out out/obs.csv", {"--rig", "is missing"});
 }
 #endif
 
@@ -226,20 +200,19 @@ TEST_F(CommandLine, BagsThatCannotBeRead) {
                                             {"run.db3", "SQLite format 3", "ROS 2 bag"}}) {
     expect_refused(track(in(name, content)), {name, what});
   }
-  expect_refused("servo --replay " + in("run.bag"), {"--rig", "is missing"});
-  expect_refused("servo --replay " + in("run.bag") + " --rig " + rig_, {"run.bag", "ROS 1 bag"});
-  expect_refused("calibrate registration " + in("run.db3") + " --rig " + rig_ + " --out " + out("rig.yaml"),
+  expect_refused("servo --replay in/run.bag", {"--rig", "is missing"});
+  expect_refused("servo --replay in/run.bag --rig configs/example.yaml", {"run.bag", "ROS 1 bag"});
+  expect_refused("calibrate registration in/run.db3 --rig configs/example.yaml --out out/rig.yaml",
                  {"run.db3", "ROS 2 bag"});
-  expect_refused("track " + in("picture.png", "?") + " --image-topic /image --out " + out("obs.csv"),
+  expect_refused("track " + in("picture.png", "?") + " --image-topic /image --out out/obs.csv",
                  {"--image-topic", "is /image, which is for bags"});
-  expect_refused("calibrate registration " + in("obs.csv", "a\n") + " --joint-topic /joints --rig " + rig_ + " --out " +
-                     out("rig.yaml"),
+  expect_refused("calibrate registration " + in("obs.csv", "a\n") +
+                     " --joint-topic /joints --rig configs/example.yaml --out out/rig.yaml",
                  {"--joint-topic", "is /joints, which is for bags"});
 }
 
 TEST_F(CommandLine, CamerasThatAreNone) {
-  const std::string servo = "servo --rig " + lapservo::testing::source_folder().string() +
-                            "/configs/paper.yaml --robot ros2:PSM1 --out " + out("run") + " --camera ";
+  const std::string servo = "servo --rig configs/paper.yaml --robot ros2:PSM1 --out out/run --camera ";
   expect_refused(servo + "/dev/video-none", {"/dev/video-none", "can't be opened", "expected a camera"});
   expect_refused(servo + "video.mp4", {"--camera", "is video.mp4", "/dev/videoN"});
   expect_refused(servo + "''", {"--camera", "is missing", "ros2:/topic"});
@@ -247,11 +220,11 @@ TEST_F(CommandLine, CamerasThatAreNone) {
 
 #ifdef LAPSERVO_WEB
 TEST_F(CommandLine, PagesThatCanNotBeServed) {
-  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
-  const std::string picture = in("grey.png") + " --rig " + rig_ + " ";
-  const std::string track = "track " + picture + "--out " + out("obs.csv") + " ";
+  write_grey("in/grey.png");
+  const std::string picture = "in/grey.png --rig configs/example.yaml ";
+  const std::string track = "track " + picture + "--out out/obs.csv ";
   expect_refused(track + "--listen 0.0.0.0", {"--listen", "expected --web"});
-  expect_refused("servo --robot sim --rig " + rig_ + " --listen 0.0.0.0", {"--listen", "expected --web"});
+  expect_refused("servo --robot sim --rig configs/example.yaml --listen 0.0.0.0", {"--listen", "expected --web"});
   expect_refused(track + "--web 65536", {"--web", "65536"});
   expect_refused(track + "--web 0 --listen robot.example", {"--listen", "robot.example", "an address"});
   expect_refused("view " + picture + "--port 0 --listen 192.0.2.1", {"--port", "192.0.2.1"});  // nobody's
@@ -259,47 +232,47 @@ TEST_F(CommandLine, PagesThatCanNotBeServed) {
 #endif
 
 TEST_F(CommandLine, NothingFoundIsOne) {
-  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
-  EXPECT_EQ(run("track " + in("grey.png") + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
-  EXPECT_EQ(CsvTable::read(out("obs.csv")).text(0, "status"), "no_marker");
+  write_grey("in/grey.png");
+  EXPECT_EQ(run("track in/grey.png --rig configs/example.yaml --out out/obs.csv"), 1);
+  EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "status"), "no_marker");
 }
 
 TEST_F(CommandLine, PicturesThatAreNone) {
   cv::Mat noise(720, 1280, CV_8UC3);
   cv::randu(noise, 0, 255);
-  cv::imwrite(in("whole.png"), noise);
-  cv::imwrite(in("whole.jpg"), noise);
-  cv::imwrite(in("small.png"), noise(cv::Rect(0, 0, 960, 540)));
-  const std::string png = read(in("whole.png")), jpg = read(in("whole.jpg"));
-  expect_refused(track(in("missing.png")), {"missing.png", "does not exist"});
+  cv::imwrite("in/whole.png", noise);
+  cv::imwrite("in/whole.jpg", noise);
+  cv::imwrite("in/small.png", noise(cv::Rect(0, 0, 960, 540)));
+  const std::string png = read_file("in/whole.png"), jpg = read_file("in/whole.jpg");
+  expect_refused(track("in/missing.png"), {"missing.png", "does not exist"});
   expect_refused(track(in("half.png", png.substr(0, png.size() / 2))), {"half.png", "truncated"});
   expect_refused(track(in("half.jpg", jpg.substr(0, jpg.size() / 2))), {"half.jpg", "truncated"});
   expect_refused(track(in("text.png", "this is no picture")), {"text.png", "expected a picture"});
   expect_refused(track(in("film.mp4", "this is no film")), {"film.mp4", "expected"});
-  expect_refused(track(in("small.png")), {"small.png", "960x540", "1280x720"});
-  std::ofstream(in("empty.png"));
-  expect_refused(track(in("empty.png")), {"empty.png", "is empty"});
-  fs::create_directories(folder_ / "in/folder");
-  expect_refused(track(in("folder")), {"folder", "no pictures"});
+  expect_refused(track("in/small.png"), {"small.png", "960x540", "1280x720"});
+  in("empty.png", "");
+  expect_refused(track("in/empty.png"), {"empty.png", "is empty"});
+  fs::create_directories("in/folder");
+  expect_refused(track("in/folder"), {"folder", "no pictures"});
 }
 
 TEST_F(CommandLine, GreyDeepAndTransparentPicturesAreAccepted) {
-  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC1, cv::Scalar(90)));
-  cv::imwrite(in("deep.png"), cv::Mat(720, 1280, CV_16UC3, cv::Scalar(9000, 9000, 9000)));
-  cv::imwrite(in("alpha.png"), cv::Mat(720, 1280, CV_8UC4, cv::Scalar(90, 90, 90, 10)));
+  cv::imwrite("in/grey.png", cv::Mat(720, 1280, CV_8UC1, cv::Scalar(90)));
+  cv::imwrite("in/deep.png", cv::Mat(720, 1280, CV_16UC3, cv::Scalar(9000, 9000, 9000)));
+  cv::imwrite("in/alpha.png", cv::Mat(720, 1280, CV_8UC4, cv::Scalar(90, 90, 90, 10)));
   for (const char* name : {"grey.png", "deep.png", "alpha.png"})
-    EXPECT_EQ(run("track " + in(name) + " --rig " + rig_ + " --out " + out("obs.csv")), 1) << name;
+    EXPECT_EQ(run(std::string("track in/") + name + " --rig configs/example.yaml --out out/obs.csv"), 1) << name;
 }
 
 TEST_F(CommandLine, RigsThatAreNone) {
-  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
-  const std::string good = read(rig_);
+  write_grey("in/grey.png");
+  const std::string good = read_file("configs/example.yaml");
   const auto with = [&](const std::string& what, const std::string& instead) {
     std::string text = good;
     text.replace(text.find(what), what.size(), instead);
-    return "track " + in("grey.png") + " --rig " + in("rig.yaml", text) + " --out " + out("obs.csv");
+    return "track in/grey.png --rig " + in("rig.yaml", text) + " --out out/obs.csv";
   };
-  expect_refused("track " + in("grey.png") + " --rig " + in("none.yaml") + " --out " + out("obs.csv"), {"none.yaml"});
+  expect_refused("track in/grey.png --rig in/none.yaml --out out/obs.csv", {"none.yaml"});
   expect_refused(with("diameter_m: 0.0084", "diameter_m: -1"), {"rig.yaml", "diameter_m", "-1"});
   expect_refused(with("diameter_m: 0.0084", "diameter_m: .nan"), {"rig.yaml", "diameter_m", ".nan"});
   expect_refused(with("diameter_m: 0.0084", "diameter: 0.0084"),
@@ -310,76 +283,72 @@ TEST_F(CommandLine, RigsThatAreNone) {
 }
 
 TEST_F(CommandLine, OutputsThatCannotBe) {
-  cv::imwrite(in("grey.png"), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
-  expect_refused("track " + in("grey.png") + " --rig " + rig_ + " --out " + out("no/such/folder/obs.csv"),
+  write_grey("in/grey.png");
+  expect_refused("track in/grey.png --rig configs/example.yaml --out out/no/such/folder/obs.csv",
                  {"obs.csv", "can't be written"});
-  expect_refused("track " + in("grey.png") + " --rig " + rig_ + " --out " + in("grey.png"),
-                 {"grey.png", "the input itself"});
-  expect_refused("track " + in("grey.png") + " --rig " + rig_ + " --method guess --out " + out("obs.csv"), {"guess"});
+  expect_refused("track in/grey.png --rig configs/example.yaml --out in/grey.png", {"grey.png", "the input itself"});
+  expect_refused("track in/grey.png --rig configs/example.yaml --method guess --out out/obs.csv", {"guess"});
   unsetenv("DISPLAY");
   unsetenv("WAYLAND_DISPLAY");
-  expect_refused("track " + in("grey.png") + " --rig " + rig_ + " --view --out " + out("obs.csv"),
-                 {"--view", "display"});
+  expect_refused("track in/grey.png --rig configs/example.yaml --view --out out/obs.csv", {"--view", "display"});
 }
 
 TEST_F(CommandLine, RenderingWhatCannotBe) {
-  std::string text = read(rig_);
+  std::string text = read_file("configs/example.yaml");
   text.erase(text.find("    camera_from_rcm"));
-  expect_refused("render --rig " + in("free.yaml", text) + " --out " + out("frames"),
+  expect_refused("render --rig " + in("free.yaml", text) + " --out out/frames",
                  {"free.yaml", "camera_from_rcm", "missing"});
-  expect_refused("render --rig " + rig_ + " --poses " + in("q.csv", "theta_rad,phi_rad,rho_m,psi_rad\n0,1.5,nan,0\n") +
-                     " --out " + out("frames"),
+  expect_refused("render --rig configs/example.yaml --poses " +
+                     in("q.csv", "theta_rad,phi_rad,rho_m,psi_rad\n0,1.5,nan,0\n") + " --out out/frames",
                  {"q.csv", "rho_m", "nan"});
 }
 
 TEST_F(CommandLine, Markers) {
-  EXPECT_EQ(run("marker design --diameter-mm 8.4 --out " + out("marker.yaml")), 0) << errors();
-  EXPECT_NE(read(out("marker.yaml")).find("bands_upper_m"), std::string::npos);
-  for (const char* name : {"sheet.pdf", "sheet.svg"}) {
-    EXPECT_EQ(run("marker print --rig " + rig_ + " --out " + out(name)), 0) << errors();
-    EXPECT_GT(fs::file_size(out(name)), 1000U);
+  expect_done("marker design --diameter-mm 8.4 --out out/marker.yaml");
+  expect_in(read_file("out/marker.yaml"), "bands_upper_m");
+  for (const char* name : {"out/sheet.pdf", "out/sheet.svg"}) {
+    expect_done(std::string("marker print --rig configs/example.yaml --out ") + name);
+    EXPECT_GT(fs::file_size(name), 1000U);
   }
-  EXPECT_EQ(run("marker show --rig " + rig_ + " --out " + out("marker.png")), 0) << errors();
-  EXPECT_NE(output().find("222"), std::string::npos);
-  fs::remove_all(folder_ / "out");
-  fs::create_directories(folder_ / "out");
+  expect_done("marker show --rig configs/example.yaml --out out/marker.png");
+  expect_in(output(), "222");
+  empty_out();
   expect_refused("marker design --bands-upper-mm 5,5,10 --bands-lower-mm 10,5,5", {"not decodable"});
   expect_refused("marker design --diameter-mm 8 --length-mm 8", {"do not fit"});
-  expect_refused("marker print --rig " + rig_ + " --out " + out("sheet.txt"), {"sheet.txt"});
-  expect_refused("marker show --rig " + rig_ + " --instrument PSM9", {"PSM9"});
+  expect_refused("marker print --rig configs/example.yaml --out out/sheet.txt", {"sheet.txt"});
+  expect_refused("marker show --rig configs/example.yaml --instrument PSM9", {"PSM9"});
 }
 
 TEST_F(CommandLine, ServoRunsAndReplays) {
-  const std::string paper = lapservo::testing::source_folder().string() + "/configs/paper.yaml";
-  ASSERT_EQ(run("servo --rig " + paper + " --robot sim --duration 6 --seed 2 --out " + out("run")), 0) << errors();
-  EXPECT_NE(output().find("within 1 px and 5 mrad from"), std::string::npos) << output();
-  for (const char* name : {"log.csv", "rig.yaml", "controller.yaml"}) EXPECT_TRUE(fs::exists(out("run") + "/" + name));
-  EXPECT_EQ(CsvTable::read(out("run") + "/log.csv").rows(), 360U);
-  EXPECT_EQ(run("servo --replay " + out("run") + "/log.csv"), 0) << errors();
-  EXPECT_NE(output().find("360 ticks reproduced bit for bit"), std::string::npos) << output();
+  expect_done("servo --rig configs/paper.yaml --robot sim --duration 6 --seed 2 --out out/run");
+  expect_in(output(), "within 1 px and 5 mrad from");
+  for (const char* name : {"log.csv", "rig.yaml", "controller.yaml"})
+    EXPECT_TRUE(fs::exists(fs::path("out/run") / name));
+  EXPECT_EQ(CsvTable::read("out/run/log.csv").rows(), 360U);
+  expect_done("servo --replay out/run/log.csv");
+  expect_in(output(), "360 ticks reproduced bit for bit");
 
-  const std::string controller = read(out("run") + "/controller.yaml");
-  std::ofstream(out("run") + "/controller.yaml")
+  const std::string controller = read_file("out/run/controller.yaml");
+  std::ofstream("out/run/controller.yaml")
       << "gains_per_s: [4, 5, 5, 5]\n"
       << controller.substr(0, controller.find("gains")) << controller.substr(controller.find("delay_s"));
-  EXPECT_EQ(run("servo --replay " + out("run") + "/log.csv"), 1);
-  EXPECT_NE(errors().find("tick"), std::string::npos);
+  EXPECT_EQ(run("servo --replay out/run/log.csv"), 1);
+  expect_in(errors(), "tick");
   // It has not converged after half a second.
-  EXPECT_EQ(run("servo --rig " + paper + " --robot sim --duration 0.5"), 1);
+  EXPECT_EQ(run("servo --rig configs/paper.yaml --robot sim --duration 0.5"), 1);
   // It converges, and then ends in a hold.
-  EXPECT_EQ(run("servo --rig " + paper + " --robot sim --duration 4.5 --seed 2 --hide 4,9"), 1);
-  EXPECT_NE(output().find("within 1 px and 5 mrad from"), std::string::npos) << output();
-  EXPECT_NE(output().find("ended in a hold: marker_lost"), std::string::npos) << output();
+  EXPECT_EQ(run("servo --rig configs/paper.yaml --robot sim --duration 4.5 --seed 2 --hide 4,9"), 1);
+  expect_in(output(), "within 1 px and 5 mrad from");
+  expect_in(output(), "ended in a hold: marker_lost");
 }
 
 // Section V-D, to the letter: omega is 0.5 rad/s for all features, K holds per control period (60 a second).
 TEST_F(CommandLine, ServoByThePapersMethod) {
-  const std::string paper = lapservo::testing::source_folder().string() + "/configs/paper.yaml";
   EXPECT_EQ(
-      run("servo --method paper --rig " + paper + " --robot sim --trajectory paper --duration 3 --out " + out("run")),
+      run("servo --method paper --rig configs/paper.yaml --robot sim --trajectory paper --duration 3 --out out/run"),
       1);
-  EXPECT_NE(output().find("Algorithm 1"), std::string::npos) << output();
-  const CsvTable log = CsvTable::read(out("run") + "/log.csv");
+  expect_in(output(), "Algorithm 1");
+  const CsvTable log = CsvTable::read("out/run/log.csv");
   ASSERT_EQ(log.rows(), 180U);
   const double start_s = log.number(0, "time_s");
   for (std::size_t row = 0; row < log.rows(); ++row) {
@@ -389,7 +358,7 @@ TEST_F(CommandLine, ServoByThePapersMethod) {
     EXPECT_NEAR(log.number(row, "desired_l_px"), 365 + 30 * swing, 1e-9);
     EXPECT_NEAR(log.number(row, "desired_d_px"), 212 + 37 * swing, 1e-9);
   }
-  const std::string controller = read(out("run") + "/controller.yaml");
+  const std::string controller = read_file("out/run/controller.yaml");
   double s = 0, r = 0, l = 0, d = 0;
   ASSERT_EQ(std::sscanf(controller.c_str() + controller.find("gains_per_s"), "gains_per_s: [%lf, %lf, %lf, %lf]", &s,
                         &r, &l, &d),
@@ -398,24 +367,24 @@ TEST_F(CommandLine, ServoByThePapersMethod) {
   const std::array<double, 4> per_period{s / 60, r / 60, l / 60, d / 60}, papers{0.032, 0.008, 0.0008, 0.01};
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(per_period.at(i), papers.at(i), 1e-12) << i;
 
-  run("servo --method paper --tracker surface --rig " + paper + " --robot sim --duration 0.5");
-  EXPECT_NE(output().find("all visible lines"), std::string::npos) << output();
+  run("servo --method paper --tracker surface --rig configs/paper.yaml --robot sim --duration 0.5");
+  expect_in(output(), "all visible lines");
 }
 
 // A number is the whole text, finite and in its range, for every option of every subcommand.
 TEST_F(CommandLine, NumbersThatAreNone) {
-  const std::string frames = "render --rig " + rig_ + " --out " + out("frames"), design = "marker design",
-                    servo = "servo --rig " + rig_ + " --robot sim --out " + out("run"),
-                    estimate = "estimate-rcm " + in("obs.csv", "instrument,status\n") + " --out " + out("rcm.csv");
+  const std::string frames = "render --rig configs/example.yaml --out out/frames", design = "marker design",
+                    servo = "servo --rig configs/example.yaml --robot sim --out out/run",
+                    estimate = "estimate-rcm " + in("obs.csv", "instrument,status\n") + " --out out/rcm.csv";
   const std::vector<std::pair<std::string, std::vector<const char*>>> options{
       {frames, {"count", "seed", "light", "smoke", "blood", "noise", "blur-px", "motion", "film-mm", "fps"}},
       {design, {"diameter-mm", "length-mm", "smallest-band-mm", "focal-px", "distance-mm", "sigma-px"}},
-      {"marker print --rig " + rig_ + " --out " + out("sheet.pdf"), {"copies"}},
-      {"marker show --rig " + rig_, {"focal-px", "distance-mm", "sigma-px"}},
+      {"marker print --rig configs/example.yaml --out out/sheet.pdf", {"copies"}},
+      {"marker show --rig configs/example.yaml", {"focal-px", "distance-mm", "sigma-px"}},
       {servo, {"duration", "latency-ms", "fps", "seed"}},
       {estimate, {"sigma-px", "common-px"}},
-      {"experiment rcm --out " + out("report"), {"seed"}},
-      {track(in("none.png")), {"fps"}}};
+      {"experiment rcm --out out/report", {"seed"}},
+      {track("in/none.png"), {"fps"}}};
   for (const auto& [command, names] : options)
     for (const char* name : names)
       for (const char* value : {"nan", "-1", "1x"})
@@ -431,75 +400,71 @@ TEST_F(CommandLine, NumbersThatAreNone) {
 
 // A flipped bit that the decoder notices, a picture of a palette, one that is to be turned: never a row that is ok.
 TEST_F(CommandLine, FlawedPicturesHaveAWordOfTheirOwn) {
-  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("frames") + " --count 1 --seed 5 --format jpg"), 0)
-      << errors();
-  const std::string whole = read(out("frames") + "/0000.jpg");
+  expect_done("render --rig configs/example.yaml --out out/frames --count 1 --seed 5 --format jpg");
+  const std::string whole = read_file("out/frames/0000.jpg");
   std::string damaged = whole;
   damaged.erase(damaged.size() / 2, 300);
-  cv::Mat few = cv::imread(out("frames") + "/0000.jpg");
+  cv::Mat few = cv::imread("out/frames/0000.jpg");
   few &= cv::Scalar(0xc0, 0xc0, 0xc0);
-  cv::imwrite(in("few.png"), few);
-  for (const auto& [file, word] : {std::pair{in("damaged.jpg", damaged), "damaged"}, {in("few.png"), "few_colors"}}) {
-    EXPECT_EQ(run("track " + file + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
-    EXPECT_EQ(CsvTable::read(out("obs.csv")).text(0, "status"), word);
+  cv::imwrite("in/few.png", few);
+  for (const auto& [file, word] : {std::pair{in("damaged.jpg", damaged), "damaged"}, {"in/few.png", "few_colors"}}) {
+    EXPECT_EQ(run("track " + file + " --rig configs/example.yaml --out out/obs.csv"), 1);
+    EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "status"), word);
   }
-  EXPECT_EQ(run("track " + in("whole.jpg", whole) + " --rig " + rig_ + " --out " + out("obs.csv")), 0) << errors();
+  expect_done("track " + in("whole.jpg", whole) + " --rig configs/example.yaml --out out/obs.csv");
 }
 
 TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {
-  ASSERT_EQ(run("render --rig " + rig_ + " --out " + out("film") + " --count 12 --moving"), 0) << errors();
-  cv::VideoWriter video(in("a.mkv"), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25, {1280, 720});
+  expect_done("render --rig configs/example.yaml --out out/film --count 12 --moving");
+  cv::VideoWriter video("in/a.mkv", cv::CAP_FFMPEG, cv::VideoWriter::fourcc('m', 'p', '4', 'v'), 25, {1280, 720});
   for (int i = 0; i < 12; ++i)
-    video.write(cv::imread(out("film") + (i < 10 ? "/000" : "/00") + std::to_string(i) + ".png"));
+    video.write(cv::imread((i < 10 ? "out/film/000" : "out/film/00") + std::to_string(i) + ".png"));
   video.release();
-  const std::string whole = read(in("a.mkv"));
+  const std::string whole = read_file("in/a.mkv");
   const std::string half = in("half.mkv", whole.substr(0, whole.size() / 2));
-  EXPECT_EQ(run("track " + half + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
-  EXPECT_NE(errors().find("half.mkv: ends early"), std::string::npos) << errors();
+  EXPECT_EQ(run("track " + half + " --rig configs/example.yaml --out out/obs.csv"), 1);
+  expect_in(errors(), "half.mkv: ends early");
   const std::string said = errors();
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
-  const std::size_t rows = CsvTable::read(out("obs.csv")).rows();
+  const std::size_t rows = CsvTable::read("out/obs.csv").rows();
   EXPECT_GE(rows, 3U);
   EXPECT_LT(rows, 12U);
 }
 
 TEST_F(CommandLine, ANameWithALineEndIsQuoted) {
-  fs::create_directories(folder_ / "in/folder");
-  cv::imwrite((folder_ / "in/folder/a.png").string(), cv::Mat(720, 1280, CV_8UC3, cv::Scalar(90, 90, 90)));
-  fs::rename(folder_ / "in/folder/a.png", folder_ / "in/folder/a\nb.png");
-  EXPECT_EQ(run("track " + in("folder") + " --rig " + rig_ + " --out " + out("obs.csv")), 1);
-  EXPECT_EQ(CsvTable::read(out("obs.csv")).text(0, "file"), "a\nb.png");
+  fs::create_directories("in/folder");
+  write_grey("in/folder/a.png");
+  fs::rename("in/folder/a.png", "in/folder/a\nb.png");
+  EXPECT_EQ(run("track in/folder --rig configs/example.yaml --out out/obs.csv"), 1);
+  EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "file"), "a\nb.png");
 }
 
 TEST_F(CommandLine, WhatHasNoEndIsRefused) {
-  fs::create_symlink("/dev/zero", in("endless.png"));
-  expect_refused(track(in("endless.png")), {"endless.png", "larger than 256 MiB"});
-  std::ofstream(in("sparse.png")) << "x";
-  fs::resize_file(in("sparse.png"), std::uintmax_t{8} << 30);
-  expect_refused(track(in("sparse.png")), {"sparse.png", "larger than 256 MiB"});
-  expect_refused("track /dev/zero --rig " + rig_ + " --out " + out("obs.csv"), {"/dev/zero", "no file"});
-  expect_refused("estimate-rcm /dev/zero --out " + out("rcm.csv"), {"/dev/zero", "larger than 256 MiB"});
+  fs::create_symlink("/dev/zero", "in/endless.png");
+  expect_refused(track("in/endless.png"), {"endless.png", "larger than 256 MiB"});
+  in("sparse.png", "x");
+  fs::resize_file("in/sparse.png", std::uintmax_t{8} << 30);
+  expect_refused(track("in/sparse.png"), {"sparse.png", "larger than 256 MiB"});
+  expect_refused("track /dev/zero --rig configs/example.yaml --out out/obs.csv", {"/dev/zero", "no file"});
+  expect_refused("estimate-rcm /dev/zero --out out/rcm.csv", {"/dev/zero", "larger than 256 MiB"});
 }
 
 TEST_F(CommandLine, TheLeastFramesASecondThatServoTakesWork) {
-  const std::string servo =
-      "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --robot sim";
+  const std::string servo = "servo --rig configs/paper.yaml --robot sim";
   EXPECT_EQ(run(servo + " --fps 6 --duration 1"), 1) << errors();  // it has not converged, but it ran
-  EXPECT_NE(output().find("not within 1 px"), std::string::npos) << output() << errors();
-  expect_refused(servo + " --fps 5 --out " + out("run"), {"--fps", "expected a number of 6"});
+  expect_in(output(), "not within 1 px");
+  expect_refused(servo + " --fps 5 --out out/run", {"--fps", "expected a number of 6"});
 }
 
 TEST_F(CommandLine, ALogWithoutPeriodsIsNoSuccess) {
-  const std::string paper = lapservo::testing::source_folder().string() + "/configs/paper.yaml";
-  run("servo --rig " + paper + " --robot sim --duration 0.1 --out " + in("run"));
-  const std::string log = read(in("run") + "/log.csv");
-  std::ofstream(in("run") + "/log.csv") << log.substr(0, log.find('\n') + 1);
-  expect_refused("servo --replay " + in("run") + "/log.csv", {"log.csv", "holds no tick"});
+  run("servo --rig configs/paper.yaml --robot sim --duration 0.1 --out in/run");
+  const std::string log = read_file("in/run/log.csv");
+  write_file("in/run/log.csv", log.substr(0, log.find('\n') + 1));
+  expect_refused("servo --replay in/run/log.csv", {"log.csv", "holds no tick"});
 }
 
 TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
-  const std::string servo =
-      "servo --rig " + lapservo::testing::source_folder().string() + "/configs/paper.yaml --out " + out("run");
+  const std::string servo = "servo --rig configs/paper.yaml --out out/run";
   expect_refused(servo, {"--robot", "sim"});
   expect_refused(servo + " --robot psm9", {"--robot", "psm9", "sim"});
   expect_refused(servo + " --robot sim --set-point 0.9,795,365,900", {"--set-point", "can't be followed at 0.00 s"});
@@ -509,22 +474,19 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   expect_refused(servo + " --robot sim --tracker magic", {"--tracker", "magic"});
   expect_refused(servo + " --robot sim --delay-ms soon", {"--delay-ms", "soon"});
   expect_refused(servo + " --robot sim --fps 1", {"--fps"});
-  expect_refused(servo + " --robot sim --trajectory " + in("none.csv"), {"none.csv"});
+  expect_refused(servo + " --robot sim --trajectory in/none.csv", {"none.csv"});
   expect_refused(servo + " --robot sim --trajectory " +
                      in("fast.csv", "time_s,s_rad,r_px,l_px,d_px\n0,0.9,795,365,212\n0.1,0.9,855,365,212\n"),
                  {"fast.csv", "limits.rate"});
   expect_refused(servo + " --robot sim --controller " + in("gains.yaml", "gains_per_s: [1, 2, 3, -4]\n"),
                  {"gains", "-4"});
-  expect_refused("servo --replay " + in("log.csv"), {"rig.yaml"});
-  expect_refused("servo --rig " + lapservo::testing::source_folder().string() +
-                     "/configs/paper.yaml --robot sim --out /proc/nowhere",
-                 {"/proc/nowhere", "folder"});
+  expect_refused("servo --replay in/log.csv", {"rig.yaml"});
+  expect_refused("servo --rig configs/paper.yaml --robot sim --out /proc/nowhere", {"/proc/nowhere", "folder"});
 }
 
 // A registration that is off by 10 mm: without --strict it is said, with it the run ends.
 TEST_F(CommandLine, ServoStrictRefusesAContradictedRegistration) {
-  const std::string servo = "servo --rig " + lapservo::testing::source_folder().string() +
-                            "/configs/paper.yaml --robot sim --start 0.05,1.57,0.064,1.2 --duration 1.5 ";
+  const std::string servo = "servo --rig configs/paper.yaml --robot sim --start 0.05,1.57,0.064,1.2 --duration 1.5 ";
   const std::string off = "--registration-error 10,0,0 ";
   const auto contradicted = [&] { return output().find("registration_contradicted") != std::string::npos; };
   EXPECT_NE(run(servo), 2) << errors();
@@ -533,15 +495,15 @@ TEST_F(CommandLine, ServoStrictRefusesAContradictedRegistration) {
   EXPECT_TRUE(contradicted()) << output();
   EXPECT_EQ(run(servo + off + "--strict"), 1) << errors();
   EXPECT_TRUE(contradicted()) << output();
-  EXPECT_NE(output().find("registration_contradicted in 1 of"), std::string::npos) << output();
+  expect_in(output(), "registration_contradicted in 1 of");
 }
 
 TEST_F(CommandLine, ExperimentsWriteAReport) {
-  ASSERT_EQ(run("experiment rcm --method surface --seed 3 --out " + out("report")), 0) << errors();
-  EXPECT_TRUE(fs::exists(out("report") + "/report.html"));
-  EXPECT_GT(CsvTable::read(out("report") + "/rcm.csv").rows(), 0U);
-  fs::remove_all(out("report"));
-  expect_refused("experiment cooking --out " + out("report"), {"cooking"});
+  expect_done("experiment rcm --method surface --seed 3 --out out/report");
+  EXPECT_TRUE(fs::exists("out/report/report.html"));
+  EXPECT_GT(CsvTable::read("out/report/rcm.csv").rows(), 0U);
+  fs::remove_all("out/report");
+  expect_refused("experiment cooking --out out/report", {"cooking"});
   expect_refused("experiment rcm --out /proc/nowhere", {"/proc/nowhere"});
 }
 
@@ -550,10 +512,10 @@ TEST_F(CommandLine, HelpShowsExamples) {
        {"track", "view", "render", "marker", "marker design", "marker print", "marker show", "servo", "experiment",
         "estimate-rcm", "sim-robot", "record", "check", "calibrate", "calibrate all", "calibrate camera",
         "calibrate colour", "calibrate marker", "calibrate registration"}) {
-    EXPECT_EQ(run(std::string(command) + " --help"), 0);
-    EXPECT_NE(output().find("Example"), std::string::npos) << command;
+    expect_done(std::string(command) + " --help");
+    expect_in(output(), "Example");
   }
-  EXPECT_EQ(run("--version"), 0);
+  expect_done("--version");
   EXPECT_EQ(output().rfind("lapservo ", 0), 0U);
   EXPECT_EQ(run("fly"), 2);
 }
@@ -561,7 +523,7 @@ TEST_F(CommandLine, HelpShowsExamples) {
 // A swinging arm whose joints are read by another clock, from the other side of its gears: from a rig that knows
 // their names only.
 TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
-  std::string plain = read(rig_);
+  std::string plain = read_file("configs/example.yaml");
   const std::string known = plain.substr(plain.find("    camera_from_rcm:"));
   plain.resize(plain.size() - known.size());
   const std::string joints_entry =
@@ -584,15 +546,12 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
     const auto q = q_at(i / 50.0);
     joints += std::to_string(i / 50.0 - clock_s) + "," + row({q[0], 1.5 - q[1], q[2] + 0.02, 0.7 - q[3]});
   }
-  ASSERT_EQ(run("render --rig " + rig_ + " --out " + in("swing") + " --poses " + in("poses.csv", poses)), 0)
-      << errors();
-  const std::string calibrate =
-      "calibrate registration " + in("swing") + " --fps 8 --rig " + unregistered + " --out " + out("rig.yaml");
-  ASSERT_EQ(run(calibrate + " --joints " + in("joints.csv", joints) + " --report " + out("report.html")), 0)
-      << errors();
-  EXPECT_NE(read(out("report.html")).find("<svg"), std::string::npos);
-  const std::string written = read(out("rig.yaml"));
-  EXPECT_NE(written.find("sign: [1, -1, 1, -1]"), std::string::npos) << written;
+  expect_done("render --rig configs/example.yaml --out in/swing --poses " + in("poses.csv", poses));
+  const std::string calibrate = "calibrate registration in/swing --fps 8 --rig " + unregistered + " --out out/rig.yaml";
+  expect_done(calibrate + " --joints " + in("joints.csv", joints) + " --report out/report.html");
+  expect_in(read_file("out/report.html"), "<svg");
+  const std::string written = read_file("out/rig.yaml");
+  expect_in(written, "sign: [1, -1, 1, -1]");
   const auto numbers_of = [&](const std::string& key) {
     std::string text = written.substr(written.find("\n      " + key + ": [") + key.size() + 10);
     std::vector<double> numbers;
@@ -610,64 +569,57 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   EXPECT_NEAR(std::stod(written.substr(written.find(delay) + delay.size())), clock_s, 5e-3);
 
   // The same swing judges both rigs: the first knows nothing yet.
-  const std::string check = "check " + in("swing") + " --fps 8 --joints " + in("joints.csv") + " --rig ";
-  EXPECT_EQ(run(check + out("rig.yaml") + " --out " + out("check.html")), 0) << errors() << output();
-  EXPECT_NE(output().find("\ngood enough\n"), std::string::npos) << output();
-  EXPECT_NE(read(out("check.html")).find("Rotation against encoder"), std::string::npos);
+  const std::string check = "check in/swing --fps 8 --joints in/joints.csv --rig ";
+  expect_done(check + "out/rig.yaml --out out/check.html");
+  expect_in(output(), "\ngood enough\n");
+  expect_in(read_file("out/check.html"), "Rotation against encoder");
   EXPECT_EQ(run(check + unregistered), 1);
-  EXPECT_NE(output().find("not good enough: the rig has no camera_from_rcm"), std::string::npos) << output();
-  EXPECT_EQ(run(check + out("rig.yaml") + " --out " + out("rig.yaml")), 2);
-  EXPECT_EQ(run("check " + in("nothing") + " --rig " + out("rig.yaml")), 2);
+  expect_in(output(), "not good enough: the rig has no camera_from_rcm");
+  EXPECT_EQ(run(check + "out/rig.yaml --out out/rig.yaml"), 2);
+  EXPECT_EQ(run("check in/nothing --rig out/rig.yaml"), 2);
 
   // Without joints: from what was tracked without a registration; with one, the axes would pass through it anyway.
-  ASSERT_EQ(run("track " + in("swing") + " --rig " + unregistered + " --out " + out("free.csv")), 0) << errors();
-  ASSERT_EQ(run("calibrate registration " + out("free.csv") + " --rig " + unregistered + " --out " + out("rcm.yaml")),
-            0)
-      << errors();
-  EXPECT_NE(output().find("is a convention"), std::string::npos);
+  expect_done("track in/swing --rig " + unregistered + " --out out/free.csv");
+  expect_done("calibrate registration out/free.csv --rig " + unregistered + " --out out/rcm.yaml");
+  expect_in(output(), "is a convention");
   // A rig from a pipe, which can be read only once, gives the same.
-  ASSERT_EQ(::mkfifo(in("pipe").c_str(), 0600), 0);
-  ASSERT_EQ(std::system(("cat " + unregistered + " >" + in("pipe") + " &").c_str()), 0);
-  ASSERT_EQ(run("calibrate registration " + out("free.csv") + " --rig " + in("pipe") + " --out " + out("piped.yaml")),
-            0)
-      << errors();
-  EXPECT_EQ(read(out("piped.yaml")), read(out("rcm.yaml")));
-  ASSERT_EQ(run("track " + in("swing") + " --rig " + out("rig.yaml") + " --out " + out("bound.csv")), 0) << errors();
-  EXPECT_EQ(
-      run("calibrate registration " + out("bound.csv") + " --rig " + out("rig.yaml") + " --out " + out("no.yaml")), 1);
-  EXPECT_NE(errors().find("camera_from_rcm"), std::string::npos);
-  EXPECT_FALSE(fs::exists(out("no.yaml")));
+  ASSERT_EQ(::mkfifo("in/pipe", 0600), 0);
+  ASSERT_EQ(std::system(("cat " + unregistered + " >in/pipe &").c_str()), 0);
+  expect_done("calibrate registration out/free.csv --rig in/pipe --out out/piped.yaml");
+  EXPECT_EQ(read_file("out/piped.yaml"), read_file("out/rcm.yaml"));
+  expect_done("track in/swing --rig out/rig.yaml --out out/bound.csv");
+  EXPECT_EQ(run("calibrate registration out/bound.csv --rig out/rig.yaml --out out/no.yaml"), 1);
+  expect_in(errors(), "camera_from_rcm");
+  EXPECT_FALSE(fs::exists("out/no.yaml"));
 
   EXPECT_EQ(run(calibrate + " --joints " + in("other.csv", "time_s,a,b,c,d\n0,1,2,3,4\n1,1,2,3,4\n")), 2);
-  EXPECT_NE(errors().find("yaw"), std::string::npos);
+  expect_in(errors(), "yaw");
 #ifdef LAPSERVO_TEST_BAGS
-  write_bags_of("swing", fps, CsvTable::read(in("joints.csv")));
-  expect_tracked_as(out("bound.csv"), in("run.bag"), out("rig.yaml"));
-  expect_tracked_as(out("bound.csv"), in("run"), out("rig.yaml"));
-  for (const char* bag : {"run.bag", "run"}) {
-    ASSERT_EQ(run("calibrate registration " + in(bag) + " --rig " + unregistered + " --out " + out("bag.yaml")), 0)
-        << errors();
-    expect_same_numbers(written, read(out("bag.yaml")));
+  write_bags_of("swing", fps, CsvTable::read("in/joints.csv"));
+  for (const std::string bag : {"in/run.bag", "in/run"}) {
+    expect_tracked_as("out/bound.csv", bag, "out/rig.yaml");
+    expect_done("calibrate registration " + bag + " --rig " + unregistered + " --out out/bag.yaml");
+    expect_same_numbers(written, read_file("out/bag.yaml"));
   }
   // The loop over the same recording; what it decided is a run's log like any other.
-  const std::string decide = "servo --replay " + in("run.bag") + " --rig ";
-  ASSERT_EQ(run(decide + out("rig.yaml") + " --out " + out("decided")), 0) << errors() << output();
-  EXPECT_NE(output().find("72 images and the joints; nothing was sent"), std::string::npos) << output();
+  const std::string decide = "servo --replay in/run.bag --rig ";
+  expect_done(decide + "out/rig.yaml --out out/decided");
+  expect_in(output(), "72 images and the joints; nothing was sent");
   EXPECT_EQ(output().find("not_following"), std::string::npos) << output();
-  EXPECT_EQ(run("servo --replay " + out("decided/log.csv")), 0) << errors();
-  EXPECT_EQ(run(decide + out("rig.yaml") + " --out " + out("decided")), 2);
-  EXPECT_EQ(run(decide + out("rig.yaml") + " --enable-motion"), 2);
-  EXPECT_EQ(run(decide + rig_), 2);
-  EXPECT_NE(errors().find("joints is missing"), std::string::npos) << errors();
-  EXPECT_EQ(run(decide + out("rig.yaml") + " --joint-topic /PSM2/measured_js"), 2);
-  EXPECT_NE(errors().find("/PSM1/measured_js"), std::string::npos) << errors();
+  expect_done("servo --replay out/decided/log.csv");
+  EXPECT_EQ(run(decide + "out/rig.yaml --out out/decided"), 2);
+  EXPECT_EQ(run(decide + "out/rig.yaml --enable-motion"), 2);
+  EXPECT_EQ(run(decide + "configs/example.yaml"), 2);
+  expect_in(errors(), "joints is missing");
+  EXPECT_EQ(run(decide + "out/rig.yaml --joint-topic /PSM2/measured_js"), 2);
+  expect_in(errors(), "/PSM1/measured_js");
 #endif
 }
 
 // A turn of a print that is not the rig's: the marker is wrapped askew, and joints say where its seam lies.
 TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
   constexpr int frames = 48;
-  const std::string plain = read(rig_);
+  const std::string plain = read_file("configs/example.yaml");
   const auto with = [&](const std::string& bands, const std::string& more) {
     std::string text = plain;
     const auto replace = [&](const std::string& from, const std::string& to) {
@@ -691,34 +643,33 @@ TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
     // The arm's psi starts elsewhere: the seam lies 0.3 rad farther than the rig says. Its clock is late by 0.1 s.
     joints += number(i / 30.0 - 0.1) + "," + number(psi_rad - 0.3) + ",0,0,0\n";
   }
-  ASSERT_EQ(run("render --rig " + real + " --out " + in("turn") + " --poses " + in("poses.csv", poses)), 0) << errors();
-  fs::remove(in("turn") + "/rig.yaml");
+  expect_done("render --rig " + real + " --out in/turn --poses " + in("poses.csv", poses));
+  fs::remove("in/turn/rig.yaml");
 
-  const std::string calibrate = "calibrate marker " + in("turn") + " --rig " + designed + " --out " + out("rig.yaml");
-  ASSERT_EQ(run(calibrate + " --joints " + in("joints.csv", joints) + " --report " + out("report.html")), 0)
-      << errors();
-  EXPECT_NE(output().find("seam_rad"), std::string::npos);
-  EXPECT_NE(read(out("report.html")).find("<svg"), std::string::npos);
-  const std::string written = read(out("rig.yaml"));
+  const std::string calibrate = "calibrate marker in/turn --rig " + designed + " --out out/rig.yaml";
+  expect_done(calibrate + " --joints " + in("joints.csv", joints) + " --report out/report.html");
+  expect_in(output(), "seam_rad");
+  expect_in(read_file("out/report.html"), "<svg");
+  const std::string written = read_file("out/rig.yaml");
   for (const char* key : {"sigma_bands_upper_m", "sigma_wrap_m", "sigma_seam_rad", "sigma_image_delay_s: 0.01"})
-    EXPECT_NE(written.find(key), std::string::npos) << key;
+    expect_in(written, key);
   const auto value_of = [&](const std::string& key) {
     return std::stod(written.substr(written.find("\n      " + key + ": ") + key.size() + 9));
   };
   EXPECT_NEAR(value_of("wrap_m"), 0.0013, 2e-5);
   EXPECT_NEAR(value_of("seam_rad"), 0.3, 5e-3);
-  ASSERT_EQ(run("track " + in("turn") + " --rig " + out("rig.yaml") + " --out " + out("obs.csv")), 0) << errors();
-  const CsvTable observed = CsvTable::read(out("obs.csv"));
+  expect_done("track in/turn --rig out/rig.yaml --out out/obs.csv");
+  const CsvTable observed = CsvTable::read("out/obs.csv");
   for (std::size_t row = 0; row < observed.rows(); ++row) EXPECT_EQ(observed.text(row, "status"), "ok") << row;
 
   // What can't tell leaves what was there.
   const std::string before = written;
-  fs::create_directories(in("few"));
+  fs::create_directories("in/few");
   for (const char* name : {"0000.png", "0010.png", "0020.png"})
-    fs::copy_file(in("turn") + "/" + name, in("few") + "/" + name);
-  EXPECT_EQ(run("calibrate marker " + in("few") + " --rig " + designed + " --out " + out("rig.yaml")), 1);
-  EXPECT_NE(errors().find("film a slow full turn"), std::string::npos) << errors();
-  EXPECT_EQ(read(out("rig.yaml")), before);
+    fs::copy_file(fs::path("in/turn") / name, fs::path("in/few") / name);
+  EXPECT_EQ(run("calibrate marker in/few --rig " + designed + " --out out/rig.yaml"), 1);
+  expect_in(errors(), "film a slow full turn");
+  EXPECT_EQ(read_file("out/rig.yaml"), before);
 }
 
 TEST_F(CommandLine, CalibratesACamera) {
@@ -726,11 +677,11 @@ TEST_F(CommandLine, CalibratesACamera) {
   camera.width_px = 640, camera.height_px = 480;
   camera.fx_px = camera.fy_px = 612.5, camera.cx_px = 326.2, camera.cy_px = 233.1;
   camera.response = {Response::Kind::rec709};
-  fs::create_directories(in("boards"));
+  fs::create_directories("in/boards");
   int number = 0;
   for (const Rigid3& pose : boards::different_poses({}, camera, 5, 3))
-    cv::imwrite(in("boards/" + std::to_string(number++) + ".png"), boards::render({}, camera, pose, 7));
-  cv::imwrite(in("boards/9.png"), cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));
+    cv::imwrite("in/boards/" + std::to_string(number++) + ".png", boards::render({}, camera, pose, 7));
+  cv::imwrite("in/boards/9.png", cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));
   const std::string rig = in("rig.yaml", R"(camera:
   image_width: 640
   image_height: 480
@@ -742,67 +693,65 @@ instruments:
       bands_upper_m: [0.0035, 0.0035, 0.017]
       bands_lower_m: [0.0095, 0.0095, 0.005]
 )");
-  const std::string board = " --board 9x6 --square-mm 5", before = read(rig);
+  const std::string board = " --board 9x6 --square-mm 5", before = read_file(rig);
   // Too few, and none: the rig is as it was.
-  EXPECT_EQ(run("calibrate camera " + in("boards/0.png") + board + " --rig " + rig), 1);
-  EXPECT_NE(errors().find("3 more views"), std::string::npos) << errors();
-  EXPECT_EQ(run("calibrate camera " + in("boards/9.png") + board + " --rig " + rig), 1);
-  EXPECT_NE(errors().find("in none of 1 pictures"), std::string::npos) << errors();
-  EXPECT_EQ(read(rig), before);
+  EXPECT_EQ(run("calibrate camera in/boards/0.png" + board + " --rig " + rig), 1);
+  expect_in(errors(), "3 more views");
+  EXPECT_EQ(run("calibrate camera in/boards/9.png" + board + " --rig " + rig), 1);
+  expect_in(errors(), "in none of 1 pictures");
+  EXPECT_EQ(read_file(rig), before);
 
-  ASSERT_EQ(run("calibrate camera " + in("boards") + board + " --rig " + rig + " --camera-info " + out("camera.yaml") +
-                " --report " + out("report.html")),
-            0)
-      << errors();
-  EXPECT_NE(output().find("response: rec709"), std::string::npos) << output();
-  EXPECT_NE(output().find("there is no board: " + in("boards/9.png")), std::string::npos) << output();
-  EXPECT_NE(read(out("report.html")).find("<svg"), std::string::npos);
-  for (const std::string& text : {read(rig), read(out("camera.yaml"))})
+  expect_done("calibrate camera in/boards" + board + " --rig " + rig +
+              " --camera-info out/camera.yaml --report out/report.html");
+  expect_in(output(), "response: rec709");
+  expect_in(output(), "there is no board: in/boards/9.png");
+  expect_in(read_file("out/report.html"), "<svg");
+  for (const std::string& text : {read_file(rig), read_file("out/camera.yaml")})
     for (const char* key : {"sigma_camera_matrix", "sigma_distortion_coefficients", "response: rec709",
                             "sigma_lateral_chromatic_aberration"})
-      EXPECT_NE(text.find(key), std::string::npos) << key;
+      expect_in(text, key);
   // Both can be read: a rig may name the camera's file.
   std::string other = before;
-  other.replace(0, other.find("instruments"), "camera: " + out("camera.yaml") + "\n");
-  const std::string empty = in("boards/9.png");
+  other.replace(0, other.find("instruments"), "camera: ../out/camera.yaml\n");
+  const std::string empty = "in/boards/9.png";
   for (const std::string& calibrated : {rig, in("other.yaml", other)})
-    EXPECT_EQ(run("track " + empty + " --rig " + calibrated + " --out " + out("obs.csv")), 1) << errors();
+    EXPECT_EQ(run("track " + empty + " --rig " + calibrated + " --out out/obs.csv"), 1) << errors();
 }
 
 // It must not even be read: nobody writes into this one.
 TEST_F(CommandLine, CalibrateAllRefusesARigThatCanNotBeReplaced) {
-  const std::string pipe = in("pipe");
+  const std::string pipe = "in/pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   expect_refused("calibrate all --no-questions --rig " + pipe,
                  {"pipe: is a pipe or a device", "each step replaces it"});
 }
 
 TEST_F(CommandLine, CalibrateCameraRefusesBadInput) {
-  cv::imwrite(in("large.png"), cv::Mat(90, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
-  cv::imwrite(in("small.png"), cv::Mat(80, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
-  const std::string to = " --out " + out("camera.yaml"), board = " --board 9x6 --square-mm 5";
-  const std::string calibrate = "calibrate camera " + in("large.png");
+  cv::imwrite("in/large.png", cv::Mat(90, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
+  cv::imwrite("in/small.png", cv::Mat(80, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
+  const std::string to = " --out out/camera.yaml", board = " --board 9x6 --square-mm 5";
+  const std::string calibrate = "calibrate camera in/large.png";
   expect_refused(calibrate + " --square-mm 5 --board 9by6" + to, {"--board", "9by6", "inner corners"});
   expect_refused(calibrate + " --square-mm 0 --board 9x6" + to, {"--square-mm"});
   expect_refused(calibrate + board, {"--rig, --out or --camera-info"});
-  expect_refused(calibrate + " " + in("small.png") + board + to, {"small.png", "160 x 80", "160 x 90", "large.png"});
-  expect_refused(calibrate + board + " --rig " + rig_, {"large.png", "160 x 90", "the rig's camera"});
+  expect_refused(calibrate + " in/small.png" + board + to, {"small.png", "160 x 80", "160 x 90", "large.png"});
+  expect_refused(calibrate + board + " --rig configs/example.yaml", {"large.png", "160 x 90", "the rig's camera"});
   expect_refused(calibrate + board + to + " --aruco DICT_9", {"--aruco", "DICT_9", "DICT_4X4_50"});
   expect_refused(calibrate + board + to + " --marker-mm 3", {"--marker-mm", "--aruco"});
-  expect_refused(calibrate + board + to + " --report " + out("camera.yaml"), {"camera.yaml", "two results"});
-  expect_refused(calibrate + board + " --out " + in("large.png"), {"large.png", "input itself"});
+  expect_refused(calibrate + board + to + " --report out/camera.yaml", {"camera.yaml", "two results"});
+  expect_refused(calibrate + board + " --out in/large.png", {"large.png", "input itself"});
 }
 
 TEST_F(CommandLine, CalibrateMarkerRefusesBadInput) {
-  cv::imwrite(in("small.png"), cv::Mat(90, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
-  const std::string rig = " --rig " + rig_ + " --out " + out("rig.yaml");
-  expect_refused("calibrate marker " + in("small.png") + rig, {"small.png", "160 x 90", "1280 x 720"});
-  expect_refused("calibrate marker " + in("none.png") + rig, {"none.png"});
-  expect_refused("calibrate marker " + in("small.png") + rig + " --instrument B", {"--instrument", "B"});
-  expect_refused("calibrate marker " + in("small.png") + rig + " --joints " + in("joints.csv", "time_s\n1\n"),
+  cv::imwrite("in/small.png", cv::Mat(90, 160, CV_8UC3, cv::Scalar(20, 20, 20)));
+  const std::string rig = " --rig configs/example.yaml --out out/rig.yaml";
+  expect_refused("calibrate marker in/small.png" + rig, {"small.png", "160 x 90", "1280 x 720"});
+  expect_refused("calibrate marker in/none.png" + rig, {"none.png"});
+  expect_refused("calibrate marker in/small.png" + rig + " --instrument B", {"--instrument", "B"});
+  expect_refused("calibrate marker in/small.png" + rig + " --joints " + in("joints.csv", "time_s\n1\n"),
                  {"joints", "PSM1", "lacks"});
-  expect_refused("calibrate marker " + in("small.png") + " --rig " + rig_ + " --out " + in("small.png"), {"small.png"});
-  expect_refused("calibrate marker " + in("small.png") + rig + " --report " + out("rig.yaml"), {"--out and --report"});
+  expect_refused("calibrate marker in/small.png --rig configs/example.yaml --out in/small.png", {"small.png"});
+  expect_refused("calibrate marker in/small.png" + rig + " --report out/rig.yaml", {"--out and --report"});
 }
 
 }  // namespace

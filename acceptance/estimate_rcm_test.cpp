@@ -1,37 +1,25 @@
 // `lapservo estimate-rcm` as its user meets it, and the accuracy promised for it.
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <initializer_list>
 #include <sstream>
 #include <string>
-#include <sys/wait.h>
-#include <unistd.h>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "acceptance/tool_test.h"
 #include "lapservo/core/csv.h"
 #include "lapservo/core/random.h"
 #include "lapservo/rig/rig.h"
-#include "lapservo/testing/sample_frames.h"
 
 namespace lapservo {
 using namespace internal;
 namespace {
 namespace fs = std::filesystem;
-
-const std::string paper_rig = (lapservo::testing::source_folder() / "configs/paper.yaml").string();
-
-std::string read(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
+using lapservo::testing::read_file;
+using lapservo::testing::write_file;
 
 std::string replaced(std::string text, const std::string& what, const std::string& by) {
   const auto at = text.find(what);
@@ -39,39 +27,16 @@ std::string replaced(std::string text, const std::string& what, const std::strin
   return at == std::string::npos ? text : text.replace(at, what.size(), by);
 }
 
-class EstimateRcm : public ::testing::Test {
+class EstimateRcm : public acceptance::ToolTest {
  protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("lapservo_rcm_" + std::to_string(::getpid()) +
-                                           ::testing::UnitTest::GetInstance()->current_test_info()->name());
-    fs::create_directories(folder_);
+  static std::string write(const std::string& name, const std::string& content) {
+    write_file(name, content);
+    return name;
   }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-  std::string write(const std::string& name, const std::string& content) const {
-    std::ofstream(folder_ / name, std::ios::binary) << content;
-    return path(name);
+  static void expect_refused(const std::string& arguments, const std::vector<std::string>& words) {
+    ToolTest::expect_refused("estimate-rcm " + arguments, words);
+    EXPECT_FALSE(fs::exists("rcm.csv"));
   }
-  int run(const std::string& arguments) const {
-    const std::string command =
-        std::string(LAPSERVO_TOOL) + " " + arguments + " >" + path("stdout") + " 2>" + path("stderr") + " </dev/null";
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-  void expect_refused(const std::string& arguments, std::initializer_list<const char*> words) const {
-    SCOPED_TRACE(arguments);
-    EXPECT_EQ(run("estimate-rcm " + arguments), 2);
-    const std::string text = read(path("stderr"));
-    EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
-    for (const char* word : words) EXPECT_NE(text.find(word), std::string::npos) << "no '" << word << "' in: " << text;
-    EXPECT_FALSE(fs::exists(path("rcm.csv")));
-  }
-  void expect_said(const std::string& where, const std::string& word) const {
-    EXPECT_NE(read(path(where)).find(word), std::string::npos) << "no '" << word << "' in: " << read(path(where));
-  }
-
-  fs::path folder_;
 };
 
 const std::string header = "frame,instrument,status,e0_u_px,e0_v_px,e3_u_px,e3_v_px\n";
@@ -96,14 +61,14 @@ std::string observed_lines(const Camera& camera, const std::string& instrument, 
 
 // Section V-B with 20 positions: the paper has 3.62 +- 2.13 px. The rig that tracks knows no RCM.
 TEST_F(EstimateRcm, WithinAPixelFromTwentyPositions) {
-  std::string free_rig = read(paper_rig);
+  std::string free_rig = read_file("configs/paper.yaml");
   free_rig.resize(free_rig.find("    camera_from_rcm"));
   write("free.yaml", free_rig);
-  ASSERT_EQ(run("render --rig " + paper_rig + " --out " + path("frames") + " --count 20 --seed 3"), 0);
-  ASSERT_EQ(run("track " + path("frames") + " --rig " + path("free.yaml") + " --single --out " + path("obs.csv")), 0);
-  ASSERT_EQ(run("estimate-rcm " + path("obs.csv") + " --rig " + paper_rig + " --out " + path("rcm.csv")), 0);
-  EXPECT_EQ(read(path("stderr")), "");
-  const CsvTable report = CsvTable::read(path("rcm.csv")), truth = CsvTable::read(path("frames/truth.csv"));
+  expect_done("render --rig configs/paper.yaml --out frames --count 20 --seed 3");
+  expect_done("track frames --rig free.yaml --single --out obs.csv");
+  expect_done("estimate-rcm obs.csv --rig configs/paper.yaml --out rcm.csv");
+  EXPECT_EQ(errors(), "");
+  const CsvTable report = CsvTable::read("rcm.csv"), truth = CsvTable::read("frames/truth.csv");
   ASSERT_EQ(report.rows(), 2U);
   EXPECT_EQ(report.text(0, "method"), "weighted");
   EXPECT_EQ(report.text(1, "method"), "pairwise");
@@ -118,30 +83,30 @@ TEST_F(EstimateRcm, WithinAPixelFromTwentyPositions) {
 TEST_F(EstimateRcm, UndistortsWithARigAndWarnsWithout) {
   constexpr std::uint64_t seed = 81;
   Random random(seed);
-  const std::string bent =
-      write("bent.yaml", replaced(read(paper_rig), "data: [0, 0, 0, 0, 0]", "data: [-0.25, 0.08, 0.001, -0.0005, 0]"));
+  const std::string bent = write("bent.yaml", replaced(read_file("configs/paper.yaml"), "data: [0, 0, 0, 0, 0]",
+                                                       "data: [-0.25, 0.08, 0.001, -0.0005, 0]"));
   const Rig rig = load_rig(bent);
   const Eigen::Vector3d t = rig.instruments.front().camera_from_rcm->translation;
   const std::string observations =
       write("obs.csv", header + observed_lines(rig.camera, "PSM1", rig.camera.ideal_from_point(t), 1e-2, random));
-  ASSERT_EQ(run("estimate-rcm " + observations + " --rig " + bent + " --out " + path("rcm.csv")), 0);
-  EXPECT_LT(CsvTable::read(path("rcm.csv")).number(0, "distance_px"), 0.3);
-  EXPECT_EQ(read(path("stderr")), "");
-  ASSERT_EQ(run("estimate-rcm " + observations + " --out " + path("rcm.csv")), 0);
-  expect_said("stderr", "without --rig");
-  EXPECT_GT(CsvTable::read(path("rcm.csv")).number(0, "noise_px"), 0.1);
+  expect_done("estimate-rcm " + observations + " --rig " + bent + " --out rcm.csv");
+  EXPECT_LT(CsvTable::read("rcm.csv").number(0, "distance_px"), 0.3);
+  EXPECT_EQ(errors(), "");
+  expect_done("estimate-rcm " + observations + " --out rcm.csv");
+  expect_in(errors(), "without --rig");
+  EXPECT_GT(CsvTable::read("rcm.csv").number(0, "noise_px"), 0.1);
 }
 
 TEST_F(EstimateRcm, GivesEveryInstrumentItsOwn) {
   constexpr std::uint64_t seed = 82;
   Random random(seed);
-  const Camera camera = load_rig(paper_rig).camera;
+  const Camera camera = load_rig("configs/paper.yaml").camera;
   const std::string observations =
       write("obs.csv", header + observed_lines(camera, "left", {-300, 900}, 0.02, random) +
                            observed_lines(camera, "\"right, second\"", {1600, 800}, 0.02, random) +
                            "20,lost,no_marker,,,,\n");
-  ASSERT_EQ(run("estimate-rcm " + observations + " --sigma-px 0.02 --out " + path("rcm.csv")), 0);
-  const CsvTable report = CsvTable::read(path("rcm.csv"));
+  expect_done("estimate-rcm " + observations + " --sigma-px 0.02 --out rcm.csv");
+  const CsvTable report = CsvTable::read("rcm.csv");
   ASSERT_EQ(report.rows(), 6U);
   EXPECT_NEAR(report.number(0, "rcm_u_px"), -300, 2);
   EXPECT_EQ(report.text(2, "instrument"), "lost");
@@ -150,37 +115,37 @@ TEST_F(EstimateRcm, GivesEveryInstrumentItsOwn) {
   EXPECT_EQ(report.text(4, "instrument"), "right, second");
   EXPECT_NEAR(report.number(4, "rcm_v_px"), 800, 2);
   EXPECT_NEAR(report.number(4, "chi2"), 18, 18);
-  ASSERT_EQ(run("estimate-rcm " + observations + " --sigma-px 0.02 --common-px 1 --out " + path("wide.csv")), 0);
-  EXPECT_GT(CsvTable::read(path("wide.csv")).number(4, "sigma_u_px"), 5 * report.number(4, "sigma_u_px"));
+  expect_done("estimate-rcm " + observations + " --sigma-px 0.02 --common-px 1 --out wide.csv");
+  EXPECT_GT(CsvTable::read("wide.csv").number(4, "sigma_u_px"), 5 * report.number(4, "sigma_u_px"));
 }
 
 TEST_F(EstimateRcm, ExitsWithOneWhenThereIsNone) {
   const std::string one = "0,PSM1,ok,100,100,300,100\n", beside = "1,PSM1,ok,100,200,300,200\n";
   EXPECT_EQ(run("estimate-rcm " + write("none.csv", header)), 1);
   EXPECT_EQ(run("estimate-rcm " + write("one.csv", header + one + "1,PSM1,cut,,,,\n")), 1);
-  expect_said("stdout", "too_few_lines");
+  expect_in(output(), "too_few_lines");
   EXPECT_EQ(run("estimate-rcm " + write("parallel.csv", header + one + beside)), 1);
-  expect_said("stdout", "parallel");
+  expect_in(output(), "parallel");
 }
 
 TEST_F(EstimateRcm, RepeatedRowsAndVeryManyOfThem) {
   constexpr std::uint64_t seed = 84;
   Random random(seed);
-  const Camera camera = load_rig(paper_rig).camera;
+  const Camera camera = load_rig("configs/paper.yaml").camera;
   const std::string rows = observed_lines(camera, "PSM1", {-300, 900}, 0.5, random);
   std::string often = header, many = header;
   for (int i = 0; i < 100; ++i) often += rows;
   for (int i = 0; i < 96000 / 20; ++i) many += observed_lines(camera, "PSM1", {-300, 900}, 0.5, random);
-  ASSERT_EQ(run("estimate-rcm " + write("once.csv", header + rows) + " --out " + path("a.csv")), 0);
-  ASSERT_EQ(run("estimate-rcm " + write("often.csv", often) + " --out " + path("b.csv")), 0);
-  expect_said("stderr", "2000 rows of 20 positions");
-  const CsvTable once = CsvTable::read(path("a.csv")), repeated = CsvTable::read(path("b.csv"));
+  expect_done("estimate-rcm " + write("once.csv", header + rows) + " --out a.csv");
+  expect_done("estimate-rcm " + write("often.csv", often) + " --out b.csv");
+  expect_in(errors(), "2000 rows of 20 positions");
+  const CsvTable once = CsvTable::read("a.csv"), repeated = CsvTable::read("b.csv");
   for (std::size_t method = 0; method < 2; ++method)
     EXPECT_NEAR(repeated.number(method, "sigma_u_px") / once.number(method, "sigma_u_px"), 1, 1e-3);
   const auto start = std::chrono::steady_clock::now();
-  ASSERT_EQ(run("estimate-rcm " + write("many.csv", many) + " --out " + path("c.csv")), 0);
+  expect_done("estimate-rcm " + write("many.csv", many) + " --out c.csv");
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
-  EXPECT_NEAR(CsvTable::read(path("c.csv")).number(0, "rcm_u_px"), -300, 2);
+  EXPECT_NEAR(CsvTable::read("c.csv").number(0, "rcm_u_px"), -300, 2);
 }
 
 TEST_F(EstimateRcm, RefusesTenParallelLines) {
@@ -189,49 +154,49 @@ TEST_F(EstimateRcm, RefusesTenParallelLines) {
     rows += std::to_string(i) + ",PSM1,ok,100," + std::to_string(100 + 20 * i) + ",400," +
             std::to_string(100 + 20 * i) + (i % 2 ? ".001\n" : "\n");
   EXPECT_EQ(run("estimate-rcm " + write("parallel.csv", rows)), 1);
-  expect_said("stdout", "weighted: none (parallel");
-  expect_said("stdout", "pairwise: none (parallel");
+  expect_in(output(), "weighted: none (parallel");
+  expect_in(output(), "pairwise: none (parallel");
 }
 
 TEST_F(EstimateRcm, WarnsOfWhatTheNumbersDoNotTell) {
   const std::string one = "0,PSM1,ok,100,100,300,100\n";
   EXPECT_EQ(run("estimate-rcm " + write("narrow.csv", header + one + "1,PSM1,ok,100,200,300,205\n")), 0);
-  expect_said("stderr", "nearly parallel");
-  expect_said("stdout", "sigma unknown");
+  expect_in(errors(), "nearly parallel");
+  expect_in(output(), "sigma unknown");
   constexpr std::uint64_t seed = 83;
   Random random(seed);
-  const Camera camera = load_rig(paper_rig).camera;
+  const Camera camera = load_rig("configs/paper.yaml").camera;
   EXPECT_EQ(run("estimate-rcm " + write("exact.csv", header + observed_lines(camera, "PSM1", {-300, 900}, 0, random))),
             0);
-  expect_said("stderr", "camera_from_rcm");
+  expect_in(errors(), "camera_from_rcm");
   EXPECT_EQ(run("estimate-rcm --sigma-px 0.001 " +
                 write("noisy.csv", header + observed_lines(camera, "PSM1", {-300, 900}, 1, random))),
             1)
       << "the few lines left are parallel to within the noise";
-  expect_said("stderr", "--sigma-px is too small");
+  expect_in(errors(), "--sigma-px is too small");
 }
 
 TEST_F(EstimateRcm, RefusesBadInput) {
   const std::string good = write("good.csv", header + "0,PSM1,ok,100,100,300,100\n1,PSM1,ok,100,100,100,300\n");
-  const std::string out = " --out " + path("rcm.csv");
-  expect_refused(path("absent.csv") + out, {"absent.csv"});
+  const std::string out = " --out rcm.csv";
+  expect_refused("absent.csv" + out, {"absent.csv"});
   expect_refused(write("columns.csv", "instrument,status\nPSM1,ok\n") + out, {"columns.csv", "e0_u_px"});
   expect_refused(write("word.csv", header + "0,PSM1,ok,100,x,300,100\n") + out, {"word.csv:2", "e0_v_px", "is x"});
   expect_refused(write("empty.csv", header + "0,PSM1,ok,100,,300,100\n") + out, {"empty.csv:2", "e0_v_px", "empty"});
-  expect_refused(write("other.csv", header + "0,PSM9,ok,100,1,300,100\n") + " --rig " + paper_rig + out,
+  expect_refused(write("other.csv", header + "0,PSM9,ok,100,1,300,100\n") + " --rig configs/paper.yaml" + out,
                  {"other.csv", "PSM9", "paper.yaml"});
-  expect_refused(good + " --rig " + path("absent.yaml") + out, {"absent.yaml"});
+  expect_refused(good + " --rig absent.yaml" + out, {"absent.yaml"});
   expect_refused(good + " --sigma-px -1" + out, {"sigma-px"});
-  expect_refused(good + " --out " + path("absent/rcm.csv"), {"absent/rcm.csv"});
-  const std::string before = read(good);
+  expect_refused(good + " --out absent/rcm.csv", {"absent/rcm.csv"});
+  const std::string before = read_file(good);
   expect_refused(good + " --out " + good, {"good.csv", "input"});
-  EXPECT_EQ(read(good), before);
+  EXPECT_EQ(read_file(good), before);
 }
 
 TEST_F(EstimateRcm, HelpShowsAnExample) {
-  EXPECT_EQ(run("estimate-rcm --help"), 0);
-  expect_said("stdout", "Example");
-  expect_said("stdout", "--sigma-px");
+  expect_done("estimate-rcm --help");
+  expect_in(output(), "Example");
+  expect_in(output(), "--sigma-px");
 }
 
 }  // namespace

@@ -18,8 +18,7 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/testing/sample_frames.h"
-#include "lapservo/testing/temporary_folder.h"
+#include "acceptance/tool_test.h"
 
 namespace lapservo {
 namespace {
@@ -27,33 +26,11 @@ namespace fs = std::filesystem;
 using testing::read_file;
 using testing::write_file;
 
-class Outputs : public ::testing::Test {
+class Outputs : public acceptance::ToolTest {
  protected:
   void SetUp() override {
-    ::setenv("ASAN_OPTIONS", "detect_leaks=0", 1);
-    fs::current_path(folder_.path());
+    ToolTest::SetUp();
     fs::create_directory("out");
-  }
-  void TearDown() override { fs::current_path("/"); }
-
-  int run(const std::string& arguments, const std::string& before = "") {
-    const std::string command = before + std::string(LAPSERVO_TOOL) + " " + arguments + " >stdout 2>stderr </dev/null";
-    const int status = std::system(command.c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-  // Exit code 2 and one line of ours, with all the words in it.
-  void expect_refused(const std::string& arguments, const std::vector<std::string>& words,
-                      const std::string& before = "") {
-    SCOPED_TRACE(before + arguments);
-    EXPECT_EQ(run(arguments, before), 2);
-    const std::string text = read_file("stderr");
-    EXPECT_TRUE(text.starts_with("lapservo: ")) << text;
-    EXPECT_EQ(text.find('\n') + 1, text.size()) << text;
-    EXPECT_EQ(text.find("filesystem error"), std::string::npos) << text;
-    for (const std::string& word : words) EXPECT_NE(text.find(word), std::string::npos) << word << " in " << text;
-  }
-  void expect_done(const std::string& arguments, const std::string& before = "") {
-    EXPECT_EQ(run(arguments, before), 0) << arguments << ": " << read_file("stderr");
   }
   void render(const std::string& more = "") { expect_done("render --rig " + rig_ + " --out frames --count 2" + more); }
 
@@ -79,9 +56,8 @@ class Outputs : public ::testing::Test {
     return std::count(text.begin(), text.end(), '\n');
   }
 
-  const testing::TemporaryFolder folder_;
-  const std::string configs_ = testing::source_folder().string() + "/configs/", rig_ = configs_ + "example.yaml";
-  const std::string servo_ = "servo --rig " + configs_ + "paper.yaml --robot sim --set-point 0.9,795,365,212 --seed 2 ";
+  const std::string rig_ = "configs/example.yaml";
+  const std::string servo_ = "servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --seed 2 ";
 };
 
 // A file as every subcommand that writes one treats it.
@@ -196,7 +172,7 @@ TEST_F(Outputs, FoldersOfARunAreReplacedOnlyWhenAsked) {
   write_file("frames.part/mine", "mine");
   write_file("frames/notes.txt", "mine");
   fs::create_symlink("frames", "link");
-  const std::vector<std::string> same{"frames/", "frames/../frames", "link", "link/", folder_.path() / "frames"};
+  const std::vector<std::string> same{"frames/", "frames/../frames", "link", "link/", fs::current_path() / "frames"};
   for (const std::string& path : same) {
     expect_done("render --rig " + rig_ + " --seed 2 --count 1 --force --out " + path);
     EXPECT_TRUE(fs::exists("frames/0000.png") && !fs::exists("frames/0001.png")) << path;
@@ -228,7 +204,8 @@ TEST_F(Outputs, AnEmptyFolderIsTakenAsItIs) {
   ::stat("out", &before);
   fs::current_path("out");
   EXPECT_EQ(
-      std::system((std::string(LAPSERVO_TOOL) + " render --rig " + rig_ + " --out . --count 1 >/dev/null").c_str()), 0);
+      std::system((std::string(LAPSERVO_TOOL) + " render --rig ../" + rig_ + " --out . --count 1 >/dev/null").c_str()),
+      0);
   fs::current_path("..");
   ::stat("out", &after);
   EXPECT_TRUE(before.st_ino == after.st_ino && before.st_mode == after.st_mode);
@@ -236,14 +213,14 @@ TEST_F(Outputs, AnEmptyFolderIsTakenAsItIs) {
 }
 
 TEST_F(Outputs, ARunsFolderStandsOnItsOwn) {
-  const std::string text = read_file(configs_ + "paper.yaml");
+  const std::string text = read_file("configs/paper.yaml");
   const std::size_t list = text.find("instruments:"), camera = text.find("camera:");
   fs::create_directory("in");
   std::string inlined = text.substr(camera + 7, list - camera - 7);
   write_file("in/cam.yaml", inlined);
   write_file("in/rig.yaml", "camera: cam.yaml\n" + text.substr(list));
-  EXPECT_EQ(run("servo --rig in/rig.yaml --robot sim --duration 0.5 --out of_file"), 1) << read_file("stderr");
-  const std::string piped = "cat " + configs_ + "paper.yaml | " + LAPSERVO_TOOL +
+  EXPECT_EQ(run("servo --rig in/rig.yaml --robot sim --duration 0.5 --out of_file"), 1) << errors();
+  const std::string piped = "cat configs/paper.yaml | " LAPSERVO_TOOL
                             " servo --rig /dev/stdin --robot sim --duration 0.5 --out of_pipe >/dev/null";
   std::system(piped.c_str());
   expect_done("render --rig in/rig.yaml --out frames --count 1");
@@ -281,7 +258,7 @@ TEST_F(Outputs, WhatAKilledServoLoggedReplays) {
     const fs::path part = folder + "/unfinished/log.csv.part";
     ASSERT_TRUE(killed_when(servo_ + "--duration 600 --force --out " + folder, [&] { return lines_in(part) >= 20; }));
     expect_done("servo --replay " + part.string());
-    EXPECT_NE(read_file("stdout").find("ticks reproduced bit for bit"), std::string::npos);
+    expect_in(output(), "ticks reproduced bit for bit");
     expect_refused(servo_ + "--duration 8 --out " + folder, {folder, "not finished", "--force"});
   }
   EXPECT_EQ(read_file("run/log.csv"), log);
@@ -321,7 +298,7 @@ TEST_F(Outputs, AFullDiskIsNoSuccess) {
                  limit);
   expect_done("servo --replay run/unfinished/log.csv.part");
   EXPECT_EQ(run("marker show --rig " + rig_ + " >/dev/full 2>stderr; true #"), 0);
-  EXPECT_NE(read_file("stderr").find("standard output"), std::string::npos);
+  expect_in(errors(), "standard output");
 }
 
 TEST_F(Outputs, AFolderThatCanNotBeWrittenIsSaidBeforeTheWork) {
@@ -343,7 +320,7 @@ TEST_F(Outputs, StandardOutputIsWrittenIntoWhereverItGoes) {
   render();
   const std::string tool = std::string(LAPSERVO_TOOL) + " track frames --out ";
   std::system((tool + "/dev/stdout >red 2>stderr").c_str());
-  EXPECT_TRUE(read_file("red").starts_with("frame,time_s")) << read_file("stderr");
+  EXPECT_TRUE(read_file("red").starts_with("frame,time_s")) << errors();
   EXPECT_EQ(lines_in("red"), 5) << "two rows, and what the tool says";
   std::system((tool + "/dev/fd/3 3>three >red 2>stderr").c_str());
   EXPECT_EQ(lines_in("three"), 3);
@@ -354,12 +331,12 @@ TEST_F(Outputs, StandardOutputIsWrittenIntoWhereverItGoes) {
 TEST_F(Outputs, HelpSaysWhatBecomesOfExistingOnes) {
   for (const char* command : {"track", "estimate-rcm", "marker design", "marker print", "marker show"}) {
     expect_done(std::string(command) + " --help");
-    EXPECT_NE(read_file("stdout").find("repla"), std::string::npos) << command;
+    expect_in(output(), "repla");
   }
   for (const char* command : {"render", "servo", "experiment"}) {
     expect_done(std::string(command) + " --help");
-    EXPECT_NE(read_file("stdout").find("--force"), std::string::npos) << command;
-    EXPECT_NE(read_file("stdout").find("unfinished"), std::string::npos) << command;
+    expect_in(output(), "--force");
+    expect_in(output(), "unfinished");
   }
 }
 
