@@ -18,7 +18,6 @@
 #include "lapservo/marker/decoder.h"
 #include "lapservo/marker/design.h"
 #include "lapservo/marker/drawing.h"
-#include "lapservo/marker/length_code.h"
 #include "lapservo/rig/instrument_index.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/rig/rig_writer.h"
@@ -48,8 +47,7 @@ struct DesignOptions {
   double diameter_mm = 8.4;
   std::optional<double> length_mm, min_band_mm, print_error_mm;
   std::vector<double> hues_deg{90, 180, 270}, upper_mm, lower_mm;
-  std::string code = "cross-ratio", out;
-  bool by_length() const { return code == "length"; }
+  std::string out;
   ViewingOptions viewing;
 };
 
@@ -64,9 +62,8 @@ Marker given_marker(const DesignOptions& options) {
     marker.bands_lower_m[i] = 1e-3 * options.lower_mm[i];
   }
   if (const auto problem = marker_problem(marker)) throw InputError("marker", *problem);
-  const std::string problem =
-      options.by_length() ? length_decoding_problem(marker, most_telling_band(marker)) : decoding_problem(marker);
-  if (!problem.empty()) throw InputError("marker", "not decodable: " + problem);
+  if (const std::string problem = decoding_problem(marker); !problem.empty())
+    throw InputError("marker", "not decodable: " + problem);
   return marker;
 }
 
@@ -97,37 +94,6 @@ void print_sigmas(const Marker& marker, const Viewing& viewing, double print_err
       "measures the print as it is.\n");
 }
 
-// Eq. (16) beside eq. (18): what noise leaves of each, and what a depth or an inclination that is not known does.
-void print_length_code(const Marker& marker, const Viewing& viewing) {
-  constexpr ViewingError depth{0.01, 0}, inclined{0, 10 * pi / 180};
-  const std::size_t band = most_telling_band(marker);
-  const std::string problem = decoding_problem(marker);
-  std::printf(
-      "\nRead from the length of band %zu alone (eq. 16), and from the cross-ratio (eq. 18); errors in mrad:\n\n"
-      "              boundary noise          depth believed 1 %% too far     shaft inclined by 10 deg, not known\n"
-      "  tau [deg]   eq. (16)   eq. (18)   eq. (16)   eq. (18)             eq. (16)   eq. (18)\n",
-      band);
-  const auto by_cross_ratio = [&](double value_rad, int width) {
-    return problem.empty() ? fmt::format("{:{}.1f}", std::abs(value_rad) < 1e-6 ? 0 : 1e3 * value_rad, width)
-                           : fmt::format("{:>{}}", "-", width);
-  };
-  const auto error = [&](double tau_rad, const ViewingError& viewing_error) {
-    return perspective_errors(marker, band, tau_rad, viewing, viewing_error);
-  };
-  for (int i = 1; i < 8; ++i) {
-    const double tau_rad = two_pi * i / 8;
-    const CodeErrors by_depth = error(tau_rad, depth), by_inclination = error(tau_rad, inclined);
-    std::printf("  %9.0f   %8.1f   %s   %8.1f   %s             %8.1f   %s\n", deg_from_rad(tau_rad),
-                1e3 * predicted_sigma_length_rad(marker, band, viewing),
-                by_cross_ratio(predicted_sigma_centre_line_rad(marker, tau_rad, viewing), 8).c_str(),
-                1e3 * by_depth.by_length_rad, by_cross_ratio(by_depth.by_cross_ratio_rad, 8).c_str(),
-                1e3 * by_inclination.by_length_rad, by_cross_ratio(by_inclination.by_cross_ratio_rad, 8).c_str());
-  }
-  std::printf(
-      "\nA length must be known in metres: one picture tells it only as well as depth and inclination are known.\n");
-  if (!problem.empty()) std::printf("Not for a rig, whose trackers read the cross-ratio: %s.\n", problem.c_str());
-}
-
 int run_design(const DesignOptions& options) {
   if (options.hues_deg.size() != 3) throw InputError("--hues", "needs three hues, like 90,180,270");
   const Viewing viewing = options.viewing.viewing();
@@ -138,12 +104,8 @@ int run_design(const DesignOptions& options) {
   if (given) {
     marker = given_marker(options);
   } else {
-    DesignSpec spec{options.by_length() ? MarkerCode::length : MarkerCode::cross_ratio,
-                    1e-3 * options.diameter_mm,
-                    {},
-                    {},
-                    {options.hues_deg[0], options.hues_deg[1], options.hues_deg[2]},
-                    viewing};
+    DesignSpec spec{
+        1e-3 * options.diameter_mm, {}, {}, {options.hues_deg[0], options.hues_deg[1], options.hues_deg[2]}, viewing};
     spec.print_error_m = 1e-3 * options.print_error_mm.value_or(0);
     if (options.length_mm) spec.length_m = 1e-3 * *options.length_mm;
     if (options.min_band_mm) spec.min_band_m = 1e-3 * *options.min_band_mm;
@@ -157,15 +119,11 @@ int run_design(const DesignOptions& options) {
   for (std::size_t i = 0; i < 3; ++i)
     std::printf("  %4zu   %9.0f   %15.2f   %15.2f\n", i, marker.hues_deg[i], 1e3 * marker.bands_upper_m[i],
                 1e3 * marker.bands_lower_m[i]);
-  if (options.by_length())
-    print_length_code(marker, viewing);
-  else
-    print_sigmas(marker, viewing, options.print_error_mm ? 1e-3 * *options.print_error_mm : usual_print_error_m);
-  if (decoding_problem(marker).empty())
-    std::printf("\nThe cross-ratio is monotonic over the turn%s.\n", in_linear_family(marker)
-                                                                         ? ", and linear: eq. (18) is exact"
-                                                                         : " (not linear: decoded by the rational "
-                                                                           "inverse)");
+  print_sigmas(marker, viewing, options.print_error_mm ? 1e-3 * *options.print_error_mm : usual_print_error_m);
+  std::printf("\nThe cross-ratio is monotonic over the turn%s.\n", in_linear_family(marker)
+                                                                       ? ", and linear: eq. (18) is exact"
+                                                                       : " (not linear: decoded by the rational "
+                                                                         "inverse)");
   std::puts("");
   std::fputs(yaml_of(marker).c_str(), stdout);
   if (file) {
@@ -266,18 +224,11 @@ void add_design(Command parent, Run& run_later) {
       .finite_number()
       .delimiter(',');
   command.add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge").finite_number().delimiter(',');
-  command
-      .add_option("--code", options->code,
-                  "What tells the rotation. cross-ratio: of all three bands (eq. 17, 18), which trackers read; length: "
-                  "of one band (eq. 16), set beside the cross-ratio to show what perspective does to it")
-      .shows_default()
-      .one_of({"cross-ratio", "length"});
   command.add_option("--out", options->out, "Write the marker: block of a rig; a file of that name is replaced");
   add_viewing(command, options->viewing);
   command.footer(
       "Example:\n  lapservo marker design --diameter-mm 8.4 --distance-mm 110 --out marker.yaml\n"
-      "  lapservo marker design --bands-upper-mm 3.5,3.5,17 --bands-lower-mm 9.5,9.5,5\n"
-      "  lapservo marker design --bands-upper-mm 3.5,3.5,17 --bands-lower-mm 9.5,9.5,5 --code length");
+      "  lapservo marker design --bands-upper-mm 3.5,3.5,17 --bands-lower-mm 9.5,9.5,5");
   command.runs(run_later, [options] { return run_design(*options); });
 }
 

@@ -10,7 +10,6 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/marker/decoder.h"
-#include "lapservo/marker/length_code.h"
 
 namespace lapservo {
 using namespace internal;
@@ -72,19 +71,7 @@ std::optional<Choice> search(const DesignSpec& spec, double length_m, double min
   return best;
 }
 
-// The first band grows at the cost of the last. nullopt when there is no room to grow.
-std::optional<Marker> length_marker(const DesignSpec& spec, double length_m, double min_m) {
-  const double longest_m = length_m - 2 * min_m;
-  if (longest_m - min_m < rounding_m / 2) return std::nullopt;
-  Marker marker;
-  marker.diameter_m = spec.diameter_m;
-  marker.hues_deg = spec.hues_deg;
-  marker.bands_upper_m = {min_m, min_m, longest_m};
-  marker.bands_lower_m = {longest_m, min_m, min_m};
-  return marker;
-}
-
-std::optional<Marker> cross_ratio_marker(const DesignSpec& spec, double length_m, double min_m) {
+std::optional<Marker> least_sigma_marker(const DesignSpec& spec, double length_m, double min_m) {
   const double reach_m = (length_m - 3 * min_m) / 2, middle_m = (length_m + min_m) / 2;
   const auto coarse = search(spec, length_m, min_m, {0.5, middle_m, middle_m}, 0.5, reach_m);
   if (!coarse) return std::nullopt;
@@ -115,14 +102,13 @@ bool in_linear_family(const Marker& marker) {
 Marker design_marker(const DesignSpec& spec) {
   const double length_m = spec.length_m.value_or(std::round(3e3 * spec.diameter_m) * 1e-3);
   const double min_m = spec.min_band_m.value_or(std::max(0.003, 12 / spec.viewing.px_per_m()));
-  const bool by_cross_ratio = spec.code == MarkerCode::cross_ratio;
-  const auto marker = by_cross_ratio ? cross_ratio_marker(spec, length_m, min_m) : length_marker(spec, length_m, min_m);
+  const auto marker = least_sigma_marker(spec, length_m, min_m);
   if (!marker)
     throw InputError("length", "no marker: three bands of at least " + millimetres(min_m) +
                                    " that change over the turn do not fit into " + millimetres(length_m));
   if (const auto problem = marker_problem(*marker)) throw InputError("marker", *problem);
-  const std::string problem = by_cross_ratio ? decoding_problem(*marker) : length_decoding_problem(*marker, 0);
-  if (!problem.empty()) throw InputError("marker", "not decodable: " + problem);
+  if (const std::string problem = decoding_problem(*marker); !problem.empty())
+    throw InputError("marker", "not decodable: " + problem);
   return *marker;
 }
 

@@ -8,13 +8,7 @@
 
 namespace lapservo {
 
-enum class MarkerCode {
-  cross_ratio,  ///< of all three bands, eq. (17) and (18): what trackers read
-  length,       ///< of one band, eq. (16)
-};
-
 struct DesignSpec {
-  MarkerCode code = MarkerCode::cross_ratio;
   double diameter_m = 0.0084;
   std::optional<double> length_m;    ///< default: three diameters, to the millimetre
   std::optional<double> min_band_m;  ///< default: 3 mm or 12 px, whichever is more
@@ -24,9 +18,7 @@ struct DesignSpec {
 };
 
 /// The marker of the linear family (l1 : l2 constant) with the least worst-case predicted sigma of tau on the centre
-/// line, by noise and the print's errors together. For MarkerCode::length instead the marker whose first band changes
-/// most over the turn, the middle one staying as short as can be; its cross-ratio turns back, so that only
-/// LengthDecoder reads it.
+/// line, by noise and the print's errors together.
 ///
 /// The family's three free numbers (fraction of l1 in l1 + l2, and l1 + l2 at either edge) are searched on a grid and
 /// refined; l1 + l2 comes out in tenths of a millimetre. Throws InputError when no such marker fits.

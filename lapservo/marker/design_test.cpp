@@ -12,7 +12,6 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/marker/decoder.h"
-#include "lapservo/marker/length_code.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/markers.h"
 
@@ -101,20 +100,6 @@ TEST(DesignMarker, RefusesWhatMakesNoMarker) {
             "marker: diameter_m: is 0.2, expected 0.0005 to 0.1 (metres)");
   EXPECT_EQ(testing::input_error([&] { design_marker(close); }),
             "marker: hues_deg[1]: is 100, expected hues at least 40 degrees apart");
-}
-
-// Eq. (16) alone: no band changes more, and only its length can be decoded.
-TEST(DesignMarker, ForOneLengthGivesTheFirstBandAllThereIs) {
-  DesignSpec spec;
-  spec.code = MarkerCode::length;
-  const Marker marker = design_marker(spec);
-  EXPECT_FALSE(marker_problem(marker));
-  EXPECT_EQ(most_telling_band(marker), 0U);
-  EXPECT_NEAR(marker.bands_lower_m[0] - marker.bands_upper_m[0], marker.length_m() - 3 * min_band_m(marker), 1e-12);
-  EXPECT_NE(decoding_problem(marker), "");
-  EXPECT_LT(predicted_sigma_length_rad(marker, 0, {}), worst_sigma_centre_line_rad(design_marker({}), {}));
-  spec.length_m = 0.009;
-  EXPECT_NE(testing::input_error([&] { design_marker(spec); }).find("do not fit into 9.0 mm"), std::string::npos);
 }
 
 TEST(WorstSigma, IsTheLargestOverTheTurn) {
