@@ -6,9 +6,6 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
-#ifdef LAPSERVO_MUJOCO_ARM
-#include "lapservo/mujoco_arm/mujoco_arm.h"
-#endif
 
 namespace lapservo::app {
 namespace {
@@ -32,26 +29,9 @@ std::vector<Blotch> blotches_of(const SimulationOptions& options, const Marker& 
   return blotches;
 }
 
-std::unique_ptr<Simulator> with_arm(const SimulationOptions& options, const Rig& rig, const SimulatorConfig& config,
-                                    const JointVector& q_measured) {
-  if (options.dynamics == "first-order") return std::make_unique<Simulator>(rig, config, q_measured);
-#ifdef LAPSERVO_MUJOCO_ARM
-  internal::MujocoArmConfig arm;
-  arm.joints = config.arm;
-  return std::make_unique<Simulator>(rig, config, std::make_unique<internal::MujocoArm>(arm, q_measured.vector()));
-#else
-  throw InputError("--dynamics", "is mujoco, which this program was built without: it needs libmujoco-dev");
-#endif
-}
-
 }  // namespace
 
 void add_simulation_options(Command command, SimulationOptions& options, const std::string& only) {
-  command
-      .add_option("--dynamics", options.dynamics,
-                  only + "first-order, or mujoco: motors with PD servos, friction, gravity, elastic transmissions")
-      .shows_default()
-      .one_of({"first-order", "mujoco"});
   command
       .add_option("--endoscope-motion", options.endoscope_motion,
                   only +
@@ -109,7 +89,7 @@ std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, cons
   all.endoscope.exposure_s = options.exposure_ms / 1000;
   all.render.smoke = static_cast<float>(options.smoke);
   all.blotches = blotches_of(options, true_rig.instruments.front().marker, config.seed);
-  auto simulator = with_arm(options, true_rig, all, q_measured);
+  auto simulator = std::make_unique<Simulator>(true_rig, all, q_measured);
   if (!options.light.empty())
     simulator->change_light({options.light[0], options.light[0] + options.light[1]},
                             static_cast<float>(std::max(0.0, options.light[2])));

@@ -11,7 +11,6 @@ namespace lapservo::app {
 
 /// How the simulated arm and its endoscope are made.
 struct SimulationOptions {
-  std::string dynamics = "first-order";
   std::vector<double> endoscope_motion;  ///< s, s, 3 x mm, 3 x degrees
   std::string endoscope_profile = "even";
   double exposure_ms = 0, smoke = 0;
@@ -27,7 +26,7 @@ void add_simulation_options(Command command, SimulationOptions& options, const s
 /// As things are in the simulation, where `rig` is what is believed of them.
 Rig true_rig_of(const SimulationOptions& options, const Rig& rig);
 
-/// `true_rig`: see true_rig_of(). Throws InputError for dynamics that this program was built without.
+/// `true_rig`: see true_rig_of().
 std::unique_ptr<Simulator> make_simulator(const SimulationOptions& options, const Rig& true_rig,
                                           const SimulatorConfig& config, const JointVector& q_measured);
 

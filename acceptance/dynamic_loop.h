@@ -6,10 +6,10 @@
 #include <optional>
 #include <vector>
 
+#include "acceptance/mujoco_arm.h"
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/random.h"
-#include "lapservo/mujoco_arm/mujoco_arm.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/servo.h"
 #include "lapservo/sim/simulator.h"

@@ -1,9 +1,9 @@
+#include "acceptance/dynamic_loop.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
-
-#include "lapservo/mujoco_arm/test_dynamic_loop.h"
 
 namespace lapservo::testing {
 namespace {

@@ -1,4 +1,4 @@
-#include "lapservo/mujoco_arm/mujoco_arm.h"
+#include "acceptance/mujoco_arm.h"
 
 #include <cmath>
 #include <limits>
