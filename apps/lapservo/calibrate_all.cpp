@@ -293,7 +293,8 @@ void add_calibrate_all(Command parent, Run& run_later) {
   command.add_option("--swing", options->swing, "For the registration: a smooth swing");
   command.add_option("--joints", options->joints, "CSV of the joints meanwhile");
   command.add_option("--check", options->judged, "For the check: a recording; else --swing");
-  command.add_option("--check-joints", options->judged_joints, "CSV of the joints meanwhile; else --joints");
+  command.add_option("--check-joints", options->judged_joints,
+                     "CSV of the joints meanwhile; else, without --check, --joints");
   command.add_option(
       "--camera", options->camera,
       "A live system's images, as `lapservo record` takes them: what is missing of --turn and --swing is "

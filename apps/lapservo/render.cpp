@@ -36,7 +36,7 @@ namespace {
 constexpr std::uintmax_t frames_bytes = 4 << 20;
 
 struct RenderArguments {
-  std::string rig, out, poses, background = "tissue", condition = "rendered", format = "png";
+  std::string rig, out, poses, background = "tissue", format = "png";
   int count = 20;
   std::uint64_t seed = 1;
   bool moving = false, video = false, force = false;
@@ -151,7 +151,7 @@ int run(const RenderArguments& options) {
       const std::string name = fmt::format("{:04}.{}", i, options.format);
       for (std::size_t k = 0; k < rig.instruments.size(); ++k) {
         try {
-          truth.add(name, options.condition, rig.camera, rig.instruments[k], frames[i][k]);
+          truth.add(name, "rendered", rig.camera, rig.instruments[k], frames[i][k]);
         } catch (const std::invalid_argument& error) {
           throw InputError(options.poses, fmt::format("frame {}: {}", i, error.what()));
         }
@@ -209,7 +209,6 @@ void add_render(Command app, Run& run_later) {
   command.add_option("--film-mm", options->film_mm, "Thickness of the film that carries the marker")
       .shows_default()
       .number_between(0.0, 1.0);
-  command.add_option("--condition", options->condition, "Name for truth.csv").shows_default();
   command.add_option("--format", options->format, "png or jpg").shows_default().one_of({"png", "jpg"});
   command.add_flag("--video", options->video, "Write video.mp4 instead of pictures");
   command.add_option("--fps", options->fps, "Of the video").shows_default().number_between(0.1, 1000.0);

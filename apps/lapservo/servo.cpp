@@ -4,6 +4,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -36,6 +38,15 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
+// As things are in the simulation, where `rig` is what the loop goes by.
+Rig true_rig_of(const ServoOptions& options, const Rig& rig) {
+  Rig truth = rig;
+  auto& camera_from_rcm = truth.instruments.front().camera_from_rcm;
+  if (camera_from_rcm && !options.registration_error.empty())
+    camera_from_rcm->translation += 1e-3 * Eigen::Vector3d(options.registration_error.data());
+  return truth;
+}
+
 JointVector joints_at_start(const ServoOptions& options, const Trajectory& trajectory, const RunConfig& run,
                             const FeatureModel& true_model, const Eigen::Vector4d& joint_offset) {
   const std::string source = trajectory_name(options);
@@ -51,11 +62,10 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
 // What the user gets of a run: the log, the picture, the progress, the last lines.
 class Watcher : public RunObserver {
  public:
-  /// `true_rig`: as things are until the endoscope moves.
-  Watcher(const Rig& rig, const Rig& true_rig, const Simulator& simulator, RunFolder* folder, LiveView* view, int ticks,
-          bool strict, ServoPage* page, HoldableRobot& robot)
+  Watcher(const Rig& rig, FeatureModel true_model, const Simulator& simulator, RunFolder* folder, LiveView* view,
+          int ticks, bool strict, ServoPage* page, HoldableRobot& robot)
       : rig_(rig),
-        true_rig_(true_rig),
+        true_model_(std::move(true_model)),
         simulator_(simulator),
         folder_(folder),
         view_(view),
@@ -65,9 +75,7 @@ class Watcher : public RunObserver {
         robot_(robot) {}
 
   bool on_tick(const ControlTick& tick) override {
-    const Rigid3 camera_from_rcm =
-        simulator_.camera_from_first_camera() * *true_rig_.instruments.front().camera_from_rcm;
-    const InstrumentTruth truth = truth_at(feature_model(true_rig_, camera_from_rcm), simulator_.true_q());
+    const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
     summary_.add(tick, truth);
     if (folder_) folder_->log().add(tick.input, tick.decision, truth);
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
@@ -90,7 +98,7 @@ class Watcher : public RunObserver {
   }
 
   Rig rig_;
-  Rig true_rig_;
+  FeatureModel true_model_;
   const Simulator& simulator_;
   RunFolder* folder_;
   LiveView* view_;
@@ -106,7 +114,7 @@ int simulate(const ServoOptions& options) {
   std::optional<LiveView> view;
   if (options.view) view.emplace("servo", "use --out to write a log instead");
   RunConfig config = run_config_of(options);
-  const Rig true_rig = true_rig_of(options.simulation, config.rig);
+  const Rig true_rig = true_rig_of(options, config.rig);
   const FeatureModel true_model = feature_model(true_rig);
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
@@ -115,8 +123,7 @@ int simulate(const ServoOptions& options) {
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = periods_per_s(options);
   const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
-  const auto made = make_simulator(options.simulation, true_rig, simulated, start);
-  Simulator& simulator = *made;
+  Simulator simulator(true_rig, simulated, start);
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<ServoPage> page;
   if (options.web.port) page.emplace(options.web, config.rig, "servo, simulated", true);
@@ -125,7 +132,7 @@ int simulate(const ServoOptions& options) {
   if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
   watch_for_interrupts();
 
-  Watcher watcher(config.rig, true_rig, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
+  Watcher watcher(config.rig, true_model, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
                   static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict,
                   page ? &*page : nullptr, robot);
   lapservo::run(robot, simulator, simulator, config, trajectory, duration_s(options), watcher);
@@ -264,7 +271,12 @@ void add_simulator_options(Command command, ServoOptions& options) {
       .add_option("--fps", options.fps,
                   "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
       .number_between(6.0, 500.0);
-  add_simulation_options(command, options.simulation, "sim: ");
+  command
+      .add_option("--registration-error", options.registration_error,
+                  "sim: x,y,z: the true RCM lies by so many mm, in the camera's frame, beside the rig's")
+      .finite_number()
+      .delimiter(',')
+      .expected(3);
   command.add_option("--hide", options.hide, "sim: cover the marker from,to seconds")
       .finite_number()
       .delimiter(',')

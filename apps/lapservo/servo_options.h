@@ -7,7 +7,6 @@
 
 #include <Eigen/Core>
 
-#include "apps/lapservo/simulation.h"
 #include "apps/lapservo/web_view.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/servo/run.h"
@@ -19,13 +18,13 @@ struct ServoOptions {
   std::string rig, robot, camera, joint_limits, trajectory = "paper", method = "default", tracker, controller,
                                                 delay = "estimate", out, replay, image_topic, joint_topic;
   std::vector<double> set_point, via, start, rcm_px, hide;
+  std::vector<double> registration_error;  // 3 x mm
   double latency_ms = 80;
   std::optional<double> duration;  // s
   std::optional<double> fps;       // control periods a second, and frames of the simulation
   std::optional<int> endoscope_attempts;
   std::uint64_t seed = 1;
   bool view = false, force = false, enable_motion = false, strict = false;
-  SimulationOptions simulation;
   WebOptions web;
 };
 

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "apps/lapservo/interrupt.h"
-#include "apps/lapservo/simulation.h"
 #include "apps/lapservo/subcommands.h"
 #include "apps/lapservo/transports.h"
 #include "lapservo/control/paper_trajectory.h"
@@ -29,7 +28,6 @@ struct SimRobotOptions {
   std::vector<double> start;
   double latency_ms = 80, fps = 30, duration_s = 0;
   std::uint64_t seed = 1;
-  SimulationOptions simulation;
 };
 
 // Where the paper's trajectory can be followed from, unless said.
@@ -52,9 +50,7 @@ int run(const SimRobotOptions& options) {
   simulated.endoscope.latency_s = options.latency_ms / 1000;
   simulated.endoscope.frame_rate_hz = options.fps;
   simulated.endoscope.real_time = true;
-  const Rig true_rig = true_rig_of(options.simulation, rig);
-  const auto made = make_simulator(options.simulation, true_rig, simulated, start_of(options, true_rig, simulated.arm));
-  Simulator& simulator = *made;
+  Simulator simulator(rig, simulated, start_of(options, rig, simulated.arm));
   const auto transport = make_transport(options.transport, "lapservo_sim_robot", "--transport");
   SimRobotConfig config;
   config.arm = resolved_name({options.transport, options.arm}, "--arm");
@@ -97,7 +93,6 @@ void add_sim_robot(Command app, Run& run_later) {
       .shows_default()
       .number_between(0.0, 1000.0);
   command.add_option("--fps", options->fps, "Frames a second").shows_default().number_between(6.0, 120.0);
-  add_simulation_options(command, options->simulation, "");
   command.add_option("--duration", options->duration_s, "Seconds; 0: until interrupted")
       .shows_default()
       .number_between(0.0, 1e6);
