@@ -196,7 +196,7 @@ TEST_F(Tutorial, EveryCommandWorksAndCalibrateAllGoesOnWhereItStopped) {
 
 TEST_F(Tutorial, HasItsPictures) {
   const fs::path folder = lapservo::testing::source_folder() / "docs/tutorial";
-  for (const char* picture : {"marker.png", "overlay.jpg", "colour_before.jpg", "colour_after.jpg", "check.png"}) {
+  for (const char* picture : {"marker.png", "overlay.jpg", "check.png"}) {
     ASSERT_TRUE(fs::exists(folder / picture)) << picture;
     EXPECT_LT(fs::file_size(folder / picture), 400000U) << picture;
   }

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "lapservo/experiments/svg_plot.h"
+#include "lapservo/report/svg_plot.h"
 
 namespace {
 using namespace lapservo::internal;
@@ -56,7 +56,7 @@ int main(int argc, char** argv) {
   plot.x = {"image", "megapixels", {}, {}, true};
   plot.y = {"time", "ms", {}, {}, true};
   for (const Shown& one : shown) {
-    Series series{std::string(one.title), {}, {}, {}, one.draw, one.color};
+    Series series{std::string(one.title), {}, {}, one.draw, one.color};
     for (const auto& [megapixels, milliseconds] : medians[{std::string(one.name), std::string(one.instruments)}])
       series.x.push_back(megapixels), series.y.push_back(milliseconds);
     if (!series.x.empty()) plot.series.push_back(series);

@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct AllOptions {
-  std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, reports, instrument, redo;
+  std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, report, instrument, redo;
   std::string camera, robot, joint_limits;  // of a live system
   double square_mm = 0, fps = 30;
   bool deinterlace = false, no_questions = false, enable_motion = false;
@@ -159,11 +159,9 @@ class Guide {
     return all;
   }
 
-  // Where its page goes is no part of what was done.
+  // Where the check's page goes is no part of what was done.
   std::vector<std::string> with_report(std::vector<std::string> arguments, const Step& step) const {
-    if (!options_.reports.empty())
-      arguments.insert(arguments.end(), {step.name == "check" ? "--out" : "--report",
-                                         (fs::path(options_.reports) / (step.name + ".html")).string()});
+    if (step.name == "check" && !options_.report.empty()) arguments.insert(arguments.end(), {"--out", options_.report});
     return arguments;
   }
 
@@ -272,7 +270,6 @@ int run_all(AllOptions options) {
   if (options.motion.empty()) options.motion = options.swing.empty() ? options.turn : options.swing;
   if (options.judged.empty()) options.judged = options.swing;
   if (options.judged_joints.empty() && options.judged == options.swing) options.judged_joints = options.joints;
-  if (!options.reports.empty()) fs::create_directories(options.reports);
   return Guide(options).run();
 }
 
@@ -303,7 +300,7 @@ void add_calibrate_all(Command parent, Run& run_later) {
   command.add_flag("--enable-motion", options->enable_motion,
                    "Move the arm for these recordings, see `lapservo record --move`; else a person does, and is asked");
   command.add_option("--joint-limits", options->joint_limits, "For --enable-motion: YAML of the arm's joints");
-  command.add_option("--reports", options->reports, "Folder for a page a step");
+  command.add_option("--report", options->report, "The check's HTML page with figures");
   command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
   command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
   command.add_option("--fps", options->fps, "Frames per second of folders of pictures")
@@ -319,7 +316,7 @@ void add_calibrate_all(Command parent, Run& run_later) {
       "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
       "changed.\n"
       "Example:\n  lapservo calibrate all --rig rig.yaml --boards boards/ --board 9x6 --square-mm 5 --turn turn.mp4 "
-      "--swing swing.mp4 --joints joints.csv --reports pages\n"
+      "--swing swing.mp4 --joints joints.csv --report check.html\n"
       "  lapservo calibrate all --rig rig.yaml --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --enable-motion");
   command.runs(run_later, [options] { return run_all(*options); });
 }

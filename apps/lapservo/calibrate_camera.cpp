@@ -11,7 +11,6 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/calibrate_inputs.h"
-#include "apps/lapservo/camera_report.h"
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
@@ -30,7 +29,7 @@ namespace fs = std::filesystem;
 
 struct CameraOptions {
   std::vector<std::string> inputs;
-  std::string rig, out, camera_info, board, dictionary, report, image_topic;
+  std::string rig, out, camera_info, board, dictionary, image_topic;
   double square_mm = 0;
   std::optional<double> marker_mm;
   std::size_t views = 30;
@@ -58,7 +57,7 @@ void check_files(const CameraOptions& options, const std::optional<Rig>& rig) {
     if (fs::is_directory(input, error)) files.add_pictures_in(input);
   }
   std::vector<fs::path> places;
-  for (const std::string& place : {options.rig_out(), options.camera_info, options.report}) {
+  for (const std::string& place : {options.rig_out(), options.camera_info}) {
     if (place.empty()) continue;
     files.refuse_as_output(place);
     const fs::path canonical = fs::weakly_canonical(place, error);
@@ -68,7 +67,7 @@ void check_files(const CameraOptions& options, const std::optional<Rig>& rig) {
   }
   if (!rig) return;
   files.add_rig(options.rig, *rig);
-  files.refuse_as_output(options.camera_info), files.refuse_as_output(options.report);
+  files.refuse_as_output(options.camera_info);
 }
 
 void look_at(const std::string& input, const std::string& image_topic, BoardRecordings& recordings) {
@@ -143,10 +142,6 @@ int run_camera(const CameraOptions& options) {
   for (const std::string& name : without_board) std::printf("left out, there is no board: %s\n", name.c_str());
   print_result(views, calibration);
   if (!more.empty()) std::printf("better still: %s\n", more.c_str());
-  if (!options.report.empty()) {
-    write_camera_report(options.report, before, views, calibration);
-    std::printf("report: %s\n", options.report.c_str());
-  }
   write_results(options, text, calibration);
   if (rig && std::any_of(rig->instruments.begin(), rig->instruments.end(),
                          [](const Instrument& instrument) { return instrument.camera_from_rcm.has_value(); }))
@@ -175,7 +170,6 @@ void add_calibrate_camera(Command parent, Run& run_later) {
                      "With --rig: the rig to write, else the rig itself is replaced. Without: the camera's file");
   command.add_option("--camera-info", options->camera_info,
                      "The camera alone, as a ROS camera_info, which a rig's camera may name");
-  command.add_option("--report", options->report, "HTML page: coverage, what edges miss the fit by, the response");
   command.add_option("--views", options->views, "Views to choose from a video or a camera at most")
       .shows_default()
       .whole_number_between(4, 200);
@@ -186,7 +180,7 @@ void add_calibrate_camera(Command parent, Run& run_later) {
       "Ctrl-C.\n"
       "All numbers are written with one standard deviation each (sigma_...), the response's where the pictures tell "
       "it.\n"
-      "Example:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml --report camera.html");
+      "Example:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml");
   command.runs(run_later, [options] { return run_camera(*options); });
 }
 

@@ -14,7 +14,6 @@
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/calibration/colour_measurement.h"
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/experiments/html_report.h"
 #include "lapservo/rig/rig_updater.h"
 
 namespace lapservo::app {
@@ -49,31 +48,6 @@ void print(const Instrument& instrument, const ColourCalibration& calibration, s
   std::printf("\nresponse: %s\n", calibration.response_found.c_str());
 }
 
-void write_colour_report(const std::string& path, const Instrument& instrument, const ColourCalibration& calibration,
-                         const std::vector<cv::Mat>& kept, const Rig& before, const Rig& after) {
-  ReportSection section;
-  section.id = "colour";
-  section.title = "The colours of " + instrument.name;
-  section.text = {fmt::format("Found in {} of {} frames before, in {} after.", calibration.found_before, kept.size(),
-                              calibration.found)};
-  for (const std::size_t at : {kept.size() / 4, 3 * kept.size() / 4}) {
-    const cv::Mat& frame = kept[at];
-    section.figures.push_back({Picture{"Before", segmentation_picture(frame, before)}, "With the rig's hues."});
-    section.figures.push_back({Picture{"After", segmentation_picture(frame, after)}, "With the calibrated hues."});
-  }
-  Table table{"Hues [deg], one standard deviation each", {"", "before", "after", "sigma"}, {}};
-  for (std::size_t band = 0; band < 3; ++band)
-    table.rows.push_back({fmt::format("band {}", band), fmt::format("{:.1f}", instrument.marker.hues_deg[band]),
-                          fmt::format("{:.1f}", calibration.hues_deg[band]),
-                          fmt::format("{:.1f}", calibration.sigma_hues_deg[band])});
-  section.tables = {table};
-  section.notes = {"Response: " + calibration.response_found + "."};
-  Report report;
-  report.title = "lapservo calibrate colour";
-  report.sections = {section};
-  write_report(path, report);
-}
-
 // Until the user has seen them. It was Ctrl-C that ended live frames: it does not end this.
 void show(LiveView& view, const std::vector<cv::Mat>& kept, const Rig& before, const Rig& after, bool live) {
   for (std::size_t i = 0; i < kept.size() && (live || !interrupted()); ++i)
@@ -88,7 +62,7 @@ int run_colour(const ColourOptions& options) {
   refuse_outputs_over_inputs(options, rig);
   const auto source = open_frames(options.input, options.fps, options.image_topic);
   std::optional<LiveView> view;
-  if (options.view) view.emplace("calibrate colour", "use --report for a page with the pictures");
+  if (options.view) view.emplace("calibrate colour", "`lapservo check --out` writes a page with the segmentation");
   AtomicFile out(options.out);
   watch_for_interrupts();
 
@@ -104,10 +78,6 @@ int run_colour(const ColourOptions& options) {
   print(instrument, calibration, measured.frames.size());
   const Rig after = with_colour(rig, index, calibration);
   if (view) show(*view, measured.frames, rig, after, live);
-  if (!options.report.empty()) {
-    write_colour_report(options.report, instrument, calibration, measured.frames, rig, after);
-    std::printf("report: %s\n", options.report.c_str());
-  }
   out.stream() << updated_rig_yaml(
       text, options.out, index, MeasuredColour{calibration.hues_deg, calibration.sigma_hues_deg, calibration.response});
   out.commit();
@@ -126,7 +96,6 @@ void add_calibrate_colour(Command parent, Run& run_later) {
                   "The marker in motion: pictures, a folder, a video, or a camera until Ctrl-C")
       .required();
   add_calibrate_options(command, *options);
-  command.add_option("--report", options->report, "HTML page with the segmentation before and after");
   command.add_flag("--replace-response", options->replace_response,
                    "Also a response that calibrate camera measured (sigma_response), which stays else");
   command.add_flag("--view", options->view, "Show the segmentation before and after in a window");
@@ -134,7 +103,7 @@ void add_calibrate_colour(Command parent, Run& run_later) {
       "Move the instrument through the picture and turn it, 10 s or more, wholly in view and not overexposed. The "
       "rig's\n"
       "hues may be up to 60 degrees off; the response is written where the frames tell another than the rig's.\n"
-      "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml --report colour.html");
+      "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml");
   command.runs(run_later, [options] { return run_colour(*options); });
 }
 

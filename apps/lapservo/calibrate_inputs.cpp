@@ -54,9 +54,6 @@ void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig)
   for (const std::string& input : {options.input, options.joints})
     if (fs::is_directory(input, error)) inputs.add_pictures_in(input);
   for (const std::string& out : {options.out, options.report}) inputs.refuse_as_output(out);
-  if (!options.report.empty() &&
-      fs::weakly_canonical(options.out, error) == fs::weakly_canonical(options.report, error))
-    throw InputError(options.out, "is the place for --out and --report, expected two places");
   inputs.add_rig(options.rig, rig);
   inputs.refuse_as_output(options.report);
 }

@@ -15,7 +15,7 @@ struct CalibrateOptions {
   bool deinterlace = false;
 };
 
-/// All but the input, the joints and the report, which each subcommand describes itself.
+/// All but the input and the joints, which each subcommand describes itself.
 void add_calibrate_options(Command command, CalibrateOptions& options);
 
 /// Of these, those that say how the recording is read and which instrument is meant.
@@ -28,7 +28,7 @@ inline std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& opti
   return named_instrument(rig, options.instrument, options.rig);
 }
 
-/// Throws InputError when a result would go over an input or over the other result.
+/// Throws InputError when a result would go over an input, or check's page over the rig.
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
 
 /// What a source could not read, on stderr, when there is such.

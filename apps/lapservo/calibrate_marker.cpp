@@ -10,7 +10,6 @@
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/joint_input.h"
-#include "apps/lapservo/marker_report.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/calibration/marker_measurement.h"
 #include "lapservo/core/atomic_file.h"
@@ -67,10 +66,6 @@ int run_marker(const CalibrateOptions& options) {
         "the pictures look compressed, and the turn does not go both ways: if they come from a video, which leaves the "
         "seam a little behind, psi is some mrad off; turn the instrument there and back\n");
   if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
-  if (!options.report.empty()) {
-    write_marker_report(options.report, instrument, calibration);
-    std::printf("report: %s\n", options.report.c_str());
-  }
   out.stream() << updated_rig_yaml(text, options.out, index, calibration.marker);
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
@@ -92,14 +87,12 @@ void add_calibrate_marker(Command parent, Run& run_later) {
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
       "bag, the input itself for example: seam_rad too, which pictures alone can't tell");
-  command.add_option("--report", options->report,
-                     "HTML page with what the boundaries miss the print by, before and after");
   command.footer(
       "Turn the instrument about its axis once, or a little more, in 20 to 60 s, near and sharp, the whole marker in "
       "view;\n"
       "it may move otherwise too. For a compressed video turn it there and back. All numbers are written with one "
       "standard deviation each (sigma_...).\n"
-      "Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml --report marker.html");
+      "Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml");
   command.runs(run_later, [options] { return run_marker(*options); });
 }
 

@@ -13,7 +13,6 @@
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/joint_input.h"
-#include "apps/lapservo/registration_report.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/calibration/registration_measurement.h"
 #include "lapservo/core/atomic_file.h"
@@ -79,10 +78,6 @@ int run_registration(const CalibrateOptions& options) {
   print_numbers(instrument, registration);
   print_residuals(registration);
   for (const std::string& what : registration.unknown) std::printf("%s\n", what.c_str());
-  if (!options.report.empty()) {
-    write_registration_report(options.report, instrument, registration);
-    std::printf("report: %s\n", options.report.c_str());
-  }
   out.stream() << updated_rig_yaml(text, options.out, index, measured(registration));
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
@@ -108,16 +103,13 @@ void add_calibrate_registration(Command parent, Run& run_later) {
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
       "bag; without it those in the input, where it is a bag. Without any only the RCM's position can be "
       "told");
-  command.add_option("--report", options->report, "HTML page with what is left at each frame");
   command.footer(
       "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "
       "it\n"
       "smoothly for 10 to 60 s, the marker in view. Clocks of joints and video may differ by up to 3 s. theta's "
       "offset\n"
       "stays the rig's: camera_from_rcm turns with it.\n"
-      "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml "
-      "--report "
-      "registration.html");
+      "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
   command.runs(run_later, [options] { return run_registration(*options); });
 }
 

@@ -16,6 +16,7 @@
 #include "apps/lapservo/joint_input.h"
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
+#include "lapservo/calibration/colour_calibration.h"
 #include "lapservo/calibration/rig_check.h"
 #include "lapservo/experiments/sigma_map.h"
 #include "lapservo/io/frame_source.h"
@@ -87,10 +88,13 @@ int run_check(const CalibrateOptions& options) {
 
   constexpr int enough = 1800;
   RigEvidence evidence(rig, index);
+  cv::Mat seen, missed;  // the last frames with and without the marker
+  int count = 0;         // of those with it
   const FramesRead read = read_frames({*source, options.input, options.deinterlace}, rig, every_of(*source, enough),
                                       watched_job(), [&](const cv::Mat& bgr, double time_s) {
-                                        evidence.add(bgr, time_s);
-                                        return fmt::format(", {} in {}", instrument.name, evidence.poses().size());
+                                        const bool found = evidence.add(bgr, time_s);
+                                        (found ? seen : missed) = bgr, count += found;
+                                        return fmt::format(", {} in {}", instrument.name, count);
                                       });
   if (read.stopped) {
     std::fprintf(stderr, "lapservo: %s: stopped\n", options.input.c_str());
@@ -123,6 +127,8 @@ int run_check(const CalibrateOptions& options) {
   std::printf("%s\n", instrument.name.c_str());
   print(checked);
   if (!options.report.empty()) {
+    if (!seen.empty()) checked.found_segmented = segmentation_picture(seen, rig);
+    if (!missed.empty()) checked.missed_segmented = segmentation_picture(missed, rig);
     write_check_report(options.report, instrument.name, checked);
     std::printf("report: %s\n", options.report.c_str());
   }

@@ -7,23 +7,21 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/lapservo/print_residual_plot.h"
+#include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/experiments/html_report.h"
+#include "lapservo/report/html_report.h"
 
 namespace lapservo::app {
 using namespace internal;
 namespace {
 
 Series points(const std::string& name, int color) {
-  return {.name = name, .x = {}, .y = {}, .sigma = {}, .draw = Draw::points, .color = color};
+  return {name, {}, {}, Draw::points, color};
 }
 
 Plot over_time(const std::string& title, const std::string& label, const std::string& unit) {
-  Plot plot;
-  plot.title = title;
-  plot.x = {.label = "time", .unit = "s", .low = {}, .high = {}};
-  plot.y = {.label = label, .unit = unit, .low = 0, .high = {}};
+  Plot plot = time_plot(title, label, unit, {});
+  plot.y.low = 0;
   return plot;
 }
 
@@ -58,6 +56,36 @@ Plot frame_plot(const std::vector<FrameEvidence>& frames, const std::string& tit
   for (const FrameEvidence& frame : frames)
     if (const std::optional<double> y = value(frame)) series.x.push_back(frame.time_s), series.y.push_back(*y);
   plot.series.push_back(std::move(series));
+  return plot;
+}
+
+// Of one boundary, by parts of the turn: of thousands of points a page that opens.
+Series residual_means(const std::vector<PrintResidual>& residuals, std::size_t boundary) {
+  constexpr std::size_t parts = 60;
+  constexpr int least = 3;
+  std::array<double, parts> sums_m{};
+  std::array<int, parts> counts{};
+  for (const PrintResidual& r : residuals) {
+    if (r.boundary != boundary) continue;
+    const auto part = static_cast<std::size_t>(std::clamp(r.tau_rad / two_pi * parts, 0.0, parts - 1.0));
+    sums_m[part] += r.residual_m, counts[part] += 1;
+  }
+  Series series = points(fmt::format("e{}", boundary), static_cast<int>(boundary));
+  for (std::size_t part = 0; part < parts; ++part) {
+    if (counts[part] < least) continue;
+    series.x.push_back(360 * (static_cast<double>(part) + 0.5) / parts);
+    series.y.push_back(1e3 * sums_m[part] / counts[part]);
+  }
+  return series;
+}
+
+Plot print_plot(const std::vector<PrintResidual>& residuals) {
+  Plot plot{"Boundaries about the rig's print",
+            {"tau", "deg", 0, 360},
+            {"along the shaft", "mm", {}, {}},
+            {},
+            {{"the rig's print", 0}}};
+  for (std::size_t boundary = 0; boundary < 4; ++boundary) plot.series.push_back(residual_means(residuals, boundary));
   return plot;
 }
 
@@ -161,9 +189,16 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
                                 }),
                      "Median over the marker. Near 255 boundaries are lost."});
   if (f.print && f.print->refusal.empty())
-    figures.push_back({print_residual_plot("Boundaries about the rig's print", f.print->residuals,
-                                           {"e0", "e1", "e2", "e3"}, "the rig's print", 60),
-                       "Means over 6 degrees. Straight lines off 0 are the print's errors."});
+    figures.push_back(
+        {print_plot(f.print->residuals),
+         "Where boundaries lie beyond the rig's print, means over 6 degrees. Straight lines off 0 are the "
+         "print's errors."});
+  for (const auto& [picture, caption] : {std::pair{checked.found_segmented, "where the marker is found"},
+                                         {checked.missed_segmented, "where the marker is not found"}})
+    if (!picture.empty())
+      figures.push_back(
+          {Picture{"Colours", picture},
+           fmt::format("The pixels that have a band's colour by the rig's hues, in the last frame {}.", caption)});
   return figures;
 }
 

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include <opencv2/core.hpp>
+
 #include "lapservo/calibration/rig_check.h"
 #include "lapservo/experiments/sigma_map.h"
 
@@ -15,6 +17,9 @@ struct CheckedRig {
   std::vector<internal::FrameEvidence> frames;
   std::vector<internal::SigmaMap> maps;
   std::vector<internal::Advice> advice;
+  /// A frame of each kind with the pixels that have a band's hue painted (segmentation_picture); empty without such a
+  /// frame.
+  cv::Mat found_segmented, missed_segmented;
 
   bool good_enough() const;
 };

@@ -14,11 +14,11 @@
 #include "apps/lapservo/progress.h"
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/core/error.h"
-#include "lapservo/experiments/html_report.h"
 #include "lapservo/experiments/illumination.h"
 #include "lapservo/experiments/rcm.h"
 #include "lapservo/experiments/rotation.h"
 #include "lapservo/experiments/tracking.h"
+#include "lapservo/report/html_report.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/rig/single_instrument.h"
 

@@ -11,9 +11,6 @@ trap 'rm -rf "$work"' EXIT
 LAPSERVO_TUTORIAL_FOLDER=$work "$build/acceptance/tutorial_test" --gtest_filter='*EveryCommand*' || true
 
 cp "$work/marker.png" "$here/marker.png"
-# The figures of the colours' page, in their order: before, after.
-grep -o 'base64,[^"]*' "$work/pages/colour.html" | cut -d, -f2 | sed -n 1p | base64 -d >"$here/colour_before.jpg"
-grep -o 'base64,[^"]*' "$work/pages/colour.html" | cut -d, -f2 | sed -n 2p | base64 -d >"$here/colour_after.jpg"
 # A frame as JPEG, so that the overlay is one.
 sed -n '1p;30p' "$work/swing_poses.csv" >"$work/one.csv"
 "$build/lapservo" render --rig "$work/truth.yaml" --poses "$work/one.csv" --format jpg --out "$work/one"

@@ -158,11 +158,9 @@ void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edge
   for (std::size_t i = 0; i < edges.points.size(); ++i) {
     std::vector<double> of_view;
     for (std::size_t k = 0; k < edges.points[i].size(); ++k) {
-      const EdgePoint& point = edges.points[i][k];
-      if (point.channel != green) continue;
+      if (edges.points[i][k].channel != green) continue;
       const double residual_px = adjustment.residuals_px[i][k];
       of_view.push_back(residual_px), all.push_back(residual_px);
-      calibration.residuals.push_back({i, point.raw_px, residual_px * point.normal});
     }
     calibration.view_rms_px.push_back(rms(of_view));
   }
@@ -220,6 +218,18 @@ Tilts tilts_of(const std::vector<BoardView>& views, const cv::Size& size) {
   return tilts;
 }
 
+// Which parts of the picture, by row and column, hold a corner in some view.
+std::array<std::array<bool, 4>, 3> parts_seen(const std::vector<BoardView>& views, const cv::Size& size) {
+  std::array<std::array<bool, 4>, 3> seen{};
+  const auto part = [](double at_px, int size_px, int parts) {
+    return static_cast<std::size_t>(std::clamp(static_cast<int>(at_px * parts / size_px), 0, parts - 1));
+  };
+  for (const BoardView& view : views)
+    for (const BoardCorner& corner : view.corners)
+      seen[part(corner.raw_px.y(), size.height, 3)][part(corner.raw_px.x(), size.width, 4)] = true;
+  return seen;
+}
+
 }  // namespace
 
 bool BoardViews::add(const std::string& name, const cv::Mat& bgr, bool always) {
@@ -244,41 +254,18 @@ bool BoardViews::add(const std::string& name, const cv::Mat& bgr, bool always) {
   return true;
 }
 
-Coverage coverage_of(const std::vector<BoardView>& views, const cv::Size& size) {
-  Coverage coverage;
-  for (const BoardView& view : views) {
-    std::array<bool, std::tuple_size_v<decltype(coverage.views)>> seen{};
-    for (const BoardCorner& corner : view.corners) {
-      const int column =
-          std::clamp(static_cast<int>(corner.raw_px.x() * Coverage::columns / size.width), 0, Coverage::columns - 1);
-      const int row =
-          std::clamp(static_cast<int>(corner.raw_px.y() * Coverage::rows / size.height), 0, Coverage::rows - 1);
-      seen[static_cast<std::size_t>(row * Coverage::columns + column)] = true;
-    }
-    for (std::size_t i = 0; i < seen.size(); ++i) coverage.views[i] += seen[i];
-  }
-  return coverage;
-}
-
 std::string advice(const std::vector<BoardView>& views, const cv::Size& size) {
   std::vector<std::string> wanted;
   if (views.size() < least_views)
     wanted.push_back(fmt::format("show the board in {} more views", least_views - views.size()));
-  const Coverage coverage = coverage_of(views, size);
+  const auto seen = parts_seen(views, size);
   constexpr std::array vertical{"upper", "middle", "lower"};
   std::vector<std::string> empty;
-  for (int row = 0; row < Coverage::rows; ++row)
-    for (const auto& [side, from] : {std::pair{"left", 0}, {"right", Coverage::columns / 2}}) {
-      const auto first = static_cast<std::size_t>(row * Coverage::columns + from);
-      if (coverage.views[first] + coverage.views[first + 1] == 0)
-        empty.push_back(fmt::format("{} {}", vertical[static_cast<std::size_t>(row)], side));
-    }
-  for (const auto& [side, column] : {std::pair{"left side", 0}, {"right side", Coverage::columns - 1}}) {
-    int seen = 0;
-    for (int row = 0; row < Coverage::rows; ++row)
-      seen += coverage.views[static_cast<std::size_t>(row * Coverage::columns + column)];
-    if (seen == 0) empty.push_back(side);
-  }
+  for (std::size_t row = 0; row < seen.size(); ++row)
+    for (const auto& [side, from] : {std::pair{"left", 0U}, {"right", 2U}})
+      if (!seen[row][from] && !seen[row][from + 1]) empty.push_back(fmt::format("{} {}", vertical[row], side));
+  for (const auto& [side, column] : {std::pair{"left side", 0U}, {"right side", 3U}})
+    if (!seen[0][column] && !seen[1][column] && !seen[2][column]) empty.push_back(side);
   if (!empty.empty()) wanted.push_back(fmt::format("fill the {}", fmt::join(empty, ", the ")));
   const Tilts tilts = tilts_of(views, size);
   if (tilts.up_down_rad < least_tilt_rad)

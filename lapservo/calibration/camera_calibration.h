@@ -45,20 +45,8 @@ class BoardViews {
   int found_ = 0;
 };
 
-/// Where a fraction of the picture's parts (`columns` x `rows`, row by row) has corners in so many views.
-struct Coverage {
-  static constexpr int columns = 4, rows = 3;
-  std::array<int, static_cast<std::size_t>(columns* rows)> views{};
-};
-Coverage coverage_of(const std::vector<BoardView>& views, const cv::Size& size);
 /// What the next pictures should show: "fill the lower left", "tilt the board". Empty when nothing is missing.
 std::string advice(const std::vector<BoardView>& views, const cv::Size& size);
-
-/// An edge's residual in a view, green.
-struct CameraResidual {
-  std::size_t view;
-  Eigen::Vector2d raw_px, beyond_px;
-};
 
 struct CameraCalibration {
   /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
@@ -70,7 +58,6 @@ struct CameraCalibration {
   double rms_px = 0;
   std::vector<Rigid3> poses;   ///< camera_from_board, by view
   double bright_wider_px = 0;  ///< with the calibrated response, green: 0 for a board whose squares are equally wide
-  std::vector<CameraResidual> residuals;
 };
 
 /// Matrix, distortion, lateral chromatic aberration and response of the camera that took the views, all of one size.

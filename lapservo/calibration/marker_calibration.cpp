@@ -352,8 +352,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
         "the seam is not seen well enough to tell where the print begins: film it slowly passing the camera, without "
         "glare");
   if (!settled) return refused("the fit does not settle: more frames, sharper ones, or a rig nearer to the print");
-  const ResidualSummary residuals_after = summary_of(*last, fit.measured(), fit.marker(), 2);
-  calibration.after_px = residuals_after.rms_px, calibration.after = residuals_after.residuals;
+  calibration.after_px = summary_of(*last, fit.measured(), fit.marker(), 2).rms_px;
   calibration.marker = fit.marker();
   calibration.marker.sigmas = sigmas_of(*last->covariance, nominal.sigmas);
   if (no_gap_sigma_rad) calibration.marker.sigmas.gap_rad = no_gap_sigma_rad;

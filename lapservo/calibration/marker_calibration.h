@@ -59,8 +59,8 @@ struct MarkerCalibration {
   /// Of boundaries' points about a fit of the poses, for the rig's print and for the calibrated one: rms of what is no
   /// outlier to the latter.
   double before_px = 0, after_px = 0;
-  std::vector<PrintResidual> before, after;
-  std::vector<KeyFrame> key_frames;  ///< those used, where the calibrated marker has them
+  std::vector<PrintResidual> before;  ///< for the rig's print
+  std::vector<KeyFrame> key_frames;   ///< those used, where the calibrated marker has them
 };
 
 /// Bands, wrap, skew and gap of the rig's marker from frames of a full turn. The diameter stays: pictures tell lengths

@@ -105,7 +105,7 @@ FrameEvidence RigEvidence::tracked_as_it_is(const cv::Mat& bgr, double time_s) {
   return frame;
 }
 
-void RigEvidence::add(const cv::Mat& bgr, double time_s) {
+bool RigEvidence::add(const cv::Mat& bgr, double time_s) {
   // The worker's half and this one share nothing, so that both at once find what one after the other would. Some frames
   // apart, as now the one and then the other takes longer.
   constexpr std::size_t most_unfinished = 4;
@@ -116,8 +116,9 @@ void RigEvidence::add(const cv::Mat& bgr, double time_s) {
   });
   look_at_picture(bgr);
   FreeSight free;
-  if (!look_with(exact_, bgr, time_s, free)) look_with(tolerant_, bgr, time_s, free);
+  const bool found = look_with(exact_, bgr, time_s, free) || look_with(tolerant_, bgr, time_s, free);
   unfinished_.push_back({std::move(as_it_is), free});
+  return found;
 }
 
 void RigEvidence::finish_all_but(std::size_t unfinished) const {

@@ -43,8 +43,8 @@ class RigEvidence {
   RigEvidence(const Rig& rig, std::size_t instrument, Cores cores = Cores::two);
 
   /// 8-bit BGR of the rig's size, whose pixels stay as they are: the second core may look at them some frames later.
-  /// Then it also throws what was wrong with one before.
-  void add(const cv::Mat& bgr, double time_s);
+  /// Then it also throws what was wrong with one before. Returns whether the marker was found by the image alone.
+  bool add(const cv::Mat& bgr, double time_s);
 
   // What follows waits for all frames that were added.
   const std::vector<FrameEvidence>& frames() const;

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/experiments/html_report.h"
 #include "lapservo/experiments/statistics.h"
+#include "lapservo/report/html_report.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {

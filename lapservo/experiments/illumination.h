@@ -6,9 +6,9 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/experiments/html_report.h"
 #include "lapservo/experiments/setup.h"
 #include "lapservo/experiments/statistics.h"
+#include "lapservo/report/html_report.h"
 #include "lapservo/vision/observation.h"
 
 namespace lapservo::internal {

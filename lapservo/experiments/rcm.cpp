@@ -59,7 +59,7 @@ std::vector<double> distances_of(const RcmResult::OfMethod& of_method, double mi
 
 Plot error_plane(const std::string& title) {
   Plot plot{title, {"error in u", "px", {}, {}}, {"error in v", "px", {}, {}}, {}, {}, true};
-  plot.series.push_back({"truth", {0}, {0}, {}, Draw::points, -1});
+  plot.series.push_back({"truth", {0}, {0}, Draw::points, -1});
   return plot;
 }
 
@@ -74,7 +74,7 @@ Figure robust_figure(Plot plot, const std::string& caption) {
 
 Figure cloud_of_intersections(const RcmResult::OfMethod& of_method, const Eigen::Vector2d& true_px) {
   Plot plot = error_plane("Intersections about the truth: " + method_title(of_method.method));
-  Series series{"of two lines", {}, {}, {}, Draw::points, method_color(of_method.method)};
+  Series series{"of two lines", {}, {}, Draw::points, method_color(of_method.method)};
   for (const RcmResult::Intersection& at : of_method.intersections)
     if (at.set == 0) {
       series.x.push_back(at.px.x() - true_px.x());
@@ -88,7 +88,7 @@ Figure cloud_of_estimates(const RcmResult::OfMethod& of_method) {
   Plot plot = error_plane("Estimates about the truth: " + method_title(of_method.method));
   for (const bool pairwise : {true, false}) {
     const auto& of = pairwise ? of_method.pairwise : of_method.least_squares;
-    Series series{estimator_name(pairwise), {}, {}, {}, Draw::points, pairwise ? 1 : 0};
+    Series series{estimator_name(pairwise), {}, {}, Draw::points, pairwise ? 1 : 0};
     for (const RcmResult::Estimate& estimate : of.estimates) {
       series.x.push_back(estimate.error_px.x());
       series.y.push_back(estimate.error_px.y());
@@ -109,7 +109,7 @@ Plot fractions_within(const RcmResult& result) {
             {{"half of them", 50}},
             false};
   for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), {}, {}, {}, Draw::line, method_color(of_method.method)};
+    Series series{method_title(of_method.method), {}, {}, Draw::line, method_color(of_method.method)};
     const auto distances = distances_of(of_method, 0);
     for (int percent = 1; percent <= 100; ++percent) {
       series.x.push_back(quantile_of(distances, 0.01 * percent));
@@ -120,7 +120,6 @@ Plot fractions_within(const RcmResult& result) {
   plot.series.push_back({fmt::format("the paper\u2019s mean, {} px", RcmResult::paper_mean_px),
                          {RcmResult::paper_mean_px, RcmResult::paper_mean_px},
                          {0, 100},
-                         {},
                          Draw::dashed,
                          -1});
   return plot;
@@ -132,9 +131,8 @@ Plot fan(const RcmResult& result, const Camera& camera) {
   Plot plot{
       "The centre lines of the first set meet in the RCM", {"u", "px", {}, {}}, {"v", "px", {}, {}}, {}, {}, true};
   const double right = camera.width_px - 1, bottom = camera.height_px - 1;
-  plot.series.push_back({"image", {0, right, right, 0, 0}, {0, 0, bottom, bottom, 0}, {}, Draw::dashed, -1});
-  Series extended{"", {}, {}, {}, Draw::line, -1},
-      seen{"e0 to e3", {}, {}, {}, Draw::line, method_color(of_method.method)};
+  plot.series.push_back({"image", {0, right, right, 0, 0}, {0, 0, bottom, bottom, 0}, Draw::dashed, -1});
+  Series extended{"", {}, {}, Draw::line, -1}, seen{"e0 to e3", {}, {}, Draw::line, method_color(of_method.method)};
   const auto gap = [](Series& series) { series.x.push_back(std::nan("")), series.y.push_back(std::nan("")); };
   const auto add = [](Series& series, const Eigen::Vector2d& p) {
     series.x.push_back(p.x()), series.y.push_back(p.y());
@@ -146,7 +144,7 @@ Plot fan(const RcmResult& result, const Camera& camera) {
   }
   plot.series.push_back(std::move(extended));
   plot.series.push_back(std::move(seen));
-  plot.series.push_back({"true RCM", {result.true_px.x()}, {result.true_px.y()}, {}, Draw::points, 2});
+  plot.series.push_back({"true RCM", {result.true_px.x()}, {result.true_px.y()}, Draw::points, 2});
   return plot;
 }
 

@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include "lapservo/experiments/html_report.h"
 #include "lapservo/experiments/setup.h"
 #include "lapservo/experiments/statistics.h"
 #include "lapservo/rcm/line_observation.h"
+#include "lapservo/report/html_report.h"
 
 namespace lapservo::internal {
 

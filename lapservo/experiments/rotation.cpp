@@ -39,13 +39,13 @@ Plot one_trial(const RotationResult& result) {
             {},
             {},
             false};
-  Series reference{"reference", {}, {}, {}, Draw::dashed, -1};
+  Series reference{"reference", {}, {}, Draw::dashed, -1};
   for (int step = 0; step < RotationResult::steps; ++step) {
     reference.x.push_back(RotationResult::turn_s * step / RotationResult::steps);
     reference.y.push_back(true_rotation_rad(step));
   }
   for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), {}, {}, {}, Draw::points, method_color(of_method.method)};
+    Series series{method_title(of_method.method), {}, {}, Draw::points, method_color(of_method.method)};
     for (const RotationResult::Sample& sample : of_method.samples)
       if (sample.set == 0 && sample.trial == 0) {
         series.x.push_back(sample.time_s());
@@ -65,7 +65,7 @@ Plot distribution_by_trial(const RotationResult::OfMethod& of_method) {
             {},
             {{"no error", 0}},
             false};
-  Series series{"", {}, {}, {}, Draw::boxes, method_color(of_method.method)};
+  Series series{"", {}, {}, Draw::boxes, method_color(of_method.method)};
   for (const RotationResult::Sample& sample : of_method.samples)
     if (sample.set == 0) {
       series.x.push_back(initial_rotation_rad(sample.trial));
@@ -83,7 +83,7 @@ Plot error_against_true(const RotationResult::OfMethod& of_method) {
             {},
             {{"no error", 0}},
             false};
-  Series series{"", {}, {}, {}, Draw::points, method_color(of_method.method)};
+  Series series{"", {}, {}, Draw::points, method_color(of_method.method)};
   for (const RotationResult::Sample& sample : of_method.samples)
     if (sample.set == 0) {
       series.x.push_back(sample.true_rad);
@@ -100,14 +100,13 @@ Plot deviation_by_trial(const RotationResult& result) {
             {},
             {},
             false};
-  Series paper{"the paper", {}, {}, {}, Draw::line_and_points, -1};
+  Series paper{"the paper", {}, {}, Draw::line_and_points, -1};
   for (int trial = 0; trial < RotationResult::trials; ++trial) {
     paper.x.push_back(initial_rotation_rad(trial));
     paper.y.push_back(1e3 * RotationResult::paper_deviation_rad[static_cast<std::size_t>(trial)]);
   }
   for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), paper.x, {}, {}, Draw::line_and_points,
-                  method_color(of_method.method)};
+    Series series{method_title(of_method.method), paper.x, {}, Draw::line_and_points, method_color(of_method.method)};
     for (std::size_t trial = 0; trial < RotationResult::trials; ++trial)
       series.y.push_back(1e3 * of_method.by_trial[trial].deviation);
     plot.series.push_back(std::move(series));

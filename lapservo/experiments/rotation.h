@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "lapservo/experiments/html_report.h"
 #include "lapservo/experiments/setup.h"
 #include "lapservo/experiments/statistics.h"
+#include "lapservo/report/html_report.h"
 
 namespace lapservo::internal {
 

@@ -27,14 +27,6 @@ Spread spread_of(std::vector<double> values) {
   return spread;
 }
 
-double quantile_of(std::vector<double> values, double fraction) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  const double place = fraction * static_cast<double>(values.size() - 1);
-  const auto below = static_cast<std::size_t>(place), above = std::min(below + 1, values.size() - 1);
-  return values[below] + (place - static_cast<double>(below)) * (values[above] - values[below]);
-}
-
 double fraction_within(const std::vector<double>& values, double bound) {
   if (values.empty()) return 0;
   const auto within = std::count_if(values.begin(), values.end(), [bound](double v) { return std::abs(v) < bound; });

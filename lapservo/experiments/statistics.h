@@ -5,6 +5,8 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/core/quantile.h"
+
 namespace lapservo::internal {
 
 /// Of a list of numbers: all zero when it is empty.
@@ -17,10 +19,6 @@ struct Spread {
   double median = 0;
 };
 Spread spread_of(std::vector<double> values);
-
-/// The value below which a fraction of the numbers lies, between two of them on the straight line; 0 when there are
-/// none.
-double quantile_of(std::vector<double> values, double fraction);
 
 /// Of the magnitudes, the fraction that is smaller than a bound; 0 when there are none.
 double fraction_within(const std::vector<double>& values, double bound);

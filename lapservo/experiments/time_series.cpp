@@ -30,18 +30,9 @@ void write_data(const TimeTable& table, const std::filesystem::path& path) {
 
 Series over_time(const TimeTable& table, const std::string& column, std::string legend, int color, Draw draw,
                  double scale) {
-  Series series{std::move(legend), table.time_s, table.column(column).values, {}, draw, color};
+  Series series{std::move(legend), table.time_s, table.column(column).values, draw, color};
   for (double& value : series.y) value *= scale;
   return series;
-}
-
-Plot time_plot(std::string title, std::string label, std::string unit, std::vector<Series> series) {
-  return {std::move(title),
-          {"time", "s", {}, {}},
-          {std::move(label), std::move(unit), {}, {}},
-          std::move(series),
-          {},
-          false};
 }
 
 }  // namespace lapservo::internal

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "lapservo/experiments/svg_plot.h"
+#include "lapservo/report/svg_plot.h"
 
 namespace lapservo::internal {
 
@@ -28,8 +28,5 @@ void write_data(const TimeTable& table, const std::filesystem::path& path);
 /// A column as a line of a plot over time, its values multiplied by `scale`.
 Series over_time(const TimeTable& table, const std::string& column, std::string legend, int color,
                  Draw draw = Draw::line, double scale = 1);
-
-/// Lines over time: the x axis is "time [s]".
-Plot time_plot(std::string title, std::string label, std::string unit, std::vector<Series> series);
 
 }  // namespace lapservo::internal

@@ -8,9 +8,9 @@
 #include <Eigen/Core>
 
 #include "lapservo/control/controller_config.h"
-#include "lapservo/experiments/html_report.h"
 #include "lapservo/experiments/setup.h"
 #include "lapservo/experiments/time_series.h"
+#include "lapservo/report/html_report.h"
 
 namespace lapservo::internal {
 

@@ -1,4 +1,4 @@
-#include "lapservo/experiments/html_report.h"
+#include "lapservo/report/html_report.h"
 
 #include <filesystem>
 #include <fstream>
@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/experiments/test_markup.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/report/test_markup.h"
 
 namespace lapservo::internal {
 namespace {
@@ -21,7 +21,7 @@ Report sample_report(const std::string& word = "word") {
   section.text = {word, word};
   section.comparisons = {{word, "1.49 px", "0.2 px", ""}, {word, "", "", "1"}};
   Plot plot{word, {"time", "s", {}, {}}, {word, "px", {}, {}}, {}, {}, false};
-  plot.series.push_back({word, {0, 1, 2}, {1, 3, 2}, {}, Draw::line_and_points, 0});
+  plot.series.push_back({word, {0, 1, 2}, {1, 3, 2}, Draw::line_and_points, 0});
   section.figures.push_back({plot, word});
   cv::Mat picture(40, 60, CV_8UC3, cv::Scalar(200, 40, 20));
   section.figures.push_back({Picture{word, picture}, word});

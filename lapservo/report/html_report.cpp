@@ -1,4 +1,4 @@
-#include "lapservo/experiments/html_report.h"
+#include "lapservo/report/html_report.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,14 +1,15 @@
-#include "lapservo/experiments/svg_plot.h"
+#include "lapservo/report/svg_plot.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <utility>
 
 #include <fmt/format.h>
 
-#include "lapservo/experiments/statistics.h"
+#include "lapservo/core/quantile.h"
 
 namespace lapservo::internal {
 namespace {
@@ -70,11 +71,7 @@ Range x_range(const Plot& plot) {
 Range y_range(const Plot& plot) {
   Range range{HUGE_VAL, -HUGE_VAL};
   for (const Series& series : plot.series)
-    for (std::size_t i = 0; i < series.y.size(); ++i) {
-      const double sigma = series.sigma.empty() ? 0 : series.sigma[i];
-      extend(range, series.y[i] - sigma, plot.y.logarithmic);
-      extend(range, series.y[i] + sigma, plot.y.logarithmic);
-    }
+    for (const double y : series.y) extend(range, y, plot.y.logarithmic);
   for (const ReferenceLine& line : plot.references) extend(range, line.y, plot.y.logarithmic);
   return padded(range, plot.y);
 }
@@ -145,34 +142,12 @@ std::string line_path(const Layout& layout, const Series& series) {
   return path;
 }
 
-// y - sigma to y + sigma, over the points that are there.
-std::string band_path(const Layout& layout, const Series& series) {
-  std::string there, back;
-  for (std::size_t i = 0; i < series.x.size(); ++i) {
-    const double low = series.y[i] - series.sigma[i], high = series.y[i] + series.sigma[i];
-    if (!layout.x.drawable(series.x[i]) || !layout.y.drawable(low) || !layout.y.drawable(high)) continue;
-    const double x = layout.x(series.x[i]);
-    there += fmt::format("{}{:.1f} {:.1f}", there.empty() ? 'M' : 'L', x, layout.y(high));
-    back = fmt::format("L{:.1f} {:.1f}", x, layout.y(low)) + back;
-  }
-  return there.empty() ? "" : there + back + "z";
-}
-
 std::string hover_text(const Plot& plot, const Series& series, std::size_t i) {
   const auto part = [](const Axis& axis, double value) {
     return fmt::format("{} {}{}{}", axis.label, number(value), axis.unit.empty() ? "" : " ", axis.unit);
   };
   std::string text = series.name.empty() ? "" : series.name + ": ";
-  text += part(plot.x, series.x[i]) + ", " + part(plot.y, series.y[i]);
-  if (!series.sigma.empty()) text += " \u00b1 " + number(series.sigma[i]);
-  return escaped(text);
-}
-
-std::string error_bar(const Layout& layout, const Series& series, std::size_t i) {
-  const double low = series.y[i] - series.sigma[i], high = series.y[i] + series.sigma[i];
-  if (!layout.y.drawable(low) || !layout.y.drawable(high)) return "";
-  return fmt::format("<path class=\"bar s-{}\" d=\"M{:.1f} {:.1f}V{:.1f}\"/>", color_class(series.color),
-                     layout.x(series.x[i]), layout.y(low), layout.y(high));
+  return escaped(text + part(plot.x, series.x[i]) + ", " + part(plot.y, series.y[i]));
 }
 
 std::string points_of(const Plot& plot, const Layout& layout, const Series& series) {
@@ -180,7 +155,6 @@ std::string points_of(const Plot& plot, const Layout& layout, const Series& seri
   std::string text;
   for (std::size_t i = 0; i < series.x.size(); ++i) {
     if (!drawable(layout, series, i)) continue;
-    if (!series.sigma.empty()) text += error_bar(layout, series, i);
     text += fmt::format("<path class=\"point f-{}\" d=\"{}\"><title>{}</title></path>\n", color_class(series.color),
                         shape_path(series.color, layout.x(series.x[i]), layout.y(series.y[i]), size),
                         hover_text(plot, series, i));
@@ -218,7 +192,7 @@ std::string boxes_of(const Plot& plot, const Layout& layout, const Series& serie
   for (std::size_t i = 0; i < series.x.size(); ++i)
     if (drawable(layout, series, i)) by_x[series.x[i]].push_back(series.y[i]);
   const double room_px = std::abs(layout.x.at_high_px - layout.x.at_low_px) / (static_cast<double>(by_x.size()) + 1);
-  Series beyond{series.name, {}, {}, {}, Draw::points, series.color};
+  Series beyond{series.name, {}, {}, Draw::points, series.color};
   std::string text;
   for (const auto& [x, values] : by_x) {
     const Box box = box_of(values);
@@ -245,13 +219,9 @@ std::string drawn(const Plot& plot, const Layout& layout, const Series& given) {
   const bool many = has_line(given.draw) && given.x.size() > 2000;
   const Series series = many ? thinned(given, static_cast<int>(width_px)) : given;
   std::string text;
-  if (has_line(series.draw)) {
-    if (!series.sigma.empty() && !has_points(series.draw))
-      text +=
-          fmt::format("<path class=\"band f-{}\" d=\"{}\"/>\n", color_class(series.color), band_path(layout, series));
+  if (has_line(series.draw))
     text += fmt::format("<path class=\"line s-{}{}\" d=\"{}\"/>\n", color_class(series.color),
                         series.draw == Draw::dashed ? " dashed" : "", line_path(layout, series));
-  }
   return text + (has_points(series.draw) ? points_of(plot, layout, series) : hover_points_of(plot, layout, series));
 }
 
@@ -430,7 +400,7 @@ std::vector<std::string> tick_labels(const std::vector<double>& ticks) {
 Series thinned(const Series& series, int columns) {
   if (series.x.empty() || series.x.size() <= 4 * static_cast<std::size_t>(columns)) return series;
   Series thin = series;
-  thin.x.clear(), thin.y.clear(), thin.sigma.clear();
+  thin.x.clear(), thin.y.clear();
   const double low = series.x.front(), span = series.x.back() - low;
   const auto column_of = [&](std::size_t i) {
     return span > 0 ? std::min(columns - 1, static_cast<int>((series.x[i] - low) / span * columns)) : 0;
@@ -445,10 +415,7 @@ Series thinned(const Series& series, int columns) {
     std::array<std::size_t, 4> kept{first, lowest, highest, last};
     std::sort(kept.begin(), kept.end());
     const auto end = std::unique(kept.begin(), kept.end());
-    for (auto i = kept.begin(); i != end; ++i) {
-      thin.x.push_back(series.x[*i]), thin.y.push_back(series.y[*i]);
-      if (!series.sigma.empty()) thin.sigma.push_back(series.sigma[*i]);
-    }
+    for (auto i = kept.begin(); i != end; ++i) thin.x.push_back(series.x[*i]), thin.y.push_back(series.y[*i]);
     first = last + 1;
   }
   return thin;
@@ -476,6 +443,15 @@ std::string escaped(const std::string& text) {
         if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') safe += c;  // others are not HTML
     }
   return safe;
+}
+
+Plot time_plot(std::string title, std::string label, std::string unit, std::vector<Series> series) {
+  return {std::move(title),
+          {"time", "s", {}, {}},
+          {std::move(label), std::move(unit), {}, {}},
+          std::move(series),
+          {},
+          false};
 }
 
 std::string svg_from(const Plot& plot) {
@@ -517,7 +493,7 @@ void limit_to_most(Plot& plot, double room) {
       if (const double distance = std::hypot(series.x[i], series.y[i]); std::isfinite(distance))
         distances.push_back(distance);
   const double limit = room * quantile_of(distances, 0.9);
-  if (!(limit > 0) || fraction_within(distances, limit) == 1) return;
+  if (!(limit > 0) || *std::max_element(distances.begin(), distances.end()) < limit) return;
   for (Axis* axis : {&plot.x, &plot.y}) axis->low = -limit, axis->high = limit;
 }
 
@@ -531,7 +507,7 @@ std::string plot_css() {
       ".plot .title{font-weight:600}.plot .middle{text-anchor:middle}.plot .end{text-anchor:end}\n"
       ".plot .grid{stroke:var(--grid);fill:none}.plot .frame{stroke:var(--grey);fill:none}\n"
       ".plot .line{fill:none;stroke-width:1.8;stroke-linejoin:round}.plot .dashed{stroke-dasharray:6 4}\n"
-      ".plot .box{fill-opacity:.25;stroke-width:1.4}.plot .band{opacity:.2}.plot "
+      ".plot .box{fill-opacity:.25;stroke-width:1.4}.plot "
       ".bar{stroke-width:1.4;opacity:.6}.plot .hover{fill:transparent}\n"
       ".plot .point{fill-opacity:.8}.plot .point:hover,.plot .hover:hover{stroke:var(--ink);stroke-width:1.5}\n";
   for (const char* name : {"c0", "c1", "c2", "c3", "c4", "grey"})

@@ -7,7 +7,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/experiments/svg_plot.h"
+#include "lapservo/report/svg_plot.h"
 
 namespace lapservo::internal {
 

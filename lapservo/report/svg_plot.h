@@ -15,7 +15,6 @@ enum class Draw { line, dashed, points, line_and_points, boxes };
 struct Series {
   std::string name;
   std::vector<double> x, y;
-  std::vector<double> sigma;  ///< empty, or one a point: a band about a line, a bar at a point
   Draw draw = Draw::line;
   int color = 0;  ///< 0 to 4, of the report's palette; -1 grey
 };
@@ -39,6 +38,9 @@ struct Plot {
   std::vector<ReferenceLine> references;
   bool image_plane = false;  ///< one scale for both axes, y down
 };
+
+/// Over time: the x axis is "time [s]".
+Plot time_plot(std::string title, std::string label, std::string unit, std::vector<Series> series);
 
 /// The plot as an <svg> element for an HTML page that has plot_css(). Made to be read at 340 px of width; every point
 /// tells its numbers when pointed at. Lines of many points are thinned to what can be seen.
