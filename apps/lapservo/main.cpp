@@ -59,7 +59,6 @@ int parse_and_run(int argc, char** argv) {
   lapservo::app::add_sim_robot(program, run);
   lapservo::app::add_marker(program, run);
   lapservo::app::add_estimate_rcm(program, run);
-  lapservo::app::add_reference(app, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {

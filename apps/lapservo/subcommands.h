@@ -16,8 +16,6 @@ void add_estimate_rcm(Command app, Run& run);
 void add_experiment(Command app, Run& run);
 void add_marker(Command app, Run& run);
 void add_record(Command app, Run& run);
-/// `app`: what reference pages are written of.
-void add_reference(CLI::App& app, Run& run);
 void add_render(Command app, Run& run);
 void add_servo(Command app, Run& run);
 void add_sim_robot(Command app, Run& run);
