@@ -19,7 +19,6 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
-#include "lapservo/rig/rig_updater.h"
 #include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
@@ -103,29 +102,22 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
                 response.sharpening, response.sharpening_px);
 }
 
-void write_results(const CameraOptions& options, const std::optional<RigText>& rig,
-                   const CameraCalibration& calibration) {
-  const std::string fields = rig ? measured_camera_yaml(*rig, calibration.camera, calibration.sigmas)
-                                 : measured_camera_yaml(calibration.camera, calibration.sigmas);
-  if (!options.camera_info.empty()) {
-    write_file(options.camera_info, fields);
-    std::printf("camera: %s\n", options.camera_info.c_str());
+void write_results(const CameraOptions& options, std::optional<Rig> rig, const Camera& camera) {
+  for (const std::string& place : {options.camera_info, rig ? std::string() : options.out}) {
+    if (place.empty()) continue;
+    write_file(place, camera_yaml(camera));
+    std::printf("camera: %s\n", place.c_str());
   }
-  if (!rig) {
-    if (options.out.empty()) return;
-    write_file(options.out, fields);
-    std::printf("camera: %s\n", options.out.c_str());
-    return;
-  }
-  write_file(options.rig_out(), updated_rig_yaml(*rig, calibration.camera, calibration.sigmas));
+  if (!rig) return;
+  rig->camera = camera;
+  write_file(options.rig_out(), rig_yaml(*rig));
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 
 int run_camera(const CameraOptions& options) {
   const Board board = board_of(options);
-  std::optional<RigText> text;
-  if (!options.rig.empty()) text = RigText::read(options.rig);
-  const std::optional<Rig> rig = text ? std::optional(text->rig()) : std::nullopt;
+  std::optional<Rig> rig;
+  if (!options.rig.empty()) rig = load_rig(options.rig);
   check_files(options, rig);
   watch_for_interrupts();
 
@@ -142,7 +134,7 @@ int run_camera(const CameraOptions& options) {
   for (const std::string& name : without_board) std::printf("left out, there is no board: %s\n", name.c_str());
   print_result(views, calibration);
   if (!more.empty()) std::printf("better still: %s\n", more.c_str());
-  write_results(options, text, calibration);
+  write_results(options, rig, measured_camera(calibration));
   if (rig && std::any_of(rig->instruments.begin(), rig->instruments.end(),
                          [](const Instrument& instrument) { return instrument.camera_from_rcm.has_value(); }))
     std::printf("camera_from_rcm is as it was: where it was measured with another camera, measure it again\n");

@@ -14,7 +14,7 @@
 #include "apps/lapservo/subcommands.h"
 #include "lapservo/calibration/colour_measurement.h"
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/rig/rig_updater.h"
+#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -55,8 +55,7 @@ void show(LiveView& view, const std::vector<cv::Mat>& kept, const Rig& before, c
 }
 
 int run_colour(const ColourOptions& options) {
-  const RigText text = RigText::read(options.rig);
-  const Rig rig = text.rig();
+  const Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
@@ -67,7 +66,7 @@ int run_colour(const ColourOptions& options) {
   watch_for_interrupts();
 
   const bool live = source->kind() == FrameSource::Kind::live;
-  const bool keep_response = !options.replace_response && is_response_measured(text);
+  const bool keep_response = !options.replace_response && rig.camera.response.sigma.has_value();
   const ColourMeasurement measured = measure_colour(rig, index, {*source, options.input, options.deinterlace},
                                                     keep_response, watched_job(), [&](const cv::Mat& bgr) {
                                                       if (view && live) view->show(segmentation_picture(bgr, rig));
@@ -78,8 +77,7 @@ int run_colour(const ColourOptions& options) {
   print(instrument, calibration, measured.frames.size());
   const Rig after = with_colour(rig, index, calibration);
   if (view) show(*view, measured.frames, rig, after, live);
-  out.stream() << updated_rig_yaml(
-      text, options.out, index, MeasuredColour{calibration.hues_deg, calibration.sigma_hues_deg, calibration.response});
+  out.stream() << rig_yaml(after, options.out);
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
   return 0;

@@ -14,7 +14,7 @@
 #include "lapservo/calibration/marker_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/io/frame_source.h"
-#include "lapservo/rig/rig_updater.h"
+#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -36,8 +36,7 @@ void print_table(const std::vector<CalibratedNumber>& numbers) {
 }
 
 int run_marker(const CalibrateOptions& options) {
-  const RigText text = RigText::read(options.rig);
-  const Rig rig = text.rig();
+  Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
@@ -66,7 +65,8 @@ int run_marker(const CalibrateOptions& options) {
         "the pictures look compressed, and the turn does not go both ways: if they come from a video, which leaves the "
         "seam a little behind, psi is some mrad off; turn the instrument there and back\n");
   if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
-  out.stream() << updated_rig_yaml(text, options.out, index, calibration.marker);
+  rig.instruments[index].marker = calibration.marker;
+  out.stream() << rig_yaml(rig, options.out);
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
   return 0;

@@ -18,7 +18,7 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/rig/rig_updater.h"
+#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -55,8 +55,7 @@ void print_residuals(const Registration& registration) {
 }
 
 int run_registration(const CalibrateOptions& options) {
-  const RigText text = RigText::read(options.rig);
-  const Rig rig = text.rig();
+  Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
@@ -78,7 +77,8 @@ int run_registration(const CalibrateOptions& options) {
   print_numbers(instrument, registration);
   print_residuals(registration);
   for (const std::string& what : registration.unknown) std::printf("%s\n", what.c_str());
-  out.stream() << updated_rig_yaml(text, options.out, index, measured(registration));
+  rig.instruments[index] = registered(rig.instruments[index], registration);
+  out.stream() << rig_yaml(rig, options.out);
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
   return 0;

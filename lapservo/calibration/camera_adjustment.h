@@ -8,7 +8,6 @@
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/rigid3.h"
-#include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::internal {
 

@@ -321,7 +321,6 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   if (!adjustment) return refuse("the views are too alike to tell the camera");
   calibration.camera = rounded_by_sigmas(adjustment->camera, adjustment->sigmas);
   calibration.sigmas = adjustment->sigmas;
-  if (calibration.response) calibration.sigmas.response = calibration.response->sigma;
   calibration.bright_wider_px = adjustment->bright_wider_px[green];
   calibration.poses = adjustment->camera_from_board;
   add_residuals(*adjustment, edges, calibration);

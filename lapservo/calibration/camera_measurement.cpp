@@ -11,6 +11,7 @@
 #include "lapservo/calibration/asked_while_fitting.h"
 #include "lapservo/calibration/frame_recording.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/rounded_sigma.h"
 
 namespace lapservo::internal {
 namespace {
@@ -117,6 +118,17 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
       board, measured.views, start, [&](const std::string& what) { watch.tell(std::nullopt, ++step, ", " + what); });
   measured.advice = advice(measured.views, *recordings.size());
   return measured;
+}
+
+Camera measured_camera(const CameraCalibration& calibration) {
+  Camera camera = calibration.camera;
+  camera.sigmas = calibration.sigmas;
+  CameraSigmas& sigmas = camera.sigmas;
+  for (double* sigma : {&sigmas.fx_px, &sigmas.fy_px, &sigmas.cx_px, &sigmas.cy_px, &sigmas.blue, &sigmas.red})
+    *sigma = rounded_sigma(*sigma);
+  for (double& sigma : sigmas.distortion) sigma = rounded_sigma(sigma);
+  if (calibration.response) camera.response.sigma = rounded_sigma(calibration.response->sigma);
+  return camera;
 }
 
 std::vector<CalibratedNumber> calibrated_numbers(const Camera& before, const CameraCalibration& calibration) {

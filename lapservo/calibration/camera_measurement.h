@@ -65,6 +65,9 @@ struct CameraMeasurement {
 CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
                                  const JobWatch& watch);
 
+/// The camera with its sigmas, as a rig holds it.
+Camera measured_camera(const CameraCalibration& calibration);
+
 /// Each number of the camera, in its units; `before` is that of the camera that was started with.
 std::vector<CalibratedNumber> calibrated_numbers(const Camera& before, const CameraCalibration& calibration);
 

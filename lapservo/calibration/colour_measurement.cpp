@@ -1,10 +1,12 @@
 #include "lapservo/calibration/colour_measurement.h"
 
+#include <cmath>
 #include <string>
 
 #include <fmt/format.h>
 
 #include "lapservo/calibration/asked_while_fitting.h"
+#include "lapservo/core/rounded_sigma.h"
 
 namespace lapservo::internal {
 
@@ -40,8 +42,13 @@ std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const Col
 }
 
 Rig with_colour(Rig rig, std::size_t instrument, const ColourCalibration& calibration) {
-  rig.instruments[instrument].marker.hues_deg = calibration.hues_deg;
-  if (calibration.response) rig.camera.response = *calibration.response;
+  Marker& marker = rig.instruments[instrument].marker;
+  marker.sigmas.hues_deg.emplace();
+  for (std::size_t i = 0; i < 3; ++i) {
+    marker.hues_deg[i] = std::round(100 * calibration.hues_deg[i]) / 100;
+    (*marker.sigmas.hues_deg)[i] = rounded_sigma(calibration.sigma_hues_deg[i]);
+  }
+  if (calibration.response) rig.camera.response = *calibration.response, rig.camera_file.clear();
   return rig;
 }
 

@@ -28,7 +28,8 @@ ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const F
 /// The hues, in degrees.
 std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const ColourCalibration& calibration);
 
-/// The rig with what was measured, for pictures of it.
+/// The rig with what was measured: hues to a hundredth of a degree. A response that is another can't go into a camera's
+/// own file, which other rigs may name: the camera stands in the rig then.
 Rig with_colour(Rig rig, std::size_t instrument, const ColourCalibration& calibration);
 
 }  // namespace lapservo::internal

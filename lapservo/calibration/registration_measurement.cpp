@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/calibration/pose_table.h"
+#include "lapservo/core/rounded_sigma.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
@@ -14,6 +15,13 @@ namespace {
 
 constexpr int enough_images = 3600;
 constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+template <std::size_t N, typename Numbers>
+std::array<double, N> rounded_sigmas(const Numbers& sigmas) {
+  std::array<double, N> rounded;
+  std::transform(sigmas.begin(), sigmas.end(), rounded.begin(), rounded_sigma);
+  return rounded;
+}
 
 }  // namespace
 
@@ -49,23 +57,18 @@ MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::strin
   return poses;
 }
 
-MeasuredRegistration measured(const Registration& registration) {
-  MeasuredRegistration result;
-  result.camera_from_rcm = registration.camera_from_rcm;
-  for (std::size_t i = 0; i < 3; ++i)
-    result.sigma_translation_m[i] = registration.sigma_translation_m[static_cast<Eigen::Index>(i)];
-  if (registration.sigma_quaternion) {
-    result.sigma_quaternion_xyzw.emplace();
-    for (std::size_t i = 0; i < 4; ++i)
-      (*result.sigma_quaternion_xyzw)[i] = (*registration.sigma_quaternion)[static_cast<Eigen::Index>(i)];
-  }
-  if (registration.arm) {
-    result.joints = registration.arm->joints;
-    result.sigma_offset = registration.arm->sigma_offset;
-    result.image_delay_s = registration.arm->image_delay_s;
-    result.sigma_image_delay_s = registration.arm->sigma_image_delay_s;
-  }
-  return result;
+Instrument registered(Instrument instrument, const Registration& registration) {
+  instrument.camera_from_rcm = registration.camera_from_rcm;
+  instrument.sigma_translation_m = rounded_sigmas<3>(registration.sigma_translation_m);
+  instrument.sigma_quaternion_xyzw.reset();
+  if (registration.sigma_quaternion)
+    instrument.sigma_quaternion_xyzw = rounded_sigmas<4>(*registration.sigma_quaternion);
+  if (!registration.arm) return instrument;
+  instrument.joints = registration.arm->joints;
+  instrument.joints->sigma_offset = rounded_sigmas<4>(registration.arm->sigma_offset);
+  instrument.image_delay_s = registration.arm->image_delay_s;
+  instrument.sigma_image_delay_s = rounded_sigma(registration.arm->sigma_image_delay_s);
+  return instrument;
 }
 
 std::vector<CalibratedNumber> registered_numbers(const Instrument& before, const Registration& registration) {

@@ -10,7 +10,7 @@
 #include "lapservo/calibration/frame_recording.h"
 #include "lapservo/calibration/registration.h"
 #include "lapservo/calibration/timed_pose.h"
-#include "lapservo/rig/rig_updater.h"
+#include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
 
@@ -28,8 +28,8 @@ MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const Fram
 /// Of a CSV of observations that were tracked without camera_from_rcm. Throws InputError as read_poses().
 MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::string& instrument);
 
-/// What goes into the rig.
-MeasuredRegistration measured(const Registration& registration);
+/// The instrument with what was measured; what was not stays.
+Instrument registered(Instrument instrument, const Registration& registration);
 
 /// What was measured, in mm, mrad and ms; `before` is NaN where the rig had nothing. `before` has the joints that the
 /// registration was made with.

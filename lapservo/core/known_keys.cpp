@@ -43,13 +43,12 @@ const std::string& nearest(std::string_view key, const std::vector<std::string>&
 }
 
 void expect_sigma(const YamlField& field) {
-  constexpr auto expected = "standard deviations: numbers from 0 up, as many as they belong to";
   if (field.is_scalar()) {
-    field.number_between(0, std::numeric_limits<double>::max(), expected);
+    field.number_between(0, std::numeric_limits<double>::max(), sigmas_expected);
   } else if (field.is_map()) {
-    for (const auto& [key, value] : field.entries(expected)) expect_sigma(value);
+    for (const auto& [key, value] : field.entries(sigmas_expected)) expect_sigma(value);
   } else {
-    for (const YamlField& item : field.list(expected)) expect_sigma(item);
+    for (const YamlField& item : field.list(sigmas_expected)) expect_sigma(item);
   }
 }
 

@@ -7,6 +7,8 @@
 
 namespace lapservo::internal {
 
+inline constexpr auto sigmas_expected = "standard deviations: numbers from 0 up, as many as they belong to";
+
 /// The keys that a map may have.
 struct KnownKeys {
   std::vector<std::string_view> words;

@@ -21,6 +21,14 @@ struct ChromaticAberration {
   bool operator==(const ChromaticAberration&) const = default;
 };
 
+/// One standard deviation of each number of a camera, in its units; 0 for what was not measured.
+struct CameraSigmas {
+  double fx_px = 0, fy_px = 0, cx_px = 0, cy_px = 0;
+  std::array<double, 5> distortion{};
+  double blue = 0, red = 0;  ///< of the lateral chromatic aberration
+  bool operator==(const CameraSigmas&) const = default;
+};
+
 /// Pinhole camera with plumb_bob distortion (k1 k2 p1 p2 k3), as in a ROS camera_info. Pixel centres lie at integer
 /// coordinates. Raw pixels are those of the image; ideal pixels are undistorted with the same camera matrix.
 struct Camera {
@@ -31,7 +39,9 @@ struct Camera {
   Response response;
   bool deinterlace = false;  ///< its frames are two fields, of two moments
   ChromaticAberration chromatic_aberration = {};
+  CameraSigmas sigmas = {};
 
+  bool operator==(const Camera&) const = default;
   bool distorted() const {
     int some = 0;  // asked for every sample: no branches
     for (const double k : distortion) some |= static_cast<int>(k != 0);

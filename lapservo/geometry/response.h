@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 namespace lapservo {
@@ -12,7 +13,11 @@ struct Response {
   double gamma = 1;  ///< for Kind::power: light = value^gamma; 1 is linear
   /// For Kind::table: light at value, straight lines between; both rise strictly from 0 to 1 and are equally long.
   std::vector<double> table_light{}, table_value{};
+  /// One standard deviation of values by it, and of each number of the tables; none where it was not measured.
+  std::optional<double> sigma{};
+  std::vector<double> sigma_light{}, sigma_value{};
 
+  bool operator==(const Response&) const = default;
   double light_from_value(double value) const;
   double value_from_light(double light) const;
   /// Light for each 8-bit value.

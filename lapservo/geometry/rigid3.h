@@ -9,6 +9,7 @@ struct Rigid3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
+  bool operator==(const Rigid3&) const = default;
   Eigen::Vector3d operator*(const Eigen::Vector3d& point) const { return rotation * point + translation; }
   Rigid3 operator*(const Rigid3& other) const { return {rotation * other.rotation, *this * other.translation}; }
   Rigid3 inverse() const {

@@ -14,7 +14,8 @@ namespace lapservo {
 struct MarkerSigmas {
   std::optional<double> diameter_m;
   std::optional<std::array<double, 3>> hues_deg, bands_upper_m, bands_lower_m;
-  std::optional<double> seam_rad, wrap_m, skew_m, gap_rad;
+  std::optional<double> seam_rad, wrap_m, skew_m, gap_rad, tolerance_m;
+  bool operator==(const MarkerSigmas&) const = default;
 };
 
 /// A printed three-colour marker, wrapped around a shaft (docs/conventions.md, "Marker"). The bands run from proximal
@@ -32,6 +33,7 @@ struct Marker {
   double gap_rad = 0;      ///< what the print leaves bare
   MarkerSigmas sigmas{};
 
+  bool operator==(const Marker&) const = default;
   double radius_m() const { return diameter_m / 2; }
   double covered_rad() const { return 2 * std::numbers::pi - gap_rad; }
   bool bands_are_measured() const { return sigmas.bands_upper_m && sigmas.bands_lower_m; }

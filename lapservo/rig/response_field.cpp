@@ -21,11 +21,22 @@ std::vector<double> rising_from_0_to_1(const YamlField& field) {
   return numbers;
 }
 
+std::vector<double> sigmas_like(const YamlField& field, std::size_t size) {
+  std::vector<double> sigmas;
+  for (const YamlField& item : field.list(sigmas_expected)) sigmas.push_back(item.number(sigmas_expected));
+  if (sigmas.size() != size) field.fail(field.value_text(), sigmas_expected);
+  return sigmas;
+}
+
 Response parse_table(const YamlField& field) {
   expect_keys(field, {{}, {"light", "value"}});
   Response response{Response::Kind::table, 1, rising_from_0_to_1(field["light"]), rising_from_0_to_1(field["value"])};
   if (response.table_light.size() != response.table_value.size())
     field["value"].fail(field["value"].value_text(), "as many numbers as light has");
+  if (const YamlField sigmas = field["sigma_light"]; sigmas.present())
+    response.sigma_light = sigmas_like(sigmas, response.table_light.size());
+  if (const YamlField sigmas = field["sigma_value"]; sigmas.present())
+    response.sigma_value = sigmas_like(sigmas, response.table_value.size());
   return response;
 }
 

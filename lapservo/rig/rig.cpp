@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -23,6 +24,17 @@ namespace fs = std::filesystem;
 
 constexpr auto file_kind = "rig file";
 constexpr double max_tolerance_m = 5e-3;
+
+// One standard deviation each, where the key is there; not below 0, by expect_keys().
+std::optional<double> sigma_in(const YamlField& map, const char* key) {
+  const YamlField field = map[key];
+  return field.present() ? std::optional(field.number(sigmas_expected)) : std::nullopt;
+}
+template <std::size_t N>
+std::optional<std::array<double, N>> sigmas_in(const YamlField& map, const char* key) {
+  const YamlField field = map[key];
+  return field.present() ? std::optional(field.numbers<N>(sigmas_expected)) : std::nullopt;
+}
 
 int parse_image_size(const YamlField& field) {
   constexpr auto expected = "a whole number of pixels, 16 to 16384";
@@ -48,7 +60,7 @@ void check_shape(const YamlField& field, int rows, int columns) {
 
 template <std::size_t N>
 std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns, std::string_view expected) {
-  expect_keys(field, {{"rows", "cols"}, {"data"}});
+  expect_keys(field, {{"rows", "cols", "data"}, {}});
   const auto numbers = field["data"].numbers<N>(expected);
   check_shape(field, rows, columns);
   return numbers;
@@ -58,7 +70,7 @@ std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns
 // rational_polynomial with k4 k5 k6 of 0.
 std::array<double, 5> parse_distortion(const YamlField& field) {
   constexpr auto expected = "k1 k2 p1 p2 k3, of which k3 or all may be left out, or k4 k5 k6 of 0 follow";
-  expect_keys(field, {{"rows", "cols"}, {"data"}});
+  expect_keys(field, {{"rows", "cols", "data"}, {}});
   const YamlField data = field["data"];
   const auto items = data.list(expected);
   if (items.size() != 0 && items.size() != 4 && items.size() != 5 && items.size() != 8)
@@ -107,7 +119,7 @@ void check_unused(const YamlField& field) {
 ChromaticAberration parse_chromatic_aberration(const YamlField& field) {
   ChromaticAberration aberration;
   if (!field.present()) return aberration;
-  expect_keys(field, {{}, {"blue", "red"}});
+  expect_keys(field, {{"blue", "red"}, {}});
   const auto read = [&](const char* channel, double& magnification) {
     if (const YamlField given = field[channel]; given.present())
       magnification = given.number_between(0.98, 1.02, "0.98 to 1.02, times green's image");
@@ -116,11 +128,25 @@ ChromaticAberration parse_chromatic_aberration(const YamlField& field) {
   return aberration;
 }
 
+CameraSigmas parse_camera_sigmas(const YamlField& camera) {
+  CameraSigmas sigmas;
+  if (const YamlField matrix = camera["sigma_camera_matrix"]; matrix.present()) {
+    const auto k = parse_matrix<9>(matrix, 3, 3, sigmas_expected);
+    sigmas.fx_px = k[0], sigmas.cx_px = k[2], sigmas.fy_px = k[4], sigmas.cy_px = k[5];
+  }
+  if (const YamlField distortion = camera["sigma_distortion_coefficients"]; distortion.present())
+    sigmas.distortion = parse_distortion(distortion);
+  if (const YamlField aberration = camera["sigma_lateral_chromatic_aberration"]; aberration.present()) {
+    expect_keys(aberration, {{"blue", "red"}, {}});
+    sigmas.blue = sigma_in(aberration, "blue").value_or(0), sigmas.red = sigma_in(aberration, "red").value_or(0);
+  }
+  return sigmas;
+}
+
 Camera parse_camera_fields(const YamlField& field) {
-  expect_keys(field, {{"header", "camera_name", "distortion_model", "camera_model", "rectification_matrix",
-                       "projection_matrix", "binning_x", "binning_y", "roi", "deinterlace"},
-                      {"image_width", "image_height", "camera_matrix", "distortion_coefficients", "response",
-                       "lateral_chromatic_aberration"}});
+  expect_keys(field, {{"image_width", "image_height", "header", "camera_name", "distortion_model", "camera_model",
+                       "rectification_matrix", "projection_matrix", "binning_x", "binning_y", "roi", "deinterlace"},
+                      {"camera_matrix", "distortion_coefficients", "response", "lateral_chromatic_aberration"}});
   Camera camera;
   camera.width_px = parse_image_size(field["image_width"]);
   camera.height_px = parse_image_size(field["image_height"]);
@@ -139,9 +165,12 @@ Camera parse_camera_fields(const YamlField& field) {
     check_invertible(camera, coefficients["data"]);
   }
   camera.response = parse_response(field["response"]);
+  // By 0 earlier versions said that it was not measured.
+  if (const auto sigma = sigma_in(field, "sigma_response"); sigma != 0) camera.response.sigma = sigma;
   camera.chromatic_aberration = parse_chromatic_aberration(field["lateral_chromatic_aberration"]);
   if (const YamlField deinterlace = field["deinterlace"]; deinterlace.present())
     camera.deinterlace = deinterlace.boolean();
+  camera.sigmas = parse_camera_sigmas(field);
   check_unused(field);
   return camera;
 }
@@ -152,18 +181,18 @@ Camera parse_camera(const YamlField& field, const fs::path& folder) {
   return parse_camera_fields(YamlField::parse(with_rig_keys(read_yaml(path), path.string()), path.string(), file_kind));
 }
 
-MarkerSigmas parse_sigmas(const YamlField& marker) {
-  constexpr auto expected = "standard deviations: numbers from 0 up, as many as they belong to";
-  const auto one = [&](const char* key) -> std::optional<double> {
-    const YamlField field = marker[key];
-    return field.present() ? std::optional(field.number(expected)) : std::nullopt;
-  };
-  const auto three = [&](const char* key) -> std::optional<std::array<double, 3>> {
-    const YamlField field = marker[key];
-    return field.present() ? std::optional(field.numbers<3>(expected)) : std::nullopt;
-  };
-  return {one("sigma_diameter_m"), three("sigma_hues_deg"), three("sigma_bands_upper_m"), three("sigma_bands_lower_m"),
-          one("sigma_seam_rad"),   one("sigma_wrap_m"),     one("sigma_skew_m"),          one("sigma_gap_rad")};
+MarkerSigmas parse_marker_sigmas(const YamlField& marker) {
+  MarkerSigmas sigmas;
+  sigmas.diameter_m = sigma_in(marker, "sigma_diameter_m");
+  sigmas.hues_deg = sigmas_in<3>(marker, "sigma_hues_deg");
+  sigmas.bands_upper_m = sigmas_in<3>(marker, "sigma_bands_upper_m");
+  sigmas.bands_lower_m = sigmas_in<3>(marker, "sigma_bands_lower_m");
+  sigmas.seam_rad = sigma_in(marker, "sigma_seam_rad");
+  sigmas.wrap_m = sigma_in(marker, "sigma_wrap_m");
+  sigmas.skew_m = sigma_in(marker, "sigma_skew_m");
+  sigmas.gap_rad = sigma_in(marker, "sigma_gap_rad");
+  sigmas.tolerance_m = sigma_in(marker, "sigma_tolerance_m");
+  return sigmas;
 }
 
 Marker parse_marker(const YamlField& field) {
@@ -182,7 +211,7 @@ Marker parse_marker(const YamlField& field) {
   if (const YamlField wrap = field["wrap_m"]; wrap.present()) marker.wrap_m = wrap.number("a length in metres");
   if (const YamlField skew = field["skew_m"]; skew.present()) marker.skew_m = skew.number("a length in metres");
   if (const YamlField gap = field["gap_rad"]; gap.present()) marker.gap_rad = gap.number("an angle in radians");
-  marker.sigmas = parse_sigmas(field);
+  marker.sigmas = parse_marker_sigmas(field);
   if (const auto problem = marker_problem(marker)) field.fail_within(*problem);
   if (const std::string problem = decoding_problem(marker); !problem.empty())
     field.fail("not decodable", "bands whose cross-ratio is monotonic over the rotation: " + problem);
@@ -224,6 +253,7 @@ Joints parse_joints(const YamlField& field) {
   for (const double sign : joints.sign)
     if (std::abs(sign) != 1) signs.fail(std::to_string(sign), "1 or -1");
   joints.offset = field["offset"].numbers<4>("four numbers, rad rad m rad", 100, "an offset within 100 rad or m");
+  joints.sigma_offset = sigmas_in<4>(field, "sigma_offset");
   return joints;
 }
 
@@ -234,11 +264,15 @@ Instrument parse_instrument(const YamlField& field) {
   if (!is_plain_name(instrument.name))
     field["name"].fail(instrument.name, "a name without commas and control characters");
   instrument.marker = parse_marker(field["marker"]);
-  if (const YamlField transform = field["camera_from_rcm"]; transform.present())
+  if (const YamlField transform = field["camera_from_rcm"]; transform.present()) {
     instrument.camera_from_rcm = parse_transform(transform);
+    instrument.sigma_translation_m = sigmas_in<3>(transform, "sigma_translation_m");
+    instrument.sigma_quaternion_xyzw = sigmas_in<4>(transform, "sigma_quaternion_xyzw");
+  }
   if (const YamlField joints = field["joints"]; joints.present()) instrument.joints = parse_joints(joints);
   if (const YamlField delay = field["image_delay_s"]; delay.present())
     instrument.image_delay_s = delay.number_between(-10, 10, "-10 to 10 (seconds)");
+  instrument.sigma_image_delay_s = sigma_in(field, "sigma_image_delay_s");
   return instrument;
 }
 

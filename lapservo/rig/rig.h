@@ -18,14 +18,21 @@ struct Joints {
   std::array<std::string, 4> names;
   std::array<double, 4> sign{1, 1, 1, 1};  ///< 1 or -1
   std::array<double, 4> offset{};
+  std::optional<std::array<double, 4>> sigma_offset{};
+  bool operator==(const Joints&) const = default;
 };
 
+/// `sigma_`: one standard deviation, where it was measured.
 struct Instrument {
   std::string name;
   Marker marker;
   std::optional<Rigid3> camera_from_rcm;
   std::optional<Joints> joints{};
   std::optional<double> image_delay_s{};  ///< a frame's stamp minus the joints' clock at its exposure
+  std::optional<std::array<double, 3>> sigma_translation_m{};  ///< of camera_from_rcm
+  std::optional<std::array<double, 4>> sigma_quaternion_xyzw{};
+  std::optional<double> sigma_image_delay_s{};
+  bool operator==(const Instrument&) const = default;
 };
 
 /// What stands before the camera and which camera it is (docs/conventions.md, "rig.yaml").
@@ -33,6 +40,7 @@ struct Rig {
   Camera camera;
   std::vector<Instrument> instruments;
   std::filesystem::path camera_file{};  ///< where the camera was read from, when it has a file of its own
+  bool operator==(const Rig&) const = default;
 };
 
 /// Reads and checks everything: after it, the camera can be inverted over its whole image and every marker decoded.

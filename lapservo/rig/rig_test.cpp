@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -156,7 +157,15 @@ TEST(Rig, TakesTheOtherKeysOfACameraInfoAndSigmas) {
   sigma_distortion_coefficients: {data: [0.01, 0.01, 0.01, 0.01, 0]}
   response)")),
             "");
-  EXPECT_EQ(error_of(with("      seam_rad: 0.25", "      seam_rad: 0.25\n      sigma_seam_rad: 0.01")), "");
+}
+
+TEST(Rig, TakesAResponsesSigmaOfZeroForNone) {
+  const auto sigma = [](const std::string& text) {
+    return parse_rig(with("  response", "  sigma_response: " + text + "\n  response"), "rig.yaml")
+        .camera.response.sigma;
+  };
+  EXPECT_EQ(sigma("0.003"), 0.003);
+  EXPECT_EQ(sigma("0"), std::nullopt);
 }
 
 TEST(Rig, NormalisesARoundedQuaternion) {
@@ -323,6 +332,11 @@ const Complaints misunderstandings{
      "camera.response.light[2]: is 0.4, expected 2 to 4096 numbers that rise from 0 to 1"},
     {with("gamma:2.2", "{light: [0, 0.5, 1], value: [0, 1]}"),
      "camera.response.value: is a list of 2, expected as many numbers as light has"},
+    {with("gamma:2.2", "{light: [0, 1], value: [0, 1], sigma_light: [0]}"),
+     "camera.response.sigma_light: is a list of 1, expected standard deviations: numbers from 0 up, as many as they "
+     "belong to"},
+    {with("0, 0, 1]}", "0, 0, 1], sigma_data: [0, 0, 0, 0, 0, 0, 0, 0, 0]}"),
+     unknown("camera.camera_matrix.sigma_data", "data")},
     {with("gamma:2.2", "{light: [0, 0.5], value: [0, 1]}"),
      "camera.response.light: is a list of 2, expected 2 to 4096 numbers that rise from 0 to 1"},
 };

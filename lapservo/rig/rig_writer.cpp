@@ -1,30 +1,46 @@
 #include "lapservo/rig/rig_writer.h"
 
 #include <array>
-#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-
-#include "lapservo/core/rounded_sigma.h"
+#include <yaml-cpp/yaml.h>
 
 namespace lapservo::internal {
 namespace {
+namespace fs = std::filesystem;
 
 // {} writes the shortest text that reads back as the same number.
-template <typename Numbers>
-std::string list_of(const Numbers& numbers) {
+template <typename Number>
+std::string text_of(const Number& number) {
+  return fmt::format("{}", number);
+}
+template <typename Item, std::size_t N>
+std::string text_of(const std::array<Item, N>& items) {
+  return fmt::format("[{}]", fmt::join(items, ", "));
+}
+std::string text_of(const std::vector<double>& numbers) {
   return fmt::format("[{}]", fmt::join(numbers, ", "));
+}
+std::string text_of(const ChromaticAberration& aberration) {
+  return fmt::format("{{blue: {}, red: {}}}", aberration.blue, aberration.red);
 }
 
 template <typename Numbers>
-std::string rounded_list_of(const Numbers& sigmas) {
-  std::string text;
-  for (const double sigma : sigmas) text += (text.empty() ? "" : ", ") + sigma_text(sigma);
-  return "[" + text + "]";
+std::string matrix_text(int rows, const Numbers& numbers) {
+  return fmt::format("{{rows: {}, cols: {}, data: {}}}", rows, numbers.size() / static_cast<std::size_t>(rows),
+                     text_of(numbers));
+}
+
+// Of Camera and of CameraSigmas.
+template <typename Pinhole>
+std::string pinhole_text(const Pinhole& k, double last) {
+  return matrix_text(3, std::array{k.fx_px, 0.0, k.cx_px, 0.0, k.fy_px, k.cy_px, 0.0, 0.0, last});
 }
 
 std::string quoted(const std::string& text) {
@@ -36,45 +52,42 @@ std::string quoted(const std::string& text) {
   return quoted + '"';
 }
 
-std::string joints_yaml(const Joints& joints) {
-  std::array<std::string, 4> names;
-  for (std::size_t i = 0; i < names.size(); ++i) names[i] = quoted(joints.names[i]);
-  return fmt::format("    joints:\n      names: {}\n      sign: {}\n      offset: {}\n", list_of(names),
-                     list_of(joints.sign), list_of(joints.offset));
-}
+// Keys and values of one map.
+class Lines {
+ public:
+  explicit Lines(int indent) : indent_(indent) {}
 
-std::string chromatic_aberration_yaml(const ChromaticAberration& aberration) {
-  if (aberration == ChromaticAberration{}) return "";
-  return fmt::format("  lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", aberration.blue, aberration.red);
-}
-
-std::string camera_yaml(const Camera& camera) {
-  const std::array matrix{camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0};
-  return fmt::format(
-      "camera:\n  image_width: {}\n  image_height: {}\n  distortion_model: plumb_bob\n"
-      "  camera_matrix: {{rows: 3, cols: 3, data: {}}}\n"
-      "  distortion_coefficients: {{rows: 1, cols: 5, data: {}}}\n  response: {}\n{}{}",
-      camera.width_px, camera.height_px, list_of(matrix), list_of(camera.distortion), response_yaml(camera.response),
-      chromatic_aberration_yaml(camera.chromatic_aberration), camera.deinterlace ? "  deinterlace: true\n" : "");
-}
-
-std::string instrument_yaml(const Instrument& instrument) {
-  std::string text =
-      fmt::format("  - name: {}\n    marker:\n{}", quoted(instrument.name), marker_yaml(instrument.marker, 6));
-  if (instrument.camera_from_rcm) {
-    const auto& [rotation, translation] = *instrument.camera_from_rcm;
-    text += fmt::format("    camera_from_rcm:\n      translation_m: {}\n      quaternion_xyzw: {}\n",
-                        list_of(std::array{translation.x(), translation.y(), translation.z()}),
-                        list_of(std::array{rotation.x(), rotation.y(), rotation.z(), rotation.w()}));
+  void add(std::string_view key, const std::string& value) {
+    text_ += fmt::format("{:{}}{}: {}\n", "", indent_, key, value);
   }
-  if (instrument.joints) text += joints_yaml(*instrument.joints);
-  if (instrument.image_delay_s) text += fmt::format("    image_delay_s: {}\n", *instrument.image_delay_s);
-  return text;
+  void add_map(std::string_view key, const std::string& lines) {
+    text_ += fmt::format("{:{}}{}:\n{}", "", indent_, key, lines);
+  }
+  template <typename Value>
+  void add_measured(std::string_view key, const Value& value, const std::optional<Value>& sigma) {
+    add(key, text_of(value));
+    if (sigma) add(fmt::format("sigma_{}", key), text_of(*sigma));
+  }
+  // Where it is not what a rig without it has.
+  void add_unless_zero(std::string_view key, double value, const std::optional<double>& sigma) {
+    if (value != 0 || sigma) add_measured(key, value, sigma);
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  int indent_;
+  std::string text_;
+};
+
+std::string table_text(const Response& response) {
+  std::string text =
+      fmt::format("{{light: {}, value: {}", text_of(response.table_light), text_of(response.table_value));
+  if (!response.sigma_light.empty()) text += ", sigma_light: " + text_of(response.sigma_light);
+  if (!response.sigma_value.empty()) text += ", sigma_value: " + text_of(response.sigma_value);
+  return text + "}";
 }
 
-}  // namespace
-
-std::string response_yaml(const Response& response) {
+std::string response_text(const Response& response) {
   switch (response.kind) {
     case Response::Kind::srgb:
       return "srgb";
@@ -83,64 +96,98 @@ std::string response_yaml(const Response& response) {
     case Response::Kind::power:
       return fmt::format("gamma:{}", response.gamma);
     case Response::Kind::table:
-      return fmt::format("{{light: {}, value: {}}}", list_of(response.table_light), list_of(response.table_value));
+      return table_text(response);
   }
   return "srgb";
 }
 
-std::string measured_camera_yaml(const Camera& camera, const CameraSigmas& sigmas) {
-  const std::array matrix{camera.fx_px, 0.0, camera.cx_px, 0.0, camera.fy_px, camera.cy_px, 0.0, 0.0, 1.0};
-  const std::array sigma{sigmas.fx_px, 0.0, sigmas.cx_px, 0.0, sigmas.fy_px, sigmas.cy_px, 0.0, 0.0, 0.0};
-  const auto matrix_of = [](int rows, int columns, const std::string& data) {
-    return fmt::format("{{rows: {}, cols: {}, data: {}}}\n", rows, columns, data);
-  };
-  std::string text = fmt::format("image_width: {}\nimage_height: {}\ndistortion_model: plumb_bob\n", camera.width_px,
-                                 camera.height_px);
-  text += "camera_matrix: " + matrix_of(3, 3, list_of(matrix)) +
-          "sigma_camera_matrix: " + matrix_of(3, 3, rounded_list_of(sigma));
-  text += "distortion_coefficients: " + matrix_of(1, 5, list_of(camera.distortion)) +
-          "sigma_distortion_coefficients: " + matrix_of(1, 5, rounded_list_of(sigmas.distortion));
-  text += fmt::format("response: {}\n", response_yaml(camera.response));
-  if (sigmas.response > 0) text += fmt::format("sigma_response: {}\n", sigma_text(sigmas.response));
-  const ChromaticAberration& aberration = camera.chromatic_aberration;
-  text += fmt::format("lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", aberration.blue, aberration.red);
-  text += fmt::format("sigma_lateral_chromatic_aberration: {{blue: {}, red: {}}}\n", sigma_text(sigmas.blue),
-                      sigma_text(sigmas.red));
-  if (camera.deinterlace) text += "deinterlace: true\n";
-  return text;
+std::string joints_yaml(const Joints& joints, int indent) {
+  Lines lines(indent);
+  std::array<std::string, 4> names;
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = quoted(joints.names[i]);
+  lines.add("names", text_of(names));
+  lines.add("sign", text_of(joints.sign));
+  lines.add_measured("offset", joints.offset, joints.sigma_offset);
+  return lines.text();
+}
+
+std::string transform_yaml(const Instrument& instrument, int indent) {
+  Lines lines(indent);
+  const Eigen::Vector3d& t = instrument.camera_from_rcm->translation;
+  const Eigen::Quaterniond& q = instrument.camera_from_rcm->rotation;
+  lines.add_measured("translation_m", std::array{t.x(), t.y(), t.z()}, instrument.sigma_translation_m);
+  lines.add_measured("quaternion_xyzw", std::array{q.x(), q.y(), q.z(), q.w()}, instrument.sigma_quaternion_xyzw);
+  return lines.text();
+}
+
+std::string instrument_yaml(const Instrument& instrument) {
+  Lines lines(4);
+  lines.add_map("marker", marker_yaml(instrument.marker, 6));
+  if (instrument.camera_from_rcm) lines.add_map("camera_from_rcm", transform_yaml(instrument, 6));
+  if (instrument.joints) lines.add_map("joints", joints_yaml(*instrument.joints, 6));
+  if (instrument.image_delay_s)
+    lines.add_measured("image_delay_s", *instrument.image_delay_s, instrument.sigma_image_delay_s);
+  return fmt::format("  - name: {}\n{}", quoted(instrument.name), lines.text());
+}
+
+std::string path_yaml(const fs::path& file, const fs::path& destination) {
+  std::error_code error;
+  const fs::path relative = fs::relative(file, fs::absolute(destination, error).parent_path(), error);
+  YAML::Emitter text;
+  text << (relative.empty() ? fs::absolute(file, error) : relative).string();
+  return text.c_str();
+}
+
+}  // namespace
+
+std::string camera_yaml(const Camera& camera, int indent) {
+  const CameraSigmas& sigmas = camera.sigmas;
+  Lines lines(indent);
+  lines.add("image_width", text_of(camera.width_px));
+  lines.add("image_height", text_of(camera.height_px));
+  lines.add("distortion_model", "plumb_bob");
+  lines.add("camera_matrix", pinhole_text(camera, 1));
+  if (sigmas.fx_px != 0 || sigmas.fy_px != 0 || sigmas.cx_px != 0 || sigmas.cy_px != 0)
+    lines.add("sigma_camera_matrix", pinhole_text(sigmas, 0));
+  lines.add("distortion_coefficients", matrix_text(1, camera.distortion));
+  if (sigmas.distortion != CameraSigmas{}.distortion)
+    lines.add("sigma_distortion_coefficients", matrix_text(1, sigmas.distortion));
+  lines.add("response", response_text(camera.response));
+  if (camera.response.sigma) lines.add("sigma_response", text_of(*camera.response.sigma));
+  const bool measured = sigmas.blue != 0 || sigmas.red != 0;
+  if (measured || camera.chromatic_aberration != ChromaticAberration{})
+    lines.add_measured("lateral_chromatic_aberration", camera.chromatic_aberration,
+                       measured ? std::optional(ChromaticAberration{sigmas.blue, sigmas.red}) : std::nullopt);
+  if (camera.deinterlace) lines.add("deinterlace", "true");
+  return lines.text();
 }
 
 std::string marker_yaml(const Marker& marker, int indent) {
-  std::string text;
-  const auto add = [&](std::string_view key, const std::string& value) {
-    text += fmt::format("{:{}}{}: {}\n", "", indent, key, value);
-  };
-  const auto add_number = [&](std::string_view key, double value, const std::optional<double>& sigma) {
-    add(key, fmt::format("{}", value));
-    if (sigma) add(fmt::format("sigma_{}", key), fmt::format("{}", *sigma));
-  };
-  const auto add_list = [&](std::string_view key, const std::array<double, 3>& values,
-                            const std::optional<std::array<double, 3>>& sigmas) {
-    add(key, list_of(values));
-    if (sigmas) add(fmt::format("sigma_{}", key), list_of(*sigmas));
-  };
   const MarkerSigmas& sigmas = marker.sigmas;
-  add_number("diameter_m", marker.diameter_m, sigmas.diameter_m);
-  add_list("hues_deg", marker.hues_deg, sigmas.hues_deg);
-  add_list("bands_upper_m", marker.bands_upper_m, sigmas.bands_upper_m);
-  add_list("bands_lower_m", marker.bands_lower_m, sigmas.bands_lower_m);
-  add_number("seam_rad", marker.seam_rad, sigmas.seam_rad);
-  if (marker.wrap_m != 0 || sigmas.wrap_m) add_number("wrap_m", marker.wrap_m, sigmas.wrap_m);
-  if (marker.skew_m != 0 || sigmas.skew_m) add_number("skew_m", marker.skew_m, sigmas.skew_m);
-  if (marker.gap_rad != 0 || sigmas.gap_rad) add_number("gap_rad", marker.gap_rad, sigmas.gap_rad);
-  if (marker.tolerance_m > 0) add("tolerance_m", fmt::format("{}", marker.tolerance_m));
-  return text;
+  Lines lines(indent);
+  lines.add_measured("diameter_m", marker.diameter_m, sigmas.diameter_m);
+  lines.add_measured("hues_deg", marker.hues_deg, sigmas.hues_deg);
+  lines.add_measured("bands_upper_m", marker.bands_upper_m, sigmas.bands_upper_m);
+  lines.add_measured("bands_lower_m", marker.bands_lower_m, sigmas.bands_lower_m);
+  lines.add_measured("seam_rad", marker.seam_rad, sigmas.seam_rad);
+  lines.add_unless_zero("wrap_m", marker.wrap_m, sigmas.wrap_m);
+  lines.add_unless_zero("skew_m", marker.skew_m, sigmas.skew_m);
+  lines.add_unless_zero("gap_rad", marker.gap_rad, sigmas.gap_rad);
+  lines.add_unless_zero("tolerance_m", marker.tolerance_m, sigmas.tolerance_m);
+  return lines.text();
 }
 
-std::string rig_yaml(const Rig& rig) {
-  std::string text = camera_yaml(rig.camera) + "instruments:\n";
-  for (const Instrument& instrument : rig.instruments) text += instrument_yaml(instrument);
-  return text;
+std::string rig_yaml(const Rig& rig, const fs::path& destination) {
+  const bool named = !rig.camera_file.empty() && !destination.empty();
+  Lines lines(0);
+  if (named)
+    lines.add("camera", path_yaml(rig.camera_file, destination));
+  else
+    lines.add_map("camera", camera_yaml(rig.camera, 2));
+  std::string instruments;
+  for (const Instrument& instrument : rig.instruments) instruments += instrument_yaml(instrument);
+  lines.add_map("instruments", instruments);
+  return lines.text();
 }
 
 }  // namespace lapservo::internal

@@ -1,5 +1,7 @@
 #include "lapservo/rig/rig_writer.h"
 
+#include <array>
+#include <filesystem>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -11,118 +13,157 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr auto markers = R"(instruments:
+constexpr auto every_key = R"(camera:
+  image_width: 640
+  image_height: 480
+  distortion_model: plumb_bob
+  camera_matrix: {rows: 3, cols: 3, data: [500.25, 0, 320, 0, 501, 240, 0, 0, 1]}
+  sigma_camera_matrix: {rows: 3, cols: 3, data: [0.1, 0, 0.2, 0, 0.3, 0.4, 0, 0, 0]}
+  distortion_coefficients: {rows: 1, cols: 5, data: [-0.1, 0.02, 0.001, -0.002, 1e-17]}
+  sigma_distortion_coefficients: {rows: 1, cols: 5, data: [0.01, 0.02, 0.03, 0.04, 0.05]}
+  response: {light: [0, 0.2, 1], value: [0, 0.5, 1], sigma_light: [0, 0.01, 0], sigma_value: [0, 0.02, 0]}
+  sigma_response: 0.003
+  lateral_chromatic_aberration: {blue: 0.9993, red: 1.0007}
+  sigma_lateral_chromatic_aberration: {blue: 1e-05, red: 2e-05}
+  deinterlace: true
+instruments:
   - name: "a \"b\" \\ # : é"
     marker:
-      diameter_m: 0.00841
+      diameter_m: 0.0084
+      sigma_diameter_m: 1e-05
       hues_deg: [90.1, 180.2, 270.3]
+      sigma_hues_deg: [0.5, 0.25, 1]
       bands_upper_m: [0.0035, 0.0036, 0.0169]
-      bands_lower_m: [0.0095, 0.0094, 0.0051]
+      sigma_bands_upper_m: [1e-06, 2e-06, 3e-06]
+      bands_lower_m: [0.0095, 0.0094, 0.0053]
+      sigma_bands_lower_m: [4e-06, 5e-06, 6e-06]
       seam_rad: 0.1
+      sigma_seam_rad: 0.001
+      wrap_m: 0.0003
+      sigma_wrap_m: 7e-06
+      skew_m: 0.0002
+      sigma_skew_m: 8e-06
+      gap_rad: 0.2
+      sigma_gap_rad: 0.002
+      tolerance_m: 0.0001
+      sigma_tolerance_m: 9e-06
+    camera_from_rcm:
+      translation_m: [-0.0778, 0.0672, 0.0592]
+      sigma_translation_m: [0.0001, 0.0002, 0.0003]
+      quaternion_xyzw: [0, 0, 0.6, 0.8]
+      sigma_quaternion_xyzw: [0.001, 0.002, 0.003, 0.004]
+    joints:
+      names: ["yaw", "a \"pitch\"", "insertion \\", "roll"]
+      sign: [1, -1, 1, -1]
+      offset: [0, 1.5, -0.0156, 2]
+      sigma_offset: [0, 0.01, 0.0001, 0.02]
+    image_delay_s: 0.08
+    sigma_image_delay_s: 0.001
 )";
-
-void expect_same_bits(const Rig& a, const Rig& b) {
-  EXPECT_EQ(a.camera.width_px, b.camera.width_px);
-  EXPECT_EQ(a.camera.height_px, b.camera.height_px);
-  for (const auto member : {&Camera::fx_px, &Camera::fy_px, &Camera::cx_px, &Camera::cy_px})
-    EXPECT_EQ(a.camera.*member, b.camera.*member);
-  EXPECT_EQ(a.camera.distortion, b.camera.distortion);
-  EXPECT_EQ(a.camera.deinterlace, b.camera.deinterlace);
-  EXPECT_EQ(a.camera.chromatic_aberration, b.camera.chromatic_aberration);
-  EXPECT_EQ(a.camera.response.kind, b.camera.response.kind);
-  EXPECT_EQ(a.camera.response.gamma, b.camera.response.gamma);
-  EXPECT_EQ(a.camera.response.table_light, b.camera.response.table_light);
-  EXPECT_EQ(a.camera.response.table_value, b.camera.response.table_value);
-  ASSERT_EQ(a.instruments.size(), b.instruments.size());
-  for (std::size_t i = 0; i < a.instruments.size(); ++i) {
-    const Instrument &left = a.instruments[i], &right = b.instruments[i];
-    EXPECT_EQ(left.name, right.name);
-    EXPECT_EQ(left.marker.diameter_m, right.marker.diameter_m);
-    EXPECT_EQ(left.marker.hues_deg, right.marker.hues_deg);
-    EXPECT_EQ(left.marker.bands_upper_m, right.marker.bands_upper_m);
-    EXPECT_EQ(left.marker.bands_lower_m, right.marker.bands_lower_m);
-    EXPECT_EQ(left.marker.seam_rad, right.marker.seam_rad);
-    EXPECT_EQ(left.marker.tolerance_m, right.marker.tolerance_m);
-    for (const auto member : {&Marker::wrap_m, &Marker::skew_m, &Marker::gap_rad})
-      EXPECT_EQ(left.marker.*member, right.marker.*member);
-    const MarkerSigmas &of_left = left.marker.sigmas, &of_right = right.marker.sigmas;
-    for (const auto member : {&MarkerSigmas::diameter_m, &MarkerSigmas::seam_rad, &MarkerSigmas::wrap_m,
-                              &MarkerSigmas::skew_m, &MarkerSigmas::gap_rad})
-      EXPECT_EQ(of_left.*member, of_right.*member);
-    for (const auto member : {&MarkerSigmas::hues_deg, &MarkerSigmas::bands_upper_m, &MarkerSigmas::bands_lower_m})
-      EXPECT_EQ(of_left.*member, of_right.*member);
-    EXPECT_EQ(left.image_delay_s, right.image_delay_s);
-    ASSERT_EQ(left.joints.has_value(), right.joints.has_value());
-    if (left.joints) {
-      EXPECT_EQ(left.joints->names, right.joints->names);
-      EXPECT_EQ(left.joints->sign, right.joints->sign);
-      EXPECT_EQ(left.joints->offset, right.joints->offset);
-    }
-    ASSERT_EQ(left.camera_from_rcm.has_value(), right.camera_from_rcm.has_value());
-    if (!left.camera_from_rcm) continue;
-    EXPECT_EQ(left.camera_from_rcm->translation, right.camera_from_rcm->translation);
-    EXPECT_EQ(left.camera_from_rcm->rotation.coeffs(), right.camera_from_rcm->rotation.coeffs());
-  }
-}
 
 Rig written_and_read(const Rig& rig) {
   return parse_rig(rig_yaml(rig), "rig.yaml");
 }
 
-TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
-  Random random(1);
-  for (int i = 0; i < 200; ++i) {
-    Rig rig = parse_rig(std::string("camera: {image_width: 1280, image_height: 720, "
-                                    "camera_matrix: {data: [1100, 0, 639.5, 0, 1090, 359.5, 0, 0, 1]}}\n") +
-                            markers,
-                        "rig.yaml");
-    if (i % 2 == 0) rig.camera.chromatic_aberration = {random.uniform(0.99, 1.01), random.uniform(0.99, 1.01)};
-    rig.camera.fx_px = random.uniform(500, 2000), rig.camera.cy_px = random.uniform(300, 400);
-    rig.camera.distortion = {random.uniform(-0.05, 0.05), 1e-17, 0, -0.0, random.uniform(-1e-9, 1e-9)};
-    if (i % 3 == 0) rig.camera.response = {Response::Kind::power, random.uniform(0.3, 4)};
-    if (i % 3 == 1) rig.camera.response = {Response::Kind::power, 1};
-    if (i % 7 == 2) rig.camera.response = {Response::Kind::rec709};
-    if (i % 7 == 3) {
-      const double bend = random.uniform(0.1, 0.9);
-      rig.camera.response = {Response::Kind::table, 1, {0, bend, 1}, {0, 1 - bend / 3, 1}};
-    }
-    rig.camera.deinterlace = i % 2 == 1;
-    Instrument& instrument = rig.instruments[0];
-    if (i % 5 == 0)
-      instrument.joints =
-          Joints{{"yaw", "a \"pitch\"", "insertion \\", "roll"}, {1, -1, 1, -1}, {0, 1.0 / 3, -0.0, random.normal()}};
-    if (i % 5 == 1) instrument.image_delay_s = random.uniform(0, 0.3);
-    instrument.marker.seam_rad = random.uniform(-3, 3);
-    instrument.marker.hues_deg[0] += random.uniform(-1, 1);
-    if (i % 4 == 1) instrument.marker.tolerance_m = random.uniform(0, 1e-3);
-    if (i % 4 == 2) {
-      instrument.marker.wrap_m = random.uniform(-2e-3, 2e-3), instrument.marker.gap_rad = random.uniform(0, 0.3);
-      instrument.marker.skew_m = random.uniform(-1e-3, 1e-3);
-      instrument.marker.bands_lower_m[2] += instrument.marker.skew_m;
-      MarkerSigmas& sigmas = instrument.marker.sigmas;
-      sigmas.bands_upper_m = sigmas.bands_lower_m = sigmas.hues_deg = {random.uniform(), 1.0 / 3, 1e-17};
-      sigmas.diameter_m = sigmas.seam_rad = sigmas.wrap_m = sigmas.skew_m = sigmas.gap_rad = random.uniform(0, 1e-3);
-    }
-    if (i % 4 == 3) instrument.marker.sigmas.wrap_m = 1e-5;
-    if (i % 2 == 0)
-      instrument.camera_from_rcm =
-          Rigid3{Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized(),
-                 {random.uniform(-1, 1), 1.0 / 3, -0.0}};
-    expect_same_bits(rig, written_and_read(rig));
+TEST(RigWriter, KeepsEveryKey) {
+  const Rig rig = parse_rig(every_key, "rig.yaml");
+  EXPECT_EQ(rig_yaml(rig), every_key);
+  EXPECT_EQ(written_and_read(rig), rig);
+}
+
+template <std::size_t N>
+std::array<double, N> random_sigmas(Random& random) {
+  std::array<double, N> sigmas;
+  for (double& sigma : sigmas) sigma = random.uniform(0, 1e-3);
+  return sigmas;
+}
+
+Response random_response(Random& random) {
+  const double bend = random.uniform(0.1, 0.9);
+  switch (static_cast<int>(random.uniform(0, 5))) {
+    case 0:
+      return {};
+    case 1:
+      return {Response::Kind::rec709};
+    case 2:
+      return {Response::Kind::power, 1};
+    case 3:
+      return {Response::Kind::power, random.uniform(0.3, 4)};
+    default:
+      return {Response::Kind::table, 1, {0, bend, 1}, {0, 1 - bend / 3, 1}};
   }
 }
 
-TEST(RigWriter, ARigWhoseCameraHasAFileStandsOnItsOwn) {
+void change_camera(Random& random, Camera& camera) {
+  const auto some = [&] { return random.uniform() < 0.5; };
+  camera.fx_px = random.uniform(500, 2000), camera.cy_px = random.uniform(200, 300);
+  camera.distortion = {random.uniform(-0.05, 0.05), 1e-17, 0, -0.0, random.uniform(-1e-9, 1e-9)};
+  camera.response = random_response(random);
+  if (some()) camera.response.sigma = random.uniform();
+  camera.deinterlace = some();
+  if (some()) camera.chromatic_aberration = {random.uniform(0.99, 1.01), random.uniform(0.99, 1.01)};
+  if (some()) camera.sigmas = {};
+}
+
+void change_marker(Random& random, Marker& marker) {
+  const auto some = [&] { return random.uniform() < 0.5; };
+  marker.seam_rad = random.uniform(-3, 3), marker.hues_deg[0] += random.uniform(-1, 1);
+  if (some()) marker.wrap_m = random.uniform(-2e-3, 2e-3);
+  if (some()) marker.gap_rad = random.uniform(0, 0.3);
+  if (some()) marker.tolerance_m = 0, marker.sigmas.tolerance_m.reset();
+  if (some()) marker.sigmas = {};
+  if (some()) marker.sigmas.bands_upper_m = random_sigmas<3>(random);
+  if (some()) marker.sigmas.wrap_m = random.uniform(0, 1e-3);
+}
+
+void change_registration(Random& random, Instrument& instrument) {
+  const auto some = [&] { return random.uniform() < 0.5; };
+  instrument.camera_from_rcm = {
+      Eigen::Quaterniond(random.normal(), random.normal(), random.normal(), random.normal()).normalized(),
+      {random.uniform(-1, 1), 1.0 / 3, -0.0}};
+  instrument.sigma_translation_m = random_sigmas<3>(random);
+  if (some()) instrument.sigma_quaternion_xyzw.reset();
+  if (some())
+    instrument.camera_from_rcm.reset(), instrument.sigma_translation_m.reset(),
+        instrument.sigma_quaternion_xyzw.reset();
+  instrument.joints->offset = {0, 1.0 / 3, -0.0, random.normal()};
+  if (some()) instrument.joints->sigma_offset.reset();
+  if (some()) instrument.joints.reset();
+  instrument.image_delay_s = random.uniform(0, 0.3);
+  if (some()) instrument.sigma_image_delay_s.reset();
+  if (some()) instrument.image_delay_s.reset(), instrument.sigma_image_delay_s.reset();
+}
+
+TEST(RigWriter, WhatItWritesReadsBackToTheLastBit) {
+  Random random(1);
+  for (int i = 0; i < 300; ++i) {
+    Rig rig = parse_rig(every_key, "rig.yaml");
+    change_camera(random, rig.camera);
+    change_marker(random, rig.instruments[0].marker);
+    change_registration(random, rig.instruments[0]);
+    ASSERT_EQ(written_and_read(rig), rig) << rig_yaml(rig);
+  }
+}
+
+TEST(RigWriter, NamesACamerasFileFromWhereverTheRigGoes) {
   const testing::TemporaryFolder folder;
-  testing::write_file(
-      folder / "cam.yaml",
-      "image_width: 640\nimage_height: 480\ncamera_matrix: {data: [500, 0, 320, 0, 501, 240, 0, 0, 1]}\n"
-      "distortion_coefficients: {data: [-0.1, 0.02, 0.001, -0.002, 0]}\nresponse: linear\n");
-  testing::write_file(folder / "rig.yaml", std::string("camera: cam.yaml\n") + markers);
-  const Rig rig = load_rig(folder / "rig.yaml");
-  EXPECT_EQ(rig.camera_file, folder / "cam.yaml");
-  expect_same_bits(rig, written_and_read(rig));
-  EXPECT_EQ(written_and_read(rig).camera_file, "");
+  std::filesystem::create_directories(folder / "home/cameras");
+  const std::string text = every_key;
+  const std::size_t instruments = text.find("instruments:");
+  const Camera camera = parse_rig(every_key, "rig.yaml").camera;
+  testing::write_file(folder / "home/cameras/a: b.yaml", camera_yaml(camera));
+  testing::write_file(folder / "home/rig.yaml", "camera: 'cameras/a: b.yaml'\n" + text.substr(instruments));
+  const Rig rig = load_rig(folder / "home/rig.yaml");
+  EXPECT_EQ(rig.camera, camera);
+  for (const char* place : {"home/rig.yaml", "home/new.yaml", "away.yaml", "home/cameras/new.yaml"}) {
+    const auto path = folder / place;
+    testing::write_file(path, rig_yaml(rig, path));
+    const Rig moved = load_rig(path);
+    EXPECT_TRUE(std::filesystem::equivalent(moved.camera_file, rig.camera_file)) << place;
+    EXPECT_EQ(moved.camera, camera) << place;
+    EXPECT_EQ(moved.instruments, rig.instruments) << place;
+  }
+  EXPECT_EQ(rig_yaml(rig), every_key) << "on its own";
 }
 
 }  // namespace

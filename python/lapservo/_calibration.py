@@ -39,14 +39,11 @@ class CalibratedNumber:
 class Calibration:
     """What every calibration has.
 
-    `rig` is the Rig with what was measured; `yaml` the same as the command line writes it: with sigmas, and with all
-    else that the rig's file says, where the rig was given as a path.
+    `rig` is the Rig with what was measured; `yaml` the same as the command line writes it.
     """
 
     rig: Any = field(repr=False)
     yaml: str = field(repr=False)
-    origin: str = field(repr=False)
-    camera_file: str = field(repr=False)
     numbers: list[CalibratedNumber] = field(repr=False)
     complaint: str = field(repr=False)
 
@@ -55,7 +52,7 @@ class Calibration:
 
         Raises InputError at that file's own path: there it would be lost.
         """
-        _core._write_calibrated(self.yaml, self.origin, self.camera_file, path)
+        _core._write_calibrated(self.rig, self.yaml, path)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,12 +16,10 @@
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/instrument_index.h"
-#include "lapservo/rig/rig_updater.h"
 #include "lapservo/rig/rig_writer.h"
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
 #include "python/src/python_frames.h"
-#include "python/src/python_rig.h"
 
 // What python/lapservo/_calibration.py makes its results of.
 namespace lapservo::python {
@@ -30,22 +28,18 @@ using namespace internal;
 namespace fs = std::filesystem;
 using namespace py::literals;
 
-// A rig that Python has, or that stands in a file: then what else is written there stays.
+// A rig that Python has, or that stands in a file.
 struct GivenRig {
-  RigText text;
   Rig rig;
+  fs::path path;
 
-  std::string name() const { return text.path.empty() ? "Rig" : text.path.string(); }
+  std::string name() const { return path.empty() ? "Rig" : path.string(); }
 };
 
 GivenRig rig_of(const py::object& given) {
-  if (py::isinstance<PythonRig>(given)) {
-    const PythonRig rig = given.cast<PythonRig>();
-    return {{rig.yaml(), {}}, rig};
-  }
+  if (py::isinstance<Rig>(given)) return {given.cast<Rig>(), {}};
   const auto path = given.cast<fs::path>();
-  const RigText text = RigText::read(path);
-  return {text, text.rig()};
+  return {load_rig(path), path};
 }
 
 std::size_t index_of(const GivenRig& given, const std::optional<std::string>& name) {
@@ -79,17 +73,18 @@ void expect_result(const std::string& refusal, const std::string& source) {
   if (!refusal.empty()) throw InputError(source, refusal);
 }
 
-// What every result has.
-py::dict result_of(const std::string& yaml, const GivenRig* given, const std::vector<CalibratedNumber>& numbers,
+// What every result has: without a rig, `camera` is what was measured.
+py::dict result_of(std::optional<GivenRig> measured, const Camera& camera, const std::vector<CalibratedNumber>& numbers,
                    const std::string& complaint) {
   py::list rows;
   for (const CalibratedNumber& n : numbers) rows.append(py::make_tuple(n.name, n.before, n.after, n.sigma));
+  py::dict result("yaml"_a = measured ? rig_yaml(measured->rig, measured->path) : camera_yaml(camera),
+                  "numbers"_a = rows, "complaint"_a = complaint, "rig"_a = py::none());
+  if (!measured) return result;
   // Absolute: who saves it may stand in another folder by then.
-  const auto absolute = [](const fs::path& path) { return path.empty() ? "" : fs::absolute(path).string(); };
-  py::dict result("yaml"_a = yaml, "origin"_a = given ? absolute(given->text.path) : "",
-                  "camera_file"_a = given ? absolute(given->rig.camera_file) : "", "numbers"_a = rows,
-                  "complaint"_a = complaint, "rig"_a = py::none());
-  if (given) result["rig"] = py::cast(PythonRig::parse(yaml, given->name(), given->text.path.parent_path()));
+  fs::path& camera_file = measured->rig.camera_file;
+  if (!camera_file.empty()) camera_file = fs::absolute(camera_file);
+  result["rig"] = py::cast(measured->rig);
   return result;
 }
 
@@ -124,15 +119,13 @@ py::dict calibrate_camera(const py::list& pictures, const std::string& corners, 
   }
   const CameraCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, name);
-  const std::string yaml = given ? updated_rig_yaml(given->text, calibration.camera, calibration.sigmas)
-                                 : measured_camera_yaml(calibration.camera, calibration.sigmas);
-  py::dict result = result_of(yaml, given ? &*given : nullptr, calibrated_numbers(before, calibration), complaint);
+  const Camera camera = measured_camera(calibration);
+  if (given) given->rig.camera = camera, given->rig.camera_file.clear();
+  py::dict result = result_of(given, camera, calibrated_numbers(before, calibration), complaint);
   py::list views;
   for (std::size_t i = 0; i < measured.views.size(); ++i)
     views.append(py::make_tuple(measured.views[i].name, measured.views[i].corners.size(), calibration.view_rms_px[i]));
-  const auto sigma_response = calibration.response ? std::optional(calibration.sigmas.response) : std::nullopt;
-  result["camera"] =
-      given ? py::object(result["rig"].attr("camera")) : py::cast(PythonCamera{calibration.camera, sigma_response});
+  result["camera"] = camera;
   result["rms_px"] = calibration.rms_px;
   result["views"] = views;
   result["without_board"] = without_board;
@@ -147,7 +140,7 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
   const GivenRig given = rig_of(rig);
   const std::size_t index = index_of(given, instrument);
   const GivenFrames source(frames, fps);
-  const bool keep_response = !replace_response && is_response_measured(given.text);
+  const bool keep_response = !replace_response && given.rig.camera.response.sigma.has_value();
   ColourMeasurement measured;
   {
     const py::gil_scoped_release others_run;
@@ -156,11 +149,9 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
   }
   const ColourCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, source.name);
-  const std::string yaml =
-      updated_rig_yaml(given.text, given.text.path, index,
-                       MeasuredColour{calibration.hues_deg, calibration.sigma_hues_deg, calibration.response});
   const Instrument& before = given.rig.instruments[index];
-  py::dict result = result_of(yaml, &given, calibrated_numbers(before.marker, calibration), measured.read.complaint);
+  py::dict result = result_of(GivenRig{with_colour(given.rig, index, calibration), given.path}, {},
+                              calibrated_numbers(before.marker, calibration), measured.read.complaint);
   result["instrument"] = before.name;
   result["hues_deg"] = calibration.hues_deg;
   result["sigma_hues_deg"] = calibration.sigma_hues_deg;
@@ -224,9 +215,10 @@ py::dict calibrate_marker(const py::object& frames, const py::object& rig, const
   }
   const MarkerCalibration& calibration = measured.calibration;
   expect_result(calibration.refusal, source.name);
-  py::dict result =
-      result_of(updated_rig_yaml(given.text, given.text.path, index, calibration.marker), &given,
-                calibrated_numbers(before.marker, calibration.marker, turn.has_value()), measured.read.complaint);
+  GivenRig after = given;
+  after.rig.instruments[index].marker = calibration.marker;
+  py::dict result = result_of(after, {}, calibrated_numbers(before.marker, calibration.marker, turn.has_value()),
+                              measured.read.complaint);
   result["instrument"] = before.name;
   result["looked_at"] = measured.read.looked_at;
   result["found"] = measured.found;
@@ -272,8 +264,9 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
         read ? register_arm(instrument, poses.all, read->recording, read->source) : register_rcm(instrument, poses.all);
   }
   expect_result(registration.refusal, name);
-  py::dict result = result_of(updated_rig_yaml(given.text, given.text.path, index, measured(registration)), &given,
-                              registered_numbers(instrument, registration), poses.read.complaint);
+  GivenRig after = given;
+  after.rig.instruments[index] = registered(given.rig.instruments[index], registration);
+  py::dict result = result_of(after, {}, registered_numbers(instrument, registration), poses.read.complaint);
   result["instrument"] = instrument.name;
   result["camera_from_rcm"] = matrix_of(registration.camera_from_rcm);
   result["sigma_translation_m"] = registration.sigma_translation_m;
@@ -297,13 +290,12 @@ void bind_calibration(py::module_& m) {
   m.def("_calibrate_colour", &calibrate_colour);
   m.def("_calibrate_marker", &calibrate_marker);
   m.def("_calibrate_registration", &calibrate_registration);
-  m.def("_write_calibrated",
-        [](const std::string& yaml, const fs::path& origin, const fs::path& camera_file, const fs::path& path) {
-          std::error_code error;
-          if (!camera_file.empty() && fs::equivalent(camera_file, path, error))
-            throw InputError(path.string(), "is the camera's own file, which the rig names, expected another path");
-          write_file(path, origin.empty() ? yaml : moved_rig_yaml({yaml, origin}, path));
-        });
+  m.def("_write_calibrated", [](const std::optional<Rig>& rig, const std::string& yaml, const fs::path& path) {
+    std::error_code error;
+    if (rig && !rig->camera_file.empty() && fs::equivalent(rig->camera_file, path, error))
+      throw InputError(path.string(), "is the camera's own file, which the rig names, expected another path");
+    write_file(path, rig ? rig_yaml(*rig, path) : yaml);
+  });
 }
 
 }  // namespace lapservo::python

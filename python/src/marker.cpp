@@ -50,6 +50,7 @@ py::dict sigmas_of(const Marker& marker) {
   add("diameter_m", s.diameter_m), add("hues_deg", s.hues_deg);
   add("bands_upper_m", s.bands_upper_m), add("bands_lower_m", s.bands_lower_m);
   add("seam_rad", s.seam_rad), add("wrap_m", s.wrap_m), add("skew_m", s.skew_m), add("gap_rad", s.gap_rad);
+  add("tolerance_m", s.tolerance_m);
   return sigmas;
 }
 

@@ -1,4 +1,3 @@
-#include <cmath>
 #include <memory>
 #include <string>
 #include <utility>
@@ -8,11 +7,9 @@
 
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
-#include "lapservo/rig/rig_updater.h"
 #include "lapservo/rig/rig_writer.h"
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
-#include "python/src/python_rig.h"
 
 namespace lapservo::python {
 namespace {
@@ -50,14 +47,12 @@ py::object response_to_python(const Response& response) {
   return py::make_tuple(response.table_light, response.table_value);
 }
 
-PythonCamera make_camera(int width_px, int height_px, const Eigen::Matrix3d& matrix,
-                         const std::array<double, 5>& distortion, const py::object& response,
-                         const std::pair<double, double>& chromatic_aberration, bool deinterlace,
-                         std::optional<double> sigma_response) {
-  PythonCamera camera;
+Camera make_camera(int width_px, int height_px, const Eigen::Matrix3d& matrix, const std::array<double, 5>& distortion,
+                   const py::object& response, const std::pair<double, double>& chromatic_aberration, bool deinterlace,
+                   std::optional<double> sigma_response) {
+  Camera camera;
   if (sigma_response && *sigma_response < 0)
     throw InputError("Camera", "sigma_response", fmt::format("{}", *sigma_response), "a standard deviation or None");
-  camera.sigma_response = sigma_response;
   camera.width_px = width_px;
   camera.height_px = height_px;
   if (matrix(0, 1) != 0 || matrix.row(1)(0) != 0 || matrix.row(2) != Eigen::RowVector3d(0, 0, 1))
@@ -66,20 +61,30 @@ PythonCamera make_camera(int width_px, int height_px, const Eigen::Matrix3d& mat
   camera.cx_px = matrix(0, 2), camera.cy_px = matrix(1, 2);
   camera.distortion = distortion;
   camera.response = response_of(response);
+  camera.response.sigma = sigma_response;
   camera.chromatic_aberration = {chromatic_aberration.first, chromatic_aberration.second};
   camera.deinterlace = deinterlace;
   return camera;
 }
 
-Eigen::Matrix3d matrix_of_camera(const PythonCamera& camera) {
+Eigen::Matrix3d matrix_of_camera(const Camera& camera) {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
   matrix(0, 0) = camera.fx_px, matrix(1, 1) = camera.fy_px;
   matrix(0, 2) = camera.cx_px, matrix(1, 2) = camera.cy_px;
   return matrix;
 }
 
+py::tuple sigmas_to_python(const CameraSigmas& s) {
+  return py::make_tuple(s.fx_px, s.fy_px, s.cx_px, s.cy_px, s.distortion, s.blue, s.red);
+}
+
+CameraSigmas sigmas_of(const py::tuple& state) {
+  const auto number = [&](std::size_t i) { return state[i].cast<double>(); };
+  return {number(0), number(1), number(2), number(3), state[4].cast<std::array<double, 5>>(), number(5), number(6)};
+}
+
 void bind_camera(py::module_& m) {
-  py::class_<PythonCamera>(m, "Camera", R"(A pinhole camera with plumb_bob distortion, as in a ROS camera_info.
+  py::class_<Camera>(m, "Camera", R"(A pinhole camera with plumb_bob distortion, as in a ROS camera_info.
 
 Pixel centres lie at integer coordinates. Raw pixels are those of the image; ideal pixels are undistorted with the same
 matrix.)")
@@ -94,37 +99,42 @@ matrix.)")
       .def_readonly("height_px", &Camera::height_px)
       .def_property_readonly("matrix", &matrix_of_camera, "float[3, 3], px")
       .def_readonly("distortion", &Camera::distortion, "k1 k2 p1 p2 k3")
-      .def_property_readonly("response", [](const PythonCamera& camera) { return response_to_python(camera.response); })
+      .def_property_readonly("response", [](const Camera& camera) { return response_to_python(camera.response); })
       .def_property_readonly("chromatic_aberration",
-                             [](const PythonCamera& camera) {
+                             [](const Camera& camera) {
                                return std::pair(camera.chromatic_aberration.blue, camera.chromatic_aberration.red);
                              })
       .def_readonly("deinterlace", &Camera::deinterlace)
-      .def_readonly(
-          "sigma_response", &PythonCamera::sigma_response,
+      .def_property_readonly(
+          "sigma_response", [](const Camera& camera) { return camera.response.sigma; },
           "one standard deviation of the response that was measured, of the full value; None where it was not")
       .def(
           "ideal_from_raw",
-          [](const PythonCamera& camera, const Eigen::Vector2d& raw_px) { return camera.ideal_from_raw(raw_px); },
+          [](const Camera& camera, const Eigen::Vector2d& raw_px) { return camera.ideal_from_raw(raw_px); },
           py::arg("raw_px"), "float[2]; None where the distortion can't be inverted.")
       .def(
           "raw_from_ideal",
-          [](const PythonCamera& camera, const Eigen::Vector2d& ideal_px) { return camera.raw_from_ideal(ideal_px); },
+          [](const Camera& camera, const Eigen::Vector2d& ideal_px) { return camera.raw_from_ideal(ideal_px); },
           py::arg("ideal_px"), "float[2] to float[2]")
       .def(py::pickle(
-          [](const PythonCamera& camera) {
+          [](const Camera& camera) {
             const auto& [blue, red] = camera.chromatic_aberration;
             return py::make_tuple(camera.width_px, camera.height_px, matrix_of_camera(camera), camera.distortion,
                                   response_to_python(camera.response), py::make_tuple(blue, red), camera.deinterlace,
-                                  camera.sigma_response);
+                                  camera.response.sigma, camera.response.sigma_light, camera.response.sigma_value,
+                                  sigmas_to_python(camera.sigmas));
           },
           [](const py::tuple& state) {
-            return make_camera(state[0].cast<int>(), state[1].cast<int>(), state[2].cast<Eigen::Matrix3d>(),
-                               state[3].cast<std::array<double, 5>>(), state[4],
-                               state[5].cast<std::pair<double, double>>(), state[6].cast<bool>(),
-                               state.size() > 7 ? state[7].cast<std::optional<double>>() : std::nullopt);
+            Camera camera = make_camera(state[0].cast<int>(), state[1].cast<int>(), state[2].cast<Eigen::Matrix3d>(),
+                                        state[3].cast<std::array<double, 5>>(), state[4],
+                                        state[5].cast<std::pair<double, double>>(), state[6].cast<bool>(),
+                                        state[7].cast<std::optional<double>>());
+            camera.response.sigma_light = state[8].cast<std::vector<double>>();
+            camera.response.sigma_value = state[9].cast<std::vector<double>>();
+            camera.sigmas = sigmas_of(state[10]);
+            return camera;
           }))
-      .def("__repr__", [](const PythonCamera& camera) {
+      .def("__repr__", [](const Camera& camera) {
         return "<lapservo.Camera " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) + ">";
       });
 }
@@ -157,11 +167,15 @@ q = sign * joints + offset, rad and m.)")
       .def_readonly("names", &Joints::names)
       .def_readonly("sign", &Joints::sign)
       .def_readonly("offset", &Joints::offset, "rad, rad, m, rad")
-      .def(py::pickle([](const Joints& joints) { return py::make_tuple(joints.names, joints.sign, joints.offset); },
-                      [](const py::tuple& state) {
-                        return Joints{state[0].cast<std::array<std::string, 4>>(),
-                                      state[1].cast<std::array<double, 4>>(), state[2].cast<std::array<double, 4>>()};
-                      }));
+      .def(py::pickle(
+          [](const Joints& joints) {
+            return py::make_tuple(joints.names, joints.sign, joints.offset, joints.sigma_offset);
+          },
+          [](const py::tuple& state) {
+            return Joints{state[0].cast<std::array<std::string, 4>>(), state[1].cast<std::array<double, 4>>(),
+                          state[2].cast<std::array<double, 4>>(),
+                          state[3].cast<std::optional<std::array<double, 4>>>()};
+          }));
   py::class_<Instrument>(m, "Instrument", "What wears a marker, and where it enters the body.")
       .def(py::init(&make_instrument), py::arg("name"), py::arg("marker"), py::kw_only(),
            py::arg("camera_from_rcm") = py::none(), py::arg("joints") = py::none(),
@@ -178,30 +192,13 @@ q = sign * joints + offset, rad and m.)")
       .def("__repr__", [](const Instrument& instrument) { return "<lapservo.Instrument '" + instrument.name + "'>"; });
 }
 
-}  // namespace
-
-std::string PythonRig::yaml() const {
-  std::string text = internal::rig_yaml(*this);
-  if (!sigma_response) return text;
-  const std::size_t end = text.find('\n', text.find("\n  response: ") + 1);
-  const std::string sigma = std::isnan(*sigma_response) ? ".nan" : fmt::format("{}", *sigma_response);
-  return text.insert(end, "\n  sigma_response: " + sigma);
-}
-
-namespace {
-
 // Who uses it may stand in another folder by then.
-PythonRig with_absolute_camera_file(PythonRig rig) {
+Rig with_absolute_camera_file(Rig rig) {
   if (!rig.camera_file.empty()) rig.camera_file = std::filesystem::absolute(rig.camera_file);
   return rig;
 }
 
 }  // namespace
-
-PythonRig PythonRig::parse(const std::string& yaml, const std::string& source, const std::filesystem::path& folder) {
-  return with_absolute_camera_file(
-      {parse_rig(yaml, source, folder), internal::sigma_of_response({yaml, folder / "rig.yaml"})});
-}
 
 void bind_rig(py::module_& m) {
   bind_camera(m);
@@ -211,49 +208,39 @@ void bind_rig(py::module_& m) {
 The bands run from proximal to distal; tau is the azimuth on the marker from its seam, right-handed about the axis
 towards the tip.)");
   bind_instrument(m);
-  // What the other files take, and what they pickle.
-  py::class_<Rig, std::shared_ptr<Rig>>(m, "_Rig").def(
-      py::pickle([](const Rig& rig) { return internal::rig_yaml(rig); },
-                 [](const std::string& yaml) { return parse_rig(yaml, "pickled rig"); }));
-  py::class_<PythonRig, Rig, std::shared_ptr<PythonRig>>(m, "Rig", R"(What stands before which camera.
+  py::class_<Rig, std::shared_ptr<Rig>>(m, "Rig", R"(What stands before which camera.
 
 `Rig.load("rig.yaml")`, `Rig.parse(text)`, or `Rig(camera, instruments)`. Everything is checked: errors are InputError
 with the field, its value and what was expected.)")
-      .def(py::init([](const PythonCamera& camera, const std::vector<Instrument>& instruments) {
+      .def(py::init([](const Camera& camera, const std::vector<Instrument>& instruments) {
              // What can't be said by a type is checked where files are checked.
-             return PythonRig::parse(PythonRig{{camera, instruments, {}}, camera.sigma_response}.yaml(), "Rig");
+             return parse_rig(internal::rig_yaml({camera, instruments}), "Rig");
            }),
            py::arg("camera"), py::arg("instruments"))
       .def_static(
-          "load",
-          [](const std::filesystem::path& path) {
-            const internal::RigText text = internal::RigText::read(path);
-            return with_absolute_camera_file({text.rig(), internal::sigma_of_response(text)});
-          },
+          "load", [](const std::filesystem::path& path) { return with_absolute_camera_file(load_rig(path)); },
           py::arg("path"), "Reads a rig's YAML file.")
       .def_static(
           "parse",
           [](const std::string& yaml, const std::filesystem::path& folder) {
-            return PythonRig::parse(yaml, "rig", folder);
+            return with_absolute_camera_file(parse_rig(yaml, "rig", folder));
           },
           py::arg("yaml"), py::arg("folder") = ".",
           "The same from text; `folder` is where a camera file is looked for.")
-      .def_property_readonly("camera",
-                             [](const PythonRig& rig) {
-                               return PythonCamera{rig.camera, rig.sigma_response};
-                             })
+      .def_readonly("camera", &Rig::camera)
       .def_readonly("instruments", &Rig::instruments)
       .def(
           "save",
-          [](const PythonRig& rig, const std::filesystem::path& path) { internal::write_file(path, rig.yaml()); },
-          py::arg("path"),
-          "Writes to_yaml(), whole or not at all. Of the sigmas that a file has, the response's and the markers' are "
-          "in "
-          "it.")
-      .def("to_yaml", &PythonRig::yaml, "Text that Rig.parse reads back to the last bit.")
-      .def(py::pickle([](const PythonRig& rig) { return py::make_tuple(rig.yaml(), rig.camera_file.string()); },
+          [](const Rig& rig, const std::filesystem::path& path) {
+            internal::write_file(path, internal::rig_yaml(rig));
+          },
+          py::arg("path"), "Writes to_yaml(), whole or not at all.")
+      .def(
+          "to_yaml", [](const Rig& rig) { return internal::rig_yaml(rig); },
+          "Text that Rig.parse reads back to the last bit, the camera and all sigmas included.")
+      .def(py::pickle([](const Rig& rig) { return py::make_tuple(internal::rig_yaml(rig), rig.camera_file.string()); },
                       [](const py::tuple& state) {
-                        PythonRig rig = PythonRig::parse(state[0].cast<std::string>(), "pickled rig");
+                        Rig rig = parse_rig(state[0].cast<std::string>(), "pickled rig");
                         rig.camera_file = state[1].cast<std::string>();
                         return rig;
                       }))

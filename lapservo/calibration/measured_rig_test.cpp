@@ -1,0 +1,72 @@
+// What a calibration measured goes into the rig, and all else stays.
+#include <array>
+#include <optional>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/calibration/camera_measurement.h"
+#include "lapservo/calibration/colour_measurement.h"
+#include "lapservo/calibration/registration_measurement.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+Rig measured_before() {
+  Rig rig = scenes::usual_rig(2);
+  rig.camera_file = "camera.yaml";
+  rig.camera.response.sigma = 0.01, rig.camera.deinterlace = true;
+  rig.instruments[1].image_delay_s = 0.1, rig.instruments[1].sigma_image_delay_s = 0.002;
+  rig.instruments[1].sigma_quaternion_xyzw = {1e-3, 1e-3, 1e-3, 1e-3};
+  return rig;
+}
+
+TEST(MeasuredRig, HoldsOtherColours) {
+  const Rig before = measured_before();
+  ColourCalibration calibration;
+  calibration.hues_deg = {181, 97.123456, 269.5}, calibration.sigma_hues_deg = {0.5, 0.512345, 1};
+  Rig expected = before;
+  expected.instruments[1].marker.hues_deg = {181, 97.12, 269.5};
+  expected.instruments[1].marker.sigmas.hues_deg = {0.5, 0.512, 1};
+  EXPECT_EQ(with_colour(before, 1, calibration), expected);
+  calibration.response = Response{Response::Kind::power, 1.8};
+  expected.camera.response = *calibration.response, expected.camera_file.clear();
+  EXPECT_EQ(with_colour(before, 1, calibration), expected);
+}
+
+TEST(MeasuredRig, HoldsAnotherRegistration) {
+  const Instrument before = measured_before().instruments[1];
+  Registration registration;
+  registration.camera_from_rcm = {Eigen::Quaterniond(0.3, 0.4, -0.5, 0.7).normalized(), {0.1, -1.0 / 3, 0.25}};
+  registration.sigma_translation_m = {1e-5, 2.0004e-5, 3e-5};
+  Instrument expected = before;
+  expected.camera_from_rcm = registration.camera_from_rcm;
+  expected.sigma_translation_m = {1e-5, 2e-5, 3e-5};
+  expected.sigma_quaternion_xyzw.reset();  // the old one's
+  EXPECT_EQ(registered(before, registration), expected);
+  registration.sigma_quaternion = Eigen::Vector4d(1e-4, 2e-4, 3e-4, 4e-4);
+  registration.arm = Registration::Arm{{{"yaw", "pitch", "insertion", "roll"}, {1, -1, 1, 1}, {0, 1.0 / 7, 0.02, -3}},
+                                       {0, 1e-3, 2e-3, 3e-3},
+                                       1.0 / 9,
+                                       0.00100004};
+  expected.sigma_quaternion_xyzw = {1e-4, 2e-4, 3e-4, 4e-4};
+  expected.joints = registration.arm->joints, expected.joints->sigma_offset = registration.arm->sigma_offset;
+  expected.image_delay_s = 1.0 / 9, expected.sigma_image_delay_s = 0.001;
+  EXPECT_EQ(registered(before, registration), expected);
+}
+
+TEST(MeasuredRig, HoldsAnotherCamera) {
+  CameraCalibration calibration;
+  calibration.camera = measured_before().camera;
+  calibration.camera.fx_px = 501.25;
+  calibration.sigmas.fx_px = 0.12504, calibration.sigmas.red = 1.00004e-5;
+  Camera expected = calibration.camera;
+  expected.sigmas.fx_px = 0.125, expected.sigmas.red = 1e-5;
+  EXPECT_EQ(measured_camera(calibration), expected) << "its response was not measured this time: it stays";
+  calibration.response = ResponseFit{};
+  calibration.response->sigma = 0.00300004, expected.response.sigma = 0.003;
+  EXPECT_EQ(measured_camera(calibration), expected);
+}
+
+}  // namespace
+}  // namespace lapservo::internal
