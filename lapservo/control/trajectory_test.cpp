@@ -10,6 +10,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
+#include "lapservo/testing/input_error.h"
 
 namespace lapservo::internal {
 namespace {
@@ -96,13 +97,8 @@ TEST(Trajectory, CsvIsASmoothCurveThroughItsRows) {
 }
 
 TEST(Trajectory, BadInputIsNamed) {
-  const auto message = [](const std::string& text) -> std::string {
-    try {
-      trajectory_from_csv_text(text, "path.csv");
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+  const auto message = [](const std::string& text) {
+    return testing::input_error([&] { trajectory_from_csv_text(text, "path.csv"); });
   };
   const std::string header = "time_s,s_rad,r_px,l_px,d_px\n";
   EXPECT_NE(message(header + "0,1,2,3,4\n0,1,2,3,4\n").find("time_s"), std::string::npos);
