@@ -32,6 +32,7 @@
 #include "lapservo/sim_robot/sim_robot.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/wait_for.h"
 #include "transports/named_transport.h"
 #ifdef LAPSERVO_WEB
 #include "web/test_http.h"
@@ -42,9 +43,10 @@
 
 namespace lapservo::internal {
 namespace {
+using testing::wait_for;
 
-constexpr double patience_s = 60, allowed_s = 0.1;  // for anything to happen; from a fault to the last set-point
-const JointLimits limits;                           // the controller's, which the command line was not told otherwise
+constexpr double allowed_s = 0.1;  // from a fault to the last set-point
+const JointLimits limits;          // the controller's, which the command line was not told otherwise
 const double rest_s = (limits.rate.cwiseQuotient(limits.acceleration)).maxCoeff();
 
 // Those that this build has.
@@ -65,11 +67,6 @@ double now_s() {
 
 void sleep(double duration_s) {
   std::this_thread::sleep_for(std::chrono::duration<double>(duration_s));
-}
-
-bool wait_for(const std::function<bool()>& condition) {
-  for (const double end_s = now_s() + patience_s; now_s() < end_s && !condition();) sleep(0.01);
-  return condition();
 }
 
 // The tool with these arguments, its output in a file; killed with the object.
@@ -187,6 +184,11 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
   }
   std::string said(const std::string& name) const {
     return testing::read_file(folder_ / name);
+  }
+  // By the loop, after its first so many letters.
+  void expect_soon_said(const std::string& words, std::size_t after = 0) const {
+    EXPECT_TRUE(wait_for([&] { return said("servo.txt").find(words, after) != std::string::npos; }))
+        << "no '" << words << "' in: " << said("servo.txt");
   }
 
   std::unique_ptr<Process> servo(double duration_s, const std::string& output = "servo.txt", bool motion = true,
@@ -378,8 +380,7 @@ TEST_P(FirstWireLoop, HoldsAtAFaultWithin100MillisecondsAndGoesOnWithoutAJump) {
     const std::size_t said_before = said("servo.txt").size();
     const double fault_s = now_s();
     fault.begin(room);
-    ASSERT_TRUE(wait_for([&] { return said("servo.txt").find(fault.said, said_before) != std::string::npos; }))
-        << said("servo.txt");
+    expect_soon_said(fault.said, said_before);
     sleep(1);
     if (fault.silent) {
       EXPECT_LE(spy.last_s(), fault_s + allowed_s);
@@ -459,7 +460,7 @@ TEST_P(WireLoop, GoesOnWithoutAJumpWhenTheArmsClockIsSet) {
     ASSERT_TRUE(wait_for([&] { return spy.count() > before + 500; })) << said("servo.txt");
     room.clock_off_s = off_s;
     const std::string counted = fmt::format("after a jump of the clock {}", ++jumps);
-    EXPECT_TRUE(wait_for([&] { return said("servo.txt").find(counted) != std::string::npos; })) << said("servo.txt");
+    expect_soon_said(counted);
   }
   const std::size_t before = spy.count();
   ASSERT_TRUE(wait_for([&] { return spy.count() > before + 500; })) << said("servo.txt");
@@ -500,7 +501,7 @@ TEST_P(FirstWireLoop, ThePageHoldsStartsAndEnds) {
   const int port = page_port();
   ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
   EXPECT_EQ(testing::http_status(testing::http_post(port, "/hold")), 202);
-  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("hold: held") != std::string::npos; })) << said("servo.txt");
+  expect_soon_said("hold: held");
   sleep(rest_s + 0.2);
   const double rested_s = now_s();
   sleep(0.5);
@@ -531,8 +532,7 @@ TEST_P(FirstWireLoop, ThePageStartsNothingWithoutEnableMotion) {
   Spy spy(*ears);
   const auto loop = servo(600, "servo.txt", false, {"--web", "0"});
   const int port = page_port();
-  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("would send ") != std::string::npos; }))
-      << said("servo.txt");
+  expect_soon_said("would send ");
   EXPECT_EQ(testing::http_status(testing::http_post(port, testing::start_path())), 403);
   sleep(0.3);
   EXPECT_EQ(spy.count(), 0u);
@@ -549,7 +549,7 @@ TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
   const auto loop = servo(600);
   ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
   command({now_s(), "stop"});
-  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("hold: held") != std::string::npos; })) << said("servo.txt");
+  expect_soon_said("hold: held");
   sleep(rest_s + 0.2);
   const double rested_s = now_s();
   sleep(0.5);
@@ -559,21 +559,17 @@ TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
   const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
   const Eigen::Vector4d there = paper_sinusoids().offset;
   wish({now_s(), names, {there[0], 1e6, 200, 100}});
-  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("refused: set_point") != std::string::npos; }))
-      << said("servo.txt");
+  expect_soon_said("refused: set_point");
   wish({now_s(), names, {there[0], there[1] / 2, there[2] / 2, there[3] / 2}});
-  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("a set-point came") != std::string::npos; }))
-      << said("servo.txt");
+  expect_soon_said("a set-point came");
   sleep(2);
   const Eigen::Vector4d here = {there[0], there[1] / 2, there[2] / 2, there[3] / 2};
   const std::vector<double> begin(here.data(), here.data() + 4), end{here[0], here[1] + 10, here[2], here[3]};
   plan({now_s(), names, {{0, begin}, {0.1, {here[0], 1e6, here[2], here[3]}}}});
-  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("refused: trajectory") != std::string::npos; }))
-      << said("servo.txt");
+  expect_soon_said("refused: trajectory");
   const double planned_s = now_s();
   plan({planned_s, names, {{0, begin}, {0.5, begin}, {1.5, end}}});
-  ASSERT_TRUE(wait_for([&] { return said("servo.txt").find("a trajectory came") != std::string::npos; }))
-      << said("servo.txt");
+  expect_soon_said("a trajectory came");
   sleep(4);
   EXPECT_TRUE(spy.moves_after(planned_s + 0.4));
   loop->signal(SIGINT);

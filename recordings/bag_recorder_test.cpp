@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/crtk/test_messages.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "recordings/open_bag.h"
@@ -65,27 +66,23 @@ TEST(CdrEncoder, RoundsStampsUpToTheNextSecond) {
 
 TEST(Ros2BagWriter, WritesWhatIsReadAgain) {
   const lapservo::testing::TemporaryFolder folder;
+  const CompressedImageMessage jpeg{begin_s, "jpeg", {7, 8}};
   {
     Ros2BagWriter writer(folder / "bag");
     for (int i = 0; i < 5; ++i) writer.write("/PSM1/measured_js", begin_s + i, joints_at(begin_s + i));
     writer.write("/image", begin_s + 1, image_at(begin_s + 0.5));
-    writer.write("/image/compressed", begin_s + 2, CompressedImageMessage{begin_s, "jpeg", {7, 8}});
+    writer.write("/image/compressed", begin_s + 2, jpeg);
     writer.finish();
   }
   const auto bag = open_bag((folder / "bag").string());
   ASSERT_EQ(bag->topics().size(), 3u);
   const auto joints = all(*bag, "/PSM1/measured_js");
   ASSERT_EQ(joints.size(), 5u);
-  EXPECT_EQ(std::get<JointMessage>(joints[4]).positions, joints_at(begin_s + 4).positions);
+  expect_same(std::get<JointMessage>(joints[4]), joints_at(begin_s + 4));
   const auto images = all(*bag, "/image");
   ASSERT_EQ(images.size(), 1u);
-  const auto& image = std::get<ImageMessage>(images[0]);
-  EXPECT_EQ(image.stamp_s, begin_s + 0.5);
-  EXPECT_EQ(image.encoding, "rgb8");
-  EXPECT_EQ(image.step, 6u);
-  EXPECT_EQ(image.data, image_at(0).data);
-  EXPECT_EQ(std::get<CompressedImageMessage>(all(*bag, "/image/compressed").at(0)).data,
-            (std::vector<std::uint8_t>{7, 8}));
+  expect_same(std::get<ImageMessage>(images[0]), image_at(begin_s + 0.5));
+  expect_same(std::get<CompressedImageMessage>(all(*bag, "/image/compressed").at(0)), jpeg);
   EXPECT_FALSE(std::filesystem::exists(folder / "bag/bag_0.db3-wal"));
 }
 

@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/crtk/test_messages.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "recordings/test_bags.h"
@@ -66,15 +67,10 @@ void expect_entries(const Bag& bag) {
                                       "/image/compressed sensor_msgs/CompressedImage 1", "/other std_msgs/String 1"}));
   const auto joints = all<JointMessage>(bag, "/PSM1/measured_js");
   ASSERT_EQ(joints.size(), 4u);
-  EXPECT_EQ(joints[3].stamp_s, begin_s + 0.75);
-  EXPECT_EQ(joints[3].names, (std::vector<std::string>{"yaw", "pitch"}));
-  EXPECT_EQ(joints[3].positions, (std::vector<double>{1.5, -1.5}));
+  for (int i = 0; i < 4; ++i) expect_same(joints[static_cast<std::size_t>(i)], joints_at(i));
   const auto images = all<ImageMessage>(bag, "/image");
   ASSERT_EQ(images.size(), 2u);
-  EXPECT_EQ(images[1].width, 2u);
-  EXPECT_EQ(images[1].step, 6u);
-  EXPECT_EQ(images[1].encoding, "rgb8");
-  EXPECT_EQ(images[1].data, (std::vector<std::uint8_t>{1, 2, 3, 4, 5, 1}));
+  expect_same(images[1], image_at(1));
   EXPECT_EQ(all<CompressedImageMessage>(bag, "/image/compressed").at(0).format, "png");
 }
 
@@ -169,12 +165,10 @@ TEST(CdrDecoder, ReadsBothByteOrdersAndNothingThatIsCutShort) {
     const auto bytes = testing::cdr_bytes(joints, big_endian);
     const auto read = decode_cdr<JointMessage>(bytes);
     ASSERT_TRUE(read);
-    EXPECT_EQ(read->stamp_s, joints.stamp_s);
-    EXPECT_EQ(read->names, joints.names);
-    EXPECT_EQ(read->positions, joints.positions);
+    expect_same(*read, joints);
     const auto image = decode_cdr<ImageMessage>(testing::cdr_bytes(image_at(3), big_endian));
     ASSERT_TRUE(image);
-    EXPECT_EQ(image->step, 6u);
+    expect_same(*image, image_at(3));
     for (std::size_t size = 0; size < bytes.size(); ++size)
       EXPECT_FALSE(decode_cdr<JointMessage>(std::span(bytes).first(size))) << size;
     auto longer = bytes;

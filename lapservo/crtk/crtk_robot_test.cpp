@@ -1,15 +1,16 @@
 #include "lapservo/crtk/crtk_robot.h"
 
-#include <chrono>
-#include <thread>
+#include <atomic>
 
 #include <gtest/gtest.h>
 
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/crtk/test_transport.h"
+#include "lapservo/testing/wait_for.h"
 
 namespace lapservo::internal {
 namespace {
+using testing::wait_for;
 
 // Time stands still but for what the test adds.
 class StandingClock : public Clock {
@@ -44,16 +45,6 @@ void send_a_path(TestTransport& transport, StandingClock& clock, CrtkRobot& robo
   robot.send(path);
   clock.now = 10.01;
   say_all(transport, 1000.01);
-}
-
-constexpr std::chrono::seconds patience(60);
-
-template <typename Condition>
-bool wait_for(const Condition& condition) {
-  const auto end = std::chrono::steady_clock::now() + patience;
-  while (!condition() && std::chrono::steady_clock::now() < end)
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  return condition();
 }
 
 TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {

@@ -1,8 +1,6 @@
 #include "lapservo/loop_topics/loop_topics.h"
 
-#include <chrono>
 #include <cmath>
-#include <thread>
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
@@ -10,6 +8,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/crtk/test_transport.h"
 #include "lapservo/testing/rigs.h"
+#include "lapservo/testing/wait_for.h"
 
 namespace lapservo::internal {
 namespace {
@@ -40,8 +39,8 @@ TEST(LoopTopics, TellsWhatWasSeenAndDecided) {
   {
     LoopTopics topics(transport, rig, "endoscope");
     topics.publish(tick_of(rig), "");
-    for (int i = 0; i < 6000 && transport.compressed_images("/lapservo/PSM1/overlay/compressed").empty(); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(
+        testing::wait_for([&] { return !transport.compressed_images("/lapservo/PSM1/overlay/compressed").empty(); }));
   }
   const auto observations = transport.observations("/lapservo/PSM1/observation");
   ASSERT_EQ(observations.size(), 1u);

@@ -12,21 +12,17 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/crtk/test_inbox.h"
+#include "lapservo/crtk/test_messages.h"
 #include "lapservo/testing/input_error.h"
+#include "lapservo/testing/wait_for.h"
 #include "transports/ros1/ros1_master.h"
 #include "transports/ros1/test_ros_master.h"
 
 namespace lapservo::internal {
 namespace ros1_transport_test {
+using testing::wait_for;
 
-constexpr double stamp_s = 1700000000.123456;
-
-bool wait_for(const std::function<bool()>& condition) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-  while (!condition() && std::chrono::steady_clock::now() < end)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  return condition();
-}
+constexpr double stamp_s = sample_stamp_s;
 
 TEST(Ros1Master, IsMissedInOneLineWithinTwoSeconds) {
   const TestPort closed, silent(true);
@@ -59,52 +55,8 @@ TEST_F(Ros1Wire, CarriesEveryKindOfMessageThereAndBack) {
   EXPECT_EQ(states.get([] {}).state, "DISABLED");  // said before anybody listened
   states.clear();
   const auto say_state = transport_->operating_state_publisher("in/state");
-  const OperatingStateMessage state = states.get([&] { say_state({stamp_s, "ENABLED", true, false}); });
-  EXPECT_NEAR(state.stamp_s, stamp_s, 1e-6);
-  EXPECT_EQ(state.state, "ENABLED");
-  EXPECT_TRUE(state.is_homed);
-  EXPECT_FALSE(state.is_busy);
-
-  TestInbox<JointMessage> joints;
-  const auto joint_subscription = transport_->subscribe_joints("/out/joints", joints.handler());
-  const auto say_joints = transport_->joint_publisher("/in/joints");
-  const JointMessage js = joints.get([&] { say_joints({stamp_s, {"yaw", "pitch"}, {0.25, -1.5}}); });
-  EXPECT_EQ(js.names, (std::vector<std::string>{"yaw", "pitch"}));
-  EXPECT_EQ(js.positions, (std::vector<double>{0.25, -1.5}));
-
-  TestInbox<StringMessage> strings;
-  const auto string_subscription = transport_->subscribe_strings("/out/text", strings.handler());
-  const auto say_string = transport_->string_publisher("/in/text");
-  EXPECT_EQ(strings.get([&] { say_string({stamp_s, "enable"}); }).text, "enable");
-
-  TestInbox<TrajectoryMessage> trajectories;
-  const auto trajectory_subscription = transport_->subscribe_trajectories("/out/trajectory", trajectories.handler());
-  const auto say_trajectory = transport_->trajectory_publisher("/in/trajectory");
-  const TrajectoryMessage trajectory = trajectories.get([&] {
-    say_trajectory({stamp_s, {"s_rad"}, {{0, {1}}, {2.25, {3, 4}}}});
-  });
-  ASSERT_EQ(trajectory.points.size(), 2u);
-  EXPECT_EQ(trajectory.points[1].time_s, 2.25);
-  EXPECT_EQ(trajectory.points[1].positions, (std::vector<double>{3, 4}));
-
-  TestInbox<ImageMessage> images;
-  const auto image_subscription = transport_->subscribe_images("/out/image", images.handler());
-  const auto say_image = transport_->image_publisher("/in/image");
-  ImageMessage picture{stamp_s, 640, 360, 1920, "bgr8", true, {}};
-  for (unsigned i = 0; i < 1920 * 360; ++i) picture.data.push_back(static_cast<std::uint8_t>(i * i));
-  const ImageMessage image = images.get([&] { say_image(picture); });
-  EXPECT_EQ(image.width, 640u);
-  EXPECT_EQ(image.height, 360u);
-  EXPECT_EQ(image.encoding, "bgr8");
-  EXPECT_TRUE(image.is_bigendian);
-  EXPECT_EQ(image.data, picture.data);
-
-  TestInbox<CompressedImageMessage> compressed;
-  const auto compressed_subscription = transport_->subscribe_compressed_images("/out/compressed", compressed.handler());
-  const auto say_compressed = transport_->compressed_image_publisher("/in/compressed");
-  const CompressedImageMessage jpeg = compressed.get([&] { say_compressed({stamp_s, "jpeg", {1, 2, 3}}); });
-  EXPECT_EQ(jpeg.format, "jpeg");
-  EXPECT_EQ(jpeg.data, (std::vector<std::uint8_t>{1, 2, 3}));
+  expect_same(states.get([&] { say_state(sample_state); }), sample_state);
+  expect_carries_each_kind(*transport_, "/in/", *transport_, "/out/");
 }
 
 TEST_F(Ros1Wire, HearsOthersOnItsOwnTopicButNotItself) {

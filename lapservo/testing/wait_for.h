@@ -1,0 +1,17 @@
+#pragma once
+
+#include <chrono>
+#include <thread>
+
+namespace lapservo::testing {
+
+/// Whether the condition holds within a minute, which is far more than what works takes on a busy computer.
+template <typename Condition>
+bool wait_for(const Condition& condition) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(1);
+  while (!condition() && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  return condition();
+}
+
+}  // namespace lapservo::testing
