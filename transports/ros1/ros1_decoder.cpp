@@ -93,8 +93,10 @@ void read_fields(Bytes& from, StringMessage& message) {
   message.text = from.text();
 }
 
+}  // namespace
+
 template <typename Message>
-std::optional<Message> decode(std::span<const std::uint8_t> bytes) {
+std::optional<Message> decode_ros1(std::span<const std::uint8_t> bytes) {
   Bytes from(bytes);
   Message message;
   message.stamp_s = from.stamp_s();
@@ -102,36 +104,11 @@ std::optional<Message> decode(std::span<const std::uint8_t> bytes) {
   return from.result(std::move(message));
 }
 
-}  // namespace
-
-template <>
-std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  return decode<JointMessage>(bytes);
-}
-
-template <>
-std::optional<TrajectoryMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  return decode<TrajectoryMessage>(bytes);
-}
-
-template <>
-std::optional<OperatingStateMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  return decode<OperatingStateMessage>(bytes);
-}
-
-template <>
-std::optional<StringMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  return decode<StringMessage>(bytes);
-}
-
-template <>
-std::optional<ImageMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  return decode<ImageMessage>(bytes);
-}
-
-template <>
-std::optional<CompressedImageMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
-  return decode<CompressedImageMessage>(bytes);
-}
+template std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t>);
+template std::optional<TrajectoryMessage> decode_ros1(std::span<const std::uint8_t>);
+template std::optional<OperatingStateMessage> decode_ros1(std::span<const std::uint8_t>);
+template std::optional<StringMessage> decode_ros1(std::span<const std::uint8_t>);
+template std::optional<ImageMessage> decode_ros1(std::span<const std::uint8_t>);
+template std::optional<CompressedImageMessage> decode_ros1(std::span<const std::uint8_t>);
 
 }  // namespace lapservo::internal

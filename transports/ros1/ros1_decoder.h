@@ -15,17 +15,4 @@ namespace lapservo::internal {
 template <typename Message>
 std::optional<Message> decode_ros1(std::span<const std::uint8_t> bytes);
 
-template <>
-std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t> bytes);
-template <>
-std::optional<TrajectoryMessage> decode_ros1(std::span<const std::uint8_t> bytes);
-template <>
-std::optional<OperatingStateMessage> decode_ros1(std::span<const std::uint8_t> bytes);
-template <>
-std::optional<StringMessage> decode_ros1(std::span<const std::uint8_t> bytes);
-template <>
-std::optional<ImageMessage> decode_ros1(std::span<const std::uint8_t> bytes);
-template <>
-std::optional<CompressedImageMessage> decode_ros1(std::span<const std::uint8_t> bytes);
-
 }  // namespace lapservo::internal

@@ -88,8 +88,10 @@ class CdrBytes {
   bool whole_ = false, swap_ = false;
 };
 
+}  // namespace
+
 template <typename Message>
-std::optional<Message> decode(std::span<const std::uint8_t> bytes) {
+std::optional<Message> decode_cdr(std::span<const std::uint8_t> bytes) {
   CdrBytes from(bytes);
   Message message;
   message.stamp_s = from.stamp_s();
@@ -98,21 +100,8 @@ std::optional<Message> decode(std::span<const std::uint8_t> bytes) {
   return message;
 }
 
-}  // namespace
-
-template <>
-std::optional<JointMessage> decode_cdr(std::span<const std::uint8_t> bytes) {
-  return decode<JointMessage>(bytes);
-}
-
-template <>
-std::optional<ImageMessage> decode_cdr(std::span<const std::uint8_t> bytes) {
-  return decode<ImageMessage>(bytes);
-}
-
-template <>
-std::optional<CompressedImageMessage> decode_cdr(std::span<const std::uint8_t> bytes) {
-  return decode<CompressedImageMessage>(bytes);
-}
+template std::optional<JointMessage> decode_cdr(std::span<const std::uint8_t>);
+template std::optional<ImageMessage> decode_cdr(std::span<const std::uint8_t>);
+template std::optional<CompressedImageMessage> decode_cdr(std::span<const std::uint8_t>);
 
 }  // namespace lapservo::internal

@@ -14,11 +14,4 @@ namespace lapservo::internal {
 template <typename Message>
 std::optional<Message> decode_cdr(std::span<const std::uint8_t> bytes);
 
-template <>
-std::optional<JointMessage> decode_cdr(std::span<const std::uint8_t> bytes);
-template <>
-std::optional<ImageMessage> decode_cdr(std::span<const std::uint8_t> bytes);
-template <>
-std::optional<CompressedImageMessage> decode_cdr(std::span<const std::uint8_t> bytes);
-
 }  // namespace lapservo::internal
