@@ -3,13 +3,13 @@
 #include <filesystem>
 #include <limits>
 #include <stdexcept>
-#include <unistd.h>
 
 #include <gtest/gtest.h>
 
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
 #include "lapservo/experiments/time_series.h"
+#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
 namespace {
@@ -17,14 +17,8 @@ namespace fs = std::filesystem;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-class InFolder : public ::testing::Test {
- protected:
-  void SetUp() override { fs::create_directories(folder); }
-  void TearDown() override { fs::remove_all(folder); }
-  const fs::path folder = fs::temp_directory_path() / ("lapservo_data_" + std::to_string(::getpid()));
-};
-
-TEST_F(InFolder, DataComesBack) {
+TEST(DataFile, ComesBack) {
+  const testing::TemporaryFolder folder;
   DataFile file(folder / "a.csv", {"word", "number", "maybe"});
   file.row({"one", -1.25e-7, std::optional<double>()});
   file.row({std::string("two"), nan, 3});
@@ -39,14 +33,16 @@ TEST_F(InFolder, DataComesBack) {
   EXPECT_EQ(table.number(1, "maybe"), 3);
 }
 
-TEST_F(InFolder, ARowHasAsManyFieldsAsTheHeader) {
+TEST(DataFile, ARowHasAsManyFieldsAsTheHeader) {
+  const testing::TemporaryFolder folder;
   DataFile file(folder / "b.csv", {"one", "two"});
   EXPECT_THROW(file.row({1}), std::logic_error);
   EXPECT_THROW(file.row({1, 2, 3}), std::logic_error);
-  EXPECT_THROW(DataFile(folder / "missing" / "b.csv", {"one"}), InputError);
+  EXPECT_THROW(DataFile(folder / "missing/b.csv", {"one"}), InputError);
 }
 
-TEST_F(InFolder, ARunComesBackAndIsPlotted) {
+TEST(DataFile, ARunComesBackAndIsPlotted) {
+  const testing::TemporaryFolder folder;
   const TimeTable run{{0, 0.5, 1}, {{"s_rad", {0.1, nan, 0.3}}, {"l_px", {300, 301, 302}}}};
   write_data(run, folder / "run.csv");
   const CsvTable table = CsvTable::read(folder / "run.csv");

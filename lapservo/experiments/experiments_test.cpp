@@ -1,8 +1,4 @@
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <unistd.h>
 
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
@@ -18,11 +14,12 @@
 #include "lapservo/experiments/tracking.h"
 #include "lapservo/kinematics/visibility.h"
 #include "lapservo/rig/single_instrument.h"
+#include "lapservo/testing/input_error.h"
 #include "lapservo/testing/rigs.h"
+#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
 namespace {
-namespace fs = std::filesystem;
 
 constexpr std::uint64_t seed = 73;
 
@@ -67,12 +64,9 @@ TEST(SingleInstrument, NeedsARegistration) {
   rig.instruments.push_back(rig.instruments[0]);
   EXPECT_EQ(single_instrument(rig, "a.yaml").instruments.size(), 1U);
   rig.instruments[0].camera_from_rcm.reset();
-  try {
-    single_instrument(rig, "a.yaml");
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("a.yaml: instruments[0].camera_from_rcm"), std::string::npos);
-  }
+  EXPECT_TRUE(testing::input_error([&] {
+                single_instrument(rig, "a.yaml");
+              }).starts_with("a.yaml: instruments[0].camera_from_rcm"));
 }
 
 TEST(Rotation, TrialsStartWhereThePapersDo) {
@@ -207,20 +201,15 @@ TEST(Illumination, EndToEnd) {
   EXPECT_EQ(result.methods[0].points.size(), 320U);
   EXPECT_LT(result.methods[0].to_centroid.mean, 0.15);
 
-  const fs::path folder = fs::temp_directory_path() / ("lapservo_experiment_" + std::to_string(::getpid()));
-  fs::create_directories(folder);
+  const testing::TemporaryFolder folder;
   const auto text = [&](const IlluminationResult& of) {
-    write_data(of, folder);
-    std::ifstream file(folder / "illumination.csv");
-    std::stringstream all;
-    all << file.rdbuf();
-    return all.str();
+    write_data(of, folder.path());
+    return testing::read_file(folder / "illumination.csv");
   };
   const std::string first = text(result);
   EXPECT_EQ(CsvTable::parse(first, "illumination.csv").rows(), 320U);
   EXPECT_EQ(result.methods[0].largest.size(), 80U);
   EXPECT_EQ(text(measure_illumination(setup)), first);
-  fs::remove_all(folder);
 
   const ReportSection section = section_of(result, setup);
   EXPECT_EQ(section.comparisons[0].centerline, "") << "was not asked for";

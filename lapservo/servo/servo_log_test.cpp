@@ -1,9 +1,7 @@
 #include "lapservo/servo/servo_log.h"
 
 #include <cmath>
-#include <fstream>
 #include <limits>
-#include <sstream>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -95,13 +93,6 @@ void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   EXPECT_EQ(a.image->q, b.image->q);
 }
 
-std::string text_of(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  std::stringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
-
 TEST(ServoLog, ReadsBackToTheLastBit) {
   const testing::TemporaryFolder folder;
   Random random(seed);
@@ -143,11 +134,11 @@ TEST(ServoLog, NamesWhatIsWrong) {
   const Record record = any_record(random, 1);
   log.add(record.input, record.decision, record.truth);
   log.commit();
-  const std::string good = text_of(folder / "log.csv");
+  const std::string good = testing::read_file(folder / "log.csv");
   const auto complaint = [&](const std::string& from, const std::string& to) {
     std::string bad = good;
     bad.replace(bad.find(from), from.size(), to);
-    std::ofstream(folder / "bad.csv") << bad;
+    testing::write_file(folder / "bad.csv", bad);
     return testing::input_error([&] { read_servo_log(folder / "bad.csv"); });
   };
   EXPECT_NE(complaint("ENABLED", "SLEEPY").find("arm_state"), std::string::npos);
