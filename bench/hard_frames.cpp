@@ -98,9 +98,8 @@ std::vector<ShaftPlacement> crossing_placements(const Rig& rig, int index) {
 
 // The camera's picture the other way round.
 cv::Mat mirrored(const cv::Mat& picture) {
-  cv::Mat out(picture.size(), picture.type());
-  for (int v = 0; v < picture.rows; ++v)
-    for (int u = 0; u < picture.cols; ++u) out.at<cv::Vec3b>(v, picture.cols - 1 - u) = picture.at<cv::Vec3b>(v, u);
+  cv::Mat out;
+  cv::flip(picture, out, 1);
   return out;
 }
 

@@ -101,10 +101,8 @@ TEST(SurfaceTracker, ATurnedCameraSeesTheSame) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot shot(seed, {}, rig);
     const cv::Mat& image = shot.bgr;
-    cv::Mat image_turned(image.size(), image.type());
-    for (int v = 0; v < image.rows; ++v)
-      for (int u = 0; u < image.cols; ++u)
-        image_turned.at<cv::Vec3b>(image.rows - 1 - v, image.cols - 1 - u) = image.at<cv::Vec3b>(v, u);
+    cv::Mat image_turned;
+    cv::flip(image, image_turned, -1);
     const Observation a = Tracker(rig).track(image)[0], b = Tracker(turned).track(image_turned)[0];
     expect_right(a, shot.q);
     expect_right(b, shot.q);
@@ -233,9 +231,8 @@ TEST(SurfaceTracker, AMirroredPictureOrAnotherInstrumentIsNotOurs) {
       other.instruments[0].marker.hues_deg = hues_deg;
       EXPECT_NE(Tracker(other).track(image)[0].status, Status::ok) << hues_deg[0];
     }
-    cv::Mat mirrored(image.size(), image.type());
-    for (int v = 0; v < image.rows; ++v)
-      for (int u = 0; u < image.cols; ++u) mirrored.at<cv::Vec3b>(v, image.cols - 1 - u) = image.at<cv::Vec3b>(v, u);
+    cv::Mat mirrored;
+    cv::flip(image, mirrored, 1);
     EXPECT_NE(Tracker(rig).track(mirrored)[0].status, Status::ok);
   }
 }
