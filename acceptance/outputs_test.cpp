@@ -30,6 +30,7 @@ class Outputs : public acceptance::ToolTest {
  protected:
   void SetUp() override {
     ToolTest::SetUp();
+    ::setenv("ASAN_OPTIONS", "detect_leaks=0", 1);
     fs::create_directory("out");
   }
   void render(const std::string& more = "") { expect_done("render --rig " + rig_ + " --out frames --count 2" + more); }

@@ -19,8 +19,6 @@ namespace lapservo::acceptance {
 class ToolTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    // OpenCV's video backends, loaded for a try and unloaded again, keep what they allocated.
-    ::setenv("ASAN_OPTIONS", "detect_leaks=0", 1);
     std::filesystem::current_path(folder_.path());
     std::filesystem::create_symlink(testing::source_folder() / "configs", "configs");
   }
