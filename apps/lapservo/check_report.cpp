@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,47 +16,54 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-Series points(const std::string& name, int color) {
-  return {name, {}, {}, Draw::points, color};
-}
-
 Plot over_time(const std::string& title, const std::string& label, const std::string& unit) {
   Plot plot = time_plot(title, label, unit, {});
   plot.y.low = 0;
   return plot;
 }
 
+using Point = std::optional<std::pair<double, double>>;
+
+// A point for each item that has one.
+template <typename Items, typename PointOf>
+void add_points(Plot& plot, const std::string& name, int color, const Items& items, PointOf point_of) {
+  Series series{name, {}, {}, Draw::points, color};
+  for (const auto& item : items)
+    if (const Point point = point_of(item)) series.x.push_back(point->first), series.y.push_back(point->second);
+  if (!series.x.empty()) plot.series.push_back(std::move(series));
+}
+
 Plot arm_plot(const ArmCheck& arm, const std::string& title, const std::string& unit, double factor,
               double ArmResidual::*what) {
   Plot plot = over_time(title, "off by", unit);
-  const auto add = [&](const std::vector<ArmResidual>& residuals, const std::string& name, int color) {
-    Series series = points(name, color);
-    for (const ArmResidual& r : residuals) series.x.push_back(r.time_s), series.y.push_back(factor * (r.*what));
-    if (!series.x.empty()) plot.series.push_back(std::move(series));
-  };
-  add(arm.by_rig, "as the rig has it", 1), add(arm.at_best, "after a calibration", 0);
+  const auto point = [&](const ArmResidual& r) { return Point({r.time_s, factor * (r.*what)}); };
+  add_points(plot, "as the rig has it", 1, arm.by_rig, point);
+  add_points(plot, "after a calibration", 0, arm.at_best, point);
   return plot;
 }
 
 Plot encoder_plot(const ArmCheck& arm) {
-  Plot plot = over_time("Rotation against encoder", "psi beyond the encoder", "mrad");
-  plot.y.low.reset();
+  Plot plot = time_plot("Rotation against encoder", "psi beyond the encoder", "mrad", {});
   plot.references = {{"the encoder", 0}};
-  Series series = points("as the rig has it", 1);
-  for (const TrackedPsi& off : arm.beyond_encoder)
-    series.x.push_back(off.time_s), series.y.push_back(1e3 * off.psi_rad);
-  plot.series.push_back(std::move(series));
+  add_points(plot, "as the rig has it", 1, arm.beyond_encoder, [](const TrackedPsi& off) {
+    return Point({off.time_s, 1e3 * off.psi_rad});
+  });
   return plot;
 }
 
-template <typename Value>
-Plot frame_plot(const std::vector<FrameEvidence>& frames, const std::string& title, const std::string& label,
-                const std::string& unit, Value value) {
-  Plot plot = over_time(title, label, unit);
-  Series series = points(label, 0);
-  for (const FrameEvidence& frame : frames)
-    if (const std::optional<double> y = value(frame)) series.x.push_back(frame.time_s), series.y.push_back(*y);
-  plot.series.push_back(std::move(series));
+Plot sigma_plot(const std::vector<FrameEvidence>& frames) {
+  Plot plot = over_time("Sigma of psi", "sigma", "mrad");
+  add_points(plot, "sigma", 0, frames, [](const FrameEvidence& frame) {
+    return frame.status == Status::ok ? Point({frame.time_s, 1e3 * frame.sigma_roll_rad}) : std::nullopt;
+  });
+  return plot;
+}
+
+Plot light_plot(const std::vector<FrameEvidence>& frames) {
+  Plot plot = over_time("Light on the marker", "brightest channel", "of 255");
+  add_points(plot, "brightest channel", 0, frames, [](const FrameEvidence& frame) {
+    return frame.light ? Point({frame.time_s, frame.light->value}) : std::nullopt;
+  });
   return plot;
 }
 
@@ -70,7 +78,7 @@ Series residual_means(const std::vector<PrintResidual>& residuals, std::size_t b
     const auto part = static_cast<std::size_t>(std::clamp(r.tau_rad / two_pi * parts, 0.0, parts - 1.0));
     sums_m[part] += r.residual_m, counts[part] += 1;
   }
-  Series series = points(fmt::format("e{}", boundary), static_cast<int>(boundary));
+  Series series{fmt::format("e{}", boundary), {}, {}, Draw::points, static_cast<int>(boundary)};
   for (std::size_t part = 0; part < parts; ++part) {
     if (counts[part] < least) continue;
     series.x.push_back(360 * (static_cast<double>(part) + 0.5) / parts);
@@ -166,28 +174,19 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
   }
   if (f.rcm && f.rcm->refusal.empty()) {
     Plot plot = over_time("Axes and the RCM", "miss", "mm");
-    Series series = points("miss", 0);
-    for (const auto& [time_s, miss_m] : f.rcm->misses_m) series.x.push_back(time_s), series.y.push_back(1e3 * miss_m);
-    plot.series.push_back(std::move(series));
+    add_points(plot, "miss", 0, f.rcm->misses_m, [](const auto& miss) {
+      return Point({miss.first, 1e3 * miss.second});
+    });
     figures.push_back({std::move(plot), "By how much each frame's axis misses the point where they meet."});
   }
-  figures.push_back({frame_plot(checked.frames, "Sigma of psi", "sigma", "mrad",
-                                [](const FrameEvidence& frame) -> std::optional<double> {
-                                  if (frame.status != Status::ok) return std::nullopt;
-                                  return 1e3 * frame.sigma_roll_rad;
-                                }),
-                     "What the tracker says of the rotation in each frame where it is ok."});
+  figures.push_back(
+      {sigma_plot(checked.frames), "Of the rotation, as the tracker states it, in each frame where it is ok."});
   for (const SigmaMap& map : checked.maps)
     figures.push_back({map_picture(map),
                        fmt::format("Sigma of psi [mrad] to expect with the marker in each part of the picture, {:.0f} "
                                    "mm away; -: it is not wholly in view; lost: it is, and is not found.",
                                    1e3 * map.depth_m)});
-  figures.push_back({frame_plot(checked.frames, "Light on the marker", "brightest channel", "of 255",
-                                [](const FrameEvidence& frame) -> std::optional<double> {
-                                  if (!frame.light) return std::nullopt;
-                                  return frame.light->value;
-                                }),
-                     "Median over the marker. Near 255 boundaries are lost."});
+  figures.push_back({light_plot(checked.frames), "Median over the marker. Near 255 boundaries are lost."});
   if (f.print && f.print->refusal.empty())
     figures.push_back(
         {print_plot(f.print->residuals),
