@@ -7,12 +7,11 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-/// One step of the controller with an image in it, the model (feature_map) included.
-void BM_ControlStep(benchmark::State& state, ControlMode mode, bool delay_known) {
+/// One step of the default controller with an image in it, the delay estimated, the model (feature_map) included.
+void control_step(benchmark::State& state) {
   testing::Flaws flaws;
-  flaws.delay_known = delay_known;
-  ControllerConfig config = testing::test_config(flaws);
-  config.mode = mode;
+  flaws.delay_known = false;
+  const ControllerConfig config = testing::test_config(flaws);
   const testing::TestRig rig;
   VisualController controller(config, testing::model_of(rig));
   testing::TestSimulator simulator(rig, flaws, {0.05, 1.57, 0.064, 1}, 1);
@@ -33,10 +32,7 @@ void BM_ControlStep(benchmark::State& state, ControlMode mode, bool delay_known)
     benchmark::DoNotOptimize(controller.step(time_s, q, image, desired));
   }
 }
-BENCHMARK_CAPTURE(BM_ControlStep, default_known_delay, ControlMode::fused, true);
-BENCHMARK_CAPTURE(BM_ControlStep, default_estimated_delay, ControlMode::fused, false);
-BENCHMARK_CAPTURE(BM_ControlStep, paper, ControlMode::paper, true);
-BENCHMARK_CAPTURE(BM_ControlStep, uncalibrated, ControlMode::uncalibrated, false);
+BENCHMARK(control_step);
 
 }  // namespace
 }  // namespace lapservo

@@ -15,8 +15,9 @@
 #include <vector>
 
 #include "bench/frames.h"
+#include "lapservo/core/quantile.h"
 #include "lapservo/core/random.h"
-#include "lapservo/core/statistics.h"
+#include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/vision/tracker.h"
@@ -29,18 +30,6 @@ double cpu_ms() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
-}
-
-// Discs of blood over about a fraction of the print.
-std::vector<Blotch> blood(const Marker& marker, double fraction, Random& random) {
-  std::vector<Blotch> discs;
-  for (double covered = 0; covered < fraction;) {
-    const double radius_m = random.uniform(0.08, 0.25) * marker.diameter_m;
-    const double azimuth_rad = random.uniform(0, two_pi);
-    discs.push_back({azimuth_rad, random.uniform(0, marker.length_m()), radius_m});
-    covered += 0.8 * radius_m * radius_m / (marker.diameter_m * marker.length_m());
-  }
-  return discs;
 }
 
 // A part of a sequence: what lies on the markers and before them.
@@ -76,7 +65,7 @@ Renderer renderer_of(const Rig& rig, const Condition& condition, std::uint64_t s
   std::vector<ShaftModel> shafts;
   for (const Instrument& instrument : rig.instruments) {
     shafts.push_back(shaft_of(instrument));
-    shafts.back().blotches = blood(instrument.marker, condition.blood, random);
+    shafts.back().blotches = blood_over(instrument.marker, condition.blood, random);
   }
   RenderOptions options;
   options.smoke = static_cast<float>(condition.smoke);
@@ -96,13 +85,6 @@ std::vector<ShaftPlacement> crossing_placements(const Rig& rig, int index) {
   return placed;
 }
 
-// The camera's picture the other way round.
-cv::Mat mirrored(const cv::Mat& picture) {
-  cv::Mat out;
-  cv::flip(picture, out, 1);
-  return out;
-}
-
 // Of each drawing of blood the frames, one after another.
 void for_each_run(cv::Size size_px, const Sequence& sequence, int frames, std::uint64_t seed,
                   const std::function<void(const std::vector<cv::Mat>&)>& look) {
@@ -119,8 +101,8 @@ void for_each_run(cv::Size size_px, const Sequence& sequence, int frames, std::u
           condition.crossing ? crossing_placements(rig, index) : placements(rig, index);
       for (std::size_t k = 0; k < std::min(placed.size(), condition.covered.size()); ++k)
         placed[k].covered = condition.covered[k];
-      const cv::Mat frame = renderer.render(placed, static_cast<std::uint64_t>(i)).clone();
-      pictures.push_back(condition.mirrored ? mirrored(frame) : frame);
+      pictures.push_back(renderer.render(placed, static_cast<std::uint64_t>(i)).clone());
+      if (condition.mirrored) cv::flip(pictures.back(), pictures.back(), 1);
     }
     look(pictures);
   }
@@ -130,11 +112,11 @@ struct Times {
   std::vector<double> ms;
   int found = 0, looked_for = 0;
 
-  void print(const std::string& name, double memcpy_ms) {
-    const double worst = quantile(ms, 0.999);
+  void print(const std::string& name, double memcpy_ms) const {
+    const double worst = quantile_of(ms, 0.999);
     std::printf("| %s | %zu | %.0f %% | %.2f | %.2f | %.2f | %.2f | %.1f |\n", name.c_str(), ms.size(),
-                100.0 * found / std::max(1, looked_for), median(ms), quantile(ms, 0.99), worst,
-                *std::max_element(ms.begin(), ms.end()), worst / memcpy_ms);
+                100.0 * found / std::max(1, looked_for), quantile_of(ms, 0.5), quantile_of(ms, 0.99), worst,
+                quantile_of(ms, 1), worst / memcpy_ms);
   }
 };
 
@@ -147,7 +129,7 @@ double memcpy_ms(cv::Size size_px) {
     std::memcpy(to.data, from.data, from.total() * from.elemSize());
     ms.push_back(cpu_ms() - before);
   }
-  return median(ms);
+  return quantile_of(ms, 0.5);
 }
 
 // Of a run's frames, by trackers that know the runs before it.

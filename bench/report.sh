@@ -52,7 +52,7 @@ awk -F'\t' '
     }
     if (cell("apriltag/decimate_2", 1920, "-") != "" && one != "")
       required("AprilTag (decimate 2) / cold", cell("apriltag/decimate_2", 1920, "-") / one, 30, "", 1)
-    control = cell("BM_ControlStep/default_estimated_delay", "-", "-")
+    control = cell("control_step", "-", "-")
     if (control != "") required("Control step", 1000 * control, 20, " us")
 
     printf "\n| Milliseconds |"
@@ -75,21 +75,21 @@ awk -F'\t' '
     row("AprilTag, decimate 1", "apriltag/decimate_1", "-")
   }' "$scratch/medians" > "$scratch/table"
 
-jq -r '.context | "Measured \(.date | .[0:10]) on \(.num_cpus) x \(.mhz_per_cpu) MHz, load \(.load_avg[0] // "unknown"); medians of CPU time."' \
-  "$json" > "$scratch/when"
-awk -v table="$scratch/table" -v when="$scratch/when" '
-  function insert(file,   line) { while ((getline line < file) > 0) print line; close(file) }
-  /^<!-- measured -->$/ { print; insert(when); print ""; insert(table); skipping = 1 }
-  /^<!-- \/measured -->$/ { skipping = 0 }
-  !skipping' "$page" > "$scratch/page"
-cp "$scratch/page" "$page"
-readme=$(dirname "$0")/../README.md
+# between_marks FILE TEXT: TEXT in place of what stands between the marks in FILE.
+between_marks() {
+  awk -v text="$2" '
+    /<!-- measured -->$/ { print; while ((getline line < text) > 0) print line; skipping = 1 }
+    /<!-- \/measured -->$/ { skipping = 0 }
+    !skipping' "$1" > "$scratch/whole"
+  cp "$scratch/whole" "$1"
+}
+{
+  jq -r '.context | "Measured \(.date | .[0:10]) on \(.num_cpus) x \(.mhz_per_cpu) MHz, load \(.load_avg[0] // "unknown"); medians of CPU time.\n"' "$json"
+  cat "$scratch/table"
+} > "$scratch/measured"
+between_marks "$page" "$scratch/measured"
 "$(dirname "$0")/readme_figures.sh" "$page" > "$scratch/sentence"
-awk -v sentence="$scratch/sentence" '
-  /<!-- measured -->$/ { print; while ((getline line < sentence) > 0) print line; skipping = 1 }
-  /<!-- \/measured -->$/ { skipping = 0 }
-  !skipping' "$readme" > "$scratch/readme"
-cp "$scratch/readme" "$readme"
+between_marks "$(dirname "$0")/../README.md" "$scratch/sentence"
 
 "$figure_of" "$scratch/medians" > "$scratch/figure.svg"
 cp "$scratch/figure.svg" "$figure"
