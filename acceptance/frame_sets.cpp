@@ -39,13 +39,25 @@ double largest(const std::vector<double>& values) {
   return most;
 }
 
+Truth truth_of(const Rig& rig, std::size_t index, const JointVector& q) {
+  const Instrument& instrument = rig.instruments[index];
+  const auto line =
+      centre_line(rig.camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad).value();
+  Truth truth{instrument.name, "rendered", q, line.tau_rad, {}};
+  for (std::size_t k = 0; k < 4; ++k) truth.edges_raw_px[k] = rig.camera.raw_from_ideal(line.ideal_px[k]);
+  return truth;
+}
+
 void Score::add(const TrueFrame& frame, const std::vector<Observation>& observations) {
   for (const Truth& truth : frame.truths) {
     const auto named = std::find_if(frame.rig.instruments.begin(), frame.rig.instruments.end(),
                                     [&](const Instrument& i) { return i.name == truth.instrument; });
     const Observation& o = observations.at(static_cast<std::size_t>(named - frame.rig.instruments.begin()));
     ++expected;
-    if (o.status != Status::ok || !o.rcm) continue;
+    if (o.status != Status::ok || !o.rcm) {
+      ++refusals[std::string(to_string(o.status))];
+      continue;
+    }
     ++found;
     const double error_rad = wrap_pi(o.rcm->q.psi_rad - truth.q.psi_rad);
     wrong += std::abs(error_rad) > 0.1;
@@ -124,15 +136,6 @@ std::vector<Blotch> blotches(const Marker& marker, double fraction, Random& rand
     covered += pi * radius_m * radius_m / (pi * marker.diameter_m * marker.length_m());
   }
   return discs;
-}
-
-Truth truth_of(const Rig& rig, std::size_t i, const JointVector& q) {
-  const Instrument& instrument = rig.instruments[i];
-  const auto line =
-      centre_line(rig.camera, instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad).value();
-  Truth truth{instrument.name, "rendered", q, line.tau_rad, {}};
-  for (std::size_t k = 0; k < 4; ++k) truth.edges_raw_px[k] = rig.camera.raw_from_ideal(line.ideal_px[k]);
-  return truth;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <array>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -32,12 +33,16 @@ struct TrueFrame {
   std::vector<Truth> truths;
 };
 
+/// Of an instrument's marker as the rig has it; needs one before the camera.
+Truth truth_of(const Rig& rig, std::size_t instrument, const JointVector& q);
+
 /// Errors of observations against truth, over a set.
 struct Score {
   int expected = 0, found = 0, wrong = 0;  ///< wrong: ok, and psi off by more than 0.1 rad
   std::vector<double> psi_rad, theta_rad, phi_rad, rho_m, edge_px;
   std::vector<double> psi_sigmas, theta_sigmas, phi_sigmas, rho_sigmas;
   std::vector<std::array<Eigen::Vector2d, 4>> edges;  ///< of found ones, in order
+  std::map<std::string, int> refusals;                ///< statuses of the others
 
   void add(const TrueFrame& frame, const std::vector<Observation>& observations);
   double found_fraction() const { return expected ? static_cast<double>(found) / expected : 1; }

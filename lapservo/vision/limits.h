@@ -203,7 +203,7 @@ inline constexpr TurnBlurLimits turn_blur_limits;
 
 /// When a camera's processing is believed (picture_processing.cpp).
 struct ProcessingLimits {
-  /// By bench/camera_effects 12 3, 69 first guesses of 72 frames without any (none, bayer, ca, crosstalk, rec709,
+  /// By accuracy_study camera 12 3, 69 first guesses of 72 frames without any (none, bayer, ca, crosstalk, rec709,
   /// vignette) lie below these sizes, and of 60 with it (sharpen, chroma420, tone, camera, jpeg) none.
   double chroma_variance_px2 = 0.5, max_sharpening = 0.3, min_sharpening = -0.2, saturation = 0.1;
   double max_blur_px = 1.65;  ///< beyond, motion and defocus are taken for processing, and flat parts are out of reach

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "acceptance/frame_sets.h"
+#include "acceptance/random_print.h"
+
+namespace lapservo::bench {
+
+/// A row of a table of docs/accuracy.md: the errors on so many frames that the seed draws.
+struct Row {
+  std::string name;
+  std::function<acceptance::Score(int frames, std::uint64_t seed)> measure;
+};
+
+/// Rendered frames through what cameras do to them, of a strength drawn anew for every frame, by a rig as calibration
+/// would have it and, "_uncalibrated", as if nobody had calibrated. LAPSERVO_OFF=1: each frame's print is off in its
+/// bands, 2: in an ink that lies aside (random_print.h). LAPSERVO_BLOOD: so much of the marker is hidden [%]. h264 is a
+/// marker in motion, tracked, as a recorder keeps it.
+std::vector<Row> camera_rows();
+/// The same of the ray-traced samples of rotation, illumination and tilt, where they are there.
+std::vector<Row> samples_rows();
+/// Markers of which blood hides 40 %, each its own.
+std::vector<Row> blood_rows();
+/// Instruments that move or turn while the shutter is open, psi's truth being that in the middle of the exposure.
+std::vector<Row> motion_rows();
+
+/// As a tracker sees the frame whose rig takes its print for this one. What the seam's place differs by shows in no
+/// picture and counts for no error.
+void take_print_for(acceptance::TrueFrame& frame, const Marker& marker);
+
+/// The frame's one instrument looked at on its own.
+void score_alone(const acceptance::TrueFrame& frame, acceptance::Score& score);
+
+}  // namespace lapservo::bench
