@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "bench/frames.h"
-#include "lapservo/core/quantile.h"
 #include "lapservo/core/random.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/sim/blood.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"

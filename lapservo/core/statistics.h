@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <functional>
+#include <vector>
 
 namespace lapservo::internal {
 
@@ -20,6 +21,15 @@ auto quantile(Values&& values, double fraction) {
 template <typename Values>
 auto median(Values&& values) {
   return quantile(values, 0.5);
+}
+
+/// The number below which a fraction of the numbers lies, interpolated between two of them; 0 where there are none.
+inline double quantile_of(std::vector<double> numbers, double fraction) {
+  if (numbers.empty()) return 0;
+  std::sort(numbers.begin(), numbers.end());
+  const double place = fraction * static_cast<double>(numbers.size() - 1);
+  const auto below = static_cast<std::size_t>(place), above = std::min(below + 1, numbers.size() - 1);
+  return numbers[below] + (place - static_cast<double>(below)) * (numbers[above] - numbers[below]);
 }
 
 /// Root mean square of the items' values; 0 where there are none. `value`: a member or a function of an item.

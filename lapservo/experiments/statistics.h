@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "lapservo/core/quantile.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 

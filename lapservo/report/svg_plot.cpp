@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/core/quantile.h"
+#include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 namespace {
