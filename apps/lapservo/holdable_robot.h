@@ -1,5 +1,6 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "lapservo/robot/robot.h"
@@ -15,18 +16,20 @@ class HoldableRobot : public Robot {
   JointState state() override {
     JointState state = robot_.state();
     if (held_) state.operating_state = OperatingState::paused;
+    state.started = std::exchange(started_, false);
     return state;
   }
   std::vector<JointReading> readings() override { return robot_.readings(); }
   void send(const JointPath& path) override {
     if (!held_) robot_.send(path);
   }
-  void hold(bool on) { held_ = on; }
+  /// False is a start.
+  void hold(bool on) { held_ = on, started_ = !on; }
   bool held() const { return held_; }
 
  private:
   Robot& robot_;
-  bool held_ = false;
+  bool held_ = false, started_ = false;
 };
 
 }  // namespace lapservo::app

@@ -228,11 +228,6 @@ void add_control_options(Command command, ServoOptions& options) {
       .one_of({"surface", "centerline"});
   command.add_option("--controller", options.controller, "YAML: gains_per_s, limits, window, delay_s ...");
   command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`").shows_default();
-  command
-      .add_option("--endoscope-attempts", options.endoscope_attempts,
-                  "How often the arm may move a little by itself to measure where an endoscope that moved now stands, "
-                  "else 3; 0: it holds instead")
-      .whole_number_between(0, 100);
   command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated")
       .finite_number()
       .delimiter(',')

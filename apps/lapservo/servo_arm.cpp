@@ -97,15 +97,15 @@ class ArmWatcher : public RunObserver {
     if (of_page.stop) say(time_s, "end: asked for on the page");
     return of_page.stop;
   }
+  std::string state_of(const ControlStep& control, Blocked blocked) const {
+    if (blocked == Blocked::foreign_command) return "end: somebody else sends set-points to the arm (foreign_command)";
+    // However the operator keeps the arm meanwhile.
+    if (blocked == Blocked::none || !operators_part(control.reason).empty()) return state_text(control);
+    if (blocked == Blocked::not_enabled) return "hold: the arm is " + robot_.operating_state();
+    return "hold: " + std::string(to_string(blocked));
+  }
   void say_state(double time_s, const ControlStep& control, Blocked blocked) {
-    std::string state = state_text(control);
-    if (blocked == Blocked::not_enabled) {
-      state = "hold: the arm is " + robot_.operating_state();
-    } else if (blocked == Blocked::foreign_command) {
-      state = "end: somebody else sends set-points to the arm (foreign_command)";
-    } else if (blocked != Blocked::none) {
-      state = "hold: " + std::string(to_string(blocked));
-    }
+    const std::string state = state_of(control, blocked);
     if (state == state_) return;
     state_ = state;
     say(time_s, state);

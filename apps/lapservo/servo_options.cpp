@@ -42,7 +42,6 @@ ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
   }
   if (!options.joint_limits.empty()) config.limits = limits_of(options, rig);
   if (!options.controller.empty()) config = load_controller(options.controller, config);
-  if (options.endoscope_attempts) config.endoscope_attempts = *options.endoscope_attempts;
   return checked(config);
 }
 

@@ -22,7 +22,6 @@ struct ServoOptions {
   double latency_ms = 80;
   std::optional<double> duration;  // s
   std::optional<double> fps;       // control periods a second, and frames of the simulation
-  std::optional<int> endoscope_attempts;
   std::uint64_t seed = 1;
   bool view = false, force = false, enable_motion = false, strict = false;
   WebOptions web;

@@ -33,6 +33,11 @@ InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
   return inputs;
 }
 
+std::string reason_text(HoldReason reason) {
+  const std::string_view part = operators_part(reason);
+  return std::string(to_string(reason)) + (part.empty() ? "" : fmt::format(" ({})", part));
+}
+
 }  // namespace
 
 void say(double time_s, const std::string& what) {
@@ -40,9 +45,16 @@ void say(double time_s, const std::string& what) {
   std::fflush(stdout);
 }
 
+std::string_view operators_part(HoldReason reason) {
+  if (reason == HoldReason::endoscope_moved)
+    return "move the instrument, by hand or teleoperation, until endoscope_measured";
+  if (reason == HoldReason::endoscope_measured) return "start goes on";
+  return "";
+}
+
 std::string state_text(const ControlStep& control) {
   const std::string action(to_string(control.action));
-  return control.reason == HoldReason::none ? action : action + ": " + std::string(to_string(control.reason));
+  return control.reason == HoldReason::none ? action : action + ": " + reason_text(control.reason);
 }
 
 RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller)
@@ -65,9 +77,8 @@ void Summary::follow_registration(const ControlTick& tick) {
   if (moved_s_ && now) {
     const Rigid3 before_from_now = *camera_from_rcm_ * now->inverse();
     endoscope_motions_.push_back(fmt::format(
-        "the endoscope moved by {:.1f} mm and {:.1f} degrees (noticed at {:.2f} s): camera_from_rcm was measured anew "
-        "in "
-        "{:.1f} s",
+        "the endoscope moved by {:.1f} mm and {:.1f} degrees (noticed at {:.2f} s): started with camera_from_rcm "
+        "measured anew {:.1f} s later",
         1e3 * before_from_now.translation.norm(), deg_from_rad(Eigen::AngleAxisd(before_from_now.rotation).angle()),
         *moved_s_ - start_s_.value_or(*moved_s_), tick.input.time_s - *moved_s_));
     moved_s_.reset();
@@ -107,7 +118,7 @@ std::string Summary::holds_text() const {
   std::string text;
   for (const auto& [reason, count] : held_) text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
   for (const std::string& motion : endoscope_motions_) text += "\n" + motion;
-  if (held_at_end_) text += fmt::format("\nended in a hold: {}", to_string(*held_at_end_));
+  if (held_at_end_) text += "\nended in a hold: " + reason_text(*held_at_end_);
   if (contradicted_ > 0)
     text += fmt::format(
         "\nregistration_contradicted in {} of {} ticks: the images fit neither camera_from_rcm nor lens "

@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "apps/lapservo/live_view.h"
@@ -15,7 +16,9 @@ namespace lapservo::app {
 
 /// A line of a run's, at once.
 void say(double time_s, const std::string& what);
-/// "track", "hold: marker_lost".
+/// What a hold for that reason waits for the operator to do; empty where it goes on by itself.
+std::string_view operators_part(HoldReason reason);
+/// "track", "hold: marker_lost", "hold: endoscope_measured (...)" with the operator's part.
 std::string state_text(const ControlStep& control);
 
 /// A run's log.csv, rig.yaml and controller.yaml.
@@ -40,7 +43,7 @@ class Summary {
   /// Converged and not in a hold at the end; when `strict`, with a registration that no image contradicted.
   bool succeeded(bool strict) const { return converged() && !held_at_end_ && !(strict && registration_contradicted()); }
   bool registration_contradicted() const { return contradicted_ > 0; }
-  /// One line for each time that camera_from_rcm was measured anew.
+  /// One line for each time that a camera_from_rcm was started that was measured anew.
   const std::vector<std::string>& endoscope_motions() const { return endoscope_motions_; }
   std::string text() const { return convergence_text() + holds_text(); }
   /// How long it held and why, how often the endoscope moved ...: a line each, each after a line's end.

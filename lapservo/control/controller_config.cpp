@@ -119,7 +119,6 @@ ControllerConfig checked(const ControllerConfig& config) {
   check_learning(config);
   require_positive("damping_threshold", config.damping_threshold);
   require(config.min_singular_value >= 0, "min_singular_value", config.min_singular_value, "0 or more");
-  require(config.endoscope_attempts >= 0, "endoscope_attempts", config.endoscope_attempts, "0 or more");
   require_positive("stale_after_s", config.stale_after_s);
   require_positive("max_image_age_s", config.max_image_age_s);
   require_positive("max_following_error", config.max_following_error);

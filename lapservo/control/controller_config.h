@@ -107,11 +107,8 @@ struct ControllerConfig {
   ProbingConfig probing;
   double damping_threshold = 1;      ///< of damped_inverse
   double min_singular_value = 0.01;  ///< of the scaled Jacobian: below it the controller holds
-  /// How often an arm may move by itself to measure where an endoscope that moved now stands (mode `fused`). After
-  /// that many failures, so at once with 0, it holds until it is started anew.
-  int endoscope_attempts = 3;
-  double stale_after_s = 0.1;    ///< hold when no usable image arrived for so long
-  double max_image_age_s = 0.6;  ///< at arrival, by its stamp
+  double stale_after_s = 0.1;        ///< hold when no usable image arrived for so long
+  double max_image_age_s = 0.6;      ///< at arrival, by its stamp
   /// Hold when the arm is farther from its setpoint than this: theta_rad, phi_rad, rho_m, psi_rad.
   Eigen::Vector4d max_following_error{0.1, 0.1, 0.01, 0.4};
 };

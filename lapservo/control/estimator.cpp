@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-void Estimator::set_model(const FeatureModel&, bool) {}
+void Estimator::set_model(const FeatureModel&) {}
 
 std::optional<Eigen::Vector4d> Estimator::probing_velocity(double) const {
   return std::nullopt;

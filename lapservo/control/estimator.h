@@ -32,9 +32,9 @@ class Estimator {
   /// False while it is a guess that motion will tell better.
   virtual bool delay_is_known() const { return true; }
 
-  /// Another camera_from_rcm: what was learnt of delay and backlash holds. Where the instrument is the next image
-  /// tells, if `anew`.
-  virtual void set_model(const FeatureModel& model, bool anew);
+  /// Another camera_from_rcm: what was learnt of delay and backlash holds, where the instrument is the next image
+  /// tells.
+  virtual void set_model(const FeatureModel& model);
 
   /// The measured joints jumped: nothing is to be learnt across.
   virtual void interrupt() {}

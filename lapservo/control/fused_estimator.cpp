@@ -39,9 +39,9 @@ HoldReason FusedEstimator::update(const ImageMeasurement& image, const JointHist
   return reason_of(observer_.update(model_, history, image));
 }
 
-void FusedEstimator::set_model(const FeatureModel& model, bool anew) {
+void FusedEstimator::set_model(const FeatureModel& model) {
   model_ = model;
-  if (anew) observer_.start_anew();
+  observer_.start_anew();
 }
 
 std::optional<Estimate> FusedEstimator::at(double time_s, const Eigen::Vector4d& q_joint) const {

@@ -61,10 +61,10 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
   usable_s_ = time_s;
 }
 
-void VisualController::recovered(const FeatureModel& model) {
-  recovery_.reset();
-  estimator_->set_model(model, true);
-  image_reason_ = HoldReason::endoscope_moved;  // until an image tells where the instrument is
+void VisualController::resume(const FeatureModel& model) {
+  resume();
+  estimator_->set_model(model);
+  image_reason_ = HoldReason::no_image_yet;
 }
 
 ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint,
@@ -76,7 +76,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   if (timed && q_joint.allFinite()) {
     if (image) image_reason_ = update(*image);
     watch_image_age();
-    if (!recovery_) step.estimate = estimator_->at(time_s, q_joint);
+    if (suspended_ == HoldReason::none) step.estimate = estimator_->at(time_s, q_joint);
   }
   if (step.reason == HoldReason::none) step.reason = image_reason_;
 
@@ -88,7 +88,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   } else if (measured_) {
     step.velocity = leashed_hold(step.velocity);
   }
-  if (step.action == ControlAction::probe && !recovery_) estimator_->advance_probing(config_.period_s);
+  if (step.action == ControlAction::probe) estimator_->advance_probing(config_.period_s);
 
   // Without a time to start from, the path is left to brake by itself when the period before ends.
   if (timed && started_) path_.ramp_to(now_s_, step.velocity, config_.period_s);
@@ -148,7 +148,8 @@ void VisualController::remember(double time_s, const Eigen::Vector4d& q_joint, s
 
 HoldReason VisualController::update(const ImageMeasurement& image) {
   if (!all_finite(image)) return HoldReason::non_finite;
-  if (!image.found && !(recovery_ && image.marker)) return HoldReason::marker_lost;
+  const bool suspended = suspended_ != HoldReason::none;
+  if (!image.found && !(suspended && image.marker)) return HoldReason::marker_lost;
   if (now_s_ - image.time_s > config_.max_image_age_s) return HoldReason::stale_image;
   // The same stamp again, or an older one, tells nothing: the age of what was told before goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
@@ -156,7 +157,7 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   const FrozenImage::Verdict verdict = frozen_image_.add(image, history_);
   if (verdict == FrozenImage::Verdict::frozen) return HoldReason::frozen_image;
   if (verdict == FrozenImage::Verdict::again) return image_reason_;
-  const HoldReason reason = recovery_ ? HoldReason::none : estimator_->update(image, history_);
+  const HoldReason reason = suspended ? HoldReason::none : estimator_->update(image, history_);
   if (reason == HoldReason::none) usable_s_ = now_s_;
   return reason;
 }
@@ -169,21 +170,11 @@ void VisualController::watch_image_age() {
 VisualController::Law VisualController::decide(HoldReason reason, const std::optional<Estimate>& estimate,
                                                const DesiredFeatures& desired) const {
   Law law;
-  if (reason != HoldReason::none) {
-    law.reason = reason;
-    return law;
-  }
-  if (recovery_) return recovery_law();
+  law.reason = reason == HoldReason::none ? suspended_ : reason;
+  if (law.reason != HoldReason::none) return law;
   const auto probing_velocity = estimator_->probing_velocity(config_.period_s);
   law = probing_velocity ? probing_law(*probing_velocity) : tracking_law(estimate, desired);
   if (!law.velocity.allFinite() || !law.weight.allFinite()) law.reason = HoldReason::non_finite;
-  return law;
-}
-
-VisualController::Law VisualController::recovery_law() const {
-  if (recovery_->velocity) return probing_law(*recovery_->velocity);
-  Law law;
-  law.reason = HoldReason::endoscope_moved;
   return law;
 }
 

@@ -40,19 +40,12 @@ class VisualController {
   /// The same after a hold, of an arm that was enabled all the while: under its load it keeps the place that it has.
   void start_over(double time_s, const Eigen::Vector4d& q_joint);
 
-  /// While camera_from_rcm is measured anew: no image is believed, the arm holds (HoldReason::endoscope_moved) or,
-  /// where there is a velocity (rad/s, m/s), moves by it within its limits (ControlAction::probe). For the steps from
-  /// now on.
-  struct Recovery {
-    std::optional<Eigen::Vector4d> velocity;
-  };
-  void recover(const Recovery& recovery) { recovery_ = recovery; }
-  /// And on again with the model that was there: it was nothing.
-  void believe() { recovery_.reset(); }
-  /// Or with the one that was found.
-  void recovered(const FeatureModel& model);
-  /// A slightly better model while all goes on.
-  void refine(const FeatureModel& model) { estimator_->set_model(model, false); }
+  /// From the next step on the model does not count: nothing is estimated, and the arm holds for that reason.
+  void suspend(HoldReason reason) { suspended_ = reason; }
+  /// And on again with the model that was there.
+  void resume() { suspended_ = HoldReason::none; }
+  /// Or with another one, as soon as an image shows where the instrument is.
+  void resume(const FeatureModel& model);
   /// Where the joints were measured when that image was exposed; nullopt when not known.
   std::optional<Eigen::Vector4d> measured_at(const ImageMeasurement& image) const {
     return history_.at(image.time_s - delay_s());
@@ -89,7 +82,6 @@ class VisualController {
   HoldReason update(const ImageMeasurement& image);
   void watch_image_age();
   Law decide(HoldReason reason, const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
-  Law recovery_law() const;
   Law probing_law(const Eigen::Vector4d& velocity) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
@@ -106,7 +98,7 @@ class VisualController {
   FrozenImage frozen_image_;
   WildJoints wild_joints_;
   JointPath path_;
-  std::optional<Recovery> recovery_;
+  HoldReason suspended_ = HoldReason::none;
   bool started_ = false;
   bool follows_ = true;
   bool measured_ = false;      ///< the joints of this tick are believed

@@ -67,6 +67,11 @@ void CrtkRobot::send(const JointPath& path) {
   interlock_.follow(path);
 }
 
+void CrtkRobot::release() {
+  const std::lock_guard lock(mutex_);
+  interlock_.release();
+}
+
 void CrtkRobot::hold(bool on) {
   const std::lock_guard lock(mutex_);
   interlock_.hold(on);

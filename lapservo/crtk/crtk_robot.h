@@ -28,6 +28,7 @@ class CrtkRobot : public Robot {
   JointState state() override;
   std::vector<JointReading> readings() override;
   void send(const JointPath& path) override;
+  void release() override;
 
   /// See Interlock::hold().
   void hold(bool on);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "lapservo/core/words.h"
 #include "lapservo/crtk/joint_map.h"
@@ -111,7 +112,7 @@ void Interlock::on_operating_state(const OperatingStateMessage& message) {
 }
 
 void Interlock::on_foreign_command() {
-  if (config_.motion_enabled) foreign_ = true;
+  if (config_.motion_enabled && !released_) foreign_ = true;
 }
 
 // Between those that were sent of late: the arm may interpolate, and what comes back is from a moment ago.
@@ -132,12 +133,15 @@ bool Interlock::is_ours(const Reading& setpoint) const {
 }
 
 void Interlock::follow(const JointPath& path) {
-  if (!must_start_anew_ && !held_) path_ = path;
+  if (must_start_anew_ || held_) return;
+  path_ = path;
+  released_ = false;
 }
 
 void Interlock::hold(bool on) {
   if (held_ && !on) forget_path();
   held_ = on;
+  started_ = !on;
 }
 
 void Interlock::stop() {
@@ -180,6 +184,7 @@ JointState Interlock::state(double now_s) {
   watch(now_s);
   JointState state;
   state.follows = config_.motion_enabled;
+  state.started = std::exchange(started_, false);
   if (measured_) state.time_s = measured_->time_s, state.q = JointVector::from_vector(measured_->q);
   const bool well = blocked(now_s) == Blocked::none;
   if (well && told_) must_start_anew_ = false;
@@ -215,6 +220,7 @@ std::vector<double> Interlock::all_joints() const {
 
 std::optional<std::vector<double>> Interlock::tick(double now_s) {
   watch(now_s);
+  if (released_ && path_ && path_->at(now_s).velocity.isZero()) forget_path();
   if (!path_) return std::nullopt;
   // While the arm could not be moved by us it may have been by others.
   if (!moving_ && !(setpoint_->arrival_s > blocked_s_)) return std::nullopt;

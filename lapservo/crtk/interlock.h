@@ -78,8 +78,11 @@ class Interlock {
   /// The loop's wishes: Robot::send, and the end.
   void follow(const JointPath& path);
   void stop();
-  /// A person's wish: while it holds, new paths are not followed, so that the last one brakes to rest.
+  /// A person's wish: while it holds, new paths are not followed, so that the last one brakes to rest; false is a
+  /// start.
   void hold(bool on);
+  /// Robot::release: until follow() others may command the arm.
+  void release() { released_ = true; }
 
   /// Robot::state. An arm that must not be moved now is not enabled, whatever it says itself.
   JointState state(double now_s);
@@ -127,6 +130,7 @@ class Interlock {
   bool finite_ = true;
   OperatingStateMessage operating_state_;
   bool operating_state_known_ = false, held_ = false, foreign_ = false, stopped_ = false;
+  bool released_ = false, started_ = false;
   std::vector<std::string> names_;
   Places places_{};
 

@@ -322,8 +322,25 @@ TEST(Interlock, HeldItBrakesToRestAndGoesOnWhenReleased) {
   EXPECT_TRUE(bench.setpoint.isApprox(rest, 1e-12));
   EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::held);
   bench.interlock.hold(false);
+  EXPECT_TRUE(bench.interlock.state(bench.now_s).started);
+  EXPECT_FALSE(bench.interlock.state(bench.now_s).started);
   bench.control(0.5, slow);
   EXPECT_GT((bench.setpoint - rest).norm(), 0.01);
+}
+
+TEST(Interlock, ReleasedItIsSilentOnceAtRestAndOthersMayCommandTheArm) {
+  Bench bench;
+  bench.control(0.5, slow);
+  bench.interlock.release();
+  bench.pass(0.5);
+  const int sent = bench.sent_count;
+  bench.interlock.on_foreign_command();
+  bench.pass(0.5);
+  EXPECT_EQ(bench.sent_count, sent);
+  bench.control(0.5, slow);
+  EXPECT_GT(bench.sent_count, sent + 200);
+  bench.interlock.on_foreign_command();
+  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::foreign_command);
 }
 
 TEST(Interlock, CountsWhatItDrops) {

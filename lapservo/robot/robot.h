@@ -18,6 +18,8 @@ struct JointState {
   /// False where nothing that is sent moves the arm: somebody else leads it, and the loop only says what it would do.
   /// Its set-points start from the joints in each tick then, and it does not hold because the arm does not follow.
   bool follows = true;
+  /// The operator has said start since the last call of Robot::state(): what waits for that goes on.
+  bool started = false;
 };
 
 /// The joints at one time, on the loop's clock.
@@ -26,7 +28,7 @@ struct JointReading {
   JointVector q;
 };
 
-/// The port to an arm. Both calls come from the loop's thread, once a control tick, and must return at once: what talks
+/// The port to an arm. The calls come from the loop's thread, once a control tick, and must return at once: what talks
 /// to the arm (a driver, a transport) does so in a thread of its own.
 ///
 /// What an implementation owes:
@@ -44,6 +46,9 @@ class Robot {
   virtual std::vector<JointReading> readings() { return {}; }
   /// Follow this path from now on; it replaces the one before and goes on from it without a jump. To be copied.
   virtual void send(const JointPath& path) = 0;
+  /// The arm is the operator's until the next send(): once the last path has come to rest, an implementation that goes
+  /// on sending set-points stops that, so that hands or teleoperation may move the arm.
+  virtual void release() {}
 };
 
 }  // namespace lapservo

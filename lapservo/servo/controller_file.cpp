@@ -1,6 +1,5 @@
 #include "lapservo/servo/controller_file.h"
 
-#include <cmath>
 #include <initializer_list>
 #include <optional>
 #include <utility>
@@ -55,13 +54,6 @@ std::optional<double> read_delay(const YamlField& field) {
   return field.number(expected);
 }
 
-int read_attempts(const YamlField& field) {
-  constexpr auto expected = "a whole number, 0 to 100";
-  const double number = field.number_between(0, 100, expected);
-  if (number != std::floor(number)) field.fail(field.value_text(), expected);
-  return static_cast<int>(number);
-}
-
 std::string list_of(const Eigen::Vector4d& v) {
   return fmt::format("[{}, {}, {}, {}]", v[0], v[1], v[2], v[3]);
 }
@@ -72,7 +64,7 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   ControllerConfig config = base;
   const YamlField file = YamlField::read(path, "controller file");
   if (!file.is_map()) file.fail(file.value_text(), "a map of the controller's keys");
-  expect_keys(file, {{"mode", "period_s", "gains_per_s", "delay_s", "limits", "window", "endoscope_attempts"}, {}});
+  expect_keys(file, {{"mode", "period_s", "gains_per_s", "delay_s", "limits", "window"}, {}});
   if (const YamlField mode = file["mode"]; mode.present()) config.mode = read_mode(mode);
   if (const YamlField period = file["period_s"]; period.present()) config.period_s = period.number("a finite number");
   if (const YamlField gains = file["gains_per_s"]; gains.present()) config.gains.per_s = four(gains);
@@ -80,8 +72,6 @@ ControllerConfig load_controller(const std::filesystem::path& path, const Contro
   if (const YamlField limits = file["limits"]; limits.present()) config.limits = read_limits(limits, config.limits);
   if (const YamlField window = file["window"]; window.present())
     config.window = read_window(window, config.window.value_or(ImageWindow{}));
-  if (const YamlField attempts = file["endoscope_attempts"]; attempts.present())
-    config.endoscope_attempts = read_attempts(attempts);
   return config;
 }
 
@@ -92,7 +82,6 @@ std::string controller_yaml(const ControllerConfig& config) {
   text +=
       fmt::format("limits:\n  lower: {}\n  upper: {}\n  rate: {}\n  acceleration: {}\n", list_of(config.limits.lower),
                   list_of(config.limits.upper), list_of(config.limits.rate), list_of(config.limits.acceleration));
-  text += fmt::format("endoscope_attempts: {}\n", config.endoscope_attempts);
   if (config.window)
     text += fmt::format("window: {{u_min_px: {}, u_max_px: {}, v_min_px: {}, v_max_px: {}}}\n", config.window->u_min_px,
                         config.window->u_max_px, config.window->v_min_px, config.window->v_max_px);

@@ -9,8 +9,8 @@ namespace lapservo {
 
 /// Reads a controller's YAML over `base`: any key may be missing, none may be unknown. Keys: mode, period_s,
 /// gains_per_s (s r l d), delay_s (a number, or `estimate`), limits {lower, upper, rate, acceleration} (theta phi rho
-/// psi), endoscope_attempts, window {u_min_px, u_max_px, v_min_px, v_max_px} (ideal pixels). Throws InputError naming
-/// file, field, value and expectation.
+/// psi), window {u_min_px, u_max_px, v_min_px, v_max_px} (ideal pixels). Throws InputError naming file, field, value
+/// and expectation.
 ControllerConfig load_controller(const std::filesystem::path& path, const ControllerConfig& base);
 
 /// Text of these keys, from which load_controller reads their values back to the same bits. What a file cannot set

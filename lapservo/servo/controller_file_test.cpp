@@ -17,7 +17,6 @@ ControllerConfig unusual() {
   config.period_s = 1.0 / 47;
   config.gains.per_s = {1.0 / 3, 0.1, 0.2, 0.7};
   config.observer.delay_s = 0.123456789012345678;
-  config.endoscope_attempts = 1;
   config.limits.lower = {-0.1, 0.9, 0.04, -3.3};
   config.limits.acceleration = {1, 1.1, 0.3, 7};
   config.window = ImageWindow{1.5, 700.25, 3, 1.0 / 7 + 400};
@@ -42,7 +41,6 @@ TEST(ControllerFile, ReadsBackToTheLastBit) {
   EXPECT_EQ(read.period_s, config.period_s);
   EXPECT_EQ(read.gains.per_s, config.gains.per_s);
   EXPECT_EQ(read.observer.delay_s, config.observer.delay_s);
-  EXPECT_EQ(read.endoscope_attempts, config.endoscope_attempts);
   EXPECT_EQ(read.limits.lower, config.limits.lower);
   EXPECT_EQ(read.limits.upper, config.limits.upper);
   EXPECT_EQ(read.limits.rate, config.limits.rate);
@@ -62,8 +60,6 @@ TEST(ControllerFile, WhatIsMissingStays) {
 TEST(ControllerFile, NamesFileFieldValueAndExpectation) {
   for (const auto& [text, expected] : {std::pair<const char*, const char*>{"gain: 3\n", "gain"},
                                        {"gains_per_s: [1, 2, 3]\n", "gains_per_s"},
-                                       {"endoscope_attempts: 1.5\n", "endoscope_attempts"},
-                                       {"endoscope_attempts: -1\n", "endoscope_attempts"},
                                        {"gains_per_s: [1, 2, 3, x]\n", "gains_per_s[3]"},
                                        {"gains_per_s: [1, 2, 3, .nan]\n", "gains_per_s[3]"},
                                        {"mode: fast\n", "default, paper or uncalibrated"},

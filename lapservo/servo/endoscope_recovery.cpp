@@ -7,6 +7,7 @@
 #include "lapservo/servo/image_features.h"
 
 namespace lapservo::internal {
+using namespace endoscope;
 namespace {
 
 constexpr int agreed_after = 10, moved_after = 2;
@@ -19,25 +20,13 @@ constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
 
 // The endoscope rests when no edge moves farther in so long; a hundredth of a millimetre or two.
 constexpr double rest_s = 0.3, rest_px = 1.5;
-constexpr std::size_t min_rest_images = 5, min_images = 30, max_images = 400;
+constexpr std::size_t min_rest_images = 5, min_images = 30, max_images = 200;
 
-// However fast the camera is: sightings are so far apart at least, those that make it finer farther.
-constexpr double apart_s = 0.012, refining_apart_s = 0.06;
-constexpr std::size_t refining_each = 4;
+// Sightings differ by one of these at least (rad, m), however fast the camera and slow the operator is.
+const Eigen::Vector4d min_motion(3e-3, 3e-3, 2e-4, 8e-3);
 
-// An attempt has failed when its images have not shown the marker for so long.
-constexpr double max_lost_s = 2;
-
-// What a registration has to be to be gone by.
-constexpr double max_rms_px = 1, max_sigma_m = 2e-3, max_sigma_rad = 0.02;
-
-const ProbingConfig small_motion{.distance = {0.06, 0.06, 0.004, 0.16}, .joint_time_s = 0.9};
-
-// Back rather than in, where there is room for it.
-ProbingMotion exploring_motion(JointLimits limits, const Eigen::Vector4d& q_joint) {
-  if (q_joint[2] - small_motion.distance[2] > limits.lower[2]) limits.upper[2] = q_joint[2];
-  return {small_motion, limits, q_joint};
-}
+// A registration within these is good enough; images that are farther off contradict each other.
+constexpr double max_rms_px = 1, max_newest_rms_px = 3, max_sigma_m = 1e-3, max_sigma_rad = 0.01;
 
 Eigen::Matrix<double, 8, 1> edges_of(const ImageMeasurement& image) {
   Eigen::Matrix<double, 8, 1> edges;
@@ -45,37 +34,55 @@ Eigen::Matrix<double, 8, 1> edges_of(const ImageMeasurement& image) {
   return edges;
 }
 
+// Where there are many already, half of them are enough to begin with.
+void add_where_moved(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen) {
+  if (!((seen.q - sightings.back().q).array().abs() >= min_motion.array()).any()) return;
+  if (sightings.size() == max_images) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < sightings.size(); i += 2) sightings[kept++] = sightings[i];
+    sightings.resize(kept);
+  }
+  sightings.push_back(seen);
+}
+
+bool is_certain(const RegistrationFit& fit) {
+  return fit.sigma_position_m < max_sigma_m && fit.sigma_rotation_rad < max_sigma_rad;
+}
+
 }  // namespace
 
-EndoscopeRecovery::EndoscopeRecovery(const Rig& rig, const ControllerConfig& config)
-    : rig_(rig),
-      limits_(config.limits),
-      max_attempts_(config.endoscope_attempts),
-      camera_from_rcm_(rig.instruments.at(0).camera_from_rcm) {}
+EndoscopeRecovery::EndoscopeRecovery(const Rig& rig)
+    : rig_(rig), camera_from_rcm_(rig.instruments.at(0).camera_from_rcm) {}
 
 void EndoscopeRecovery::see(const ServoInput& input, VisualController& controller) {
-  follows_ = input.joints.follows;
+  if (const auto* waiting = std::get_if<WaitingForStart>(&state_); waiting && input.joints.started)
+    start(*waiting, controller);
   const auto& image = input.image;
   if (!image) return;
   if (!image->found && !image->marker) return drop_suspicion(controller);
-  if (!follow_joints(*image, controller) || phase_ != Phase::watching || !image->found) return;
-  // An endoscope that moved would show another picture.
-  if (image->repetition != Repetition::none) return;
-  // Without a marker there would be nothing to measure with.
-  const bool moves = stepped(*image, controller.delay_is_known());
-  const bool contradicts = image->marker && (!image->q || jumped(*image->q));
-  contradicting_ = contradicts ? contradicting_ + 1 : 0;
-  if (!contradicts && !(moves && image->marker)) return drop_suspicion(controller);
+  // A picture that repeats is no moved endoscope: that would show another one.
+  if (!follow_joints(*image, controller) || !image->found || image->repetition != Repetition::none) return;
+  if (auto* watching = std::get_if<Watching>(&state_)) watch(*watching, *image, controller);
+}
+
+// Without a marker there would be nothing to measure with.
+void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image, VisualController& controller) {
+  const bool moves = stepped(image, controller.delay_is_known());
+  const bool contradicts = image.marker && (!image.q || jumped(watching, *image.q));
+  watching.contradicting = contradicts ? watching.contradicting + 1 : 0;
+  if (!contradicts && !(moves && image.marker)) return drop_suspicion(controller);
   if (agreeing_ < agreed_after) return;
-  if (contradicting_ >= moved_after) return notice(controller);
-  suspected_ = true;
-  controller.recover({});
+  if (watching.contradicting >= moved_after) return notice(watching, controller);
+  watching.suspects = true;
+  controller.suspend(HoldReason::endoscope_moved);
 }
 
 void EndoscopeRecovery::drop_suspicion(VisualController& controller) {
-  if (suspected_ && phase_ == Phase::watching) controller.believe();
-  suspected_ = false;
-  contradicting_ = 0;
+  auto* watching = std::get_if<Watching>(&state_);
+  if (!watching) return;
+  if (watching->suspects) controller.resume();
+  watching->suspects = false;
+  watching->contradicting = 0;
 }
 
 bool EndoscopeRecovery::stepped(const ImageMeasurement& image, bool delay_is_known) {
@@ -92,18 +99,15 @@ void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
   if (reason != HoldReason::wild_joints && reason != HoldReason::frozen_image) return;
   agreeing_ = 0;
   drop_suspicion(controller);
-  if (reason == HoldReason::frozen_image) {
-    if (phase_ == Phase::resting || phase_ == Phase::exploring) rest_again(controller);
-    return;
-  }
-  offsets_.clear();
-  refine_at_s_.clear();  // its sightings go by the joints of before
+  auto* watching = std::get_if<Watching>(&state_);
+  if (!watching) return rest_again(controller);
+  if (reason == HoldReason::wild_joints) watching->offsets.clear();
 }
 
-// A turn about the RCM looks like a jump of the joints, which these would have told.
-bool EndoscopeRecovery::jumped(const Eigen::Vector4d& q_seen) const {
-  if (offsets_.empty()) return false;
-  const Eigen::Vector4d off = q_seen - measured_->q - offsets_.back().q;
+// A turn about the RCM looks like a jump of the joints, which these would have shown.
+bool EndoscopeRecovery::jumped(const Watching& watching, const Eigen::Vector4d& q_seen) const {
+  const Eigen::Vector4d& before = watching.offsets.empty() ? trusted_ : watching.offsets.back().q;
+  const Eigen::Vector4d off = q_seen - measured_->q - before;
   return (off.head<3>().cwiseAbs().array() > max_jump.array()).any();
 }
 
@@ -125,63 +129,63 @@ bool EndoscopeRecovery::follow_joints(const ImageMeasurement& image, VisualContr
 
 // Until another offset is trusted, it is this path's.
 bool EndoscopeRecovery::collects() const {
-  if (path_.joints.empty() || phase_ == Phase::failed) return false;
-  return phase_ != Phase::watching || !refine_at_s_.empty() || (offsets_.empty() && agreeing_ >= agreed_after);
+  if (path_.joints.empty()) return false;
+  const auto* watching = std::get_if<Watching>(&state_);
+  return !watching || (watching->offsets.empty() && agreeing_ >= agreed_after);
 }
 
 void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step, VisualController& controller) {
-  switch (phase_) {
-    case Phase::watching:
-      trust(input, step);
-      return refine(input, controller);
-    case Phase::resting:
-      return wait_for_rest(input);
-    case Phase::exploring:
-      return explore(input, step, controller);
-    case Phase::failed:
-      return;
+  if (auto* watching = std::get_if<Watching>(&state_)) return trust(*watching, input, step);
+  if (!input.image) return;
+  const auto seen = sighting_of(*input.image);
+  if (auto* rest = std::get_if<WaitingForRest>(&state_)) {
+    if (seen) return wait_for_rest(*rest, *seen);
+    rest->sightings.clear();
+  } else if (input.image->repetition != Repetition::none) {
+    return;
+  } else if (auto* motion = std::get_if<WaitingForMotion>(&state_)) {
+    if (seen) wait_for_motion(*motion, *seen, controller);
+  } else if (auto* waiting = std::get_if<WaitingForStart>(&state_); seen) {
+    add_where_moved(waiting->sightings, *seen);
+    waiting->newest = *seen;
   }
 }
 
-void EndoscopeRecovery::trust(const ServoInput& input, const ControlStep& step) {
+void EndoscopeRecovery::trust(Watching& watching, const ServoInput& input, const ControlStep& step) {
   const auto& image = input.image;
   if (!image || !image->found || !image->q || step.action != ControlAction::track || !step.estimate || !measured_)
     return;
   agreeing_ = std::min(agreeing_ + 1, agreed_after);
-  offsets_.push_back({input.time_s, step.estimate->q - input.joints.q.vector(), *measured_});
-  while (input.time_s - offsets_.front().time_s > offset_memory_s) offsets_.pop_front();
+  watching.offsets.push_back({input.time_s, step.estimate->q - input.joints.q.vector(), *measured_});
+  while (input.time_s - watching.offsets.front().time_s > offset_memory_s) watching.offsets.pop_front();
 }
 
-void EndoscopeRecovery::notice(VisualController& controller) {
-  suspected_ = false;
+void EndoscopeRecovery::notice(Watching& watching, VisualController& controller) {
   // Where none was trusted since the last time, that time's still holds.
-  if (!offsets_.empty()) trust_before();
+  if (!watching.offsets.empty()) trust_before(std::move(watching.offsets));
   camera_from_rcm_.reset();
-  refine_at_s_.clear();
-  oldest_counted_ = ++registration_;
+  ++registration_;
   rest_again(controller);
 }
 
-void EndoscopeRecovery::trust_before() {
+void EndoscopeRecovery::trust_before(std::deque<Offset> offsets) {
   // Where the latest are too young, the oldest that there is.
-  const double last_s = offsets_.back().time_s;
+  const double last_s = offsets.back().time_s;
   std::deque<Offset> later;
-  while (offsets_.size() > 1 && last_s - offsets_.back().time_s < offset_age_s) {
-    later.push_front(offsets_.back());
-    offsets_.pop_back();
+  while (offsets.size() > 1 && last_s - offsets.back().time_s < offset_age_s) {
+    later.push_front(offsets.back());
+    offsets.pop_back();
   }
-  later.push_front(offsets_.back());
-  trusted_ = offsets_.back().q;
-  offsets_.clear();
+  later.push_front(offsets.back());
+  trusted_ = offsets.back().q;
   path_ = {later.front().measured.sides, {}};
   for (const Offset& offset : later) path_.joints.emplace_back(offset.measured.q.tail<2>());
   path_.joints.emplace_back(measured_->q.tail<2>());
 }
 
 void EndoscopeRecovery::rest_again(VisualController& controller) {
-  phase_ = follows_ && failed_ < max_attempts_ ? Phase::resting : Phase::failed;
-  sightings_.clear();
-  controller.recover({});
+  state_ = WaitingForRest{};
+  controller.suspend(HoldReason::endoscope_moved);
 }
 
 std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurement& image) const {
@@ -195,79 +199,49 @@ std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurem
   return sighting;
 }
 
-void EndoscopeRecovery::wait_for_rest(const ServoInput& input) {
-  if (!input.image) return;
-  const auto seen = sighting_of(*input.image);
-  const bool rests =
-      seen && !sightings_.empty() && (seen->edges_px - sightings_.front().edges_px).cwiseAbs().maxCoeff() < rest_px;
-  if (!rests) {
-    sightings_.clear();
-    rests_since_s_ = input.image->time_s;
+void EndoscopeRecovery::wait_for_rest(WaitingForRest& waiting, const MarkerSighting& seen) {
+  Sightings& sightings = waiting.sightings;
+  if (sightings.empty() || !((seen.edges_px - sightings.front().edges_px).cwiseAbs().maxCoeff() < rest_px)) {
+    sightings.clear();
+    waiting.since_s = measured_->stamp_s;
   }
-  if (!seen) return;
-  add_sighting(*seen, apart_s);
-  if (sightings_.size() < min_rest_images || input.image->time_s - rests_since_s_ < rest_s) return;
+  sightings.push_back(seen);
+  if (sightings.size() < min_rest_images || measured_->stamp_s - waiting.since_s < rest_s) return;
   // Those before may still show the end of a motion that ends smoothly.
-  sightings_.erase(sightings_.begin(), sightings_.end() - min_rest_images);
-  phase_ = Phase::exploring;
-  explored_s_ = 0;
-  seen_s_ = input.time_s;
-  motion_ = exploring_motion(limits_, input.joints.q.vector());
+  sightings.erase(sightings.begin(), sightings.end() - min_rest_images);
+  state_ = WaitingForMotion{std::move(sightings), min_images};
 }
 
-void EndoscopeRecovery::explore(const ServoInput& input, const ControlStep& step, VisualController& controller) {
-  const bool moves = step.action == ControlAction::probe;
-  if (moves) explored_s_ += controller.config().period_s;
-  const auto seen = input.image ? sighting_of(*input.image) : std::nullopt;
-  if (seen) seen_s_ = input.time_s;
-  const bool fresh = input.image && input.image->repetition == Repetition::none;
-  if (seen && fresh && moves && sightings_.size() < max_images) add_sighting(*seen, apart_s);
-  if (input.time_s - seen_s_ > max_lost_s) {
-    ++failed_;
-    return rest_again(controller);
+void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen,
+                                        VisualController& controller) {
+  add_where_moved(waiting.sightings, seen);
+  if (waiting.sightings.size() < waiting.fit_at) return;
+  const auto found = fit(waiting.sightings);
+  if (found && !(found->rms_px < max_rms_px)) return rest_again(controller);
+  if (!found || !is_certain(*found)) {
+    waiting.fit_at = std::min(waiting.sightings.size() * 3 / 2, max_images);
+    return;
   }
-  if (explored_s_ < motion_.duration_s()) return controller.recover({motion_.velocity(explored_s_)});
-  conclude(input, controller);
+  state_ = WaitingForStart{std::move(waiting.sightings), seen};
+  controller.suspend(HoldReason::endoscope_measured);
 }
 
-void EndoscopeRecovery::add_sighting(const MarkerSighting& sighting, double min_apart_s) {
-  if (!(measured_->stamp_s - sighted_s_ >= min_apart_s)) return;
-  sighted_s_ = measured_->stamp_s;
-  sightings_.push_back(sighting);
-}
-
-void EndoscopeRecovery::conclude(const ServoInput& input, VisualController& controller) {
+std::optional<RegistrationFit> EndoscopeRecovery::fit(const Sightings& sightings) const {
   const Marker& marker = rig_.instruments.front().marker;
-  const auto fit =
-      fit_registration(rig_.camera, marker, sightings_, path_, camera_from_rcm_by(marker, sightings_.front()));
-  if (!fit || sightings_.size() < min_images || !(fit->rms_px < max_rms_px) || !(fit->sigma_position_m < max_sigma_m) ||
-      !(fit->sigma_rotation_rad < max_sigma_rad)) {
-    ++failed_;
-    return rest_again(controller);
-  }
-  failed_ = contradicting_ = 0;
-  phase_ = Phase::watching;
-  camera_from_rcm_ = fit->camera_from_rcm;
-  oldest_counted_ = ++registration_;
-  refine_at_s_ = {input.time_s + 1.5, input.time_s + 4};
-  controller.recovered(feature_model(rig_, fit->camera_from_rcm));
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < sightings_.size(); i += refining_each) sightings_[kept++] = sightings_[i];
-  sightings_.resize(kept);
+  return fit_registration(rig_.camera, marker, sightings, path_, camera_from_rcm_by(marker, sightings.front()));
 }
 
-// Of the images that were seen from here to there, few are enough.
-void EndoscopeRecovery::refine(const ServoInput& input, VisualController& controller) {
-  if (refine_at_s_.empty()) return;
-  if (input.image && input.image->repetition == Repetition::none)
-    if (const auto seen = sighting_of(*input.image)) add_sighting(*seen, refining_apart_s);
-  if (input.time_s < refine_at_s_.front()) return;
-  refine_at_s_.pop_front();
-  const auto fit = fit_registration(rig_.camera, rig_.instruments.front().marker, sightings_, path_, *camera_from_rcm_);
-  if (!fit || !(fit->rms_px < max_rms_px)) return;
-  camera_from_rcm_ = fit->camera_from_rcm;
+void EndoscopeRecovery::start(const WaitingForStart& waiting, VisualController& controller) {
+  Sightings sightings = waiting.sightings;
+  sightings.push_back(waiting.newest);
+  const auto found = fit(sightings);
+  if (!found || !(found->rms_px < max_rms_px) || !(found->newest_rms_px < max_newest_rms_px))
+    return rest_again(controller);
+  state_ = Watching{};
+  agreeing_ = agreed_after;
+  camera_from_rcm_ = found->camera_from_rcm;
   ++registration_;
-  controller.refine(feature_model(rig_, fit->camera_from_rcm));
+  controller.resume(feature_model(rig_, found->camera_from_rcm));
 }
 
 }  // namespace lapservo::internal

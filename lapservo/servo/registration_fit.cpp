@@ -90,10 +90,15 @@ struct Sums {
   Normal information = Normal::Zero();
   Numbers gradient = Numbers::Zero();
   double cost = 0, squares_px2 = 0;
+  double newest_px2 = 0;  // of the last one
 };
 
 double loss(double squares) {
   return loss_sigmas * loss_sigmas * std::log1p(squares / (loss_sigmas * loss_sigmas));
+}
+
+double rms_px(double squares_px2, std::size_t sightings) {
+  return std::sqrt(squares_px2 / (8.0 * static_cast<double>(sightings)));
 }
 
 bool add(const Model& model, const CrossedSighting& sighting, const Numbers& x, bool with_slopes, Sums& sums) {
@@ -101,7 +106,8 @@ bool add(const Model& model, const CrossedSighting& sighting, const Numbers& x, 
   if (!expected) return false;
   const Edges off = (*expected - sighting.edges_px) / sigma_px;
   sums.cost += loss(off.squaredNorm());
-  sums.squares_px2 += sigma_px * sigma_px * off.squaredNorm();
+  sums.newest_px2 = sigma_px * sigma_px * off.squaredNorm();
+  sums.squares_px2 += sums.newest_px2;
   if (!with_slopes) return true;
   static const Numbers step = steps();
   Slopes slopes;
@@ -177,7 +183,8 @@ std::optional<RegistrationFit> fit_registration(const Camera& camera, const Mark
   }
   RegistrationFit fit;
   fit.camera_from_rcm = model.camera_from_rcm(x);
-  fit.rms_px = std::sqrt(at->squares_px2 / (8.0 * static_cast<double>(sightings.size())));
+  fit.rms_px = rms_px(at->squares_px2, sightings.size());
+  fit.newest_rms_px = rms_px(at->newest_px2, 1);
   const double worse = std::max(1.0, fit.rms_px / sigma_px);
   const Normal covariance = alike_images * worse * worse * inverse_of_symmetric(at->information);
   fit.sigma_rotation_rad = std::sqrt(covariance.topLeftCorner<3, 3>().trace());

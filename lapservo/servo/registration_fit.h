@@ -35,6 +35,7 @@ struct RegistrationPrior {
 struct RegistrationFit {
   Rigid3 camera_from_rcm;
   double rms_px = 0;              ///< of the edges' coordinates
+  double newest_rms_px = 0;       ///< of the last sighting's alone
   double sigma_position_m = 0;    ///< of the RCM: root of the squares' sum
   double sigma_rotation_rad = 0;  ///< of the angle between the true rotation and this
 };

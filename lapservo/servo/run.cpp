@@ -15,7 +15,8 @@ namespace {
 // An image alone can't tell an endoscope that moved from an instrument that did; the joints do.
 void withhold_contradicted(ControlTick& tick) {
   const HoldReason reason = tick.decision.control.reason;
-  if (!tick.seen || (reason != HoldReason::outlier && reason != HoldReason::endoscope_moved)) return;
+  const bool contradicted = reason == HoldReason::outlier || reason == HoldReason::endoscope_moved;
+  if (!tick.seen || !(contradicted || tick.decision.release)) return;
   tick.seen->observations.front().rcm.reset();
   tick.seen->observations.front().features.r_px.reset();
   tick.seen->measurement.found = false;
@@ -41,6 +42,7 @@ void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& confi
     if (tick.seen) tick.input.image = tick.seen->measurement;
     tick.decision = servo.step(tick.input);
     if (tick.decision.send) robot.send(servo.path());
+    if (tick.decision.release) robot.release();
     if (tick.decision.registration != registration) {
       registration = tick.decision.registration;
       vision->use(registration, tick.decision.camera_from_rcm);

@@ -43,8 +43,9 @@ class RunObserver {
 /// The servo loop: reads the joints, sees, decides, sends, then tells the observer, once every
 /// ControllerConfig::period_s for `duration_s`; then lets the arm brake to rest. A missing or stale image, a lost
 /// marker, an outlier, a number that is not finite or an arm that is not enabled make it hold within the tick; it goes
-/// on by itself when all is well again. A late tick shifts none of those after it. Where the endoscope moves it holds,
-/// and once that rests measures camera_from_rcm anew by small motions of the arm (ControlAction::probe).
+/// on by itself when all is well again. A late tick shifts none of those after it. Where the endoscope moves it
+/// releases the arm, measures camera_from_rcm anew from motion that the operator makes, and goes on after
+/// JointState::started.
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 

@@ -6,9 +6,11 @@
 #include <cstdio>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
+#include "lapservo/control/calibration_motion.h"
 #include "lapservo/control/newton_inverse.h"
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/random_start.h"
@@ -49,7 +51,7 @@ struct Case {
   std::optional<Interval> frozen{};  ///< the picture from its beginning arrives again and again
   bool new_stamps = true;            ///< then, as if it were new
   std::optional<EndoscopeMotion> endoscope{};
-  int endoscope_attempts = 3;
+  bool operated = true;  ///< then somebody moves the released arm, and says start
   double exposure_s = 0;
   float smoke = 0;
   std::vector<Blotch> blotches{};
@@ -78,21 +80,61 @@ RunConfig config_of(const Rig& rig, const Case& c) {
   RunConfig config;
   config.rig = rig;
   config.controller.mode = c.mode;
-  config.controller.endoscope_attempts = c.endoscope_attempts;
   config.controller.window = image_window(rig.camera, 10);
   config.tracking_thread = c.thread;
   return config;
 }
 
+// The simulated arm, whose operator swings all joints while it is released, until that is enough, and then says start.
+class OperatedArm : public Robot {
+ public:
+  explicit OperatedArm(Simulator& simulator) : simulator_(simulator) {}
+
+  JointState state() override {
+    JointState state = simulator_.state();
+    state.started = std::exchange(started_, false);
+    return state;
+  }
+  std::vector<JointReading> readings() override { return simulator_.readings(); }
+  void send(const JointPath& path) override { simulator_.send(path); }
+
+  void operate(const ServoDecision& decision, double time_s) {
+    constexpr double rests_s = 1.5, waits_s = 0.5, period_s = 1.0 / 60;
+    if (!decision.release) return hand_.reset();
+    if (!hand_) hand_ = Hand{time_s + rests_s, swing_motion(simulator_.measured_jp(), limits_, 1, 10)};
+    if (decision.control.reason == HoldReason::endoscope_measured && !hand_->measured_s) hand_->measured_s = time_s;
+    started_ = hand_->measured_s && time_s > *hand_->measured_s + waits_s;
+    if (hand_->measured_s || time_s < hand_->begin_s) return;
+    const double since_s = time_s - hand_->begin_s;
+    if (since_s < period_s) path_.reset(time_s, simulator_.measured_jp());
+    path_.ramp_to(time_s, (hand_->motion.at(since_s + period_s) - hand_->motion.at(since_s)) / period_s, period_s);
+    simulator_.send(path_);
+  }
+
+ private:
+  struct Hand {
+    double begin_s;
+    JointMotion motion;
+    std::optional<double> measured_s{};
+  };
+  Simulator& simulator_;
+  JointLimits limits_;
+  JointPath path_{limits_.acceleration};
+  std::optional<Hand> hand_;
+  bool started_ = false;
+};
+
 class Watcher : public RunObserver {
  public:
-  Watcher(const Case& c, const Rig& rig, Simulator& simulator) : case_(c), rig_(rig), simulator_(simulator) {}
+  Watcher(const Case& c, const Rig& rig, Simulator& simulator, OperatedArm* operated = nullptr)
+      : case_(c), rig_(rig), simulator_(simulator), operated_(operated) {}
 
   bool on_tick(const ControlTick& tick) override {
     const double time_s = tick.input.time_s;
     SimulatedArm& arm = simulator_.arm();
     if (case_.faulted && case_.faulted->contains(time_s) && !arm.faulted()) arm.fault();
     if (case_.faulted && time_s >= case_.faulted->end_s && arm.faulted()) arm.recover();
+    if (operated_) operated_->operate(tick.decision, time_s);
     const Rigid3 camera_from_first_camera = simulator_.camera_from_first_camera();
     const Rigid3 camera_from_rcm = camera_from_first_camera * *rig_.instruments[0].camera_from_rcm;
     done.records.push_back({tick.input, tick.decision,
@@ -109,6 +151,7 @@ class Watcher : public RunObserver {
   Case case_;
   Rig rig_;
   Simulator& simulator_;
+  OperatedArm* operated_;
 };
 
 // So long a wait means that something hangs.
@@ -193,7 +236,8 @@ PastRun run_case(const Case& c) {
   if (c.hidden) simulator.cover_marker(*c.hidden);
   if (c.dark) simulator.change_light(*c.dark, 0.01F);
   if (c.endoscope) simulator.move_endoscope(*c.endoscope);
-  Watcher watcher(c, rig, simulator);
+  OperatedArm arm(simulator);
+  Watcher watcher(c, rig, simulator, c.operated ? &arm : nullptr);
   if (c.frozen) {
     FreezingImages images(simulator, *c.frozen, c.new_stamps);
     run(simulator, images, simulator, config, trajectory, c.duration_s, watcher);
@@ -201,7 +245,7 @@ PastRun run_case(const Case& c) {
     InStep in_step(simulator);
     run(in_step, in_step, in_step, config, trajectory, c.duration_s, watcher);
   } else {
-    run(simulator, simulator, simulator, config, trajectory, c.duration_s, watcher);
+    run(arm, simulator, simulator, config, trajectory, c.duration_s, watcher);
   }
   return std::move(watcher.done);
 }
@@ -412,22 +456,37 @@ bool is_right(const PastRun& done, std::size_t k, double max_px) {
          done.error(k).tail<3>().cwiseAbs().maxCoeff() < max_px;
 }
 
+// From the moment on in which the loop released the arm nothing was sent, nor was another registration gone by, until
+// the operator said start.
+void expect_nothing_until_start(const PastRun& done) {
+  bool released = false;
+  int registration = 0;
+  for (const auto& [input, decision, truth, camera, seen] : done.records) {
+    if (input.joints.started) released = false, ++registration;
+    if (decision.release && !released) released = true, ++registration;
+    EXPECT_EQ(decision.release, released) << input.time_s;
+    EXPECT_EQ(decision.registration, registration) << input.time_s;
+    EXPECT_FALSE(released && decision.send) << input.time_s;
+  }
+}
+
 void expect_measured_anew(const Rig& rig, const Case& c) {
   const PastRun done = run_case(c);
   const ControllerConfig controller = config_of(rig, c).controller;
-  std::optional<double> held_s, measured_s;
+  std::optional<double> held_s, started_s;
   double wrong_s = 0;
   for (std::size_t k = 0; k < done.records.size(); ++k) {
     const ServoDecision& decision = done.records[k].decision;
     const double since_s = done.records[k].input.time_s - endoscope_moves_s;
     if (since_s < 0) continue;
     if (!held_s && decision.control.action == ControlAction::hold) held_s = since_s;
-    if (!measured_s && decision.registration == 2) measured_s = since_s;
+    if (!started_s && decision.registration == 2) started_s = since_s;
     if (!is_right(done, k, 1)) wrong_s = since_s;
   }
-  ASSERT_TRUE(held_s && measured_s);
+  ASSERT_TRUE(held_s && started_s);
   const auto difference = replay(logged(done), rig, controller);
   EXPECT_FALSE(difference) << difference->tick << " " << difference->column;
+  expect_nothing_until_start(done);
   // By the first image that shows it, 83 or 100 ms; by the second one where builds' last bits differ.
   EXPECT_LE(*held_s, c.endoscope->duration_s > 0 ? 0.12 : 0.1);
   EXPECT_LE(wrong_s, c.duration_s - endoscope_moves_s - 0.3);
@@ -435,28 +494,29 @@ void expect_measured_anew(const Rig& rig, const Case& c) {
   if (c.endoscope->duration_s == 0) expect_right_where_ok(done, c.latency_s, controller.period_s);
 }
 
-// Held at once, measured anew by small motions, and on again. At once and slowly, so that what is seen meanwhile
-// belongs to neither place.
-TEST(Run, MeasuresTheRegistrationAnewWhenTheEndoscopeMoved) {
+// Held at once, measured anew by the operator's motion, and on again after start. At once and slowly, so that what is
+// seen meanwhile belongs to neither place.
+TEST(Run, GoesOnAfterStartWhereTheEndoscopeMoved) {
   const Rig rig = testing::small_test_rig();
   Random random(1);
   for (const double duration_s : {0.0, 0.6}) {
     SCOPED_TRACE(duration_s);
     Case c;
-    c.duration_s = 10;
+    c.duration_s = 14;
     c.endoscope = random_motion(rig, duration_s, random);
     expect_measured_anew(rig, c);
   }
 }
 
-TEST(Run, HoldsForGoodWhereItMayNotMeasureAMovedEndoscope) {
+TEST(Run, HoldsForGoodWhereNobodyMovesTheArmAfterTheEndoscopeMoved) {
   const Rig rig = testing::small_test_rig();
   Random random(1);
   Case c;
-  c.endoscope_attempts = 0;
+  c.operated = false;
   c.duration_s = endoscope_moves_s + 3;
   c.endoscope = random_motion(rig, 0, random);
   const PastRun done = run_case(c);
+  expect_nothing_until_start(done);
   for (const Record& record : done.records) {
     if (record.input.time_s > endoscope_moves_s + 0.1) {
       EXPECT_EQ(record.decision.control.reason, HoldReason::endoscope_moved) << record.input.time_s;

@@ -25,13 +25,13 @@ Servo::Servo(const ControllerConfig& config, FeatureModel model)
 
 Servo::Servo(const ControllerConfig& config, const Rig& rig) : Servo(config, feature_model(rig)) {
   camera_from_rcm_ = rig.instruments.front().camera_from_rcm;
-  if (config.mode == ControlMode::fused) recovery_.emplace(rig, config);
+  if (config.mode == ControlMode::fused) recovery_.emplace(rig);
 }
 
 ServoDecision Servo::step(const ServoInput& input) {
   if (!recovery_) return decide(input);
   ServoInput counted = input;
-  if (input.image && !recovery_->counts(input.image->registration)) counted.image.reset();
+  if (input.image && input.image->registration != recovery_->registration()) counted.image.reset();
   recovery_->see(counted, controller_);
   ServoDecision decision = decide(counted);
   recovery_->follow(counted, decision.control, controller_);
@@ -51,13 +51,13 @@ ServoDecision Servo::decide(const ServoInput& input) {
   decision.registration_contradicted = images_contradicting_ >= contradicted_after;
   decision.send = orderly(decision.control);
   start_anew_when_at_rest(input, decision.control.reason);
-  if (input.joints.operating_state != OperatingState::enabled) {
-    decision.control.action = ControlAction::hold;
-    decision.control.reason = HoldReason::arm_not_enabled;
-    decision.send = false;
-    // Setpoints stay where the arm is, so that nothing jumps when it is enabled again.
-    if (std::isfinite(input.time_s) && q.allFinite()) controller_.reset(input.time_s, q);
-  }
+  decision.release = recovery_ && recovery_->moved();
+  if (input.joints.operating_state == OperatingState::enabled && !decision.release) return decision;
+  decision.control.action = ControlAction::hold;
+  if (!decision.release) decision.control.reason = HoldReason::arm_not_enabled;
+  decision.send = false;
+  // Setpoints stay where the arm is, so that nothing jumps when it is to move again.
+  if (std::isfinite(input.time_s) && q.allFinite()) controller_.reset(input.time_s, q);
   return decision;
 }
 

@@ -26,10 +26,11 @@ struct ServoDecision {
   /// Images show the marker well, but for some time nowhere where camera_from_rcm, lens and RCM agree on a
   /// configuration: one of them is wrong, r with it, and nothing in the image tells by how much.
   bool registration_contradicted = false;
-  /// Which camera_from_rcm the loop goes by: 0 the rig's, then one more whenever the endoscope moved and when it has
-  /// been measured anew. Images that were tracked with another one do not count.
+  /// Which camera_from_rcm the loop goes by: 0 the rig's, then one more whenever the endoscope moved and when the
+  /// operator has started it with one that was measured anew. Images that were tracked with another one do not count.
   int registration = 0;
-  std::optional<Rigid3> camera_from_rcm;  ///< nullopt while it is being measured, and where the rig has none
+  std::optional<Rigid3> camera_from_rcm;  ///< nullopt until that start, and where the rig has none
+  bool release = false;                   ///< until that start the arm is the operator's: Robot::release()
   bool send = false;                      ///< the arm is to follow path(); else it is left alone and holds by itself
 };
 

@@ -45,7 +45,7 @@ std::string covariance_column(int row, int column) {
 }
 
 std::vector<std::string> make_input_columns() {
-  std::vector<std::string> columns{"time_s", "arm_state", "arm_follows"};
+  std::vector<std::string> columns{"time_s", "arm_state", "arm_follows", "arm_started"};
   name(columns, "joint_", joints);
   columns.emplace_back("readings");
   columns.insert(columns.end(), {"image", "image_time_s", "image_registration", "image_repetition"});
@@ -118,6 +118,7 @@ std::vector<std::string> input_fields(const ServoInput& input) {
   write(fields, input.time_s);
   fields.emplace_back(to_string(input.joints.operating_state));
   fields.emplace_back(input.joints.follows ? "1" : "0");
+  fields.emplace_back(input.joints.started ? "1" : "0");
   write(fields, input.joints.q.vector());
   fields.push_back(text_of(input.readings));
   write_image(fields, input.image);
@@ -140,6 +141,11 @@ class Row {
     const double value = std::strtod(field.c_str(), &end);
     if (field.empty() || *end) complain(column, "a number");
     return value;
+  }
+  bool flag(const std::string& column) const {
+    const std::string& field = text(column);
+    if (field != "0" && field != "1") complain(column, "0 or 1");
+    return field == "1";
   }
   Eigen::Vector4d numbers(const char* prefix, const Names& names) const {
     Eigen::Vector4d values;
@@ -209,9 +215,8 @@ ServoInput read_input(const Row& row) {
   const auto state = operating_state_from_string(row.text("arm_state"));
   if (!state) row.complain("arm_state", "DISABLED, ENABLED, PAUSED or FAULT");
   input.joints.operating_state = *state;
-  const std::string follows = row.text("arm_follows");
-  if (follows != "0" && follows != "1") row.complain("arm_follows", "0 or 1");
-  input.joints.follows = follows == "1";
+  input.joints.follows = row.flag("arm_follows");
+  input.joints.started = row.flag("arm_started");
   input.readings = read_readings(row);
   input.image = read_image(row);
   input.desired.features = row.numbers("desired_", features);

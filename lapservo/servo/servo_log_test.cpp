@@ -29,7 +29,7 @@ Record any_record(Random& random, int kind) {
   Record record;
   record.input.time_s = random.uniform(0, 100);
   record.input.joints = {record.input.time_s, JointVector::from_vector(any(random)),
-                         kind % 2 ? OperatingState::enabled : OperatingState::fault, kind % 3 != 0};
+                         kind % 2 ? OperatingState::enabled : OperatingState::fault, kind % 3 != 0, kind % 5 == 0};
   record.input.desired = {any(random), any(random), any(random)};
   for (int i = 0; i < kind % 4; ++i)
     record.input.readings.push_back({random.uniform(), JointVector::from_vector(any(random))});
@@ -66,6 +66,7 @@ void expect_same_bits(const ServoInput& a, const ServoInput& b) {
   EXPECT_EQ(a.joints.q.vector(), b.joints.q.vector());
   EXPECT_EQ(a.joints.operating_state, b.joints.operating_state);
   EXPECT_EQ(a.joints.follows, b.joints.follows);
+  EXPECT_EQ(a.joints.started, b.joints.started);
   ASSERT_EQ(a.readings.size(), b.readings.size());
   for (std::size_t i = 0; i < a.readings.size(); ++i) {
     EXPECT_EQ(a.readings[i].time_s, b.readings[i].time_s);

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "lapservo/control/calibration_motion.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
@@ -241,14 +242,20 @@ class MovedEndoscope {
   void aim(const Eigen::Vector4d& from_start) {
     desired_.features = feature_model(rig_)(start + from_start).value().features;
   }
+  void push(const Eigen::Vector4d& by) { q_ += by; }
   void move() { camera_from_rcm_.translation += Eigen::Vector3d(0.004, -0.006, 0.01); }
 
   ServoDecision step() {
-    ServoInput input{time_s_, {time_s_, JointVector::from_vector(q_ + encoder_off), state}, std::nullopt, desired_, {}};
+    ServoInput input{time_s_,
+                     {time_s_, JointVector::from_vector(q_ + encoder_off), state, true, started},
+                     std::nullopt,
+                     desired_,
+                     {}};
     if (steps_++ % image_every == 0) input.image = image();
     time_s_ += period_s_;
     last_ = servo_.step(input);
     q_exposed_ = q_;
+    started = false;
     if (last_.send) q_ = last_.control.setpoint.position - encoder_off;
     return last_;
   }
@@ -263,16 +270,27 @@ class MovedEndoscope {
       if (condition(step())) return true;
     return false;
   }
-  bool until_registration(int number) {
-    return until([number](const ServoDecision& decision) { return decision.registration == number; });
+  // As somebody does who swings all joints until that is enough; nothing else moves them.
+  bool until_measured() {
+    const Eigen::Vector4d from = q_;
+    const JointMotion motion = swing_motion(from, JointLimits(), 0.7, 12);
+    const double begin_s = time_s_ + 0.5;
+    return until([&](const ServoDecision& decision) {
+      EXPECT_FALSE(decision.send);
+      EXPECT_TRUE(decision.release);
+      if (decision.control.reason == HoldReason::endoscope_measured) return true;
+      q_ = motion.at(time_s_ - begin_s);
+      return false;
+    });
   }
-  bool until_probing() {
-    return until([](const ServoDecision& decision) { return decision.control.action == ControlAction::probe; });
+  ServoDecision start_anew() {
+    started = true;
+    return step();
   }
 
   OperatingState state = OperatingState::enabled;
   Eigen::Vector4d encoder_off = Eigen::Vector4d::Zero(), seen_off = Eigen::Vector4d::Zero();
-  bool visible = true, tells_q = true, tells_marker = true, frozen = false;
+  bool visible = true, tells_q = true, tells_marker = true, frozen = false, started = false;
   int image_every = 1;
 
  private:
@@ -313,18 +331,55 @@ class MovedEndoscope {
   int steps_ = 0;
 };
 
-TEST(MovedEndoscope, IsMeasuredAnewAlsoWhenItMovesAgainBeforeAnImageAgreed) {
+bool released(const ServoDecision& decision) {
+  return decision.release;
+}
+
+TEST(MovedEndoscope, ReleasesTheArmUntilItIsMeasuredAndStarted) {
   MovedEndoscope world;
   EXPECT_EQ(world.steps(60).registration, 0);
   world.move();
-  ASSERT_TRUE(world.until_registration(2));
+  const ServoDecision moved = world.steps(2);
+  EXPECT_EQ(moved.registration, 1);
+  EXPECT_TRUE(moved.release && !moved.send);
+  EXPECT_EQ(world.start_anew().control.reason, HoldReason::endoscope_moved);  // where it stands is not known yet
+  ASSERT_TRUE(world.until_measured());
+  const ServoDecision measured = world.steps(600);
+  EXPECT_EQ(measured.control.reason, HoldReason::endoscope_measured);
+  EXPECT_TRUE(measured.release && !measured.send && !measured.camera_from_rcm);
+  const ServoDecision started = world.start_anew();
+  EXPECT_EQ(started.registration, 2);
+  EXPECT_FALSE(started.release);
+  EXPECT_LT(world.steps(360).control.error.norm(), 0.1);
+}
+
+TEST(MovedEndoscope, IsMeasuredAnewAlsoWhenItMovesAgainBeforeAnImageAgreed) {
+  MovedEndoscope world;
+  world.steps(60);
+  world.move();
+  ASSERT_TRUE(world.until(released) && world.until_measured());
+  EXPECT_EQ(world.start_anew().registration, 2);
   world.tells_q = false;
   EXPECT_EQ(world.steps(2).registration, 3);
   world.tells_q = true;
-  ASSERT_TRUE(world.until_registration(4));
-  const ServoDecision last = world.steps(360);
-  EXPECT_EQ(last.registration, 6);  // refined twice
-  EXPECT_LT(last.control.error.norm(), 0.1);
+  ASSERT_TRUE(world.until_measured());
+  EXPECT_EQ(world.start_anew().registration, 4);
+  EXPECT_LT(world.steps(360).control.error.norm(), 0.1);
+}
+
+TEST(MovedEndoscope, IsNotGoneByWhereItMovedAgainBeforeTheStart) {
+  MovedEndoscope world;
+  world.steps(60);
+  world.move();
+  ASSERT_TRUE(world.until(released) && world.until_measured());
+  world.move();
+  world.steps(2);
+  const ServoDecision refused = world.start_anew();
+  EXPECT_EQ(refused.control.reason, HoldReason::endoscope_moved);
+  EXPECT_TRUE(refused.release);
+  ASSERT_TRUE(world.until_measured());
+  EXPECT_EQ(world.start_anew().registration, 2);
+  EXPECT_LT(world.steps(360).control.error.norm(), 0.1);
 }
 
 TEST(MovedEndoscope, IsMeasuredByCamerasOfAnyRate) {
@@ -334,40 +389,28 @@ TEST(MovedEndoscope, IsMeasuredByCamerasOfAnyRate) {
   slow.image_every = 5;
   slow.steps(120);
   slow.move();
-  EXPECT_TRUE(slow.until_registration(2));
+  EXPECT_TRUE(slow.until(released) && slow.until_measured());
   config.period_s = 1.0 / 240;
   MovedEndoscope fast(config);
   fast.steps(120);
   fast.move();
-  EXPECT_TRUE(fast.until_registration(2));
+  EXPECT_TRUE(fast.until(released) && fast.until_measured());
 }
 
-TEST(MovedEndoscope, IsMeasuredAfterAPause) {
-  ControllerConfig config = PerfectWorld::config();
-  config.endoscope_attempts = 1;
-  MovedEndoscope world(config);
+// As an arm is that is led by hand; and whoever hides the marker for a while goes on afterwards.
+TEST(MovedEndoscope, IsMeasuredWhileTheArmIsNotEnabled) {
+  MovedEndoscope world;
   world.steps(60);
   world.move();
-  ASSERT_TRUE(world.until_probing());
-  world.state = OperatingState::paused;
-  EXPECT_EQ(world.steps(600).registration, 1);
+  ASSERT_TRUE(world.until(released));
+  world.state = OperatingState::disabled;
+  world.visible = false;
+  world.steps(200);
+  world.visible = true;
+  ASSERT_TRUE(world.until_measured());
+  EXPECT_EQ(world.start_anew().control.reason, HoldReason::arm_not_enabled);
   world.state = OperatingState::enabled;
-  EXPECT_TRUE(world.until_registration(2));
-}
-
-TEST(MovedEndoscope, AnAttemptThatLosesTheMarkerHasFailed) {
-  ControllerConfig config = PerfectWorld::config();
-  config.endoscope_attempts = 1;
-  for (const double lost_s : {1.0, 3.0}) {
-    MovedEndoscope world(config);
-    world.steps(60);
-    world.move();
-    ASSERT_TRUE(world.until_probing());
-    world.visible = false;
-    world.steps(static_cast<int>(lost_s / period_s));
-    world.visible = true;
-    EXPECT_EQ(world.until_registration(2), lost_s < 2);
-  }
+  EXPECT_LT(world.steps(360).control.error.norm(), 0.1);
 }
 
 TEST(MovedEndoscope, IsNotWhatHidesTheMarkerNowAndThen) {
@@ -458,18 +501,19 @@ TEST(MovedEndoscope, IsNoPictureThatRepeats) {
 
 // What was seen before may be of another place than what is seen afterwards.
 TEST(MovedEndoscope, IsNotMeasuredByAPictureThatFreezesMeanwhile) {
-  ControllerConfig config = PerfectWorld::config();
-  config.endoscope_attempts = 1;
-  MovedEndoscope world(config);
+  MovedEndoscope world;
   world.steps(60);
   world.move();
-  ASSERT_TRUE(world.until_probing());
-  world.steps(20);
+  ASSERT_TRUE(world.until(released) && world.until_measured());
   world.frozen = true;
-  EXPECT_EQ(world.steps(90).control.reason, HoldReason::frozen_image);
+  EXPECT_EQ(world.steps(2).control.reason, HoldReason::endoscope_measured);
+  world.push({0.01, 0, 0, 0});
+  EXPECT_EQ(world.steps(30).control.reason, HoldReason::frozen_image);
   world.move();
   world.frozen = false;
-  EXPECT_TRUE(world.until_registration(2));
+  EXPECT_EQ(world.start_anew().control.reason, HoldReason::endoscope_moved);
+  ASSERT_TRUE(world.until_measured());
+  EXPECT_EQ(world.start_anew().registration, 2);
 }
 
 TEST(MovedEndoscope, IsNoEncoderThatIsSetWhileTheArmIsNotEnabled) {

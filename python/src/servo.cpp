@@ -42,6 +42,7 @@ class PythonRobot : public Robot {
     return readings;
   }
   void send(const JointPath& path) override { PYBIND11_OVERRIDE_PURE(void, Robot, send, path); }
+  void release() override { PYBIND11_OVERRIDE(void, Robot, release); }
 };
 
 class PythonClock : public Clock {
@@ -68,20 +69,25 @@ class PythonImageStream : public ImageStream {
 
 void bind_ports(py::module_& m) {
   py::class_<JointState>(m, "JointState", "What an arm says of itself.")
-      .def(py::init([](double time_s, const Eigen::Vector4d& q, const std::string& operating_state, bool follows) {
-             return JointState{time_s, JointVector::from_vector(q), operating_state_of(operating_state), follows};
+      .def(py::init([](double time_s, const Eigen::Vector4d& q, const std::string& operating_state, bool follows,
+                       bool started) {
+             return JointState{time_s, JointVector::from_vector(q), operating_state_of(operating_state), follows,
+                               started};
            }),
            py::arg("time_s"), py::arg("q"), py::arg("operating_state") = "ENABLED", py::arg("follows") = true,
+           py::arg("started") = false,
            "time_s: when the joints were read, on the loop's clock; q: float[4], theta, phi [rad], rho [m], psi [rad]; "
            "operating_state: CRTK's word; follows: False where nothing that is sent moves the arm, and the loop only "
            "says "
-           "what it would do.")
+           "what it would do; started: the operator has said start since the last state, which a loop waits for after "
+           "the endoscope moved.")
       .def_readonly("time_s", &JointState::time_s)
       .def_property_readonly(
           "q", [](const JointState& self) { return self.q.vector(); }, "float[4]")
       .def_property_readonly("operating_state",
                              [](const JointState& self) { return std::string(to_string(self.operating_state)); })
-      .def_readonly("follows", &JointState::follows);
+      .def_readonly("follows", &JointState::follows)
+      .def_readonly("started", &JointState::started);
 
   py::class_<JointPath>(m, "JointPath",
                         R"(Set-points over time. Where no newer path comes it brakes to rest by itself.)")
@@ -96,7 +102,7 @@ void bind_ports(py::module_& m) {
 
   py::class_<Robot, PythonRobot>(m, "Robot", R"(The port to an arm: subclass it.
 
-Both calls come from the loop's thread once a control tick and must return at once. An arm samples the last path at its
+The calls come from the loop's thread once a control tick and must return at once. An arm samples the last path at its
 own rate, and forgets it as soon as it is not enabled.)")
       .def(py::init<>())
       .def("state", &Robot::state, py::call_guard<py::gil_scoped_release>(), "JointState: the latest reading.")
@@ -115,7 +121,9 @@ own rate, and forgets it as soon as it is not enabled.)")
           "than "
           "the loop asks. May be left out.")
       .def("send", &Robot::send, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
-           "Follow this JointPath from now on; it is yours.");
+           "Follow this JointPath from now on; it is yours.")
+      .def("release", &Robot::release, py::call_guard<py::gil_scoped_release>(),
+           "Until the next send() hands or teleoperation may move the arm: the endoscope moved. May be left out.");
   py::class_<ImageStream, PythonImageStream>(m, "ImageStream", "The port to a camera: subclass it.")
       .def(py::init<>())
       .def(
