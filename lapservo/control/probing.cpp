@@ -8,10 +8,12 @@
 
 namespace lapservo::internal {
 
-ProbingMotion::ProbingMotion(const ProbingConfig& config, const JointLimits& limits, const Eigen::Vector4d& q_joint)
+ProbingMotion::ProbingMotion(const ProbingConfig& config, const JointLimits& limits, const Eigen::Vector4d& q_joint,
+                             const Eigen::Vector4d& side)
     : joint_time_s_(config.joint_time_s) {
   const Eigen::Vector4d middle = (limits.lower + limits.upper) / 2;
   for (int i = 0; i < 4; ++i) distance_[i] = q_joint[i] > middle[i] ? -config.distance[i] : config.distance[i];
+  distance_ = distance_.cwiseProduct(side);
 }
 
 Eigen::Vector4d ProbingMotion::velocity(double time_s) const {
@@ -21,6 +23,12 @@ Eigen::Vector4d ProbingMotion::velocity(double time_s) const {
   const int joint = static_cast<int>(turn);
   result[joint] = distance_[joint] * (pi / joint_time_s_) * std::sin(two_pi * (turn - joint));
   return result;
+}
+
+double ProbingMotion::way_back_s(double time_s) const {
+  const double turn = time_s / joint_time_s_, begin = std::floor(turn);
+  if (!(turn >= 0) || turn >= 4 || turn - begin >= 0.5) return time_s;
+  return joint_time_s_ * (2 * begin + 1 - turn);
 }
 
 double ProbingMotion::duration_s() const {

@@ -20,10 +20,16 @@ namespace lapservo::internal {
 class ProbingMotion {
  public:
   ProbingMotion() = default;
-  ProbingMotion(const ProbingConfig& config, const JointLimits& limits, const Eigen::Vector4d& q_joint);
+  /// `side`: of each joint, 1, or -1 for towards the nearer limit.
+  ProbingMotion(const ProbingConfig& config, const JointLimits& limits, const Eigen::Vector4d& q_joint,
+                const Eigen::Vector4d& side = Eigen::Vector4d::Ones());
 
   Eigen::Vector4d velocity(double time_s) const;
   double duration_s() const;
+
+  /// When the joint that moves then is there again on its way back; the same time where it is on that way already, or
+  /// all joints rest.
+  double way_back_s(double time_s) const;
 
  private:
   Eigen::Vector4d distance_ = Eigen::Vector4d::Zero();  ///< signed

@@ -3,6 +3,15 @@
 #include <algorithm>
 
 namespace lapservo::internal {
+namespace {
+
+bool contains(const ImageWindow& window, const Eigen::Vector4d& ends_px) {
+  const Eigen::Array2d u(ends_px[0], ends_px[2]), v(ends_px[1], ends_px[3]);
+  return u.minCoeff() >= window.u_min_px && u.maxCoeff() <= window.u_max_px && v.minCoeff() >= window.v_min_px &&
+         v.maxCoeff() <= window.v_max_px;
+}
+
+}  // namespace
 
 UncalibratedEstimator::UncalibratedEstimator(const ControllerConfig& config)
     : scales_(config.scales),
@@ -10,7 +19,8 @@ UncalibratedEstimator::UncalibratedEstimator(const ControllerConfig& config)
       probing_(config.probing),
       known_delay_s_(config.observer.delay_s),
       jacobian_(config.jacobian, config.scales),
-      fit_(config.scales, config.observer.delay_s) {}
+      fit_(config.scales, config.observer.delay_s),
+      window_(config.window) {}
 
 HoldReason UncalibratedEstimator::update(const ImageMeasurement& image, const JointHistory& history) {
   HoldReason reason = HoldReason::none;
@@ -28,7 +38,8 @@ HoldReason UncalibratedEstimator::update(const ImageMeasurement& image, const Jo
 }
 
 HoldReason UncalibratedEstimator::learn_from_probing(const ImageMeasurement& image, const JointHistory& history) {
-  if (!motion_) motion_ = ProbingMotion(probing_, limits_, *history.newest());
+  if (!motion_) motion_ = ProbingMotion(probing_, limits_, *history.newest(), side_);
+  if (window_ && !contains(*window_, image.ends_px)) turn_back();
   fit_.add(image.time_s, image.features, image.ends_px, history);
   if (probed_s_ < motion_->duration_s()) return HoldReason::none;
   const auto model = fit_.solve();
@@ -40,6 +51,16 @@ HoldReason UncalibratedEstimator::learn_from_probing(const ImageMeasurement& ima
   learnt_delay_s_ = model->delay_s;
   learnt_ = true;
   return HoldReason::none;
+}
+
+// Nothing is known yet of what a joint does in the image but that it just left the window: back, and next time to the
+// other side.
+void UncalibratedEstimator::turn_back() {
+  const double back_s = motion_->way_back_s(probed_s_);
+  if (back_s == probed_s_) return;
+  const auto joint = static_cast<Eigen::Index>(probed_s_ / probing_.joint_time_s);
+  side_[joint] = -side_[joint];
+  probed_s_ = back_s;
 }
 
 void UncalibratedEstimator::probe_again() {

@@ -21,6 +21,7 @@ class UncalibratedEstimator : public Estimator {
  private:
   HoldReason learn_from_probing(const ImageMeasurement& image, const JointHistory& history);
   void probe_again();
+  void turn_back();
 
   Scales scales_;
   JointLimits limits_;
@@ -28,7 +29,9 @@ class UncalibratedEstimator : public Estimator {
   std::optional<double> known_delay_s_;
   JacobianEstimator jacobian_;
   std::optional<ProbingMotion> motion_;
+  Eigen::Vector4d side_ = Eigen::Vector4d::Ones();  ///< to which the joints are probed
   ProbingFit fit_;
+  std::optional<ImageWindow> window_;
   double probed_s_ = 0;
   bool learnt_ = false;
   double learnt_delay_s_ = 0;

@@ -411,6 +411,25 @@ TEST(VisualController, ConvergesUncalibratedFromRandomStarts) {
   }
 }
 
+// With what the picture's age lets it move beyond the window, whose margin is there for that.
+TEST(VisualController, ProbesInTheImageFromTheEdgeOfTheWindow) {
+  constexpr double beside_px = 2;
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    SCOPED_TRACE(seed);
+    const Flaws flaws = usual_flaws();
+    ControllerConfig config = testing::test_config(flaws);
+    config.mode = ControlMode::uncalibrated;
+    config.probing.distance *= 2;
+    Random random(seed);
+    const Eigen::Vector4d start = testing::random_start({}, config, flaws, random, beside_px);
+    TestSimulator simulator({}, flaws, start, seed);
+    VisualController controller(config, {});
+    const auto moments = simulator.run(controller, set_point(paper_sinusoids().offset), 12);
+    expect_in_image(moments);
+    EXPECT_LT(settled_s(moments), 11);
+  }
+}
+
 TEST(VisualController, TracksUncalibrated) {
   const Flaws flaws = usual_flaws();
   ControllerConfig config = testing::test_config(flaws);
