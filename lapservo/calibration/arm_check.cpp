@@ -27,21 +27,21 @@ struct Fitted {
 
 std::optional<Fitted> fitted(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                              const ArmFaults& faults) {
-  ArmModel model(instrument, start.poses, recording, start.guess, faults);
-  auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(start.delay_s),
+  ArmModel model(instrument, start, recording, faults);
+  auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
                         2 * poses_per_second(start.poses));
   if (!fit) return std::nullopt;
   return Fitted{std::move(model), std::move(*fit)};
 }
 
 Told focal_of(const Fitted& f) {
-  const Eigen::Index i = f.model.focal();
-  return {std::abs(f.fit.x[i]), unmodelled_sigmas * std::sqrt(f.fit.covariance(i, i))};
+  const Block& focal = f.model.blocks().focal;
+  return {focal.of(f.fit.x).norm(), unmodelled_sigmas * std::sqrt(focal.of(f.fit.covariance).trace())};
 }
 
 // By how much the marker in the middle of its work moves in the camera over the recording.
 Told drift_of_place(const Fitted& f) {
-  const Eigen::Index i = f.model.drift();
+  const Block& drift = f.model.blocks().drift;
   const Rigid3 camera_from_rcm = f.model.camera_from_rcm(f.fit.x);
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const TimedPose& pose : f.model.poses()) mean += pose.origin() / static_cast<double>(f.model.poses().size());
@@ -49,13 +49,14 @@ Told drift_of_place(const Fitted& f) {
   Eigen::Matrix<double, 3, 6> by_drift = Eigen::Matrix<double, 3, 6>::Identity();
   for (Eigen::Index k = 0; k < 3; ++k)
     by_drift.col(3 + k) = camera_from_rcm.rotation * Eigen::Vector3d::Unit(k).cross(arm);
-  const Eigen::Matrix3d covariance = by_drift * f.fit.covariance.block<6, 6>(i, i) * by_drift.transpose();
-  return {(by_drift * f.fit.x.segment<6>(i)).norm(), unmodelled_sigmas * std::sqrt(std::max(0.0, covariance.trace()))};
+  const Eigen::Matrix3d covariance = by_drift * drift.of(f.fit.covariance) * by_drift.transpose();
+  return {(by_drift * drift.of(f.fit.x)).norm(), unmodelled_sigmas * std::sqrt(std::max(0.0, covariance.trace()))};
 }
 
 Told drift_of_directions(const Fitted& f) {
-  const Eigen::Index i = f.model.drift() + 3;
-  return {f.fit.x.segment<3>(i).norm(), unmodelled_sigmas * std::sqrt(f.fit.covariance.block<3, 3>(i, i).trace())};
+  const Block& drift = f.model.blocks().drift;
+  return {drift.of(f.fit.x).tail<3>().norm(),
+          unmodelled_sigmas * std::sqrt(drift.of(f.fit.covariance).bottomRightCorner<3, 3>().trace())};
 }
 
 Rigid3 marker_at(const Instrument& instrument, const Rigid3& camera_from_rcm, const Joints& joints,
@@ -93,14 +94,15 @@ std::vector<ArmResidual> residuals(const Instrument& instrument, const Camera& c
 // By how much the fit's registration may be off at the markers: place, direction and turn.
 Eigen::Vector3d registration_sigmas(const Fitted& f) {
   const Eigen::MatrixXd& c = f.fit.covariance;
-  const double turn_rad = std::sqrt(c.topLeftCorner<3, 3>().trace());
+  const ArmModel::Blocks& blocks = f.model.blocks();
+  const double turn_rad = std::sqrt(blocks.rotation.of(c).trace());
   double rho_m = 0;
   const Eigen::Vector3d rcm = f.model.camera_from_rcm(f.fit.x).translation;
   for (const TimedPose& pose : f.model.poses())
     rho_m += (pose.origin() - rcm).norm() / static_cast<double>(f.model.poses().size());
   // The joint offsets' share goes with the rotation's and the translation's: their sum is known better than each.
-  const double place_m = std::hypot(std::sqrt(c.block<3, 3>(3, 3).trace()), 0.2 * turn_rad * rho_m);
-  return unmodelled_sigmas * Eigen::Vector3d(place_m, turn_rad, std::sqrt(c(8, 8)) + turn_rad);
+  const double place_m = std::hypot(std::sqrt(blocks.translation.of(c).trace()), 0.2 * turn_rad * rho_m);
+  return unmodelled_sigmas * Eigen::Vector3d(place_m, turn_rad, std::sqrt(blocks.offsets.of(c)(2, 2)) + turn_rad);
 }
 
 }  // namespace
@@ -122,11 +124,12 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
   const Eigen::VectorXd& x = best->fit.x;
   const Rigid3 camera_from_rcm = best->model.camera_from_rcm(x);
   const Joints joints = best->model.joints(x);
-  check.measured_delay_s = x[ArmModel::delay];
+  const Block& delay = best->model.blocks().delay;
+  check.measured_delay_s = delay.of(x)[0];
   check.at_best = residuals(instrument, camera, start, recording, camera_from_rcm, joints, check.measured_delay_s);
   if (instrument.image_delay_s)
     check.delay_s = Told{std::abs(*instrument.image_delay_s - check.measured_delay_s),
-                         unmodelled_sigmas * std::sqrt(best->fit.covariance(ArmModel::delay, ArmModel::delay))};
+                         unmodelled_sigmas * std::sqrt(delay.of(best->fit.covariance).trace())};
   if (!instrument.camera_from_rcm) return check;
   const double delay_s = instrument.image_delay_s.value_or(check.measured_delay_s);
   check.by_rig =

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "lapservo/calibration/arm_guess.h"
+#include "lapservo/calibration/arm_start.h"
 #include "lapservo/calibration/frame_fit.h"
 #include "lapservo/calibration/joint_recording.h"
 #include "lapservo/calibration/timed_pose.h"
@@ -22,27 +22,32 @@ struct ArmFaults {
   bool drift = false;  ///< what the RCM frame moves by in the camera over the recording, steadily
 };
 
-/// Where a marker is seen, as its arm's joints have it. The numbers x of a fit: rotation about the RCM frame's axes (3)
-/// beyond the guess, its translation (3), offsets of phi, rho, psi, delay; what frames have in common and no number of
-/// them averages out: the scale of distances, the axis' tilt along the view; backlash of those joints that move; then
-/// the faults: relative change of the focal length; translation (3, camera frame) and rotation (3, RCM frame) of the
-/// RCM frame from the first pose to the last.
+/// Where a marker is seen, as its arm's joints have it.
 class ArmModel {
  public:
-  static constexpr Eigen::Index rotation = 0, translation = 3, offsets = 6, delay = 9, scale = 10, tilt = 11,
-                                backlash = 12;
+  /// The numbers x of a fit.
+  struct Blocks {
+    Block rotation;     ///< about the RCM frame's axes (3), beyond the guess
+    Block translation;  ///< of the RCM frame (3)
+    Block offsets;      ///< of phi, rho, psi
+    Block delay;
+    /// What frames have in common and no number of them averages out: the scale of distances, the axis' tilt along the
+    /// view.
+    Block scale, tilt;
+    Block backlash;  ///< of those joints that move
+    Block focal;     ///< relative change of the focal length; empty without this fault, as the next
+    Block drift;     ///< of the RCM frame from the first pose to the last: place (3, camera frame), turn (3, RCM frame)
+  };
 
-  ArmModel(const Instrument& instrument, std::vector<TimedPose> poses, const JointRecording& recording,
-           const ArmGuess& guess, const ArmFaults& faults = {});
+  ArmModel(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
+           const ArmFaults& faults = {});
 
-  std::vector<Unknown> unknowns(double delay_s) const;
+  const Blocks& blocks() const { return blocks_; }
+  const std::vector<Unknown>& unknowns() const { return unknowns_; }
   /// In the middle of the recording, where it drifts.
   Rigid3 camera_from_rcm(const Eigen::VectorXd& x) const;
   Joints joints(const Eigen::VectorXd& x) const;
   std::array<double, 4> backlash_of(const Eigen::VectorXd& x) const;
-  /// Places in x of the faults that were asked for.
-  Eigen::Index focal() const { return backlash + static_cast<Eigen::Index>(moving_.size()); }
-  Eigen::Index drift() const { return focal() + (faults_.focal ? 1 : 0); }
 
   /// Off across the view (2) and along it; the axis turned in the picture and tilted along the view; turned about it.
   Eigen::MatrixXd residuals(const Eigen::VectorXd& x) const;
@@ -51,6 +56,7 @@ class ArmModel {
 
  private:
   JointRecording behind_backlash(const Eigen::VectorXd& x) const;
+  void add_unknowns(double delay_s, const ArmFaults& faults);
   Rigid3 camera_from_rcm_at(const Eigen::VectorXd& x, double time_s) const;
   Eigen::Matrix<double, 6, 1> difference(const TimedPose& pose, const Rigid3& camera_from_rcm, const JointVector& q,
                                          const Eigen::VectorXd& x) const;
@@ -59,8 +65,9 @@ class ArmModel {
   std::vector<TimedPose> poses_;
   JointRecording recording_;
   ArmGuess guess_;
-  ArmFaults faults_;
   std::vector<std::size_t> moving_;
+  std::vector<Unknown> unknowns_;
+  Blocks blocks_;
 };
 
 }  // namespace lapservo::internal

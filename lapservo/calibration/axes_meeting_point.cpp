@@ -33,7 +33,8 @@ Eigen::Matrix<double, 2, 3> across(const TimedPose& pose, double reach_m) {
 
 }  // namespace
 
-std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>& poses) {
+std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>& poses,
+                                                   const AtIteration& at_iteration) {
   if (poses.size() < min_poses) return std::nullopt;
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero(), mean = Eigen::Vector3d::Zero();
@@ -53,8 +54,8 @@ std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>&
     return all;
   };
   const Eigen::Vector3d start_m = solve_symmetric(information, sum);
-  const auto fit =
-      fit_frames(misses, {{start_m.x(), 1e-5}, {start_m.y(), 1e-5}, {start_m.z(), 1e-5}}, poses_per_second(poses));
+  const auto fit = fit_frames(misses, {{start_m.x(), 1e-5}, {start_m.y(), 1e-5}, {start_m.z(), 1e-5}},
+                              poses_per_second(poses), at_iteration);
   if (!fit) return std::nullopt;
   AxesMeetingPoint result{fit->x, fit->covariance, {}};
   for (const TimedPose& pose : poses)

@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "lapservo/calibration/at_iteration.h"
 #include "lapservo/calibration/timed_pose.h"
 
 namespace lapservo::internal {
@@ -15,6 +16,7 @@ struct AxesMeetingPoint {
 };
 
 /// Nullopt when they are too few or too alike to tell.
-std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>& poses);
+std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>& poses,
+                                                   const AtIteration& at_iteration = {});
 
 }  // namespace lapservo::internal

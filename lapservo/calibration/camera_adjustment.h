@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/calibration/at_iteration.h"
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/rigid3.h"
 
@@ -38,6 +39,6 @@ struct CameraAdjustment {
 /// that look wider than dark ones, by as much all over a view, are allowed for. nullopt when it does not settle.
 std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::vector<Rigid3>& camera_from_board,
                                               const std::vector<std::vector<EdgePoint>>& views,
-                                              const CameraFreedom& freedom);
+                                              const CameraFreedom& freedom, const AtIteration& at_iteration);
 
 }  // namespace lapservo::internal

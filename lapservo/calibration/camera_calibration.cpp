@@ -137,16 +137,17 @@ struct Refined {
 };
 
 // What the views can't tell from nothing stays nothing: k3, and pixels that are not square.
-std::optional<CameraAdjustment> adjust_what_shows(const LensFit& fit, const MeasuredEdges& edges) {
+std::optional<CameraAdjustment> adjust_what_shows(const LensFit& fit, const MeasuredEdges& edges,
+                                                  const AtIteration& at_iteration) {
   CameraFreedom freedom;
-  auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom);
+  auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom, at_iteration);
   if (!all) return std::nullopt;
   const Camera& camera = all->camera;
   freedom.k3 = std::abs(camera.distortion[4]) > significant_sigmas * all->sigmas.distortion[4];
   freedom.aspect =
       std::abs(camera.fy_px / camera.fx_px - 1) > std::max(square_pixels, significant_sigmas * all->sigma_aspect);
   if (freedom.k3 && freedom.aspect) return all;
-  return adjust_camera(camera, all->camera_from_board, edges.points, freedom);
+  return adjust_camera(camera, all->camera_from_board, edges.points, freedom, at_iteration);
 }
 
 LensFit fit_of(const CameraAdjustment& adjustment) {
@@ -276,7 +277,8 @@ std::string advice(const std::vector<BoardView>& views, const cv::Size& size) {
 }
 
 CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
-                                   const std::function<void(const std::string&)>& progress) {
+                                   const std::function<void(const std::string&)>& progress,
+                                   const AtIteration& at_iteration) {
   const auto told = [&](const std::string& what) {
     if (progress) progress(what);
   };
@@ -299,7 +301,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   for (int round = 0; round < 2; ++round) {
     told("edges in green");
     adjustment = adjust_camera(fit->camera, fit->camera_from_board, measured(board, views, *fit, false, false).points,
-                               {false, true});
+                               {false, true}, at_iteration);
     if (!adjustment) return refuse("the views are too alike to tell the camera");
     fit = fit_of(*adjustment);
   }
@@ -310,14 +312,14 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
     told("response");
     const bool last = round + 1 == response_rounds;
     const auto response = fit_response(some_of(measured(board, views, *fit, false, true).profiles, last ? 600 : 300),
-                                       fit->camera.response, last);
+                                       fit->camera.response, last, at_iteration);
     if (!response) break;
     calibration.response = response;
     fit->camera.response = response->response;
   }
   told("edges in all colours");
   const MeasuredEdges edges = measured(board, views, *fit, true, false);
-  adjustment = adjust_what_shows(*fit, edges);
+  adjustment = adjust_what_shows(*fit, edges, at_iteration);
   if (!adjustment) return refuse("the views are too alike to tell the camera");
   calibration.camera = rounded_by_sigmas(adjustment->camera, adjustment->sigmas);
   calibration.sigmas = adjustment->sigmas;

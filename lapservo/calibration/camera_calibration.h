@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "lapservo/calibration/at_iteration.h"
 #include "lapservo/calibration/board.h"
 #include "lapservo/calibration/camera_adjustment.h"
 #include "lapservo/calibration/response_fit.h"
@@ -63,6 +64,7 @@ struct CameraCalibration {
 /// Matrix, distortion, lateral chromatic aberration and response of the camera that took the views, all of one size.
 /// `start` gives the response to begin with. `progress` is told what is done.
 CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
-                                   const std::function<void(const std::string&)>& progress = {});
+                                   const std::function<void(const std::string&)>& progress = {},
+                                   const AtIteration& at_iteration = {});
 
 }  // namespace lapservo::internal

@@ -11,8 +11,8 @@
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "lapservo/calibration/camera_measurement.h"
 #include "lapservo/core/random.h"
-#include "lapservo/rig/rig_writer.h"
 #include "lapservo/testing/boards.h"
 #include "lapservo/testing/environment.h"
 

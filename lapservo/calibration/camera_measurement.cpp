@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/calibration/asked_while_fitting.h"
 #include "lapservo/calibration/frame_recording.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/rounded_sigma.h"
@@ -112,10 +111,9 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
         read.looked_at, read.damaged());
     return measured;
   }
-  const AskedWhileFitting asking(watch.is_stopped);
   int step = 0;
-  measured.calibration = calibrate_camera(
-      board, measured.views, start, [&](const std::string& what) { watch.tell(std::nullopt, ++step, ", " + what); });
+  const auto progress = [&](const std::string& what) { watch.tell(std::nullopt, ++step, ", " + what); };
+  measured.calibration = calibrate_camera(board, measured.views, start, progress, watch.is_stopped);
   measured.advice = advice(measured.views, *recordings.size());
   return measured;
 }

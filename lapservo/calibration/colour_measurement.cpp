@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/calibration/asked_while_fitting.h"
 #include "lapservo/core/rounded_sigma.h"
 
 namespace lapservo::internal {
@@ -25,7 +24,6 @@ ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const F
   // A camera goes on for ever: the user ends what is enough.
   if (measured.read.stopped && !live) return measured.calibration.refusal = "stopped", measured;
   measured.frames = kept.frames();
-  const AskedWhileFitting asking(watch.is_stopped);
   int step = 0;
   measured.calibration =
       calibrate_colour(rig, instrument, measured.frames, keep_response,

@@ -102,7 +102,7 @@ double loss_scale(Eigen::Index channels) {
   return 2.5 * std::sqrt(static_cast<double>(channels));
 }
 
-bool solve(Linearisation& at, Eigen::VectorXd& x, const Eigen::VectorXd& weights) {
+bool solve(Linearisation& at, Eigen::VectorXd& x, const Eigen::VectorXd& weights, const AtIteration& at_iteration) {
   Update update(at, x);
   ceres::Problem::Options options;
   options.evaluation_callback = &update;
@@ -118,7 +118,7 @@ bool solve(Linearisation& at, Eigen::VectorXd& x, const Eigen::VectorXd& weights
   solver.max_num_iterations = 100;
   solver.function_tolerance = 1e-12;  // what priors alone hold costs next to nothing
   ceres::Solver::Summary summary;
-  return solve_quietly(solver, problem, summary) && x.allFinite();
+  return solve_quietly(solver, problem, summary, at_iteration) && x.allFinite();
 }
 
 Eigen::VectorXd robust_scales(const Eigen::MatrixXd& residuals) {
@@ -166,8 +166,14 @@ std::optional<Eigen::MatrixXd> covariance(const Linearisation& at, const Eigen::
 
 }  // namespace
 
+Block add_block(std::vector<Unknown>& unknowns, const std::vector<Unknown>& added) {
+  const auto first = static_cast<Eigen::Index>(unknowns.size());
+  unknowns.insert(unknowns.end(), added.begin(), added.end());
+  return {first, static_cast<Eigen::Index>(added.size())};
+}
+
 std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::vector<Unknown>& unknowns,
-                                   std::size_t alike_frames) {
+                                   std::size_t alike_frames, const AtIteration& at_iteration) {
   Eigen::VectorXd x(static_cast<Eigen::Index>(unknowns.size()));
   for (std::size_t i = 0; i < unknowns.size(); ++i) x[static_cast<Eigen::Index>(i)] = unknowns[i].start;
   Linearisation at{residuals, unknowns, residuals(x), {}};
@@ -175,7 +181,7 @@ std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::v
   Eigen::VectorXd scales = robust_scales(at.residuals);
   for (int round = 0; round < 6; ++round) {
     const Eigen::VectorXd weights = scales.cwiseInverse();
-    if (!solve(at, x, weights)) return std::nullopt;
+    if (!solve(at, x, weights, at_iteration)) return std::nullopt;
     at.update(x, true);
     const Eigen::VectorXd next = robust_scales(at.residuals);
     const bool settled = ((next - scales).cwiseAbs().array() < 0.01 * scales.array()).all();

@@ -7,6 +7,8 @@
 
 #include <Eigen/Core>
 
+#include "lapservo/calibration/at_iteration.h"
+
 namespace lapservo::internal {
 
 /// Residuals at x: a column a frame, a row a channel (what is measured in every frame), in the measurements' own
@@ -27,10 +29,21 @@ struct Unknown {
   double prior = 0;    ///< standard deviation about 0 of what is known beforehand; 0: nothing is
 };
 
+/// Numbers of x that belong together. Block::of() an x is theirs, of a covariance theirs among each other.
+struct Block {
+  Eigen::Index first = 0, size = 0;
+
+  auto of(const Eigen::VectorXd& x) const { return x.segment(first, size); }
+  auto of(const Eigen::MatrixXd& covariance) const { return covariance.block(first, first, size, size); }
+};
+
+/// Appends numbers that belong together.
+Block add_block(std::vector<Unknown>& unknowns, const std::vector<Unknown>& added);
+
 /// Least squares over frames with Cauchy's loss (Ceres). Channels are weighed by their own scatter. The covariance
 /// holds for residuals that stay alike over `alike_frames` neighbouring ones (Newey and West 1987). Nullopt when the
 /// solver fails or the residuals leave a number open.
 std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::vector<Unknown>& unknowns,
-                                   std::size_t alike_frames);
+                                   std::size_t alike_frames, const AtIteration& at_iteration = {});
 
 }  // namespace lapservo::internal

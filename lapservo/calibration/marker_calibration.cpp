@@ -71,8 +71,11 @@ bool tells_pose(const EdgeMeasurements& edges) {
 // The frames and the print while they are being fitted.
 class TurnFit {
  public:
-  TurnFit(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames)
-      : measurer_(rig, instrument), marker_(rig.instruments[instrument].marker), frames_(std::move(frames)) {
+  TurnFit(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames, const AtIteration& at_iteration)
+      : measurer_(rig, instrument),
+        marker_(rig.instruments[instrument].marker),
+        frames_(std::move(frames)),
+        at_iteration_(at_iteration) {
     for (KeyFrame& frame : frames_) settle(frame);
   }
 
@@ -101,7 +104,8 @@ class TurnFit {
     if (frames_.empty()) return std::nullopt;
     take_processing_off(measured_);
     auto adjustment =
-        adjust(measured_, marker_, {how.loss_scale_sigmas, free_print, free_gap_ && free_print, with_covariance});
+        adjust(measured_, marker_, {how.loss_scale_sigmas, free_print, free_gap_ && free_print, with_covariance},
+               at_iteration_);
     if (!adjustment) return std::nullopt;
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       Sighting& sighting = frames_[i].sighting;
@@ -159,6 +163,7 @@ class TurnFit {
   ViewMeasurer measurer_;
   Marker marker_;
   std::vector<KeyFrame> frames_;
+  const AtIteration& at_iteration_;
   std::vector<ViewMeasurements> measured_;
   bool free_gap_ = true, only_video_ = false;
 };
@@ -306,11 +311,11 @@ std::vector<KeyFrame> KeyFrames::take() {
 }
 
 MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames,
-                                   const std::function<void(int, int)>& progress) {
+                                   const std::function<void(int, int)>& progress, const AtIteration& at_iteration) {
   const Marker nominal = rig.instruments[instrument].marker;
   if (const std::string why = refusal_of(frames, nominal); !why.empty()) return refused(why);
   const std::string unsolvable = "the frames contradict one another: is it one marker, and the rig's camera?";
-  TurnFit fit(rig, instrument, std::move(frames));
+  TurnFit fit(rig, instrument, std::move(frames), at_iteration);
   MarkerCalibration calibration;
 
   // The rig's print first, to start the poses and to tell what it leaves.

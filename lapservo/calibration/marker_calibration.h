@@ -8,6 +8,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/calibration/at_iteration.h"
 #include "lapservo/calibration/print_shape.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/marker_survey.h"
@@ -66,6 +67,7 @@ struct MarkerCalibration {
 /// Bands, wrap, skew and gap of the rig's marker from frames of a full turn. The diameter stays: pictures tell lengths
 /// in diameters, since a smaller shaft nearer by looks the same. `progress` is told rounds done and at most to come.
 MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames,
-                                   const std::function<void(int, int)>& progress = {});
+                                   const std::function<void(int, int)>& progress = {},
+                                   const AtIteration& at_iteration = {});
 
 }  // namespace lapservo::internal

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/calibration/asked_while_fitting.h"
 #include "lapservo/calibration/seam_registration.h"
 #include "lapservo/core/error.h"
 
@@ -41,10 +40,10 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
                     measured.read.looked_at, measured.read.damaged());
     return measured;
   }
-  const AskedWhileFitting asking(watch.is_stopped);
-  measured.calibration = calibrate_marker(rig, index, key_frames.take(), [&](int round, int most) {
+  const auto progress = [&](int round, int most) {
     watch.tell(std::nullopt, round, fmt::format(" of at most {} rounds of fitting", most));
-  });
+  };
+  measured.calibration = calibrate_marker(rig, index, key_frames.take(), progress, watch.is_stopped);
   if (measured.read.jpegs == measured.read.looked_at) measured.calibration.seam_may_lag = false;
   if (joints && measured.calibration.refusal.empty()) add_seam(instrument, *joints, measured.calibration);
   return measured;

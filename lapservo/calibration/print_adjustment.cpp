@@ -17,22 +17,13 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double mm = 1e-3;
-// Of a frame: its pose and, as in every fit of the tracker, the film's thickness in film_sigma_m.
-constexpr int frame_numbers = 7, film = 6;
-// After the print's numbers (lengths in mm): what all films are off by, in film_sigma_m, and all sides, the seam's
-// edges and each boundary, in all frames alike [px]; and by how much the seam's edges stay behind their motion [px].
-constexpr int shared_film = print_numbers, sides = shared_film + 1, seam = sides + 1, boundaries = seam + 2;
-constexpr int seam_lag = boundaries + 4, shared_numbers = seam_lag + 1;
-constexpr int gap = print_numbers - 1;
+constexpr int pose_numbers = 6;
 constexpr std::size_t upper_group = measurement_groups, groups = measurement_groups + 2;
 
 // Before the fit, one sigma: how far a print may be off; and what the model leaves out of every frame alike, which is
 // taken for zero: to tell it from so many frames would be to believe the model to a thousandth of a pixel.
 constexpr double print_prior_mm = 2, gap_prior_rad = 0.5;
-// From the film on. Measured on rendered frames: sides up to 0.08 px, an end whose face is seen up to 0.1 px, inner
-// boundaries 0.01 px.
-constexpr std::array shared_sigmas{1.0, 0.05, 0.03, 0.03, 0.05, 0.01, 0.01, 0.05};
-constexpr double zero = 1e-3;            // of these
+constexpr double zero = 1e-3;            // of the sigmas of these
 constexpr double common_seam_px = 0.03;  // of one frame
 // Compressed video leaves the seam's edges 0.05 to 0.14 px behind and the bands' boundaries, which move less, 0.02 px
 // at most. A turn there and back tells by how much; one of one way can't tell it from a seam that lies elsewhere.
@@ -40,99 +31,133 @@ constexpr double seam_lag_px = 0.1, seam_lag_from_px = 0.2;
 constexpr std::ptrdiff_t min_seam_views_each_way = 3;
 constexpr double min_noise_of_lag = 0.3;  // of edges, beyond the usual
 
-using SharedRow = std::array<double, shared_numbers>;
-
-// (row . frame + shared_row . shared + common - residual) / sigma.
-class LinearCost : public ceres::SizedCostFunction<1, frame_numbers, shared_numbers, 1> {
- public:
-  LinearCost(const UnknownVector& row, const SharedRow& shared, double residual_px, double sigma_px)
-      : shared_(shared), residual_px_(residual_px), per_sigma_(1 / sigma_px) {
-    for (Eigen::Index i = 0; i < row.size(); ++i) row_[static_cast<std::size_t>(i)] = row[i];
-  }
-  bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
-    double predicted = parameters[2][0];
-    for (std::size_t i = 0; i < row_.size(); ++i) predicted += row_[i] * parameters[0][i];
-    for (std::size_t i = 0; i < shared_.size(); ++i) predicted += shared_[i] * parameters[1][i];
-    residuals[0] = per_sigma_ * (predicted - residual_px_);
-    if (!jacobians) return true;
-    if (jacobians[0])
-      for (std::size_t i = 0; i < row_.size(); ++i) jacobians[0][i] = per_sigma_ * row_[i];
-    if (jacobians[1])
-      for (std::size_t i = 0; i < shared_.size(); ++i) jacobians[1][i] = per_sigma_ * shared_[i];
-    if (jacobians[2]) jacobians[2][0] = per_sigma_;
-    return true;
-  }
-  double residual_px(const double* frame, const double* shared, double common) const {
-    const double* const parameters[] = {frame, shared, &common};
-    double residual = 0;
-    Evaluate(parameters, &residual, nullptr);
-    return -residual / per_sigma_;
-  }
-  double sigma_px() const { return 1 / per_sigma_; }
-
- private:
-  std::array<double, frame_numbers> row_{};
-  SharedRow shared_;
-  double residual_px_, per_sigma_;
+struct TakenForZero {
+  double* unknown;
+  double sigma;
 };
 
-// (value - expected) / sigma of one number of a block.
-class Prior : public ceres::CostFunction {
+// The unknowns of all frames alike.
+struct SharedUnknowns {
+  std::array<double, 4> upper_mm{}, lower_mm{};  // changes of the boundaries; upper_mm[0] stays 0
+  double gap_rad = 0;
+  double film_sigmas = 0;                 // what all films are off by, in film_sigma_m
+  double sides_px = 0;                    // what all sides are off by, and so on
+  std::array<double, 2> seam_edges_px{};  // upper and lower
+  std::array<double, 4> boundaries_px{};
+  double seam_lag_px = 0;  // by how much the seam's edges stay behind their motion
+
+  std::array<double*, print_numbers - 1> lengths_mm() {
+    return {&upper_mm[1], &upper_mm[2], &upper_mm[3], &lower_mm[0], &lower_mm[1], &lower_mm[2], &lower_mm[3]};
+  }
+  // Measured on rendered frames: sides up to 0.08 px, an end whose face is seen up to 0.1 px, inner boundaries 0.01 px.
+  std::array<TakenForZero, 8> taken_for_zero() {
+    return {{{&film_sigmas, 1},
+             {&sides_px, 0.05},
+             {&seam_edges_px[0], 0.03},
+             {&seam_edges_px[1], 0.03},
+             {&boundaries_px[0], 0.05},
+             {&boundaries_px[1], 0.01},
+             {&boundaries_px[2], 0.01},
+             {&boundaries_px[3], 0.05}}};
+  }
+};
+
+// Of a frame: its pose, its film as in every fit of the tracker, and what one group of its measurements has in common.
+struct FrameUnknowns {
+  std::array<double, pose_numbers> pose{};
+  double film_sigmas = 0;
+  std::array<double, groups> common_px{};
+};
+
+// A block of unknowns and the slope by each of them.
+struct Term {
+  using Slopes = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, pose_numbers, 1>;
+  Term(double* unknown_block, double slope) : block(unknown_block), slopes(Slopes::Constant(1, slope)) {}
+  Term(std::array<double, pose_numbers>& pose, const UnknownVector& row)
+      : block(pose.data()), slopes(row.head<pose_numbers>()) {}
+  double* block;
+  Slopes slopes;
+};
+
+// (slopes . unknowns - expected) / sigma.
+class LinearCost : public ceres::CostFunction {
  public:
-  Prior(int size, int index, double expected, double sigma)
-      : index_(index), expected_(expected), per_sigma_(1 / sigma) {
+  LinearCost(std::vector<Term> terms, double expected, double sigma)
+      : terms_(std::move(terms)), expected_(expected), sigma_(sigma) {
     set_num_residuals(1);
-    mutable_parameter_block_sizes()->push_back(size);
+    for (const Term& term : terms_) {
+      blocks_.push_back(term.block);
+      mutable_parameter_block_sizes()->push_back(static_cast<int>(term.slopes.size()));
+    }
   }
+  const std::vector<double*>& blocks() const { return blocks_; }
   bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
-    residuals[0] = per_sigma_ * (parameters[0][index_] - expected_);
-    if (!jacobians || !jacobians[0]) return true;
-    std::fill_n(jacobians[0], parameter_block_sizes()[0], 0.0);
-    jacobians[0][index_] = per_sigma_;
+    residuals[0] = -expected_ / sigma_;
+    for (std::size_t i = 0; i < terms_.size(); ++i) {
+      const Term::Slopes& slopes = terms_[i].slopes;
+      residuals[0] += slopes.dot(Eigen::Map<const Eigen::VectorXd>(parameters[i], slopes.size())) / sigma_;
+      if (jacobians && jacobians[i]) Eigen::Map<Eigen::VectorXd>(jacobians[i], slopes.size()) = slopes / sigma_;
+    }
     return true;
   }
+  // In sigmas, by the unknowns as they are now.
+  double left() const {
+    double residual = 0;
+    Evaluate(blocks_.data(), &residual, nullptr);
+    return -residual;
+  }
+  double sigma() const { return sigma_; }
 
  private:
-  int index_;
-  double expected_, per_sigma_;
+  std::vector<Term> terms_;
+  std::vector<double*> blocks_;
+  double expected_, sigma_;
 };
 
-// d(position)/d(shared numbers) of a point of an edge.
-SharedRow shared_row(const Measurement& m, const PrintShape& shape, double covered_rad) {
-  SharedRow row{};
-  row[shared_film] = m.row[film];
+void add_prior(ceres::Problem& problem, double* unknown, double expected, double sigma) {
+  problem.AddResidualBlock(new LinearCost({{unknown, 1}}, expected, sigma), nullptr, unknown);
+}
+
+std::vector<Term> terms_of(const Measurement& m, const PrintShape& shape, double covered_rad, FrameUnknowns& frame,
+                           SharedUnknowns& shared) {
+  const double by_film = m.row[pose_numbers];
+  std::vector<Term> terms{{frame.pose, m.row},
+                          {&frame.common_px[m.group], 1},
+                          {&frame.film_sigmas, by_film},
+                          {&shared.film_sigmas, by_film}};
   if (m.group >= 4) {
-    row[sides] = 1;
-    return row;
+    terms.push_back({&shared.sides_px, 1});
+    return terms;
   }
   const std::size_t k = m.group;
   const double along = mm * m.along_px_per_m;
-  row[boundaries + k] = 1;
-  if (k > 0) row[k - 1] = along * (1 - m.turn_fraction);
-  row[3 + k] = along * m.turn_fraction;
+  terms.push_back({&shared.boundaries_px[k], 1});
+  if (k > 0) terms.push_back({&shared.upper_mm[k], along * (1 - m.turn_fraction)});
+  terms.push_back({&shared.lower_mm[k], along * m.turn_fraction});
   // A wider gap leaves less around the shaft for the same print.
-  row[gap] = m.along_px_per_m * (shape.lower_m[k] - shape.upper_m[k]) * m.turn_fraction / covered_rad;
-  return row;
+  terms.push_back(
+      {&shared.gap_rad, m.along_px_per_m * (shape.lower_m[k] - shape.upper_m[k]) * m.turn_fraction / covered_rad});
+  return terms;
 }
 
 double moved_px(const SeamEdge& edge, double turned_rad) {
   return edge.row[edge.row.size() - 1] * turned_rad;
 }
 
-SharedRow shared_row(const SeamEdge& edge, bool lower, double turned_rad) {
-  SharedRow row{};
+std::vector<Term> terms_of(const SeamEdge& edge, bool lower, double turned_rad, FrameUnknowns& frame,
+                           SharedUnknowns& shared) {
   const double along_px = moved_px(edge, turned_rad);
-  row[seam_lag] = -along_px / std::hypot(along_px, seam_lag_from_px);
-  row[gap] = edge.by_gap_px;
-  row[lower ? seam + 1 : seam] = 1;
-  return row;
+  return {{frame.pose, edge.row},
+          {&frame.common_px[upper_group + (lower ? 1 : 0)], 1},
+          {&shared.seam_lag_px, -along_px / std::hypot(along_px, seam_lag_from_px)},
+          {&shared.gap_rad, edge.by_gap_px},
+          {&shared.seam_edges_px[lower ? 1 : 0], 1}};
 }
 
-struct FrameBlocks {
-  std::array<double, frame_numbers> frame{};
-  std::array<double, groups> common{};
-  std::vector<LinearCost*> edges, seam;  // owned by the problem
-  std::vector<std::size_t> edge_groups;
+// The costs are owned by the problem.
+struct EdgeCost {
+  const LinearCost* cost;
+  std::size_t group;
 };
 
 double common_sigma_px(std::size_t group, const ViewMeasurements& frame) {
@@ -143,31 +168,27 @@ double common_sigma_px(std::size_t group, const ViewMeasurements& frame) {
   return std::hypot(usual_px + more_px, fine_fit_limits.fraction_of_processing * frame.bias_px[group]);
 }
 
-void add_frame(ceres::Problem& problem, const ViewMeasurements& frame, const PrintShape& shape, double covered_rad,
-               double loss_scale_sigmas, std::array<double, shared_numbers>& shared, FrameBlocks& blocks) {
-  const auto add = [&](LinearCost* cost, std::size_t group) {
-    problem.AddResidualBlock(cost, new ceres::CauchyLoss(loss_scale_sigmas), blocks.frame.data(), shared.data(),
-                             &blocks.common[group]);
-  };
-  problem.AddResidualBlock(new Prior(frame_numbers, film, (film_mean_m - frame.film_m) / film_sigma_m, 1), nullptr,
-                           blocks.frame.data());
+std::vector<EdgeCost> add_frame(ceres::Problem& problem, const ViewMeasurements& measured, const PrintShape& shape,
+                                double covered_rad, double loss_scale_sigmas, SharedUnknowns& shared,
+                                FrameUnknowns& frame) {
   std::array<bool, groups> used{};
-  for (const Measurement& m : frame.edges.all) {
-    auto* cost = new LinearCost(m.row, shared_row(m, shape, covered_rad), m.residual_px, m.sigma_px);
-    blocks.edges.push_back(cost), blocks.edge_groups.push_back(m.group);
-    add(cost, m.group), used[m.group] = true;
-  }
-  const auto add_seam = [&](const std::optional<SeamEdge>& edge, std::size_t group) {
-    if (!edge) return;
-    auto* cost = new LinearCost(edge->row, shared_row(*edge, group != upper_group, frame.turned_rad), edge->residual_px,
-                                edge->sigma_px);
-    blocks.seam.push_back(cost);
-    add(cost, group), used[group] = true;
+  const auto add = [&](const auto& edge, std::size_t group, std::vector<Term> terms) {
+    auto* cost = new LinearCost(std::move(terms), edge.residual_px, edge.sigma_px);
+    problem.AddResidualBlock(cost, new ceres::CauchyLoss(loss_scale_sigmas), cost->blocks());
+    used[group] = true;
+    return cost;
   };
-  if (frame.seam) add_seam(frame.seam->upper, upper_group), add_seam(frame.seam->lower, upper_group + 1);
+  add_prior(problem, &frame.film_sigmas, (film_mean_m - measured.film_m) / film_sigma_m, 1);
+  std::vector<EdgeCost> edges;
+  for (const Measurement& m : measured.edges.all)
+    edges.push_back({add(m, m.group, terms_of(m, shape, covered_rad, frame, shared)), m.group});
+  const auto add_seam = [&](const std::optional<SeamEdge>& edge, bool lower) {
+    if (edge) add(*edge, upper_group + (lower ? 1 : 0), terms_of(*edge, lower, measured.turned_rad, frame, shared));
+  };
+  if (measured.seam) add_seam(measured.seam->upper, false), add_seam(measured.seam->lower, true);
   for (std::size_t group = 0; group < groups; ++group)
-    if (used[group])
-      problem.AddResidualBlock(new Prior(1, 0, 0, common_sigma_px(group, frame)), nullptr, &blocks.common[group]);
+    if (used[group]) add_prior(problem, &frame.common_px[group], 0, common_sigma_px(group, measured));
+  return edges;
 }
 
 // Views that hardly moved tell no lag, and which way they did is their poses' error as well.
@@ -182,14 +203,11 @@ bool tells_lag(const std::vector<ViewMeasurements>& frames) {
   return std::min(views(1), views(-1)) >= min_seam_views_each_way;
 }
 
-void add_priors(ceres::Problem& problem, std::array<double, shared_numbers>& shared, bool free_lag) {
-  const auto add = [&](int index, double sigma) {
-    problem.AddResidualBlock(new Prior(shared_numbers, index, 0, sigma), nullptr, shared.data());
-  };
-  for (int i = 0; i < gap; ++i) add(i, print_prior_mm);
-  add(gap, gap_prior_rad);
-  for (int i = shared_film; i < seam_lag; ++i) add(i, zero * shared_sigmas[static_cast<std::size_t>(i - shared_film)]);
-  add(seam_lag, free_lag ? seam_lag_px : zero * seam_lag_px);
+void add_priors(ceres::Problem& problem, SharedUnknowns& shared, bool free_lag) {
+  for (double* length_mm : shared.lengths_mm()) add_prior(problem, length_mm, 0, print_prior_mm);
+  add_prior(problem, &shared.gap_rad, 0, gap_prior_rad);
+  for (const TakenForZero& taken : shared.taken_for_zero()) add_prior(problem, taken.unknown, 0, zero * taken.sigma);
+  add_prior(problem, &shared.seam_lag_px, 0, free_lag ? seam_lag_px : zero * seam_lag_px);
 }
 
 double sigma_of_edges_px(const std::vector<ViewMeasurements>& frames) {
@@ -216,37 +234,45 @@ double common_doubt_scale(const std::vector<ViewMeasurements>& frames, double ed
   return doubt_scale(edges_px, median(blurs_px), median(biases_px));
 }
 
-// One sigma of what was taken for zero in all frames, from the film on.
-Eigen::VectorXd sigmas_of_common(const std::vector<ViewMeasurements>& frames, double edges_px, bool free_lag) {
-  const auto known = static_cast<Eigen::Index>(shared_sigmas.size());
-  Eigen::VectorXd sigmas(free_lag ? known : known + 1);
-  sigmas.head(known) =
-      common_doubt_scale(frames, edges_px) * Eigen::Map<const Eigen::VectorXd>(shared_sigmas.data(), known);
-  sigmas[0] = shared_sigmas[0];  // the film is as thick in any picture
-  if (!free_lag) sigmas[known] = seam_lag_px * std::min(1.0, noise_beyond_usual(edges_px));
-  return sigmas;
+// What was taken for zero in all frames, by one sigma of what it may be.
+std::vector<TakenForZero> common_errors(SharedUnknowns& shared, const std::vector<ViewMeasurements>& frames,
+                                        double edges_px, bool free_lag) {
+  const auto taken = shared.taken_for_zero();
+  std::vector<TakenForZero> errors(taken.begin(), taken.end());
+  const double scale = common_doubt_scale(frames, edges_px);
+  for (TakenForZero& error : errors)
+    if (error.unknown != &shared.film_sigmas) error.sigma *= scale;  // the film is as thick in any picture
+  if (!free_lag) errors.push_back({&shared.seam_lag_px, seam_lag_px * std::min(1.0, noise_beyond_usual(edges_px))});
+  return errors;
 }
 
-// The print's; what was taken for zero in all frames, by `prior`, counts as it was before the fit.
-std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, const std::array<double, shared_numbers>& shared,
-                                             bool free_gap, double noise_scale, const Eigen::VectorXd& prior) {
+// The print's; the common errors count as they were before the fit.
+std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, SharedUnknowns& shared,
+                                             const std::vector<TakenForZero>& errors, double noise_scale) {
+  const auto lengths_mm = shared.lengths_mm();
+  std::vector<const double*> unknowns(lengths_mm.begin(), lengths_mm.end());
+  unknowns.push_back(&shared.gap_rad);
+  Eigen::VectorXd prior(static_cast<Eigen::Index>(errors.size()));
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    unknowns.push_back(errors[i].unknown);
+    prior[static_cast<Eigen::Index>(i)] = errors[i].sigma;
+  }
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
   ceres::Covariance covariance(options);
-  const std::vector<std::pair<const double*, const double*>> blocks{{shared.data(), shared.data()}};
-  if (!covariance.Compute(blocks, &problem)) return std::nullopt;
-  Eigen::Matrix<double, shared_numbers, shared_numbers, Eigen::RowMajor> all;
-  if (!covariance.GetCovarianceBlock(shared.data(), shared.data(), all.data())) return std::nullopt;
-  const Eigen::Index common = prior.size();
+  if (!covariance.Compute(unknowns, &problem)) return std::nullopt;
+  const auto size = static_cast<Eigen::Index>(unknowns.size());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> all(size, size);
+  if (!covariance.GetCovarianceMatrix(unknowns, all.data())) return std::nullopt;
   const PrintCovariance joint = all.topLeftCorner<print_numbers, print_numbers>();
-  const Eigen::MatrixXd cross = all.block(0, shared_film, print_numbers, common);
-  const Eigen::MatrixXd of_common = all.block(shared_film, shared_film, common, common);
+  const Eigen::MatrixXd cross = all.topRightCorner(print_numbers, prior.size());
+  const Eigen::MatrixXd of_common = all.bottomRightCorner(prior.size(), prior.size());
   const Eigen::MatrixXd by_common = solve_symmetric(of_common, cross.transpose()).transpose();
   const PrintCovariance known = joint - by_common * cross.transpose();  // were the common errors known
   const PrintCovariance print = std::max(1.0, noise_scale * noise_scale) * known +
                                 by_common * prior.cwiseAbs2().asDiagonal() * by_common.transpose();
   PrintNumbers units = PrintNumbers::Constant(mm);
-  units[gap] = free_gap ? 1 : 0;
+  units[print_numbers - 1] = problem.IsParameterBlockConstant(&shared.gap_rad) ? 0 : 1;
   const PrintCovariance scaled = units.asDiagonal() * print * units.asDiagonal();
   return scaled.allFinite() ? std::optional(scaled) : std::nullopt;
 }
@@ -254,48 +280,48 @@ std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, const std:
 }  // namespace
 
 std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, const Marker& marker,
-                                 const AdjustmentOptions& options) {
-  std::array<double, shared_numbers> shared{};
-  std::vector<FrameBlocks> blocks(frames.size());
+                                 const AdjustmentOptions& options, const AtIteration& at_iteration) {
+  SharedUnknowns shared;
+  std::vector<FrameUnknowns> unknowns(frames.size());
   ceres::Problem problem;
-  problem.AddParameterBlock(shared.data(), shared_numbers);
   const bool free_lag = tells_lag(frames);
   add_priors(problem, shared, free_lag);
   const PrintShape shape = PrintShape::of(marker);
+  std::vector<std::vector<EdgeCost>> edges;
   for (std::size_t i = 0; i < frames.size(); ++i)
-    add_frame(problem, frames[i], shape, marker.covered_rad(), options.loss_scale_sigmas, shared, blocks[i]);
-  std::vector<int> fixed;
+    edges.push_back(
+        add_frame(problem, frames[i], shape, marker.covered_rad(), options.loss_scale_sigmas, shared, unknowns[i]));
   if (!options.free_print)
-    for (int i = 0; i < print_numbers; ++i) fixed.push_back(i);
-  else if (!options.free_gap)
-    fixed.push_back(gap);
-  if (!fixed.empty()) problem.SetManifold(shared.data(), new ceres::SubsetManifold(shared_numbers, fixed));
+    for (double* length_mm : shared.lengths_mm()) problem.SetParameterBlockConstant(length_mm);
+  if (!options.free_print || !options.free_gap) problem.SetParameterBlockConstant(&shared.gap_rad);
 
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   solver.max_num_iterations = 30;
   solver.function_tolerance = 1e-9;
   ceres::Solver::Summary summary;
-  if (!solve_quietly(solver, problem, summary)) return std::nullopt;
+  if (!solve_quietly(solver, problem, summary, at_iteration)) return std::nullopt;
 
   Adjustment result;
   const double edges_px = sigma_of_edges_px(frames);
   result.lags = !free_lag && noise_beyond_usual(edges_px) > min_noise_of_lag;
-  for (int i = 0; i < print_numbers; ++i) result.print[i] = shared[static_cast<std::size_t>(i)] * (i == gap ? 1 : mm);
+  const auto lengths_mm = shared.lengths_mm();
+  for (std::size_t i = 0; i < lengths_mm.size(); ++i) result.print[static_cast<Eigen::Index>(i)] = mm * *lengths_mm[i];
+  result.print[print_numbers - 1] = shared.gap_rad;
   std::vector<double> sigmas;
-  for (const FrameBlocks& frame : blocks) {
-    result.steps.push_back(Eigen::Map<const Eigen::Matrix<double, frame_numbers, 1>>(frame.frame.data()));
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    UnknownVector& step = result.steps.emplace_back(pose_numbers + 1);
+    step << Eigen::Map<const Eigen::Matrix<double, pose_numbers, 1>>(unknowns[i].pose.data()), unknowns[i].film_sigmas;
     auto& residuals_px = result.residuals_px.emplace_back();
-    for (std::size_t i = 0; i < frame.edges.size(); ++i) {
-      const std::size_t group = frame.edge_groups[i];
-      residuals_px.push_back(frame.edges[i]->residual_px(frame.frame.data(), shared.data(), frame.common[group]));
-      if (group < 4) sigmas.push_back(residuals_px.back() / frame.edges[i]->sigma_px());
+    for (const auto& [cost, group] : edges[i]) {
+      residuals_px.push_back(cost->left() * cost->sigma());
+      if (group < 4) sigmas.push_back(cost->left());
     }
   }
   result.noise_scale = robust_scale(std::move(sigmas));
   if (options.with_covariance) {
-    result.covariance = covariance_of(problem, shared, options.free_gap, result.noise_scale,
-                                      sigmas_of_common(frames, edges_px, free_lag));
+    result.covariance =
+        covariance_of(problem, shared, common_errors(shared, frames, edges_px, free_lag), result.noise_scale);
     if (!result.covariance) return std::nullopt;
   }
   return result;

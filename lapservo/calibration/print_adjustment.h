@@ -3,6 +3,7 @@
 #include <optional>
 #include <vector>
 
+#include "lapservo/calibration/at_iteration.h"
 #include "lapservo/calibration/print_shape.h"
 #include "lapservo/vision/marker_survey.h"
 
@@ -33,6 +34,6 @@ struct Adjustment {
 /// robust loss. `film_m` is the film's thickness that the edges were measured with, `marker` the print. Nullopt when
 /// the solver fails.
 std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, const Marker& marker,
-                                 const AdjustmentOptions& options);
+                                 const AdjustmentOptions& options, const AtIteration& at_iteration = {});
 
 }  // namespace lapservo::internal

@@ -78,15 +78,16 @@ void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result
   result.camera_from_rcm = model.camera_from_rcm(fit.x);
   const Eigen::MatrixXd covariance = unmodelled * fit.covariance;
   const Eigen::VectorXd sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  const Eigen::Matrix3d turn = covariance.topLeftCorner<3, 3>();
-  result.sigma_translation_m = sigma.segment<3>(ArmModel::translation);
+  const ArmModel::Blocks& blocks = model.blocks();
+  const Eigen::Matrix3d turn = blocks.rotation.of(covariance);
+  result.sigma_translation_m = blocks.translation.of(sigma);
   result.sigma_quaternion = quaternion_sigma(result.camera_from_rcm.rotation, turn);
   result.sigma_rotation_rad = std::sqrt(turn.trace());
   Registration::Arm arm;
   arm.joints = model.joints(fit.x);
-  for (Eigen::Index i = 0; i < 3; ++i) arm.sigma_offset[static_cast<std::size_t>(i) + 1] = sigma[ArmModel::offsets + i];
+  for (Eigen::Index i = 0; i < 3; ++i) arm.sigma_offset[static_cast<std::size_t>(i) + 1] = blocks.offsets.of(sigma)[i];
   arm.sigma_offset[3] = std::hypot(arm.sigma_offset[3], common_turn_rad(model.poses()));
-  arm.image_delay_s = fit.x[ArmModel::delay], arm.sigma_image_delay_s = sigma[ArmModel::delay];
+  arm.image_delay_s = blocks.delay.of(fit.x)[0], arm.sigma_image_delay_s = blocks.delay.of(sigma)[0];
   arm.backlash = model.backlash_of(fit.x);
   result.arm = arm;
   for (std::size_t i = 0; i < model.poses().size(); ++i) {
@@ -101,10 +102,11 @@ void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result
 
 }  // namespace
 
-Registration register_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses) {
+Registration register_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses,
+                          const AtIteration& at_iteration) {
   Registration result;
   if (poses.size() < min_registration_poses) return result.refusal = too_few_poses(poses.size()), result;
-  const auto meeting = axes_meeting_point(poses);
+  const auto meeting = axes_meeting_point(poses, at_iteration);
   Eigen::Vector3d sigma_m = Eigen::Vector3d::Zero();
   if (meeting) {
     const Eigen::Matrix3d covariance = unmodelled * meeting->covariance + common_covariance(poses, meeting->point_m);
@@ -119,7 +121,7 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
   result.unknown.push_back(known ? "camera_from_rcm's rotation is the rig's: it takes --joints to measure it"
                                  : "camera_from_rcm's rotation is a convention (x along the mean shaft, z up in the "
                                    "image), not the arm's: theta, phi and psi differ from the joints' by constants");
-  result.unknown.push_back("joints and image_delay_s stay as the rig has them: they take --joints");
+  result.unknown.emplace_back("joints and image_delay_s stay as the rig has them: they take --joints");
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Eigen::Vector3d arm_m = poses[i].origin() - meeting->point_m;
     const double axis_rad = std::asin(std::min(1.0, meeting->misses_m[i] / std::max(1e-6, arm_m.norm())));
@@ -129,13 +131,13 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
 }
 
 Registration register_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
-                          const JointRecording& recording, const std::string& source) {
+                          const JointRecording& recording, const std::string& source, const AtIteration& at_iteration) {
   Registration result;
   const ArmStart start = start_arm(instrument, poses, recording, source);
   if (!start.refusal.empty()) return result.refusal = start.refusal, result;
-  const ArmModel model(instrument, start.poses, recording, start.guess);
-  const auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); },
-                              model.unknowns(start.delay_s), 2 * poses_per_second(start.poses));
+  const ArmModel model(instrument, start, recording);
+  const auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
+                              2 * poses_per_second(start.poses), at_iteration);
   if (!fit)
     return result.refusal = "the motion leaves the registration open: " + travel_of(start.joints) + ": " + swing_more,
            result;
@@ -144,7 +146,7 @@ Registration register_arm(const Instrument& instrument, const std::vector<TimedP
     result.refusal = fmt::format("it would be known to {:.1f} mm and {:.2f} degrees only; {}: {}",
                                  1e3 * result.sigma_translation_m.norm(), 57.3 * result.sigma_rotation_rad,
                                  travel_of(start.joints), swing_more);
-  result.unknown.push_back("theta's offset is the rig's: camera_from_rcm turns with it");
+  result.unknown.emplace_back("theta's offset is the rig's: camera_from_rcm turns with it");
   return result;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "lapservo/calibration/at_iteration.h"
 #include "lapservo/calibration/joint_recording.h"
 #include "lapservo/calibration/timed_pose.h"
 #include "lapservo/rig/rig.h"
@@ -43,7 +44,8 @@ struct Registration {
 
 /// From the poses alone: where the RCM is. The rotation stays the rig's; where it has none, x points along the mean
 /// shaft and z up in the image, so that phi is near a right angle.
-Registration register_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses);
+Registration register_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses,
+                          const AtIteration& at_iteration = {});
 
 /// camera_from_rcm, joints.sign, joints.offset and image_delay_s, with the backlash between readings and instrument,
 /// whatever of them the instrument knows; its `joints` names the columns. theta's offset stays the rig's, and of the
@@ -51,6 +53,7 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
 /// camera_from_rcm, else that of its theta's sign. Throws InputError when the recording and the frames have no time in
 /// common, naming `source`.
 Registration register_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
-                          const JointRecording& recording, const std::string& source);
+                          const JointRecording& recording, const std::string& source,
+                          const AtIteration& at_iteration = {});
 
 }  // namespace lapservo::internal

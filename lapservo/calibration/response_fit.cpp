@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numeric>
 #include <tuple>
 #include <type_traits>
 #include <utility>
@@ -22,21 +21,35 @@
 namespace lapservo::internal {
 namespace {
 
-// All edges share: the curve's numbers; the logarithm of dark over bright reflectance; sharpening's strength and log
-// blur.
-constexpr int ratio = curve_numbers, strength = ratio + 1, common_numbers = strength + 2;
 // Those at like angles to the rows of pixels: how blurred edges differ from a normal distribution's at so many steps on
 // either side. What filters on pixels make of a lens' blur is symmetric and no more.
 constexpr int shape_numbers = 8;
 constexpr std::array shape_angles_rad{rad_from_deg(6), rad_from_deg(12), rad_from_deg(24), rad_from_deg(46)};
-// Of an edge: logarithm of its bright light, of dark over bright beyond the common one, of its blur in pixels; its
-// offset.
-constexpr int edge_numbers = 4;
+using Shape = std::array<double, shape_numbers>;
 
 constexpr double max_sharpening_reach_px = 7;
 // Before the fit, one sigma: reflectances at different places of the board (gloss, veil), edges about the geometry's.
 constexpr double ratio_sigma = 0.03, offset_sigma_px = 0.02, log_blur_sigma = 0.3;
 constexpr double strength_sigma = 0.5, usual_mask_px = 1.5, log_mask_sigma = 0.3, shape_sigma = 0.02;
+
+// Of all edges.
+struct SharedUnknowns {
+  std::array<double, curve_numbers> curve{};
+  double log_ratio = 0;                                          // of dark over bright reflectance
+  double strength = 0.1, log_mask_px = std::log(usual_mask_px);  // of sharpening, and its blur
+};
+
+constexpr int edge_numbers = 4;
+using EdgeBlock = std::array<double, edge_numbers>;
+template <typename T>
+struct Edge {
+  explicit Edge(const T* block)
+      : log_bright(block[0]), log_ratio_beyond(block[1]), log_blur_px(block[2]), offset_px(block[3]) {}
+  const T& log_bright;
+  const T& log_ratio_beyond;  // of dark over bright, beyond the common one
+  const T& log_blur_px;
+  const T& offset_px;
+};
 
 // Value at a light, by a response that is known.
 template <typename T>
@@ -64,24 +77,26 @@ struct ProfileCost {
 
   // The values of a profile as the numbers have them.
   template <typename T>
-  std::vector<T> values(const T* shared, const T* shape, const T* edge) const {
+  std::vector<T> values(const T* curve, const T& log_ratio, const T& strength, const T& log_mask_px, const T* shape,
+                        const Edge<T>& edge) const {
     using std::erfc;
     using std::exp;
     const int half = static_cast<int>(profile->value.size() / 2);
     const int reach = given->sharpened ? static_cast<int>(max_sharpening_reach_px / profile_step_px) : 0;
-    const T bright = exp(edge[0]), dark = exp(edge[0] + shared[ratio] + edge[1]), blur_px = exp(edge[2]);
+    const T bright = exp(edge.log_bright), dark = exp(edge.log_bright + log_ratio + edge.log_ratio_beyond),
+            blur_px = exp(edge.log_blur_px);
     const auto rise = [&](const T& z) { return T(0.5) * erfc(-z / std::sqrt(2.0)); };
     std::vector<T> plain;
     for (int i = -half - reach; i <= half + reach; ++i) {
-      const T z = (T(i * profile_step_px) - edge[3]) / blur_px;
+      const T z = (T(i * profile_step_px) - edge.offset_px) / blur_px;
       T part = rise(z);
       if (const int from = std::abs(i); from > 0 && from <= shape_numbers)
         part += static_cast<double>(i > 0 ? 1 : -1) * shape[from - 1];
       const T light = dark + (bright - dark) * part;
-      plain.push_back(given->response ? encoded_by(*given->response, light) : value_by_curve(shared, light));
+      plain.push_back(given->response ? encoded_by(*given->response, light) : value_by_curve(curve, light));
     }
     if (!given->sharpened) return plain;
-    const T mask_px = exp(shared[strength + 1]);
+    const T mask_px = exp(log_mask_px);
     std::vector<T> mask;
     T sum(0);
     for (int k = 0; k <= reach; ++k) {
@@ -94,18 +109,20 @@ struct ProfileCost {
       const auto centre = static_cast<std::size_t>(i + reach);
       T smooth = mask[0] * plain[centre];
       for (std::size_t k = 1; k < mask.size(); ++k) smooth += mask[k] * (plain[centre - k] + plain[centre + k]);
-      values.push_back(plain[centre] + shared[strength] * (plain[centre] - smooth / sum));
+      values.push_back(plain[centre] + strength * (plain[centre] - smooth / sum));
     }
     return values;
   }
   template <typename T>
-  bool operator()(const T* shared, const T* shape, const T* edge, T* residuals) const {
-    const std::vector<T> expected = values(shared, shape, edge);
+  bool operator()(const T* curve, const T* log_ratio, const T* strength, const T* log_mask_px, const T* shape,
+                  const T* edge_block, T* residuals) const {
+    const Edge<T> edge(edge_block);
+    const std::vector<T> expected = values(curve, *log_ratio, *strength, *log_mask_px, shape, edge);
     for (std::size_t i = 0; i < expected.size(); ++i)
       residuals[i] = std::isnan(profile->value[i]) ? T(0) : (expected[i] - profile->value[i]) / profile->sigma[i];
-    residuals[expected.size()] = edge[1] / ratio_sigma;
-    residuals[expected.size() + 1] = edge[3] / offset_sigma_px;
-    residuals[expected.size() + 2] = (edge[2] - std::log(profile->blur_px)) / log_blur_sigma;
+    residuals[expected.size()] = edge.log_ratio_beyond / ratio_sigma;
+    residuals[expected.size() + 1] = edge.offset_px / offset_sigma_px;
+    residuals[expected.size() + 2] = (edge.log_blur_px - std::log(profile->blur_px)) / log_blur_sigma;
     return true;
   }
 };
@@ -114,16 +131,22 @@ struct CurvePrior {
   UsualCurves usual = usual_curves();
 
   template <typename T>
-  bool operator()(const T* shared, T* residuals) const {
+  bool operator()(const T* curve, T* residuals) const {
     for (int i = 0; i < curve_numbers; ++i) {
       residuals[i] = T(0);
-      for (int k = i; k < curve_numbers; ++k) residuals[i] += usual.whitening(i, k) * (shared[k] - usual.mean[k]);
+      for (int k = i; k < curve_numbers; ++k) residuals[i] += usual.whitening(i, k) * (curve[k] - usual.mean[k]);
     }
-    residuals[curve_numbers] = shared[strength] / strength_sigma;
-    residuals[curve_numbers + 1] = (shared[strength + 1] - std::log(usual_mask_px)) / log_mask_sigma;
     return true;
   }
-  static constexpr int size = curve_numbers + 2;
+};
+
+struct SharpeningPrior {
+  template <typename T>
+  bool operator()(const T* strength, const T* log_mask_px, T* residuals) const {
+    residuals[0] = *strength / strength_sigma;
+    residuals[1] = (*log_mask_px - std::log(usual_mask_px)) / log_mask_sigma;
+    return true;
+  }
 };
 
 struct ShapePrior {
@@ -134,22 +157,19 @@ struct ShapePrior {
   }
 };
 
-using Shared = std::array<double, common_numbers>;
-using Shape = std::array<double, shape_numbers>;
-
 std::size_t shape_of(const BoardEdgeProfile& profile) {
   std::size_t i = 0;
   while (i + 1 < shape_angles_rad.size() && profile.angle_rad > shape_angles_rad[i]) ++i;
   return i;
 }
 
-ResponseCurve curve_of(const Shared& shared) {
-  return ResponseCurve::Map(shared.data());
+ResponseCurve curve_of(const SharedUnknowns& shared) {
+  return ResponseCurve::Map(shared.curve.data());
 }
 
-Shared start_of(const Response& response) {
-  Shared shared{};
-  ResponseCurve::Map(shared.data()) =
+SharedUnknowns start_of(const Response& response) {
+  SharedUnknowns shared;
+  ResponseCurve::Map(shared.curve.data()) =
       nearest_curve([&](double s) { return response.value_from_light(Response{}.light_from_value(s)); });
   return shared;
 }
@@ -181,15 +201,15 @@ std::vector<Named> named_responses() {
   return all;
 }
 
-double curve_sigma_of(ceres::Problem& problem, const Shared& shared, double scale, double low, double high) {
+double curve_sigma_of(ceres::Problem& problem, const SharedUnknowns& shared, double scale, double low, double high) {
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
   ceres::Covariance covariance(options);
-  if (!covariance.Compute(std::vector<std::pair<const double*, const double*>>{{shared.data(), shared.data()}},
-                          &problem))
+  const double* curve = shared.curve.data();
+  if (!covariance.Compute(std::vector<std::pair<const double*, const double*>>{{curve, curve}}, &problem))
     return std::numeric_limits<double>::infinity();
-  Eigen::Matrix<double, common_numbers, common_numbers, Eigen::RowMajor> c;
-  covariance.GetCovarianceBlock(shared.data(), shared.data(), c.data());
+  Eigen::Matrix<double, curve_numbers, curve_numbers, Eigen::RowMajor> c;
+  covariance.GetCovarianceBlock(curve, curve, c.data());
   // The curve's values at some lights, less what another exposure would be.
   constexpr int places = 41;
   Eigen::Matrix<double, places, curve_numbers> rows;
@@ -198,10 +218,10 @@ double curve_sigma_of(ceres::Problem& problem, const Shared& shared, double scal
     const double s = low + (high - low) * i / (places - 1), light = Response{}.light_from_value(s);
     rows.row(i) = splines_at(light).transpose();
     constexpr double step = 1e-3;
-    by_exposure[i] = value_by_curve(shared.data(), light * (1 + step)) - value_by_curve(shared.data(), light);
+    by_exposure[i] = value_by_curve(curve, light * (1 + step)) - value_by_curve(curve, light);
   }
   rows -= by_exposure * (by_exposure.transpose() * rows) / by_exposure.squaredNorm();
-  const double most = (rows * c.topLeftCorner<curve_numbers, curve_numbers>() * rows.transpose()).diagonal().maxCoeff();
+  const double most = (rows * c * rows.transpose()).diagonal().maxCoeff();
   return scale * std::sqrt(most);
 }
 
@@ -214,8 +234,8 @@ constexpr double least_strength = 0.15;  // of sharpening: less is a detail of t
 // Profiles, what explains them, and the problem that holds both together.
 class ProfileFit {
  public:
-  ProfileFit(const std::vector<BoardEdgeProfile>& profiles, const Response& start)
-      : profiles_(profiles), shared_(start_of(start)) {
+  ProfileFit(const std::vector<BoardEdgeProfile>& profiles, const Response& start, const AtIteration& at_iteration)
+      : profiles_(profiles), at_iteration_(at_iteration), shared_(start_of(start)) {
     const Response from = table_of(curve_of(shared_));
     std::vector<double> ratios;
     for (const BoardEdgeProfile& p : profiles_) {
@@ -223,8 +243,7 @@ class ProfileFit {
       ratios.push_back(std::log(std::max(1e-4, from.light_from_value(std::max(0.0, p.dark))) / bright));
       edges_.push_back({std::log(bright), 0, std::log(p.blur_px), 0});
     }
-    shared_[ratio] = median(ratios);
-    shared_[strength] = 0.1, shared_[strength + 1] = std::log(usual_mask_px);
+    shared_.log_ratio = median(ratios);
     add_costs();
     solver_.linear_solver_type = ceres::SPARSE_SCHUR;
     solver_.max_num_iterations = 40;
@@ -238,8 +257,9 @@ class ProfileFit {
     int count = 0;
     for (std::size_t i = 0; i < profiles_.size(); ++i) {
       const BoardEdgeProfile& profile = profiles_[i];
-      const auto values =
-          ProfileCost{&profile, &given_}.values(shared_.data(), shapes_[shape_of(profile)].data(), edges_[i].data());
+      const auto values = ProfileCost{&profile, &given_}.values(
+          shared_.curve.data(), shared_.log_ratio, shared_.strength, shared_.log_mask_px,
+          shapes_[shape_of(profile)].data(), Edge<double>(edges_[i].data()));
       for (std::size_t k = 0; k < values.size(); ++k)
         if (std::isfinite(profile.value[k]))
           squares += std::pow((values[k] - profile.value[k]) / profile.sigma[k], 2), ++count;
@@ -253,18 +273,15 @@ class ProfileFit {
     if (!solve_for(false)) return false;
     if (misfit() <= max_plain_misfit) return true;
     std::tie(shared_, shapes_, edges_) = start;  // without sharpening it went astray
-    return solve_for(true) && (shared_[strength] >= least_strength || solve_for(false));
+    return solve_for(true) && (shared_.strength >= least_strength || solve_for(false));
   }
 
   /// The cost with a known response; what was fitted stays.
   std::optional<double> cost_with(const Response& response) {
     const auto fitted = std::tuple(shared_, shapes_, edges_);
-    std::vector<int> fixed(curve_numbers);
-    std::iota(fixed.begin(), fixed.end(), 0);
-    if (!given_.sharpened) fixed.insert(fixed.end(), {strength, strength + 1});
     given_.response = &response;
     solver_.max_num_iterations = 10;
-    const bool usable = run(fixed);
+    const bool usable = run();
     const double cost = summary_.final_cost;
     std::tie(shared_, shapes_, edges_) = fitted;
     given_.response = nullptr;
@@ -272,43 +289,53 @@ class ProfileFit {
   }
 
   double cost() const { return summary_.final_cost; }
-  const Shared& shared() const { return shared_; }
+  const SharedUnknowns& shared() const { return shared_; }
   bool sharpened() const { return given_.sharpened; }
   ceres::Problem& problem() { return problem_; }
 
  private:
   void add_costs() {
     for (std::size_t i = 0; i < profiles_.size(); ++i) {
-      auto* cost =
-          new ceres::AutoDiffCostFunction<ProfileCost, ceres::DYNAMIC, common_numbers, shape_numbers, edge_numbers>(
-              new ProfileCost{&profiles_[i], &given_}, static_cast<int>(profiles_[i].value.size()) + 3);
-      problem_.AddResidualBlock(cost, nullptr, shared_.data(), shapes_[shape_of(profiles_[i])].data(),
-                                edges_[i].data());
+      auto* cost = new ceres::AutoDiffCostFunction<ProfileCost, ceres::DYNAMIC, curve_numbers, 1, 1, 1, shape_numbers,
+                                                   edge_numbers>(new ProfileCost{&profiles_[i], &given_},
+                                                                 static_cast<int>(profiles_[i].value.size()) + 3);
+      problem_.AddResidualBlock(cost, nullptr, shared_.curve.data(), &shared_.log_ratio, &shared_.strength,
+                                &shared_.log_mask_px, shapes_[shape_of(profiles_[i])].data(), edges_[i].data());
     }
-    problem_.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<CurvePrior, CurvePrior::size, common_numbers>(new CurvePrior), nullptr,
-        shared_.data());
+    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<CurvePrior, curve_numbers, curve_numbers>(new CurvePrior),
+                              nullptr, shared_.curve.data());
+    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<SharpeningPrior, 2, 1, 1>(new SharpeningPrior), nullptr,
+                              &shared_.strength, &shared_.log_mask_px);
     for (Shape& shape : shapes_)
       problem_.AddResidualBlock(
           new ceres::AutoDiffCostFunction<ShapePrior, shape_numbers, shape_numbers>(new ShapePrior), nullptr,
           shape.data());
-    problem_.SetParameterLowerBound(shared_.data(), strength, 0);
-    problem_.SetParameterLowerBound(shared_.data(), strength + 1, std::log(1.0));
-    problem_.SetParameterUpperBound(shared_.data(), strength + 1, std::log(3.0));
+    problem_.SetParameterLowerBound(&shared_.strength, 0, 0);
+    problem_.SetParameterLowerBound(&shared_.log_mask_px, 0, std::log(1.0));
+    problem_.SetParameterUpperBound(&shared_.log_mask_px, 0, std::log(3.0));
   }
   bool solve_for(bool sharpened) {
     given_.sharpened = sharpened;
-    return run(sharpened ? std::vector<int>{} : std::vector<int>{strength, strength + 1});
+    return run();
   }
-  bool run(const std::vector<int>& fixed) {
-    problem_.SetManifold(shared_.data(), fixed.empty() ? nullptr : new ceres::SubsetManifold(common_numbers, fixed));
-    return solve_quietly(solver_, problem_, summary_);
+  // What is given is fixed.
+  bool run() {
+    const auto fix = [&](double* block, bool fixed) {
+      if (fixed)
+        problem_.SetParameterBlockConstant(block);
+      else
+        problem_.SetParameterBlockVariable(block);
+    };
+    fix(shared_.curve.data(), given_.response != nullptr);
+    fix(&shared_.strength, !given_.sharpened), fix(&shared_.log_mask_px, !given_.sharpened);
+    return solve_quietly(solver_, problem_, summary_, at_iteration_);
   }
 
   const std::vector<BoardEdgeProfile>& profiles_;
-  Shared shared_;
+  const AtIteration& at_iteration_;
+  SharedUnknowns shared_;
   std::array<Shape, shape_angles_rad.size()> shapes_{};
-  std::vector<std::array<double, edge_numbers>> edges_;
+  std::vector<EdgeBlock> edges_;
   Given given_;
   ceres::Problem problem_;
   ceres::Solver::Options solver_;
@@ -339,16 +366,16 @@ void name_response(ProfileFit& profiles, ResponseFit& fit) {
 }  // namespace
 
 std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& profiles, const Response& start,
-                                        bool try_named) {
+                                        bool try_named, const AtIteration& at_iteration) {
   constexpr std::size_t least_profiles = 50;
   if (profiles.size() < least_profiles) return std::nullopt;
   ResponseFit fit;
-  ProfileFit fitted(profiles, start);
+  ProfileFit fitted(profiles, start, at_iteration);
   fit.misfit[0] = fitted.misfit();
   if (!fitted.solve()) return std::nullopt;
   fit.misfit[1] = fitted.misfit();
-  fit.sharpening = fitted.sharpened() ? fitted.shared()[strength] : 0;
-  fit.sharpening_px = std::exp(fitted.shared()[strength + 1]);
+  fit.sharpening = fitted.sharpened() ? fitted.shared().strength : 0;
+  fit.sharpening_px = std::exp(fitted.shared().log_mask_px);
   std::vector<double> darks, brights;
   for (const BoardEdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
   fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);

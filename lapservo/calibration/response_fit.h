@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "lapservo/calibration/at_iteration.h"
 #include "lapservo/calibration/board_edge_profile.h"
 #include "lapservo/geometry/response.h"
 
@@ -26,6 +27,6 @@ struct ResponseFit {
 /// is and however much light falls on it. With `try_named` a named response is taken where it explains
 /// the edges as well. nullopt when edges are too few or too alike to tell.
 std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& profiles, const Response& start,
-                                        bool try_named);
+                                        bool try_named, const AtIteration& at_iteration);
 
 }  // namespace lapservo::internal

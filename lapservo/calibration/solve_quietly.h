@@ -2,10 +2,12 @@
 
 #include <ceres/ceres.h>
 
+#include "lapservo/calibration/at_iteration.h"
+
 namespace lapservo::internal {
 
 /// Ceres' solver without a word on stderr: what it complains of, its results say. Whether there is a solution to use.
-/// Calls AskedWhileFitting::ask() at each iteration, and throws what that throws.
-bool solve_quietly(ceres::Solver::Options options, ceres::Problem& problem, ceres::Solver::Summary& summary);
+bool solve_quietly(ceres::Solver::Options options, ceres::Problem& problem, ceres::Solver::Summary& summary,
+                   const AtIteration& at_iteration);
 
 }  // namespace lapservo::internal

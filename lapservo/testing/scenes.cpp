@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <mutex>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/geometry/rotation.h"
@@ -141,16 +143,29 @@ CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad) 
   }
 }
 
+namespace {
+
+// Made once for each size of pictures.
+cv::Mat usual_tissue(const Camera& camera) {
+  static std::mutex mutex;
+  static std::map<std::pair<int, int>, cv::Mat> tissues;
+  const std::lock_guard lock(mutex);
+  cv::Mat& tissue = tissues[{camera.width_px, camera.height_px}];
+  if (tissue.empty()) tissue = make_tissue(camera.width_px, camera.height_px, 5);
+  return tissue;
+}
+
+}  // namespace
+
 cv::Mat render(const Rig& rig, const std::vector<JointVector>& configurations, std::uint64_t seed,
                const RenderOptions& options) {
-  static const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
   std::vector<ShaftModel> shafts;
   std::vector<ShaftPlacement> placements;
   for (std::size_t i = 0; i < configurations.size(); ++i) {
     shafts.push_back(shaft_of(rig.instruments[i]));
     placements.push_back(placement_of(rig.instruments[i], configurations[i]));
   }
-  return Renderer(rig.camera, shafts, tissue, options).render(placements, seed);
+  return Renderer(rig.camera, shafts, usual_tissue(rig.camera), options).render(placements, seed);
 }
 
 cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t seed,

@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/calibration/asked_while_fitting.h"
 #include "lapservo/calibration/camera_measurement.h"
 #include "lapservo/calibration/colour_measurement.h"
 #include "lapservo/calibration/marker_measurement.h"
@@ -256,12 +255,12 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
   const JobWatch watch = watch_of(progress);
   {
     const py::gil_scoped_release others_run;
-    const AskedWhileFitting asking(watch.is_stopped);
     poses = table ? poses_in_table(name, instrument.name)
                   : poses_in_frames(given.rig, index, {*source->source, name, deinterlace}, watch);
     expect_result(poses.none, name);
     registration =
-        read ? register_arm(instrument, poses.all, read->recording, read->source) : register_rcm(instrument, poses.all);
+        read ? register_arm(instrument, poses.all, read->recording, read->source, watch.is_stopped)
+             : register_rcm(instrument, poses.all, watch.is_stopped);
   }
   expect_result(registration.refusal, name);
   GivenRig after = given;
