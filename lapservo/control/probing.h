@@ -19,7 +19,6 @@ namespace lapservo::internal {
 /// been seen.
 class ProbingMotion {
  public:
-  ProbingMotion() = default;
   /// `side`: of each joint, 1, or -1 for towards the nearer limit.
   ProbingMotion(const ProbingConfig& config, const JointLimits& limits, const Eigen::Vector4d& q_joint,
                 const Eigen::Vector4d& side = Eigen::Vector4d::Ones());

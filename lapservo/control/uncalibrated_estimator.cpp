@@ -13,75 +13,74 @@ bool contains(const ImageWindow& window, const Eigen::Vector4d& ends_px) {
 
 }  // namespace
 
-UncalibratedEstimator::UncalibratedEstimator(const ControllerConfig& config)
-    : scales_(config.scales),
-      limits_(config.limits),
-      probing_(config.probing),
-      known_delay_s_(config.observer.delay_s),
-      jacobian_(config.jacobian, config.scales),
-      fit_(config.scales, config.observer.delay_s),
-      window_(config.window) {}
-
 HoldReason UncalibratedEstimator::update(const ImageMeasurement& image, const JointHistory& history) {
-  HoldReason reason = HoldReason::none;
-  if (!learnt_) {
-    reason = learn_from_probing(image, history);
-  } else {
-    const auto q_then = history.at(image.time_s - delay_s());
-    if (!q_then) return HoldReason::no_history;
-    const double interval_s = std::max(0.0, image.time_s - last_image_s_);
-    const auto update = jacobian_.update(*q_then, image.features, image.ends_px, interval_s);
-    if (update != JacobianEstimator::Update::accepted) reason = HoldReason::outlier;
-  }
-  if (reason == HoldReason::none) last_image_s_ = image.time_s;
-  return reason;
+  if (auto* learnt = std::get_if<Learnt>(&state_)) return follow(*learnt, image, history);
+  if (std::holds_alternative<Waiting>(state_))
+    state_ = Probing{ProbingMotion(config_.probing, config_.limits, *history.newest(), side_),
+                     ProbingFit(config_.scales, config_.observer.delay_s)};
+  return learn(std::get<Probing>(state_), image, history);
 }
 
-HoldReason UncalibratedEstimator::learn_from_probing(const ImageMeasurement& image, const JointHistory& history) {
-  if (!motion_) motion_ = ProbingMotion(probing_, limits_, *history.newest(), side_);
-  if (window_ && !contains(*window_, image.ends_px)) turn_back();
-  fit_.add(image.time_s, image.features, image.ends_px, history);
-  if (probed_s_ < motion_->duration_s()) return HoldReason::none;
-  const auto model = fit_.solve();
+HoldReason UncalibratedEstimator::learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
+  if (config_.window && !contains(*config_.window, image.ends_px)) turn_back(probing);
+  probing.fit.add(image.time_s, image.features, image.ends_px, history);
+  if (probing.probed_s < probing.motion.duration_s()) return HoldReason::none;
+  const auto model = probing.fit.solve();
   if (!model) {
-    probe_again();
+    state_ = Waiting{};
     return HoldReason::not_learnt;
   }
-  jacobian_.start(*model);
-  learnt_delay_s_ = model->delay_s;
-  learnt_ = true;
+  Learnt learnt{JacobianEstimator(config_.jacobian, config_.scales), model->delay_s, image.time_s};
+  learnt.jacobian.start(*model);
+  state_ = learnt;
   return HoldReason::none;
 }
 
 // Nothing is known yet of what a joint does in the image but that it just left the window: back, and next time to the
 // other side.
-void UncalibratedEstimator::turn_back() {
-  const double back_s = motion_->way_back_s(probed_s_);
-  if (back_s == probed_s_) return;
-  const auto joint = static_cast<Eigen::Index>(probed_s_ / probing_.joint_time_s);
+void UncalibratedEstimator::turn_back(Probing& probing) {
+  const double back_s = probing.motion.way_back_s(probing.probed_s);
+  if (back_s == probing.probed_s) return;
+  const auto joint = static_cast<Eigen::Index>(probing.probed_s / config_.probing.joint_time_s);
   side_[joint] = -side_[joint];
-  probed_s_ = back_s;
+  probing.probed_s = back_s;
 }
 
-void UncalibratedEstimator::probe_again() {
-  fit_ = ProbingFit(scales_, known_delay_s_);
-  motion_.reset();
-  probed_s_ = 0;
+HoldReason UncalibratedEstimator::follow(Learnt& learnt, const ImageMeasurement& image,
+                                         const JointHistory& history) const {
+  const auto q_then = history.at(image.time_s - delay_s());
+  if (!q_then) return HoldReason::no_history;
+  const double interval_s = std::max(0.0, image.time_s - learnt.last_image_s);
+  if (learnt.jacobian.update(*q_then, image.features, image.ends_px, interval_s) != JacobianEstimator::Update::accepted)
+    return HoldReason::outlier;
+  learnt.last_image_s = image.time_s;
+  return HoldReason::none;
+}
+
+double UncalibratedEstimator::delay_s() const {
+  if (config_.observer.delay_s) return *config_.observer.delay_s;
+  const auto* learnt = std::get_if<Learnt>(&state_);
+  return learnt ? learnt->delay_s : 0;
 }
 
 std::optional<Eigen::Vector4d> UncalibratedEstimator::probing_velocity(double time_s) const {
-  if (learnt_ || !motion_) return std::nullopt;
-  return motion_->velocity(probed_s_ + time_s);
+  const auto* probing = std::get_if<Probing>(&state_);
+  return probing ? std::optional(probing->motion.velocity(probing->probed_s + time_s)) : std::nullopt;
+}
+
+void UncalibratedEstimator::advance_probing(double time_s) {
+  if (auto* probing = std::get_if<Probing>(&state_)) probing->probed_s += time_s;
 }
 
 std::optional<Estimate> UncalibratedEstimator::at(double, const Eigen::Vector4d& q_joint) const {
-  if (!learnt_) return std::nullopt;
-  const FeatureState state = jacobian_.at(q_joint);
+  const auto* learnt = std::get_if<Learnt>(&state_);
+  if (!learnt) return std::nullopt;
+  const FeatureState state = learnt->jacobian.at(q_joint);
   Estimate now;
   now.q = q_joint;
   now.features = state.features;
-  now.covariance = scales_.features.cwiseAbs2().asDiagonal();
-  now.covariance *= jacobian_.variance_at(q_joint);
+  now.covariance = config_.scales.features.cwiseAbs2().asDiagonal();
+  now.covariance *= learnt->jacobian.variance_at(q_joint);
   now.jacobian = state.jacobian;
   now.ends_px = state.ends_px;
   now.ends_jacobian = state.ends_jacobian;

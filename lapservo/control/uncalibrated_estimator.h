@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <variant>
 
 #include "lapservo/control/estimator.h"
 #include "lapservo/control/jacobian_estimator.h"
@@ -11,31 +12,34 @@ namespace lapservo::internal {
 /// Without any model: a small probing motion tells the Jacobian and the delay, and JacobianEstimator keeps learning.
 class UncalibratedEstimator : public Estimator {
  public:
-  explicit UncalibratedEstimator(const ControllerConfig& config);
+  explicit UncalibratedEstimator(const ControllerConfig& config) : config_(config) {}
   HoldReason update(const ImageMeasurement& image, const JointHistory& history) override;
   std::optional<Estimate> at(double time_s, const Eigen::Vector4d& q_joint) const override;
-  double delay_s() const override { return known_delay_s_.value_or(learnt_delay_s_); }
+  double delay_s() const override;
   std::optional<Eigen::Vector4d> probing_velocity(double time_s) const override;
-  void advance_probing(double time_s) override { probed_s_ += time_s; }
+  void advance_probing(double time_s) override;
 
  private:
-  HoldReason learn_from_probing(const ImageMeasurement& image, const JointHistory& history);
-  void probe_again();
-  void turn_back();
+  /// For an image, by which the probing motion begins.
+  struct Waiting {};
+  struct Probing {
+    ProbingMotion motion;
+    ProbingFit fit;
+    double probed_s = 0;
+  };
+  struct Learnt {
+    JacobianEstimator jacobian;
+    double delay_s;
+    double last_image_s;  ///< stamp of the last one used
+  };
 
-  Scales scales_;
-  JointLimits limits_;
-  ProbingConfig probing_;
-  std::optional<double> known_delay_s_;
-  JacobianEstimator jacobian_;
-  std::optional<ProbingMotion> motion_;
+  HoldReason learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history);
+  void turn_back(Probing& probing);
+  HoldReason follow(Learnt& learnt, const ImageMeasurement& image, const JointHistory& history) const;
+
+  ControllerConfig config_;
   Eigen::Vector4d side_ = Eigen::Vector4d::Ones();  ///< to which the joints are probed
-  ProbingFit fit_;
-  std::optional<ImageWindow> window_;
-  double probed_s_ = 0;
-  bool learnt_ = false;
-  double learnt_delay_s_ = 0;
-  double last_image_s_ = 0;  ///< stamp of the last one used
+  std::variant<Waiting, Probing, Learnt> state_;
 };
 
 }  // namespace lapservo::internal
