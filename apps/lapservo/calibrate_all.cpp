@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -12,6 +13,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "apps/lapservo/calibrate_steps.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/record.h"
 #include "apps/lapservo/subcommands.h"
@@ -31,13 +33,14 @@ struct AllOptions {
   bool deinterlace = false, no_questions = false, enable_motion = false;
 };
 
-// One step: what the user is to record for it, and the command that measures it.
+// One step: what the user is to record for it, the command that measures it, and what that does.
 struct Step {
   std::string name, what_to_record;
   std::string* input;
   const char* flag;                    // of the input
   std::string joints;                  // of the arm meanwhile, where they are given
   std::vector<std::string> arguments;  // beyond the subcommand, the input, the rig and the joints
+  std::function<int(const CalibrateOptions&)> run;
 };
 
 constexpr const char* to_record_turn =
@@ -58,15 +61,6 @@ std::string command_line(const std::vector<std::string>& arguments) {
   std::string text = "lapservo";
   for (const std::string& argument : arguments) text += " " + shell_word(argument);
   return text;
-}
-
-int run_command(const std::vector<std::string>& arguments) {
-  Run run;
-  parse_arguments("calibrate all", arguments, [&](Command program) {
-    add_calibrate(program, run);
-    add_check(program, run);
-  });
-  return run();
 }
 
 std::string now_utc() {
@@ -130,20 +124,30 @@ class Guide {
     AllOptions& o = options_;
     std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm)};
     if (!o.aruco.empty()) board.insert(board.end(), {"--aruco", o.aruco});
-    return {{"camera",
-             "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
-             &o.boards, "--boards", "", board},
-            {"colour", "the mounted marker moved through the picture, 10 s", &o.motion, "--motion", "", {}},
-            {"marker", to_record_turn, &o.turn, "--turn", "", {}},
-            {"registration",
-             "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s",
-             &o.swing,
-             "--swing",
-             o.joints,
-             {}},
-            {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}}};
+    return {
+        {"camera",
+         "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
+         &o.boards, "--boards", "", board, [this](const auto& options) { return run_camera(options); }},
+        {"colour",
+         "the mounted marker moved through the picture, 10 s",
+         &o.motion,
+         "--motion",
+         "",
+         {},
+         [](const auto& options) { return calibrate_colour({options}); }},
+        {"marker", to_record_turn, &o.turn, "--turn", "", {}, calibrate_marker},
+        {"registration", to_record_swing, &o.swing, "--swing", o.joints, {}, calibrate_registration},
+        {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}, check}};
   }
 
+  int run_camera(const CalibrateOptions& options) const {
+    CalibrateCameraOptions camera;
+    camera.inputs = {options.input}, camera.rig = options.rig;
+    camera.board = options_.board, camera.square_mm = options_.square_mm, camera.dictionary = options_.aruco;
+    return calibrate_camera(camera);
+  }
+
+  // As a user types it; where its page goes is no part of what was done.
   std::vector<std::string> arguments_of(const Step& step) const {
     const bool check = step.name == "check", camera = step.name == "camera";
     std::vector<std::string> all;
@@ -159,10 +163,13 @@ class Guide {
     return all;
   }
 
-  // Where the check's page goes is no part of what was done.
-  std::vector<std::string> with_report(std::vector<std::string> arguments, const Step& step) const {
-    if (step.name == "check" && !options_.report.empty()) arguments.insert(arguments.end(), {"--out", options_.report});
-    return arguments;
+  CalibrateOptions options_of(const Step& step) const {
+    CalibrateOptions options;
+    options.input = *step.input, options.rig = options_.rig, options.joints = step.joints;
+    if (step.name != "check") options.out = options_.rig;
+    options.instrument = options_.instrument, options.fps = options_.fps, options.deinterlace = options_.deinterlace;
+    if (step.name == "check") options.report = options_.report;
+    return options;
   }
 
   static std::string state_of(const Step& step) {
@@ -186,13 +193,12 @@ class Guide {
     expect_recording(step);
     if (step.name == "camera" && (options_.board.empty() || options_.square_mm <= 0))
       throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
-    const std::vector<std::string> arguments = arguments_of(step);
-    const CalibrationStep now{step.name, command_line(arguments), state_of(step), now_utc()};
+    const CalibrationStep now{step.name, command_line(arguments_of(step)), state_of(step), now_utc()};
     if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs)
       return tell_done(*done);
     std::printf("\n%s: %s\n", step.name.c_str(), now.command.c_str());
     std::fflush(stdout);
-    const int code = run_command(with_report(arguments, step));
+    const int code = step.run(options_of(step));
     if (code == 0) {
       record_.add(now), record_.rig = content_state(options_.rig);
       write_record(record_file_, record_);

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/calibrate_steps.h"
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/input_files.h"
 #include "apps/lapservo/interrupt.h"
@@ -26,27 +26,13 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-struct CameraOptions {
-  std::vector<std::string> inputs;
-  std::string rig, out, camera_info, board, dictionary, image_topic;
-  double square_mm = 0;
-  std::optional<double> marker_mm;
-  std::size_t views = 30;
-
-  // Where the rig goes; empty without one.
-  const std::string& rig_out() const { return rig.empty() || !out.empty() ? out : rig; }
-  std::string input() const {
-    return inputs.size() == 1 ? inputs.front() : fmt::format("{} and others", inputs.front());
-  }
-};
-
-Board board_of(const CameraOptions& options) {
+Board board_of(const CalibrateCameraOptions& options) {
   BoardWords words{options.board, 1e-3 * options.square_mm, options.dictionary};
   if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
   return internal::board_of(words);
 }
 
-void check_files(const CameraOptions& options, const std::optional<Rig>& rig) {
+void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>& rig) {
   if (options.rig.empty() && options.out.empty() && options.camera_info.empty())
     throw InputError("calibrate camera", "has no place for its result, expected --rig, --out or --camera-info");
   InputFiles files;
@@ -76,7 +62,7 @@ void look_at(const std::string& input, const std::string& image_topic, BoardReco
   if (!recordings.read().stopped) say_complaint(input, recordings.read().complaint);
 }
 
-int refuse(const CameraOptions& options, const std::string& why) {
+int refuse(const CalibrateCameraOptions& options, const std::string& why) {
   std::fprintf(stderr, "lapservo: %s: %s; nothing was written\n", options.input().c_str(), why.c_str());
   return 1;
 }
@@ -102,7 +88,7 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
                 response.sharpening, response.sharpening_px);
 }
 
-void write_results(const CameraOptions& options, std::optional<Rig> rig, const Camera& camera) {
+void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig, const Camera& camera) {
   for (const std::string& place : {options.camera_info, rig ? std::string() : options.out}) {
     if (place.empty()) continue;
     write_file(place, camera_yaml(camera));
@@ -114,7 +100,9 @@ void write_results(const CameraOptions& options, std::optional<Rig> rig, const C
   std::printf("rig: %s\n", options.rig_out().c_str());
 }
 
-int run_camera(const CameraOptions& options) {
+}  // namespace
+
+int calibrate_camera(const CalibrateCameraOptions& options) {
   const Board board = board_of(options);
   std::optional<Rig> rig;
   if (!options.rig.empty()) rig = load_rig(options.rig);
@@ -141,10 +129,8 @@ int run_camera(const CameraOptions& options) {
   return 0;
 }
 
-}  // namespace
-
 void add_calibrate_camera(Command parent, Run& run_later) {
-  auto options = std::make_shared<CameraOptions>();
+  auto options = std::make_shared<CalibrateCameraOptions>();
   Command command = parent.add_subcommand(
       "camera", "Measure a camera with a chessboard: matrix, distortion, lateral chromatic aberration, response.");
   command
@@ -173,7 +159,7 @@ void add_calibrate_camera(Command parent, Run& run_later) {
       "All numbers are written with one standard deviation each (sigma_...), the response's where the pictures tell "
       "it.\n"
       "Example:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml");
-  command.runs(run_later, [options] { return run_camera(*options); });
+  command.runs(run_later, [options] { return calibrate_camera(*options); });
 }
 
 }  // namespace lapservo::app

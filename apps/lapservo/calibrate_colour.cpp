@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
-#include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/calibrate_steps.h"
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/live_view.h"
@@ -19,10 +19,6 @@
 namespace lapservo::app {
 using namespace internal;
 namespace {
-
-struct ColourOptions : CalibrateOptions {
-  bool view = false, replace_response = false;
-};
 
 cv::Mat halved(const cv::Mat& picture) {
   cv::Mat small;
@@ -54,7 +50,9 @@ void show(LiveView& view, const std::vector<cv::Mat>& kept, const Rig& before, c
     if (!view.show(before_and_after(kept[i], before, after))) return;
 }
 
-int run_colour(const ColourOptions& options) {
+}  // namespace
+
+int calibrate_colour(const CalibrateColourOptions& options) {
   const Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
@@ -83,10 +81,8 @@ int run_colour(const ColourOptions& options) {
   return 0;
 }
 
-}  // namespace
-
 void add_calibrate_colour(Command parent, Run& run_later) {
-  auto options = std::make_shared<ColourOptions>();
+  auto options = std::make_shared<CalibrateColourOptions>();
   Command command = parent.add_subcommand(
       "colour", "Measure the hues of a mounted marker's bands as the camera has them, and how it encodes light.");
   command
@@ -102,7 +98,7 @@ void add_calibrate_colour(Command parent, Run& run_later) {
       "rig's\n"
       "hues may be up to 60 degrees off; the response is written where the frames tell another than the rig's.\n"
       "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options] { return run_colour(*options); });
+  command.runs(run_later, [options] { return calibrate_colour(*options); });
 }
 
 }  // namespace lapservo::app

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/calibrate_steps.h"
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/joint_input.h"
@@ -35,7 +35,9 @@ void print_table(const std::vector<CalibratedNumber>& numbers) {
                 n.after - n.before);
 }
 
-int run_marker(const CalibrateOptions& options) {
+}  // namespace
+
+int calibrate_marker(const CalibrateOptions& options) {
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
@@ -72,8 +74,6 @@ int run_marker(const CalibrateOptions& options) {
   return 0;
 }
 
-}  // namespace
-
 void add_calibrate_marker(Command parent, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
   Command command = parent.add_subcommand(
@@ -93,7 +93,7 @@ void add_calibrate_marker(Command parent, Run& run_later) {
       "it may move otherwise too. For a compressed video turn it there and back. All numbers are written with one "
       "standard deviation each (sigma_...).\n"
       "Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml");
-  command.runs(run_later, [options] { return run_marker(*options); });
+  command.runs(run_later, [options] { return calibrate_marker(*options); });
 }
 
 }  // namespace lapservo::app

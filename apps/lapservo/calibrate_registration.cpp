@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/calibrate_steps.h"
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
 #include "apps/lapservo/joint_input.h"
@@ -54,7 +54,9 @@ void print_residuals(const Registration& registration) {
       1e3 * rms(registration.residuals, &RegistrationResidual::roll_rad), registration.residuals.size());
 }
 
-int run_registration(const CalibrateOptions& options) {
+}  // namespace
+
+int calibrate_registration(const CalibrateOptions& options) {
   Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
@@ -84,8 +86,6 @@ int run_registration(const CalibrateOptions& options) {
   return 0;
 }
 
-}  // namespace
-
 void add_calibrate_registration(Command parent, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
   Command command = parent.add_subcommand(
@@ -110,7 +110,7 @@ void add_calibrate_registration(Command parent, Run& run_later) {
       "offset\n"
       "stays the rig's: camera_from_rcm turns with it.\n"
       "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
-  command.runs(run_later, [options] { return run_registration(*options); });
+  command.runs(run_later, [options] { return calibrate_registration(*options); });
 }
 
 }  // namespace lapservo::app

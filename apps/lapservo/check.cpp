@@ -9,7 +9,7 @@
 
 #include <fmt/format.h>
 
-#include "apps/lapservo/calibrate_inputs.h"
+#include "apps/lapservo/calibrate_steps.h"
 #include "apps/lapservo/check_report.h"
 #include "apps/lapservo/frame_input.h"
 #include "apps/lapservo/interrupt.h"
@@ -76,7 +76,9 @@ void print(const CheckedRig& checked) {
                 advice.what.c_str(), advice.command.c_str(), advice.gain.c_str());
 }
 
-int run_check(const CalibrateOptions& options) {
+}  // namespace
+
+int check(const CalibrateOptions& options) {
   const Rig rig = load_rig(options.rig);
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
@@ -135,8 +137,6 @@ int run_check(const CalibrateOptions& options) {
   return checked.good_enough() ? 0 : 1;
 }
 
-}  // namespace
-
 void add_check(Command app, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
   Command command = app.add_subcommand("check", "Tell whether a rig is good enough, and what to improve first.");
@@ -154,7 +154,7 @@ void add_check(Command app, Run& run_later) {
       "Swing, insert and withdraw the instrument, and turn it about its axis once, in 10 to 60 s, the marker in view.\n"
       "Exit code 0: good enough, 1: not good enough.\n"
       "Example:\n  lapservo check swing.mp4 --joints joints.csv --rig rig.yaml --out check.html");
-  command.runs(run_later, [options] { return run_check(*options); });
+  command.runs(run_later, [options] { return check(*options); });
 }
 
 }  // namespace lapservo::app

@@ -118,15 +118,4 @@ void Command::runs(Run& run_later, Run run) {
   app_->callback([&run_later, run = std::move(run)] { run_later = run; });
 }
 
-void parse_arguments(const std::string& source, const std::vector<std::string>& arguments,
-                     const std::function<void(Command)>& add) {
-  CLI::App app{"", "lapservo"};
-  add(Command(&app));
-  try {
-    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
-  } catch (const CLI::ParseError& error) {
-    throw InputError(source, error.what());
-  }
-}
-
 }  // namespace lapservo::app

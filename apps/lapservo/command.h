@@ -65,8 +65,4 @@ class Command {
   CLI::App* app_;
 };
 
-/// As if the user had typed these: `add` adds the subcommands that there are. Throws InputError naming `source`.
-void parse_arguments(const std::string& source, const std::vector<std::string>& arguments,
-                     const std::function<void(Command)>& add);
-
 }  // namespace lapservo::app
