@@ -9,7 +9,7 @@ RUN git config --global --add safe.directory /source && ./dev package
 
 FROM debian:12-slim
 RUN --mount=type=bind,from=build,source=/source/build/package,target=/packages \
-    apt-get update && apt-get install -y --no-install-recommends /packages/*.deb && rm -rf /var/lib/apt/lists/*
+    apt-get update && apt-get install -y --no-install-recommends /packages/*.deb gstreamer1.0-plugins-good && rm -rf /var/lib/apt/lists/*
 RUN useradd --create-home lapservo
 USER lapservo
 WORKDIR /data

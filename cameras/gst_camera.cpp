@@ -1,3 +1,4 @@
+#include <chrono>
 #include <cstdint>
 #include <gst/app/gstappsink.h>
 #include <gst/gst.h>
@@ -8,14 +9,15 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include <opencv2/core.hpp>
 
 #include "cameras/camera.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo::internal {
 namespace {
-
-constexpr GstClockTime patience = 10 * GST_SECOND;
 
 struct Unref {
   void operator()(void* object) const { gst_object_unref(object); }
@@ -25,6 +27,7 @@ using Owned = std::unique_ptr<T, Unref>;
 struct UnrefSample {
   void operator()(GstSample* sample) const { gst_sample_unref(sample); }
 };
+using Sample = std::unique_ptr<GstSample, UnrefSample>;
 struct UnrefMessage {
   void operator()(GstMessage* message) const { gst_message_unref(message); }
 };
@@ -43,12 +46,33 @@ std::string text_of(GError* error) {
   return text;
 }
 
-// What an element says of its end, an error or the last image.
+// An element's end, by an error or the last image. Details, as the system's error, follow the place in the source.
 std::string end_of(GstMessage* message) {
   if (GST_MESSAGE_TYPE(message) == GST_MESSAGE_EOS) return {};
   GError* error = nullptr;
-  gst_message_parse_error(message, &error, nullptr);
-  return std::string(GST_OBJECT_NAME(GST_MESSAGE_SRC(message))) + ": " + text_of(error);
+  gchar* details = nullptr;
+  gst_message_parse_error(message, &error, &details);
+  const std::string all = details ? details : "";
+  g_free(details);
+  const std::size_t line = all.find('\n');
+  return std::string(GST_OBJECT_NAME(GST_MESSAGE_SRC(message))) + ": " + text_of(error) +
+         (line == std::string::npos ? "" : ", " + one_line(all.substr(line + 1)));
+}
+
+// By the caps' colorimetry. GStreamer's own 8-bit conversion to RGB is off by up to 5.
+cv::Matx34d bgr_from_yuv(const GstVideoInfo& info) {
+  double red = 0, blue = 0;  // of the light
+  if (!gst_video_color_matrix_get_Kr_Kb(info.colorimetry.matrix, &red, &blue))
+    gst_video_color_matrix_get_Kr_Kb(GST_VIDEO_COLOR_MATRIX_BT601, &red, &blue);
+  const double green = 1 - red - blue, from_u = 2 * (1 - blue), from_v = 2 * (1 - red);
+  cv::Matx33d matrix(1, from_u, 0, 1, -blue * from_u / green, -red * from_v / green, 1, 0, from_v);
+  int offset[GST_VIDEO_MAX_COMPONENTS] = {}, scale[GST_VIDEO_MAX_COMPONENTS] = {};
+  gst_video_color_range_offsets(info.colorimetry.range, info.finfo, offset, scale);
+  for (int i = 0; i < 3; ++i)
+    for (int row = 0; row < 3; ++row) matrix(row, i) *= 255.0 / scale[i];
+  cv::Matx34d affine;
+  cv::hconcat(matrix, matrix * cv::Vec3d(-offset[0], -offset[1], -offset[2]), affine);
+  return affine;
 }
 
 void require_gstreamer() {
@@ -58,7 +82,8 @@ void require_gstreamer() {
 
 class GstCamera : public LiveCamera {
  public:
-  GstCamera(const std::string& text, ImageSink sink) : text_(text), sink_(std::move(sink)) {
+  GstCamera(const std::string& camera, const cv::Size& size, CameraSink sink)
+      : camera_(camera), size_(size), sink_(std::move(sink)) {
     require_gstreamer();
     parse();
     // The clock of our stamps: the monotonic one, as everywhere.
@@ -84,55 +109,102 @@ class GstCamera : public LiveCamera {
     return ended_;
   }
 
+  std::optional<ImageMessage> take(std::chrono::milliseconds patience) override {
+    const Sample sample(gst_app_sink_try_pull_sample(app_sink(), std::chrono::nanoseconds(patience).count()));
+    return sample ? image_of(*sample) : std::nullopt;
+  }
+
+  double frames_per_second() const override {
+    constexpr double usual = 30;
+    const Owned<GstPad> pad(gst_element_get_static_pad(sink_element_.get(), "sink"));
+    GstCaps* const caps = gst_pad_get_current_caps(pad.get());
+    GstVideoInfo info;
+    const bool announced = caps && gst_video_info_from_caps(&info, caps) && info.fps_n > 0 && info.fps_d > 0;
+    if (caps) gst_caps_unref(caps);
+    return announced ? static_cast<double>(info.fps_n) / info.fps_d : usual;
+  }
+
  private:
+  GstAppSink* app_sink() const { return GST_APP_SINK(sink_element_.get()); }
+
   void parse() {
     GError* error = nullptr;
     const std::string whole =
-        text_ + " ! videoconvert ! video/x-raw,format=BGR ! appsink name=lapservo_sink max-buffers=2 drop=true";
+        camera_pipeline(camera_, size_) +
+        " ! videoconvert ! video/x-raw,format={BGR,v308} ! appsink name=lapservo_sink max-buffers=2";
     pipeline_.reset(gst_parse_launch_full(whole.c_str(), nullptr, GST_PARSE_FLAG_FATAL_ERRORS, &error));
-    if (!pipeline_ || error) refuse(text_of(error));
-    g_clear_error(&error);
-    if (!GST_IS_PIPELINE(pipeline_.get())) refuse("it is no pipeline");
+    if (error && g_error_matches(error, GST_PARSE_ERROR, GST_PARSE_ERROR_NO_SUCH_ELEMENT))
+      refuse(text_of(error), "one of installed plugins, as gstreamer1.0-plugins-base and gstreamer1.0-plugins-good");
+    if (!pipeline_ || error) refuse(text_of(error), expectation());
+    if (!GST_IS_PIPELINE(pipeline_.get())) refuse("it is no pipeline", expectation());
     sink_element_.reset(gst_bin_get_by_name(GST_BIN(pipeline_.get()), "lapservo_sink"));
+    if (!sink_) return;
     GstAppSinkCallbacks callbacks{};
-    callbacks.new_sample = [](GstAppSink* from, gpointer camera) {
-      static_cast<GstCamera*>(camera)->take(from);
+    callbacks.new_sample = [](GstAppSink*, gpointer camera) {
+      auto& self = *static_cast<GstCamera*>(camera);
+      if (auto image = self.take({})) self.sink_(std::move(*image));
       return GST_FLOW_OK;
     };
-    gst_app_sink_set_callbacks(GST_APP_SINK(sink_element_.get()), &callbacks, this, nullptr);
-  }
-  void start() {
-    GstStateChangeReturn paused = gst_element_set_state(pipeline_.get(), GST_STATE_PAUSED);
-    if (paused == GST_STATE_CHANGE_ASYNC) paused = gst_element_get_state(pipeline_.get(), nullptr, nullptr, patience);
-    if (paused == GST_STATE_CHANGE_FAILURE || paused == GST_STATE_CHANGE_ASYNC) {
-      refuse(ended().value_or("no image came within 10 s"));
-    }
-    // What is live is taken as it comes; the rest at its own speed.
-    g_object_set(sink_element_.get(), "sync", paused != GST_STATE_CHANGE_NO_PREROLL, nullptr);
-    if (gst_element_set_state(pipeline_.get(), GST_STATE_PLAYING) == GST_STATE_CHANGE_FAILURE)
-      refuse(ended().value_or("it does not start"));
-  }
-  [[noreturn]] void refuse(const std::string& why) const {
-    throw InputError("gst:" + text_, "can't be played (" + why + "), expected a pipeline without a sink: videotestsrc");
+    gst_app_sink_set_callbacks(app_sink(), &callbacks, this, nullptr);
   }
 
-  void take(GstAppSink* from) {
-    const std::unique_ptr<GstSample, UnrefSample> sample(gst_app_sink_pull_sample(from));
+  // What is live is taken as it comes; the rest at its own speed, and whole.
+  void start() {
+    const bool live = change_to(GST_STATE_PAUSED) == GST_STATE_CHANGE_NO_PREROLL;
+    g_object_set(sink_element_.get(), "sync", !live, "drop", live, nullptr);
+    change_to(GST_STATE_PLAYING);
+  }
+  // Until the first image is there; but what is live gives none while it is paused.
+  GstStateChangeReturn change_to(GstState state) const {
+    constexpr GstClockTime moment = 50 * GST_MSECOND, patience = 10 * GST_SECOND;
+    GstStateChangeReturn changed = gst_element_set_state(pipeline_.get(), state);
+    for (GstClockTime waited = 0; changed == GST_STATE_CHANGE_ASYNC && waited < patience; waited += moment) {
+      changed = gst_element_get_state(pipeline_.get(), nullptr, nullptr, moment);
+      if (changed == GST_STATE_CHANGE_ASYNC && !ended().value_or("").empty()) break;
+    }
+    if (changed == GST_STATE_CHANGE_FAILURE || changed == GST_STATE_CHANGE_ASYNC) {
+      const std::string why = ended().value_or("");
+      const bool late = changed == GST_STATE_CHANGE_ASYNC;
+      refuse(!why.empty() ? why : late ? "none came within 10 s" : "it does not start", expectation());
+    }
+    return changed;
+  }
+
+  std::string expectation() const {
+    if (camera_.starts_with("gst:")) return "a pipeline without a sink: videotestsrc";
+    const std::string size = std::to_string(size_.width) + "x" + std::to_string(size_.height) + " as in the rig";
+    return "a camera that is plugged in, that this user may open (group video) and no other program uses" +
+           (size_.empty() ? "" : ", and that gives " + size);
+  }
+  [[noreturn]] void refuse(const std::string& why, const std::string& expected) const {
+    throw InputError(camera_, "gives no images (" + why + "), expected " + expected);
+  }
+
+  std::optional<ImageMessage> image_of(GstSample& sample) const {
     GstVideoInfo info;
     GstVideoFrame frame;
-    if (!sample || !gst_video_info_from_caps(&info, gst_sample_get_caps(sample.get())) ||
-        !gst_video_frame_map(&frame, &info, gst_sample_get_buffer(sample.get()), GST_MAP_READ))
-      return;
-    ImageMessage message{stamp_of(*sample), {}, {}, {}, "bgr8", false, {}};
-    message.width = static_cast<std::uint32_t>(GST_VIDEO_FRAME_WIDTH(&frame));
-    message.height = static_cast<std::uint32_t>(GST_VIDEO_FRAME_HEIGHT(&frame));
-    message.step = static_cast<std::uint32_t>(GST_VIDEO_FRAME_PLANE_STRIDE(&frame, 0));
-    const auto* const pixels = static_cast<const std::uint8_t*>(GST_VIDEO_FRAME_PLANE_DATA(&frame, 0));
-    const std::size_t last_row = std::size_t{3} * message.width;
-    if (message.height > 0)
-      message.data.assign(pixels, pixels + std::size_t{message.step} * (message.height - 1) + last_row);
+    if (!gst_video_info_from_caps(&info, gst_sample_get_caps(&sample)) ||
+        !gst_video_frame_map(&frame, &info, gst_sample_get_buffer(&sample), GST_MAP_READ))
+      return std::nullopt;
+    const int width = GST_VIDEO_FRAME_WIDTH(&frame), height = GST_VIDEO_FRAME_HEIGHT(&frame);
+    const auto step = static_cast<std::uint32_t>(3 * width);
+    ImageMessage message{stamp_of(sample),
+                         static_cast<std::uint32_t>(width),
+                         static_cast<std::uint32_t>(height),
+                         step,
+                         "bgr8",
+                         false,
+                         std::vector<std::uint8_t>(std::size_t{step} * height)};
+    const cv::Mat pixels(height, width, CV_8UC3, GST_VIDEO_FRAME_PLANE_DATA(&frame, 0),
+                         static_cast<std::size_t>(GST_VIDEO_FRAME_PLANE_STRIDE(&frame, 0)));
+    const cv::Mat bgr(height, width, CV_8UC3, message.data.data());
+    if (GST_VIDEO_INFO_IS_RGB(&info)) {
+      pixels.copyTo(bgr);
+    } else {
+      cv::transform(pixels, bgr, bgr_from_yuv(info));
+    }
     gst_video_frame_unmap(&frame);
-    sink_.image(std::move(message));
+    return message;
   }
   double stamp_of(GstSample& sample) const {
     const GstSegment* const segment = gst_sample_get_segment(&sample);
@@ -146,8 +218,9 @@ class GstCamera : public LiveCamera {
     return 1e-9 * static_cast<double>(running + base);
   }
 
-  std::string text_;
-  ImageSink sink_;
+  std::string camera_;
+  cv::Size size_;
+  CameraSink sink_;
   Owned<GstElement> pipeline_, sink_element_;
   mutable std::mutex mutex_;
   mutable std::optional<std::string> ended_;
@@ -155,8 +228,8 @@ class GstCamera : public LiveCamera {
 
 }  // namespace
 
-std::unique_ptr<LiveCamera> open_gst_camera(const std::string& pipeline, ImageSink sink) {
-  return std::make_unique<GstCamera>(pipeline, std::move(sink));
+std::unique_ptr<LiveCamera> open_camera(const std::string& camera, const cv::Size& size, CameraSink sink) {
+  return std::make_unique<GstCamera>(camera, size, std::move(sink));
 }
 
 }  // namespace lapservo::internal

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -12,8 +13,10 @@
 #include "lapservo/crtk/image_decoder.h"
 #include "lapservo/crtk/image_receiver.h"
 #include "lapservo/crtk/test_inbox.h"
+#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
 namespace {
@@ -31,14 +34,13 @@ TEST(GstCamera, ImagesCarryTheMonotonicTimeOfTheirCapture) {
   std::mutex mutex;
   std::vector<double> ages_s;
   const auto take = images.handler();
-  const auto camera = open_gst_camera(
-      "videotestsrc is-live=true pattern=red ! video/x-raw,format=I420,width=322,height=200,framerate=100/1",
-      {[&](ImageMessage&& message) {
-         const std::lock_guard lock(mutex);
-         ages_s.push_back(clock.now_s() - message.stamp_s);
-         take(std::move(message));
-       },
-       {}});
+  const auto camera = open_camera(
+      "gst:videotestsrc is-live=true pattern=red ! video/x-raw,format=I420,width=322,height=200,framerate=100/1", {},
+      [&](ImageMessage&& message) {
+        const std::lock_guard lock(mutex);
+        ages_s.push_back(clock.now_s() - message.stamp_s);
+        take(std::move(message));
+      });
   ASSERT_TRUE(wait_for([&] { return images.count() >= 20; }));
   EXPECT_FALSE(camera->ended());
   const auto all = images.all();
@@ -60,11 +62,50 @@ TEST(GstCamera, ImagesCarryTheMonotonicTimeOfTheirCapture) {
 TEST(GstCamera, AFileOrAnEndIsPlayedAtItsOwnSpeedAndSaid) {
   TestInbox<ImageMessage> images;
   const auto begin = std::chrono::steady_clock::now();
-  const auto camera = open_gst_camera("videotestsrc num-buffers=11 ! video/x-raw,width=64,height=48,framerate=20/1",
-                                      {images.handler(), {}});
+  const auto camera = open_camera("gst:videotestsrc num-buffers=11 ! video/x-raw,width=64,height=48,framerate=20/1", {},
+                                  images.handler());
   ASSERT_TRUE(wait_for([&] { return camera->ended().has_value(); }));
   EXPECT_EQ(camera->ended(), "");
   EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(450));
+}
+
+// As cameras send it: without the Huffman tables that JPEG's standard names.
+std::string motion_jpeg(const cv::Size& size, const cv::Scalar& bgr) {
+  std::vector<std::uint8_t> jpeg = encode_jpeg(cv::Mat(size, CV_8UC3, bgr));
+  for (std::size_t at = 2; jpeg[at + 1] != 0xda;) {
+    const std::size_t length = 2 + 256u * jpeg[at + 2] + jpeg[at + 3];
+    if (jpeg[at + 1] == 0xc4) {
+      jpeg.erase(jpeg.begin() + static_cast<std::ptrdiff_t>(at),
+                 jpeg.begin() + static_cast<std::ptrdiff_t>(at + length));
+    } else {
+      at += length;
+    }
+  }
+  return {jpeg.begin(), jpeg.end()};
+}
+
+// Whatever a device sends, by another source in its place.
+TEST(GstCamera, ADevicesRawAndJpegImagesHaveTheirColours) {
+  const testing::TemporaryFolder folder;
+  const std::string device = "v4l2src device=\"/dev/video0\"", raw = "videotestsrc is-live=true pattern=red";
+  for (const cv::Size& size : {cv::Size(640, 480), cv::Size(1280, 720)}) {
+    testing::write_file(folder / "jpeg", motion_jpeg(size, {0, 0, 255}));
+    const std::string jpeg =
+        "filesrc location=" + (folder / "jpeg").string() +
+        " blocksize=1000000 ! queue ! capsfilter caps=image/jpeg,framerate=25/1,width=" + std::to_string(size.width) +
+        ",height=" + std::to_string(size.height);
+    std::string pipeline = camera_pipeline("/dev/video0", size);
+    ASSERT_TRUE(pipeline.starts_with(device));
+    pipeline.erase(0, device.size());
+    for (const std::string& source : {raw, raw + " ! video/x-raw,format=YUY2", jpeg}) {
+      const auto frame = open_camera_or_file("gst:" + source + pipeline, 30)->next();
+      ASSERT_TRUE(frame) << source;
+      EXPECT_EQ(frame->bgr.size(), size) << source;
+      const auto pixel = frame->bgr.at<cv::Vec3b>(100, 100);
+      EXPECT_LE(std::max(pixel[0], pixel[1]), 3) << source << pixel;
+      EXPECT_GE(pixel[2], 252) << source << pixel;
+    }
+  }
 }
 
 TEST(GstCamera, RepeatedAndResizedFramesAreCounted) {
@@ -72,42 +113,90 @@ TEST(GstCamera, RepeatedAndResizedFramesAreCounted) {
   ImageReceiver receiver(64, 48);
   // Each frame twice, with one stamp.
   const auto camera =
-      open_gst_camera("videotestsrc is-live=true num-buffers=10 ! video/x-raw,width=32,height=48,framerate=50/1",
-                      {[&](ImageMessage&& message) {
-                         receiver.receive(ImageMessage(message), clock.now_s());
-                         receiver.newest();
-                         receiver.receive(std::move(message), clock.now_s());
-                       },
-                       {}});
+      open_camera("gst:videotestsrc is-live=true num-buffers=10 ! video/x-raw,width=32,height=48,framerate=50/1", {},
+                  [&](ImageMessage&& message) {
+                    receiver.receive(ImageMessage(message), clock.now_s());
+                    receiver.newest();
+                    receiver.receive(std::move(message), clock.now_s());
+                  });
   ASSERT_TRUE(wait_for([&] { return camera->ended().has_value(); }));
   EXPECT_GT(receiver.counts().resized, 0);
   EXPECT_EQ(receiver.counts().repeated, receiver.counts().resized);
   EXPECT_EQ(receiver.complaint(), "the same stamp again");
 }
 
-TEST(GstCamera, ABadPipelineIsRefusedInOneLine) {
-  const auto refusal = [](const char* pipeline) {
-    return testing::input_error([&] { open_gst_camera(pipeline, {[](ImageMessage&&) {}, {}}); });
+TEST(GstCamera, WhatGivesNoImagesIsRefusedInOneLine) {
+  struct Refusal {
+    std::string camera;
+    cv::Size size;
+    std::vector<std::string> said;
   };
-  EXPECT_NE(refusal("nosuchelement").find("gst:nosuchelement: can't be played (no element \"nosuchelement\""),
-            std::string::npos)
-      << refusal("nosuchelement");
-  EXPECT_NE(refusal("filesrc location=/nowhere ! decodebin").find("can't be played (filesrc"), std::string::npos)
-      << refusal("filesrc location=/nowhere ! decodebin");
-  for (const char* bad : {"", "!", "videotestsrc ! fakesink", "audiotestsrc", "videotestsrc pattern=nosuch"}) {
-    const std::string said = refusal(bad);
-    EXPECT_NE(said, "") << bad;
-    EXPECT_EQ(said.find('\n'), std::string::npos) << said;
+  for (const auto& [camera, size, said] :
+       {Refusal{"gst:nosuchelement",
+                {},
+                {"gst:nosuchelement: gives no images (no element \"nosuchelement\"", "plugins-good"}},
+        {"gst:filesrc location=/nowhere ! decodebin", {}, {"(filesrc", "No such file", "expected a pipeline"}},
+        {"gst:videotestsrc ! video/x-raw,format=nosuch", {}, {"expected a pipeline"}},
+        {"gst:", {}, {"expected a pipeline"}},
+        {"gst:!", {}, {"expected a pipeline"}},
+        {"gst:videotestsrc ! fakesink", {}, {"expected a pipeline"}},
+        {"gst:audiotestsrc", {}, {"expected a pipeline"}},
+        {"gst:videotestsrc pattern=nosuch", {}, {"expected a pipeline"}},
+        {"/dev/video-none",
+         {},
+         {"/dev/video-none: gives no images (v4l2src", "No such file", "plugged in", "group video"}},
+        {"/dev/video-none", {640, 480}, {"and that gives 640x480 as in the rig"}},
+        {"/dev/video/../null", {}, {"expected a camera"}}}) {
+    const std::string refusal = testing::input_error([&] { open_camera(camera, size); });
+    for (const std::string& part : said) EXPECT_NE(refusal.find(part), std::string::npos) << camera << ": " << refusal;
+    EXPECT_EQ(refusal.find('\n'), std::string::npos) << refusal;
   }
 }
 
 // An error while it plays: a source that breaks off.
 TEST(GstCamera, AnErrorLaterIsSaid) {
-  const auto camera = open_gst_camera(
-      "videotestsrc is-live=true ! video/x-raw,width=64,height=48,framerate=50/1 ! identity error-after=5",
-      {[](ImageMessage&&) {}, {}});
+  const auto camera = open_camera(
+      "gst:videotestsrc is-live=true ! video/x-raw,width=64,height=48,framerate=50/1 ! identity error-after=5", {},
+      [](ImageMessage&&) {});
   ASSERT_TRUE(wait_for([&] { return camera->ended().has_value(); }));
   EXPECT_NE(camera->ended()->find("identity"), std::string::npos) << *camera->ended();
+}
+
+TEST(CameraFrames, AreAllOfAFileAndEndWithIt) {
+  const auto frames =
+      open_camera_or_file("gst:videotestsrc num-buffers=9 ! video/x-raw,width=64,height=48,framerate=50/1", 30);
+  EXPECT_EQ(frames->kind(), FrameSource::Kind::live);
+  EXPECT_EQ(frames->frames_per_second(), 50);
+  for (int i = 0; i < 9; ++i) {
+    const auto frame = frames->next();
+    ASSERT_TRUE(frame) << i;
+    EXPECT_EQ(frame->index, i);
+    EXPECT_EQ(frame->bgr.size(), cv::Size(64, 48));
+    EXPECT_NEAR(frame->time_s, i / 50.0, 1e-6);
+    std::this_thread::sleep_for(std::chrono::milliseconds(60));
+  }
+  EXPECT_FALSE(frames->next());
+  EXPECT_EQ(frames->complaint(), "");
+}
+
+// Whoever is slow gets the newest, and not those that have been waiting.
+TEST(CameraFrames, OfALiveCameraAreTheNewest) {
+  const auto frames =
+      open_camera_or_file("gst:videotestsrc is-live=true ! video/x-raw,width=64,height=48,framerate=100/1", 30);
+  const auto first = frames->next();
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  const auto second = frames->next();
+  ASSERT_TRUE(first && second);
+  EXPECT_GT(second->time_s - first->time_s, 0.5);
+}
+
+TEST(CameraFrames, EndWhenTheyAreToStopOrTheCameraFails) {
+  const std::string camera = "gst:videotestsrc is-live=true ! video/x-raw,width=64,height=48,framerate=50/1";
+  EXPECT_FALSE(open_camera_or_file(camera, 30, {}, [] { return true; })->next());
+  const auto frames = open_camera_or_file(camera + " ! identity error-after=5", 30);
+  while (frames->next())
+    ;
+  EXPECT_NE(frames->complaint().find("identity"), std::string::npos) << frames->complaint();
 }
 
 }  // namespace

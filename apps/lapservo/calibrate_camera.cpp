@@ -55,8 +55,9 @@ void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>
   files.refuse_as_output(options.camera_info);
 }
 
-void look_at(const std::string& input, const std::string& image_topic, BoardRecordings& recordings) {
-  const auto source = open_frames(input, 30, image_topic);
+void look_at(const std::string& input, const std::string& image_topic, const Camera* camera,
+             BoardRecordings& recordings) {
+  const auto source = open_frames(input, 30, image_topic, camera);
   recordings.look_at(*source, input, watched_job(),
                      [](const std::string& wanted) { std::fprintf(stderr, "lapservo: %s\n", wanted.c_str()); });
   if (!recordings.read().stopped) say_complaint(input, recordings.read().complaint);
@@ -112,7 +113,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   const Camera before = rig ? rig->camera : Camera{};
   BoardRecordings recordings(board, options.views, rig);
   for (const std::string& input : options.inputs) {
-    look_at(input, options.image_topic, recordings);
+    look_at(input, options.image_topic, rig ? &rig->camera : nullptr, recordings);
     if (recordings.read().stopped) break;
   }
   const auto without_board = recordings.without_board();

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "apps/lapservo/interrupt.h"
+#include "cameras/camera.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/read_ahead.h"
 #include "recordings/bag_frames.h"
@@ -10,10 +12,12 @@
 namespace lapservo::app {
 using namespace internal;
 
-std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic) {
+std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic,
+                                         const Camera* camera) {
   if (is_bag(input)) return read_ahead(std::make_unique<BagFrames>(open_bag(input), image_topic));
   refuse_topic_outside_bags("--image-topic", image_topic, input);
-  auto source = open_frame_source(input, folder_fps);
+  const cv::Size size = camera ? cv::Size(camera->width_px, camera->height_px) : cv::Size();
+  auto source = open_camera_or_file(input, folder_fps, size, interrupted);
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }
 

@@ -4,12 +4,15 @@
 #include <string>
 
 #include "apps/lapservo/subcommands.h"
+#include "lapservo/geometry/camera.h"
 #include "lapservo/io/frame_source.h"
 
 namespace lapservo::app {
 
-/// open_frame_source(), and the images of bags; `image_topic`: see internal::image_topic_of().
-std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic);
+/// internal::open_camera_or_file() until Ctrl-C, and the images of bags; `image_topic`: see internal::image_topic_of().
+/// `camera`: the rig's, whose size a camera's images shall have; null where none is known.
+std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic,
+                                         const Camera* camera);
 
 /// Throws InputError naming `option` where it names a topic although `input` is no bag.
 void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input);

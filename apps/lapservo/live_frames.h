@@ -9,7 +9,7 @@
 
 namespace lapservo::app {
 
-/// Live images as frames to be measured: the newest each time, until they end, none comes for 15 s or Ctrl-C.
+/// A topic's images as frames to be measured: the newest each time, until none comes for 15 s or Ctrl-C.
 class LiveFrames : public FrameSource {
  public:
   /// See LiveImages.

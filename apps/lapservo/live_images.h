@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -25,11 +26,14 @@ class Transports {
   std::map<std::string, std::unique_ptr<internal::Transport>> transports_;
 };
 
-/// Whether a text names images that come by themselves: ros2:/topic, ros1:/topic, gst:PIPELINE, /dev/videoN.
-bool names_live_images(const std::string& text);
-
-/// Whether it names a topic: its stamps are the sender's then.
+/// Whether a text names a topic, ros2:/topic or ros1:/topic, whose stamps are the sender's.
 bool names_topic(const std::string& text);
+
+/// Where images go, in another thread, one at a time.
+struct ImageSink {
+  std::function<void(internal::ImageMessage&&)> image;
+  std::function<void(internal::CompressedImageMessage&&)> compressed;
+};
 
 /// Where such images come from, until it is destroyed.
 struct ImageInput {
@@ -39,16 +43,16 @@ struct ImageInput {
   /// See internal::LiveCamera; topics never end.
   std::optional<std::string> ended() const { return camera ? camera->ended() : std::nullopt; }
 };
-/// Those images, into the sink. /dev/videoN must have this size. Throws InputError, naming `option`, for what is none
-/// of them or can't be opened. The transports must outlive it.
+/// The images of a topic or a camera, into the sink; for `size` see internal::camera_pipeline(). Throws InputError for
+/// what is neither (naming `option`) or can't be opened. The transports must outlive it.
 ImageInput open_images(const std::string& text, const std::string& option, const cv::Size& size, Transports& transports,
-                       internal::ImageSink sink);
+                       ImageSink sink);
 
 /// Those images, received; see internal::ImageReceiver.
 class LiveImages : public ImageStream {
  public:
-  /// `camera`: the rig's, whose size images must have. Throws InputError, naming `option`, for what is none of them or
-  /// can't be opened. The transports and the clock must outlive it.
+  /// `camera`: the rig's, whose size images must have. Throws as open_images(). The transports and the clock must
+  /// outlive it.
   LiveImages(const std::string& text, const std::string& option, const Camera& camera, const Clock& clock,
              Transports& transports);
 
@@ -58,7 +62,7 @@ class LiveImages : public ImageStream {
   std::optional<std::string> ended() const { return input_.ended(); }
 
  private:
-  internal::ImageSink sink();
+  ImageSink sink();
 
   const Clock& clock_;
   internal::ImageReceiver receiver_;

@@ -83,14 +83,11 @@ class Recording {
             [this, topic](CompressedImageMessage&& message) { add(topic, std::move(message)); }};
   }
   ImageSink sink_of_camera(const Clock& clock) {
-    const auto add_stamped = [this, &clock](const std::string& topic, auto&& message) {
-      message.stamp_s = stamp_since_1970_s(message.stamp_s, clock);
-      add(topic, std::move(message));
-    };
-    return {[add_stamped](ImageMessage&& message) { add_stamped("/camera/image_raw", std::move(message)); },
-            [add_stamped](CompressedImageMessage&& message) {
-              add_stamped("/camera/image_raw/compressed", std::move(message));
-            }};
+    return {[this, &clock](ImageMessage&& message) {
+              message.stamp_s = stamp_since_1970_s(message.stamp_s, clock);
+              add("/camera/image_raw", std::move(message));
+            },
+            {}};
   }
 
   double fps_, next_image_s_ = 0;
@@ -270,7 +267,8 @@ void add_record(Command app, Run& run_later) {
       .required();
   command.add_option("--robot", options->robot, "The arm whose measured_js is recorded too: ros2:PSM1 or ros1:PSM1");
   command.add_option("--out", options->out, "Folder to make: a ROS 2 bag; a second of raw 720p takes 80 MB").required();
-  command.add_option("--rig", options->rig, "For /dev/videoN, which is asked for its camera's size, and for --move");
+  command.add_option("--rig", options->rig,
+                     "Its camera's size is that of /dev/videoN, else GStreamer's choice; also for --move");
   command.add_option("--duration", options->duration_s, "Seconds, from the first image on")
       .shows_default()
       .number_between(1, 3600);

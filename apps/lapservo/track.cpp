@@ -99,6 +99,8 @@ class RigByFrame {
   void expect_pictures() { tracking_.frame_budget.reset(); }
   const std::shared_ptr<const Rig>& rig() const { return rig_; }
   const fs::path& path() const { return path_; }
+  /// Null while no rig is known.
+  const Camera* camera() const { return rig_ ? &rig_->camera : nullptr; }
 
  private:
   bool has_other_rig(const fs::path& picture) const {
@@ -172,16 +174,11 @@ void say_moved(const TrackOptions& options, const Frame& frame) {
   throw error;
 }
 
-// Devices are OpenCV's here: what their size is need not be known before.
-bool is_live(const std::string& input) {
-  return names_live_images(input) && !input.starts_with("/dev/");
-}
-
-std::unique_ptr<LiveFrames> open_live(const TrackOptions& options) {
-  if (!is_live(options.input)) return nullptr;
-  if (options.rig.empty())
+// Null where the frames are no topic's.
+std::unique_ptr<LiveFrames> open_topic(const TrackOptions& options, const RigByFrame& rigs) {
+  if (!rigs.camera() && (names_topic(options.input) || options.input.starts_with("gst:")))
     throw InputError("--rig", "is missing, expected a rig's YAML: live images have none beside them");
-  return std::make_unique<LiveFrames>(options.input, load_rig(options.rig).camera);
+  return names_topic(options.input) ? std::make_unique<LiveFrames>(options.input, *rigs.camera()) : nullptr;
 }
 
 PageConfig page_config_of(const TrackOptions& options, const FrameSource& source) {
@@ -205,8 +202,8 @@ class TrackRun {
   explicit TrackRun(const TrackOptions& options)
       : options_(options),
         rigs_(options),
-        live_(open_live(options)),
-        file_(live_ ? nullptr : open_frames(options.input, options.fps, options.image_topic)),
+        live_(open_topic(options, rigs_)),
+        file_(live_ ? nullptr : open_frames(options.input, options.fps, options.image_topic, rigs_.camera())),
         source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
     if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
       rigs_.expect_pictures();

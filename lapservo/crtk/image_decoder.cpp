@@ -68,27 +68,9 @@ cv::Mat upper_bytes(const cv::Mat& bytes, bool big_endian) {
   return upper;
 }
 
-// A plane of light, then one of colours for four pixels each, in rows of the same step.
-DecodedImage decode_nv12(const ImageMessage& message) {
-  const auto [width, height, step] = std::array{message.width, message.height, message.step};
-  if (width == 0 || height == 0 || width > max_px || height > max_px || width % 2 != 0 || height % 2 != 0)
-    return BadImage{fmt::format("size {}x{}", width, height)};
-  const std::size_t rows = height + height / 2;
-  if (step < width || message.data.size() < std::size_t{step} * (rows - 1) + width)
-    return BadImage{fmt::format("{} bytes with a step of {} for {}x{} nv12", message.data.size(), step, width, height)};
-  auto* const data = const_cast<std::uint8_t*>(message.data.data());
-  const cv::Mat light(static_cast<int>(height), static_cast<int>(width), CV_8UC1, data, step);
-  const cv::Mat colours(static_cast<int>(height / 2), static_cast<int>(width / 2), CV_8UC2,
-                        data + std::size_t{step} * height, step);
-  cv::Mat bgr;
-  cv::cvtColorTwoPlane(light, colours, bgr, cv::COLOR_YUV2BGR_NV12);
-  return bgr;
-}
-
 }  // namespace
 
 DecodedImage decode(const ImageMessage& message) {
-  if (message.encoding == "nv12") return decode_nv12(message);
   const auto found = std::find_if(encodings.begin(), encodings.end(),
                                   [&](const Encoding& known) { return known.name == message.encoding; });
   if (found == encodings.end()) return bad_encoding(message.encoding);

@@ -1,13 +1,13 @@
 #include "lapservo/io/frame_source.h"
 
 #include <algorithm>
+#include <chrono>
 #include <system_error>
 #include <utility>
 #include <vector>
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/live_source.h"
 #include "lapservo/io/video_reader.h"
 
 namespace lapservo {
@@ -67,6 +67,34 @@ class VideoSource : public FrameSource {
   int index_ = 0;
 };
 
+// Frames have the times at which they were asked for.
+class StreamSource : public FrameSource {
+ public:
+  explicit StreamSource(const std::string& name)
+      : stream_(name, std::chrono::seconds(30), VideoReader::Kind::stream), first_(stream_.next()) {
+    if (!first_) throw InputError(name, "gives no frames, expected a stream");
+  }
+
+  std::optional<Frame> next() override {
+    auto image = first_ ? std::exchange(first_, std::nullopt) : stream_.next();
+    if (!image) return std::nullopt;
+    const auto now = std::chrono::steady_clock::now();
+    if (index_ == 0) start_ = now;
+    Frame frame{std::move(image->bgr), index_++, std::chrono::duration<double>(now - start_).count(), {}, {}};
+    if (image->damaged) frame.flaw = Status::damaged;
+    return frame;
+  }
+  Kind kind() const override { return Kind::live; }
+  std::optional<int> frame_count() const override { return std::nullopt; }
+  double frames_per_second() const override { return stream_.frames_per_second(); }
+
+ private:
+  VideoReader stream_;
+  std::optional<VideoReader::Image> first_;
+  int index_ = 0;
+  std::chrono::steady_clock::time_point start_;
+};
+
 std::vector<fs::path> pictures_in(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code error;
@@ -89,7 +117,7 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
 
 std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps) {
   using Kind = FrameSource::Kind;
-  if (is_live(input)) return open_live_source(input);
+  if (input.find("://") != std::string::npos) return std::make_unique<StreamSource>(input);
   std::error_code error;  // of a name that no file can have, or a folder that may not be looked into
   if (!fs::exists(input, error))
     throw InputError(input, "does not exist, expected a picture, a folder of pictures or a video");

@@ -19,9 +19,8 @@ struct Frame {
   std::optional<Status> flaw;  ///< why nothing is to be measured in it
 };
 
-/// Frames of a picture, a folder of pictures (sorted by name, numbers in names by value), a video file, a camera ("0",
-/// "/dev/video0") or a stream
-/// ("rtsp://...").
+/// Frames of a picture, a folder of pictures (sorted by name, numbers in names by value), a video file, a stream
+/// ("rtsp://...") or a camera.
 class FrameSource {
  public:
   enum class Kind { image, folder, video, live };
@@ -39,8 +38,8 @@ class FrameSource {
   virtual std::string complaint() const { return {}; }
 };
 
-/// `folder_fps` gives the pictures of a folder their times. Throws InputError when there is nothing to read: a missing
-/// or empty file, a folder without pictures, a video without frames, a camera that doesn't answer.
+/// All but cameras. `folder_fps` gives the pictures of a folder their times. Throws InputError when there is nothing to
+/// read: a missing or empty file, a folder without pictures, a video without frames, a stream that doesn't answer.
 std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps);
 
 }  // namespace lapservo

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "cameras/camera.h"
 #include "lapservo/core/error.h"
 
 namespace lapservo::python {
@@ -81,7 +82,7 @@ GivenFrames::GivenFrames(const py::object& given, double fps, bool of_one_record
     throw InputError("fps", "number", std::string(py::str(py::float_(fps))), "0.001 to 1000 frames per second");
   if (is_path(given)) {
     name = given.cast<std::filesystem::path>().string();
-    owned = open_frame_source(name, fps);
+    owned = internal::open_camera_or_file(name, fps);
   } else if (!py::isinstance<FrameSource>(given)) {
     owned = std::make_unique<IteratedFrames>(given, fps, of_one_recording);
   }

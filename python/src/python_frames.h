@@ -15,8 +15,9 @@ bool is_path(const py::object& given);
 /// that is iterated over: uint8[H, W, 3], (time_s, uint8[H, W, 3]) or Frame. Created and destroyed with Python's lock,
 /// used without.
 struct GivenFrames {
-  /// `fps` gives times to the pictures of a folder and to those without. Throws InputError as open_frame_source().
-  /// What is iterated over is refused, as it comes, where a time is not finite or, `of_one_recording`, does not rise.
+  /// `fps` gives times to the pictures of a folder and to those without. Throws InputError as
+  /// internal::open_camera_or_file(). What is iterated over is refused, as it comes, where a time is not finite or,
+  /// `of_one_recording`, does not rise.
   GivenFrames(const py::object& given, double fps, bool of_one_recording = true);
 
   py::object kept;  ///< what `source` is of

@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "cameras/camera.h"
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
@@ -275,9 +276,10 @@ void bind_frames(py::module_& m) {
       });
   m.def(
       "open_frames",
-      [](const std::filesystem::path& input, double fps) { return open_frame_source(input.string(), fps); },
+      [](const std::filesystem::path& input, double fps) { return internal::open_camera_or_file(input.string(), fps); },
       py::arg("input"), py::arg("fps") = 30.0,
-      "A picture, a folder of pictures (with `fps`), a video, '/dev/video0' or 'rtsp://...': a FrameSource.");
+      "A picture, a folder of pictures (with `fps`), a video, 'rtsp://...', '/dev/video0' or 'gst:PIPELINE': a "
+      "FrameSource.");
   m.def(
       "_png",
       [](const Image& image) {

@@ -68,6 +68,18 @@ def test_numbers_are_the_command_lines(tmp_path):
     assert rows > 3
 
 
+def test_cameras_give_frames():
+    try:
+        source = lapservo.open_frames("gst:videotestsrc num-buffers=3 ! video/x-raw,width=64,height=48,framerate=50/1")
+    except lapservo.InputError as error:
+        pytest.skip(str(error))  # built without GStreamer
+    assert source.frames_per_second == 50
+    assert [frame.image.shape for frame in source] == 3 * [(48, 64, 3)]
+    assert source.complaint == ""
+    with pytest.raises(lapservo.InputError, match="/dev/video-none: gives no images"):
+        lapservo.open_frames("/dev/video-none")
+
+
 def test_rows_of_an_image_may_lie_apart(rig, image):
     wide = np.zeros((720, 1400, 3), np.uint8)
     wide[:, :1280] = image

@@ -1,0 +1,79 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "cameras/camera.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo::internal {
+namespace {
+
+using Rgb = std::array<int, 3>;
+constexpr std::array<Rgb, 4> colours{Rgb{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {128, 128, 128}};
+constexpr int bar = 16, width = bar * static_cast<int>(colours.size()), height = 16;  // one colour beside the other
+
+// Recommendations ITU-R BT.601 and BT.709: what red and blue add to the light.
+struct Matrix {
+  const char* name;
+  double red, blue;
+};
+constexpr std::array matrices{Matrix{"bt601", 0.299, 0.114}, Matrix{"bt709", 0.2126, 0.0722}};
+
+// As GStreamer names it: range, matrix, transfer, primaries.
+std::string colorimetry(const Matrix& matrix, bool full_range) {
+  const bool is_601 = std::string(matrix.name) == "bt601";
+  return !full_range ? matrix.name : is_601 ? "1:4:16:4" : "1:3:5:1";
+}
+
+std::array<char, 3> yuv_of(const Rgb& rgb, const Matrix& matrix, bool full_range) {
+  const double r = rgb[0] / 255.0, g = rgb[1] / 255.0, b = rgb[2] / 255.0;
+  const double y = matrix.red * r + (1 - matrix.red - matrix.blue) * g + matrix.blue * b;
+  const double u = (b - y) / (2 * (1 - matrix.blue)), v = (r - y) / (2 * (1 - matrix.red));
+  const auto byte = [](double value) { return static_cast<char>(std::clamp(std::lround(value), 0L, 255L)); };
+  if (full_range) return {byte(255 * y), byte(128 + 255 * u), byte(128 + 255 * v)};
+  return {byte(16 + 219 * y), byte(128 + 224 * u), byte(128 + 224 * v)};
+}
+
+// An image's bytes in one of GStreamer's formats.
+std::string bars(const std::string& format, const Matrix& matrix, bool full_range) {
+  std::string light, u_plane, v_plane, uv_plane, packed;
+  for (int row = 0; row < height; ++row) {
+    for (int column = 0; column < width; column += 2) {
+      const auto [y, u, v] = yuv_of(colours[static_cast<std::size_t>(column / bar)], matrix, full_range);
+      packed += {y, u, y, v};
+      light += {y, y};
+      if (row % 2 == 0) u_plane += u, v_plane += v, uv_plane += {u, v};
+    }
+  }
+  return format == "yuy2" ? packed : light + (format == "nv12" ? uv_plane : u_plane + v_plane);
+}
+
+TEST(Colours, AreThoseOfTheCapsColorimetry) {
+  const testing::TemporaryFolder folder;
+  for (const char* format : {"i420", "nv12", "yuy2"}) {
+    for (const Matrix& matrix : matrices) {
+      for (const bool full_range : {false, true}) {
+        testing::write_file(folder / "bars", bars(format, matrix, full_range));
+        const std::string pipeline = fmt::format(
+            "filesrc location={} ! rawvideoparse format={} width={} height={} ! "
+            "capssetter caps=video/x-raw,colorimetry={}",
+            (folder / "bars").string(), format, width, height, colorimetry(matrix, full_range));
+        const auto image = open_camera_or_file("gst:" + pipeline, 30)->next();
+        ASSERT_TRUE(image) << pipeline;
+        for (std::size_t i = 0; i < colours.size(); ++i) {
+          const auto bgr = image->bgr.at<cv::Vec3b>(height / 2, static_cast<int>(i) * bar + bar / 2);
+          for (std::size_t channel = 0; channel < 3; ++channel)
+            EXPECT_NEAR(bgr[2 - static_cast<int>(channel)], colours[i][channel], 2) << pipeline << ", colour " << i;
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lapservo::internal
