@@ -1,12 +1,9 @@
 #include "apps/lapservo/output_folder.h"
 
-#include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fcntl.h>
 #include <fstream>
-#include <string_view>
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
@@ -16,7 +13,6 @@
 
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
-#include "lapservo/core/temporary_file.h"
 #include "lapservo/rig/rig_writer.h"
 
 namespace lapservo::app {
@@ -24,24 +20,11 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-constexpr std::string_view heading = "# Written by lapservo: the rig of the results in this folder.";
-constexpr auto unfinished_name = "unfinished", replaced_name = "replaced";  // the latter within the former
+constexpr auto unfinished_name = "unfinished";
+constexpr auto mark_name = ".lapservo-run";  // the names of the results, one a line
 
 [[noreturn]] void fail(const fs::path& path, const std::error_code& error) {
   throw InputError(path.string(), "can't be written: " + error.message());
-}
-
-// What any run writes: servo, render, experiment.
-bool is_result(const std::string& name) {
-  static constexpr std::array<std::string_view, 7> names{"rig.yaml",  "controller.yaml", "log.csv",    "log.csv.part",
-                                                         "truth.csv", "video.mp4",       "report.html"};
-  static constexpr std::array<std::string_view, 4> experiments{"illumination", "rcm", "rotation", "tracking"};
-  if (std::find(names.begin(), names.end(), name) != names.end()) return true;
-  if (name.ends_with(".csv"))
-    return std::any_of(experiments.begin(), experiments.end(),
-                       [&](std::string_view experiment) { return name.starts_with(experiment); });
-  const auto digits = name.find_first_not_of("0123456789");
-  return digits != std::string::npos && digits >= 4 && (name.substr(digits) == ".png" || name.substr(digits) == ".jpg");
 }
 
 // Hidden ones apart.
@@ -54,12 +37,15 @@ std::vector<std::string> names_in(const fs::path& folder) {
   return names;
 }
 
-bool holds_run(const fs::path& folder) {
+bool is_marked(const fs::path& folder) {
   std::error_code error;
-  std::ifstream file(folder / "rig.yaml");
-  std::string line(heading.size(), '\0');
-  return fs::is_regular_file(folder / "rig.yaml", error) &&
-         file.read(line.data(), static_cast<std::streamsize>(line.size())) && line == heading;
+  return fs::is_regular_file(folder / mark_name, error);
+}
+
+void add_marked_names(const fs::path& folder, std::set<std::string>& names) {
+  std::ifstream mark(folder / mark_name);
+  for (std::string name; std::getline(mark, name);)
+    if (fs::path(name).filename() == name) names.insert(name);
 }
 
 FileDescriptor locked(const fs::path& folder, const fs::path& unfinished) {
@@ -71,25 +57,28 @@ FileDescriptor locked(const fs::path& folder, const fs::path& unfinished) {
   return opened;
 }
 
-void refuse_existing(const fs::path& folder, bool force) {
-  const auto names = names_in(folder);
-  if (names.empty()) return;
+// The results of earlier runs, which this one may replace: of one that was killed while it moved them, in both places.
+std::set<std::string> replaceable(const fs::path& folder, bool force) {
+  const auto there = names_in(folder);
+  if (there.empty()) return {};
   const fs::path unfinished = folder / unfinished_name;
   std::error_code error;
   const bool stopped = fs::exists(fs::symlink_status(unfinished, error));
   if (stopped) locked(folder, unfinished);
-  const bool leftover = holds_run(unfinished) || (stopped && fs::is_empty(unfinished, error));
-  if (!leftover && !holds_run(folder))
-    throw InputError(folder.string(), "holds " + names.front() + ", expected a new or an empty folder" +
+  const bool leftover = stopped && (is_marked(unfinished) || names_in(unfinished).empty());
+  if (!leftover && (stopped || !is_marked(folder)))
+    throw InputError(folder.string(), "holds " + (stopped ? unfinished_name : there.front()) +
+                                          ", which no run has written, expected a new or an empty folder" +
                                           (force ? ", or a run for --force to replace" : ""));
   if (!force)
-    throw InputError(folder.string(), leftover ? "holds a run that was not finished (see its folder unfinished), "
-                                                 "expected a new or an empty folder (or --force to replace it)"
-                                               : "holds a run already, expected a new or an empty folder (or --force "
-                                                 "to replace it)");
-  if (stopped && !leftover && !names_in(unfinished).empty())
-    throw InputError(folder.string(), "holds unfinished, which no run has written, expected a new or an empty folder");
+    throw InputError(folder.string(), std::string(leftover ? "holds a run that was not finished (see its folder "
+                                                             "unfinished)"
+                                                           : "holds a run already") +
+                                          ", expected a new or an empty folder (or --force to replace it)");
+  std::set<std::string> names;
+  for (const fs::path& marked : {folder, unfinished}) add_marked_names(marked, names);
   fs::remove_all(unfinished, error);
+  return names;
 }
 
 void check_room(const fs::path& folder, std::uintmax_t needed_bytes) {
@@ -100,20 +89,18 @@ void check_room(const fs::path& folder, std::uintmax_t needed_bytes) {
                                                   space.available >> 20, needed_bytes >> 20));
 }
 
-const fs::path& checked(const fs::path& folder, const InputFiles& inputs, bool force, std::uintmax_t needed_bytes) {
+std::set<std::string> checked(const fs::path& folder, const InputFiles& inputs, bool force,
+                              std::uintmax_t needed_bytes) {
   inputs.refuse_in_folder(folder);
   inputs.refuse_in_folder(folder / unfinished_name);
-  refuse_existing(folder, force);
   check_room(folder, needed_bytes);
-  return folder;
+  return replaceable(folder, force);
 }
 
-void move_up(const fs::path& from, const fs::path& to, const std::vector<std::string>& names) {
-  for (const std::string& name : names) {
-    std::error_code error;
-    fs::rename(from / name, to / name, error);
-    if (error) fail(to / name, error);
-  }
+void move_up(const fs::path& from, const fs::path& to, const std::string& name) {
+  std::error_code error;
+  fs::rename(from / name, to / name, error);
+  if (error) fail(to / name, error);
 }
 
 }  // namespace
@@ -126,28 +113,33 @@ OutputFolder::Unfinished::Unfinished(const fs::path& folder) : path(folder / unf
 OutputFolder::Unfinished::~Unfinished() {
   std::error_code error;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))
-    if (entry->path().extension() == ".part" || entry->path().filename() == replaced_name) return;
+    if (is_complete || entry->path().extension() == ".part") return;
   fs::remove_all(path, error);
 }
 
 OutputFolder::OutputFolder(const fs::path& path, const Rig& rig, const InputFiles& inputs, bool force,
                            std::uintmax_t needed_bytes)
-    : folder_(path), unfinished_(checked(folder_.path(), inputs, force, needed_bytes)) {
-  write_file(*this / "rig.yaml", fmt::format("{}\n{}", heading, rig_yaml(rig)));
+    : folder_(path), old_(checked(folder_.path(), inputs, force, needed_bytes)), unfinished_(folder_.path()) {
+  write_file(*this / mark_name, "");
+  write_file(*this / "rig.yaml", rig_yaml(rig));
 }
 
+// The mark comes last: until then it says in `unfinished` which files of the folder are this run's.
 void OutputFolder::commit() {
-  const fs::path &folder = folder_.path(), replaced = unfinished_.path / replaced_name;
-  std::vector<std::string> old, fresh = names_in(unfinished_.path);
-  for (const std::string& name : names_in(folder))
-    if (is_result(name)) old.push_back(name);
-  // rig.yaml comes last, so that `unfinished` is known for ours should we be killed at this very point.
-  std::partition(fresh.begin(), fresh.end(), [](const std::string& name) { return name != "rig.yaml"; });
+  const fs::path &folder = folder_.path(), &unfinished = unfinished_.path;
+  const std::vector<std::string> fresh = names_in(unfinished);
+  std::string listed;
+  for (const std::string& name : fresh) listed += name + '\n';
+  write_file(unfinished / mark_name, listed);
+  unfinished_.is_complete = true;
   std::error_code error;
-  if (!old.empty() && !fs::create_directory(replaced, error)) fail(folder, error);
-  move_up(folder, replaced, old);
-  move_up(unfinished_.path, folder, fresh);
-  fs::remove_all(replaced, error);
+  for (const std::string& name : fresh)
+    if (!old_.contains(name) && fs::exists(fs::symlink_status(folder / name, error)))
+      throw InputError((folder / name).string(),
+                       "is there, and no run has written it: the results are in " + unfinished.string());
+  for (const std::string& name : fresh) move_up(unfinished, folder, name), old_.erase(name);
+  for (const std::string& name : old_) fs::remove(folder / name, error);
+  move_up(unfinished, folder, mark_name);
 }
 
 }  // namespace lapservo::app

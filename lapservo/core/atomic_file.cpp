@@ -1,32 +1,29 @@
 #include "lapservo/core/atomic_file.h"
 
-#include <cstring>
-#include <string>
-
-#include "lapservo/core/error.h"
+#include <cerrno>
 
 namespace lapservo::internal {
-namespace fs = std::filesystem;
+namespace {
 
-AtomicFile::AtomicFile(const fs::path& path)
-    : target_(output_target(path)),
-      opened_(target_.is_stream ? open_stream(target_) : FileDescriptor()),
-      buffer_(target_.is_stream ? opened_.number() : temporary_.emplace(target_).descriptor()),
-      stream_(&buffer_) {}
-
-void AtomicFile::commit() {
-  stream_.flush();
-  if (!stream_)
-    throw InputError(target_.name.string(), std::string("could not be written to its end") +
-                                                (buffer_.error() ? std::string(": ") + std::strerror(buffer_.error())
-                                                                 : " (is the disk full?)"));
-  if (temporary_) temporary_->commit();
+void write_whole(const OutputTarget& target, std::string_view text) {
+  if (target.is_stream()) {
+    if (const int error = write_all(open_stream(target).number(), text)) target.fail_writing(error);
+    return;
+  }
+  TemporaryFile file(target);
+  file.write(text);
+  file.commit();
 }
 
-void write_file(const fs::path& path, std::string_view text) {
-  AtomicFile file(path);
-  file.stream() << text;
-  file.commit();
+}  // namespace
+
+void AtomicFile::commit() {
+  if (!text_) target_.fail_writing(ENOMEM);
+  write_whole(target_, text_.view());
+}
+
+void write_file(const std::filesystem::path& path, std::string_view text) {
+  write_whole(OutputTarget(path), text);
 }
 
 }  // namespace lapservo::internal

@@ -1,34 +1,26 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
-#include <ostream>
+#include <sstream>
 #include <string_view>
 
 #include "lapservo/core/output_target.h"
-#include "lapservo/core/temporary_file.h"
 
 namespace lapservo::internal {
 
-/// A file that appears whole or not at all: written under no or a temporary name, put in its place by commit(). Without
-/// commit() whatever stood at `path` before stays, and nothing else is left. What is no regular file is written into as
-/// it comes. See OutputTarget.
-/// Throws InputError when it can't be written, at construction, and when writing failed, in commit().
+/// A file that appears whole or not at all: gathered in memory and written by commit(). Without commit() nothing
+/// changes. See OutputTarget.
+/// Throws InputError when it can't be written, at construction where that shows by then, else in commit().
 class AtomicFile {
  public:
-  explicit AtomicFile(const std::filesystem::path& path);
-  AtomicFile(const AtomicFile&) = delete;
-  AtomicFile& operator=(const AtomicFile&) = delete;
+  explicit AtomicFile(const std::filesystem::path& path) : target_(path) {}
 
-  std::ostream& stream() { return stream_; }
+  std::ostream& stream() { return text_; }
   void commit();
 
  private:
   OutputTarget target_;
-  std::optional<TemporaryFile> temporary_;
-  FileDescriptor opened_;  // of a stream
-  DescriptorBuffer buffer_;
-  std::ostream stream_;
+  std::ostringstream text_;
 };
 
 /// Writes the whole text in that way.

@@ -1,8 +1,10 @@
 #include "lapservo/core/atomic_file.h"
 
+#include <csignal>
 #include <fcntl.h>
 #include <filesystem>
 #include <string>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -63,19 +65,21 @@ TEST(AtomicFile, RefusesAFolderAndAMissingFolderAtConstruction) {
   EXPECT_EQ(files_in(folder), 0);
 }
 
-TEST(AtomicFile, RefusesANameThatNoFileCanHave) {
+TEST(AtomicFile, AFullDiskIsAnErrorAndKeepsWhatStoodThere) {
   const testing::TemporaryFolder folder;
-  const std::string path = (folder / std::string(300, 'x')).string();
-  EXPECT_EQ(input_error([&] { AtomicFile file(path); }), path + ": can't be written: File name too long");
-}
-
-TEST(AtomicFile, ATornWriteIsAnErrorAndLeavesNothing) {
-  const testing::TemporaryFolder folder;
-  AtomicFile file(folder / "out.csv");
-  file.stream().setstate(std::ios::failbit);
-  EXPECT_EQ(input_error([&] { file.commit(); }),
-            (folder / "out.csv").string() + ": could not be written to its end (is the disk full?)");
-  EXPECT_FALSE(fs::exists(folder / "out.csv"));
+  const std::string path = (folder / "out.csv").string();
+  testing::write_file(path, "old");
+  const auto previous = std::signal(SIGXFSZ, SIG_IGN);
+  struct rlimit old {};
+  ::getrlimit(RLIMIT_FSIZE, &old);
+  const struct rlimit small { 10, old.rlim_max };
+  ::setrlimit(RLIMIT_FSIZE, &small);
+  const std::string said = input_error([&] { write_file(path, "longer than ten bytes"); });
+  ::setrlimit(RLIMIT_FSIZE, &old);
+  std::signal(SIGXFSZ, previous);
+  EXPECT_EQ(said, path + ": could not be written to its end: File too large");
+  EXPECT_EQ(read_file(path), "old");
+  EXPECT_EQ(files_in(folder), 1);
 }
 
 TEST(AtomicFile, KeepsLinksAndModes) {

@@ -1,9 +1,7 @@
 #pragma once
 
-#include <streambuf>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 namespace lapservo::internal {
 
@@ -28,20 +26,7 @@ class FileDescriptor {
 /// Writes everything, however often it takes. Returns 0, or errno.
 int write_all(int descriptor, std::string_view bytes);
 
-/// What std::ostream needs to write into a file descriptor. What is buffered is dropped with the object.
-class DescriptorBuffer : public std::streambuf {
- public:
-  explicit DescriptorBuffer(int descriptor);
-  /// errno of the first write that failed; 0 while all is well.
-  int error() const { return error_; }
-
- protected:
-  int_type overflow(int_type c) override;
-  int sync() override;
-
- private:
-  int descriptor_, error_ = 0;
-  std::vector<char> room_;
-};
+/// Locks an open file or folder for as long as it is open. False when somebody else has it.
+bool lock(const FileDescriptor& file);
 
 }  // namespace lapservo::internal

@@ -2,13 +2,13 @@
 
 #include <atomic>
 #include <cerrno>
-#include <charconv>
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
-#include <string_view>
+#include <string>
 #include <system_error>
 #include <unistd.h>
+#include <utility>
 
 #include "lapservo/core/error.h"
 
@@ -16,34 +16,18 @@ namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 
-// The number in /dev/fd/N and the like. Opening these again would begin at the start of a file that the shell or our
-// own messages are writing to.
-std::optional<int> own_descriptor(const fs::path& path) {
-  const std::string text = path.string();
-  if (text == "/dev/stdout") return STDOUT_FILENO;
-  if (text == "/dev/stderr") return STDERR_FILENO;
-  for (const std::string_view folder : {"/dev/fd/", "/proc/self/fd/"}) {
-    int number = 0;
-    if (!text.starts_with(folder)) continue;
-    const char *digits = text.data() + folder.size(), *end = text.data() + text.size();
-    if (const auto parsed = std::from_chars(digits, end, number); parsed.ec == std::errc() && parsed.ptr == end)
-      return number;
+// Opening it again would begin at the start of a file that the shell or our own messages are writing to, and replacing
+// it would lose what it holds.
+int own_descriptor_of(const struct stat& status) {
+  for (const int own : {STDOUT_FILENO, STDERR_FILENO}) {
+    struct stat ours {};
+    if (::fstat(own, &ours) == 0 && ours.st_dev == status.st_dev && ours.st_ino == status.st_ino) return own;
   }
-  return std::nullopt;
+  return -1;
 }
 
-// The end of a chain of symbolic links, whether it exists or not.
-fs::path link_target(fs::path path) {
-  std::error_code error;
-  for (int i = 0; i < 40 && !own_descriptor(path) && fs::is_symlink(path, error); ++i)
-    path = path.parent_path() / fs::read_symlink(path, error);
-  return path;
-}
-
-void refuse_kind(const fs::path& name, mode_t mode) {
-  if (S_ISDIR(mode)) throw InputError(name.string(), "is a folder, expected a file to write");
-  if (S_ISBLK(mode)) throw InputError(name.string(), "is a disk, expected a file to write");
-  if (S_ISSOCK(mode)) throw InputError(name.string(), "is a socket, expected a file to write");
+[[noreturn]] void refuse(const fs::path& name, const char* kind) {
+  throw InputError(name.string(), std::string(kind) + ", expected a file to write");
 }
 
 // The owner only where we may.
@@ -52,82 +36,78 @@ void keep_owner_and_mode(const OutputTarget& target, int descriptor) {
   if (::fchmod(descriptor, target.existing->st_mode & 0777) != 0) target.fail(errno);
 }
 
-// Flushed to the disk. Some special file systems know no such thing.
-bool synced(int descriptor) {
-  return ::fsync(descriptor) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP;
-}
-
-void sync_folder(const fs::path& folder) {
-  const FileDescriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (opened.is_open()) synced(opened.number());
-}
-
-// Gives a file without a name the target's, or one beside it where the target's is taken. 0 or errno.
-int link_unnamed(const OutputTarget& target, int descriptor, fs::path& linked) {
-  static std::atomic<int> count = 0;
-  const std::string unnamed = "/proc/self/fd/" + std::to_string(descriptor);
-  linked = target.file;
-  for (int attempt = 0; attempt < 100; ++attempt) {
-    if (::linkat(AT_FDCWD, unnamed.c_str(), AT_FDCWD, linked.c_str(), AT_SYMLINK_FOLLOW) == 0) return 0;
-    if (errno != EEXIST) return errno;
-    linked = target.folder() / (".lapservo-" + std::to_string(::getpid()) + "-link" + std::to_string(count++));
-  }
-  return EEXIST;
-}
-
 }  // namespace
 
-fs::path OutputTarget::folder() const {
-  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+OutputTarget::OutputTarget(const fs::path& given) : name(given) {
+  if (name.empty()) throw InputError("output", "has no name, expected a file to write");
+  struct stat status {};
+  if (::stat(name.c_str(), &status) == 0) {
+    take(status);
+  } else if (errno == ENOENT) {
+    if (!name.has_filename()) refuse(name, "is a folder's name");
+    std::error_code error;
+    if (fs::is_symlink(name, error)) refuse(name, "is a link to no file");
+    file = name;
+  } else {
+    fail(errno);
+  }
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  if (!is_stream() && ::access(folder.c_str(), W_OK | X_OK) != 0) fail(errno);
+}
+
+void OutputTarget::take(const struct stat& status) {
+  if (S_ISDIR(status.st_mode)) refuse(name, "is a folder");
+  if (S_ISBLK(status.st_mode)) refuse(name, "is a disk");
+  if (::access(name.c_str(), W_OK) != 0) fail(errno);
+  own_descriptor = own_descriptor_of(status);
+  if (own_descriptor >= 0 || !S_ISREG(status.st_mode)) return;
+  existing = status;
+  std::error_code error;
+  file = fs::canonical(name, error);
+  if (error) fail(error.value());
 }
 
 void OutputTarget::fail(int error) const {
-  throw InputError(name.string(), std::string("can't be written: ") + std::strerror(error ? error : EIO));
+  throw InputError(name.string(), std::string("can't be written: ") + std::strerror(error));
 }
 
-OutputTarget output_target(const fs::path& name) {
-  OutputTarget target{name, link_target(name), {}, false};
-  if (name.empty()) throw InputError("output", "has no name, expected a file to write");
-  if (own_descriptor(target.file)) {
-    target.is_stream = true;
-    return target;
-  }
-  struct stat status {};
-  // By the given name: the kernel refuses links of others in shared folders, we must not walk around it.
-  if (::stat(name.c_str(), &status) != 0) {
-    if (errno != ENOENT) target.fail(errno);
-    if (!name.has_filename()) throw InputError(name.string(), "is a folder's name, expected a file to write");
-    return target;
-  }
-  refuse_kind(name, status.st_mode);
-  target.is_stream = !S_ISREG(status.st_mode);
-  if (target.is_stream) return target;
-  target.existing = status;
-  const FileDescriptor allowed(::open(name.c_str(), O_WRONLY | O_CLOEXEC));
-  if (!allowed.is_open()) target.fail(errno);
-  return target;
+void OutputTarget::fail_writing(int error, const std::string& kept) const {
+  throw InputError(name.string(), std::string("could not be written to its end: ") + std::strerror(error) + kept);
 }
 
 FileDescriptor open_stream(const OutputTarget& target) {
-  const auto own = own_descriptor(target.file);
-  FileDescriptor opened(own ? ::fcntl(*own, F_DUPFD_CLOEXEC, 3)
-                            : ::open(target.name.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY));
+  FileDescriptor opened(target.own_descriptor >= 0 ? ::fcntl(target.own_descriptor, F_DUPFD_CLOEXEC, 3)
+                                                   : ::open(target.name.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY));
   if (!opened.is_open()) target.fail(errno);
   return opened;
 }
 
 void put_in_place(const OutputTarget& target, int descriptor, const fs::path& temporary) {
   if (target.existing) keep_owner_and_mode(target, descriptor);
-  if (!synced(descriptor)) target.fail(errno);
-  fs::path from = temporary;
-  if (temporary.empty())
-    if (const int error = link_unnamed(target, descriptor, from)) target.fail(error);
-  if (from != target.file && ::rename(from.c_str(), target.file.c_str()) != 0) {
-    const int error = errno;
-    if (temporary.empty()) ::unlink(from.c_str());
-    target.fail(error);
-  }
-  sync_folder(target.folder());
+  const bool synced = ::fsync(descriptor) == 0 || errno == EINVAL || errno == ENOTSUP;  // some file systems can't
+  if (!synced || ::rename(temporary.c_str(), target.file.c_str()) != 0) target.fail(errno);
+}
+
+TemporaryFile::TemporaryFile(OutputTarget target) : target_(std::move(target)) {
+  static std::atomic<int> count = 0;
+  do {  // a killed process may have had our number, and left a file
+    path_ = target_.file.string() + "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part";
+    file_ = FileDescriptor(::open(path_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666));
+  } while (!file_.is_open() && errno == EEXIST);
+  if (!file_.is_open()) target_.fail(errno);
+}
+
+TemporaryFile::~TemporaryFile() {
+  if (!path_.empty()) ::unlink(path_.c_str());
+}
+
+void TemporaryFile::write(std::string_view bytes) {
+  if (const int error = write_all(file_.number(), bytes)) target_.fail_writing(error);
+}
+
+void TemporaryFile::commit() {
+  put_in_place(target_, file_.number(), path_);
+  path_.clear();
 }
 
 }  // namespace lapservo::internal

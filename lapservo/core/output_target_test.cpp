@@ -2,9 +2,8 @@
 
 #include <filesystem>
 #include <string>
-#include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
@@ -16,49 +15,49 @@ namespace lapservo::internal {
 namespace {
 namespace fs = std::filesystem;
 using testing::input_error;
+using testing::read_file;
 using testing::TemporaryFolder;
 
 std::string refusal_to_write(const fs::path& path) {
-  return input_error([&] { output_target(path); });
+  return input_error([&] { const OutputTarget target(path); });
 }
 
-TEST(OutputTarget, FollowsLinksToFilesThatAreThereOrNot) {
+TEST(OutputTarget, FollowsLinksToFiles) {
   const TemporaryFolder folder;
   fs::create_directory(folder / "sub");
   testing::write_file(folder / "sub/there.csv", "old");
   fs::create_symlink("sub/there.csv", folder / "first");
   fs::create_symlink(folder / "first", folder / "second");
-  fs::create_symlink("sub/missing.csv", folder / "dangling");
-  EXPECT_TRUE(fs::equivalent(output_target(folder / "second").file, folder / "sub/there.csv"));
-  EXPECT_TRUE(output_target(folder / "second").existing);
-  EXPECT_EQ(output_target(folder / "dangling").file, folder / "sub/missing.csv");
-  EXPECT_FALSE(output_target(folder / "dangling").existing);
-  fs::create_symlink("loop", folder / "loop");
-  EXPECT_EQ(refusal_to_write(folder / "loop"),
-            (folder / "loop").string() + ": can't be written: Too many levels of symbolic links");
+  EXPECT_EQ(OutputTarget(folder / "second").file, fs::canonical(folder / "sub/there.csv"));
+  EXPECT_TRUE(OutputTarget(folder / "second").existing);
+  EXPECT_FALSE(OutputTarget(folder / "sub/new.csv").existing);
 }
 
 TEST(OutputTarget, KnowsWhatIsNoRegularFile) {
   const TemporaryFolder folder;
   ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
   for (const fs::path& path : {fs::path("/dev/null"), fs::path("/dev/full"), fs::path("/dev/stdout"), folder / "fifo"})
-    EXPECT_TRUE(output_target(path).is_stream) << path;
+    EXPECT_TRUE(OutputTarget(path).is_stream()) << path;
 }
 
 TEST(OutputTarget, RefusesWhatCanNotBeAFile) {
   const TemporaryFolder folder;
   const std::string place = folder.path().string();
-  EXPECT_EQ(refusal_to_write(""), "output: has no name, expected a file to write");
-  EXPECT_EQ(refusal_to_write(folder.path()), place + ": is a folder, expected a file to write");
-  EXPECT_EQ(refusal_to_write(place + "/"), place + "/: is a folder, expected a file to write");
-  EXPECT_EQ(refusal_to_write(place + "/none/"), place + "/none/: is a folder's name, expected a file to write");
+  fs::create_symlink("loop", folder / "loop");
+  fs::create_symlink("missing.csv", folder / "dangling");
   testing::write_file(folder / "file", "");
-  EXPECT_EQ(refusal_to_write(folder / "file/x"), place + "/file/x: can't be written: Not a directory");
-  const FileDescriptor listening(::socket(AF_UNIX, SOCK_STREAM, 0));
-  sockaddr_un address{AF_UNIX, {}};
-  (folder / "socket").string().copy(address.sun_path, sizeof address.sun_path - 1);
-  ASSERT_EQ(::bind(listening.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-  EXPECT_EQ(refusal_to_write(folder / "socket"), place + "/socket: is a socket, expected a file to write");
+  for (const auto& [path, complaint] : {std::pair<std::string, std::string>{"", ": is a folder"},
+                                        {"/", ": is a folder"},
+                                        {"/none/", ": is a folder's name"},
+                                        {"/dangling", ": is a link to no file"}})
+    EXPECT_EQ(refusal_to_write(place + path), place + path + complaint + ", expected a file to write");
+  for (const auto& [path, complaint] :
+       {std::pair<std::string, std::string>{"/loop", "Too many levels of symbolic links"},
+        {"/file/x", "Not a directory"},
+        {"/none/x", "No such file or directory"},
+        {"/" + std::string(300, 'x'), "File name too long"}})
+    EXPECT_EQ(refusal_to_write(place + path), place + path + ": can't be written: " + complaint);
+  EXPECT_EQ(refusal_to_write(""), "output: has no name, expected a file to write");
 }
 
 TEST(OutputTarget, AFileThatMayNotBeWrittenIsNotReplaced) {
@@ -68,6 +67,53 @@ TEST(OutputTarget, AFileThatMayNotBeWrittenIsNotReplaced) {
   fs::permissions(folder / "precious.csv", fs::perms::owner_read);
   EXPECT_EQ(refusal_to_write(folder / "precious.csv"),
             (folder / "precious.csv").string() + ": can't be written: Permission denied");
+}
+
+TEST(TemporaryFile, IsBesideItsTargetAndGoneInTheEnd) {
+  const TemporaryFolder folder;
+  testing::write_file(folder / "a.mp4", "old");
+  {
+    const TemporaryFile file(OutputTarget(folder / "a.mp4"));
+    EXPECT_EQ(file.path().parent_path(), fs::canonical(folder.path()));
+    EXPECT_EQ(file.path().extension(), ".part");
+    EXPECT_TRUE(fs::exists(file.path()));
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+  EXPECT_EQ(read_file(folder / "a.mp4"), "old");
+}
+
+TEST(TemporaryFile, OfTwoWritersTheLastIsThereWhole) {
+  const TemporaryFolder folder;
+  const OutputTarget target(folder / "a.csv");
+  TemporaryFile first(target), second(target);
+  first.write("first");
+  second.write("second");
+  second.commit();
+  EXPECT_EQ(read_file(folder / "a.csv"), "second");
+  first.commit();
+  EXPECT_EQ(read_file(folder / "a.csv"), "first");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
+}
+
+TEST(TemporaryFile, OfAKilledProcessChangesNothingAndIsInNobodysWay) {
+  const TemporaryFolder folder;
+  testing::write_file(folder / "a.csv", "old");
+  const OutputTarget target(folder / "a.csv");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    TemporaryFile file(target);
+    file.write("half");
+    ::_exit(0);
+  }
+  ::waitpid(child, nullptr, 0);
+  EXPECT_EQ(read_file(folder / "a.csv"), "old");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 2);
+  const std::string of_our_number = target.file.string() + "." + std::to_string(::getpid()) + "-";
+  for (int i = 0; i < 100; ++i) testing::write_file(of_our_number + std::to_string(i) + ".part", "half");
+  TemporaryFile file(target);
+  file.write("new");
+  file.commit();
+  EXPECT_EQ(read_file(folder / "a.csv"), "new");
 }
 
 }  // namespace

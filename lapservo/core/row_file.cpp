@@ -1,12 +1,10 @@
 #include "lapservo/core/row_file.h"
 
 #include <cerrno>
-#include <cstring>
 #include <fcntl.h>
 #include <unistd.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/core/temporary_file.h"
 
 namespace lapservo::internal {
 namespace {
@@ -18,24 +16,16 @@ bool begins_with(const FileDescriptor& file, const std::string& header) {
   return got == static_cast<ssize_t>(text.size()) && text == header;
 }
 
-bool is_regular(const FileDescriptor& file) {
-  struct stat status {};
-  return ::fstat(file.number(), &status) == 0 && S_ISREG(status.st_mode);
-}
-
 // Not once its writer has given it its final name, between our opening and locking it.
-bool still_named(const FileDescriptor& file, const fs::path& path) {
-  struct stat opened {
-  }, named{};
-  return ::fstat(file.number(), &opened) == 0 && ::lstat(path.c_str(), &named) == 0 && opened.st_dev == named.st_dev &&
-         opened.st_ino == named.st_ino;
+bool still_named(const struct stat& opened, const fs::path& path) {
+  struct stat named {};
+  return ::lstat(path.c_str(), &named) == 0 && opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
 }
 
 }  // namespace
 
-RowFile::RowFile(const fs::path& path, std::string_view header)
-    : target_(output_target(path)), header_(std::string(header) + '\n') {
-  if (target_.is_stream) {
+RowFile::RowFile(const fs::path& path, std::string_view header) : target_(path), header_(std::string(header) + '\n') {
+  if (target_.is_stream()) {
     file_ = open_stream(target_);
     begin();
   } else {
@@ -44,35 +34,27 @@ RowFile::RowFile(const fs::path& path, std::string_view header)
 }
 
 RowFile::~RowFile() {
-  if (!part_.empty() && begun_) ::unlink(part_.c_str());
+  if (!part_.empty() && ours_) ::unlink(part_.c_str());
 }
 
 void RowFile::open_part() {
-  part_ = target_.file.string() + ".part";
-  file_ = FileDescriptor(::open(part_.c_str(), O_CREAT | O_EXCL | O_RDWR | O_CLOEXEC, 0666));
-  if (file_.is_open()) return start_part();
-  if (errno != EEXIST) target_.fail(errno);
-  file_ = FileDescriptor(::open(part_.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  if (!file_.is_open() || !is_regular(file_) || !begins_with(file_, header_))
+  const fs::path part = target_.file.string() + ".part";
+  file_ = FileDescriptor(::open(part.c_str(), O_CREAT | O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666));
+  if (!file_.is_open() && errno != ELOOP && errno != EISDIR) target_.fail(errno);
+  struct stat status {};
+  if (!file_.is_open() || ::fstat(file_.number(), &status) != 0 || !S_ISREG(status.st_mode) ||
+      (status.st_size > 0 && !begins_with(file_, header_)))
     throw InputError(target_.name.string(),
-                     "can't be written: " + part_.string() + " is in the way, and is no unfinished file of this kind");
-  if (!lock(file_) || !still_named(file_, part_))
+                     "can't be written: " + part.string() + " is in the way, and is no unfinished file of this kind");
+  if (!lock(file_) || !still_named(status, part))
     throw InputError(target_.name.string(), "is being written by another run");
-}
-
-// With the header at once, by which the next run knows it.
-void RowFile::start_part() {
-  lock(file_);
-  begun_ = true;
-  if (const int error = write_all(file_.number(), header_)) {
-    ::unlink(part_.c_str());
-    target_.fail(error);
-  }
+  ours_ = status.st_size == 0;
+  part_ = part;
 }
 
 // Over what a killed run has left, not before there is something to take its place.
 void RowFile::begin() {
-  begun_ = true;
+  ours_ = begun_ = true;
   if (!part_.empty() && ::ftruncate(file_.number(), 0) != 0) target_.fail(errno);
   write(header_);
 }
@@ -87,8 +69,7 @@ void RowFile::write(const std::string& text) {
     kept = "; the rows before are in " + part_.string();
     part_.clear();
   }
-  throw InputError(target_.name.string(),
-                   std::string("could not be written to its end: ") + std::strerror(error) + kept);
+  target_.fail_writing(error, kept);
 }
 
 void RowFile::add(std::string_view row) {

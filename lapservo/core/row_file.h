@@ -8,11 +8,11 @@
 
 namespace lapservo::internal {
 
-/// A table of a long run, which may be killed: each row is written when it comes, to `PATH.part`, which commit() puts
-/// in the place of PATH. Without commit() it is removed, and what stood at PATH stays; but of a killed process, or of
-/// one that could not write on, PATH.part stays with all whole rows. The next run of that PATH writes over it with its
-/// first row, when it is such a table (begins with the same header) and its writer is gone; anything else of that name
-/// is left alone and refused. What is no regular file is written into as the rows come. See OutputTarget.
+/// A table of a long run, which may be killed: each row is written when it comes, to `PATH.part`, which commit()
+/// renames to PATH. Without commit() it is removed, and what stood at PATH stays; but of a killed process, or of one
+/// that could not write on, PATH.part stays with all whole rows. The next run of that PATH writes over it with its
+/// first row, when it begins with the same header and its writer is gone; anything else of that name is left alone and
+/// refused. What is no regular file is written into as the rows come. See OutputTarget.
 class RowFile {
  public:
   /// Throws InputError at once when it can't be written.
@@ -27,7 +27,6 @@ class RowFile {
 
  private:
   void open_part();
-  void start_part();
   void write(const std::string& text);
   void begin();
 
@@ -35,6 +34,7 @@ class RowFile {
   std::filesystem::path part_;  ///< empty when there is none of ours
   FileDescriptor file_;
   std::string header_;
+  bool ours_ = false;   ///< nothing in it is another run's
   bool begun_ = false;  ///< whether the header is written
 };
 

@@ -71,14 +71,15 @@ TEST(RowFile, LeavesAloneWhatIsNotItsOwnUnfinishedTable) {
                     refusal = path + ": can't be written: " + path +
                               ".part is in the way, and is no unfinished file of this kind";
   const auto said = [&] { return input_error([&] { RowFile(path, "a,b"); }); };
-  testing::write_file(path + ".part", "");
-  EXPECT_EQ(said(), refusal);
   testing::write_file(path + ".part", "my notes, quite long");
   EXPECT_EQ(said(), refusal);
   EXPECT_EQ(read_file(path + ".part"), "my notes, quite long");
   fs::remove(path + ".part");
   testing::write_file(folder / "elsewhere", "a,b\n");
   fs::create_symlink("elsewhere", path + ".part");
+  EXPECT_EQ(said(), refusal);
+  fs::remove(path + ".part");
+  fs::create_directory(path + ".part");
   EXPECT_EQ(said(), refusal);
 }
 
@@ -111,6 +112,7 @@ TEST(RowFile, AFullDiskKeepsTheWholeRowsBefore) {
 
 TEST(RowFile, WritesThroughALinkWhichStays) {
   const TemporaryFolder folder;
+  testing::write_file(folder / "real.csv", "old");
   fs::create_symlink("real.csv", folder / "link.csv");
   RowFile file(folder / "link.csv", "a,b");
   file.commit();

@@ -38,10 +38,4 @@ std::vector<std::uint8_t> encode_image(const fs::path& name, const cv::Mat& imag
   return bytes;
 }
 
-void write_open_image(AtomicFile& file, const fs::path& name, const cv::Mat& image) {
-  const auto bytes = encode_image(name, image);
-  file.stream().write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  file.commit();
-}
-
 }  // namespace lapservo::internal

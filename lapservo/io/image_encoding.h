@@ -6,8 +6,6 @@
 
 #include <opencv2/core.hpp>
 
-#include "lapservo/core/atomic_file.h"
-
 namespace lapservo::internal {
 
 /// Whether a file is a JPEG by its ending, in any case.
@@ -16,8 +14,5 @@ bool has_jpeg_extension(const std::filesystem::path& name);
 /// A picture of the kind that `name` says by its ending (has_image_extension()). 8-bit grey or BGR, PNG also alpha and
 /// 16 bits; JPEG of quality 95, all others without loss. Throws InputError for anything else.
 std::vector<std::uint8_t> encode_image(const std::filesystem::path& name, const cv::Mat& image);
-
-/// write_image() into a file that is open already; `name` says the format by its ending.
-void write_open_image(AtomicFile& file, const std::filesystem::path& name, const cv::Mat& image);
 
 }  // namespace lapservo::internal

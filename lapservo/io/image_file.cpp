@@ -227,8 +227,8 @@ cv::Mat read_image(const fs::path& path) {
 }
 
 void write_image(const fs::path& path, const cv::Mat& image) {
-  AtomicFile file(path);
-  write_open_image(file, path, image);
+  const auto bytes = encode_image(path, image);
+  write_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace lapservo

@@ -40,6 +40,6 @@ bool has_few_colors(const cv::Mat& bgr);
 /// 8-bit BGR of any supported pixel type, as above.
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source);
 
-/// Writes whole or not at all: see AtomicFile. Throws InputError when that fails.
+/// Writes whole or not at all: see write_file(). Throws InputError when that fails.
 void write_image(const std::filesystem::path& path, const cv::Mat& image);
 }  // namespace lapservo

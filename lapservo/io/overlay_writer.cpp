@@ -3,10 +3,9 @@
 #include <optional>
 #include <system_error>
 
-#include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/new_folder.h"
-#include "lapservo/io/image_encoding.h"
+#include "lapservo/core/output_target.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/video_writer.h"
 
@@ -16,13 +15,12 @@ namespace fs = std::filesystem;
 
 class PictureOverlay : public OverlayWriter {
  public:
-  explicit PictureOverlay(const fs::path& path) : path_(path), file_(path) {}
-  void add(const Frame&, const cv::Mat& overlay) override { write_open_image(file_, path_, overlay); }
+  explicit PictureOverlay(const fs::path& path) : path_(OutputTarget(path).name) {}
+  void add(const Frame&, const cv::Mat& overlay) override { write_image(path_, overlay); }
   void commit() override {}
 
  private:
   fs::path path_;
-  AtomicFile file_;
 };
 
 class FolderOverlay : public OverlayWriter {

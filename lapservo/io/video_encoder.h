@@ -20,7 +20,7 @@ std::string video_remark();
 /// part 2.
 class VideoEncoder {
  public:
-  /// The container goes by the name's ending. Throws InputError naming `shown` when there is none for it.
+  /// The container goes by the ending of `shown`. Throws InputError naming it when there is none for it.
   VideoEncoder(const std::filesystem::path& path, const std::string& shown, const cv::Size& size,
                double frames_per_second);
 

@@ -25,10 +25,10 @@ int frames_in(const fs::path& path) {
 }  // namespace
 
 VideoWriter::VideoWriter(const fs::path& path, double frames_per_second)
-    : target_(output_target(path)), frames_per_second_(frames_per_second) {
-  if (target_.is_stream)
+    : target_(path), frames_per_second_(frames_per_second) {
+  if (target_.is_stream())
     throw InputError(path.string(), "is no regular file, expected a video to write, like overlay.mp4");
-  temporary_.emplace(target_, TemporaryFile::Name::always);
+  temporary_.emplace(target_);
 }
 
 void VideoWriter::add(const cv::Mat& frame, std::optional<double> time_s) {

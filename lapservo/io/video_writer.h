@@ -7,7 +7,6 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/core/output_target.h"
-#include "lapservo/core/temporary_file.h"
 #include "lapservo/io/video_encoder.h"
 
 namespace lapservo::internal {
