@@ -13,11 +13,12 @@ namespace lapservo::app {
 using namespace internal;
 
 std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic,
-                                         const Camera* camera) {
+                                         const Camera* camera, bool deinterlace) {
   if (is_bag(input)) return read_ahead(std::make_unique<BagFrames>(open_bag(input), image_topic));
   refuse_topic_outside_bags("--image-topic", image_topic, input);
   const cv::Size size = camera ? cv::Size(camera->width_px, camera->height_px) : cv::Size();
-  auto source = open_camera_or_file(input, folder_fps, size, interrupted);
+  const bool deinterlaced = deinterlace || (camera && camera->deinterlace);
+  auto source = open_camera_or_file(input, folder_fps, size, interrupted, deinterlaced);
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }
 

@@ -10,9 +10,10 @@
 namespace lapservo::app {
 
 /// internal::open_camera_or_file() until Ctrl-C, and the images of bags; `image_topic`: see internal::image_topic_of().
-/// `camera`: the rig's, whose size a camera's images shall have; null where none is known.
+/// `camera`: the rig's, whose size a camera's images shall have; null where none is known. `deinterlace`: one field of
+/// each frame is tracked; also where the rig's camera says so.
 std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic,
-                                         const Camera* camera);
+                                         const Camera* camera, bool deinterlace = false);
 
 /// Throws InputError naming `option` where it names a topic although `input` is no bag.
 void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input);

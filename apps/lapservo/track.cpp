@@ -203,7 +203,9 @@ class TrackRun {
       : options_(options),
         rigs_(options),
         live_(open_topic(options, rigs_)),
-        file_(live_ ? nullptr : open_frames(options.input, options.fps, options.image_topic, rigs_.camera())),
+        file_(live_
+                  ? nullptr
+                  : open_frames(options.input, options.fps, options.image_topic, rigs_.camera(), options.deinterlace)),
         source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
     if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
       rigs_.expect_pictures();

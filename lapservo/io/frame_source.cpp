@@ -41,7 +41,8 @@ class PictureSource : public FrameSource {
 
 class VideoSource : public FrameSource {
  public:
-  explicit VideoSource(const std::string& path) : video_(path), first_(video_.next()) {
+  VideoSource(const std::string& path, bool deinterlaced)
+      : video_(path, std::chrono::seconds(5), VideoReader::Kind::file, deinterlaced), first_(video_.next()) {
     if (!first_) throw InputError(path, "has no frames, expected a video");
   }
 
@@ -115,7 +116,7 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps) {
+std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps, bool deinterlaced) {
   using Kind = FrameSource::Kind;
   if (input.find("://") != std::string::npos) return std::make_unique<StreamSource>(input);
   std::error_code error;  // of a name that no file can have, or a folder that may not be looked into
@@ -127,7 +128,7 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (has_image_extension(input))
     return std::make_unique<PictureSource>(Kind::image, std::vector<fs::path>{input}, folder_fps);
   if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected a picture, a folder or a video");
-  return std::make_unique<VideoSource>(input);
+  return std::make_unique<VideoSource>(input, deinterlaced);
 }
 
 }  // namespace lapservo

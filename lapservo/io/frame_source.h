@@ -38,8 +38,10 @@ class FrameSource {
   virtual std::string complaint() const { return {}; }
 };
 
-/// All but cameras. `folder_fps` gives the pictures of a folder their times. Throws InputError when there is nothing to
-/// read: a missing or empty file, a folder without pictures, a video without frames, a stream that doesn't answer.
-std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps);
+/// All but cameras. `folder_fps` gives the pictures of a folder their times. `deinterlaced`: one field of each frame is
+/// to be tracked, so that the chroma of a 4:2:0 video is read for each field by itself. Throws InputError when there is
+/// nothing to read: a missing or empty file, a folder without pictures, a video without frames, a stream that doesn't
+/// answer.
+std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps, bool deinterlaced = false);
 
 }  // namespace lapservo

@@ -65,6 +65,27 @@ TEST_P(VideoColors, ReadAsTheirTagsSay) {
   EXPECT_EQ(frames, 3);
 }
 
+// Red in the rows of one field, blue in those of the other.
+TEST(VideoFields, HaveTheirOwnChroma) {
+  const testing::TemporaryFolder folder;
+  cv::Mat picture(64, 64, CV_8UC3);
+  for (int row = 0; row < picture.rows; ++row) picture.row(row).setTo(patches[row % 2 == 0 ? 0 : 2]);
+  testing::write_file(folder / "raw", std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
+  const auto path = folder / "a.mkv";
+  const std::string command = "ffmpeg -v quiet -y -f rawvideo -pix_fmt bgr24 -s 64x64 -r 25 -i '" +
+                              (folder / "raw").string() +
+                              "' -vf scale=interl=1:out_color_matrix=bt709:out_range=tv:flags=accurate_rnd "
+                              "-c:v ffv1 -pix_fmt yuv420p -colorspace bt709 -color_range tv '" +
+                              path.string() + "'";
+  if (std::system(command.c_str()) != 0) GTEST_SKIP() << "no ffmpeg";
+  const auto frame = open_frame_source(path.string(), 25, true)->next();
+  ASSERT_TRUE(frame);
+  for (const int row : {30, 31, 32, 33})
+    for (int channel = 0; channel < 3; ++channel)
+      EXPECT_NEAR(frame->bgr.at<cv::Vec3b>(row, 32)[channel], picture.at<cv::Vec3b>(row, 32)[channel], 2)
+          << "row " << row << ", " << channel;
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Tags, VideoColors,
     ::testing::Combine(::testing::Values(Colors{"bt709", "bt709", "tv"}, Colors{"bt709", "bt709", "pc"},

@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 extern "C" {
 #include <libavutil/display.h>
+#include <libavutil/opt.h>
 #include <libavutil/pixdesc.h>
 }
 
@@ -38,8 +40,8 @@ bool turned(const AVStream& stream) {
 
 class VideoReader::State {
  public:
-  State(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind)
-      : source_(path.string()), kind_(kind), patience_(patience) {
+  State(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind, bool fields)
+      : source_(path.string()), kind_(kind), patience_(patience), fields_(fields) {
     av_log_set_level(AV_LOG_QUIET);
     open();
     stream_ = format_->streams[choose_stream()];
@@ -197,30 +199,58 @@ class VideoReader::State {
       throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
                        "bt709, smpte170m, bt470bg, bt2020nc, fcc or smpte240m (convert it: ffmpeg -i IN -vf "
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
-    const Scaled scaled{frame_->width, frame_->height, format, *colors};
-    if (scaler_ && scaled == scaled_) return;
-    scaler_.reset(sws_getContext(frame_->width, frame_->height, format, frame_->width, frame_->height, AV_PIX_FMT_BGR24,
-                                 SWS_BICUBIC, nullptr, nullptr, nullptr));
-    if (!scaler_) throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
-    if (!is_rgb) set_colors(*scaler_, *colors);
+    const bool by_field = fields_ && description && description->log2_chroma_h == 1 && frame_->height % 4 == 0;
+    const Scaled scaled{frame_->width, frame_->height, format, *colors, by_field};
+    if (!scalers_.empty() && scaled == scaled_) return;
+    scalers_.clear();
+    // Where a field's chroma lies between two of its rows, in 1/256 of a row: of the even rows, of the odd ones.
+    for (const int row : by_field ? std::vector{64, 192} : std::vector{default_row}) {
+      libav::Scaler scaler = scaler_of(scaled, row);
+      if (!scaler) throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
+      if (!is_rgb) set_colors(*scaler, *colors);
+      scalers_.push_back(std::move(scaler));
+    }
     scaled_ = scaled;
   }
 
+  // The whole frame by one scaler, or each of its fields by one.
   void convert() {
-    const int height = frame_->height, width = frame_->width;
     update_scaler();
-    last_.create(height, width, CV_8UC3);
-    std::uint8_t* rows[4] = {last_.data};
-    const int steps[4] = {static_cast<int>(last_.step)};
-    sws_scale(scaler_.get(), frame_->data, frame_->linesize, 0, height, rows, steps);
+    last_.create(frame_->height, frame_->width, CV_8UC3);
+    const int fields = static_cast<int>(scalers_.size());
+    for (int field = 0; field < fields; ++field) {
+      const std::uint8_t* from[4];
+      int from_steps[4];
+      for (int plane = 0; plane < 4; ++plane) {
+        from[plane] = frame_->data[plane] ? frame_->data[plane] + field * frame_->linesize[plane] : nullptr;
+        from_steps[plane] = fields * frame_->linesize[plane];
+      }
+      std::uint8_t* const rows[4] = {last_.ptr(field)};
+      const int steps[4] = {fields * static_cast<int>(last_.step)};
+      sws_scale(scalers_[field].get(), from, from_steps, 0, frame_->height / fields, rows, steps);
+    }
   }
 
   struct Scaled {
     int width_px = 0, height_px = 0;
     AVPixelFormat format = AV_PIX_FMT_NONE;
     YuvColors colors;
+    bool by_field = false;
     bool operator==(const Scaled&) const = default;
   };
+  static constexpr int default_row = -513;  // swscale's
+
+  // `chroma_row`: where chroma lies between two rows of luma.
+  static libav::Scaler scaler_of(const Scaled& scaled, int chroma_row) {
+    libav::Scaler scaler(sws_alloc_context());
+    if (!scaler) return nullptr;
+    const int height_px = scaled.by_field ? scaled.height_px / 2 : scaled.height_px;
+    const auto set = [&](const char* name, int value) { av_opt_set_int(scaler.get(), name, value, 0); };
+    set("srcw", scaled.width_px), set("srch", height_px), set("src_format", scaled.format);
+    set("dstw", scaled.width_px), set("dsth", height_px), set("dst_format", AV_PIX_FMT_BGR24);
+    set("sws_flags", SWS_BICUBIC), set("src_v_chr_pos", chroma_row);
+    return sws_init_context(scaler.get(), nullptr, nullptr) < 0 ? nullptr : std::move(scaler);
+  }
 
   std::string source_;
   Kind kind_;
@@ -230,8 +260,9 @@ class VideoReader::State {
   libav::Codec decoder_;
   libav::Packet packet_{av_packet_alloc()};
   libav::Frame frame_{av_frame_alloc()};
-  libav::Scaler scaler_;
-  Scaled scaled_;  // what scaler_ reads
+  bool fields_;
+  std::vector<libav::Scaler> scalers_;  // of the whole frame, or of its two fields
+  Scaled scaled_;                       // what they read
   AVStream* stream_ = nullptr;
   cv::Mat last_;
   std::optional<double> time_s_;  // of the last frame, since the first
@@ -243,8 +274,8 @@ class VideoReader::State {
   bool spoiled_ = false;  // the last frame is damaged
 };
 
-VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind)
-    : state_(std::make_unique<State>(path, patience, kind)) {}
+VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind, bool fields)
+    : state_(std::make_unique<State>(path, patience, kind, fields)) {}
 VideoReader::~VideoReader() = default;
 
 std::optional<VideoReader::Image> VideoReader::next() {

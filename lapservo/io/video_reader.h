@@ -24,9 +24,10 @@ class VideoReader {
 
   /// Throws InputError when it holds no video that can be decoded, or one that is to be turned for display: a
   /// calibration belongs to the pixels in one orientation and nobody can tell to which.
-  /// Opening may take no longer than `patience`; reading may.
+  /// Opening may take no longer than `patience`; reading may. `fields`: frames are of two fields, and chroma that has
+  /// fewer rows than luma (4:2:0) belongs to each field by itself.
   explicit VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience = std::chrono::seconds(5),
-                       Kind kind = Kind::file);
+                       Kind kind = Kind::file, bool fields = false);
   ~VideoReader();
 
   /// nullopt at the end.

@@ -276,10 +276,12 @@ void bind_frames(py::module_& m) {
       });
   m.def(
       "open_frames",
-      [](const std::filesystem::path& input, double fps) { return internal::open_camera_or_file(input.string(), fps); },
-      py::arg("input"), py::arg("fps") = 30.0,
+      [](const std::filesystem::path& input, double fps, bool deinterlaced) {
+        return internal::open_camera_or_file(input.string(), fps, {}, nullptr, deinterlaced);
+      },
+      py::arg("input"), py::arg("fps") = 30.0, py::arg("deinterlaced") = false,
       "A picture, a folder of pictures (with `fps`), a video, 'rtsp://...', '/dev/video0' or 'gst:PIPELINE': a "
-      "FrameSource.");
+      "FrameSource. `deinterlaced`: one field of each frame is tracked.");
   m.def(
       "_png",
       [](const Image& image) {
