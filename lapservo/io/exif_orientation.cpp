@@ -11,7 +11,7 @@ namespace lapservo::internal {
 namespace {
 using Bytes = std::span<const std::uint8_t>;
 
-constexpr int orientation_tag = 0x0112;
+constexpr std::size_t orientation_tag = 0x0112;
 
 bool begins_with(Bytes bytes, std::string_view magic) {
   return bytes.size() >= magic.size() && std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
@@ -22,13 +22,13 @@ Bytes from(Bytes bytes, std::size_t at) {
 }
 
 // EXIF is a TIFF header too.
-std::optional<int> of_exif(Bytes bytes) {
+std::optional<std::size_t> of_exif(Bytes bytes) {
   constexpr std::string_view prefix("Exif\0\0", 6);
-  return tiff_tag(begins_with(bytes, prefix) ? from(bytes, prefix.size()) : bytes, orientation_tag);
+  return tiff_value(begins_with(bytes, prefix) ? from(bytes, prefix.size()) : bytes, orientation_tag);
 }
 
 // Segments up to the start of the scan: FF, a marker, a length that counts itself.
-std::optional<int> of_jpeg(Bytes bytes) {
+std::optional<std::size_t> of_jpeg(Bytes bytes) {
   const Numbers numbers{bytes, true};
   for (std::size_t at = 2; at + 4 <= bytes.size();) {
     const std::size_t marker = numbers.of(at + 1, 1), length = numbers.of(at + 2, 2);
@@ -45,7 +45,7 @@ std::optional<int> of_jpeg(Bytes bytes) {
 }
 
 // Chunks of a name and a length: PNG's have 8 bytes before their content and 4 behind, RIFF's an even length.
-std::optional<int> of_chunks(Bytes bytes, std::size_t first, bool png) {
+std::optional<std::size_t> of_chunks(Bytes bytes, std::size_t first, bool png) {
   const Numbers numbers{bytes, png};
   for (std::size_t at = first; at + 8 <= bytes.size();) {
     const std::size_t length = numbers.of(png ? at : at + 4, 4);
@@ -57,11 +57,11 @@ std::optional<int> of_chunks(Bytes bytes, std::size_t first, bool png) {
 
 }  // namespace
 
-std::optional<int> exif_orientation(Bytes picture) {
+std::optional<std::size_t> exif_orientation(Bytes picture) {
   if (begins_with(picture, "\xff\xd8")) return of_jpeg(picture);
   if (begins_with(picture, "\x89PNG")) return of_chunks(picture, 8, true);
   if (begins_with(picture, "RIFF")) return of_chunks(picture, 12, false);
-  return tiff_tag(picture, orientation_tag);
+  return tiff_value(picture, orientation_tag);
 }
 
 }  // namespace lapservo::internal

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -8,6 +9,6 @@ namespace lapservo::internal {
 
 /// The orientation (1 upright, 2 to 8 turned or mirrored) that a JPEG, PNG, TIFF or WebP asks its viewers for, by EXIF
 /// or TIFF tag 0x0112; nullopt where it says nothing that can be understood.
-std::optional<int> exif_orientation(std::span<const std::uint8_t> picture);
+std::optional<std::size_t> exif_orientation(std::span<const std::uint8_t> picture);
 
 }  // namespace lapservo::internal

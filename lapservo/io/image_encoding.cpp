@@ -2,11 +2,9 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/lower_case.h"
-#include "lapservo/io/image_file.h"
 #include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/io/libav_picture.h"
 #include "lapservo/io/png_encoding.h"
-#include "lapservo/io/webp_picture.h"
 
 namespace lapservo::internal {
 namespace fs = std::filesystem;
@@ -20,8 +18,6 @@ bool is_jpeg_extension(const std::string& extension) {
 std::vector<std::uint8_t> encoded_as(const std::string& extension, const cv::Mat& image) {
   if (extension == ".png") return encode_png(image);
   if (is_jpeg_extension(extension)) return encode_jpeg(image);
-  const bool takes = !image.empty() && image.depth() == CV_8U;
-  if (extension == ".webp" && takes) return encode_webp(bgr8_from(image, "picture"));
   return libav_encode(extension, image);
 }
 

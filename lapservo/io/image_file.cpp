@@ -20,7 +20,6 @@
 #include "lapservo/io/numbers.h"
 #include "lapservo/io/png_picture.h"
 #include "lapservo/io/tiff_directory.h"
-#include "lapservo/io/webp_picture.h"
 
 namespace lapservo {
 using namespace internal;
@@ -81,24 +80,12 @@ bool is_jpeg(std::span<const std::uint8_t> bytes) {
   return starts_with(bytes, "\xff\xd8");
 }
 
-// Up to the end of a BMP's last row; of a run-length encoded one to where it says that it ends.
-std::size_t bmp_bytes(std::span<const std::uint8_t> bytes) {
-  const Numbers numbers{bytes, false};
-  constexpr std::size_t old_header = 12, run_length_8 = 1, run_length_4 = 2;
-  const bool old = numbers.of(14, 4) == old_header;
-  const std::size_t width = numbers.of(18, old ? 2 : 4), bits = numbers.of(old ? 24 : 28, 2);
-  const std::size_t compression = old ? 0 : numbers.of(30, 4);
-  if (compression == run_length_8 || compression == run_length_4) return numbers.of(2, 4);
-  const auto rows = static_cast<std::int32_t>(numbers.of(old ? 20 : 22, old ? 2 : 4));  // negative: from the top
-  const std::size_t step = (width * bits + 31) / 32 * 4;
-  return numbers.of(10, 4) + step * static_cast<std::size_t>(std::abs(std::int64_t{rows}));
-}
-
-// Of a format whose decoder takes what is there.
+// The bytes that the file says it has.
 std::size_t least_bytes(std::span<const std::uint8_t> bytes, const std::string& format) {
   constexpr std::size_t riff_header = 8;
-  if (format == "WebP") return riff_header + Numbers{bytes, false}.of(4, 4);
-  return format == "BMP" ? bmp_bytes(bytes) : 0;
+  const Numbers numbers{bytes, false};
+  if (format == "WebP") return riff_header + numbers.of(4, 4);
+  return format == "BMP" ? numbers.of(2, 4) : 0;
 }
 
 // Decoders return half a picture for half a file, and fill gigabytes for a few bytes: ask for end and size beforehand.
@@ -115,31 +102,23 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
       throw InputError(source, "is a truncated JPEG, expected a whole picture");
     check_size(jpeg_size(bytes), source);
   }
-  if (const std::string format = rare_format(bytes); bytes.size() < least_bytes(bytes, format))
+  if (const std::string format = libav_format(bytes); bytes.size() < least_bytes(bytes, format))
     throw InputError(source, "is a truncated " + format + ", expected a whole picture");
   if (!tiff_has_its_rows(bytes)) throw InputError(source, "is a truncated TIFF, expected a whole picture");
 }
 
-// What OpenCV read once, and others may send.
-void refuse_unread(std::span<const std::uint8_t> bytes, const std::string& source) {
-  constexpr int compression = 259, photometric = 262, tile_width = 322, sample_format = 339;
-  constexpr int jpeg_before_tiff_6 = 6, in_jpeg = 7, ycbcr = 6, is_unsigned = 1;
-  const std::string format = rare_format(bytes);
-  if (tiff_tag(bytes, sample_format).value_or(is_unsigned) != is_unsigned) refuse_pixel_type(source);
-  const int packed_by = tiff_tag(bytes, compression).value_or(0);
-  const char* const kind = tiff_tag(bytes, tile_width)                               ? "in tiles"
-                           : tiff_tag(bytes, photometric).value_or(0) == ycbcr       ? "in YCbCr"
-                           : packed_by == jpeg_before_tiff_6 || packed_by == in_jpeg ? "in JPEG's compression"
-                                                                                     : nullptr;
-  if (kind) throw InputError(source, std::string("is a TIFF ") + kind + ", which is not read: convert it to PNG");
-  if (!format.empty() && format != "WebP" && !libav_decodes(format))
-    throw InputError(source, "is a picture of format " + format + ", which is not read: convert it to PNG");
+// FFmpeg takes all samples for unsigned, and YCbCr for a video's.
+void refuse_misread(std::span<const std::uint8_t> bytes, const std::string& source) {
+  constexpr std::size_t photometric = 262, sample_format = 339, ycbcr = 6, is_unsigned = 1;
+  if (tiff_value(bytes, sample_format).value_or(is_unsigned) != is_unsigned) refuse_pixel_type(source);
+  if (tiff_value(bytes, photometric) == ycbcr)
+    throw InputError(source, "is a TIFF in YCbCr, which is not read: convert it to PNG");
 }
 
 DecodedPicture decode(std::span<const std::uint8_t> bytes) {
   if (is_png(bytes)) return decode_png(bytes);
   if (is_jpeg(bytes)) return decode_jpeg(bytes);
-  return {rare_format(bytes) == "WebP" ? decode_webp(bytes) : libav_decode(bytes), ""};
+  return {libav_decode(bytes), ""};
 }
 
 }  // namespace
@@ -193,13 +172,14 @@ bool has_few_colors(const cv::Mat& bgr) {
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
   if (bytes.empty()) throw InputError(source, "is empty, expected a picture");
   check_whole(bytes, source);
-  refuse_unread(bytes, source);
+  refuse_misread(bytes, source);
   // 0 and numbers above 8 have no meaning in EXIF; they are shown upright everywhere.
   if (const auto orientation = exif_orientation(bytes); orientation && *orientation >= 2 && *orientation <= 8)
     throw InputError(source, "EXIF orientation", std::to_string(*orientation),
                      "1: the pixels as the calibrated camera has them, not to be turned");
   DecodedPicture decoded = decode(bytes);
-  if (decoded.bgr.empty()) throw InputError(source, "can't be decoded, expected a picture");
+  if (decoded.bgr.empty())
+    throw InputError(source, "can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM picture");
   check_size({static_cast<std::uint32_t>(decoded.bgr.cols), static_cast<std::uint32_t>(decoded.bgr.rows)}, source);
   Picture picture{bgr8_from(decoded.bgr, source), std::nullopt};
   if (!decoded.complaint.empty()) {

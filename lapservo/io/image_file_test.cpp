@@ -25,6 +25,7 @@ using testing::input_error;
 using testing::TemporaryFolder;
 
 constexpr std::uint64_t seed = 61;
+constexpr auto not_decoded = "p: can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM picture";
 
 template <typename Value>
 cv::Mat random_image(int rows, int columns, int type, Random& random) {
@@ -201,9 +202,9 @@ TEST(Image, IsRefusedWhereverTheFileIsCut) {
     const Bytes whole = encoded(image, format.extension);
     EXPECT_EQ(refusal(whole), "");
     for (std::size_t size = 1; size < whole.size() - format.dispensable; ++size)
-      EXPECT_EQ(refusal(std::span(whole).first(size)),
-                size < format.signature ? "p: can't be decoded, expected a picture"
-                                        : "p: is a truncated " + format.name + ", expected a whole picture")
+      EXPECT_EQ(
+          refusal(std::span(whole).first(size)),
+          size < format.signature ? not_decoded : "p: is a truncated " + format.name + ", expected a whole picture")
           << size << " of " << whole.size() << " bytes";
   }
 }
@@ -224,12 +225,8 @@ TEST(Image, OfARareFormatIsRefusedWhereverTheFileIsCut) {
 
 TEST(Image, IsRefusedWhenItIsSomethingElse) {
   const std::string text = "frame,time_s\n0,0\n";
-  EXPECT_EQ(refusal(Bytes(text.begin(), text.end())), "p: can't be decoded, expected a picture");
+  EXPECT_EQ(refusal(Bytes(text.begin(), text.end())), not_decoded);
   EXPECT_EQ(refusal({}), "p: is empty, expected a picture");
-  for (const auto& [begin, name] :
-       {std::pair<std::string, std::string>{{"\0\0\0\x0cjP  \r\n", 10}, "JPEG 2000"}, {"\x76\x2f\x31\x01", "OpenEXR"}})
-    EXPECT_EQ(refusal(Bytes(begin.begin(), begin.end())),
-              "p: is a picture of format " + name + ", which is not read: convert it to PNG");
   EXPECT_EQ(input_error([] { bgr8_from(cv::Mat(4, 4, CV_8UC2, cv::Scalar(1, 2)), "p"); }),
             "p: channels: is 2, expected 1 (grey), 3 or 4 (alpha)");
 }
@@ -249,7 +246,7 @@ TEST(Image, OfFloatingPointOrInTilesIsRefused) {
   EXPECT_EQ(refusal(tiff), "");
   EXPECT_EQ(refusal(with_tag(339 - 256)),
             "p: pixel type: is floating point or signed, expected 8 or 16 bits a channel");
-  EXPECT_EQ(refusal(with_tag(322 - 256)), "p: is a TIFF in tiles, which is not read: convert it to PNG");
+  EXPECT_EQ(refusal(with_tag(322 - 256)), not_decoded);
   EXPECT_EQ(refusal(with_tag(297 - 256)), "") << "what no decoder knows may stand there";
 }
 

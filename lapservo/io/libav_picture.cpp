@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <optional>
 #include <string_view>
 
 extern "C" {
@@ -13,7 +12,6 @@ extern "C" {
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/io/libav.h"
-#include "lapservo/io/tiff_directory.h"
 
 namespace lapservo::internal {
 namespace {
@@ -23,40 +21,18 @@ constexpr std::int64_t max_pixels = std::int64_t{16384} * 16384;
 
 struct Format {
   std::string_view magic, name;
-  AVCodecID codec = AV_CODEC_ID_NONE;
-  std::string_view magic_at_8 = {};
+  AVCodecID codec;
 };
-constexpr std::array formats{
-    Format{"BM"sv, "BMP", AV_CODEC_ID_BMP},
-    Format{"P1"sv, "PNM", AV_CODEC_ID_PBM},
-    Format{"P2"sv, "PNM", AV_CODEC_ID_PGM},
-    Format{"P3"sv, "PNM", AV_CODEC_ID_PPM},
-    Format{"P4"sv, "PNM", AV_CODEC_ID_PBM},
-    Format{"P5"sv, "PNM", AV_CODEC_ID_PGM},
-    Format{"P6"sv, "PNM", AV_CODEC_ID_PPM},
-    Format{"II*\0"sv, "TIFF", AV_CODEC_ID_TIFF},
-    Format{"MM\0*"sv, "TIFF", AV_CODEC_ID_TIFF},
-    Format{"RIFF"sv, "WebP", AV_CODEC_ID_NONE, "WEBP"sv},
-    Format{"\0\0\0\x0cjP  "sv, "JPEG 2000"},
-    Format{"\xff\x4f\xff\x51"sv, "JPEG 2000"},
-    Format{"\x76\x2f\x31\x01"sv, "OpenEXR"},
-    Format{"#?RADIANCE"sv, "Radiance HDR"},
-    Format{"#?RGBE"sv, "Radiance HDR"},
-    Format{"\x59\xa6\x6a\x95"sv, "Sun raster"},
-    Format{"P7"sv, "PAM"},
-    Format{"PF"sv, "PFM"},
-    Format{"Pf"sv, "PFM"},
-    Format{"GIF8"sv, "GIF"},
-    Format{"II+\0"sv, "BigTIFF"},
-    Format{"MM\0+"sv, "BigTIFF"},
-};
+constexpr std::array formats{Format{"BM"sv, "BMP", AV_CODEC_ID_BMP},      Format{"P1"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P2"sv, "PNM", AV_CODEC_ID_PPM},      Format{"P3"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P4"sv, "PNM", AV_CODEC_ID_PPM},      Format{"P5"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P6"sv, "PNM", AV_CODEC_ID_PPM},      Format{"II*\0"sv, "TIFF", AV_CODEC_ID_TIFF},
+                             Format{"MM\0*"sv, "TIFF", AV_CODEC_ID_TIFF}, Format{"RIFF"sv, "WebP", AV_CODEC_ID_WEBP}};
 
 const Format* format_of(std::span<const std::uint8_t> bytes) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const auto found = std::find_if(formats.begin(), formats.end(), [&](const Format& format) {
-    return text.starts_with(format.magic) &&
-           (format.magic_at_8.empty() || (text.size() >= 12 && text.substr(8).starts_with(format.magic_at_8)));
-  });
+  const auto found = std::find_if(formats.begin(), formats.end(),
+                                  [&](const Format& format) { return text.starts_with(format.magic); });
   return found == formats.end() ? nullptr : &*found;
 }
 
@@ -85,7 +61,8 @@ libav::Codec open_decoder(AVCodecID id, std::uint8_t& fill) {
   context->max_pixels = max_pixels;
   context->opaque = &fill;
   context->get_buffer2 = filled_buffer;
-  context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
+  context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER;
+  if (id != AV_CODEC_ID_TIFF) context->err_recognition |= AV_EF_EXPLODE;  // which refuses tags that it does not know
   return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
 }
 
@@ -101,73 +78,34 @@ libav::Frame decoded_frame(AVCodecID id, std::span<const std::uint8_t> bytes, st
   return flawed ? nullptr : std::move(frame);
 }
 
-// The pixels as another format has them, which must be one of a single plane.
-cv::Mat converted(const AVFrame& frame, AVPixelFormat format, int type) {
-  const libav::Scaler scaler(sws_getContext(
-      frame.width, frame.height, static_cast<AVPixelFormat>(frame.format), frame.width, frame.height, format,
-      SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP, nullptr, nullptr, nullptr));
+// Grey or BGR of 8 or 16 bits.
+struct Layout {
+  AVPixelFormat format;
+  int type;
+};
+
+Layout layout_of(AVPixelFormat format) {
+  const AVPixFmtDescriptor& of = *av_pix_fmt_desc_get(format);
+  const bool grey = of.nb_components <= 2 && (of.flags & AV_PIX_FMT_FLAG_PAL) == 0;
+  const bool deep = of.comp[0].depth > 8;
+  if (grey) return deep ? Layout{AV_PIX_FMT_GRAY16, CV_16UC1} : Layout{AV_PIX_FMT_GRAY8, CV_8UC1};
+  return deep ? Layout{AV_PIX_FMT_BGR48, CV_16UC3} : Layout{AV_PIX_FMT_BGR24, CV_8UC3};
+}
+
+cv::Mat pixels_of(const libav::Frame& decoded) {
+  if (!decoded) return {};
+  const AVFrame& frame = *decoded;
+  const auto format = static_cast<AVPixelFormat>(frame.format);
+  const Layout layout = layout_of(format);
+  const libav::Scaler scaler(sws_getContext(frame.width, frame.height, format, frame.width, frame.height, layout.format,
+                                            SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP,
+                                            nullptr, nullptr, nullptr));
   if (!scaler) return {};
-  cv::Mat pixels(frame.height, frame.width, type);
+  cv::Mat pixels(frame.height, frame.width, layout.type);
   std::uint8_t* rows[4] = {pixels.data};
   const int steps[4] = {static_cast<int>(pixels.step)};
   sws_scale(scaler.get(), frame.data, frame.linesize, 0, frame.height, rows, steps);
   return pixels;
-}
-
-cv::Mat as_it_lies(const AVFrame& frame, int type) {
-  return cv::Mat(frame.height, frame.width, type, frame.data[0], static_cast<std::size_t>(frame.linesize[0])).clone();
-}
-
-cv::Mat recoloured(const cv::Mat& pixels, int conversion) {
-  cv::Mat result;
-  if (!pixels.empty()) cv::cvtColor(pixels, result, conversion);
-  return result;
-}
-
-cv::Mat first_channel(const cv::Mat& pixels) {
-  cv::Mat first;
-  cv::extractChannel(pixels, first, 0);
-  return first;
-}
-
-// One bit a pixel, in whole bytes a row.
-cv::Mat of_bits(const AVFrame& frame, std::uint8_t of_one) {
-  cv::Mat pixels(frame.height, frame.width, CV_8UC1);
-  for (int v = 0; v < frame.height; ++v) {
-    const std::uint8_t* bits = frame.data[0] + static_cast<std::ptrdiff_t>(v) * frame.linesize[0];
-    for (int u = 0; u < frame.width; ++u) {
-      const bool one = (bits[u / 8] >> (7 - u % 8) & 1) != 0;
-      pixels.at<std::uint8_t>(v, u) = one ? of_one : static_cast<std::uint8_t>(255 - of_one);
-    }
-  }
-  return pixels;
-}
-
-// Without the scaler where it would go through YUV, or take grey for a video's, whose black is 16.
-cv::Mat pixels_of(const libav::Frame& decoded) {
-  if (!decoded) return {};
-  const AVFrame& frame = *decoded;
-  switch (frame.format) {
-    case AV_PIX_FMT_GRAY8:
-      return as_it_lies(frame, CV_8UC1);
-    case AV_PIX_FMT_MONOBLACK:
-      return of_bits(frame, 255);
-    case AV_PIX_FMT_MONOWHITE:
-      return of_bits(frame, 0);
-    case AV_PIX_FMT_YA8:
-      return first_channel(as_it_lies(frame, CV_8UC2));
-    case AV_PIX_FMT_GRAY16LE:
-    case AV_PIX_FMT_GRAY16BE:
-      return converted(frame, AV_PIX_FMT_GRAY16, CV_16UC1);
-    case AV_PIX_FMT_RGB48LE:
-    case AV_PIX_FMT_RGB48BE:
-      return recoloured(converted(frame, AV_PIX_FMT_RGB48, CV_16UC3), cv::COLOR_RGB2BGR);
-    case AV_PIX_FMT_RGBA64LE:
-    case AV_PIX_FMT_RGBA64BE:
-      return recoloured(converted(frame, AV_PIX_FMT_RGBA64, CV_16UC4), cv::COLOR_RGBA2BGRA);
-    default:
-      return converted(frame, AV_PIX_FMT_BGR24, CV_8UC3);
-  }
 }
 
 struct Encoding {
@@ -180,15 +118,24 @@ constexpr std::array encodings{
     Encoding{".bmp", "bmp", AV_PIX_FMT_BGR24, AV_PIX_FMT_GRAY8},
     Encoding{".tif", "tiff", AV_PIX_FMT_RGB24, AV_PIX_FMT_GRAY8, "compression_algo", "lzw"},
     Encoding{".tiff", "tiff", AV_PIX_FMT_RGB24, AV_PIX_FMT_GRAY8, "compression_algo", "lzw"},
+    Encoding{".webp", "libwebp", AV_PIX_FMT_RGB32, AV_PIX_FMT_NONE, "lossless", "1"},
     Encoding{".ppm", "ppm", AV_PIX_FMT_RGB24, AV_PIX_FMT_NONE},
     Encoding{".pgm", "pgm", AV_PIX_FMT_NONE, AV_PIX_FMT_GRAY8},
 };
+
+cv::Mat recoloured(const cv::Mat& pixels, int conversion) {
+  cv::Mat result;
+  cv::cvtColor(pixels, result, conversion);
+  return result;
+}
 
 cv::Mat laid_out(const cv::Mat& image, AVPixelFormat format) {
   const bool is_grey = image.channels() == 1;
   switch (format) {
     case AV_PIX_FMT_GRAY8:
       return is_grey ? image : recoloured(image, cv::COLOR_BGR2GRAY);
+    case AV_PIX_FMT_RGB32:
+      return recoloured(image, is_grey ? cv::COLOR_GRAY2BGRA : cv::COLOR_BGR2BGRA);
     case AV_PIX_FMT_RGB24:
       return recoloured(image, is_grey ? cv::COLOR_GRAY2RGB : cv::COLOR_BGR2RGB);
     default:
@@ -196,7 +143,7 @@ cv::Mat laid_out(const cv::Mat& image, AVPixelFormat format) {
   }
 }
 
-AVPixelFormat layout_of(const Encoding& encoding, bool is_grey) {
+AVPixelFormat format_of(const Encoding& encoding, bool is_grey) {
   if (is_grey) return encoding.grey != AV_PIX_FMT_NONE ? encoding.grey : encoding.color;
   return encoding.color != AV_PIX_FMT_NONE ? encoding.color : encoding.grey;
 }
@@ -227,25 +174,16 @@ libav::Frame frame_around(const cv::Mat& pixels, AVPixelFormat format) {
 
 }  // namespace
 
-std::string rare_format(std::span<const std::uint8_t> bytes) {
+std::string libav_format(std::span<const std::uint8_t> bytes) {
   const Format* format = format_of(bytes);
   return format ? std::string(format->name) : "";
 }
 
-bool libav_decodes(const std::string& format) {
-  return std::any_of(formats.begin(), formats.end(),
-                     [&](const Format& known) { return known.name == format && known.codec != AV_CODEC_ID_NONE; });
-}
-
 cv::Mat libav_decode(std::span<const std::uint8_t> bytes) {
   const Format* format = format_of(bytes);
-  if (!format || format->codec == AV_CODEC_ID_NONE) return {};
-  const std::vector<std::uint8_t> tiff =
-      format->codec == AV_CODEC_ID_TIFF ? tiff_of_pixels(bytes) : std::vector<std::uint8_t>();
-  const auto decoded = [&](std::uint8_t fill) {
-    return pixels_of(decoded_frame(format->codec, tiff.empty() ? bytes : tiff, fill));
-  };
-  const cv::Mat pixels = decoded(0), again = decoded(255);
+  if (!format) return {};
+  const cv::Mat pixels = pixels_of(decoded_frame(format->codec, bytes, 0));
+  const cv::Mat again = pixels_of(decoded_frame(format->codec, bytes, 255));
   const bool whole = !pixels.empty() && pixels.size() == again.size() && pixels.type() == again.type() &&
                      cv::norm(pixels, again, cv::NORM_INF) == 0;
   return whole ? pixels : cv::Mat();
@@ -256,7 +194,7 @@ std::vector<std::uint8_t> libav_encode(const std::string& extension, const cv::M
       std::find_if(encodings.begin(), encodings.end(), [&](const Encoding& e) { return e.extension == extension; });
   if (encoding == encodings.end() || image.empty() || (image.type() != CV_8UC1 && image.type() != CV_8UC3)) return {};
   av_log_set_level(AV_LOG_QUIET);
-  const AVPixelFormat format = layout_of(*encoding, image.channels() == 1);
+  const AVPixelFormat format = format_of(*encoding, image.channels() == 1);
   const cv::Mat pixels = laid_out(image, format);
   const libav::Codec encoder = open_encoder(*encoding, format, pixels);
   const libav::Frame frame = frame_around(pixels, format);
