@@ -11,7 +11,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/kinematics/features.h"
 #include "lapservo/sim/tissue.h"
 

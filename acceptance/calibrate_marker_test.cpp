@@ -16,8 +16,8 @@
 #include <gtest/gtest.h>
 
 #include "acceptance/frame_sets.h"
-#include "lapservo/calibration/marker_calibration.h"
-#include "lapservo/calibration/marker_measurement.h"
+#include "lapservo/calibration/marker/marker_calibration.h"
+#include "lapservo/calibration/marker/marker_measurement.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/testing/camera_effects.h"

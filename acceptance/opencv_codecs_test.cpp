@@ -12,12 +12,12 @@
 #include <opencv2/videoio.hpp>
 
 #include "lapservo/core/random.h"
-#include "lapservo/io/image_encoding.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/jpeg_encoding.h"
-#include "lapservo/io/png_encoding.h"
-#include "lapservo/io/video_reader.h"
-#include "lapservo/io/video_writer.h"
+#include "lapservo/io/pictures/image_encoding.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/io/pictures/png_encoding.h"
+#include "lapservo/io/video/video_reader.h"
+#include "lapservo/io/video/video_writer.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/videos.h"
 

@@ -23,7 +23,7 @@
 #include "lapservo/core/random.h"
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/image_receiver.h"
-#include "lapservo/io/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"

@@ -13,7 +13,7 @@
 #include "lapservo/crtk/image_decoder.h"
 #include "lapservo/crtk/image_receiver.h"
 #include "lapservo/crtk/test_inbox.h"
-#include "lapservo/io/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"

@@ -7,7 +7,7 @@
 #include "fuzz/require.h"
 #include "fuzz/small_rig.h"
 #include "lapservo/core/csv.h"
-#include "lapservo/io/configuration_csv.h"
+#include "lapservo/io/tables/configuration_csv.h"
 
 // Any text is a table whose numbers are finite, or an InputError. The columns are those of observations and truth.
 namespace {

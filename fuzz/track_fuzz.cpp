@@ -10,8 +10,8 @@
 
 #include "fuzz/require_observation.h"
 #include "fuzz/small_rig.h"
-#include "lapservo/io/observation_csv.h"
 #include "lapservo/io/overlay.h"
+#include "lapservo/io/tables/observation_csv.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "lapservo/calibration/joint_recording.h"
+#include "lapservo/calibration/recording/joint_recording.h"
 #include "recordings/bag.h"
 
 namespace lapservo::internal {

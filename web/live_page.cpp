@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/csv.h"
-#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/io/overlay.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
 #include "web/page_files.h"
 #include "web/page_state.h"
 

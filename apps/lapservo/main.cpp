@@ -9,7 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
-#include "apps/lapservo/subcommands.h"
+#include "apps/lapservo/cli/subcommands.h"
 #include "lapservo/core/error.h"
 
 namespace {

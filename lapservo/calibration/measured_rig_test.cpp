@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/calibration/camera_measurement.h"
-#include "lapservo/calibration/colour_measurement.h"
-#include "lapservo/calibration/registration_measurement.h"
+#include "lapservo/calibration/camera/camera_measurement.h"
+#include "lapservo/calibration/colour/colour_measurement.h"
+#include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/testing/scenes.h"
 
 namespace lapservo::internal {

@@ -4,7 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "lapservo/core/random.h"
-#include "lapservo/io/png_encoding.h"
+#include "lapservo/io/pictures/png_encoding.h"
 
 namespace lapservo::internal {
 namespace {

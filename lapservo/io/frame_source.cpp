@@ -8,7 +8,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/video_reader.h"
+#include "lapservo/io/video/video_reader.h"
 
 namespace lapservo {
 using namespace internal;

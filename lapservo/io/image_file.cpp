@@ -13,13 +13,13 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/input_file.h"
 #include "lapservo/core/lower_case.h"
-#include "lapservo/io/exif_orientation.h"
-#include "lapservo/io/image_encoding.h"
-#include "lapservo/io/jpeg_picture.h"
-#include "lapservo/io/libav_picture.h"
-#include "lapservo/io/numbers.h"
-#include "lapservo/io/png_picture.h"
-#include "lapservo/io/tiff_directory.h"
+#include "lapservo/io/pictures/exif_orientation.h"
+#include "lapservo/io/pictures/image_encoding.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/pictures/libav_picture.h"
+#include "lapservo/io/pictures/png_picture.h"
+#include "lapservo/io/pictures/tiff_directory.h"
+#include "lapservo/io/tables/numbers.h"
 
 namespace lapservo {
 using namespace internal;

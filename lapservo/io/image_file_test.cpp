@@ -14,7 +14,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
-#include "lapservo/io/image_encoding.h"
+#include "lapservo/io/pictures/image_encoding.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 

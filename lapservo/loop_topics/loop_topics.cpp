@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/io/jpeg_encoding.h"
 #include "lapservo/io/overlay.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
 
 namespace lapservo::internal {
 namespace {

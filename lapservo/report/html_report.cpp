@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/atomic_file.h"
-#include "lapservo/io/jpeg_encoding.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
 
 namespace lapservo::internal {
 namespace {

@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/calibration/camera_measurement.h"
-#include "lapservo/calibration/colour_measurement.h"
-#include "lapservo/calibration/marker_measurement.h"
-#include "lapservo/calibration/registration_measurement.h"
+#include "lapservo/calibration/camera/camera_measurement.h"
+#include "lapservo/calibration/colour/colour_measurement.h"
+#include "lapservo/calibration/marker/marker_measurement.h"
+#include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
 #include "lapservo/rig/instrument_index.h"
@@ -258,9 +258,8 @@ py::dict calibrate_registration(const py::object& frames, const py::object& rig,
     poses = table ? poses_in_table(name, instrument.name)
                   : poses_in_frames(given.rig, index, {*source->source, name, deinterlace}, watch);
     expect_result(poses.none, name);
-    registration =
-        read ? register_arm(instrument, poses.all, read->recording, read->source, watch.is_stopped)
-             : register_rcm(instrument, poses.all, watch.is_stopped);
+    registration = read ? register_arm(instrument, poses.all, read->recording, read->source, watch.is_stopped)
+                        : register_rcm(instrument, poses.all, watch.is_stopped);
   }
   expect_result(registration.refusal, name);
   GivenRig after = given;

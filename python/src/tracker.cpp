@@ -12,7 +12,7 @@
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/overlay.h"
-#include "lapservo/io/png_encoding.h"
+#include "lapservo/io/pictures/png_encoding.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rig/instrument_index.h"
 #include "python/src/bindings.h"

@@ -1,0 +1,330 @@
+#include <cstdio>
+#include <ctime>
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <unistd.h>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/record.h"
+#include "lapservo/core/error.h"
+#include "lapservo/rig/calibration_record.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+namespace fs = std::filesystem;
+
+struct AllOptions {
+  std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, report, instrument, redo;
+  std::string camera, robot, joint_limits;  // of a live system
+  double square_mm = 0, fps = 30;
+  bool deinterlace = false, no_questions = false, enable_motion = false;
+};
+
+// One step: what the user is to record for it, the command that measures it, and what that does.
+struct Step {
+  std::string name, what_to_record;
+  std::string* input;
+  const char* flag;                    // of the input
+  std::string joints;                  // of the arm meanwhile, where they are given
+  std::vector<std::string> arguments;  // beyond the subcommand, the input, the rig and the joints
+  std::function<int(const CalibrateOptions&)> run;
+};
+
+constexpr const char* to_record_turn =
+    "a slow full turn about the shaft's axis, there and back, 20 s or more each way, near and sharp";
+constexpr const char* to_record_swing =
+    "a smooth swing: 0.5 rad in both directions, 20 mm of insertion, 2 rad of turn, 10 to 60 s";
+
+std::string shell_word(const std::string& word) {
+  const bool plain = word.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_./:,=") ==
+                     std::string::npos;
+  if (plain && !word.empty()) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? "'\\''" : std::string(1, c);
+  return text + "'";
+}
+
+std::string command_line(const std::vector<std::string>& arguments) {
+  std::string text = "lapservo";
+  for (const std::string& argument : arguments) text += " " + shell_word(argument);
+  return text;
+}
+
+std::string now_utc() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  gmtime_r(&now, &utc);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &utc);
+  return text;
+}
+
+// Empty: leave the step out.
+std::string asked(const Step& step) {
+  std::fprintf(stderr, "\n%s: %s\n  where is it (a folder, a video, a bag; empty: leave this step out)? ",
+               step.name.c_str(), step.what_to_record.c_str());
+  std::string answer;
+  if (!std::getline(std::cin, answer)) return {};
+  return answer;
+}
+
+bool asks(const AllOptions& options) {
+  return !options.no_questions && ::isatty(STDIN_FILENO);
+}
+
+class Guide {
+ public:
+  explicit Guide(AllOptions& options)
+      : options_(options), record_file_(record_path(options.rig)), record_(read_record(record_file_)) {
+    if (record_.steps.empty() || record_.rig == content_state(options.rig)) return;
+    std::printf("%s is not as the last step left it: all steps are done anew\n", options.rig.c_str());
+    record_.steps.clear();
+  }
+
+  int run() {
+    watch_for_interrupts();
+    std::vector<Step> all = steps();
+    if (!asks(options_))
+      for (const Step& step : all) expect_redone(step);
+    for (Step& step : all) {
+      const int code = take(step);
+      if (code != 0) return code;
+    }
+    return 0;
+  }
+
+ private:
+  void expect_redone(const Step& step) const {
+    if (step.input->empty() && options_.redo == step.name)
+      throw InputError("--redo", fmt::format("{} needs {}: {}", step.name, step.flag, step.what_to_record));
+  }
+
+  // What goes on for ever can't be told from what was done before, and the Ctrl-C that ends it would end all steps.
+  static void expect_recording(const Step& step) {
+    if (input_state(*step.input).empty())
+      throw InputError(step.flag, fmt::format("is {}, expected a folder with files, a video or a bag; `lapservo {}` "
+                                              "alone takes a camera or a stream",
+                                              *step.input, (step.name == "check" ? "" : "calibrate ") + step.name));
+  }
+
+  std::vector<Step> steps() {
+    AllOptions& o = options_;
+    std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm)};
+    if (!o.aruco.empty()) board.insert(board.end(), {"--aruco", o.aruco});
+    return {
+        {"camera",
+         "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
+         &o.boards, "--boards", "", board, [this](const auto& options) { return run_camera(options); }},
+        {"colour",
+         "the mounted marker moved through the picture, 10 s",
+         &o.motion,
+         "--motion",
+         "",
+         {},
+         [](const auto& options) { return calibrate_colour({options}); }},
+        {"marker", to_record_turn, &o.turn, "--turn", "", {}, calibrate_marker},
+        {"registration", to_record_swing, &o.swing, "--swing", o.joints, {}, calibrate_registration},
+        {"check", "another swing, or the same, with a full turn", &o.judged, "--check", o.judged_joints, {}, check}};
+  }
+
+  int run_camera(const CalibrateOptions& options) const {
+    CalibrateCameraOptions camera;
+    camera.inputs = {options.input}, camera.rig = options.rig;
+    camera.board = options_.board, camera.square_mm = options_.square_mm, camera.dictionary = options_.aruco;
+    return calibrate_camera(camera);
+  }
+
+  // As a user types it; where its page goes is no part of what was done.
+  std::vector<std::string> arguments_of(const Step& step) const {
+    const bool check = step.name == "check", camera = step.name == "camera";
+    std::vector<std::string> all;
+    if (!check) all.push_back("calibrate");
+    all.insert(all.end(), {step.name, *step.input, "--rig", options_.rig});
+    if (!check && !camera) all.insert(all.end(), {"--out", options_.rig});
+    if (!step.joints.empty()) all.insert(all.end(), {"--joints", step.joints});
+    all.insert(all.end(), step.arguments.begin(), step.arguments.end());
+    if (camera) return all;
+    if (!options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
+    if (options_.deinterlace) all.push_back("--deinterlace");
+    all.insert(all.end(), {"--fps", fmt::format("{}", options_.fps)});
+    return all;
+  }
+
+  CalibrateOptions options_of(const Step& step) const {
+    CalibrateOptions options;
+    options.input = *step.input, options.rig = options_.rig, options.joints = step.joints;
+    if (step.name != "check") options.out = options_.rig;
+    options.instrument = options_.instrument, options.fps = options_.fps, options.deinterlace = options_.deinterlace;
+    if (step.name == "check") options.report = options_.report;
+    return options;
+  }
+
+  static std::string state_of(const Step& step) {
+    return input_state(*step.input) + (step.joints.empty() ? "" : "; " + input_state(step.joints));
+  }
+
+  static int tell_done(const CalibrationStep& done) {
+    std::printf("%s: done on %s by %s\n", done.name.c_str(), done.when.c_str(), done.command.c_str());
+    return 0;
+  }
+
+  int take(Step& step) {
+    if (step.input->empty() && asks(options_)) *step.input = asked(step);
+    expect_redone(step);
+    const CalibrationStep* done = record_.find(step.name);
+    if (step.input->empty()) {
+      if (done) return tell_done(*done);
+      std::printf("%s: left out; %s names %s\n", step.name.c_str(), step.flag, step.what_to_record.c_str());
+      return 0;
+    }
+    expect_recording(step);
+    if (step.name == "camera" && (options_.board.empty() || options_.square_mm <= 0))
+      throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
+    const CalibrationStep now{step.name, command_line(arguments_of(step)), state_of(step), now_utc()};
+    if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs)
+      return tell_done(*done);
+    std::printf("\n%s: %s\n", step.name.c_str(), now.command.c_str());
+    std::fflush(stdout);
+    const int code = step.run(options_of(step));
+    if (code == 0) {
+      record_.add(now), record_.rig = content_state(options_.rig);
+      write_record(record_file_, record_);
+    }
+    if (code == 0 && !interrupted()) return 0;
+    std::fprintf(stderr, "lapservo: stopped %s %s: the same command goes on from there\n", code == 0 ? "after" : "at",
+                 step.name.c_str());
+    return 1;
+  }
+
+  AllOptions& options_;
+  fs::path record_file_;
+  CalibrationRecord record_;
+};
+
+#ifdef LAPSERVO_ROS2_BAGS
+// The recording of this name beside the rig, made now where it isn't there. Empty: it could not be made.
+std::string recorded(const AllOptions& options, const std::string& name, const char* what) {
+  const fs::path folder = fs::path(options.rig + ".recordings") / name;
+  if (fs::exists(folder / "metadata.yaml")) {
+    std::printf("%s: as recorded in %s\n", name.c_str(), folder.c_str());
+    return folder.string();
+  }
+  RecordOptions recording;
+  recording.camera = options.camera, recording.robot = options.robot, recording.rig = options.rig;
+  recording.joint_limits = options.joint_limits, recording.out = folder.string();
+  recording.instrument = options.instrument;
+  recording.enable_motion = options.enable_motion, recording.until_enter = !options.enable_motion;
+  if (options.enable_motion) {
+    recording.move = name;
+  } else {
+    if (!asks(options))
+      throw InputError("--camera", "needs a terminal where it is asked when to record, or --enable-motion");
+    std::fprintf(stderr, "\n%s: %s\n  Enter begins, and ends it: ", name.c_str(), what);
+    std::string line;
+    std::getline(std::cin, line);
+  }
+  std::printf("\nrecording %s: %s\n", name.c_str(), folder.c_str());
+  std::fflush(stdout);
+  try {
+    if (record(recording) == 0 && !interrupted()) return folder.string();
+  } catch (...) {
+    fs::remove_all(folder);
+    throw;
+  }
+  fs::remove_all(folder);
+  std::fprintf(stderr, "lapservo: stopped at recording %s: the same command goes on from there\n", name.c_str());
+  return {};
+}
+#endif
+
+// Before it is read: what a pipe holds is gone then.
+void expect_replaceable(const fs::path& rig) {
+  std::error_code error;
+  const fs::file_status status = fs::status(rig, error);
+  if (fs::is_fifo(status) || fs::is_character_file(status) || fs::is_socket(status))
+    throw InputError(rig.string(), "is a pipe or a device, expected a file: each step replaces it");
+}
+
+int run_all(AllOptions options) {
+  expect_replaceable(options.rig);
+  load_rig(options.rig);
+  if (options.camera.empty() && (options.enable_motion || !options.robot.empty()))
+    throw InputError(options.robot.empty() ? "--enable-motion" : "--robot", "needs --camera: both are to be recorded");
+  if (!options.camera.empty()) {
+#ifdef LAPSERVO_ROS2_BAGS
+    if (options.turn.empty()) options.turn = recorded(options, "turn", to_record_turn);
+    if (options.turn.empty()) return 1;
+    if (options.swing.empty()) options.swing = recorded(options, "swing", to_record_swing);
+    if (options.swing.empty()) return 1;
+#else
+    throw InputError("--camera", "can't be recorded by this build, which lacks libsqlite3-dev");
+#endif
+  }
+  if (options.motion.empty()) options.motion = options.swing.empty() ? options.turn : options.swing;
+  if (options.judged.empty()) options.judged = options.swing;
+  if (options.judged_joints.empty() && options.judged == options.swing) options.judged_joints = options.joints;
+  return Guide(options).run();
+}
+
+}  // namespace
+
+void add_calibrate_all(Command parent, Run& run_later) {
+  auto options = std::make_shared<AllOptions>();
+  Command command = parent.add_subcommand(
+      "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.");
+  command.add_option("--rig", options->rig, "The rig as it is known so far; each step replaces it").required();
+  command.add_option("--boards", options->boards, "For the camera: pictures of a chessboard");
+  command.add_option("--board", options->board, "Its inner corners, COLUMNSxROWS, for example 9x6");
+  command.add_option("--square-mm", options->square_mm, "Width of its squares").number_between(0.1, 1000.0);
+  command.add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
+  command.add_option("--motion", options->motion, "For the colours: the marker in motion; else --swing, else --turn");
+  command.add_option("--turn", options->turn,
+                     "For the marker: a slow full turn about the shaft's axis, there and back");
+  command.add_option("--swing", options->swing, "For the registration: a smooth swing");
+  command.add_option("--joints", options->joints, "CSV of the joints meanwhile");
+  command.add_option("--check", options->judged, "For the check: a recording; else --swing");
+  command.add_option("--check-joints", options->judged_joints,
+                     "CSV of the joints meanwhile; else, without --check, --joints");
+  command.add_option(
+      "--camera", options->camera,
+      "A live system's images, as `lapservo record` takes them: what is missing of --turn and --swing is "
+      "recorded into RIG.recordings; delete it to have it recorded anew");
+  command.add_option("--robot", options->robot, "and its arm: ros2:PSM1 or ros1:PSM1");
+  command.add_flag("--enable-motion", options->enable_motion,
+                   "Move the arm for these recordings, see `lapservo record --move`; else a person does, and is asked");
+  command.add_option("--joint-limits", options->joint_limits, "For --enable-motion: YAML of the arm's joints");
+  command.add_option("--report", options->report, "The check's HTML page with figures");
+  command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
+  command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
+  command.add_option("--fps", options->fps, "Frames per second of folders of pictures")
+      .shows_default()
+      .number_between(0.001, 1000.0);
+  command.add_option("--redo", options->redo, "A step that is done again though it was done, with those after it")
+      .one_of({"camera", "colour", "marker", "registration", "check"});
+  command.add_flag("--no-questions", options->no_questions,
+                   "Leave out what no option names; on a terminal it is asked for");
+  command.footer(
+      "What was done, by which command and when stands beside the rig (RIG.calibration.yaml): a second run goes on "
+      "where\n"
+      "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
+      "changed.\n"
+      "Example:\n  lapservo calibrate all --rig rig.yaml --boards boards/ --board 9x6 --square-mm 5 --turn turn.mp4 "
+      "--swing swing.mp4 --joints joints.csv --report check.html\n"
+      "  lapservo calibrate all --rig rig.yaml --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --enable-motion");
+  command.runs(run_later, [options] { return run_all(*options); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,166 @@
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/input_files.h"
+#include "lapservo/calibration/camera/camera_measurement.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/error.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/rig/rig_writer.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+namespace fs = std::filesystem;
+
+Board board_of(const CalibrateCameraOptions& options) {
+  BoardWords words{options.board, 1e-3 * options.square_mm, options.dictionary};
+  if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
+  return internal::board_of(words);
+}
+
+void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>& rig) {
+  if (options.rig.empty() && options.out.empty() && options.camera_info.empty())
+    throw InputError("calibrate camera", "has no place for its result, expected --rig, --out or --camera-info");
+  InputFiles files;
+  std::error_code error;
+  for (const std::string& input : options.inputs) {
+    files.add(input);
+    if (fs::is_directory(input, error)) files.add_pictures_in(input);
+  }
+  std::vector<fs::path> places;
+  for (const std::string& place : {options.rig_out(), options.camera_info}) {
+    if (place.empty()) continue;
+    files.refuse_as_output(place);
+    const fs::path canonical = fs::weakly_canonical(place, error);
+    if (std::find(places.begin(), places.end(), canonical) != places.end())
+      throw InputError(place, "is the place for two results, expected a place for each");
+    places.push_back(canonical);
+  }
+  if (!rig) return;
+  files.add_rig(options.rig, *rig);
+  files.refuse_as_output(options.camera_info);
+}
+
+void look_at(const std::string& input, const std::string& image_topic, const Camera* camera,
+             BoardRecordings& recordings) {
+  const auto source = open_frames(input, 30, image_topic, camera);
+  recordings.look_at(*source, input, watched_job(),
+                     [](const std::string& wanted) { std::fprintf(stderr, "lapservo: %s\n", wanted.c_str()); });
+  if (!recordings.read().stopped) say_complaint(input, recordings.read().complaint);
+}
+
+int refuse(const CalibrateCameraOptions& options, const std::string& why) {
+  std::fprintf(stderr, "lapservo: %s: %s; nothing was written\n", options.input().c_str(), why.c_str());
+  return 1;
+}
+
+void print_result(const std::vector<BoardView>& views, const CameraCalibration& calibration) {
+  const Camera& camera = calibration.camera;
+  std::printf("%zu views; edges miss the fit by %.3f px rms\n", views.size(), calibration.rms_px);
+  for (std::size_t i = 0; i < views.size(); ++i)
+    std::printf("  %-40s %4zu corners   %.3f px\n", views[i].name.c_str(), views[i].corners.size(),
+                calibration.view_rms_px[i]);
+  for (const CalibratedNumber& n : calibrated_numbers(Camera{}, calibration))
+    std::printf("  %-24s %12.6f   sigma %.6f\n", n.name.c_str(), n.after, n.sigma);
+  if (!calibration.response) {
+    std::printf("response: as it was, these pictures don't tell it\n");
+    return;
+  }
+  const ResponseFit& response = *calibration.response;
+  std::printf("response: %s, seen from values of %.0f to %.0f, sigma %.4f of the full value\n",
+              camera.response.kind == Response::Kind::table ? "a table" : response.nearest.c_str(), 255 * response.low,
+              255 * response.high, response.sigma);
+  if (response.sharpening > 0)
+    std::printf("the pictures are sharpened (by %.2f over %.1f px): switch it off where the camera can\n",
+                response.sharpening, response.sharpening_px);
+}
+
+void write_results(const CalibrateCameraOptions& options, std::optional<Rig> rig, const Camera& camera) {
+  for (const std::string& place : {options.camera_info, rig ? std::string() : options.out}) {
+    if (place.empty()) continue;
+    write_file(place, camera_yaml(camera));
+    std::printf("camera: %s\n", place.c_str());
+  }
+  if (!rig) return;
+  rig->camera = camera;
+  write_file(options.rig_out(), rig_yaml(*rig));
+  std::printf("rig: %s\n", options.rig_out().c_str());
+}
+
+}  // namespace
+
+int calibrate_camera(const CalibrateCameraOptions& options) {
+  const Board board = board_of(options);
+  std::optional<Rig> rig;
+  if (!options.rig.empty()) rig = load_rig(options.rig);
+  check_files(options, rig);
+  watch_for_interrupts();
+
+  const Camera before = rig ? rig->camera : Camera{};
+  BoardRecordings recordings(board, options.views, rig);
+  for (const std::string& input : options.inputs) {
+    look_at(input, options.image_topic, rig ? &rig->camera : nullptr, recordings);
+    if (recordings.read().stopped) break;
+  }
+  const auto without_board = recordings.without_board();
+  const CameraMeasurement measured = measure_camera(board, std::move(recordings), before, watched_job());
+  const auto& [calibration, views, more] = measured;
+  if (!calibration.refusal.empty()) return refuse(options, calibration.refusal);
+  for (const std::string& name : without_board) std::printf("left out, there is no board: %s\n", name.c_str());
+  print_result(views, calibration);
+  if (!more.empty()) std::printf("better still: %s\n", more.c_str());
+  write_results(options, rig, measured_camera(calibration));
+  if (rig && std::any_of(rig->instruments.begin(), rig->instruments.end(),
+                         [](const Instrument& instrument) { return instrument.camera_from_rcm.has_value(); }))
+    std::printf("camera_from_rcm is as it was: where it was measured with another camera, measure it again\n");
+  return 0;
+}
+
+void add_calibrate_camera(Command parent, Run& run_later) {
+  auto options = std::make_shared<CalibrateCameraOptions>();
+  Command command = parent.add_subcommand(
+      "camera", "Measure a camera with a chessboard: matrix, distortion, lateral chromatic aberration, response.");
+  command
+      .add_option("input", options->inputs,
+                  "Pictures of the board from different sides: pictures, folders, a video, a bag, a camera or a stream")
+      .required();
+  add_image_topic_option(command, options->image_topic);
+  command.add_option("--board", options->board, "Inner corners of the board, COLUMNSxROWS, for example 9x6").required();
+  command.add_option("--square-mm", options->square_mm, "Width of a square").required().number_between(0.1, 1000.0);
+  command.add_option("--aruco", options->dictionary, "For a ChArUco board: its markers' dictionary, as DICT_4X4_50");
+  command.add_option("--marker-mm", options->marker_mm, "For a ChArUco board: a marker's width; else 3/4 of a square")
+      .number_between(0.05, 1000.0);
+  command.add_option("--rig", options->rig, "The rig that has this camera: its response is where the search starts");
+  command.add_option("--out", options->out,
+                     "With --rig: the rig to write, else the rig itself is replaced. Without: the camera's file");
+  command.add_option("--camera-info", options->camera_info,
+                     "The camera alone, as a ROS camera_info, which a rig's camera may name");
+  command.add_option("--views", options->views, "Views to choose from a video or a camera at most")
+      .shows_default()
+      .whole_number_between(4, 200);
+  command.footer(
+      "Show the whole board, flat and sharp, in 12 or more pictures: in every part of the picture, near, and tilted "
+      "by\n"
+      "20 to 40 degrees to all sides; fix exposure and focus. A camera is looked at until its views suffice, or "
+      "Ctrl-C.\n"
+      "All numbers are written with one standard deviation each (sigma_...), the response's where the pictures tell "
+      "it.\n"
+      "Example:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml");
+  command.runs(run_later, [options] { return calibrate_camera(*options); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,86 @@
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/progress.h"
+#include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/input_files.h"
+#include "lapservo/core/error.h"
+#include "lapservo/rig/instrument_index.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace fs = std::filesystem;
+
+void add_calibrate_options(Command command, CalibrateOptions& options) {
+  command.add_option("--rig", options.rig, "The rig as it is known so far").required();
+  command.add_option("--out", options.out, "The rig to write or replace, with what was measured; may be --rig's")
+      .required();
+  add_recording_options(command, options);
+}
+
+void add_recording_options(Command command, CalibrateOptions& options) {
+  command.add_option("--instrument", options.instrument, "Its name, where the rig has several");
+  command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
+  add_image_topic_option(command, options.image_topic);
+  command.add_option("--fps", options.fps, "Frames per second of a folder of pictures")
+      .shows_default()
+      .number_between(0.001, 1000.0);
+}
+
+std::size_t named_instrument(const Rig& rig, const std::string& name, const std::string& rig_file) {
+  if (name.empty()) {
+    if (rig.instruments.size() > 1) throw InputError(rig_file, "has several instruments: name one with --instrument");
+    return 0;
+  }
+  const auto index = instrument_index(rig, name);
+  if (!index) throw InputError("--instrument", "name", name, "an instrument of " + rig_file);
+  return *index;
+}
+
+void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig) {
+  InputFiles inputs;
+  inputs.add(options.input), inputs.add(options.joints);
+  std::error_code error;
+  for (const std::string& input : {options.input, options.joints})
+    if (fs::is_directory(input, error)) inputs.add_pictures_in(input);
+  for (const std::string& out : {options.out, options.report}) inputs.refuse_as_output(out);
+  inputs.add_rig(options.rig, rig);
+  inputs.refuse_as_output(options.report);
+}
+
+void say_complaint(const std::string& input, const std::string& complaint) {
+  if (!complaint.empty())
+    std::fprintf(stderr, "lapservo: %s: %s: what could be read is used\n", input.c_str(), complaint.c_str());
+}
+
+JobWatch watched_job() {
+  struct Stage {
+    std::optional<Progress> progress;
+    std::optional<int> total;
+    int done = 0;
+  };
+  const auto stage = std::make_shared<Stage>();
+  return {interrupted, [stage](std::optional<int> total, int done, const std::string& remark) {
+            // Another one has begun: its time counts anew.
+            if (!stage->progress || total != stage->total || done < stage->done) stage->progress.emplace(total);
+            stage->total = total, stage->done = done;
+            stage->progress->show(done, remark);
+          }};
+}
+
+int refuse_calibration(const CalibrateOptions& options, const std::string& why) {
+  std::fprintf(stderr, "lapservo: %s: %s; the rig is as it was\n", options.input.c_str(), why.c_str());
+  return 1;
+}
+
+}  // namespace lapservo::app

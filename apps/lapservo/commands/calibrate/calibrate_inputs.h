@@ -1,0 +1,43 @@
+#pragma once
+
+#include <string>
+
+#include "apps/lapservo/cli/subcommands.h"
+#include "lapservo/calibration/recording/frame_recording.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::app {
+
+/// What the subcommands that measure one instrument of a rig from frames are told.
+struct CalibrateOptions {
+  std::string input, rig, out, instrument, joints, report, image_topic, joint_topic;
+  double fps = 30;
+  bool deinterlace = false;
+};
+
+/// All but the input and the joints, which each subcommand describes itself.
+void add_calibrate_options(Command command, CalibrateOptions& options);
+
+/// Of these, those that say how the recording is read and which instrument is meant.
+void add_recording_options(Command command, CalibrateOptions& options);
+
+/// Place in the rig of the instrument of that name, or of the only one where none is given. Throws InputError where
+/// that is open or unknown.
+std::size_t named_instrument(const Rig& rig, const std::string& name, const std::string& rig_file);
+inline std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& options) {
+  return named_instrument(rig, options.instrument, options.rig);
+}
+
+/// Throws InputError when a result would go over an input, or check's page over the rig.
+void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
+
+/// What a source could not read, on stderr, when there is such.
+void say_complaint(const std::string& input, const std::string& complaint);
+
+/// Ends a job at Ctrl-C and tells how far it is (progress.h), until it is destroyed.
+internal::JobWatch watched_job();
+
+/// Says on stderr why nothing was written; returns the exit code.
+int refuse_calibration(const CalibrateOptions& options, const std::string& why);
+
+}  // namespace lapservo::app

@@ -1,0 +1,99 @@
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/joint_input.h"
+#include "lapservo/calibration/marker/marker_measurement.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/rig/rig_writer.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+// What the joints are compared with must be there before the work.
+std::optional<JointsOfTurn> joints_of_turn(const CalibrateOptions& options, const Instrument& instrument,
+                                           const FrameSource& frames) {
+  if (options.joints.empty()) return std::nullopt;
+  expect_registration(instrument, options.rig, "--joints");
+  return JointsOfTurn{read_joint_input(options, instrument, &frames).recording, options.joints};
+}
+
+void print_table(const std::vector<CalibratedNumber>& numbers) {
+  std::printf("\n                               before        after      sigma     change\n");
+  for (const CalibratedNumber& n : numbers)
+    std::printf("  %-22s   %10.4f   %10.4f   %8.4f   %+8.4f\n", n.name.c_str(), n.before, n.after, n.sigma,
+                n.after - n.before);
+}
+
+}  // namespace
+
+int calibrate_marker(const CalibrateOptions& options) {
+  Rig rig = load_rig(options.rig);
+  const std::size_t index = instrument_meant(rig, options);
+  const Instrument& instrument = rig.instruments[index];
+  refuse_outputs_over_inputs(options, rig);
+  const auto source = open_frames(options.input, options.fps, options.image_topic, &rig.camera, options.deinterlace);
+  const auto joints = joints_of_turn(options, instrument, *source);
+  AtomicFile out(options.out);
+  watch_for_interrupts();
+
+  const MarkerMeasurement measured =
+      measure_marker(rig, index, {*source, options.input, options.deinterlace}, joints, watched_job());
+  const MarkerCalibration& calibration = measured.calibration;
+  if (!measured.read.stopped) say_complaint(options.input, measured.read.complaint);
+  if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
+  std::printf("%s: found in %d of %d frames; %zu from all sides are used, %zu of them show the seam\n",
+              instrument.name.c_str(), measured.found, measured.read.looked_at, calibration.frames,
+              calibration.seam_views);
+  print_table(calibrated_numbers(instrument.marker, calibration.marker, joints.has_value()));
+  std::printf("\nboundaries miss the print by %.3f px rms before, %.3f px after\n", calibration.before_px,
+              calibration.after_px);
+  std::printf(
+      "diameter_m is the rig's (%.3f mm): pictures tell lengths in diameters; a smaller shaft nearer by looks "
+      "the same\n",
+      1e3 * instrument.marker.diameter_m);
+  if (calibration.seam_may_lag)
+    std::printf(
+        "the pictures look compressed, and the turn does not go both ways: if they come from a video, which leaves the "
+        "seam a little behind, psi is some mrad off; turn the instrument there and back\n");
+  if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
+  rig.instruments[index].marker = calibration.marker;
+  out.stream() << rig_yaml(rig, options.out);
+  out.commit();
+  std::printf("rig: %s\n", options.out.c_str());
+  return 0;
+}
+
+void add_calibrate_marker(Command parent, Run& run_later) {
+  auto options = std::make_shared<CalibrateOptions>();
+  Command command = parent.add_subcommand(
+      "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.");
+  command
+      .add_option("input", options->input,
+                  "Pictures of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
+      .required();
+  add_calibrate_options(command, *options);
+  add_joint_options(
+      command, *options,
+      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
+      "bag, the input itself for example: seam_rad too, which pictures alone can't tell");
+  command.footer(
+      "Turn the instrument about its axis once, or a little more, in 20 to 60 s, near and sharp, the whole marker in "
+      "view;\n"
+      "it may move otherwise too. For a compressed video turn it there and back. All numbers are written with one "
+      "standard deviation each (sigma_...).\n"
+      "Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml");
+  command.runs(run_later, [options] { return calibrate_marker(*options); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,160 @@
+#include <algorithm>
+#include <cstdio>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/progress.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/calibrate/calibrate_steps.h"
+#include "apps/lapservo/commands/check_report.h"
+#include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/joint_input.h"
+#include "lapservo/calibration/check/rig_check.h"
+#include "lapservo/calibration/colour/colour_calibration.h"
+#include "lapservo/experiments/sigma_map.h"
+#include "lapservo/io/frame_source.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+// Near and far of where the marker was, where it was measured.
+std::vector<double> depths_of(const std::vector<TimedPose>& poses) {
+  std::vector<double> depths_m;
+  for (const TimedPose& pose : poses) depths_m.push_back(pose.origin().z());
+  std::sort(depths_m.begin(), depths_m.end());
+  const std::size_t tenth = depths_m.size() / 10;
+  return {depths_m[tenth], depths_m[depths_m.size() - 1 - tenth]};
+}
+
+// The poses at which the rig's own tracker measured, with its sigmas.
+std::vector<MeasuredSigma> measured_sigmas(const RigEvidence& evidence, const Marker& marker) {
+  std::vector<MeasuredSigma> measured;
+  auto frame = evidence.frames().begin();
+  for (const TimedPose& pose : evidence.poses()) {
+    while (frame != evidence.frames().end() && frame->time_s < pose.time_s) ++frame;
+    if (frame == evidence.frames().end() || frame->status != Status::ok) continue;
+    // The marker's own frame is an unrolled one, too: x towards tau = 0, where psi + seam is 0.
+    measured.push_back({pose.marker.camera_from_marker, -marker.seam_rad, frame->sigma_roll_rad});
+  }
+  return measured;
+}
+
+void look_over_work_space(const Rig& rig, std::size_t index, const RigEvidence& evidence, CheckedRig& checked) {
+  const auto measured = measured_sigmas(evidence, rig.instruments[index].marker);
+  if (measured.empty()) return;
+  checked.maps = sigma_maps(rig, index, depths_of(evidence.poses()), measured);
+  WorkSpace work_space;
+  int good = 0;
+  for (const SigmaMap& map : checked.maps) {
+    const auto lost = static_cast<int>(std::count(map.lost.begin(), map.lost.end(), true));
+    work_space.places += lost, work_space.lost += lost;
+    for (const auto& sigma_rad : map.sigma_rad) {
+      if (!sigma_rad) continue;
+      ++work_space.places, good += *sigma_rad <= rig_limits.sigma_rad;
+      work_space.worst_rad = std::max(work_space.worst_rad, *sigma_rad);
+    }
+  }
+  if (work_space.places == 0) return;
+  work_space.good = static_cast<double>(good) / work_space.places;
+  checked.findings.work_space = work_space;
+}
+
+void print(const CheckedRig& checked) {
+  for (const CheckLine& line : check_lines(checked)) std::printf("  %-26s %s\n", line.name.c_str(), line.found.c_str());
+  std::printf("\n%s\n", verdict_of(checked).c_str());
+  int rank = 0;
+  for (const Advice& advice : checked.advice)
+    std::printf("  %d. %s%s\n     do: %s\n     gains: %s\n", ++rank, advice.needed ? "" : "(may be) ",
+                advice.what.c_str(), advice.command.c_str(), advice.gain.c_str());
+}
+
+}  // namespace
+
+int check(const CalibrateOptions& options) {
+  const Rig rig = load_rig(options.rig);
+  const std::size_t index = instrument_meant(rig, options);
+  Instrument instrument = rig.instruments[index];
+  refuse_outputs_over_inputs(options, rig);
+  const auto source = open_frames(options.input, options.fps, options.image_topic, &rig.camera, options.deinterlace);
+  const auto joints = find_joint_input(options, instrument, source.get());
+  if (joints) instrument.joints = joints->joints;
+  watch_for_interrupts();
+
+  constexpr int enough = 1800;
+  RigEvidence evidence(rig, index);
+  cv::Mat seen, missed;  // the last frames with and without the marker
+  int count = 0;         // of those with it
+  const FramesRead read = read_frames({*source, options.input, options.deinterlace}, rig, every_of(*source, enough),
+                                      watched_job(), [&](const cv::Mat& bgr, double time_s) {
+                                        const bool found = evidence.add(bgr, time_s);
+                                        (found ? seen : missed) = bgr, count += found;
+                                        return fmt::format(", {} in {}", instrument.name, count);
+                                      });
+  if (read.stopped) {
+    std::fprintf(stderr, "lapservo: %s: stopped\n", options.input.c_str());
+    return 1;
+  }
+  say_complaint(options.input, read.complaint);
+  CheckedRig checked;
+  {
+    Progress progress(std::nullopt);
+    progress.show(1, " of 3: the arm");
+    checked.findings = findings_of(rig, index, evidence);
+    checked.frames = evidence.frames();
+    // Takes as long as the rest, which needs nothing of it.
+    std::future<PrintCheck> print;
+    if (checked.findings.light)
+      print = std::async(std::launch::async, [&, frames = evidence.take_key_frames()]() mutable {
+        return check_print(rig, index, std::move(frames));
+      });
+    if (joints && !evidence.poses().empty())
+      checked.findings.arm = check_arm(instrument, rig.camera, evidence.poses(), evidence.tracked_psi(),
+                                       joints->recording, joints->source);
+    else
+      checked.findings.rcm = check_rcm(instrument, evidence.poses());
+    progress.show(2, " of 3: the work space");
+    look_over_work_space(rig, index, evidence, checked);
+    progress.show(3, " of 3: the print");
+    if (print.valid()) checked.findings.print = print.get();
+  }
+  checked.advice = advice_on(checked.findings);
+  std::printf("%s\n", instrument.name.c_str());
+  print(checked);
+  if (!options.report.empty()) {
+    if (!seen.empty()) checked.found_segmented = segmentation_picture(seen, rig);
+    if (!missed.empty()) checked.missed_segmented = segmentation_picture(missed, rig);
+    write_check_report(options.report, instrument.name, checked);
+    std::printf("report: %s\n", options.report.c_str());
+  }
+  return checked.good_enough() ? 0 : 1;
+}
+
+void add_check(Command app, Run& run_later) {
+  auto options = std::make_shared<CalibrateOptions>();
+  Command command = app.add_subcommand("check", "Tell whether a rig is good enough, and what to improve first.");
+  command.add_option("input", options->input, "A short recording of the marker in motion: a folder, a video or a bag")
+      .required();
+  command.add_option("--rig", options->rig, "The rig that is judged").required();
+  add_joint_options(
+      command, *options,
+      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
+      "bag; without it those in the input, where it is a bag: registration, delay, focal length and "
+      "drift too");
+  add_recording_options(command, *options);
+  command.add_option("--out", options->report, "HTML page with figures");
+  command.footer(
+      "Swing, insert and withdraw the instrument, and turn it about its axis once, in 10 to 60 s, the marker in view.\n"
+      "Exit code 0: good enough, 1: not good enough.\n"
+      "Example:\n  lapservo check swing.mp4 --joints joints.csv --rig rig.yaml --out check.html");
+  command.runs(run_later, [options] { return check(*options); });
+}
+
+}  // namespace lapservo::app

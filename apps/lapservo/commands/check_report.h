@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/calibration/check/rig_check.h"
+#include "lapservo/experiments/sigma_map.h"
+
+namespace lapservo::app {
+
+/// All that `check` found out.
+struct CheckedRig {
+  internal::RigFindings findings;
+  std::vector<internal::FrameEvidence> frames;
+  std::vector<internal::SigmaMap> maps;
+  std::vector<internal::Advice> advice;
+  /// A frame of each kind with the pixels that have a band's hue painted (segmentation_picture); empty without such a
+  /// frame.
+  cv::Mat found_segmented, missed_segmented;
+
+  bool good_enough() const;
+};
+
+/// One line a topic: its name and what was found.
+struct CheckLine {
+  std::string name, found;
+};
+std::vector<CheckLine> check_lines(const CheckedRig& checked);
+
+/// "good enough", or "not good enough: " and what to do first.
+std::string verdict_of(const CheckedRig& checked);
+
+/// One HTML page. Throws InputError when it can't be written.
+void write_check_report(const std::filesystem::path& path, const std::string& instrument, const CheckedRig& checked);
+
+}  // namespace lapservo::app

@@ -1,0 +1,275 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/progress.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/inputs/input_files.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "lapservo/kinematics/centre_line.h"
+#include "lapservo/rcm/distinct_lines.h"
+#include "lapservo/rcm/pairwise_mean.h"
+#include "lapservo/rcm/projected_rcm.h"
+#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+namespace fs = std::filesystem;
+
+struct EstimateRcmOptions {
+  std::string observations, rig, out;
+  double sigma_px = 0;  // 0: to be estimated
+  double common_px = 0.01;
+};
+
+// One estimate as it is printed and written. `point_px` is empty when there is none, for the reason in `status`.
+struct Result {
+  std::string instrument, method, status;
+  std::size_t lines = 0, outliers = 0;
+  std::optional<Eigen::Vector2d> point_px;
+  std::optional<Eigen::Matrix2d> covariance_px2;
+  std::optional<double> noise_px, chi2, spread_rad;
+  bool near_parallel = false;
+  std::optional<Eigen::Vector2d> rig_px;  // where the rig's camera_from_rcm has it
+};
+
+using LinesByInstrument = std::map<std::string, std::vector<LineObservation>>;
+
+const Instrument* find_instrument(const std::optional<Rig>& rig, const std::string& name) {
+  if (!rig) return nullptr;
+  const auto index = instrument_index(*rig, name);
+  return index ? &rig->instruments[*index] : nullptr;
+}
+
+Eigen::Vector2d read_ideal_point(const CsvTable& table, std::size_t row, const char* edge,
+                                 const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
+  const double u_px = table.number(row, fmt::format("{}_u_px", edge));
+  const double v_px = table.number(row, fmt::format("{}_v_px", edge));
+  Eigen::Vector2d raw(u_px, v_px);
+  if (!rig) return raw;
+  const auto ideal = rig->camera.ideal_from_raw(raw);
+  if (!ideal)
+    throw InputError(options.observations, fmt::format("row {}: {}", row + 1, edge),
+                     fmt::format("({:.1f}, {:.1f})", raw.x(), raw.y()),
+                     "a pixel at which the camera of " + options.rig + " can be undistorted");
+  return *ideal;
+}
+
+// Every instrument of the file has an entry, if only an empty one.
+LinesByInstrument read_lines(const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
+  const CsvTable table = CsvTable::read(options.observations);
+  const double sigma_px = options.sigma_px > 0 ? options.sigma_px : 1;
+  LinesByInstrument lines;
+  Progress progress(static_cast<int>(table.rows()));
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    progress.show(static_cast<int>(row) + 1, "");
+    const std::string& name = table.text(row, "instrument");
+    if (rig && !find_instrument(rig, name))
+      throw InputError(options.observations, "instrument", name, "an instrument of " + options.rig);
+    auto& own = lines[name];
+    if (table.text(row, "status") != "ok") continue;
+    const Eigen::Vector2d e0 = read_ideal_point(table, row, "e0", options, rig);
+    const Eigen::Vector2d e3 = read_ideal_point(table, row, "e3", options, rig);
+    own.push_back(line_between(e0, e3, sigma_px));
+  }
+  return lines;
+}
+
+Result weighted_result(const std::vector<LineObservation>& lines, const EstimateRcmOptions& options) {
+  const bool known = options.sigma_px > 0;
+  const RcmEstimate estimate =
+      estimate_projected_rcm(lines, {known ? NoiseScale::known : NoiseScale::estimated, options.common_px});
+  Result result;
+  result.method = "weighted";
+  result.status = to_string(estimate.status);
+  result.lines = estimate.lines, result.outliers = estimate.outliers;
+  if (estimate.status != RcmStatus::ok) return result;
+  result.point_px = estimate.point_px;
+  result.covariance_px2 = estimate.covariance_px2;
+  result.chi2 = known ? std::optional(estimate.chi2) : std::nullopt;
+  if (estimate.degrees_of_freedom > 0)
+    result.noise_px = (known ? options.sigma_px : 1) * std::sqrt(estimate.chi2 / estimate.degrees_of_freedom);
+  result.spread_rad = estimate.direction_spread_rad;
+  result.near_parallel = estimate.near_parallel;
+  return result;
+}
+
+// Of parallel lines the pairs meet anywhere.
+Result pairwise_result(const std::vector<LineObservation>& lines, const Result& weighted) {
+  Result result;
+  result.method = "pairwise";
+  result.lines = static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), is_usable));
+  const bool parallel = weighted.status == to_string(RcmStatus::parallel);
+  const auto mean = parallel ? std::nullopt : mean_of_intersections(lines);
+  result.status = to_string(mean ? RcmStatus::ok : result.lines < 2 ? RcmStatus::too_few_lines : RcmStatus::parallel);
+  if (!mean) return result;
+  result.point_px = mean->point_px;
+  result.covariance_px2 = mean->covariance_px2;
+  return result;
+}
+
+std::vector<Result> estimate_all(const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
+  std::vector<Result> results;
+  for (const auto& [name, rows] : read_lines(options, rig)) {
+    const Instrument* instrument = find_instrument(rig, name);
+    const std::vector<LineObservation> lines = distinct_lines(rows);
+    if (lines.size() < rows.size())
+      std::fprintf(stderr, "lapservo: note: %s: %zu rows of %zu positions that differ: a position counts once\n",
+                   name.c_str(), rows.size(), lines.size());
+    const Result weighted = weighted_result(lines, options);
+    for (Result result : std::array{weighted, pairwise_result(lines, weighted)}) {
+      result.instrument = name;
+      if (instrument && instrument->camera_from_rcm)
+        result.rig_px = projected_rcm_px(rig->camera, *instrument->camera_from_rcm);
+      results.push_back(std::move(result));
+    }
+  }
+  return results;
+}
+
+std::string number_or_empty(std::optional<double> value) {
+  return value ? fmt::format("{:.6g}", *value) : "";
+}
+
+void write_report(AtomicFile& file, const std::vector<Result>& results) {
+  file.stream()
+      << "instrument,method,status,lines,outliers,rcm_u_px,rcm_v_px,sigma_u_px,sigma_v_px,correlation,noise_px,"
+         "chi2,direction_spread_rad,near_parallel,rig_u_px,rig_v_px,distance_px\n";
+  for (const Result& r : results) {
+    const auto of = [](const auto& optional, auto get) {
+      return optional ? std::optional<double>(get(*optional)) : std::nullopt;
+    };
+    const auto sigma = [&](Eigen::Index i) {
+      return of(r.covariance_px2, [&](const Eigen::Matrix2d& c) { return std::sqrt(c(i, i)); });
+    };
+    const auto u = [](const Eigen::Vector2d& p) { return p.x(); };
+    const auto v = [](const Eigen::Vector2d& p) { return p.y(); };
+    std::string row = fmt::format("{},{},{},{},{}", csv_field(r.instrument), r.method, r.status, r.lines, r.outliers);
+    const auto correlation = [](const Eigen::Matrix2d& c) {
+      const double scale = std::sqrt(c(0, 0) * c(1, 1));
+      return scale > 0 ? c(0, 1) / scale : 0;
+    };
+    const auto distance = r.point_px && r.rig_px ? std::optional((*r.point_px - *r.rig_px).norm()) : std::nullopt;
+    for (const auto& value : {of(r.point_px, u), of(r.point_px, v), sigma(0), sigma(1),
+                              of(r.covariance_px2, correlation), r.noise_px, r.chi2, r.spread_rad})
+      row += "," + number_or_empty(value);
+    row += r.near_parallel ? ",1" : ",0";
+    for (const auto& value : {of(r.rig_px, u), of(r.rig_px, v), distance}) row += "," + number_or_empty(value);
+    file.stream() << row << '\n';
+  }
+  file.commit();
+}
+
+void print(const Result& r) {
+  const std::string head = fmt::format("{} {:<9}", r.instrument, r.method + ":");
+  if (!r.point_px) {
+    const char* why = r.status == "parallel" ? ": turn the instrument farther between frames" : "";
+    std::printf("%s none (%s, %zu lines%s)\n", head.c_str(), r.status.c_str(), r.lines, why);
+    return;
+  }
+  std::string line = fmt::format("({:.2f}, {:.2f}) px", r.point_px->x(), r.point_px->y());
+  line += r.covariance_px2 ? fmt::format(", sigma ({:.2f}, {:.2f}) px", std::sqrt((*r.covariance_px2)(0, 0)),
+                                         std::sqrt((*r.covariance_px2)(1, 1)))
+                           : std::string(", sigma unknown");
+  line += fmt::format(", {} lines", r.lines);
+  if (r.method == "weighted") line += fmt::format(", {} of them outliers", r.outliers);
+  if (r.noise_px) line += fmt::format(", noise {:.3f} px", *r.noise_px);
+  if (r.chi2) line += fmt::format(", chi2 {:.1f} of {}", *r.chi2, r.lines - r.outliers - 2);
+  if (r.rig_px) line += fmt::format("; {:.2f} px from the rig's", (*r.point_px - *r.rig_px).norm());
+  std::printf("%s %s\n", head.c_str(), line.c_str());
+}
+
+// What the numbers alone don't tell.
+void warn(const Result& r) {
+  constexpr double suspiciously_small_px = 0.005;
+  if (r.near_parallel)
+    std::fprintf(stderr,
+                 "lapservo: warning: %s: the lines are nearly parallel (their directions spread by %.1f degrees): the "
+                 "estimate is poor along them; turn the instrument farther\n",
+                 r.instrument.c_str(), r.spread_rad.value_or(0) * 180 / pi);
+  if (3 * r.outliers > r.lines)
+    std::fprintf(stderr,
+                 "lapservo: warning: %s: %zu of %zu lines don't fit: --sigma-px is too small, or something else moved "
+                 "(the port, the camera)\n",
+                 r.instrument.c_str(), r.outliers, r.lines);
+  if (r.noise_px && *r.noise_px < suspiciously_small_px)
+    std::fprintf(
+        stderr,
+        "lapservo: warning: %s: the lines meet almost exactly: if they were tracked with camera_from_rcm in the "
+        "rig, this is only that; track with a rig that has none\n",
+        r.instrument.c_str());
+}
+
+int run(const EstimateRcmOptions& options) {
+  std::optional<Rig> rig;
+  if (!options.rig.empty()) rig = load_rig(options.rig);
+  InputFiles inputs;
+  inputs.add(options.observations);
+  if (rig) inputs.add_rig(options.rig, *rig);
+  inputs.refuse_as_output(options.out);
+  std::optional<AtomicFile> report;
+  if (!options.out.empty()) report.emplace(options.out);
+  const std::vector<Result> results = estimate_all(options, rig);
+  if (report) write_report(*report, results);
+  for (const Result& result : results) {
+    print(result);
+    warn(result);
+  }
+  if (!rig) std::fprintf(stderr, "lapservo: note: without --rig the lens is taken to have no distortion\n");
+  if (!options.out.empty()) std::printf("report: %s\n", options.out.c_str());
+  if (std::any_of(results.begin(), results.end(), [](const Result& r) { return r.point_px.has_value(); })) return 0;
+  std::fprintf(stderr, "lapservo: no RCM was estimated: it takes two observations or more, in different directions\n");
+  return 1;
+}
+
+}  // namespace
+
+void add_estimate_rcm(Command app, Run& run_later) {
+  auto options = std::make_shared<EstimateRcmOptions>();
+  Command command = app.add_subcommand(
+      "estimate-rcm", "Estimate where the RCM appears in the image, from the lines on which the instrument was seen.");
+  command
+      .add_option("observations", options->observations,
+                  "CSV of `lapservo track`, with a rig that has no camera_from_rcm (else it only repeats that one)")
+      .required();
+  command.add_option("--rig", options->rig,
+                     "To undistort the lines, and to compare with its camera_from_rcm where it has one");
+  command.add_option("--out", options->out,
+                     "CSV to write or replace: a row per instrument and method, in ideal pixels");
+  command
+      .add_option("--sigma-px", options->sigma_px,
+                  "Standard deviation of e0 and e3 in either coordinate; else estimated from how badly the lines meet")
+      .number_between(1e-6, 1000.0);
+  command
+      .add_option("--common-px", options->common_px,
+                  "Standard deviation of an error across the lines that all of them share and no number of lines "
+                  "averages out; the default is that of `lapservo track` behind a well calibrated lens")
+      .shows_default()
+      .number_between(0.0, 1000.0);
+  command.footer(
+      "Prints two estimates: weighted, by total least squares without outliers, and pairwise, the paper's mean of all\n"
+      "intersections, with one standard deviation each. Lines should come from positions of the instrument that "
+      "differ:\n"
+      "many frames of one position count as one line.\n"
+      "Example:\n  lapservo track frames --rig camera_and_marker.yaml --single --out obs.csv\n"
+      "  lapservo estimate-rcm obs.csv --rig camera_and_marker.yaml --out rcm.csv");
+  command.runs(run_later, [options] { return run(*options); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,269 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/inputs/input_files.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "lapservo/marker/decoder.h"
+#include "lapservo/marker/design.h"
+#include "lapservo/marker/drawing.h"
+#include "lapservo/rig/instrument_index.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/rig/rig_writer.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+struct ViewingOptions {
+  double focal_px = 1100, distance_mm = 110, sigma_px = 0.1;
+  Viewing viewing() const { return {focal_px, 1e-3 * distance_mm, sigma_px}; }
+};
+
+void add_viewing(Command command, ViewingOptions& options) {
+  command.add_option("--focal-px", options.focal_px, "Focal length of the camera")
+      .shows_default()
+      .number_between(10.0, 1e5);
+  command.add_option("--distance-mm", options.distance_mm, "From the camera to the marker")
+      .shows_default()
+      .number_between(5.0, 2000.0);
+  command.add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line")
+      .shows_default()
+      .number_between(1e-4, 100.0);
+}
+
+struct DesignOptions {
+  double diameter_mm = 8.4;
+  std::optional<double> length_mm, min_band_mm, print_error_mm;
+  std::vector<double> hues_deg{90, 180, 270}, upper_mm, lower_mm;
+  std::string out;
+  ViewingOptions viewing;
+};
+
+Marker given_marker(const DesignOptions& options) {
+  if (options.upper_mm.size() != 3 || options.lower_mm.size() != 3)
+    throw InputError("--bands-upper-mm, --bands-lower-mm", "need three lengths each, like 3.5,3.5,17");
+  Marker marker;
+  marker.diameter_m = 1e-3 * options.diameter_mm;
+  for (std::size_t i = 0; i < 3; ++i) {
+    marker.hues_deg[i] = options.hues_deg[i];
+    marker.bands_upper_m[i] = 1e-3 * options.upper_mm[i];
+    marker.bands_lower_m[i] = 1e-3 * options.lower_mm[i];
+  }
+  if (const auto problem = marker_problem(marker)) throw InputError("marker", *problem);
+  if (const std::string problem = decoding_problem(marker); !problem.empty())
+    throw InputError("marker", "not decodable: " + problem);
+  return marker;
+}
+
+// To eight digits, as it is written down.
+std::string yaml_of(Marker marker) {
+  const auto round = [](double& value) { value = parse_finite(fmt::format("{:.8g}", value)).value(); };
+  for (auto* bands : {&marker.bands_upper_m, &marker.bands_lower_m})
+    for (double& length_m : *bands) round(length_m);
+  round(marker.diameter_m), round(marker.seam_rad);
+  return "marker:\n" + marker_yaml(marker, 2);
+}
+
+constexpr double usual_print_error_m = 0.1e-3;
+
+void print_sigmas(const Marker& marker, const Viewing& viewing, double print_error_m) {
+  std::printf("\n  tau [deg]   cross-ratio   sigma [mrad]: centre line   whole surface   print off by %.2f mm\n",
+              1e3 * print_error_m);
+  for (int i = 0; i <= 8; ++i) {
+    const double tau_rad = two_pi * std::min(i / 8.0, 0.99999);
+    std::printf("  %9.0f   %11.4f   %25.1f   %13.2f   %20.0f\n", deg_from_rad(two_pi * i / 8),
+                cross_ratio_at(marker, tau_rad), 1e3 * predicted_sigma_centre_line_rad(marker, tau_rad, viewing),
+                1e3 * predicted_sigma_surface_rad(marker, tau_rad, viewing),
+                1e3 * predicted_print_error_rad(marker, tau_rad, print_error_m));
+  }
+  std::printf(
+      "\nThe print's error (one standard deviation of each boundary) does not average out: `lapservo calibrate "
+      "marker`\n"
+      "measures the print as it is.\n");
+}
+
+int run_design(const DesignOptions& options) {
+  if (options.hues_deg.size() != 3) throw InputError("--hues", "needs three hues, like 90,180,270");
+  const Viewing viewing = options.viewing.viewing();
+  std::optional<AtomicFile> file;
+  if (!options.out.empty()) file.emplace(options.out);
+  const bool given = !options.upper_mm.empty() || !options.lower_mm.empty();
+  Marker marker;
+  if (given) {
+    marker = given_marker(options);
+  } else {
+    DesignSpec spec{
+        1e-3 * options.diameter_mm, {}, {}, {options.hues_deg[0], options.hues_deg[1], options.hues_deg[2]}, viewing};
+    spec.print_error_m = 1e-3 * options.print_error_mm.value_or(0);
+    if (options.length_mm) spec.length_m = 1e-3 * *options.length_mm;
+    if (options.min_band_mm) spec.min_band_m = 1e-3 * *options.min_band_mm;
+    marker = design_marker(spec);
+  }
+  std::printf(
+      "diameter %.2f mm, length %.2f mm, seen from %.0f mm with a focal length of %.0f px, %.2f px a boundary\n\n",
+      1e3 * marker.diameter_m, 1e3 * marker.length_m(), 1e3 * viewing.distance_m, viewing.focal_px,
+      viewing.sigma_edge_px);
+  std::printf("  band   hue [deg]   upper edge [mm]   lower edge [mm]\n");
+  for (std::size_t i = 0; i < 3; ++i)
+    std::printf("  %4zu   %9.0f   %15.2f   %15.2f\n", i, marker.hues_deg[i], 1e3 * marker.bands_upper_m[i],
+                1e3 * marker.bands_lower_m[i]);
+  print_sigmas(marker, viewing, options.print_error_mm ? 1e-3 * *options.print_error_mm : usual_print_error_m);
+  std::printf("\nThe cross-ratio is monotonic over the turn%s.\n", in_linear_family(marker)
+                                                                       ? ", and linear: eq. (18) is exact"
+                                                                       : " (not linear: decoded by the rational "
+                                                                         "inverse)");
+  std::puts("");
+  std::fputs(yaml_of(marker).c_str(), stdout);
+  if (file) {
+    file->stream() << yaml_of(marker);
+    file->commit();
+    std::printf("\nwritten: %s\n", options.out.c_str());
+  }
+  return 0;
+}
+
+struct RigOptions {
+  std::string rig, instrument, out, paper = "a4";
+  int copies = 4;
+  ViewingOptions viewing;
+};
+
+Instrument chosen(const RigOptions& options) {
+  const Rig rig = load_rig(options.rig);
+  InputFiles inputs;
+  inputs.add_rig(options.rig, rig);
+  inputs.refuse_as_output(options.out);
+  if (options.instrument.empty()) return rig.instruments.front();
+  if (const auto index = instrument_index(rig, options.instrument)) return rig.instruments[*index];
+  throw InputError("--instrument", "name", options.instrument, "an instrument of " + options.rig);
+}
+
+int run_print(const RigOptions& options) {
+  const Instrument instrument = chosen(options);
+  if (!options.out.ends_with(".svg") && !options.out.ends_with(".pdf"))
+    throw InputError("--out", "name", options.out, "one that ends in .pdf or .svg");
+  write_print_sheet(options.out, instrument.name, instrument.marker, options.paper == "a4" ? Paper::a4 : Paper::letter,
+                    options.copies);
+  std::printf("print at 100 %% and measure the rulers: %s\n", options.out.c_str());
+  return 0;
+}
+
+// Rows of tau, columns along the shaft; colours on a terminal, else the band's number.
+void show_in_terminal(const Marker& marker) {
+  constexpr int rows = 16, columns = 48;
+  const bool colors = ::isatty(STDOUT_FILENO) != 0;
+  for (int row = 0; row < rows; ++row) {
+    const double tau_rad = two_pi * (row + 0.5) / rows;
+    const auto e = boundaries_m(marker, tau_rad);
+    std::string line = fmt::format("{:5.0f} deg  ", deg_from_rad(tau_rad));
+    for (int column = 0; column < columns; ++column) {
+      const double along_m = marker.length_m() * (column + 0.5) / columns;
+      const std::size_t band = along_m < e[1] ? 0 : (along_m < e[2] ? 1 : 2);
+      const PrintColor c = print_color(marker.hues_deg[band]);
+      line += colors ? fmt::format("\033[48;2;{:.0f};{:.0f};{:.0f}m \033[0m", 255 * c.r, 255 * c.g, 255 * c.b)
+                     : std::to_string(band);
+    }
+    std::puts(line.c_str());
+  }
+  std::printf("  tau      proximal %s tip\n", std::string(columns - 14, '-').append(">").c_str());
+}
+
+int run_show(const RigOptions& options) {
+  const Instrument instrument = chosen(options);
+  std::printf("%s: %.2f mm outer diameter, %.2f mm long\n", instrument.name.c_str(), 1e3 * instrument.marker.diameter_m,
+              1e3 * instrument.marker.length_m());
+  show_in_terminal(instrument.marker);
+  double worst_rad = 0;
+  for (int i = 0; i < 16; ++i)
+    worst_rad =
+        std::max(worst_rad, predicted_print_error_rad(instrument.marker, two_pi * (i + 0.5) / 16, usual_print_error_m));
+  std::printf(
+      "worst sigma of tau on the centre line: %.1f mrad by noise (%.2f px a boundary), %.0f mrad by a print that "
+      "is off by %.1f mm\n",
+      1e3 * worst_sigma_centre_line_rad(instrument.marker, options.viewing.viewing()), options.viewing.sigma_px,
+      1e3 * worst_rad, 1e3 * usual_print_error_m);
+  if (options.out.empty()) return 0;
+  write_marker_picture(options.out, instrument.name, instrument.marker, options.viewing.viewing());
+  std::printf("picture: %s\n", options.out.c_str());
+  return 0;
+}
+
+void add_design(Command parent, Run& run_later) {
+  auto options = std::make_shared<DesignOptions>();
+  Command command = parent.add_subcommand("design", "Choose the bands of a marker, or evaluate given ones.");
+  command.add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included")
+      .shows_default()
+      .number_between(0.5, 100.0);
+  command.add_option("--length-mm", options->length_mm, "Length of the marker; default three diameters")
+      .number_between(1.0, 500.0);
+  command.add_option("--smallest-band-mm", options->min_band_mm, "No band is shorter; default 3 mm or 12 px")
+      .number_between(0.1, 200.0);
+  command
+      .add_option(
+          "--print-error-mm", options->print_error_mm,
+          "Standard deviation of where each boundary is printed and cut: minimise what it does to the rotation, "
+          "together with the noise; else noise alone, and what 0.1 mm does is said")
+      .number_between(0.001, 10.0);
+  command.add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
+      .finite_number()
+      .delimiter(',')
+      .shows_default();
+  command.add_option("--bands-upper-mm", options->upper_mm, "Evaluate this design: lengths at the upper edge")
+      .finite_number()
+      .delimiter(',');
+  command.add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge").finite_number().delimiter(',');
+  command.add_option("--out", options->out, "Write the marker: block of a rig; a file of that name is replaced");
+  add_viewing(command, options->viewing);
+  command.footer(
+      "Example:\n  lapservo marker design --diameter-mm 8.4 --distance-mm 110 --out marker.yaml\n"
+      "  lapservo marker design --bands-upper-mm 3.5,3.5,17 --bands-lower-mm 9.5,9.5,5");
+  command.runs(run_later, [options] { return run_design(*options); });
+}
+
+Command add_for_rig(Command parent, const std::string& name, const std::string& about,
+                    const std::shared_ptr<RigOptions>& options) {
+  Command command = parent.add_subcommand(name, about);
+  command.add_option("--rig", options->rig, "The rig whose marker it is").required();
+  command.add_option("--instrument", options->instrument, "Its name; default the first");
+  return command;
+}
+
+}  // namespace
+
+void add_marker(Command app, Run& run_later) {
+  Command marker = app.add_subcommand("marker", "Design, print and look at markers.");
+  marker.require_subcommand();
+  marker.footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
+  add_design(marker, run_later);
+
+  auto printing = std::make_shared<RigOptions>();
+  Command print = add_for_rig(marker, "print", "Write a sheet to print at true scale.", printing);
+  print.add_option("--out", printing->out, "sheet.pdf or sheet.svg; a file of that name is replaced").required();
+  print.add_option("--paper", printing->paper, "a4 or letter").shows_default().one_of({"a4", "letter"});
+  print.add_option("--copies", printing->copies, "Markers on the sheet, as many as fit")
+      .shows_default()
+      .whole_number_between(1, 100);
+  print.footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
+  print.runs(run_later, [printing] { return run_print(*printing); });
+
+  auto showing = std::make_shared<RigOptions>();
+  Command show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
+  show.add_option("--out", showing->out, "Write a picture too: .svg, .pdf or .png; a file of that name is replaced");
+  add_viewing(show, showing->viewing);
+  show.footer("Example:\n  lapservo marker show --rig configs/example.yaml --out marker.svg");
+  show.runs(run_later, [showing] { return run_show(*showing); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,301 @@
+#include "apps/lapservo/commands/record.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <poll.h>
+#include <string>
+#include <thread>
+#include <unistd.h>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/progress.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
+#include "apps/lapservo/inputs/live_images.h"
+#include "apps/lapservo/inputs/transports.h"
+#include "lapservo/control/calibration_motion.h"
+#include "lapservo/control/motion_follower.h"
+#include "lapservo/control/motion_limits.h"
+#include "lapservo/core/error.h"
+#include "lapservo/core/wall_clock.h"
+#include "lapservo/crtk/arm_limits.h"
+#include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/robot/steady_clock.h"
+#include "recordings/bag_recorder.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+constexpr double patience_s = 15;    // for the first image, the arm's first joint states
+constexpr double max_silence_s = 1;  // of the camera while the arm moves
+
+// Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
+double stamp_since_1970_s(double stamp_s, const Clock& clock) {
+  return since_1970_s() - (std::isfinite(stamp_s) ? clock.now_s() - stamp_s : 0);
+}
+
+// What comes, into the bag.
+class Recording {
+ public:
+  Recording(const RecordOptions& options, const std::optional<Rig>& rig, Transports& transports, const Clock& clock)
+      : fps_(options.fps), recorder_(options.out) {
+    if (!options.robot.empty()) subscribe_joints(transports, address_of(options.robot, "--robot"));
+    const cv::Size size = rig ? cv::Size(rig->camera.width_px, rig->camera.height_px) : cv::Size();
+    input_ = open_images(options.camera, "--camera", size, transports,
+                         names_topic(options.camera) ? sink_of_topic(address_of(options.camera, "--camera").name)
+                                                     : sink_of_camera(clock));
+  }
+
+  RecordedCounts counts() const { return recorder_.counts(); }
+  void check() const { recorder_.check(); }
+  void finish() {
+    input_ = {}, joints_.reset();
+    recorder_.finish();
+  }
+  std::optional<std::string> ended() const { return input_.ended(); }
+
+ private:
+  template <typename Image>
+  void add(const std::string& topic, Image&& message) {
+    // Of a stream that is a little faster all are kept.
+    if (message.stamp_s < next_image_s_ && message.stamp_s > next_image_s_ - 2 / fps_) return;
+    next_image_s_ = message.stamp_s + 0.75 / fps_;
+    recorder_.add(topic, std::forward<Image>(message));
+  }
+  void subscribe_joints(Transports& transports, const Address& arm) {
+    const std::string topic = topic_of(arm.name, "measured_js");
+    joints_ = transports.get(arm.transport, "--robot").subscribe_joints(topic, [this, topic](JointMessage&& message) {
+      recorder_.add(topic, std::move(message));
+    });
+  }
+  ImageSink sink_of_topic(const std::string& topic) {
+    return {[this, topic](ImageMessage&& message) { add(topic, std::move(message)); },
+            [this, topic](CompressedImageMessage&& message) { add(topic, std::move(message)); }};
+  }
+  ImageSink sink_of_camera(const Clock& clock) {
+    return {[this, &clock](ImageMessage&& message) {
+              message.stamp_s = stamp_since_1970_s(message.stamp_s, clock);
+              add("/camera/image_raw", std::move(message));
+            },
+            {}};
+  }
+
+  double fps_, next_image_s_ = 0;
+  BagRecorder recorder_;
+  Transport::Subscription joints_;  // these last: they use the recorder
+  ImageInput input_;
+};
+
+// The arm on its way along a motion.
+class MovingArm {
+ public:
+  MovingArm(const RecordOptions& options, const Instrument& instrument, Transports& transports, const Clock& clock)
+      : options_(options), clock_(clock), config_(config_of(options, instrument)) {
+    const Address arm = address_of(options.robot, "--robot");
+    robot_ = std::make_unique<CrtkRobot>(transports.get(arm.transport, "--robot"), arm.name, config_, clock);
+  }
+  // However it ends: without new velocities the path brakes by itself.
+  ~MovingArm() {
+    std::this_thread::sleep_for(
+        std::chrono::duration<double>(stopping_time_s(config_.limits) + MotionFollower::period_s));
+  }
+  MovingArm(const MovingArm&) = delete;
+  MovingArm& operator=(const MovingArm&) = delete;
+
+  // Nothing while it is on its way or about to begin, then why it has ended: empty when the motion is done.
+  std::optional<std::string> advance() {
+    const double now_s = clock_.now_s();
+    const JointState measured = robot_->state();
+    const Blocked blocked = robot_->blocked();
+    if (blocked == Blocked::foreign_command) return std::string("somebody else sends set-points to the arm");
+    if (!follower_) return begin(now_s, measured, blocked);
+    const MotionFollower::Step step = follower_->step(now_s, measured);
+    if (step.path) robot_->send(*step.path);
+    if (blocked != Blocked::none) last_blocked_ = blocked;
+    return end_of(step.progress);
+  }
+
+ private:
+  static InterlockConfig config_of(const RecordOptions& options, const Instrument& instrument) {
+    if (!instrument.joints)
+      throw InputError(options.rig,
+                       "joints of " + instrument.name + " is missing, expected the arm's joints: names, sign, offset");
+    InterlockConfig config;
+    config.joints = *instrument.joints;
+    config.motion_enabled = options.enable_motion;
+    if (!options.joint_limits.empty())
+      config.limits = limits_of_q(config.joints, load_arm_limits(options.joint_limits));
+    // Refused now where there is no room for it, wherever the arm is.
+    if (options.move == "turn") turn_motion(Eigen::Vector4d::Zero(), config.limits, limits_source(options));
+    return config;
+  }
+  static std::string limits_source(const RecordOptions& options) {
+    return options.joint_limits.empty() ? "--joint-limits" : options.joint_limits;
+  }
+  std::optional<std::string> begin(double now_s, const JointState& measured, Blocked blocked) {
+    if (!asked_s_) asked_s_ = now_s;
+    if (blocked != Blocked::none || measured.operating_state != OperatingState::enabled) {
+      if (now_s < *asked_s_ + patience_s) return std::nullopt;
+      return std::string(to_string(blocked)) + ": the arm can't be moved";
+    }
+    const Eigen::Vector4d start = measured.q.vector();
+    follower_.emplace(options_.move == "turn"
+                          ? turn_motion(start, config_.limits, limits_source(options_))
+                          : swing_motion(start, config_.limits, options_.scale, options_.duration_s),
+                      config_.limits, config_.max_distance, now_s);
+    return std::nullopt;
+  }
+  std::optional<std::string> end_of(MotionFollower::Progress progress) const {
+    switch (progress) {
+      case MotionFollower::Progress::moving:
+      case MotionFollower::Progress::waiting:
+        return std::nullopt;
+      case MotionFollower::Progress::done:
+        return "";
+      case MotionFollower::Progress::blocked:
+        return std::string(to_string(last_blocked_)) + " (the arm is " + robot_->operating_state() + ")";
+      case MotionFollower::Progress::moved_meanwhile:
+        return "the arm was moved while it was not enabled";
+      case MotionFollower::Progress::does_not_follow:
+        break;
+    }
+    return "the arm does not follow";
+  }
+
+  const RecordOptions& options_;
+  const Clock& clock_;
+  InterlockConfig config_;
+  std::unique_ptr<CrtkRobot> robot_;
+  std::optional<MotionFollower> follower_;
+  std::optional<double> asked_s_;
+  Blocked last_blocked_ = Blocked::none;
+};
+
+// Before anything is opened or made.
+void expect_possible(const RecordOptions& options) {
+  if (options.move.empty()) return;
+  if (options.robot.empty()) throw InputError("--move", "needs --robot, for example --robot ros2:PSM1");
+  if (options.rig.empty()) throw InputError("--move", "needs --rig, whose joints entry names the arm's joints");
+  if (!options.enable_motion)
+    throw InputError("--move", "moves the arm: give --enable-motion too, once nothing is in its way");
+}
+
+bool line_was_entered() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  if (::poll(&input, 1, 0) <= 0) return false;
+  std::string line;
+  std::getline(std::cin, line);
+  return true;
+}
+
+std::string told(const RecordedCounts& counts) {
+  std::string text = fmt::format("{} images, {} joint readings", counts.images, counts.joints);
+  if (counts.dropped > 0)
+    text += fmt::format(", {} images dropped: the disk or the processor is too slow", counts.dropped);
+  if (counts.unstamped > 0) text += fmt::format(", {} messages without a stamp left out", counts.unstamped);
+  return text;
+}
+
+// Why the recording ends; empty: as it should.
+std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recording& recording, MovingArm* arm) {
+  Progress progress(std::nullopt);
+  std::optional<double> first_s;
+  const double begin_s = clock.now_s();
+  double last_image_s = begin_s;
+  long images = 0;
+  while (!interrupted()) {
+    recording.check();
+    const RecordedCounts counts = recording.counts();
+    const double now_s = clock.now_s();
+    if (std::exchange(images, counts.arrived) != counts.arrived)
+      last_image_s = now_s;  // a slow disk is no silent camera
+    if (!first_s && counts.arrived > 0) first_s = now_s;
+    progress.show(static_cast<int>(counts.images), fmt::format(" images, {} joint readings", counts.joints));
+    if (!first_s && now_s > begin_s + patience_s) return fmt::format("no image came within {:.0f} s", patience_s);
+    if (const auto ended = recording.ended()) return *ended;
+    if (first_s && arm && now_s > last_image_s + max_silence_s) return "its images have stopped";
+    if (first_s && arm) {
+      if (const auto ended = arm->advance()) return *ended;
+    } else if (first_s && (options.until_enter ? line_was_entered() : now_s > *first_s + options.duration_s)) {
+      return "";
+    }
+    std::this_thread::sleep_for(std::chrono::duration<double>(MotionFollower::period_s));
+  }
+  return "";
+}
+
+}  // namespace
+
+int record(const RecordOptions& options) {
+  expect_possible(options);
+  const std::optional<Rig> rig = options.rig.empty() ? std::nullopt : std::optional(load_rig(options.rig));
+  Transports transports("lapservo_record");
+  SteadyClock clock;
+  std::optional<MovingArm> arm;
+  if (!options.move.empty())
+    arm.emplace(options, rig->instruments[named_instrument(*rig, options.instrument, options.rig)], transports, clock);
+  Recording recording(options, rig, transports, clock);
+  watch_for_interrupts();
+  const std::string why = wait_for_end(options, clock, recording, arm ? &*arm : nullptr);
+  recording.finish();
+  const RecordedCounts counts = recording.counts();
+  std::printf("%s: %s\n", options.out.c_str(), told(counts).c_str());
+  if (!why.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", options.out.c_str(), why.c_str());
+  if (!options.robot.empty() && counts.joints == 0)
+    std::fprintf(stderr, "lapservo: %s: no measured_js came\n", options.robot.c_str());
+  return why.empty() && counts.images > 0 && (options.robot.empty() || counts.joints > 0) ? 0 : 1;
+}
+
+void add_record(Command app, Run& run_later) {
+  auto options = std::make_shared<RecordOptions>();
+  Command command =
+      app.add_subcommand("record", "Record a camera and an arm's joints into a bag, for calibrate, check and track.");
+  command
+      .add_option("--camera", options->camera,
+                  "Images: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
+                  "/dev/videoN; gst:PIPELINE")
+      .required();
+  command.add_option("--robot", options->robot, "The arm whose measured_js is recorded too: ros2:PSM1 or ros1:PSM1");
+  command.add_option("--out", options->out, "Folder to make: a ROS 2 bag; a second of raw 720p takes 80 MB").required();
+  command.add_option("--rig", options->rig,
+                     "Its camera's size is that of /dev/videoN, else GStreamer's choice; also for --move");
+  command.add_option("--duration", options->duration_s, "Seconds, from the first image on")
+      .shows_default()
+      .number_between(1, 3600);
+  command.add_option("--fps", options->fps, "Keep no more images a second than about so many")
+      .shows_default()
+      .number_between(1, 1000);
+  command
+      .add_option(
+          "--move", options->move,
+          "Move the arm meanwhile, from where it is, as the calibrations want it: swing (registration, check: all "
+          "joints, for --duration), turn (marker: a full turn about its axis)")
+      .one_of({"swing", "turn"});
+  command.add_option("--instrument", options->instrument,
+                     "For --move: the arm's name in the rig, where it has several");
+  command
+      .add_option("--scale", options->scale, "Of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
+      .shows_default()
+      .number_between(0.05, 4);
+  command.add_option("--joint-limits", options->joint_limits,
+                     "For --move: YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
+  command.add_flag("--enable-motion", options->enable_motion, "For --move: do move the arm");
+  command.footer(
+      "An arm that is moved starts from rest and ends at rest; whatever is amiss with it ends the motion, and it stays "
+      "where it is.\n"
+      "Example:\n  lapservo record --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --out swing\n"
+      "  lapservo calibrate registration swing --rig rig.yaml --out rig.yaml");
+  command.runs(run_later, [options] { return record(*options); });
+}
+
+}  // namespace lapservo::app

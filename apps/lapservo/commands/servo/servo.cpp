@@ -1,0 +1,305 @@
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/progress.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/commands/servo/holdable_robot.h"
+#include "apps/lapservo/commands/servo/servo_arm.h"
+#include "apps/lapservo/commands/servo/servo_options.h"
+#include "apps/lapservo/commands/servo/servo_output.h"
+#include "apps/lapservo/commands/servo/servo_page.h"
+#include "apps/lapservo/commands/servo/servo_recording.h"
+#include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/joint_input.h"
+#include "lapservo/control/random_start.h"
+#include "lapservo/control/trajectory_check.h"
+#include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+#include "lapservo/rig/single_instrument.h"
+#include "lapservo/servo/controller_file.h"
+#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/replay.h"
+#include "lapservo/servo/run.h"
+#include "lapservo/servo/servo_log.h"
+#include "lapservo/sim/simulator.h"
+#include "recordings/open_bag.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+namespace fs = std::filesystem;
+
+// As things are in the simulation, where `rig` is what the loop goes by.
+Rig true_rig_of(const ServoOptions& options, const Rig& rig) {
+  Rig truth = rig;
+  auto& camera_from_rcm = truth.instruments.front().camera_from_rcm;
+  if (camera_from_rcm && !options.registration_error.empty())
+    camera_from_rcm->translation += 1e-3 * Eigen::Vector3d(options.registration_error.data());
+  return truth;
+}
+
+JointVector joints_at_start(const ServoOptions& options, const Trajectory& trajectory, const RunConfig& run,
+                            const FeatureModel& true_model, const Eigen::Vector4d& joint_offset) {
+  const std::string source = trajectory_name(options);
+  if (options.start.empty()) {
+    Random random(options.seed);
+    return random_start(trajectory, duration_s(options), true_model, run.controller, joint_offset, random, source);
+  }
+  const JointVector start = JointVector::from_vector(four(options.start));
+  refuse_infeasible(trajectory, duration_s(options), true_model, run.controller, start, source);
+  return start;
+}
+
+// What the user gets of a run: the log, the picture, the progress, the last lines.
+class Watcher : public RunObserver {
+ public:
+  Watcher(const Rig& rig, FeatureModel true_model, const Simulator& simulator, RunFolder* folder, LiveView* view,
+          int ticks, bool strict, ServoPage* page, HoldableRobot& robot)
+      : rig_(rig),
+        true_model_(std::move(true_model)),
+        simulator_(simulator),
+        folder_(folder),
+        view_(view),
+        progress_(std::make_unique<Progress>(ticks)),
+        strict_(strict),
+        page_(page),
+        robot_(robot) {}
+
+  bool on_tick(const ControlTick& tick) override {
+    const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
+    summary_.add(tick, truth);
+    if (folder_) folder_->log().add(tick.input, tick.decision, truth);
+    progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
+    if (strict_ && summary_.registration_contradicted()) return false;
+    if (page_ && !obey_page(tick)) return false;
+    return !interrupted() && (!view_ || show(*view_, tick, rig_));
+  }
+  const Summary& finish() {
+    progress_.reset();
+    return summary_;
+  }
+
+ private:
+  // False when it ends the run.
+  bool obey_page(const ControlTick& tick) {
+    page_->tell(tick, tick.input.time_s, robot_.held() ? "hold: held" : state_text(tick.decision.control));
+    const PageWishes wishes = page_->wishes();
+    if (wishes.hold) robot_.hold(*wishes.hold);
+    return !wishes.stop;
+  }
+
+  Rig rig_;
+  FeatureModel true_model_;
+  const Simulator& simulator_;
+  RunFolder* folder_;
+  LiveView* view_;
+  std::unique_ptr<Progress> progress_;
+  bool strict_;
+  ServoPage* page_;
+  HoldableRobot& robot_;
+  Summary summary_;
+  int done_ = 0;
+};
+
+int simulate(const ServoOptions& options) {
+  std::optional<LiveView> view;
+  if (options.view) view.emplace("servo", "use --out to write a log instead");
+  RunConfig config = run_config_of(options);
+  const Rig true_rig = true_rig_of(options, config.rig);
+  const FeatureModel true_model = feature_model(true_rig);
+  if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
+  const Trajectory trajectory = trajectory_of(options);
+  SimulatorConfig simulated;
+  simulated.seed = options.seed;
+  simulated.endoscope.latency_s = options.latency_ms / 1000;
+  simulated.endoscope.frame_rate_hz = periods_per_s(options);
+  const JointVector start = joints_at_start(options, trajectory, config, true_model, simulated.arm.joint_offset);
+  Simulator simulator(true_rig, simulated, start);
+  if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
+  std::optional<ServoPage> page;
+  if (options.web.port) page.emplace(options.web, config.rig, "servo, simulated", true);
+  HoldableRobot robot(simulator);
+  std::optional<RunFolder> folder;
+  if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
+  watch_for_interrupts();
+
+  Watcher watcher(config.rig, true_model, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
+                  static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict,
+                  page ? &*page : nullptr, robot);
+  lapservo::run(robot, simulator, simulator, config, trajectory, duration_s(options), watcher);
+  const Summary& summary = watcher.finish();
+  std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
+              config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
+              summary.text().c_str());
+  if (folder) {
+    folder->commit();
+    std::printf("log, rig and controller: %s\n", options.out.c_str());
+  }
+  return summary.succeeded(options.strict) ? 0 : 1;
+}
+
+int replay_log(const ServoOptions& options) {
+  if (!options.rig.empty())
+    throw InputError("--rig", "is " + options.rig + ", expected none: the rig beside the log counts");
+  const fs::path log = options.replay, folder = log.parent_path();
+  const Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
+  const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
+  const auto ticks = read_servo_log(log);
+  const auto difference = replay(ticks, rig, controller);
+  if (!difference) {
+    std::printf("%zu ticks reproduced bit for bit\n", ticks.size());
+    return 0;
+  }
+  std::fprintf(stderr, "lapservo: %s: tick %zu: %s was %s and is %s now\n", log.c_str(), difference->tick,
+               difference->column.c_str(), difference->logged.c_str(), difference->replayed.c_str());
+  return 1;
+}
+
+int run(const ServoOptions& options) {
+  options.web.check();
+  const bool recorded = !options.replay.empty() && is_bag(options.replay);
+  if (!options.replay.empty() && options.web.port)
+    throw InputError("--web", "is for runs, expected none with --replay");
+  if (!options.replay.empty() && options.enable_motion)
+    throw InputError("--enable-motion", "moves nothing that was recorded, expected none with --replay");
+  if (!options.replay.empty() && !recorded) return replay_log(options);
+  if (options.rig.empty())
+    throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
+  if (recorded) return decide_on_recording(options);
+  if (options.robot == "sim") return simulate(options);
+  if (options.robot.find(':') != std::string::npos) return steer_arm(options);
+  constexpr auto expected = ", expected sim, ros2:NAMESPACE or ros1:NAMESPACE";
+  throw InputError("--robot", (options.robot.empty() ? "is missing" : "is " + options.robot) + expected);
+}
+
+void add_arm_options(Command command, ServoOptions& options) {
+  command.add_option("--rig", options.rig, "Camera, marker and camera_from_rcm");
+  command.add_option(
+      "--robot", options.robot,
+      "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/robots.md");
+  command.add_option(
+      "--camera", options.camera,
+      "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
+      "/dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
+  command.add_flag("--enable-motion", options.enable_motion,
+                   "Move a real arm; without it nothing is sent, and what would be is said");
+  command.add_option("--joint-limits", options.joint_limits,
+                     "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
+}
+
+void add_trajectory_options(Command command, ServoOptions& options) {
+  command
+      .add_option("--trajectory", options.trajectory,
+                  "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
+      .shows_default();
+  command.add_option("--set-point", options.set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
+      .finite_number()
+      .delimiter(',')
+      .expected(4);
+  command
+      .add_option("--via", options.via,
+                  "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
+      .finite_number()
+      .delimiter(',');
+  command.add_option("--duration", options.duration, "Seconds, else 20, or all of a recording")
+      .number_between(0.1, 36000.0);
+}
+
+void add_control_options(Command command, ServoOptions& options) {
+  command
+      .add_option("--method", options.method,
+                  "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
+                  "uncalibrated: learns "
+                  "the Jacobian")
+      .shows_default();
+  command
+      .add_option("--tracker", options.tracker,
+                  "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
+                  "--method paper, else surface")
+      .one_of({"surface", "centerline"});
+  command.add_option("--controller", options.controller, "YAML: gains_per_s, limits, window, delay_s ...");
+  command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`").shows_default();
+  command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated")
+      .finite_number()
+      .delimiter(',')
+      .expected(2);
+}
+
+void add_result_options(Command command, ServoOptions& options) {
+  command.add_option("--out", options.out,
+                     std::string("Folder for log.csv, rig.yaml and controller.yaml") + OutputFolder::help);
+  command.add_flag("--force", options.force, OutputFolder::force_help);
+  command.add_flag("--strict", options.strict,
+                   "End with exit code 1 when the images contradict the rig's camera_from_rcm or lens");
+  command.add_flag("--view", options.view, "Show it live");
+  add_web_options(command, options.web);
+}
+
+void add_replay_options(Command command, ServoOptions& options) {
+  command.add_option(
+      "--replay", options.replay,
+      "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2: decide on the "
+      "recorded images and joints as without --enable-motion");
+  add_image_topic_option(command, options.image_topic);
+  add_joint_topic_option(command, options.joint_topic);
+}
+
+void add_simulator_options(Command command, ServoOptions& options) {
+  command.add_option("--start", options.start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
+      .finite_number()
+      .delimiter(',')
+      .expected(4);
+  command.add_option("--seed", options.seed, "sim: of start, tissue, noise, jitter").shows_default().seed_number();
+  command.add_option("--latency-ms", options.latency_ms, "sim: from exposure to arrival")
+      .shows_default()
+      .number_between(0.0, 1000.0);
+  command
+      .add_option("--fps", options.fps,
+                  "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
+      .number_between(6.0, 500.0);
+  command
+      .add_option("--registration-error", options.registration_error,
+                  "sim: x,y,z: the true RCM lies by so many mm, in the camera's frame, beside the rig's")
+      .finite_number()
+      .delimiter(',')
+      .expected(3);
+  command.add_option("--hide", options.hide, "sim: cover the marker from,to seconds")
+      .finite_number()
+      .delimiter(',')
+      .expected(2);
+}
+
+}  // namespace
+
+void add_servo(Command app, Run& run_later) {
+  auto options = std::make_shared<ServoOptions>();
+  Command command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
+  add_arm_options(command, *options);
+  add_trajectory_options(command, *options);
+  add_control_options(command, *options);
+  add_result_options(command, *options);
+  add_replay_options(command, *options);
+  add_simulator_options(command, *options);
+  command.footer(
+      "The paper's gains K = 0.032, 0.008, 0.0008, 0.01 (s, r, l, d) and omega = 0.5 have no unit of time in it. Here "
+      "K\n"
+      "is read per control period (gains_per_s = K times --fps) and omega per second.\n"
+      "Examples:\n"
+      "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
+      "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,5 --view\n"
+      "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
+      "  lapservo servo --replay run/log.csv\n"
+      "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");
+  command.runs(run_later, [options] { return run(*options); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,281 @@
+#include "apps/lapservo/commands/servo/servo_arm.h"
+
+#include <chrono>
+#include <cstdio>
+#include <future>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/commands/servo/servo_output.h"
+#include "apps/lapservo/commands/servo/servo_page.h"
+#include "apps/lapservo/inputs/live_images.h"
+#include "apps/lapservo/inputs/transports.h"
+#include "lapservo/control/trajectory_check.h"
+#include "lapservo/core/error.h"
+#include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/loop_topics/loop_topics.h"
+#include "lapservo/robot/steady_clock.h"
+#include "lapservo/servo/image_features.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+constexpr double wait_s = 15;  // for the arm and the camera to be heard
+
+std::string list_of(const Joints& joints, const Eigen::Vector4d& q) {
+  const Eigen::Vector4d positions = joints_from_q(joints, q);
+  std::string text;
+  for (int i = 0; i < 4; ++i) text += fmt::format("{}{} {:.4f}", i ? ", " : "", joints.names[i], positions[i]);
+  return text;
+}
+
+// The trajectory, until somebody wants a set-point instead. All in the loop's thread.
+class Goal {
+ public:
+  explicit Goal(Trajectory trajectory) : trajectory_(std::make_shared<Trajectory>(std::move(trajectory))) {}
+  Trajectory trajectory() const {
+    return {0, [current = trajectory_](double time_s) { return current->at(time_s); }};
+  }
+  void replace(Trajectory trajectory) { *trajectory_ = std::move(trajectory); }
+
+ private:
+  std::shared_ptr<Trajectory> trajectory_;
+};
+
+// What changes is said once, in one line; what somebody else does to the arm ends the run.
+class ArmWatcher : public RunObserver {
+ public:
+  ArmWatcher(const ServoOptions& options, const RunConfig& run, CrtkRobot& robot, const LiveImages& images,
+             LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view, ServoPage* page)
+      : options_(options),
+        run_(run),
+        robot_(robot),
+        images_(images),
+        topics_(topics),
+        goal_(goal),
+        folder_(folder),
+        view_(view),
+        page_(page) {}
+
+  bool on_tick(const ControlTick& tick) override {
+    if (!start_s_) start_s_ = tick.input.time_s;
+    const double time_s = tick.input.time_s - *start_s_;
+    summary_.add(tick, std::nullopt);
+    if (const auto& motions = summary_.endoscope_motions(); motions.size() > said_motions_) {
+      say(time_s, motions.back());
+      said_motions_ = motions.size();
+    }
+    if (folder_) folder_->log().add(tick.input, tick.decision, std::nullopt);
+    const Blocked blocked = robot_.blocked();
+    say_state(time_s, tick.decision.control, blocked);
+    say_images(time_s);
+    topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
+    LoopWishes wishes = topics_.wishes();
+    const bool stopped = page_ && add_page_wishes(wishes, tick, time_s);
+    grant(wishes, tick, time_s);
+    if (!options_.enable_motion) say_what_would_be_sent(time_s);
+    if (blocked == Blocked::foreign_command || stopped) return false;
+    if (options_.strict && summary_.registration_contradicted()) return false;
+    return !interrupted() && (!view_ || show(*view_, tick, run_.rig));
+  }
+  const Summary& summary() const { return summary_; }
+
+ private:
+  // Of two who want different things in a tick, the one that holds. True when the page ends the run.
+  bool add_page_wishes(LoopWishes& wishes, const ControlTick& tick, double time_s) {
+    page_->tell(tick, time_s, state_);
+    const PageWishes of_page = page_->wishes();
+    if (of_page.hold) wishes.hold = wishes.hold.value_or(false) || *of_page.hold;
+    if (of_page.stop) say(time_s, "end: asked for on the page");
+    return of_page.stop;
+  }
+  std::string state_of(const ControlStep& control, Blocked blocked) const {
+    if (blocked == Blocked::foreign_command) return "end: somebody else sends set-points to the arm (foreign_command)";
+    // However the operator keeps the arm meanwhile.
+    if (blocked == Blocked::none || !operators_part(control.reason).empty()) return state_text(control);
+    if (blocked == Blocked::not_enabled) return "hold: the arm is " + robot_.operating_state();
+    return "hold: " + std::string(to_string(blocked));
+  }
+  void say_state(double time_s, const ControlStep& control, Blocked blocked) {
+    const std::string state = state_of(control, blocked);
+    if (state == state_) return;
+    state_ = state;
+    say(time_s, state);
+  }
+  void grant(const LoopWishes& wishes, const ControlTick& tick, double time_s) {
+    if (wishes.hold) robot_.hold(*wishes.hold);
+    if (wishes.set_point) wanted_ = Wanted{"set_point", 1, set_point(*wishes.set_point)};
+    if (wishes.trajectory) wanted_ = Wanted{"trajectory", wishes.trajectory->duration_s, *wishes.trajectory};
+    const ServoDecision& decision = tick.decision;
+    if (refusal_.valid() && refusal_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+      const std::string refusal = refusal_.get();
+      if (!wanted_ && asked_.registration != decision.registration) {
+        wanted_ = asked_;  // it was asked of where the endoscope stood before
+      } else if (!wanted_) {
+        begin_or_refuse(refusal, time_s);
+      }
+    }
+    const bool being_measured = run_.rig.instruments.front().camera_from_rcm && !decision.camera_from_rcm;
+    if (!wanted_ || refusal_.valid() || being_measured) return;
+    asked_ = *std::exchange(wanted_, std::nullopt);
+    asked_.registration = decision.registration;
+    // A long trajectory takes longer to walk along than a tick has.
+    refusal_ = std::async(
+        std::launch::async,
+        [this, wanted = asked_, q = tick.input.joints.q, camera_from_rcm = decision.camera_from_rcm]() -> std::string {
+          try {
+            if (camera_from_rcm)
+              refuse_infeasible(wanted.trajectory, wanted.duration_s, feature_model(run_.rig, *camera_from_rcm),
+                                run_.controller, q, wanted.name);
+          } catch (const InputError& error) {
+            return error.what();
+          }
+          return {};
+        });
+  }
+  void begin_or_refuse(const std::string& refusal, double time_s) {
+    if (!refusal.empty()) return say(time_s, "refused: " + refusal);
+    goal_.replace({0, [at = asked_.trajectory.at, time_s](double now_s) { return at(now_s - time_s); }});
+    say(time_s, std::string("a ") + (asked_.name == "set_point" ? "set-point" : "trajectory") + " came");
+  }
+  void say_images(double time_s) {
+    if (const auto ended = images_.ended(); ended && !said_ended_) {
+      said_ended_ = true;
+      say(time_s, options_.camera + ": " + (ended->empty() ? "its images have ended" : *ended));
+    }
+    const std::string counts = images_.counts().text();
+    if (counts == said_counts_ || time_s < next_counts_s_) return;
+    said_counts_ = counts;
+    next_counts_s_ = time_s + 1;
+    say(time_s, "images: " + counts + (images_.complaint().empty() ? "" : " (last: " + images_.complaint() + ")"));
+  }
+  void say_what_would_be_sent(double time_s) {
+    const auto set_point = robot_.set_point();
+    if (!set_point || time_s < next_set_point_s_) return;
+    next_set_point_s_ = time_s + 1;
+    say(time_s, "would send " + list_of(*run_.rig.instruments.front().joints, *set_point) + " (--enable-motion does)");
+  }
+
+  const ServoOptions& options_;
+  const RunConfig& run_;
+  CrtkRobot& robot_;
+  const LiveImages& images_;
+  LoopTopics& topics_;
+  Goal& goal_;
+  RunFolder* folder_;
+  LiveView* view_;
+  ServoPage* page_;
+  struct Wanted {
+    std::string name;
+    double duration_s = 0;
+    Trajectory trajectory;
+    int registration = 0;  ///< ServoDecision::registration when it was asked
+  };
+  std::optional<Wanted> wanted_;  // to be asked about next
+  Wanted asked_;
+  Summary summary_;
+  std::optional<double> start_s_;
+  double next_counts_s_ = 0, next_set_point_s_ = 0;
+  std::string state_, said_counts_;
+  bool said_ended_ = false;
+  std::size_t said_motions_ = 0;
+  std::future<std::string>
+      refusal_;  // of what was asked about, empty when it can be followed; last: it uses the others
+};
+
+// What the page asks for before the loop runs. True when it ends the run.
+bool obey(ServoPage* page, CrtkRobot& robot) {
+  if (!page) return false;
+  const PageWishes wishes = page->wishes();
+  if (wishes.hold) robot.hold(*wishes.hold);
+  return wishes.stop;
+}
+
+int end_by_page() {
+  std::printf("end: asked for on the page\n");
+  return 1;
+}
+
+// Where the arm is, once it says so; nullopt when it does not, or somebody ends the run.
+std::optional<JointVector> wait_for(CrtkRobot& robot, ServoPage* page) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
+  while (!interrupted() && !obey(page, robot) && std::chrono::steady_clock::now() < end) {
+    if (robot.counts().joint_states > 0 && robot.blocked() != Blocked::no_joint_states) return robot.state().q;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return std::nullopt;
+}
+
+InterlockConfig interlock_of(const ServoOptions& options, const RunConfig& config) {
+  InterlockConfig interlock;
+  interlock.joints = joints_of(options, config.rig);
+  interlock.limits = config.controller.limits;
+  interlock.motion_enabled = options.enable_motion;
+  return interlock;
+}
+
+void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
+  std::printf("%ld joint states; set-points: %ld sent, %ld withheld; dropped: %ld malformed, %ld repeated, %ld late, ",
+              arm.joint_states, arm.set_points, arm.withheld, arm.malformed, arm.repeated, arm.late);
+  std::printf("%ld after a jump of the clock, %ld without a stamp\n", arm.jumped, arm.unstamped);
+  std::printf("%ld images%s%s\n", images.taken, images.text().empty() ? "" : "; ", images.text().c_str());
+}
+
+}  // namespace
+
+int steer_arm(const ServoOptions& options) {
+  const Address arm = address_of(options.robot, "--robot");
+  RunConfig config = run_config_of(options);
+  const Rig rig = config.rig;
+  const InterlockConfig interlock = interlock_of(options, config);
+  if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
+  config.tracking_thread = TrackingThread::own;
+  const Trajectory trajectory = trajectory_of(options);
+  std::optional<LiveView> view;
+  if (options.view) view.emplace("servo", "use --out to write a log instead");
+
+  std::optional<ServoPage> page;
+  if (options.web.port) page.emplace(options.web, rig, "servo " + options.robot, options.enable_motion);
+
+  Transports transports("lapservo");
+  SteadyClock clock;
+  LiveImages images(options.camera, "--camera", rig.camera, clock, transports);
+  Transport& transport = transports.get(arm.transport, "--robot");
+  CrtkRobot robot(transport, arm.name, interlock, clock);
+  watch_for_interrupts();
+  ServoPage* const its_page = page ? &*page : nullptr;
+  const auto start = wait_for(robot, its_page);
+  if (!start && obey(its_page, robot)) return end_by_page();
+  if (!start) {
+    std::fprintf(stderr, "lapservo: %s: no measured_js with the rig's joints within %.0f s\n", options.robot.c_str(),
+                 wait_s);
+    return 1;
+  }
+  if (config.rig.instruments.front().camera_from_rcm)
+    refuse_infeasible(trajectory, duration_s(options), feature_model(config.rig), config.controller, *start,
+                      trajectory_name(options));
+  std::optional<RunFolder> folder;
+  if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
+
+  LoopTopics topics(transport, rig, "endoscope");
+  Goal goal(trajectory);
+  ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr, view ? &*view : nullptr,
+                     its_page);
+  if (obey(its_page, robot)) return end_by_page();
+  lapservo::run(robot, images, clock, config, goal.trajectory(), duration_s(options), watcher);
+  say_counts(robot.counts(), images.counts());
+  std::printf("%s\n", watcher.summary().text().c_str());
+  if (folder) folder->commit();
+  const bool ended_early = robot.blocked() == Blocked::foreign_command;
+  return watcher.summary().succeeded(options.strict) && !ended_early ? 0 : 1;
+}
+
+}  // namespace lapservo::app

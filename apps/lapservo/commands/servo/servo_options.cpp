@@ -1,0 +1,117 @@
+#include "apps/lapservo/commands/servo/servo_options.h"
+
+#include <cstddef>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "lapservo/control/paper_trajectory.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "lapservo/crtk/arm_limits.h"
+#include "lapservo/crtk/joint_map.h"
+#include "lapservo/experiments/setup.h"
+#include "lapservo/kinematics/centre_line.h"
+#include "lapservo/rig/single_instrument.h"
+#include "lapservo/servo/controller_file.h"
+#include "lapservo/servo/image_window.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+constexpr double window_margin_px = 20, via_dwell_s = 1;
+const Eigen::Vector4d via_rate(0.05, 60, 40, 40);  // s_rad, r, l, d px a second
+
+JointLimits limits_of(const ServoOptions& options, const Rig& rig) {
+  return limits_of_q(joints_of(options, rig), load_arm_limits(options.joint_limits));
+}
+
+ControllerConfig controller_of(const ServoOptions& options, const Rig& rig) {
+  ControllerConfig config;
+  const auto mode = control_mode_from_string(options.method);
+  if (!mode) throw InputError("--method", "is " + options.method + ", expected default, paper or uncalibrated");
+  if (*mode == ControlMode::paper) config = paper_controller(1 / periods_per_s(options));
+  config.mode = *mode;
+  config.period_s = 1 / periods_per_s(options);
+  config.window = image_window(rig.camera, window_margin_px);
+  if (options.delay != "estimate") {
+    const auto delay_ms = parse_finite(options.delay);
+    if (!delay_ms) throw InputError("--delay-ms", "is " + options.delay + ", expected milliseconds or `estimate`");
+    config.observer.delay_s = *delay_ms / 1000;
+  }
+  if (!options.joint_limits.empty()) config.limits = limits_of(options, rig);
+  if (!options.controller.empty()) config = load_controller(options.controller, config);
+  return checked(config);
+}
+
+// The paper's law comes with the paper's eyes.
+Method tracker_of(const ServoOptions& options, ControlMode mode) {
+  const bool own = options.tracker.empty() && mode == ControlMode::paper;
+  return own || options.tracker == "centerline" ? Method::centerline : Method::surface;
+}
+
+std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
+  if (numbers.size() % 4 != 0)
+    throw InputError("--via",
+                     fmt::format("holds {} numbers, expected four (s_rad,r_px,l_px,d_px) a point", numbers.size()));
+  std::vector<Eigen::Vector4d> points;
+  for (std::size_t i = 0; i < numbers.size(); i += 4) points.emplace_back(numbers.data() + i);
+  return points;
+}
+
+}  // namespace
+
+double periods_per_s(const ServoOptions& options) {
+  return options.fps.value_or(options.robot == "sim" ? 60 : 120);
+}
+
+double duration_s(const ServoOptions& options) {
+  return options.duration.value_or(20);
+}
+
+Eigen::Vector4d four(const std::vector<double>& values) {
+  return Eigen::Vector4d(values.data());
+}
+
+const Joints& joints_of(const ServoOptions& options, const Rig& rig) {
+  const auto& joints = rig.instruments.front().joints;
+  if (!joints)
+    throw InputError(options.rig, "instruments[0].joints is missing, expected the arm's joints: names, sign, offset");
+  return *joints;
+}
+
+std::string trajectory_name(const ServoOptions& options) {
+  if (!options.set_point.empty()) return "--set-point";
+  return options.via.empty() ? options.trajectory : "--via";
+}
+
+Trajectory trajectory_of(const ServoOptions& options) {
+  if (!options.set_point.empty()) return set_point(four(options.set_point));
+  if (!options.via.empty()) return via_points(points_of(options.via), via_rate, via_dwell_s);
+  if (options.trajectory == "paper") return sinusoids(paper_sinusoids());
+  return trajectory_from_csv(options.trajectory);
+}
+
+void forget_registration(RunConfig& run, const ServoOptions& options) {
+  Instrument& instrument = run.rig.instruments.front();
+  if (!options.rcm_px.empty()) {
+    run.rcm_px = Eigen::Vector2d(options.rcm_px[0], options.rcm_px[1]);
+  } else if (instrument.camera_from_rcm) {
+    run.rcm_px = projected_rcm_px(run.rig.camera, *instrument.camera_from_rcm);
+  }
+  if (!run.rcm_px)
+    throw InputError("--rcm-px", "is missing and " + options.rig +
+                                     " has no camera_from_rcm, expected the RCM's image: see lapservo estimate-rcm");
+  instrument.camera_from_rcm.reset();
+}
+
+RunConfig run_config_of(const ServoOptions& options) {
+  RunConfig run;
+  run.rig = single_instrument(load_rig(options.rig), options.rig);
+  run.controller = controller_of(options, run.rig);
+  run.tracker.method = tracker_of(options, run.controller.mode);
+  return run;
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "apps/lapservo/cli/web_view.h"
+#include "lapservo/control/trajectory.h"
+#include "lapservo/servo/run.h"
+
+namespace lapservo::app {
+
+/// What `lapservo servo` was asked for.
+struct ServoOptions {
+  std::string rig, robot, camera, joint_limits, trajectory = "paper", method = "default", tracker, controller,
+                                                delay = "estimate", out, replay, image_topic, joint_topic;
+  std::vector<double> set_point, via, start, rcm_px, hide;
+  std::vector<double> registration_error;  // 3 x mm
+  double latency_ms = 80;
+  std::optional<double> duration;  // s
+  std::optional<double> fps;       // control periods a second, and frames of the simulation
+  std::uint64_t seed = 1;
+  bool view = false, force = false, enable_motion = false, strict = false;
+  WebOptions web;
+};
+
+Eigen::Vector4d four(const std::vector<double>& values);
+
+/// Before it is made to forget anything.
+RunConfig run_config_of(const ServoOptions& options);
+/// The uncalibrated mode gets to know no more of the RCM than its image.
+void forget_registration(RunConfig& run, const ServoOptions& options);
+/// The rig's `joints` entry. Throws InputError when there is none.
+const Joints& joints_of(const ServoOptions& options, const Rig& rig);
+
+/// What is asked for, else 60 in the simulation and 120 with an arm, where an image waits for the next period.
+double periods_per_s(const ServoOptions& options);
+/// What is asked for, else 20.
+double duration_s(const ServoOptions& options);
+
+Trajectory trajectory_of(const ServoOptions& options);
+/// What the trajectory is called in complaints.
+std::string trajectory_name(const ServoOptions& options);
+
+}  // namespace lapservo::app

@@ -1,0 +1,140 @@
+#include "apps/lapservo/commands/servo/servo_output.h"
+
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+
+#include <fmt/format.h>
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/control/tracking_law.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/io/overlay.h"
+#include "lapservo/servo/controller_file.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+std::uintmax_t needed_bytes(double duration_s, const ControllerConfig& controller) {
+  constexpr std::uintmax_t bytes_a_tick = 4000;
+  return bytes_a_tick * static_cast<std::uintmax_t>(duration_s / controller.period_s) + (1 << 20);
+}
+
+InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
+  InputFiles inputs;
+  inputs.add_rig(options.rig, rig);
+  inputs.add(options.controller);
+  inputs.add(options.trajectory);
+  inputs.add(options.joint_limits);
+  inputs.add(options.replay);
+  if (!options.replay.empty()) inputs.add_pictures_in(options.replay);
+  return inputs;
+}
+
+std::string reason_text(HoldReason reason) {
+  const std::string_view part = operators_part(reason);
+  return std::string(to_string(reason)) + (part.empty() ? "" : fmt::format(" ({})", part));
+}
+
+}  // namespace
+
+void say(double time_s, const std::string& what) {
+  std::printf("%.2f s  %s\n", time_s, what.c_str());
+  std::fflush(stdout);
+}
+
+std::string_view operators_part(HoldReason reason) {
+  if (reason == HoldReason::endoscope_moved)
+    return "move the instrument, by hand or teleoperation, until endoscope_measured";
+  if (reason == HoldReason::endoscope_measured) return "start goes on";
+  return "";
+}
+
+std::string state_text(const ControlStep& control) {
+  const std::string action(to_string(control.action));
+  return control.reason == HoldReason::none ? action : action + ": " + reason_text(control.reason);
+}
+
+RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller)
+    : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(duration_s, controller)),
+      log_(folder_ / "log.csv") {
+  write_file(folder_ / "controller.yaml", controller_yaml(controller));
+}
+
+void RunFolder::commit() {
+  log_.commit();
+  folder_.commit();
+}
+
+void Summary::follow_registration(const ControlTick& tick) {
+  const auto& now = tick.decision.camera_from_rcm;
+  if (camera_from_rcm_ && !now && !moved_s_) {
+    moved_s_ = tick.input.time_s;
+    convergence_ = {};
+  }
+  if (moved_s_ && now) {
+    const Rigid3 before_from_now = *camera_from_rcm_ * now->inverse();
+    endoscope_motions_.push_back(fmt::format(
+        "the endoscope moved by {:.1f} mm and {:.1f} degrees (noticed at {:.2f} s): started with camera_from_rcm "
+        "measured anew {:.1f} s later",
+        1e3 * before_from_now.translation.norm(), deg_from_rad(Eigen::AngleAxisd(before_from_now.rotation).angle()),
+        *moved_s_ - start_s_.value_or(*moved_s_), tick.input.time_s - *moved_s_));
+    moved_s_.reset();
+  }
+  if (now) camera_from_rcm_ = now;
+}
+
+void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {
+  const ControlStep& control = tick.decision.control;
+  if (!start_s_) start_s_ = tick.input.time_s;
+  ++ticks_;
+  follow_registration(tick);
+  contradicted_ += tick.decision.registration_contradicted;
+  const bool holds = control.action == ControlAction::hold;
+  if (holds) ++held_[std::string(to_string(control.reason))];
+  held_at_end_ = holds ? std::optional(control.reason) : std::nullopt;
+  Eigen::Vector4d error = control.error;
+  if (truth && truth->features) {
+    error = feature_error(*truth->features, tick.input.desired.features);
+  } else if (!truth && !control.estimate) {
+    if (converged()) return;
+    error.setConstant(std::numeric_limits<double>::infinity());  // not known, and so not small
+  }
+  convergence_.add(tick.input.time_s - *start_s_, error);
+}
+
+std::string Summary::convergence_text() const {
+  const auto reached_s = convergence_.reached_s();
+  if (!reached_s) return "not within 1 px and 5 mrad for a second";
+  const Eigen::Vector4d rms = convergence_.rms_since();
+  return fmt::format(
+      "within 1 px and 5 mrad from {:.2f} s on; rms since: s {:.2f} mrad, r {:.2f}, l {:.2f}, d {:.2f} px", *reached_s,
+      1000 * rms[0], rms[1], rms[2], rms[3]);
+}
+
+std::string Summary::holds_text() const {
+  std::string text;
+  for (const auto& [reason, count] : held_) text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
+  for (const std::string& motion : endoscope_motions_) text += "\n" + motion;
+  if (held_at_end_) text += "\nended in a hold: " + reason_text(*held_at_end_);
+  if (contradicted_ > 0)
+    text += fmt::format(
+        "\nregistration_contradicted in {} of {} ticks: the images fit neither camera_from_rcm nor lens "
+        "of the rig, and r is off by what is wrong with them",
+        contradicted_, ticks_);
+  return text;
+}
+
+bool show(LiveView& view, const ControlTick& tick, const Rig& rig) {
+  if (!tick.seen) return true;
+  Rig now = rig;
+  now.instruments.front().camera_from_rcm = tick.decision.camera_from_rcm;
+  cv::Mat picture = draw_overlay(tick.seen->image.bgr, now, tick.seen->observations);
+  const std::string label = fmt::format("{:.2f} s  {}", tick.input.time_s, state_text(tick.decision.control));
+  cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
+  return view.show(picture);
+}
+
+}  // namespace lapservo::app

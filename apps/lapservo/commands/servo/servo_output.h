@@ -1,0 +1,69 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "apps/lapservo/cli/live_view.h"
+#include "apps/lapservo/cli/output_folder.h"
+#include "apps/lapservo/commands/servo/servo_options.h"
+#include "lapservo/servo/convergence.h"
+#include "lapservo/servo/servo_log.h"
+
+namespace lapservo::app {
+
+/// A line of a run's, at once.
+void say(double time_s, const std::string& what);
+/// What a hold for that reason waits for the operator to do; empty where it goes on by itself.
+std::string_view operators_part(HoldReason reason);
+/// "track", "hold: marker_lost", "hold: endoscope_measured (...)" with the operator's part.
+std::string state_text(const ControlStep& control);
+
+/// A run's log.csv, rig.yaml and controller.yaml.
+class RunFolder {
+ public:
+  /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
+  RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller);
+  ServoLog& log() { return log_; }
+  void commit();
+
+ private:
+  OutputFolder folder_;
+  ServoLog log_;
+};
+
+/// What the run came to, for the last lines.
+class Summary {
+ public:
+  /// By the truth, where it is known, else by the estimate.
+  void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
+  bool converged() const { return convergence_.reached_s().has_value(); }
+  /// Converged and not in a hold at the end; when `strict`, with a registration that no image contradicted.
+  bool succeeded(bool strict) const { return converged() && !held_at_end_ && !(strict && registration_contradicted()); }
+  bool registration_contradicted() const { return contradicted_ > 0; }
+  /// One line for each time that a camera_from_rcm was started that was measured anew.
+  const std::vector<std::string>& endoscope_motions() const { return endoscope_motions_; }
+  std::string text() const { return convergence_text() + holds_text(); }
+  /// How long it held and why, how often the endoscope moved ...: a line each, each after a line's end.
+  std::string holds_text() const;
+
+ private:
+  std::string convergence_text() const;
+  void follow_registration(const ControlTick& tick);
+
+  std::optional<double> start_s_, moved_s_;  ///< moved_s_: the endoscope, and not measured anew yet
+  std::optional<Rigid3> camera_from_rcm_;
+  std::vector<std::string> endoscope_motions_;
+  long contradicted_ = 0;
+  long ticks_ = 0;
+  std::map<std::string, long> held_;
+  std::optional<HoldReason> held_at_end_;  // by the last tick
+  Convergence convergence_;
+};
+
+/// The image of a tick, if it has one, with what was seen and decided. False when the window was closed.
+bool show(LiveView& view, const ControlTick& tick, const Rig& rig);
+
+}  // namespace lapservo::app

@@ -1,0 +1,106 @@
+#include "lapservo/sim_robot/sim_robot.h"
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/inputs/transports.h"
+#include "lapservo/control/paper_trajectory.h"
+#include "lapservo/control/random_start.h"
+#include "lapservo/core/error.h"
+#include "lapservo/core/random.h"
+#include "lapservo/rig/single_instrument.h"
+#include "lapservo/robot/steady_clock.h"
+#include "lapservo/servo/image_features.h"
+#include "lapservo/servo/image_window.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+struct SimRobotOptions {
+  std::string rig, transport = "ros2", arm = "PSM1", camera = "/endoscope";
+  std::vector<double> start;
+  double latency_ms = 80, fps = 30, duration_s = 0;
+  std::uint64_t seed = 1;
+};
+
+// Where the paper's trajectory can be followed from, unless said.
+JointVector start_of(const SimRobotOptions& options, const Rig& rig, const ArmConfig& arm) {
+  if (!options.start.empty()) return JointVector::from_vector(Eigen::Vector4d(options.start.data()));
+  constexpr double margin_px = 20, duration_s = 20;
+  ControllerConfig controller;
+  controller.window = image_window(rig.camera, margin_px);
+  Random random(options.seed);
+  return random_start(sinusoids(paper_sinusoids()), duration_s, feature_model(rig), controller, arm.joint_offset,
+                      random, "the paper's trajectory, which --start replaces");
+}
+
+int run(const SimRobotOptions& options) {
+  if (options.rig.empty())
+    throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
+  const Rig rig = single_instrument(load_rig(options.rig), options.rig);
+  SimulatorConfig simulated;
+  simulated.seed = options.seed;
+  simulated.endoscope.latency_s = options.latency_ms / 1000;
+  simulated.endoscope.frame_rate_hz = options.fps;
+  simulated.endoscope.real_time = true;
+  Simulator simulator(rig, simulated, start_of(options, rig, simulated.arm));
+  const auto transport = make_transport(options.transport, "lapservo_sim_robot", "--transport");
+  SimRobotConfig config;
+  config.arm = resolved_name({options.transport, options.arm}, "--arm");
+  config.camera = resolved_name({options.transport, options.camera}, "--camera");
+  SimRobot robot(*transport, rig, simulator, config);
+  watch_for_interrupts();
+  std::printf("arm %s, camera %s/image_raw; lapservo servo --rig %s --robot %s:%s --camera %s:%s/image_raw ",
+              options.arm.c_str(), options.camera.c_str(), options.rig.c_str(), options.transport.c_str(),
+              options.arm.c_str(), options.transport.c_str(), options.camera.c_str());
+  std::printf("--enable-motion moves it, Ctrl-C ends this\n");
+  std::fflush(stdout);
+  SteadyClock clock;
+  const double begin_s = clock.now_s();
+  double time_s = 0;
+  while (!interrupted() && (options.duration_s == 0 || time_s < options.duration_s)) {
+    time_s = clock.now_s() - begin_s;
+    robot.advance(time_s);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  std::printf("%ld set-points came\n", robot.statistics().count);
+  return 0;
+}
+
+}  // namespace
+
+void add_sim_robot(Command app, Run& run_later) {
+  auto options = std::make_shared<SimRobotOptions>();
+  Command command =
+      app.add_subcommand("sim-robot", "Be an arm and its camera, simulated, for another process to steer.");
+  command.add_option("--rig", options->rig, "What stands before the camera");
+  command.add_option("--transport", options->transport, "ros2 or ros1").shows_default();
+  command.add_option("--arm", options->arm, "Namespace of its CRTK topics").shows_default();
+  command.add_option("--camera", options->camera, "Namespace of image_raw and camera_info").shows_default();
+  command.add_option("--start", options->start, "Measured joints to start from, theta,phi,rho,psi; else random")
+      .finite_number()
+      .delimiter(',')
+      .expected(4);
+  command.add_option("--seed", options->seed, "Of start, tissue, noise, jitter").shows_default().seed_number();
+  command.add_option("--latency-ms", options->latency_ms, "From exposure to publication")
+      .shows_default()
+      .number_between(0.0, 1000.0);
+  command.add_option("--fps", options->fps, "Frames a second").shows_default().number_between(6.0, 120.0);
+  command.add_option("--duration", options->duration_s, "Seconds; 0: until interrupted")
+      .shows_default()
+      .number_between(0.0, 1e6);
+  command.footer(
+      "Example, in two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
+      "  lapservo sim-robot --rig configs/paper.yaml\n"
+      "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera ros2:/endoscope/image_raw --enable-motion");
+  command.runs(run_later, [options] { return run(*options); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,395 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "apps/lapservo/cli/interrupt.h"
+#include "apps/lapservo/cli/live_view.h"
+#include "apps/lapservo/cli/progress.h"
+#include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/cli/web_view.h"
+#include "apps/lapservo/inputs/frame_input.h"
+#include "apps/lapservo/inputs/input_files.h"
+#include "apps/lapservo/inputs/live_frames.h"
+#include "lapservo/calibration/check/frame_diagnosis.h"
+#include "lapservo/core/error.h"
+#include "lapservo/io/frame_source.h"
+#include "lapservo/io/overlay.h"
+#include "lapservo/io/tables/observation_csv.h"
+#include "lapservo/io/video/overlay_writer.h"
+#include "lapservo/io/video/video_encoder.h"
+#include "lapservo/robot/steady_clock.h"
+#include "lapservo/servo/registration_watch.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+namespace fs = std::filesystem;
+
+struct TrackOptions {
+  std::string input, rig, out = "obs.csv", overlay, image_topic;
+  std::string method = "surface";
+  bool single = false, deinterlace = false, view = false;
+  WebOptions web;
+  bool page_only = false;  ///< `lapservo view`: at the input's own pace, and without --out
+  double fps = 30;
+  int frames = 0;
+};
+
+// What is known to be read before the first frame; rigs beside the frames come with them.
+InputFiles inputs_of(const TrackOptions& options) {
+  InputFiles inputs;
+  std::error_code error;
+  inputs.add(options.input);
+  if (fs::is_directory(options.input, error)) inputs.add_pictures_in(options.input);
+  return inputs;
+}
+
+void refuse_outputs(const TrackOptions& options, const InputFiles& inputs) {
+  inputs.refuse_as_output(options.out);
+  inputs.refuse_as_output(options.overlay);
+  inputs.refuse_in_folder(options.overlay);
+  std::error_code error;
+  if (!options.overlay.empty() &&
+      fs::weakly_canonical(options.out, error) == fs::weakly_canonical(options.overlay, error))
+    throw InputError(options.out, "is the place for --out and --overlay, expected two places");
+}
+
+// Which rig a frame is to be tracked with: the one named by --rig, else NAME.rig.yaml beside the picture, else rig.yaml
+// in its folder. The tracker begins anew when the rig changes.
+class RigByFrame {
+ public:
+  explicit RigByFrame(const TrackOptions& options)
+      : options_(options),
+        tracking_{.method = method_from_string(options.method).value(),
+                  .single = options.single,
+                  .deinterlace = options.deinterlace} {
+    if (!options.rig.empty()) use(options.rig);
+  }
+
+  Tracker& tracker_for(const Frame& frame) {
+    if (options_.rig.empty()) {
+      const fs::path at = frame.file.empty() ? fs::path(options_.input) : frame.file;
+      const fs::path own = sidecar(at), shared = at.parent_path() / "rig.yaml";
+      std::error_code error;
+      const fs::path chosen = fs::exists(own, error) ? own : shared;
+      if (!fs::exists(chosen, error))
+        throw InputError(at.string(),
+                         "has no rig beside it (" + own.filename().string() + " or rig.yaml): name one with --rig");
+      if (chosen != path_) use(chosen);
+    } else if (!frame.file.empty() && !warned_ && has_other_rig(frame.file)) {
+      std::fprintf(stderr, "lapservo: note: --rig is used for all frames, though %s has a rig of its own\n",
+                   frame.file.filename().c_str());
+      warned_ = true;
+    }
+    if (!tracker_) tracker_.emplace(*rig_, tracking_);
+    return *tracker_;
+  }
+  /// What comes are pictures that may have nothing to do with one another: each is searched whole.
+  void expect_pictures() { tracking_.frame_budget.reset(); }
+  const std::shared_ptr<const Rig>& rig() const { return rig_; }
+  const fs::path& path() const { return path_; }
+  /// Null while no rig is known.
+  const Camera* camera() const { return rig_ ? &rig_->camera : nullptr; }
+
+ private:
+  bool has_other_rig(const fs::path& picture) const {
+    std::error_code error;
+    return fs::exists(sidecar(picture), error) && !fs::equivalent(sidecar(picture), options_.rig, error);
+  }
+  static fs::path sidecar(const fs::path& file) { return fs::path(file).replace_extension(".rig.yaml"); }
+  void use(const fs::path& path) {
+    rig_ = std::make_shared<const Rig>(load_rig(path));
+    InputFiles inputs;
+    inputs.add_rig(path, *rig_);
+    refuse_outputs(options_, inputs);
+    path_ = path;
+    tracker_.reset();
+  }
+
+  const TrackOptions& options_;
+  TrackerOptions tracking_;
+  fs::path path_;
+  std::shared_ptr<const Rig> rig_;
+  std::optional<Tracker> tracker_;
+  bool warned_ = false;
+};
+
+struct Tally {
+  int frames = 0;
+  std::map<std::string, int> found, mismatched;
+
+  void add(const std::vector<Observation>& observations) {
+    ++frames;
+    for (const Observation& observation : observations) {
+      found[observation.instrument] += observation.status == Status::ok;
+      mismatched[observation.instrument] += observation.status == Status::marker_mismatch;
+    }
+  }
+  std::string text() const {
+    std::string line;
+    for (const auto& [name, count] : found) line += fmt::format(", {} in {}", name, count);
+    return line;
+  }
+  bool anything() const {
+    return std::any_of(found.begin(), found.end(), [](const auto& entry) { return entry.second > 0; });
+  }
+};
+
+// Whether there was something to say.
+bool say_mismatched(const Tally& tally) {
+  bool any = false;
+  for (const auto& [name, count] : tally.mismatched) {
+    if (count == 0) continue;
+    any = true;
+    std::fprintf(
+        stderr,
+        "lapservo: %s: in %d of %d frames the print is not as the rig says (marker_mismatch); lapservo calibrate "
+        "marker measures it from a slow turn\n",
+        name.c_str(), count, tally.frames);
+  }
+  return any;
+}
+
+void say_moved(const TrackOptions& options, const Frame& frame) {
+  std::fprintf(
+      stderr,
+      "lapservo: %s: the endoscope moved: from %d frames before frame %d (%.2f s) on shafts miss the RCM of the "
+      "rig, and q is empty or off; lapservo calibrate registration measures camera_from_rcm anew\n",
+      options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s);
+}
+
+[[noreturn]] void rethrow_with_frame(const InputError& error, const TrackOptions& options, const Frame& frame) {
+  if (error.source() == "image") throw error.with_source(frame.file.empty() ? options.input : frame.file.string());
+  throw error;
+}
+
+// Null where the frames are no topic's.
+std::unique_ptr<LiveFrames> open_topic(const TrackOptions& options, const RigByFrame& rigs) {
+  if (!rigs.camera() && (names_topic(options.input) || options.input.starts_with("gst:")))
+    throw InputError("--rig", "is missing, expected a rig's YAML: live images have none beside them");
+  return names_topic(options.input) ? std::make_unique<LiveFrames>(options.input, *rigs.camera()) : nullptr;
+}
+
+PageConfig page_config_of(const TrackOptions& options, const FrameSource& source) {
+  PageConfig config;
+  config.title = (options.page_only ? "view " : "track ") + options.input;
+  if (options.page_only) config.option = "--port";
+  config.live = source.kind() == FrameSource::Kind::live;
+  return config;
+}
+
+// Until then, or until somebody wants the end.
+void wait_on_page(WebView& web, std::optional<double> until_s) {
+  SteadyClock clock;
+  while (!interrupted() && !web.wishes().stop && !(until_s && clock.now_s() >= *until_s))
+    clock.sleep_until(std::min(until_s.value_or(INFINITY), clock.now_s() + 0.05));
+}
+
+// One run of either command: where frames come from, and where what was seen in them goes.
+class TrackRun {
+ public:
+  explicit TrackRun(const TrackOptions& options)
+      : options_(options),
+        rigs_(options),
+        live_(open_topic(options, rigs_)),
+        file_(live_
+                  ? nullptr
+                  : open_frames(options.input, options.fps, options.image_topic, rigs_.camera(), options.deinterlace)),
+        source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
+    if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
+      rigs_.expect_pictures();
+    if (options.view) view_.emplace("track", "use --overlay to write pictures instead");
+    if (options.web.port) web_.emplace(options.web, page_config_of(options, source_));
+    if (!options.page_only) csv_.emplace(options.out);
+    if (!options.overlay.empty()) overlay_ = open_overlay_writer(options.overlay, source_);
+  }
+
+  /// The command's exit code.
+  int run() {
+    watch_for_interrupts();
+    begin_s_ = clock_.now_s();
+    track_all();
+    if (plays_a_file() && !stopped_) {
+      std::fprintf(stderr, "lapservo: %s has ended; the page stays until Ctrl-C\n", options_.input.c_str());
+      wait_on_page(*web_, std::nullopt);
+    }
+    if (csv_) csv_->commit();
+    if (overlay_) overlay_->commit();
+    tell_results();
+    return tell_complaints();
+  }
+
+ private:
+  // On a page alone, at the speed of the recording.
+  bool plays_a_file() const { return options_.page_only && source_.kind() != FrameSource::Kind::live; }
+
+  void track_all() {
+    Progress progress(source_.frame_count());
+    while (!(stopped_ = interrupted()) && (options_.frames == 0 || tally_.frames < options_.frames)) {
+      const auto frame = source_.next();
+      if (!frame) {
+        stopped_ = interrupted();
+        read_to_the_end_ = true;
+        return;
+      }
+      const double came_s = clock_.now_s() - (live_ ? live_->age_s() : 0);
+      Tracker& tracker = rigs_.tracker_for(*frame);
+      try {
+        const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
+        tally_.add(observations);
+        if (registration_.add(observations)) say_moved(options_, *frame);
+        diagnosis().add(frame->bgr, observations);
+        if ((stopped_ = !pass_on(*frame, observations, came_s))) return;
+      } catch (const InputError& error) {
+        rethrow_with_frame(error, options_, *frame);
+      }
+      progress.show(tally_.frames, tally_.text());
+      if (plays_a_file()) wait_on_page(*web_, begin_s_ + frame->time_s + 1 / source_.frames_per_second());
+    }
+  }
+
+  // To all that want it; false when somebody who looks wants the end.
+  bool pass_on(const Frame& frame, const std::vector<Observation>& observations, double came_s) {
+    for (const Observation& observation : observations)
+      if (csv_) csv_->add(frame.index, frame.time_s, frame.file.filename().string(), observation);
+    if (overlay_ || view_) {
+      const cv::Mat picture = draw_overlay(frame.bgr, *rigs_.rig(), observations);
+      if (overlay_) overlay_->add(frame, picture);
+      if (view_ && !view_->show(picture)) return false;
+    }
+    if (!web_) return true;
+    web_->show({frame.bgr, rigs_.rig(), observations, clock_.now_s() - came_s});
+    return !web_->wishes().stop;
+  }
+
+  void tell_results() const {
+    std::printf("%s%d frames%s\n", stopped_ ? "stopped after " : "", tally_.frames, tally_.text().c_str());
+    if (csv_) std::printf("observations: %s\n", options_.out.c_str());
+    if (overlay_) std::printf("overlay: %s\n", options_.overlay.c_str());
+    if (overlay_ && overlay_->is_video() && !video_remark().empty())
+      std::printf("overlay: %s\n", video_remark().c_str());
+    if (live_ && !live_->dropped().empty()) std::printf("no frames: %s\n", live_->dropped().c_str());
+  }
+
+  int tell_complaints() const {
+    if (const std::string complaint = read_to_the_end_ && !stopped_ ? source_.complaint() : ""; !complaint.empty()) {
+      std::fprintf(stderr, "lapservo: %s: %s: what could be read is measured\n", options_.input.c_str(),
+                   complaint.c_str());
+      return 1;
+    }
+    const std::string diagnosis = diagnosis_ ? diagnosis_->text() : "no frame came";
+    const bool misses_rcm = tally_.anything() && !diagnosis.empty();
+    const bool mismatched = !misses_rcm && say_mismatched(tally_);
+    if (!diagnosis.empty() && !mismatched)
+      std::fprintf(stderr, "lapservo: %s: %s\n", options_.input.c_str(), diagnosis.c_str());
+    return tally_.anything() ? 0 : 1;
+  }
+
+  FrameDiagnosis& diagnosis() {
+    if (!diagnosis_ || diagnosed_ != rigs_.rig()) {
+      diagnosed_ = rigs_.rig();
+      diagnosis_.emplace(*diagnosed_, options_.deinterlace || diagnosed_->camera.deinterlace);
+    }
+    return *diagnosis_;
+  }
+
+  const TrackOptions& options_;
+  RigByFrame rigs_;
+  std::unique_ptr<LiveFrames> live_;
+  std::unique_ptr<FrameSource> file_;
+  FrameSource& source_;
+  std::optional<LiveView> view_;
+  std::optional<WebView> web_;
+  std::optional<ObservationCsv> csv_;
+  std::unique_ptr<OverlayWriter> overlay_;
+  SteadyClock clock_;
+  double begin_s_ = 0;
+  Tally tally_;
+  RegistrationWatch registration_;
+  std::shared_ptr<const Rig> diagnosed_;
+  std::optional<FrameDiagnosis> diagnosis_;  // of frames with that rig
+  bool stopped_ = false, read_to_the_end_ = false;
+};
+
+int run(const TrackOptions& options) {
+  options.web.check();
+  refuse_outputs(options, inputs_of(options));
+  return TrackRun(options).run();
+}
+
+// What both commands take.
+void add_input_options(Command command, TrackOptions& options) {
+  command
+      .add_option(
+          "input", options.input,
+          "Picture, folder of pictures, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
+          "topic "
+          "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
+      .required();
+  add_image_topic_option(command, options.image_topic);
+  command.add_option("--rig", options.rig,
+                     "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
+  command.add_option("--method", options.method, "surface: all visible lines; centerline: the paper's Algorithm 1")
+      .shows_default()
+      .one_of({"surface", "centerline"});
+  command.add_flag("--single", options.single, "Treat every frame on its own, without tracking from the frame before");
+  command.add_flag("--deinterlace", options.deinterlace,
+                   "For interlaced video (status: interlaced): track the field of the even rows; the same as "
+                   "deinterlace: true in the rig's camera");
+  command.add_option("--fps", options.fps, "Frames per second of a folder's pictures")
+      .shows_default()
+      .number_between(0.001, 100000.0);
+}
+
+}  // namespace
+
+void add_track(Command app, Run& run_later) {
+  auto options = std::make_shared<TrackOptions>();
+  Command command =
+      app.add_subcommand("track", "Measure the instruments in pictures, a video, a bag or a camera's frames.");
+  add_input_options(command, *options);
+  command
+      .add_option("--out", options->out,
+                  "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
+                  "killed, the rows are in NAME.part, which the next run of that name writes over")
+      .shows_default();
+  command.add_option("--overlay", options->overlay,
+                     "Write pictures (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
+                     "same name");
+  command.add_flag("--view", options->view, "Show a live window");
+  add_web_options(command, options->web);
+  command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
+      .shows_default()
+      .whole_number_between(0, 1000000000);
+  command.footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
+  command.runs(run_later, [options] { return run(*options); });
+}
+
+void add_view(Command app, Run& run_later) {
+  auto options = std::make_shared<TrackOptions>();
+  options->page_only = true;
+  options->out.clear();
+  Command command =
+      app.add_subcommand("view", "Show what is measured in pictures, a video or a camera's frames on a page.");
+  add_input_options(command, *options);
+  add_page_options(command, options->web);
+  command.footer(
+      "Files are shown at their own pace, once. A browser on another computer reaches the page by\n"
+      "ssh -L 8080:localhost:8080 THIS_COMPUTER, or with --listen by the address that is printed.\n"
+      "Example:\n"
+      "  lapservo view ros2:/endoscope/image_raw --rig rig.yaml");
+  command.runs(run_later, [options] { return run(*options); });
+}
+
+}  // namespace lapservo::app

@@ -1,0 +1,57 @@
+#include "apps/lapservo/inputs/input_files.h"
+
+#include <optional>
+#include <string>
+#include <sys/stat.h>
+#include <system_error>
+
+#include "lapservo/core/error.h"
+#include "lapservo/io/image_file.h"
+
+namespace lapservo::app {
+namespace {
+namespace fs = std::filesystem;
+
+std::optional<std::pair<unsigned long long, unsigned long long>> identity_of(const fs::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return std::nullopt;
+  return std::pair<unsigned long long, unsigned long long>(status.st_dev, status.st_ino);
+}
+
+}  // namespace
+
+void InputFiles::add(const fs::path& path) {
+  if (const auto identity = identity_of(path)) files_.emplace(*identity, path);
+}
+
+void InputFiles::add_rig(const fs::path& path, const Rig& rig) {
+  add(path);
+  add(rig.camera_file);
+}
+
+void InputFiles::add_pictures_in(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    if (has_image_extension(entry->path()) || entry->path().extension() == ".yaml" ||
+        entry->path().extension() == ".db3")
+      add(entry->path());
+}
+
+void InputFiles::refuse_as_output(const fs::path& path) const {
+  const auto identity = identity_of(path);
+  if (const auto found = identity ? files_.find(*identity) : files_.end(); found != files_.end())
+    throw InputError(path.string(),
+                     "is the input itself (" + found->second.string() + "), expected another place for the results");
+}
+
+void InputFiles::refuse_in_folder(const fs::path& folder) const {
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    const auto identity = identity_of(entry->path());
+    if (identity && files_.contains(*identity))
+      throw InputError(folder.string(), "holds the input " + entry->path().filename().string() +
+                                            ", expected another folder for the results");
+  }
+}
+
+}  // namespace lapservo::app

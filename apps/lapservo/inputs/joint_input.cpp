@@ -1,0 +1,88 @@
+#include "apps/lapservo/inputs/joint_input.h"
+
+#include <cstdio>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "apps/lapservo/inputs/frame_input.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
+#include "recordings/bag_joints.h"
+#include "recordings/bag_topics.h"
+#include "recordings/open_bag.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+std::vector<std::string> columns_of(const std::string& path) {
+  std::vector<std::string> names = CsvTable::read(path).columns();
+  std::erase(names, "time_s");
+  return names;
+}
+
+// Reports on stderr how many readings are passed over.
+JointInput reported(JointInput input) {
+  const auto& [repeated, of_other_arms] = std::pair{input.recording.repeated, input.recording.of_other_arms};
+  if (repeated > 0 || of_other_arms > 0)
+    std::fprintf(stderr, "lapservo: %s: %d repeated readings and %d of other arms' joints are passed over\n",
+                 input.source.c_str(), repeated, of_other_arms);
+  return input;
+}
+
+JointInput read_table(const CalibrateOptions& options, const Instrument& instrument) {
+  refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.joints);
+  const Joints joints =
+      joints_of(instrument, instrument.joints ? std::vector<std::string>() : columns_of(options.joints), options.joints,
+                options.rig);
+  return reported({joints, read_joint_recording(options.joints, joints), options.joints});
+}
+
+JointInput read_topic(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames,
+                      const Bag& bag, const BagTopic& topic) {
+  const auto begin_s = frames ? frames->first_stamp_s() : std::nullopt;
+  if (!begin_s)
+    throw InputError("--joints", "is the bag " + bag.path() + ", expected a CSV: " + options.input +
+                                     " is no bag, and so has no stamps that would go with a bag's");
+  const Joints joints =
+      joints_of(instrument, joint_names_in_bag(bag, topic), bag.path() + ": " + topic.name, options.rig);
+  return reported({joints, joints_in_bag(bag, topic, joints, *begin_s), bag.path()});
+}
+
+}  // namespace
+
+void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {
+  command.add_option("--joints", options.joints, help);
+  add_joint_topic_option(command, options.joint_topic);
+}
+
+void add_joint_topic_option(Command command, std::string& joint_topic) {
+  command.add_option("--joint-topic", joint_topic,
+                     "Of a bag with several: the topic of the arm's measured joints; else .../INSTRUMENT/measured_js, "
+                     "or the only measured_js");
+}
+
+JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames) {
+  if (!is_bag(options.joints)) return read_table(options, instrument);
+  const auto bag = open_bag(options.joints);
+  const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
+  if (!topic)
+    throw InputError(options.joints, std::string("has no messages of ") + joint_type + ", expected the joints'");
+  return read_topic(options, instrument, frames, *bag, *topic);
+}
+
+std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
+                                           const FrameSource* frames) {
+  if (!options.joints.empty()) return read_joint_input(options, instrument, frames);
+  if (!is_bag(options.input)) {
+    refuse_topic_outside_bags("--joint-topic", options.joint_topic, options.input);
+    return std::nullopt;
+  }
+  const auto bag = open_bag(options.input);
+  const BagTopic* topic = joint_topic_of(*bag, options.joint_topic, instrument.name);
+  if (!topic) return std::nullopt;
+  return read_topic(options, instrument, frames, *bag, *topic);
+}
+
+}  // namespace lapservo::app

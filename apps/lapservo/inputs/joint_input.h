@@ -1,0 +1,30 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "apps/lapservo/commands/calibrate/calibrate_inputs.h"
+#include "lapservo/calibration/recording/joint_recording.h"
+
+namespace lapservo::app {
+
+/// What the joints read while frames were taken.
+struct JointInput {
+  Joints joints;
+  internal::JointRecording recording;
+  std::string source;  ///< for complaints
+};
+
+void add_joint_options(Command command, CalibrateOptions& options, const std::string& help);
+void add_joint_topic_option(Command command, std::string& joint_topic);
+
+/// Of --joints, a CSV or a bag. The instrument's joints are meant; where it has none, the recording's own four in the
+/// order theta, phi, rho, psi. A bag's stamps go with those of `frames`, which may be nullptr. Throws InputError for
+/// what is none of them.
+JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames);
+
+/// The same, and without --joints of the input itself where it is a bag; nullopt without any.
+std::optional<JointInput> find_joint_input(const CalibrateOptions& options, const Instrument& instrument,
+                                           const FrameSource* frames);
+
+}  // namespace lapservo::app

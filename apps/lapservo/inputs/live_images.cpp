@@ -1,0 +1,52 @@
+#include "apps/lapservo/inputs/live_images.h"
+
+#include <utility>
+
+#include "apps/lapservo/inputs/transports.h"
+#include "lapservo/core/error.h"
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+Transport::Subscription subscribe(Transport& transport, const std::string& topic, const ImageSink& sink) {
+  return topic.ends_with("/compressed") ? transport.subscribe_compressed_images(topic, sink.compressed)
+                                        : transport.subscribe_images(topic, sink.image);
+}
+
+}  // namespace
+
+Transport& Transports::get(const std::string& transport, const std::string& option) {
+  auto& made = transports_[transport];
+  if (!made) made = make_transport(transport, node_name_, option);
+  return *made;
+}
+
+bool names_topic(const std::string& text) {
+  return text.starts_with("ros1:") || text.starts_with("ros2:");
+}
+
+ImageInput open_images(const std::string& text, const std::string& option, const cv::Size& size, Transports& transports,
+                       ImageSink sink) {
+  if (names_topic(text)) {
+    const Address address = address_of(text, option);
+    return {subscribe(transports.get(address.transport, option), address.name, sink), nullptr};
+  }
+  if (!names_camera(text))
+    throw InputError(option, (text.empty() ? "is missing" : "is " + text) +
+                                 ", expected ros2:/topic, ros1:/topic, /dev/videoN or gst:PIPELINE");
+  return {nullptr, open_camera(text, size, std::move(sink.image))};
+}
+
+LiveImages::LiveImages(const std::string& text, const std::string& option, const Camera& camera, const Clock& clock,
+                       Transports& transports)
+    : clock_(clock),
+      receiver_(camera.width_px, camera.height_px, names_topic(text) ? StampsBy::sender : StampsBy::loop),
+      input_(open_images(text, option, {camera.width_px, camera.height_px}, transports, sink())) {}
+
+ImageSink LiveImages::sink() {
+  return {[this](ImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); },
+          [this](CompressedImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); }};
+}
+
+}  // namespace lapservo::app

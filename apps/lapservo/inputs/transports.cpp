@@ -1,0 +1,61 @@
+#include "apps/lapservo/inputs/transports.h"
+
+#include "lapservo/core/error.h"
+#ifdef LAPSERVO_ROS1
+#include "transports/ros1/ros1_names.h"
+#include "transports/ros1/ros1_transport.h"
+#endif
+#ifdef LAPSERVO_ROS2
+#include "transports/ros2/ros2_transport.h"
+#endif
+
+namespace lapservo::app {
+using namespace internal;
+namespace {
+
+[[noreturn]] [[maybe_unused]] void refuse_missing(const std::string& option, const std::string& transport,
+                                                  const std::string& packages) {
+  throw InputError(option, "is " + transport + ", which this build lacks: it was built without " + packages);
+}
+
+}  // namespace
+
+std::string resolved_name(const Address& address, [[maybe_unused]] const std::string& option) {
+#ifdef LAPSERVO_ROS1
+  if (address.transport == "ros1") return resolved_ros1_name(address.name, ros1_namespace(), option);
+#endif
+  return address.name;
+}
+
+Address address_of(const std::string& text, const std::string& option) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos || colon == 0 || colon + 1 == text.size())
+    throw InputError(option, (text.empty() ? "is missing" : "is " + text) +
+                                 ", expected a transport and a name: ros2:PSM1 or ros1:PSM1");
+  Address address{text.substr(0, colon), text.substr(colon + 1)};
+  address.name = resolved_name(address, option);
+  return address;
+}
+
+std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_unused]] const std::string& node_name,
+                                          const std::string& option) {
+  if (transport == "ros2") {
+#ifdef LAPSERVO_ROS2
+    return std::make_unique<Ros2Transport>(node_name);
+#else
+    refuse_missing(option, transport, "cyclonedds-dev and cyclonedds-tools");
+#endif
+  }
+  if (transport == "ros1") {
+#ifdef LAPSERVO_ROS1
+    return std::make_unique<Ros1Transport>(node_name);
+#else
+    refuse_missing(option, transport,
+                   "libroscpp-dev, libsensor-msgs-dev, libdiagnostic-msgs-dev, libtrajectory-msgs-dev and "
+                   "python3-gencpp");
+#endif
+  }
+  throw InputError(option, "is " + transport + ", expected ros2 or ros1");
+}
+
+}  // namespace lapservo::app

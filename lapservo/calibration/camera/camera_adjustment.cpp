@@ -1,0 +1,213 @@
+#include "lapservo/calibration/camera/camera_adjustment.h"
+
+#include <algorithm>
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "lapservo/calibration/fit/robust_scale.h"
+#include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/geometry/rotation.h"
+
+namespace lapservo::internal {
+namespace {
+
+struct CameraUnknowns {
+  double focal_px, aspect;  // fx, fy / fx
+  std::array<double, 2> centre_px;
+  std::array<double, 4> distortion;  // k1 k2 p1 p2
+  double k3;
+  std::array<double, 2> magnifications;  // of blue and red
+  std::array<double, 4> shifts_px{};     // of blue and red
+};
+
+constexpr int pose_numbers = 6, channels = 3;
+struct ViewUnknowns {
+  std::array<double, pose_numbers> pose;    // rotation vector and translation
+  std::array<double, channels> wider_px{};  // how far its edges lie towards dark squares in each channel
+};
+
+constexpr double loss_scale_sigmas = 3;
+// What neighbouring edges share and a fit of one doesn't tell: a floor for its sigma.
+constexpr double least_sigma_px = 0.01;
+constexpr double shift_sigma_px = 0.2;
+
+struct EdgeCost {
+  EdgePoint point;
+  double sigma_px;
+
+  template <typename T>
+  bool operator()(const T* focal_px, const T* aspect, const T* centre_px, const T* distortion, const T* k3,
+                  const T* magnifications, const T* shifts_px, const T* pose, const T* wider_px, T* residual) const {
+    const T on_board[3] = {T(point.point_m.x()), T(point.point_m.y()), T(point.point_m.z())};
+    T p[3];
+    ceres::AngleAxisRotatePoint(pose, on_board, p);
+    for (int i = 0; i < 3; ++i) p[i] += pose[3 + i];
+    const T x = p[0] / p[2], y = p[1] / p[2], r2 = x * x + y * y;
+    const T &k1 = distortion[0], &k2 = distortion[1], &p1 = distortion[2], &p2 = distortion[3];
+    const T radial = T(1) + r2 * (k1 + r2 * (k2 + r2 * *k3));
+    const T dx = x * radial + T(2) * p1 * x * y + p2 * (r2 + T(2) * x * x);
+    const T dy = y * radial + p1 * (r2 + T(2) * y * y) + T(2) * p2 * x * y;
+    T u = *focal_px * dx, v = *focal_px * *aspect * dy;
+    if (point.channel != 1) {
+      const int other = point.channel == 0 ? 0 : 1;
+      u = magnifications[other] * u + shifts_px[2 * other], v = magnifications[other] * v + shifts_px[2 * other + 1];
+    }
+    u += centre_px[0], v += centre_px[1];
+    const T beyond = T(point.normal.x()) * (point.raw_px.x() - u) + T(point.normal.y()) * (point.raw_px.y() - v);
+    residual[0] = (beyond + T(point.towards_bright) * wider_px[point.channel]) / sigma_px;
+    return true;
+  }
+  double residual(const CameraUnknowns& c, const ViewUnknowns& view) const {
+    double residual = 0;
+    (*this)(&c.focal_px, &c.aspect, c.centre_px.data(), c.distortion.data(), &c.k3, c.magnifications.data(),
+            c.shifts_px.data(), view.pose.data(), view.wider_px.data(), &residual);
+    return residual;
+  }
+  void add_to(ceres::Problem& problem, CameraUnknowns& c, ViewUnknowns& view) const {
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<EdgeCost, 1, 1, 1, 2, 4, 1, 2, 4, pose_numbers, channels>(new EdgeCost(*this)),
+        new ceres::CauchyLoss(loss_scale_sigmas), &c.focal_px, &c.aspect, c.centre_px.data(), c.distortion.data(),
+        &c.k3, c.magnifications.data(), c.shifts_px.data(), view.pose.data(), view.wider_px.data());
+  }
+};
+
+// What demosaicing and chroma filters shift blue and red by, all over the picture, is no magnification.
+struct ShiftPrior {
+  template <typename T>
+  bool operator()(const T* shifts_px, T* residuals) const {
+    for (int i = 0; i < 4; ++i) residuals[i] = shifts_px[i] / shift_sigma_px;
+    return true;
+  }
+};
+
+CameraUnknowns unknowns_of(const Camera& camera) {
+  const auto& k = camera.distortion;
+  const ChromaticAberration& aberration = camera.chromatic_aberration;
+  return {camera.fx_px, camera.fy_px / camera.fx_px,      {camera.cx_px, camera.cy_px}, {k[0], k[1], k[2], k[3]},
+          k[4],         {aberration.blue, aberration.red}};
+}
+
+Camera camera_of(const CameraUnknowns& c, Camera camera) {
+  camera.fx_px = c.focal_px, camera.fy_px = c.focal_px * c.aspect;
+  camera.cx_px = c.centre_px[0], camera.cy_px = c.centre_px[1];
+  camera.distortion = {c.distortion[0], c.distortion[1], c.distortion[2], c.distortion[3], c.k3};
+  camera.chromatic_aberration = {c.magnifications[0], c.magnifications[1]};
+  return camera;
+}
+
+ViewUnknowns unknowns_of(const Rigid3& pose) {
+  const Eigen::Vector3d rotation = rotation_vector_of(pose.rotation), &t = pose.translation;
+  return {{rotation.x(), rotation.y(), rotation.z(), t.x(), t.y(), t.z()}};
+}
+
+Rigid3 pose_of(const ViewUnknowns& view) {
+  const auto& p = view.pose;
+  return {rotation_by({p[0], p[1], p[2]}), {p[3], p[4], p[5]}};
+}
+
+struct Sigmas {
+  CameraSigmas camera;
+  double aspect = 0;
+};
+
+std::optional<Sigmas> sigmas_of(ceres::Problem& problem, const CameraUnknowns& c, double scale) {
+  ceres::Covariance::Options options;
+  options.algorithm_type = ceres::SPARSE_QR;
+  ceres::Covariance covariance(options);
+  const std::vector<std::pair<const double*, const double*>> blocks{{&c.focal_px, &c.focal_px},
+                                                                    {&c.focal_px, &c.aspect},
+                                                                    {&c.aspect, &c.aspect},
+                                                                    {c.centre_px.data(), c.centre_px.data()},
+                                                                    {c.distortion.data(), c.distortion.data()},
+                                                                    {&c.k3, &c.k3},
+                                                                    {c.magnifications.data(), c.magnifications.data()}};
+  if (!covariance.Compute(blocks, &problem)) return std::nullopt;
+  bool finite = true;
+  const auto read = [&](const double* one, const double* other, Eigen::Index size) {
+    Eigen::MatrixXd block(size, size);
+    finite = finite && covariance.GetCovarianceBlock(one, other, block.data()) && block.allFinite();
+    return block;
+  };
+  const double focal = read(&c.focal_px, &c.focal_px, 1)(0), focal_aspect = read(&c.focal_px, &c.aspect, 1)(0),
+               aspect = read(&c.aspect, &c.aspect, 1)(0), k3 = read(&c.k3, &c.k3, 1)(0);
+  const Eigen::MatrixXd centre = read(c.centre_px.data(), c.centre_px.data(), 2);
+  const Eigen::MatrixXd distortion = read(c.distortion.data(), c.distortion.data(), 4);
+  const Eigen::MatrixXd magnifications = read(c.magnifications.data(), c.magnifications.data(), 2);
+  if (!finite) return std::nullopt;
+  const auto sigma = [&](double variance) { return scale * std::sqrt(std::max(0.0, variance)); };
+  Sigmas result;
+  CameraSigmas& sigmas = result.camera;
+  sigmas.fx_px = sigma(focal);
+  sigmas.fy_px =
+      sigma(c.aspect * c.aspect * focal + 2 * c.focal_px * c.aspect * focal_aspect + c.focal_px * c.focal_px * aspect);
+  result.aspect = sigma(aspect);
+  sigmas.cx_px = sigma(centre(0, 0)), sigmas.cy_px = sigma(centre(1, 1));
+  for (Eigen::Index i = 0; i < 4; ++i) sigmas.distortion[static_cast<std::size_t>(i)] = sigma(distortion(i, i));
+  sigmas.distortion[4] = sigma(k3);
+  sigmas.blue = sigma(magnifications(0, 0)), sigmas.red = sigma(magnifications(1, 1));
+  return result;
+}
+
+}  // namespace
+
+std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::vector<Rigid3>& camera_from_board,
+                                              const std::vector<std::vector<EdgePoint>>& views,
+                                              const CameraFreedom& freedom, const AtIteration& at_iteration) {
+  CameraUnknowns camera = unknowns_of(start);
+  if (!freedom.k3) camera.k3 = 0;
+  if (!freedom.aspect) camera.aspect = 1;
+  std::vector<ViewUnknowns> view_unknowns;
+  for (const Rigid3& pose : camera_from_board) view_unknowns.push_back(unknowns_of(pose));
+
+  ceres::Problem problem;
+  std::vector<std::vector<EdgeCost>> costs(views.size());
+  std::array<bool, channels> seen{};
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (const EdgePoint& point : views[i]) {
+      costs[i].push_back({point, std::hypot(point.sigma_px, least_sigma_px)});
+      seen[static_cast<std::size_t>(point.channel)] = true;
+      costs[i].back().add_to(problem, camera, view_unknowns[i]);
+    }
+  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ShiftPrior, 4, 4>(new ShiftPrior), nullptr,
+                           camera.shifts_px.data());
+  if (!freedom.aspect) problem.SetParameterBlockConstant(&camera.aspect);
+  if (!freedom.k3) problem.SetParameterBlockConstant(&camera.k3);
+  if (!seen[0] || !seen[2]) problem.SetParameterBlockConstant(camera.magnifications.data());
+  std::vector<int> fixed_channels;
+  for (std::size_t c = 0; c < seen.size(); ++c)
+    if (!seen[c]) fixed_channels.push_back(static_cast<int>(c));
+  if (!fixed_channels.empty())
+    for (ViewUnknowns& view : view_unknowns)
+      if (problem.HasParameterBlock(view.wider_px.data()))
+        problem.SetManifold(view.wider_px.data(), new ceres::SubsetManifold(channels, fixed_channels));
+
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::SPARSE_SCHUR;
+  solver.max_num_iterations = 50;
+  solver.function_tolerance = 1e-10;
+  ceres::Solver::Summary summary;
+  if (!solve_quietly(solver, problem, summary, at_iteration)) return std::nullopt;
+
+  CameraAdjustment result;
+  result.camera = camera_of(camera, start);
+  std::vector<double> in_sigmas;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    result.camera_from_board.push_back(pose_of(view_unknowns[i]));
+    auto& residuals_px = result.residuals_px.emplace_back();
+    for (const EdgeCost& cost : costs[i]) {
+      in_sigmas.push_back(cost.residual(camera, view_unknowns[i]));
+      residuals_px.push_back(in_sigmas.back() * cost.sigma_px);
+    }
+    for (std::size_t c = 0; c < channels; ++c)
+      result.bright_wider_px[c] += view_unknowns[i].wider_px[c] / static_cast<double>(views.size());
+  }
+  const auto sigmas = sigmas_of(problem, camera, std::max(1.0, robust_scale(std::move(in_sigmas))));
+  if (!sigmas) return std::nullopt;
+  result.sigmas = sigmas->camera, result.sigma_aspect = sigmas->aspect;
+  return result;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/calibration/fit/at_iteration.h"
+#include "lapservo/geometry/camera.h"
+#include "lapservo/geometry/rigid3.h"
+
+namespace lapservo::internal {
+
+/// Where an edge of the board was seen in one channel: the line through raw_px across `normal`.
+struct EdgePoint {
+  Eigen::Vector3d point_m;  ///< on the board
+  Eigen::Vector2d raw_px, normal;
+  double sigma_px;
+  int towards_bright;  ///< 1 where `normal` points to the brighter square, else -1
+  int channel;         ///< 0 blue, 1 green, 2 red
+};
+
+/// What of the camera is free; else k3 is 0, and fy is fx.
+struct CameraFreedom {
+  bool k3 = true, aspect = true;
+};
+
+struct CameraAdjustment {
+  Camera camera;
+  CameraSigmas sigmas;
+  double sigma_aspect = 0;                        ///< of fy / fx
+  std::vector<Rigid3> camera_from_board;          ///< as many as views
+  std::vector<std::vector<double>> residuals_px;  ///< of each point: found minus expected, along `normal`
+  std::array<double, 3> bright_wider_px{};        ///< by channel: how far edges lie towards dark squares, mean of views
+};
+
+/// Fits a camera and the poses of a board in all views to the points of its edges (Ceres, Cauchy loss). Bright squares
+/// that look wider than dark ones, by as much all over a view, are allowed for. nullopt when it does not settle.
+std::optional<CameraAdjustment> adjust_camera(const Camera& start, const std::vector<Rigid3>& camera_from_board,
+                                              const std::vector<std::vector<EdgePoint>>& views,
+                                              const CameraFreedom& freedom, const AtIteration& at_iteration);
+
+}  // namespace lapservo::internal

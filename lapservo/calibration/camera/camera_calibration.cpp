@@ -1,0 +1,335 @@
+#include "lapservo/calibration/camera/camera_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <opencv2/calib3d.hpp>
+
+#include "lapservo/calibration/camera/board_edges.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/rounded_sigma.h"
+#include "lapservo/core/statistics.h"
+#include "lapservo/geometry/invertible.h"
+#include "lapservo/geometry/rotation.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr std::size_t least_views = 4, least_corners = 12;
+constexpr double least_tilt_rad = rad_from_deg(15);
+// Worse than these, one sigma, and the views are too alike.
+constexpr double max_focal_sigma = 0.003, max_centre_sigma_px = 5;
+// Pixels are square, unless the views say otherwise by more than this.
+constexpr double square_pixels = 5e-4, significant_sigmas = 3;
+
+struct Points {
+  std::vector<cv::Point3f> on_board;
+  std::vector<cv::Point2f> in_picture;
+};
+
+Points points_of(const Board& board, const std::vector<BoardCorner>& corners) {
+  Points points;
+  for (const BoardCorner& corner : corners) {
+    const Eigen::Vector3d m = board.corner_m(corner.column, corner.row);
+    points.on_board.emplace_back(static_cast<float>(m.x()), static_cast<float>(m.y()), 0.0F);
+    points.in_picture.emplace_back(static_cast<float>(corner.raw_px.x()), static_cast<float>(corner.raw_px.y()));
+  }
+  return points;
+}
+
+Rigid3 pose_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
+  const auto vector_of = [](const cv::Mat& m) {
+    return Eigen::Vector3d(m.at<double>(0), m.at<double>(1), m.at<double>(2));
+  };
+  return {rotation_by(vector_of(rotation_vector)), vector_of(translation)};
+}
+
+struct LensFit {
+  Camera camera;
+  std::vector<Rigid3> camera_from_board;
+};
+
+// By the corners alone, to start with: OpenCV's, without k3.
+std::optional<LensFit> first_fit(const Board& board, const std::vector<BoardView>& views, const Camera& start) {
+  std::vector<std::vector<cv::Point3f>> on_board;
+  std::vector<std::vector<cv::Point2f>> in_picture;
+  for (const BoardView& view : views) {
+    Points points = points_of(board, view.corners);
+    on_board.push_back(std::move(points.on_board)), in_picture.push_back(std::move(points.in_picture));
+  }
+  cv::Mat matrix, distortion;
+  std::vector<cv::Mat> rotations, translations;
+  LensFit fit{start, {}};
+  fit.camera.width_px = views.front().bgr.cols, fit.camera.height_px = views.front().bgr.rows;
+  try {
+    cv::calibrateCamera(on_board, in_picture, views.front().bgr.size(), matrix, distortion, rotations, translations,
+                        cv::CALIB_FIX_K3);
+  } catch (const cv::Exception&) {  // of views that tell nothing
+    return std::nullopt;
+  }
+  fit.camera.fx_px = matrix.at<double>(0, 0), fit.camera.fy_px = matrix.at<double>(1, 1);
+  fit.camera.cx_px = matrix.at<double>(0, 2), fit.camera.cy_px = matrix.at<double>(1, 2);
+  for (int i = 0; i < 5; ++i) fit.camera.distortion[static_cast<std::size_t>(i)] = distortion.at<double>(i);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    fit.camera_from_board.push_back(pose_of(rotations[i], translations[i]));
+    if (!fit.camera_from_board.back().translation.allFinite() || !(fit.camera_from_board.back().translation.z() > 0))
+      return std::nullopt;
+  }
+  if (!std::isfinite(fit.camera.fx_px) || !(fit.camera.fx_px > 0) || !(fit.camera.fy_px > 0)) return std::nullopt;
+  return fit;
+}
+
+void add_points(const EdgePixels& edge, const BoardEdgeFit& fit, int channel, std::vector<EdgePoint>& points) {
+  const EdgePath& path = edge.path;
+  for (const double side : {-1.0, 1.0}) {
+    const double beyond = side * fit.spread_fraction, fraction = fit.mean_fraction + beyond;
+    const double distance_px =
+        4 * path.sag_px * fraction * (1 - fraction) + fit.offset_px + fit.slope * beyond * path.length_px;
+    points.push_back({path.point_m(fraction),
+                      path.from_px + fraction * path.length_px * path.along + distance_px * path.normal, path.normal,
+                      std::sqrt(2.0) * fit.sigma_px, fit.towards_bright, channel});
+  }
+}
+
+struct MeasuredEdges {
+  std::vector<std::vector<EdgePoint>> points;  // by view
+  std::vector<BoardEdgeProfile> profiles;
+};
+
+constexpr int green = 1;
+
+MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, const LensFit& fit, bool all_channels,
+                       bool with_profiles) {
+  const std::array<float, 256> light = fit.camera.response.table();
+  MeasuredEdges result;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    auto& points = result.points.emplace_back();
+    for (const EdgePixels& edge :
+         edges_of(board, views[i].corners, fit.camera, fit.camera_from_board[i], views[i].bgr)) {
+      for (int channel = 0; channel < 3; ++channel) {
+        if (channel != green && !all_channels) continue;
+        const auto edge_fit = fit_edge(edge, channel, light);
+        if (!edge_fit) continue;
+        add_points(edge, *edge_fit, channel, points);
+        if (channel != green || !with_profiles) continue;
+        if (auto profile = profile_of(edge, edge_fit->towards_bright, channel, edge_fit->blur_px, fit.camera.response))
+          result.profiles.push_back(std::move(*profile));
+      }
+    }
+  }
+  return result;
+}
+
+// As many as tell all that there is to tell.
+std::vector<BoardEdgeProfile> some_of(std::vector<BoardEdgeProfile> profiles, std::size_t most) {
+  if (profiles.size() <= most) return profiles;
+  std::vector<BoardEdgeProfile> some;
+  for (std::size_t i = 0; i < most; ++i) some.push_back(std::move(profiles[i * profiles.size() / most]));
+  return some;
+}
+
+struct Refined {
+  LensFit fit;
+  CameraAdjustment adjustment;
+};
+
+// What the views can't tell from nothing stays nothing: k3, and pixels that are not square.
+std::optional<CameraAdjustment> adjust_what_shows(const LensFit& fit, const MeasuredEdges& edges,
+                                                  const AtIteration& at_iteration) {
+  CameraFreedom freedom;
+  auto all = adjust_camera(fit.camera, fit.camera_from_board, edges.points, freedom, at_iteration);
+  if (!all) return std::nullopt;
+  const Camera& camera = all->camera;
+  freedom.k3 = std::abs(camera.distortion[4]) > significant_sigmas * all->sigmas.distortion[4];
+  freedom.aspect =
+      std::abs(camera.fy_px / camera.fx_px - 1) > std::max(square_pixels, significant_sigmas * all->sigma_aspect);
+  if (freedom.k3 && freedom.aspect) return all;
+  return adjust_camera(camera, all->camera_from_board, edges.points, freedom, at_iteration);
+}
+
+LensFit fit_of(const CameraAdjustment& adjustment) {
+  return {adjustment.camera, adjustment.camera_from_board};
+}
+
+void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edges, CameraCalibration& calibration) {
+  std::vector<double> all;
+  for (std::size_t i = 0; i < edges.points.size(); ++i) {
+    std::vector<double> of_view;
+    for (std::size_t k = 0; k < edges.points[i].size(); ++k) {
+      if (edges.points[i][k].channel != green) continue;
+      const double residual_px = adjustment.residuals_px[i][k];
+      of_view.push_back(residual_px), all.push_back(residual_px);
+    }
+    calibration.view_rms_px.push_back(rms(of_view));
+  }
+  calibration.rms_px = rms(all);
+}
+
+// The same from the same pictures: what the last digits of sums are hangs on where in memory the numbers lie.
+Camera rounded_by_sigmas(Camera camera, const CameraSigmas& sigmas) {
+  camera.fx_px = rounded_by_sigma(camera.fx_px, sigmas.fx_px);
+  camera.fy_px = rounded_by_sigma(camera.fy_px, sigmas.fy_px);
+  camera.cx_px = rounded_by_sigma(camera.cx_px, sigmas.cx_px);
+  camera.cy_px = rounded_by_sigma(camera.cy_px, sigmas.cy_px);
+  for (std::size_t i = 0; i < camera.distortion.size(); ++i)
+    camera.distortion[i] = rounded_by_sigma(camera.distortion[i], sigmas.distortion[i]);
+  ChromaticAberration& aberration = camera.chromatic_aberration;
+  aberration.blue = rounded_by_sigma(aberration.blue, sigmas.blue);
+  aberration.red = rounded_by_sigma(aberration.red, sigmas.red);
+  return camera;
+}
+
+// Empty where the views tell enough.
+std::string too_alike(const CameraAdjustment& adjustment) {
+  const Camera& camera = adjustment.camera;
+  const CameraSigmas& sigmas = adjustment.sigmas;
+  if (sigmas.fx_px < max_focal_sigma * camera.fx_px && sigmas.cx_px < max_centre_sigma_px &&
+      sigmas.cy_px < max_centre_sigma_px)
+    return {};
+  return fmt::format(
+      "the views are too alike: one sigma of the focal length is {:.1f} px of {:.0f}, of the principal "
+      "point {:.1f} and {:.1f} px",
+      sigmas.fx_px, camera.fx_px, sigmas.cx_px, sigmas.cy_px);
+}
+
+struct Tilts {
+  double up_down_rad = 0, sideways_rad = 0;  // the largest
+};
+
+// The board's normal about the picture's axes, by a camera of a usual field of view: good enough for advice.
+Tilts tilts_of(const std::vector<BoardView>& views, const cv::Size& size) {
+  const double focal_px = 1.1 * size.width;
+  const cv::Matx33d matrix(focal_px, 0, size.width / 2.0, 0, focal_px, size.height / 2.0, 0, 0, 1);
+  const Board unit{0, 0, 1};
+  Tilts tilts;
+  for (const BoardView& view : views) {
+    const Points points = points_of(unit, view.corners);
+    cv::Mat rotation, translation;
+    if (!cv::solvePnP(points.on_board, points.in_picture, matrix, cv::noArray(), rotation, translation, false,
+                      cv::SOLVEPNP_IPPE))
+      continue;
+    Eigen::Vector3d normal = pose_of(rotation, translation).rotation * Eigen::Vector3d::UnitZ();
+    if (normal.z() < 0) normal = -normal;
+    tilts.up_down_rad = std::max(tilts.up_down_rad, std::abs(std::atan2(normal.y(), normal.z())));
+    tilts.sideways_rad = std::max(tilts.sideways_rad, std::abs(std::atan2(normal.x(), normal.z())));
+  }
+  return tilts;
+}
+
+// Which parts of the picture, by row and column, hold a corner in some view.
+std::array<std::array<bool, 4>, 3> parts_seen(const std::vector<BoardView>& views, const cv::Size& size) {
+  std::array<std::array<bool, 4>, 3> seen{};
+  const auto part = [](double at_px, int size_px, int parts) {
+    return static_cast<std::size_t>(std::clamp(static_cast<int>(at_px * parts / size_px), 0, parts - 1));
+  };
+  for (const BoardView& view : views)
+    for (const BoardCorner& corner : view.corners)
+      seen[part(corner.raw_px.y(), size.height, 3)][part(corner.raw_px.x(), size.width, 4)] = true;
+  return seen;
+}
+
+}  // namespace
+
+bool BoardViews::add(const std::string& name, const cv::Mat& bgr, bool always) {
+  BoardView view{name, bgr, find_board(board_, bgr, always)};
+  if (view.corners.size() < least_corners) return false;
+  ++found_;
+  // The places of a few corners tell position, distance and tilt.
+  constexpr double different = 0.06;  // of the picture's width
+  const auto distance_px = [&](const BoardView& other) {
+    double most = 0;
+    int shared = 0;
+    for (const BoardCorner& a : view.corners)
+      for (const BoardCorner& b : other.corners)
+        if (a.column == b.column && a.row == b.row) most = std::max(most, (a.raw_px - b.raw_px).norm()), ++shared;
+    return shared < 4 ? std::numeric_limits<double>::max() : most;
+  };
+  const bool differs = std::all_of(views_.begin(), views_.end(),
+                                   [&](const BoardView& other) { return distance_px(other) > different * bgr.cols; });
+  if (!always && (!differs || full())) return true;
+  view.bgr = bgr.clone();
+  views_.push_back(std::move(view));
+  return true;
+}
+
+std::string advice(const std::vector<BoardView>& views, const cv::Size& size) {
+  std::vector<std::string> wanted;
+  if (views.size() < least_views)
+    wanted.push_back(fmt::format("show the board in {} more views", least_views - views.size()));
+  const auto seen = parts_seen(views, size);
+  constexpr std::array vertical{"upper", "middle", "lower"};
+  std::vector<std::string> empty;
+  for (std::size_t row = 0; row < seen.size(); ++row)
+    for (const auto& [side, from] : {std::pair{"left", 0U}, {"right", 2U}})
+      if (!seen[row][from] && !seen[row][from + 1]) empty.push_back(fmt::format("{} {}", vertical[row], side));
+  for (const auto& [side, column] : {std::pair{"left side", 0U}, {"right side", 3U}})
+    if (!seen[0][column] && !seen[1][column] && !seen[2][column]) empty.push_back(side);
+  if (!empty.empty()) wanted.push_back(fmt::format("fill the {}", fmt::join(empty, ", the ")));
+  const Tilts tilts = tilts_of(views, size);
+  if (tilts.up_down_rad < least_tilt_rad)
+    wanted.push_back("tilt the board by 20 to 40 degrees, its upper edge towards the camera and away");
+  if (tilts.sideways_rad < least_tilt_rad)
+    wanted.push_back("tilt the board by 20 to 40 degrees, its left edge towards the camera and away");
+  return fmt::format("{}", fmt::join(wanted, "; "));
+}
+
+CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
+                                   const std::function<void(const std::string&)>& progress,
+                                   const AtIteration& at_iteration) {
+  const auto told = [&](const std::string& what) {
+    if (progress) progress(what);
+  };
+  CameraCalibration calibration;
+  const cv::Size size = views.empty() ? cv::Size() : views.front().bgr.size();
+  const auto refuse = [&](const std::string& why) {
+    const std::string more = advice(views, size);
+    calibration.refusal = why + (more.empty() ? "" : ": " + more);
+    return calibration;
+  };
+  if (views.size() < least_views) return refuse(fmt::format("{} views of the board are too few", views.size()));
+  told("first fit");
+  Camera without = start;
+  without.chromatic_aberration = {};
+  auto fit = first_fit(board, views, without);
+  if (!fit) return refuse("the views are too alike to tell the camera");
+
+  // Edges about the fit, and the fit about the edges.
+  std::optional<CameraAdjustment> adjustment;
+  for (int round = 0; round < 2; ++round) {
+    told("edges in green");
+    adjustment = adjust_camera(fit->camera, fit->camera_from_board, measured(board, views, *fit, false, false).points,
+                               {false, true}, at_iteration);
+    if (!adjustment) return refuse("the views are too alike to tell the camera");
+    fit = fit_of(*adjustment);
+  }
+  if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
+  // Means are of light as the last round had it.
+  constexpr int response_rounds = 2;
+  for (int round = 0; round < response_rounds; ++round) {
+    told("response");
+    const bool last = round + 1 == response_rounds;
+    const auto response = fit_response(some_of(measured(board, views, *fit, false, true).profiles, last ? 600 : 300),
+                                       fit->camera.response, last, at_iteration);
+    if (!response) break;
+    calibration.response = response;
+    fit->camera.response = response->response;
+  }
+  told("edges in all colours");
+  const MeasuredEdges edges = measured(board, views, *fit, true, false);
+  adjustment = adjust_what_shows(*fit, edges, at_iteration);
+  if (!adjustment) return refuse("the views are too alike to tell the camera");
+  calibration.camera = rounded_by_sigmas(adjustment->camera, adjustment->sigmas);
+  calibration.sigmas = adjustment->sigmas;
+  calibration.bright_wider_px = adjustment->bright_wider_px[green];
+  calibration.poses = adjustment->camera_from_board;
+  add_residuals(*adjustment, edges, calibration);
+  if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
+  if (!is_invertible(calibration.camera))
+    return refuse("the distortion that fits the views can't be inverted at the picture's border: show the board there");
+  return calibration;
+}
+
+}  // namespace lapservo::internal

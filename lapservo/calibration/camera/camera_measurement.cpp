@@ -1,0 +1,149 @@
+#include "lapservo/calibration/camera/camera_measurement.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lapservo/calibration/recording/frame_recording.h"
+#include "lapservo/core/error.h"
+#include "lapservo/core/rounded_sigma.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr std::size_t enough_live_views = 12;
+// Of a video four frames a second are looked at, as a hand moves a board, and of a long one at least so many, and four
+// for each view that is wanted: the corners of 1280x720 take some 60 ms to find.
+int every_of_video(const FrameSource& source, std::size_t most_views) {
+  constexpr int enough_frames = 120;
+  const int quarter_second = std::max(1, static_cast<int>(source.frames_per_second() / 4));
+  return std::max(quarter_second, every_of(source, std::max(enough_frames, 4 * static_cast<int>(most_views))));
+}
+
+std::string name_of(const Frame& frame) {
+  return frame.file.empty() ? fmt::format("frame {}", frame.index) : frame.file.string();
+}
+
+}  // namespace
+
+Board board_of(const BoardWords& words, const BoardWords::Names& names) {
+  Board board;
+  const char* const end = words.corners.data() + words.corners.size();
+  const auto [times, first] = std::from_chars(words.corners.data(), end, board.columns);
+  bool read = first == std::errc() && times != end && (*times == 'x' || *times == 'X');
+  if (read) {
+    const auto [rest, second] = std::from_chars(times + 1, end, board.rows);
+    read = second == std::errc() && rest == end;
+  }
+  const auto usual = [](int count) { return count >= 3 && count <= 50; };
+  if (!read || !usual(board.columns) || !usual(board.rows))
+    throw InputError(names.board, "corners", words.corners,
+                     "COLUMNSxROWS of inner corners, 3 to 50 each, for example 9x6");
+  board.square_m = words.square_m;
+  board.dictionary = words.dictionary;
+  if (words.dictionary.empty()) {
+    if (words.marker_m)
+      throw InputError(names.marker, "is of a ChArUco board, expected " + names.dictionary + " with it");
+    return board;
+  }
+  constexpr double usual_share = 0.75;
+  board.marker_m = words.marker_m.value_or(usual_share * board.square_m);
+  if (board.marker_m >= board.square_m)
+    throw InputError(names.marker, "width", fmt::format("{:.6g}", 1e3 * board.marker_m),
+                     fmt::format("less than a square's {:.6g} mm", 1e3 * words.square_m));
+  if (const std::string problem = board_problem(board); !problem.empty()) throw InputError(names.dictionary, problem);
+  return board;
+}
+
+BoardRecordings::BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig)
+    : views_(board, most_views), whose_("the rig's camera") {
+  if (rig) size_ = cv::Size(rig->camera.width_px, rig->camera.height_px);
+}
+
+void BoardRecordings::look_at(FrameSource& source, const std::string& name, const JobWatch& watch,
+                              const std::function<void(const std::string&)>& say) {
+  const bool pictures = source.kind() == FrameSource::Kind::image || source.kind() == FrameSource::Kind::folder;
+  const bool live = source.kind() == FrameSource::Kind::live;
+  const int every = pictures || live ? 1 : every_of_video(source, views_.most());
+  std::string said;
+  int read = 0;
+  while (!(read_.stopped = watch.stopped())) {
+    const auto frame = source.next();
+    if (!frame) break;
+    if (!size_) size_ = frame->bgr.size(), whose_ = name_of(*frame);
+    check_frame_size(*frame, name, *size_, whose_);
+    if (read++ % every != 0) continue;
+    if (frame->flaw) {
+      ++read_.flawed;
+      continue;
+    }
+    ++read_.looked_at;
+    // The rest is still read, since it may be damaged, but no view would be taken of it.
+    const bool searched = pictures || !views_.full();
+    if (searched && !views_.add(name_of(*frame), frame->bgr, pictures) && pictures)
+      without_board_.push_back(name_of(*frame));
+    watch.tell(source.frame_count(), read, fmt::format(", {} views", views_.views().size()));
+    if (!live) continue;
+    const std::string wanted = views_.views().empty() ? "show the board" : advice(views_.views(), *size_);
+    if (say && wanted != said) say(fmt::format("{} views: {}", views_.views().size(), wanted));
+    said = wanted;
+    if (views_.full() || (wanted.empty() && views_.views().size() >= enough_live_views)) break;
+  }
+  // A camera is stopped when there are enough views: that is how its calibration ends.
+  if (live) read_.stopped = false;
+  read_.complaint = source.complaint();
+}
+
+CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
+                                 const JobWatch& watch) {
+  CameraMeasurement measured;
+  const FramesRead& read = recordings.read();
+  if (read.stopped) return measured.calibration.refusal = "stopped", measured;
+  measured.views = recordings.take_views();
+  if (measured.views.empty()) {
+    measured.calibration.refusal = fmt::format(
+        "the board is in none of {} pictures{}: look at the board's number of inner corners, show it wholly, sharp, "
+        "with a white margin",
+        read.looked_at, read.damaged());
+    return measured;
+  }
+  int step = 0;
+  const auto progress = [&](const std::string& what) { watch.tell(std::nullopt, ++step, ", " + what); };
+  measured.calibration = calibrate_camera(board, measured.views, start, progress, watch.is_stopped);
+  measured.advice = advice(measured.views, *recordings.size());
+  return measured;
+}
+
+Camera measured_camera(const CameraCalibration& calibration) {
+  Camera camera = calibration.camera;
+  camera.sigmas = calibration.sigmas;
+  CameraSigmas& sigmas = camera.sigmas;
+  for (double* sigma : {&sigmas.fx_px, &sigmas.fy_px, &sigmas.cx_px, &sigmas.cy_px, &sigmas.blue, &sigmas.red})
+    *sigma = rounded_sigma(*sigma);
+  for (double& sigma : sigmas.distortion) sigma = rounded_sigma(sigma);
+  if (calibration.response) camera.response.sigma = rounded_sigma(calibration.response->sigma);
+  return camera;
+}
+
+std::vector<CalibratedNumber> calibrated_numbers(const Camera& before, const CameraCalibration& calibration) {
+  const Camera& after = calibration.camera;
+  const CameraSigmas& sigmas = calibration.sigmas;
+  std::vector<CalibratedNumber> numbers{{"fx [px]", before.fx_px, after.fx_px, sigmas.fx_px},
+                                        {"fy [px]", before.fy_px, after.fy_px, sigmas.fy_px},
+                                        {"cx [px]", before.cx_px, after.cx_px, sigmas.cx_px},
+                                        {"cy [px]", before.cy_px, after.cy_px, sigmas.cy_px}};
+  constexpr std::array names{"k1", "k2", "p1", "p2", "k3"};
+  for (std::size_t i = 0; i < names.size(); ++i)
+    numbers.push_back({names[i], before.distortion[i], after.distortion[i], sigmas.distortion[i]});
+  numbers.push_back(
+      {"magnification of blue", before.chromatic_aberration.blue, after.chromatic_aberration.blue, sigmas.blue});
+  numbers.push_back(
+      {"magnification of red", before.chromatic_aberration.red, after.chromatic_aberration.red, sigmas.red});
+  return numbers;
+}
+
+}  // namespace lapservo::internal

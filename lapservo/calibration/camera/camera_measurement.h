@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lapservo/calibration/calibrated_number.h"
+#include "lapservo/calibration/camera/camera_calibration.h"
+#include "lapservo/calibration/recording/frame_recording.h"
+
+namespace lapservo::internal {
+
+/// A board of `square_m` described by words: "9x6" inner corners; for a ChArUco board its dictionary, and a marker's
+/// width, else 3/4 of a square's. Throws InputError naming `names` for what is none.
+struct BoardWords {
+  std::string corners;
+  double square_m = 0;
+  std::string dictionary{};
+  std::optional<double> marker_m{};
+
+  /// How the user calls them.
+  struct Names {
+    std::string board = "--board", marker = "--marker-mm", dictionary = "--aruco";
+  };
+};
+Board board_of(const BoardWords& words, const BoardWords::Names& names = {});
+
+/// Gathers views of a board: every picture of folders; of videos and cameras those that differ, of four frames a second
+/// or fewer.
+class BoardRecordings {
+ public:
+  /// `rig`: whose camera took them, which tells their size; else the first one does.
+  BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig);
+
+  /// Of a live camera until the views suffice; `say` is told what it should be shown next. Throws InputError at a
+  /// picture of another size.
+  void look_at(FrameSource& source, const std::string& name, const JobWatch& watch,
+               const std::function<void(const std::string&)>& say = {});
+
+  const FramesRead& read() const { return read_; }
+  const std::vector<std::string>& without_board() const { return without_board_; }
+  /// Of the pictures; nullopt before the first one, where no rig tells it.
+  const std::optional<cv::Size>& size() const { return size_; }
+  /// Those chosen; empties this.
+  std::vector<BoardView> take_views() { return views_.take(); }
+
+ private:
+  BoardViews views_;
+  std::optional<cv::Size> size_;
+  std::string whose_;
+  FramesRead read_;
+  std::vector<std::string> without_board_;
+};
+
+/// A camera, measured, and the pictures that it was measured by.
+struct CameraMeasurement {
+  CameraCalibration calibration;  ///< or its refusal
+  std::vector<BoardView> views;
+  std::string advice;  ///< what more pictures should show; empty when nothing is missing
+};
+
+/// Of what the recordings show.
+CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
+                                 const JobWatch& watch);
+
+/// The camera with its sigmas, as a rig holds it.
+Camera measured_camera(const CameraCalibration& calibration);
+
+/// Each number of the camera, in its units; `before` is that of the camera that was started with.
+std::vector<CalibratedNumber> calibrated_numbers(const Camera& before, const CameraCalibration& calibration);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,81 @@
+#include "lapservo/calibration/check/frame_diagnosis.h"
+
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/testing/scenes.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int frames = 12;
+
+class FrameDiagnosisTest : public ::testing::Test {
+ protected:
+  const Rig rig = scenes::usual_rig();
+
+  // Frames of the rig as `change` leaves them, tracked and diagnosed by `believed`.
+  template <typename Change>
+  std::string text(const Rig& believed, Change change) const {
+    FrameDiagnosis diagnosis(believed);
+    Tracker tracker(believed);
+    Random random(7);
+    for (int i = 0; i < frames; ++i) {
+      cv::Mat bgr = scenes::render(rig, {scenes::random_configuration(rig, 0, random)}, 7);
+      change(bgr);
+      diagnosis.add(bgr, tracker.track(bgr));
+    }
+    return diagnosis.text();
+  }
+  static void expect_names(const std::string& text, const std::string& word) {
+    EXPECT_NE(text.find(word), std::string::npos) << text;
+  }
+};
+
+TEST_F(FrameDiagnosisTest, IsSilentWhereAllIsWell) {
+  EXPECT_EQ(text(rig, [](cv::Mat&) {}), "");
+}
+
+TEST_F(FrameDiagnosisTest, NamesTheCauseWhereNothingIsFound) {
+  const auto diagnose = [&](auto change) { return text(rig, change); };
+  expect_names(diagnose([](cv::Mat& bgr) { cv::cvtColor(bgr, bgr, cv::COLOR_BGR2RGB); }), "red and blue are exchanged");
+  expect_names(diagnose([](cv::Mat& bgr) { cv::flip(bgr, bgr, 1); }), "mirrored");
+  expect_names(diagnose([](cv::Mat& bgr) { bgr /= 16; }), "nearly black");
+  expect_names(diagnose([](cv::Mat& bgr) {
+                 cv::cvtColor(bgr, bgr, cv::COLOR_BGR2GRAY);
+                 cv::cvtColor(bgr, bgr, cv::COLOR_GRAY2BGR);
+               }),
+               "grey");
+  expect_names(FrameDiagnosis(rig).text(), "no frame");
+}
+
+TEST_F(FrameDiagnosisTest, PointsAtTheHuesWhereTheMarkerIsAnother) {
+  Rig other = rig;
+  for (double& hue_deg : other.instruments[0].marker.hues_deg) hue_deg += 60;
+  expect_names(text(other, [](cv::Mat&) {}), "hues_deg");
+}
+
+TEST_F(FrameDiagnosisTest, NamesDeinterlacing) {
+  FrameDiagnosis diagnosis(rig);
+  Observation interlaced;
+  interlaced.status = Status::interlaced;
+  interlaced.instrument = rig.instruments[0].name;
+  const cv::Mat bgr(rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar(40, 90, 200));
+  for (int i = 0; i < frames; ++i) diagnosis.add(bgr, {interlaced});
+  expect_names(diagnosis.text(), "--deinterlace");
+}
+
+TEST_F(FrameDiagnosisTest, SaysByHowMuchTheShaftMissesTheRcm) {
+  Rig shifted = rig;
+  shifted.instruments[0].camera_from_rcm->translation += Eigen::Vector3d(0.02, 0.02, 0);
+  const std::string line = text(shifted, [](cv::Mat&) {});
+  expect_names(line, "misses the rig's RCM, by ");
+  expect_names(line, "calibrate registration");
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lapservo/calibration/check/arm_check.h"
+#include "lapservo/calibration/check/rig_evidence.h"
+#include "lapservo/calibration/marker/marker_calibration.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// From when on a rig is not good enough. One number each, below which the loop's own errors (docs/accuracy.md) or its
+/// limits are larger.
+struct RigLimits {
+  double found = 0.95;                                          ///< fraction of the frames
+  double dark_value = 70, dark_chroma = 45, dark_picture = 40;  ///< of 255
+  double clipped = 0.1, clipped_picture = 0.25;                 ///< fraction of the pixels
+  double hue_deg = 12;                                          ///< between a band and the rig's hue
+  double response_px = 0.05;  ///< between edges of channels that rise and fall at one place
+  double print_rad = 5e-3;    ///< rms of psi, by a print that is not the rig's
+  double focal = 5e-3;        ///< relative
+  double drift_m = 1e-3, drift_rad = 5e-3;
+  double delay_s = 15e-3;
+  double place_m = 1e-3, axis_rad = 7e-3, roll_rad = 10e-3;  ///< by the registration
+  double width_px = 40;                                      ///< of the shaft
+  double sigma_rad = 5e-3;                                   ///< of psi over the work space
+  double work_space = 0.9;                                   ///< fraction of it that has to keep sigma_rad
+};
+inline constexpr RigLimits rig_limits;
+
+/// What a recording tells of a print. Empty refusal: all of it.
+struct PrintCheck {
+  std::string refusal;
+  double before_px = 0, after_px = 0;  ///< boundaries about the rig's print, and about the one that fits best
+  Told psi_rad;                        ///< rms over the turn of what the rig's print makes of psi
+  std::optional<Marker> measured;
+  std::vector<PrintResidual> residuals;  ///< about the rig's print
+};
+PrintCheck check_print(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames);
+
+/// The RCM by the image alone, for recordings without joints.
+struct RcmCheck {
+  std::string refusal;
+  std::optional<Told> distance_m;                   ///< of the rig's RCM from it
+  Told drift_m;                                     ///< between the recording's halves
+  std::vector<std::pair<double, double>> misses_m;  ///< time, by how much the axis misses it
+};
+RcmCheck check_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses);
+
+/// Sigma of psi that the rig has over its work space.
+struct WorkSpace {
+  double good = 1, worst_rad = 0;  ///< fraction with at most RigLimits::sigma_rad
+  int places = 0, lost = 0;        ///< looked at; of them, not good, those where the marker is not found
+};
+
+/// Everything that was found out of one instrument of a rig.
+struct RigFindings {
+  std::size_t frames = 0;
+  int found = 0, mismatched = 0;  ///< frames
+  std::string failure;            ///< the status that is most frequent of those that are not ok; empty when all are
+  PictureLight picture;
+  std::optional<MarkerLight> light;  ///< medians; empty when no frame shows the marker
+  double hue_error_deg = 0;          ///< the largest of the three bands'
+  double width_px = 0;               ///< median
+  std::optional<MarkerResponse::Result> response;
+  std::optional<PrintCheck> print;
+  std::optional<ArmCheck> arm;  ///< with joints
+  std::optional<RcmCheck> rcm;  ///< without
+  bool registered = false;      ///< the rig has camera_from_rcm
+  std::optional<WorkSpace> work_space;
+};
+
+/// What the frames tell; the optional parts are the caller's to add.
+RigFindings findings_of(const Rig& rig, std::size_t instrument, const RigEvidence& evidence);
+
+/// One thing to do.
+struct Advice {
+  bool needed;          ///< else the rig is good enough without
+  std::string what;     ///< what is wrong, with its size
+  std::string command;  ///< what helps
+  std::string gain;     ///< what it would gain
+};
+
+/// What to do, the first thing first: in the order in which one makes the next one wrong (light, colours, encoding,
+/// camera, print, what moves, delay, registration, the view), what is needed before what may be.
+std::vector<Advice> advice_on(const RigFindings& findings);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,225 @@
+#include "lapservo/calibration/check/rig_check.h"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/sim/blood.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double fps = 6, delay_s = 0.1;
+constexpr int frames = 108;
+
+JointVector q_at(double t) {
+  return {0.22 * std::sin(0.9 * t), 1.57 + 0.18 * std::sin(1.3 * t + 1), 0.089 + 0.008 * std::sin(0.7 * t),
+          3.3 * std::sin(0.5 * t + 2)};
+}
+
+// As everything really is.
+const Rig& true_rig() {
+  static const Rig rig = [] {
+    Rig usual = scenes::usual_rig();
+    usual.instruments[0].joints = Joints{{"yaw", "pitch", "insertion", "roll"}, {1, -1, 1, 1}, {0, 1.5, -0.01, 0.3}};
+    usual.instruments[0].image_delay_s = delay_s;
+    return usual;
+  }();
+  return rig;
+}
+
+std::vector<cv::Mat> rendered(int count, const RenderOptions& options) {
+  const Rig& rig = true_rig();
+  Renderer renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 5), options);
+  std::vector<cv::Mat> pictures;
+  for (int i = 0; i < count; ++i)
+    pictures.push_back(
+        renderer.render({placement_of(rig.instruments[0], q_at(i / fps))}, static_cast<std::uint64_t>(i)));
+  return pictures;
+}
+
+// `slip_rad`: by how much theta's joint lags more at the end than at the beginning.
+JointRecording joints_meanwhile(double slip_rad = 0) {
+  const Joints& joints = *true_rig().instruments[0].joints;
+  JointRecording recording;
+  for (double t = -0.6; t < frames / fps + 0.6; t += 0.02) {
+    const Eigen::Vector4d q = q_at(t).vector();
+    std::array<double, 4> at;
+    for (std::size_t j = 0; j < 4; ++j) at[j] = (q[static_cast<Eigen::Index>(j)] - joints.offset[j]) / joints.sign[j];
+    at[0] += slip_rad * t * fps / frames;
+    recording.time_s.push_back(t - delay_s), recording.joints.push_back(at);
+  }
+  return recording;
+}
+
+RigFindings found_out(const Rig& rig, const std::vector<cv::Mat>& pictures, const JointRecording& recording,
+                      bool with_print = false) {
+  RigEvidence evidence(rig, 0);
+  for (std::size_t i = 0; i < pictures.size(); ++i) evidence.add(pictures[i], static_cast<double>(i) / fps);
+  RigFindings findings = findings_of(rig, 0, evidence);
+  if (evidence.poses().size() > 40)
+    findings.arm =
+        check_arm(rig.instruments[0], rig.camera, evidence.poses(), evidence.tracked_psi(), recording, "joints.csv");
+  if (with_print) findings.print = check_print(rig, 0, evidence.take_key_frames());
+  return findings;
+}
+
+class CheckRig : public ::testing::Test {
+ protected:
+  static const std::vector<cv::Mat>& pictures() {
+    static const std::vector<cv::Mat> all = rendered(frames, {});
+    return all;
+  }
+  // The advice, those that are needed, as text.
+  static std::vector<std::string> needed(const RigFindings& findings) {
+    std::vector<std::string> texts;
+    for (const Advice& advice : advice_on(findings))
+      if (advice.needed) texts.push_back(advice.what + " -> " + advice.command);
+    return texts;
+  }
+  static void expect_first(const RigFindings& findings, const std::string& word) {
+    const auto texts = needed(findings);
+    ASSERT_FALSE(texts.empty()) << word;
+    EXPECT_NE(texts.front().find(word), std::string::npos) << texts.front();
+  }
+
+  Rig rig = true_rig();
+  Instrument& instrument = rig.instruments[0];
+  const JointRecording joints = joints_meanwhile();
+};
+
+// What blood hides is found in the one picture that there is, however long that takes.
+TEST(RigEvidence, SearchesEachPictureWhole) {
+  Rig rig = true_rig();
+  MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;  // a print that was measured may show little of itself
+  sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
+  Random random(5);
+  const JointVector q = scenes::random_configuration(rig, 0, random);
+  ShaftModel shaft = shaft_of(rig.instruments[0]);
+  shaft.blotches = blood_over(shaft.marker, 0.6, random);
+  Renderer renderer(rig.camera, {shaft}, make_tissue(rig.camera.width_px, rig.camera.height_px, 5));
+  RigEvidence evidence(rig, 0);
+  evidence.add(renderer.render({placement_of(rig.instruments[0], q)}, 5), 0);
+  EXPECT_EQ(evidence.count(Status::ok), 1);
+}
+
+// With a print that is off, so that all of the trackers have something to do.
+TEST(RigEvidence, IsTheSameFromOneCoreAndFromTwo) {
+  Rig rig = true_rig();
+  rig.instruments[0].marker.bands_upper_m[0] += 0.05e-3;
+  RigEvidence by_one(rig, 0, RigEvidence::Cores::one), by_two(rig, 0, RigEvidence::Cores::two);
+  const std::vector<cv::Mat> pictures = rendered(12, {});
+  for (std::size_t i = 0; i < pictures.size(); ++i)
+    for (RigEvidence* evidence : {&by_one, &by_two}) evidence->add(pictures[i], static_cast<double>(i) / fps);
+  ASSERT_EQ(by_one.frames().size(), by_two.frames().size());
+  for (std::size_t i = 0; i < by_one.frames().size(); ++i) {
+    const FrameEvidence &one = by_one.frames()[i], &two = by_two.frames()[i];
+    EXPECT_EQ(one.status, two.status);
+    EXPECT_EQ(one.sigma_roll_rad, two.sigma_roll_rad);
+    EXPECT_EQ(one.psi_rad, two.psi_rad);
+    EXPECT_EQ(one.width_px, two.width_px);
+    ASSERT_TRUE(one.light && two.light);
+    EXPECT_EQ(one.light->hues_deg, two.light->hues_deg);
+  }
+  ASSERT_GE(by_one.poses().size(), 10U);
+  ASSERT_EQ(by_one.poses().size(), by_two.poses().size());
+  for (std::size_t i = 0; i < by_one.poses().size(); ++i) {
+    const TimedPose &one = by_one.poses()[i], &two = by_two.poses()[i];
+    EXPECT_EQ(one.origin(), two.origin());
+    EXPECT_EQ(one.by_focal.origin_m, two.by_focal.origin_m);
+  }
+  const auto keys_of_one = by_one.take_key_frames(), keys_of_two = by_two.take_key_frames();
+  ASSERT_EQ(keys_of_one.size(), keys_of_two.size());
+  ASSERT_FALSE(keys_of_one.empty());
+  for (std::size_t i = 0; i < keys_of_one.size(); ++i)
+    EXPECT_EQ(keys_of_one[i].sighting.tau_rad, keys_of_two[i].sighting.tau_rad);
+}
+
+// What both halves throw reaches the caller once, wherever they ran.
+TEST(RigEvidence, PassesErrorsOn) {
+  for (const auto cores : {RigEvidence::Cores::one, RigEvidence::Cores::two}) {
+    RigEvidence evidence(true_rig(), 0, cores);
+    EXPECT_ANY_THROW(evidence.add(cv::Mat(), 0));
+    EXPECT_ANY_THROW(evidence.add(cv::Mat(7, 7, CV_8UC3), 0));
+  }
+}
+
+TEST_F(CheckRig, AGoodRigIsGoodEnough) {
+  const RigFindings findings = found_out(rig, pictures(), joints, true);
+  EXPECT_EQ(needed(findings), std::vector<std::string>{});
+  ASSERT_TRUE(findings.arm);
+  EXPECT_EQ(findings.arm->refusal, "");
+  EXPECT_EQ(findings.print->refusal, "");
+  EXPECT_EQ(findings.found, frames);
+  EXPECT_NEAR(findings.arm->measured_delay_s, delay_s, 2e-3);
+  EXPECT_LT(findings.arm->place_m->value, 0.2e-3);
+  EXPECT_LT(findings.arm->focal.value, 2e-3);
+  EXPECT_LT(findings.print->psi_rad.value, 3e-3);
+  EXPECT_EQ(findings.arm->by_rig.size(), findings.arm->at_best.size());
+  EXPECT_GT(findings.arm->beyond_encoder.size(), 100U);
+  for (const TrackedPsi& off : findings.arm->beyond_encoder) EXPECT_NEAR(off.psi_rad, 0, 6e-3) << off.time_s;
+}
+
+TEST_F(CheckRig, NamesAWrongFocalLengthFirst) {
+  rig.camera.fx_px *= 1.03, rig.camera.fy_px *= 1.03;
+  const RigFindings findings = found_out(rig, pictures(), joints, true);
+  expect_first(findings, "focal length is 2.");
+  EXPECT_NEAR(findings.arm->focal.value, 0.03 / 1.03, 0.002);
+}
+
+TEST_F(CheckRig, NamesAWrongRegistrationFirst) {
+  instrument.camera_from_rcm->translation += Eigen::Vector3d(6e-3, -6e-3, 5e-3);
+  const RigFindings findings = found_out(rig, pictures(), joints);
+  expect_first(findings, "registration");
+  EXPECT_NEAR(findings.arm->place_m->value, 9.85e-3, 0.3e-3);
+}
+
+TEST_F(CheckRig, NamesAWrongDelayFirst) {
+  *instrument.image_delay_s += 0.06;
+  expect_first(found_out(rig, pictures(), joints), "image_delay_s is 60 ms off");
+}
+
+TEST_F(CheckRig, NamesAPrintThatIsOffFirst) {
+  instrument.marker.bands_upper_m[0] += 0.2e-3, instrument.marker.bands_upper_m[1] -= 0.2e-3;
+  expect_first(found_out(rig, pictures(), joints, true), "the print is not the rig's");
+}
+
+TEST_F(CheckRig, NamesDriftFirst) {
+  expect_first(found_out(rig, pictures(), joints_meanwhile(0.05)), "drifts by");
+}
+
+TEST_F(CheckRig, NamesBadLightFirst) {
+  RenderOptions options;
+  options.sensor.gains = Light::Constant(0.02F);
+  expect_first(found_out(rig, rendered(8, options), joints), "dark");
+  options.sensor.gains = Light::Constant(6);
+  expect_first(found_out(rig, rendered(8, options), joints), "overexposed");
+}
+
+TEST_F(CheckRig, NamesAWrongResponseFirst) {
+  rig.camera.response = {Response::Kind::power, 1.8};
+  expect_first(found_out(rig, pictures(), joints), "encodes light otherwise than the rig says, rather as srgb");
+}
+
+TEST_F(CheckRig, WithoutJointsComparesTheRcm) {
+  RigEvidence evidence(rig, 0);
+  for (std::size_t i = 0; i < pictures().size(); ++i) evidence.add(pictures()[i], static_cast<double>(i) / fps);
+  const RcmCheck right = check_rcm(instrument, evidence.poses());
+  ASSERT_EQ(right.refusal, "");
+  EXPECT_LT(right.distance_m->value, 0.5e-3);
+  instrument.camera_from_rcm->translation.x() += 10e-3;
+  RigFindings findings = findings_of(rig, 0, evidence);
+  findings.rcm = check_rcm(instrument, evidence.poses());
+  expect_first(findings, "axes meet");
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,172 @@
+#include "lapservo/calibration/check/rig_evidence.h"
+
+#include <algorithm>
+#include <future>
+#include <optional>
+#include <utility>
+
+#include "lapservo/core/statistics.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/vision/light_image.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Where the print is off: it is not to hide what else is wrong.
+constexpr double print_tolerance_m = 0.1e-3;
+
+// Without a registration that bends poses.
+Rig free_rig(Rig rig, double tolerance_m, double focal_change) {
+  for (Instrument& instrument : rig.instruments) {
+    instrument.camera_from_rcm.reset();
+    instrument.marker.tolerance_m = std::max(instrument.marker.tolerance_m, tolerance_m);
+  }
+  rig.camera.fx_px *= 1 + focal_change, rig.camera.fy_px *= 1 + focal_change;
+  return rig;
+}
+
+// The pictures may have nothing to do with one another, and no robot waits for them.
+Tracker whole_search(const Rig& rig) {
+  return Tracker(rig, {.frame_budget = std::nullopt});
+}
+
+TimedPose::ByFocal slope_of(const Rigid3& before, const Rigid3& after, double focal_change) {
+  return {(after.translation - before.translation) / focal_change,
+          rotation_vector_of(after.rotation * before.rotation.conjugate()) / focal_change};
+}
+
+}  // namespace
+
+RigEvidence::FreeTrackers::FreeTrackers(const Rig& rig, double tolerance_m)
+    : at(whole_search(free_rig(rig, tolerance_m, 0))),
+      longer(whole_search(free_rig(rig, tolerance_m, focal_step))),
+      shorter(whole_search(free_rig(rig, tolerance_m, -focal_step))) {}
+
+RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument, Cores cores)
+    : rig_(rig),
+      instrument_(instrument),
+      as_it_is_(whole_search(rig)),
+      exact_(rig, 0),
+      tolerant_(rig, print_tolerance_m),
+      key_frames_(rig, instrument),
+      response_(rig.camera),
+      worker_(cores == Cores::two ? SerialWorker::Thread::own : SerialWorker::Thread::none) {}
+
+void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight) {
+  const Marker& marker = rig_.instruments[instrument_].marker;
+  // Each edge costs as much as tracking a frame: some of a long recording's are enough.
+  constexpr std::size_t every = 3;
+  const ShaftPose pose{seen.camera_from_unrolled, seen.psi_rad};
+  if ((frames_.size() + unfinished_.size()) % every == 0) response_.add(bgr, marker, pose);
+  const auto samples = band_samples(bgr, rig_.camera, marker, pose);
+  if (samples.empty()) return;
+  sight.light = light_of(samples, marker);
+  sight.width_px = marker.diameter_m * rig_.camera.fx_px / seen.camera_from_unrolled.translation.z();
+}
+
+bool RigEvidence::look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight) {
+  const Observation& seen = trackers.at.track(bgr)[instrument_];
+  if (seen.status != Status::ok) return false;
+  look_at_light(bgr, seen, sight);
+  if (!seen.marker) return true;
+  // From the one to the other, as then errors of either matter least; a wrong focal length made more so may find
+  // nothing.
+  const auto pose_of = [](const Observation& o, const Observation& otherwise) {
+    return (o.status == Status::ok && o.marker ? o : otherwise).marker->camera_from_marker;
+  };
+  const Observation& longer = trackers.longer.track(bgr)[instrument_];
+  const Observation& shorter = trackers.shorter.track(bgr)[instrument_];
+  const int steps = (longer.status == Status::ok && longer.marker) + (shorter.status == Status::ok && shorter.marker);
+  if (steps > 0)
+    poses_.push_back(
+        {time_s, *seen.marker, slope_of(pose_of(shorter, seen), pose_of(longer, seen), steps * focal_step)});
+  return true;
+}
+
+void RigEvidence::look_at_picture(const cv::Mat& bgr) {
+  constexpr int every = 16;  // pixels
+  std::vector<int> brightest;
+  int clipped = 0;
+  for (int v = every / 2; v < bgr.rows; v += every)
+    for (int u = every / 2; u < bgr.cols; u += every) {
+      const auto& pixel = bgr.at<cv::Vec3b>(v, u);
+      brightest.push_back(std::max({pixel[0], pixel[1], pixel[2]}));
+      clipped += brightest.back() >= LightImage::saturated_value;
+    }
+  if (brightest.empty()) return;
+  clipped_.push_back(static_cast<double>(clipped) / static_cast<double>(brightest.size()));
+  values_.push_back(quantile(brightest, 0.9));
+}
+
+FrameEvidence RigEvidence::tracked_as_it_is(const cv::Mat& bgr, double time_s) {
+  const Observation& seen = as_it_is_.track(bgr)[instrument_];
+  FrameEvidence frame{time_s, seen.status, seen.marker ? seen.marker->sigma_roll_rad : 0, {}, {}, 0};
+  if (seen.status == Status::ok && seen.rcm) frame.psi_rad = seen.rcm->q.psi_rad;
+  return frame;
+}
+
+bool RigEvidence::add(const cv::Mat& bgr, double time_s) {
+  // The worker's half and this one share nothing, so that both at once find what one after the other would. Some frames
+  // apart, as now the one and then the other takes longer.
+  constexpr std::size_t most_unfinished = 4;
+  finish_all_but(most_unfinished - 1);
+  auto as_it_is = worker_.run([this, bgr, time_s] {
+    key_frames_.add(bgr, time_s);
+    return tracked_as_it_is(bgr, time_s);
+  });
+  look_at_picture(bgr);
+  FreeSight free;
+  const bool found = look_with(exact_, bgr, time_s, free) || look_with(tolerant_, bgr, time_s, free);
+  unfinished_.push_back({std::move(as_it_is), free});
+  return found;
+}
+
+void RigEvidence::finish_all_but(std::size_t unfinished) const {
+  while (unfinished_.size() > unfinished) {
+    Unfinished next = std::move(unfinished_.front());
+    unfinished_.pop_front();
+    FrameEvidence frame = next.as_it_is.get();
+    frame.light = next.free.light, frame.width_px = next.free.width_px;
+    frames_.push_back(frame);
+  }
+}
+
+const std::vector<FrameEvidence>& RigEvidence::frames() const {
+  finish_all_but(0);
+  return frames_;
+}
+
+const std::vector<TimedPose>& RigEvidence::poses() const {
+  finish_all_but(0);
+  return poses_;
+}
+
+std::optional<MarkerResponse::Result> RigEvidence::response() const {
+  finish_all_but(0);
+  return response_.result();
+}
+
+std::vector<KeyFrame> RigEvidence::take_key_frames() {
+  finish_all_but(0);
+  return key_frames_.take();
+}
+
+std::vector<TrackedPsi> RigEvidence::tracked_psi() const {
+  std::vector<TrackedPsi> tracked;
+  for (const FrameEvidence& frame : frames())
+    if (frame.psi_rad) tracked.push_back({frame.time_s, *frame.psi_rad});
+  return tracked;
+}
+
+PictureLight RigEvidence::picture() const {
+  finish_all_but(0);
+  if (values_.empty()) return {};
+  return {median(std::vector(values_)), median(std::vector(clipped_))};
+}
+
+int RigEvidence::count(Status status) const {
+  return static_cast<int>(std::count_if(frames().begin(), frames().end(),
+                                        [&](const FrameEvidence& frame) { return frame.status == status; }));
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <future>
+#include <optional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/calibration/check/arm_check.h"
+#include "lapservo/calibration/colour/band_samples.h"
+#include "lapservo/calibration/colour/marker_response.h"
+#include "lapservo/calibration/marker/marker_calibration.h"
+#include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/core/serial_worker.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+
+/// One frame, as the rig sees its marker.
+struct FrameEvidence {
+  double time_s;
+  Status status;
+  double sigma_roll_rad = 0;         ///< when ok: about the axis, in a fit as it is tracked
+  std::optional<double> psi_rad{};   ///< when ok and the rig has camera_from_rcm
+  std::optional<MarkerLight> light;  ///< where the marker was found, be its print the rig's or not
+  double width_px = 0;               ///< of the shaft, there
+};
+
+/// The whole frame by encoded values: what is left to say when no marker is found.
+struct PictureLight {
+  double value = 0;    ///< median over frames of the 90th percentile of the brightest channel, of 255
+  double clipped = 0;  ///< median over frames of the fraction with a saturated channel
+};
+
+/// Looks at a recording's frames with all that tells whether the rig is right.
+class RigEvidence {
+ public:
+  /// How many cores frames are looked at with; both find the same.
+  enum class Cores { one, two };
+  RigEvidence(const Rig& rig, std::size_t instrument, Cores cores = Cores::two);
+
+  /// 8-bit BGR of the rig's size, whose pixels stay as they are: the second core may look at them some frames later.
+  /// Then it also throws what was wrong with one before. Returns whether the marker was found by the image alone.
+  bool add(const cv::Mat& bgr, double time_s);
+
+  // What follows waits for all frames that were added.
+  const std::vector<FrameEvidence>& frames() const;
+  /// By the image alone, whatever the print; with TimedPose::by_focal.
+  const std::vector<TimedPose>& poses() const;
+  std::vector<TrackedPsi> tracked_psi() const;
+  /// Nullopt when the marker's edges are too few to tell.
+  std::optional<MarkerResponse::Result> response() const;
+  PictureLight picture() const;
+  int count(Status status) const;
+  /// Empties what it takes.
+  std::vector<KeyFrame> take_key_frames();
+
+ private:
+  static constexpr double focal_step = 0.01;
+  // By the image alone, with the rig's focal length, with one that is longer and with one that is shorter.
+  struct FreeTrackers {
+    FreeTrackers(const Rig& rig, double tolerance_m);
+    Tracker at, longer, shorter;
+  };
+  // What those see of the marker.
+  struct FreeSight {
+    std::optional<MarkerLight> light;
+    double width_px = 0;
+  };
+  // A frame that the second core may not have looked at yet.
+  struct Unfinished {
+    std::future<FrameEvidence> as_it_is;
+    FreeSight free;
+  };
+  // Whether the marker was found.
+  bool look_with(FreeTrackers& trackers, const cv::Mat& bgr, double time_s, FreeSight& sight);
+  void look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight);
+  void look_at_picture(const cv::Mat& bgr);
+  FrameEvidence tracked_as_it_is(const cv::Mat& bgr, double time_s);
+  void finish_all_but(std::size_t unfinished) const;
+
+  Rig rig_;
+  std::size_t instrument_;
+  Tracker as_it_is_;
+  FreeTrackers exact_, tolerant_;
+  KeyFrames key_frames_;
+  MarkerResponse response_;
+  std::vector<TimedPose> poses_;
+  std::vector<double> values_, clipped_;
+  // When they are finished changes nothing that can be seen.
+  mutable std::vector<FrameEvidence> frames_;
+  mutable std::deque<Unfinished> unfinished_;
+  SerialWorker worker_;  // the last to come and the first to go: it uses the trackers
+};
+
+}  // namespace lapservo::internal

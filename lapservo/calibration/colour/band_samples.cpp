@@ -1,0 +1,68 @@
+#include "lapservo/calibration/colour/band_samples.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "lapservo/core/statistics.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/color_classes.h"
+#include "lapservo/vision/light_image.h"
+
+namespace lapservo::internal {
+
+std::vector<BandSample> band_samples(const cv::Mat& bgr, const Camera& camera, const Marker& marker,
+                                     const ShaftPose& pose, double clear_px) {
+  constexpr int azimuths = 13, places = 60;
+  constexpr double reach = 0.7;  // of the visible half angle: beyond, it is dark and the background is near
+  std::vector<BandSample> samples;
+  const auto view = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
+  if (!view) return samples;
+  const double px_per_m = camera.fx_px / std::max(1e-3, pose.camera_from_unrolled.translation.z());
+  const double clear_m = clear_px / px_per_m;
+  for (int i = 0; i < azimuths; ++i) {
+    const double azimuth_rad = visible_azimuth_rad(*view, reach, i, azimuths);
+    const double tau_rad = marker_azimuth_rad(marker, azimuth_rad, pose.psi_rad);
+    if (distance_to_seam_rad(marker, tau_rad) * marker.radius_m() < clear_m) continue;
+    const auto ends_m = boundaries_m(marker, tau_rad);
+    for (int k = 0; k < places; ++k) {
+      const double along_m = ends_m[0] + (ends_m[3] - ends_m[0]) * (k + 0.5) / places;
+      std::size_t band = 0;
+      bool clear = true;
+      for (std::size_t e = 0; e < 4; ++e) clear &= std::abs(along_m - ends_m[e]) > clear_m;
+      while (band < 2 && along_m >= ends_m[band + 1]) ++band;
+      const Eigen::Vector3d point = pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
+      if (!clear || !(point.z() > 1e-3)) continue;
+      const Eigen::Vector2d px = camera.raw_from_point(point);
+      if (!camera.contains(px, 1)) continue;
+      const auto& pixel =
+          bgr.at<cv::Vec3b>(static_cast<int>(std::lround(px.y())), static_cast<int>(std::lround(px.x())));
+      samples.push_back({band, {pixel[0], pixel[1], pixel[2]}});
+    }
+  }
+  return samples;
+}
+
+MarkerLight light_of(const std::vector<BandSample>& samples, const Marker& marker) {
+  MarkerLight light;
+  std::vector<double> values, chromas;
+  std::array<std::vector<double>, 3> beyond_deg;
+  std::size_t colored = 0, clipped = 0;
+  for (const BandSample& sample : samples) {
+    const auto [low, high] = std::minmax_element(sample.bgr.begin(), sample.bgr.end());
+    values.push_back(*high), chromas.push_back(*high - *low);
+    clipped += *high >= LightImage::saturated_value;
+    const auto hue_deg = hue_deg_of(sample.bgr[0], sample.bgr[1], sample.bgr[2]);
+    if (!hue_deg) continue;
+    ++colored;
+    beyond_deg[sample.band].push_back(std::remainder(*hue_deg - marker.hues_deg[sample.band], 360.0));
+  }
+  const auto count = static_cast<double>(samples.size());
+  light.clipped = static_cast<double>(clipped) / count, light.colored = static_cast<double>(colored) / count;
+  light.value = median(values), light.chroma = median(chromas);
+  for (std::size_t band = 0; band < 3; ++band)
+    light.hues_deg[band] = marker.hues_deg[band] + (beyond_deg[band].empty() ? 0 : median(beyond_deg[band]));
+  return light;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,116 @@
+#include "lapservo/calibration/colour/colour_calibration.h"
+
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/renderer.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/testing/scenes.h"
+#include "lapservo/vision/color_classes.h"
+
+namespace lapservo::internal {
+namespace {
+
+struct Film {
+  int frames = 24;
+  double motion = 1, light = 1;
+};
+
+// As the camera of `real` sees it.
+std::vector<cv::Mat> filmed(const Rig& real, const Film& film) {
+  RenderOptions options;
+  options.sensor.gains = Light::Constant(static_cast<float>(film.light));
+  Renderer renderer(real.camera, shafts_of(real), make_tissue(real.camera.width_px, real.camera.height_px, 5), options);
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < film.frames; ++i) {
+    const double t = film.motion * i;
+    const JointVector q{0.2 * std::sin(0.4 * t), 1.57 + 0.15 * std::sin(0.55 * t), 0.089 + 0.006 * std::sin(0.3 * t),
+                        0.5 * t};
+    frames.push_back(renderer.render({placement_of(real.instruments[0], q)}, static_cast<std::uint64_t>(i)));
+  }
+  return frames;
+}
+
+class CalibrateColour : public ::testing::Test {
+ protected:
+  const Rig rig = scenes::usual_rig();
+  Rig real = rig;
+
+  void expect_hues(const ColourCalibration& found, double within_deg) const {
+    for (std::size_t band = 0; band < 3; ++band)
+      EXPECT_LT(hue_gap_deg(found.hues_deg[band], real.instruments[0].marker.hues_deg[band]), within_deg) << band;
+  }
+};
+
+TEST_F(CalibrateColour, FindsInksThatAreNotTheRigs) {
+  for (const auto& hues_deg : {std::array{132.0, 222.0, 304.0}, std::array{74.0, 146.0, 236.0}}) {
+    real.instruments[0].marker.hues_deg = hues_deg;
+    const Film film;
+    const auto found = calibrate_colour(rig, 0, filmed(real, film));
+    ASSERT_EQ(found.refusal, "");
+    EXPECT_LE(found.found_before, found.found);
+    EXPECT_EQ(found.found, film.frames);
+    expect_hues(found, 4);
+    EXPECT_FALSE(found.response) << found.response_found;
+    for (const double sigma_deg : found.sigma_hues_deg) EXPECT_LT(sigma_deg, 3);
+  }
+}
+
+TEST_F(CalibrateColour, FindsWhatTheRigDoesNotSeeAtAll) {
+  real.instruments[0].marker.hues_deg = {138, 196, 262};
+  const auto found = calibrate_colour(rig, 0, filmed(real, {}));
+  ASSERT_EQ(found.refusal, "");
+  EXPECT_EQ(found.found_before, 0);
+  EXPECT_EQ(found.found, 24);
+  expect_hues(found, 4);
+}
+
+TEST_F(CalibrateColour, LeavesRightOnesAsTheyAre) {
+  const auto found = calibrate_colour(rig, 0, filmed(real, {}));
+  ASSERT_EQ(found.refusal, "");
+  expect_hues(found, 2);
+  EXPECT_FALSE(found.response) << found.response_found;
+  EXPECT_EQ(found.found, found.found_before);
+}
+
+TEST_F(CalibrateColour, TellsAnotherResponse) {
+  real.instruments[0].marker.hues_deg = {100, 195, 280};
+  for (const auto& [response, name] : {std::pair(Response{Response::Kind::rec709}, "rec709"),
+                                       {Response{Response::Kind::power}, "linear"},
+                                       {Response{Response::Kind::power, 1.8}, "gamma:1.8"}}) {
+    real.camera.response = response;
+    const auto found = calibrate_colour(rig, 0, filmed(real, {}));
+    ASSERT_EQ(found.refusal, "") << name;
+    ASSERT_TRUE(found.response) << name << ": " << found.response_found;
+    EXPECT_EQ(found.response_found.rfind(name, 0), 0U) << found.response_found;
+    EXPECT_EQ(found.found, 24);
+  }
+  const auto kept = calibrate_colour(rig, 0, filmed(real, {}), true);
+  EXPECT_FALSE(kept.response);
+  EXPECT_NE(kept.response_found.find("the marker alone says gamma:1.8"), std::string::npos) << kept.response_found;
+}
+
+TEST_F(CalibrateColour, RefusesWhatCanNotTell) {
+  const auto refusal = [&](const Film& film) { return calibrate_colour(rig, 0, filmed(real, film)).refusal; };
+  EXPECT_NE(refusal({.frames = 5}).find("at least"), std::string::npos);
+  EXPECT_NE(refusal({.frames = 10, .motion = 0}).find("move the instrument"), std::string::npos);
+  EXPECT_NE(refusal({.frames = 10, .light = 6}).find("lower the exposure"), std::string::npos);
+  const std::vector<cv::Mat> nothing(10, scenes::render_nothing(rig, 3));
+  EXPECT_NE(calibrate_colour(rig, 0, nothing).refusal.find("0 of 10 frames"), std::string::npos);
+}
+
+TEST_F(CalibrateColour, KeepsSomeOfManyFrames) {
+  SpreadFrames kept(8);
+  for (int i = 0; i < 100; ++i) kept.add(cv::Mat(1, 1, CV_8UC3, cv::Scalar(i, 0, 0)));
+  ASSERT_LE(kept.frames().size(), 8U);
+  ASSERT_GE(kept.frames().size(), 4U);
+  const int apart = kept.frames()[1].at<cv::Vec3b>(0, 0)[0] - kept.frames()[0].at<cv::Vec3b>(0, 0)[0];
+  for (std::size_t i = 1; i < kept.frames().size(); ++i)
+    EXPECT_EQ(kept.frames()[i].at<cv::Vec3b>(0, 0)[0] - kept.frames()[i - 1].at<cv::Vec3b>(0, 0)[0], apart);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,53 @@
+#include "lapservo/calibration/colour/colour_measurement.h"
+
+#include <cmath>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/rounded_sigma.h"
+
+namespace lapservo::internal {
+
+ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+                                 bool keep_response, const JobWatch& watch,
+                                 const std::function<void(const cv::Mat&)>& look) {
+  constexpr std::size_t most = 48;
+  SpreadFrames kept(most);
+  const bool live = recording.source.kind() == FrameSource::Kind::live;
+  ColourMeasurement measured;
+  measured.read = read_frames(recording, rig, live ? 10 : 1, watch, [&](const cv::Mat& bgr, double) {
+    kept.add(bgr);
+    if (look) look(bgr);
+    return fmt::format(", {} kept", kept.frames().size());
+  });
+  // A camera goes on for ever: the user ends what is enough.
+  if (measured.read.stopped && !live) return measured.calibration.refusal = "stopped", measured;
+  measured.frames = kept.frames();
+  int step = 0;
+  measured.calibration =
+      calibrate_colour(rig, instrument, measured.frames, keep_response,
+                       [&](const std::string& what) { watch.tell(std::nullopt, ++step, ": " + what); });
+  return measured;
+}
+
+std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const ColourCalibration& calibration) {
+  std::vector<CalibratedNumber> numbers;
+  for (std::size_t i = 0; i < 3; ++i)
+    numbers.push_back({fmt::format("hues_deg[{}] [deg]", i), before.hues_deg[i], calibration.hues_deg[i],
+                       calibration.sigma_hues_deg[i]});
+  return numbers;
+}
+
+Rig with_colour(Rig rig, std::size_t instrument, const ColourCalibration& calibration) {
+  Marker& marker = rig.instruments[instrument].marker;
+  marker.sigmas.hues_deg.emplace();
+  for (std::size_t i = 0; i < 3; ++i) {
+    marker.hues_deg[i] = std::round(100 * calibration.hues_deg[i]) / 100;
+    (*marker.sigmas.hues_deg)[i] = rounded_sigma(calibration.sigma_hues_deg[i]);
+  }
+  if (calibration.response) rig.camera.response = *calibration.response, rig.camera_file.clear();
+  return rig;
+}
+
+}  // namespace lapservo::internal

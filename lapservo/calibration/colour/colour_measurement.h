@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/calibration/calibrated_number.h"
+#include "lapservo/calibration/colour/colour_calibration.h"
+#include "lapservo/calibration/recording/frame_recording.h"
+
+namespace lapservo::internal {
+
+/// Colours, measured, and the frames that they were measured in.
+struct ColourMeasurement {
+  ColourCalibration calibration;  ///< or its refusal
+  std::vector<cv::Mat> frames;
+  FramesRead read;
+};
+
+/// Of a marker in motion; `look` sees every frame, a live camera's until it is stopped. keep_response: as
+/// calibrate_colour() has it. Throws InputError as read_frames().
+ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+                                 bool keep_response, const JobWatch& watch,
+                                 const std::function<void(const cv::Mat&)>& look = {});
+
+/// The hues, in degrees.
+std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const ColourCalibration& calibration);
+
+/// The rig with what was measured: hues to a hundredth of a degree. A response that is another can't go into a camera's
+/// own file, which other rigs may name: the camera stands in the rig then.
+Rig with_colour(Rig rig, std::size_t instrument, const ColourCalibration& calibration);
+
+}  // namespace lapservo::internal

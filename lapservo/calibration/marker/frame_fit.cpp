@@ -1,0 +1,196 @@
+#include "lapservo/calibration/marker/frame_fit.h"
+
+#include <algorithm>
+#include <ceres/ceres.h>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "lapservo/calibration/fit/robust_scale.h"
+#include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/core/dense_matrix.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Residuals and their derivatives at one x, which all frames' cost functions read.
+struct Linearisation {
+  const FrameResiduals& model;
+  const std::vector<Unknown>& unknowns;
+  Eigen::MatrixXd residuals;
+  std::vector<Eigen::MatrixXd> slopes;  // one a number, as residuals
+
+  void update(const Eigen::VectorXd& x, bool with_slopes) {
+    residuals = model(x);
+    if (!with_slopes) return;
+    slopes.clear();
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      const double size = unknowns[static_cast<std::size_t>(i)].step;
+      const Eigen::VectorXd step = size * Eigen::VectorXd::Unit(x.size(), i);
+      slopes.push_back((model(x + step) - model(x - step)) / (2 * size));
+    }
+  }
+
+  // Of one frame: channels x numbers.
+  Eigen::MatrixXd jacobian(Eigen::Index frame) const {
+    Eigen::MatrixXd result(residuals.rows(), static_cast<Eigen::Index>(slopes.size()));
+    for (Eigen::Index i = 0; i < result.cols(); ++i) result.col(i) = slopes[static_cast<std::size_t>(i)].col(frame);
+    return result;
+  }
+};
+
+class Update : public ceres::EvaluationCallback {
+ public:
+  Update(Linearisation& at, const Eigen::VectorXd& x) : at_(at), x_(x) {}
+  void PrepareForEvaluation(bool with_jacobians, bool) override { at_.update(x_, with_jacobians); }
+
+ private:
+  Linearisation& at_;
+  const Eigen::VectorXd& x_;
+};
+
+class FrameCost : public ceres::CostFunction {
+ public:
+  FrameCost(const Linearisation& at, Eigen::Index frame, const Eigen::VectorXd& weights, int numbers)
+      : at_(at), frame_(frame), weights_(weights) {
+    set_num_residuals(static_cast<int>(weights.size()));
+    mutable_parameter_block_sizes()->push_back(numbers);
+  }
+  bool Evaluate(double const* const*, double* residuals, double** jacobians) const override {
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Eigen::Map<Eigen::VectorXd>(residuals, weights_.size()) = weights_.cwiseProduct(at_.residuals.col(frame_));
+    if (jacobians && jacobians[0])
+      Eigen::Map<Rows>(jacobians[0], weights_.size(), parameter_block_sizes()[0]) =
+          weights_.asDiagonal() * at_.jacobian(frame_);
+    return at_.residuals.col(frame_).allFinite();
+  }
+
+ private:
+  const Linearisation& at_;
+  Eigen::Index frame_;
+  const Eigen::VectorXd& weights_;
+};
+
+// What is known of numbers beforehand: their size in its standard deviations.
+class PriorCost : public ceres::CostFunction {
+ public:
+  explicit PriorCost(const Eigen::VectorXd& inverse_sigmas) : inverse_sigmas_(inverse_sigmas) {
+    set_num_residuals(static_cast<int>(inverse_sigmas.size()));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(inverse_sigmas.size()));
+  }
+  bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
+    const Eigen::Index n = inverse_sigmas_.size();
+    Eigen::Map<Eigen::VectorXd>(residuals, n) =
+        inverse_sigmas_.cwiseProduct(Eigen::Map<const Eigen::VectorXd>(x[0], n));
+    if (jacobians && jacobians[0]) Eigen::Map<Eigen::MatrixXd>(jacobians[0], n, n) = inverse_sigmas_.asDiagonal();
+    return true;
+  }
+
+ private:
+  const Eigen::VectorXd& inverse_sigmas_;
+};
+
+Eigen::VectorXd inverse_priors(const std::vector<Unknown>& unknowns) {
+  Eigen::VectorXd inverse(static_cast<Eigen::Index>(unknowns.size()));
+  for (std::size_t i = 0; i < unknowns.size(); ++i)
+    inverse[static_cast<Eigen::Index>(i)] = unknowns[i].prior > 0 ? 1 / unknowns[i].prior : 0;
+  return inverse;
+}
+
+// Cauchy's scale in root mean squares of a frame's residuals.
+double loss_scale(Eigen::Index channels) {
+  return 2.5 * std::sqrt(static_cast<double>(channels));
+}
+
+bool solve(Linearisation& at, Eigen::VectorXd& x, const Eigen::VectorXd& weights, const AtIteration& at_iteration) {
+  Update update(at, x);
+  ceres::Problem::Options options;
+  options.evaluation_callback = &update;
+  ceres::CauchyLoss loss(loss_scale(weights.size()));
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(options);
+  for (Eigen::Index i = 0; i < at.residuals.cols(); ++i)
+    problem.AddResidualBlock(new FrameCost(at, i, weights, static_cast<int>(x.size())), &loss, x.data());
+  const Eigen::VectorXd priors = inverse_priors(at.unknowns);
+  problem.AddResidualBlock(new PriorCost(priors), nullptr, x.data());
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  solver.max_num_iterations = 100;
+  solver.function_tolerance = 1e-12;  // what priors alone hold costs next to nothing
+  ceres::Solver::Summary summary;
+  return solve_quietly(solver, problem, summary, at_iteration) && x.allFinite();
+}
+
+Eigen::VectorXd robust_scales(const Eigen::MatrixXd& residuals) {
+  Eigen::VectorXd scales(residuals.rows());
+  for (Eigen::Index c = 0; c < residuals.rows(); ++c) {
+    const Eigen::VectorXd channel = residuals.row(c);
+    scales[c] = std::max(1e-3, robust_scale({channel.begin(), channel.end()}));
+  }
+  return scales;
+}
+
+// (sum J'J)^-1 S (sum J'J)^-1 with S that of the frames' gradients and of their neighbours'.
+std::optional<Eigen::MatrixXd> covariance(const Linearisation& at, const Eigen::VectorXd& weights,
+                                          std::size_t alike_frames) {
+  const Eigen::Index numbers = static_cast<Eigen::Index>(at.slopes.size()), frames = at.residuals.cols();
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(numbers, numbers), gradients(numbers, frames);
+  const double scale = loss_scale(weights.size());
+  for (Eigen::Index i = 0; i < frames; ++i) {
+    const Eigen::MatrixXd jacobian = weights.asDiagonal() * at.jacobian(i);
+    const Eigen::VectorXd residual = weights.cwiseProduct(at.residuals.col(i));
+    const double trust = 1 / (1 + residual.squaredNorm() / (scale * scale));
+    information += trust * product(jacobian.transpose(), jacobian);
+    gradients.col(i) = trust * product(jacobian.transpose(), residual);
+  }
+  const Eigen::VectorXd priors = inverse_priors(at.unknowns).cwiseAbs2();
+  information.diagonal() += priors;
+  // In units of what each number alone would be known to: else metres and radians hide what is open.
+  const Eigen::VectorXd units = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd normed = units.asDiagonal() * information * units.asDiagonal();
+  if (!(eigenvalues_of_symmetric(normed)[0] > 1e-10)) return std::nullopt;
+  Eigen::MatrixXd scatter = product(gradients, gradients.transpose());
+  for (Eigen::Index lag = 1; lag < std::min(frames, static_cast<Eigen::Index>(alike_frames)); ++lag) {
+    const double weight = 1 - static_cast<double>(lag) / static_cast<double>(alike_frames);
+    const Eigen::MatrixXd shifted =
+        product(gradients.rightCols(frames - lag), gradients.leftCols(frames - lag).transpose());
+    scatter += weight * (shifted + shifted.transpose());
+  }
+  scatter.diagonal() += priors;
+  // What the fit and the window of lags take off the scatter.
+  const double taken = static_cast<double>(numbers) + static_cast<double>(alike_frames);
+  const double freedom = static_cast<double>(frames) / std::max(1.0, static_cast<double>(frames) - taken);
+  const Eigen::MatrixXd inverse = units.asDiagonal() * inverse_of_symmetric(normed) * units.asDiagonal();
+  return freedom * product(product(inverse, scatter), inverse);
+}
+
+}  // namespace
+
+Block add_block(std::vector<Unknown>& unknowns, const std::vector<Unknown>& added) {
+  const auto first = static_cast<Eigen::Index>(unknowns.size());
+  unknowns.insert(unknowns.end(), added.begin(), added.end());
+  return {first, static_cast<Eigen::Index>(added.size())};
+}
+
+std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::vector<Unknown>& unknowns,
+                                   std::size_t alike_frames, const AtIteration& at_iteration) {
+  Eigen::VectorXd x(static_cast<Eigen::Index>(unknowns.size()));
+  for (std::size_t i = 0; i < unknowns.size(); ++i) x[static_cast<Eigen::Index>(i)] = unknowns[i].start;
+  Linearisation at{residuals, unknowns, residuals(x), {}};
+  if (!at.residuals.allFinite()) return std::nullopt;
+  Eigen::VectorXd scales = robust_scales(at.residuals);
+  for (int round = 0; round < 6; ++round) {
+    const Eigen::VectorXd weights = scales.cwiseInverse();
+    if (!solve(at, x, weights, at_iteration)) return std::nullopt;
+    at.update(x, true);
+    const Eigen::VectorXd next = robust_scales(at.residuals);
+    const bool settled = ((next - scales).cwiseAbs().array() < 0.01 * scales.array()).all();
+    scales = next;
+    if (settled) break;
+  }
+  const auto sigma = covariance(at, scales.cwiseInverse(), alike_frames);
+  if (!sigma || !sigma->allFinite()) return std::nullopt;
+  return FrameFit{x, *sigma, at.residuals, scales};
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,144 @@
+#include "lapservo/calibration/marker/marker_calibration.h"
+
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/testing/scenes.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double mm = 1e-3;
+
+// Off by hand: bands by up to 0.3 mm, 3 degrees of wrap, 1 mm of gap.
+Marker real_print(const Marker& nominal, double gap_m) {
+  PrintShape shape = PrintShape::of(nominal);
+  const std::array<double, 4> upper_mm{0, 0.25, -0.2, 0.15}, lower_mm{1.38, 1.18, 1.68, 1.53};
+  for (std::size_t k = 0; k < 4; ++k) shape.upper_m[k] += mm * upper_mm[k], shape.lower_m[k] += mm * lower_mm[k];
+  shape.gap_rad = gap_m / nominal.radius_m();
+  return shape.on(nominal);
+}
+
+struct Turn {
+  int frames = 60;
+  double fraction = 1.05;
+  double blur_px = 0.8;
+};
+
+// Frames of a turn of a print, as who believes the usual rig's chooses them.
+KeyFrames turned(const Rig& nominal, const Marker& print, const Turn& turn) {
+  Rig real = nominal;
+  real.instruments[0].marker = print;
+  Random random(4);
+  const JointVector start = scenes::random_configuration(nominal, 0, random);
+  RenderOptions options;
+  options.sensor.blur_px = turn.blur_px;
+  KeyFrames key_frames(nominal, 0);
+  for (int i = 0; i < turn.frames; ++i) {
+    const double fraction = static_cast<double>(i) / turn.frames;
+    JointVector q = start;
+    q.theta_rad += 0.02 * std::sin(two_pi * fraction);
+    q.psi_rad = wrap_pi(q.psi_rad + turn.fraction * two_pi * fraction);
+    key_frames.add(scenes::render(real, {q}, static_cast<std::uint64_t>(i), options), 0);
+  }
+  return key_frames;
+}
+
+class CalibrateMarker : public ::testing::Test {
+ protected:
+  const Rig rig = scenes::usual_rig();
+  const Marker& nominal = rig.instruments[0].marker;
+
+  // All numbers within some sigmas of the truth, and near it.
+  static void expect_found(const Marker& found, const Marker& print) {
+    const PrintShape is = PrintShape::of(found), truth = PrintShape::of(print);
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_NEAR(is.upper_m[k], truth.upper_m[k], 0.05 * mm) << "e" << k;
+      EXPECT_NEAR(is.lower_m[k], truth.lower_m[k], 0.05 * mm) << "e" << k;
+    }
+    EXPECT_NEAR(is.gap_rad, truth.gap_rad, 3e-3);
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_NEAR(found.bands_upper_m[i], print.bands_upper_m[i], 4 * (*found.sigmas.bands_upper_m)[i]);
+      EXPECT_NEAR(found.bands_lower_m[i], print.bands_lower_m[i], 4 * (*found.sigmas.bands_lower_m)[i]);
+    }
+    EXPECT_NEAR(found.wrap_m, print.wrap_m, 5 * *found.sigmas.wrap_m);
+  }
+};
+
+TEST_F(CalibrateMarker, FindsThePrintAsItIs) {
+  for (const double gap_m : {1 * mm, 0.0}) {
+    const Marker print = real_print(nominal, gap_m);
+    const MarkerCalibration calibration = calibrate_marker(rig, 0, turned(rig, print, {}).take());
+    ASSERT_EQ(calibration.refusal, "");
+    expect_found(calibration.marker, print);
+    EXPECT_EQ(calibration.marker.gap_rad > 0, gap_m > 0);
+    EXPECT_LT(calibration.after_px, 0.1 * calibration.before_px);
+    EXPECT_EQ(calibration.marker.diameter_m, nominal.diameter_m);
+    EXPECT_EQ(calibration.marker.seam_rad, nominal.seam_rad);
+    EXPECT_GE(calibration.seam_views, 5U);
+
+    // And the tracker believes it where it did not believe the rig's.
+    Rig better = rig, real = rig;
+    better.instruments[0].marker = calibration.marker, real.instruments[0].marker = print;
+    Random random(8);
+    int believed = 0;
+    for (int i = 0; i < 5; ++i) {
+      const JointVector q = scenes::random_configuration(rig, 0, random);
+      const cv::Mat frame = scenes::render(real, {q}, static_cast<std::uint64_t>(100 + i));
+      believed += Tracker(rig, {.single = true}).track(frame)[0].status == Status::ok;
+      const Observation o = Tracker(better, {.single = true}).track(frame)[0];
+      ASSERT_EQ(o.status, Status::ok);
+      EXPECT_NEAR(wrap_pi(o.rcm->q.psi_rad - q.psi_rad), 0, 5e-3);
+    }
+    EXPECT_LE(believed, 1);
+  }
+}
+
+TEST_F(CalibrateMarker, AnExactPrintStaysAsItIs) {
+  const MarkerCalibration calibration = calibrate_marker(rig, 0, turned(rig, nominal, {}).take());
+  ASSERT_EQ(calibration.refusal, "");
+  expect_found(calibration.marker, nominal);
+  EXPECT_EQ(calibration.marker.gap_rad, 0);
+}
+
+// What a video leaves behind differs between the two.
+TEST_F(CalibrateMarker, KeepsFramesOfEitherWayOfTheTurn) {
+  Random random(4);
+  const JointVector start = scenes::random_configuration(rig, 0, random);
+  std::vector<cv::Mat> frames;
+  for (int i = 0; i < 8; ++i) {
+    JointVector q = start;
+    q.psi_rad = wrap_pi(q.psi_rad + 0.2 * i);
+    frames.push_back(scenes::render(rig, {q}, static_cast<std::uint64_t>(i)));
+  }
+  KeyFrames key_frames(rig, 0);
+  for (int i = 0; i < 29; ++i) key_frames.add(frames[static_cast<std::size_t>(i % 14 < 8 ? i % 14 : 14 - i % 14)], 0);
+  int there = 0, back = 0;
+  for (const KeyFrame& frame : key_frames.take()) {
+    there += frame.turned_rad > 0, back += frame.turned_rad < 0;
+    if (frame.turned_rad != 0) {
+      EXPECT_NEAR(std::abs(frame.turned_rad), 0.2, 0.01);
+    }
+  }
+  EXPECT_EQ(there, 14);
+  EXPECT_EQ(back, 14);
+}
+
+TEST_F(CalibrateMarker, RefusesWhatCanNotTell) {
+  const Marker print = real_print(nominal, 0);
+  const auto refusal = [&](const Turn& turn) {
+    return calibrate_marker(rig, 0, turned(rig, print, turn).take()).refusal;
+  };
+  EXPECT_NE(refusal({.frames = 40, .fraction = 0.6}).find("from all sides"), std::string::npos);
+  EXPECT_NE(refusal({.frames = 6}).find("at least"), std::string::npos);
+  EXPECT_NE(refusal({.frames = 30, .blur_px = 1.8}).find("blurred"), std::string::npos);
+  EXPECT_NE(refusal({.frames = 30, .blur_px = 6}), "");
+  EXPECT_NE(calibrate_marker(rig, 0, {}).refusal, "");
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,330 @@
+#include "lapservo/calibration/marker/print_adjustment.h"
+
+#include <algorithm>
+#include <array>
+#include <ceres/ceres.h>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "lapservo/calibration/fit/robust_scale.h"
+#include "lapservo/calibration/fit/solve_quietly.h"
+#include "lapservo/core/dense_matrix.h"
+#include "lapservo/vision/common_errors.h"
+#include "lapservo/vision/limits.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double mm = 1e-3;
+constexpr int pose_numbers = 6;
+constexpr std::size_t upper_group = measurement_groups, groups = measurement_groups + 2;
+
+// Before the fit, one sigma: how far a print may be off; and what the model leaves out of every frame alike, which is
+// taken for zero: to tell it from so many frames would be to believe the model to a thousandth of a pixel.
+constexpr double print_prior_mm = 2, gap_prior_rad = 0.5;
+constexpr double zero = 1e-3;            // of the sigmas of these
+constexpr double common_seam_px = 0.03;  // of one frame
+// Compressed video leaves the seam's edges 0.05 to 0.14 px behind and the bands' boundaries, which move less, 0.02 px
+// at most. A turn there and back tells by how much; one of one way can't tell it from a seam that lies elsewhere.
+constexpr double seam_lag_px = 0.1, seam_lag_from_px = 0.2;
+constexpr std::ptrdiff_t min_seam_views_each_way = 3;
+constexpr double min_noise_of_lag = 0.3;  // of edges, beyond the usual
+
+struct TakenForZero {
+  double* unknown;
+  double sigma;
+};
+
+// The unknowns of all frames alike.
+struct SharedUnknowns {
+  std::array<double, 4> upper_mm{}, lower_mm{};  // changes of the boundaries; upper_mm[0] stays 0
+  double gap_rad = 0;
+  double film_sigmas = 0;                 // what all films are off by, in film_sigma_m
+  double sides_px = 0;                    // what all sides are off by, and so on
+  std::array<double, 2> seam_edges_px{};  // upper and lower
+  std::array<double, 4> boundaries_px{};
+  double seam_lag_px = 0;  // by how much the seam's edges stay behind their motion
+
+  std::array<double*, print_numbers - 1> lengths_mm() {
+    return {&upper_mm[1], &upper_mm[2], &upper_mm[3], &lower_mm[0], &lower_mm[1], &lower_mm[2], &lower_mm[3]};
+  }
+  // Measured on rendered frames: sides up to 0.08 px, an end whose face is seen up to 0.1 px, inner boundaries 0.01 px.
+  std::array<TakenForZero, 8> taken_for_zero() {
+    return {{{&film_sigmas, 1},
+             {&sides_px, 0.05},
+             {&seam_edges_px[0], 0.03},
+             {&seam_edges_px[1], 0.03},
+             {&boundaries_px[0], 0.05},
+             {&boundaries_px[1], 0.01},
+             {&boundaries_px[2], 0.01},
+             {&boundaries_px[3], 0.05}}};
+  }
+};
+
+// Of a frame: its pose, its film as in every fit of the tracker, and what one group of its measurements has in common.
+struct FrameUnknowns {
+  std::array<double, pose_numbers> pose{};
+  double film_sigmas = 0;
+  std::array<double, groups> common_px{};
+};
+
+// A block of unknowns and the slope by each of them.
+struct Term {
+  using Slopes = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, pose_numbers, 1>;
+  Term(double* unknown_block, double slope) : block(unknown_block), slopes(Slopes::Constant(1, slope)) {}
+  Term(std::array<double, pose_numbers>& pose, const UnknownVector& row)
+      : block(pose.data()), slopes(row.head<pose_numbers>()) {}
+  double* block;
+  Slopes slopes;
+};
+
+// (slopes . unknowns - expected) / sigma.
+class LinearCost : public ceres::CostFunction {
+ public:
+  LinearCost(std::vector<Term> terms, double expected, double sigma)
+      : terms_(std::move(terms)), expected_(expected), sigma_(sigma) {
+    set_num_residuals(1);
+    for (const Term& term : terms_) {
+      blocks_.push_back(term.block);
+      mutable_parameter_block_sizes()->push_back(static_cast<int>(term.slopes.size()));
+    }
+  }
+  const std::vector<double*>& blocks() const { return blocks_; }
+  bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
+    residuals[0] = -expected_ / sigma_;
+    for (std::size_t i = 0; i < terms_.size(); ++i) {
+      const Term::Slopes& slopes = terms_[i].slopes;
+      residuals[0] += slopes.dot(Eigen::Map<const Eigen::VectorXd>(parameters[i], slopes.size())) / sigma_;
+      if (jacobians && jacobians[i]) Eigen::Map<Eigen::VectorXd>(jacobians[i], slopes.size()) = slopes / sigma_;
+    }
+    return true;
+  }
+  // In sigmas, by the unknowns as they are now.
+  double left() const {
+    double residual = 0;
+    Evaluate(blocks_.data(), &residual, nullptr);
+    return -residual;
+  }
+  double sigma() const { return sigma_; }
+
+ private:
+  std::vector<Term> terms_;
+  std::vector<double*> blocks_;
+  double expected_, sigma_;
+};
+
+void add_prior(ceres::Problem& problem, double* unknown, double expected, double sigma) {
+  problem.AddResidualBlock(new LinearCost({{unknown, 1}}, expected, sigma), nullptr, unknown);
+}
+
+std::vector<Term> terms_of(const Measurement& m, const PrintShape& shape, double covered_rad, FrameUnknowns& frame,
+                           SharedUnknowns& shared) {
+  const double by_film = m.row[pose_numbers];
+  std::vector<Term> terms{{frame.pose, m.row},
+                          {&frame.common_px[m.group], 1},
+                          {&frame.film_sigmas, by_film},
+                          {&shared.film_sigmas, by_film}};
+  if (m.group >= 4) {
+    terms.push_back({&shared.sides_px, 1});
+    return terms;
+  }
+  const std::size_t k = m.group;
+  const double along = mm * m.along_px_per_m;
+  terms.push_back({&shared.boundaries_px[k], 1});
+  if (k > 0) terms.push_back({&shared.upper_mm[k], along * (1 - m.turn_fraction)});
+  terms.push_back({&shared.lower_mm[k], along * m.turn_fraction});
+  // A wider gap leaves less around the shaft for the same print.
+  terms.push_back(
+      {&shared.gap_rad, m.along_px_per_m * (shape.lower_m[k] - shape.upper_m[k]) * m.turn_fraction / covered_rad});
+  return terms;
+}
+
+double moved_px(const SeamEdge& edge, double turned_rad) {
+  return edge.row[edge.row.size() - 1] * turned_rad;
+}
+
+std::vector<Term> terms_of(const SeamEdge& edge, bool lower, double turned_rad, FrameUnknowns& frame,
+                           SharedUnknowns& shared) {
+  const double along_px = moved_px(edge, turned_rad);
+  return {{frame.pose, edge.row},
+          {&frame.common_px[upper_group + (lower ? 1 : 0)], 1},
+          {&shared.seam_lag_px, -along_px / std::hypot(along_px, seam_lag_from_px)},
+          {&shared.gap_rad, edge.by_gap_px},
+          {&shared.seam_edges_px[lower ? 1 : 0], 1}};
+}
+
+// The costs are owned by the problem.
+struct EdgeCost {
+  const LinearCost* cost;
+  std::size_t group;
+};
+
+double common_sigma_px(std::size_t group, const ViewMeasurements& frame) {
+  const double more_px =
+      fine_fit_limits.common_fraction_of_blur * std::max(0.0, frame.blur_px - fine_fit_limits.usual_blur_px);
+  if (group >= measurement_groups) return common_seam_px + more_px;
+  const double usual_px = group < 4 ? fine_fit_limits.common_boundary_px : fine_fit_limits.common_side_px;
+  return std::hypot(usual_px + more_px, fine_fit_limits.fraction_of_processing * frame.bias_px[group]);
+}
+
+std::vector<EdgeCost> add_frame(ceres::Problem& problem, const ViewMeasurements& measured, const PrintShape& shape,
+                                double covered_rad, double loss_scale_sigmas, SharedUnknowns& shared,
+                                FrameUnknowns& frame) {
+  std::array<bool, groups> used{};
+  const auto add = [&](const auto& edge, std::size_t group, std::vector<Term> terms) {
+    auto* cost = new LinearCost(std::move(terms), edge.residual_px, edge.sigma_px);
+    problem.AddResidualBlock(cost, new ceres::CauchyLoss(loss_scale_sigmas), cost->blocks());
+    used[group] = true;
+    return cost;
+  };
+  add_prior(problem, &frame.film_sigmas, (film_mean_m - measured.film_m) / film_sigma_m, 1);
+  std::vector<EdgeCost> edges;
+  for (const Measurement& m : measured.edges.all)
+    edges.push_back({add(m, m.group, terms_of(m, shape, covered_rad, frame, shared)), m.group});
+  const auto add_seam = [&](const std::optional<SeamEdge>& edge, bool lower) {
+    if (edge) add(*edge, upper_group + (lower ? 1 : 0), terms_of(*edge, lower, measured.turned_rad, frame, shared));
+  };
+  if (measured.seam) add_seam(measured.seam->upper, false), add_seam(measured.seam->lower, true);
+  for (std::size_t group = 0; group < groups; ++group)
+    if (used[group]) add_prior(problem, &frame.common_px[group], 0, common_sigma_px(group, measured));
+  return edges;
+}
+
+// Views that hardly moved tell no lag, and which way they did is their poses' error as well.
+bool tells_lag(const std::vector<ViewMeasurements>& frames) {
+  const auto views = [&](double way) {
+    return std::count_if(frames.begin(), frames.end(), [=](const ViewMeasurements& frame) {
+      if (!frame.seam || !(way * frame.turned_rad > 0)) return false;
+      const auto& edge = frame.seam->upper ? frame.seam->upper : frame.seam->lower;
+      return edge && std::abs(moved_px(*edge, frame.turned_rad)) > seam_lag_from_px;
+    });
+  };
+  return std::min(views(1), views(-1)) >= min_seam_views_each_way;
+}
+
+void add_priors(ceres::Problem& problem, SharedUnknowns& shared, bool free_lag) {
+  for (double* length_mm : shared.lengths_mm()) add_prior(problem, length_mm, 0, print_prior_mm);
+  add_prior(problem, &shared.gap_rad, 0, gap_prior_rad);
+  for (const TakenForZero& taken : shared.taken_for_zero()) add_prior(problem, taken.unknown, 0, zero * taken.sigma);
+  add_prior(problem, &shared.seam_lag_px, 0, free_lag ? seam_lag_px : zero * seam_lag_px);
+}
+
+double sigma_of_edges_px(const std::vector<ViewMeasurements>& frames) {
+  std::vector<double> sigmas_px;
+  for (const ViewMeasurements& frame : frames)
+    for (const Measurement& m : frame.edges.all)
+      if (m.group < 4) sigmas_px.push_back(m.sigma_px);
+  return sigmas_px.empty() ? fine_fit_limits.usual_sigma_px : median(sigmas_px);
+}
+
+// By how much edges are noisier than usual: those of compressed pictures are.
+double noise_beyond_usual(double sigma_px) {
+  return std::max(0.0, sigma_px / fine_fit_limits.usual_sigma_px - 1);
+}
+
+// As the tracker has it, in all frames alike.
+double common_doubt_scale(const std::vector<ViewMeasurements>& frames, double edges_px) {
+  std::vector<double> blurs_px, biases_px;
+  for (const ViewMeasurements& frame : frames) {
+    blurs_px.push_back(frame.blur_px);
+    biases_px.push_back(Eigen::Map<const Eigen::Vector4d>(frame.bias_px.data()).norm() / 2);
+  }
+  if (blurs_px.empty()) return 1;
+  return doubt_scale(edges_px, median(blurs_px), median(biases_px));
+}
+
+// What was taken for zero in all frames, by one sigma of what it may be.
+std::vector<TakenForZero> common_errors(SharedUnknowns& shared, const std::vector<ViewMeasurements>& frames,
+                                        double edges_px, bool free_lag) {
+  const auto taken = shared.taken_for_zero();
+  std::vector<TakenForZero> errors(taken.begin(), taken.end());
+  const double scale = common_doubt_scale(frames, edges_px);
+  for (TakenForZero& error : errors)
+    if (error.unknown != &shared.film_sigmas) error.sigma *= scale;  // the film is as thick in any picture
+  if (!free_lag) errors.push_back({&shared.seam_lag_px, seam_lag_px * std::min(1.0, noise_beyond_usual(edges_px))});
+  return errors;
+}
+
+// The print's; the common errors count as they were before the fit.
+std::optional<PrintCovariance> covariance_of(ceres::Problem& problem, SharedUnknowns& shared,
+                                             const std::vector<TakenForZero>& errors, double noise_scale) {
+  const auto lengths_mm = shared.lengths_mm();
+  std::vector<const double*> unknowns(lengths_mm.begin(), lengths_mm.end());
+  unknowns.push_back(&shared.gap_rad);
+  Eigen::VectorXd prior(static_cast<Eigen::Index>(errors.size()));
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    unknowns.push_back(errors[i].unknown);
+    prior[static_cast<Eigen::Index>(i)] = errors[i].sigma;
+  }
+  ceres::Covariance::Options options;
+  options.algorithm_type = ceres::SPARSE_QR;
+  ceres::Covariance covariance(options);
+  if (!covariance.Compute(unknowns, &problem)) return std::nullopt;
+  const auto size = static_cast<Eigen::Index>(unknowns.size());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> all(size, size);
+  if (!covariance.GetCovarianceMatrix(unknowns, all.data())) return std::nullopt;
+  const PrintCovariance joint = all.topLeftCorner<print_numbers, print_numbers>();
+  const Eigen::MatrixXd cross = all.topRightCorner(print_numbers, prior.size());
+  const Eigen::MatrixXd of_common = all.bottomRightCorner(prior.size(), prior.size());
+  const Eigen::MatrixXd by_common = solve_symmetric(of_common, cross.transpose()).transpose();
+  const PrintCovariance known = joint - by_common * cross.transpose();  // were the common errors known
+  const PrintCovariance print = std::max(1.0, noise_scale * noise_scale) * known +
+                                by_common * prior.cwiseAbs2().asDiagonal() * by_common.transpose();
+  PrintNumbers units = PrintNumbers::Constant(mm);
+  units[print_numbers - 1] = problem.IsParameterBlockConstant(&shared.gap_rad) ? 0 : 1;
+  const PrintCovariance scaled = units.asDiagonal() * print * units.asDiagonal();
+  return scaled.allFinite() ? std::optional(scaled) : std::nullopt;
+}
+
+}  // namespace
+
+std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, const Marker& marker,
+                                 const AdjustmentOptions& options, const AtIteration& at_iteration) {
+  SharedUnknowns shared;
+  std::vector<FrameUnknowns> unknowns(frames.size());
+  ceres::Problem problem;
+  const bool free_lag = tells_lag(frames);
+  add_priors(problem, shared, free_lag);
+  const PrintShape shape = PrintShape::of(marker);
+  std::vector<std::vector<EdgeCost>> edges;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    edges.push_back(
+        add_frame(problem, frames[i], shape, marker.covered_rad(), options.loss_scale_sigmas, shared, unknowns[i]));
+  if (!options.free_print)
+    for (double* length_mm : shared.lengths_mm()) problem.SetParameterBlockConstant(length_mm);
+  if (!options.free_print || !options.free_gap) problem.SetParameterBlockConstant(&shared.gap_rad);
+
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  solver.max_num_iterations = 30;
+  solver.function_tolerance = 1e-9;
+  ceres::Solver::Summary summary;
+  if (!solve_quietly(solver, problem, summary, at_iteration)) return std::nullopt;
+
+  Adjustment result;
+  const double edges_px = sigma_of_edges_px(frames);
+  result.lags = !free_lag && noise_beyond_usual(edges_px) > min_noise_of_lag;
+  const auto lengths_mm = shared.lengths_mm();
+  for (std::size_t i = 0; i < lengths_mm.size(); ++i) result.print[static_cast<Eigen::Index>(i)] = mm * *lengths_mm[i];
+  result.print[print_numbers - 1] = shared.gap_rad;
+  std::vector<double> sigmas;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    UnknownVector& step = result.steps.emplace_back(pose_numbers + 1);
+    step << Eigen::Map<const Eigen::Matrix<double, pose_numbers, 1>>(unknowns[i].pose.data()), unknowns[i].film_sigmas;
+    auto& residuals_px = result.residuals_px.emplace_back();
+    for (const auto& [cost, group] : edges[i]) {
+      residuals_px.push_back(cost->left() * cost->sigma());
+      if (group < 4) sigmas.push_back(cost->left());
+    }
+  }
+  result.noise_scale = robust_scale(std::move(sigmas));
+  if (options.with_covariance) {
+    result.covariance =
+        covariance_of(problem, shared, common_errors(shared, frames, edges_px, free_lag), result.noise_scale);
+    if (!result.covariance) return std::nullopt;
+  }
+  return result;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "lapservo/calibration/fit/at_iteration.h"
+#include "lapservo/calibration/marker/print_shape.h"
+#include "lapservo/vision/marker_survey.h"
+
+namespace lapservo::internal {
+
+struct AdjustmentOptions {
+  double loss_scale_sigmas = 2.5;  ///< of the Cauchy loss
+  bool free_print = true;          ///< else poses alone
+  bool free_gap = true;
+  bool with_covariance = false;
+};
+
+/// What one round of a bundle adjustment changes.
+struct Adjustment {
+  /// Of each frame's pose and, last, of its film in film_sigma_m.
+  std::vector<UnknownVector> steps;
+  PrintNumbers print = PrintNumbers::Zero();
+  /// Residuals that are left, in the order of each frame's edges [px].
+  std::vector<std::vector<double>> residuals_px;
+  /// How many times what the measurements say of themselves their scatter is; robust.
+  double noise_scale = 1;
+  std::optional<PrintCovariance> covariance;  ///< of the print, when asked for
+  /// The pictures look compressed and turn one way: the seam may stay behind, by what nobody knows.
+  bool lags = false;
+};
+
+/// Fits the poses of all frames and one print to what was measured near the believed ones, linearised there, with a
+/// robust loss. `film_m` is the film's thickness that the edges were measured with, `marker` the print. Nullopt when
+/// the solver fails.
+std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, const Marker& marker,
+                                 const AdjustmentOptions& options, const AtIteration& at_iteration = {});
+
+}  // namespace lapservo::internal

@@ -1,0 +1,124 @@
+#include "lapservo/calibration/marker/print_adjustment.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/dense_matrix.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace print_adjustment_test {
+
+// Of a turn, seen as it is.
+std::vector<ViewMeasurements> seen_turn(const Rig& rig) {
+  constexpr int frames = 20;
+  Random random(4);
+  const JointVector start = scenes::random_configuration(rig, 0, random);
+  MarkerSurvey survey(rig, 0);
+  const ViewMeasurer measurer(rig, 0);
+  std::vector<ViewMeasurements> views;
+  for (int i = 0; i < frames; ++i) {
+    JointVector q = start;
+    q.psi_rad = wrap_pi(q.psi_rad + two_pi * i / frames);
+    const cv::Mat bgr = scenes::render(rig, {q}, static_cast<std::uint64_t>(i));
+    if (const auto sighting = survey.find(bgr))
+      views.push_back(measurer.measure({bgr, rig.camera}, rig.instruments[0].marker, *sighting, {}));
+  }
+  return views;
+}
+
+// The same there, or there and back, with the seam's edges so far behind.
+std::vector<ViewMeasurements> passing(const std::vector<ViewMeasurements>& seen, double lag_px, bool and_back) {
+  std::vector<ViewMeasurements> views;
+  for (const double turned_rad : {0.1, -0.1})
+    for (const ViewMeasurements& view : seen) {
+      if (turned_rad < 0 && !and_back) continue;
+      ViewMeasurements& passed = views.emplace_back(view);
+      passed.turned_rad = turned_rad;
+      if (!passed.seam) continue;
+      for (auto* edge : {&passed.seam->upper, &passed.seam->lower}) {
+        if (!*edge) continue;
+        const double by_psi = (*edge)->row[(*edge)->row.size() - 1];
+        (*edge)->residual_px -= by_psi * turned_rad > 0 ? lag_px : -lag_px;
+      }
+    }
+  return views;
+}
+
+class SeamLag : public ::testing::Test {
+ protected:
+  static Rig with_gap() {
+    Rig rig = scenes::usual_rig();
+    rig.instruments[0].marker.gap_rad = 0.24;
+    return rig;
+  }
+  const Rig rig = with_gap();
+  static const std::vector<ViewMeasurements>& seen() {
+    static const std::vector<ViewMeasurements> views = seen_turn(with_gap());
+    return views;
+  }
+  // Largest difference of the print's lengths when the seam stays behind.
+  double by_lag_m(bool and_back) const {
+    const Marker& marker = rig.instruments[0].marker;
+    const auto without = adjust(passing(seen(), 0, and_back), marker, {});
+    const auto with = adjust(passing(seen(), 0.2, and_back), marker, {});
+    return (without->print - with->print).head<print_numbers - 1>().cwiseAbs().maxCoeff();
+  }
+};
+
+TEST_F(SeamLag, IsTakenOffWhereTheTurnGoesBothWays) {
+  const double both_m = by_lag_m(true), one_m = by_lag_m(false);
+  EXPECT_GT(one_m, 5e-6) << "the test's own power";
+  EXPECT_LT(both_m, 0.15 * one_m);
+}
+
+// As many one way as there and back.
+std::vector<ViewMeasurements> passing_twice(const std::vector<ViewMeasurements>& seen, bool and_back) {
+  std::vector<ViewMeasurements> views = passing(seen, 0, and_back);
+  if (and_back) return views;
+  const auto again = views;
+  views.insert(views.end(), again.begin(), again.end());
+  return views;
+}
+
+TEST_F(SeamLag, IsNotToldByFramesThatHardlyMove) {
+  auto views = passing(seen(), 0, true);
+  for (ViewMeasurements& view : views) {
+    if (view.turned_rad < 0) view.turned_rad *= 0.01;
+    for (Measurement& m : view.edges.all) m.sigma_px *= 2.5;
+  }
+  EXPECT_TRUE(adjust(views, rig.instruments[0].marker, {})->lags);
+}
+
+// Noisy edges are those of compressed video.
+TEST_F(SeamLag, IsDoubtedInACompressedTurnOfOneWay) {
+  const Marker& marker = rig.instruments[0].marker;
+  const auto sigma_and_doubt = [&](bool and_back, double noisier) {
+    auto views = passing_twice(seen(), and_back);
+    for (ViewMeasurements& view : views)
+      for (Measurement& m : view.edges.all) m.sigma_px *= noisier;
+    const auto adjustment = adjust(views, marker, {.with_covariance = true});
+    // Of a print that is turned as a whole.
+    const auto slopes_m = boundary_slopes_m(marker);
+    PrintNumbers turned = PrintNumbers::Zero();
+    for (int k = 0; k < 4; ++k) {
+      if (k > 0) turned[k - 1] = slopes_m[static_cast<std::size_t>(k)];
+      turned[3 + k] = slopes_m[static_cast<std::size_t>(k)];
+    }
+    const Eigen::VectorXd information = solve_symmetric(*adjustment->covariance, turned);
+    const double sigma_rad = 1 / std::sqrt(turned.dot(information));
+    return std::pair{sigma_rad, adjustment->lags};
+  };
+  EXPECT_FALSE(sigma_and_doubt(false, 1).second);
+  const auto [one_way_rad, one_way_lags] = sigma_and_doubt(false, 2.5);
+  const auto [both_rad, both_lags] = sigma_and_doubt(true, 2.5);
+  EXPECT_TRUE(one_way_lags);
+  EXPECT_FALSE(both_lags);
+  EXPECT_GT(one_way_rad, 1.2 * both_rad);
+}
+
+}  // namespace print_adjustment_test
+}  // namespace lapservo::internal

@@ -1,0 +1,54 @@
+#include "lapservo/calibration/recording/frame_recording.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/io/pictures/image_encoding.h"
+#include "lapservo/vision/interlacing.h"
+
+namespace lapservo::internal {
+
+std::string FramesRead::damaged() const {
+  return flawed ? fmt::format(" ({} are damaged)", flawed) : "";
+}
+
+void check_frame_size(const Frame& frame, const std::string& recording, const cv::Size& expected,
+                      const std::string& whose) {
+  if (frame.bgr.size() != expected)
+    throw InputError(frame.file.empty() ? recording : frame.file.string(), "size",
+                     fmt::format("{} x {}", frame.bgr.cols, frame.bgr.rows),
+                     fmt::format("{} x {}, as {} has it", expected.width, expected.height, whose));
+}
+
+FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int every, const JobWatch& watch,
+                       const std::function<std::string(const cv::Mat&, double)>& look) {
+  FrameSource& source = recording.source;
+  const bool deinterlace = recording.deinterlace || rig.camera.deinterlace;
+  EvenField field(rig.camera.response);
+  FramesRead frames;
+  int read = 0;
+  while (!(frames.stopped = watch.stopped())) {
+    const auto frame = source.next();
+    if (!frame) break;
+    check_frame_size(*frame, recording.name, {rig.camera.width_px, rig.camera.height_px}, "the rig's camera");
+    if (read++ % every != 0) continue;
+    if (frame->flaw) {
+      ++frames.flawed;
+      continue;
+    }
+    ++frames.looked_at;
+    frames.jpegs += has_jpeg_extension(frame->file) ? 1 : 0;
+    watch.tell(source.frame_count(), read,
+               look(deinterlace ? field.of(frame->bgr).clone() : frame->bgr, frame->time_s));
+  }
+  frames.complaint = source.complaint();
+  return frames;
+}
+
+int every_of(const FrameSource& source, int enough) {
+  return std::max(1, source.frame_count().value_or(0) / enough);
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,130 @@
+#include "lapservo/calibration/registration/arm_guess.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/statistics.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/joint_conversion.h"
+
+namespace lapservo::internal {
+namespace {
+
+// The rotation that takes directions to others best (Kabsch 1976), and the mean square that is left.
+struct Turned {
+  Eigen::Matrix3d rotation;
+  double misfit;
+};
+
+Turned best_rotation(const std::vector<Eigen::Vector3d>& from, const std::vector<Eigen::Vector3d>& to) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < from.size(); ++i) sum += to[i] * from[i].transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const double handed = (svd.matrixU() * svd.matrixV().transpose()).determinant();
+  const Eigen::Vector3d signs(1, 1, handed);
+  return {svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose(),
+          2 - 2 * svd.singularValues().dot(signs) / static_cast<double>(from.size())};
+}
+
+// Offset of phi and rotation for one sign of phi.
+struct Swing {
+  double sign, offset;
+  Turned turned;
+};
+
+Swing best_swing(const std::vector<TimedPose>& poses, const std::vector<std::array<double, 4>>& joints,
+                 const Joints& given) {
+  std::vector<Eigen::Vector3d> axes, shafts(poses.size());
+  for (const TimedPose& pose : poses) axes.push_back(pose.axis());
+  double mean = 0;
+  for (const auto& at : joints) mean += at[1] / static_cast<double>(joints.size());
+  const auto turned_at = [&](double sign, double offset) {
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      const double theta_rad = given.sign[0] * joints[i][0] + given.offset[0], phi_rad = sign * joints[i][1] + offset;
+      shafts[i] = shaft_axis_in_rcm({theta_rad, phi_rad, 0, 0});
+    }
+    return best_rotation(shafts, axes);
+  };
+  Swing best{1, 0, {Eigen::Matrix3d::Identity(), 1e300}};
+  const auto consider = [&](double sign, double offset) {
+    if (const Turned turned = turned_at(sign, offset); turned.misfit < best.turned.misfit)
+      best = {sign, offset, turned};
+  };
+  // phi and -phi (with theta turned by pi) are the same axis: of both, phi lies between 0 and pi in the mean.
+  constexpr int parts = 60;
+  for (const double sign : {1.0, -1.0})
+    for (int i = 1; i < parts; ++i) consider(sign, pi * i / parts - sign * mean);
+  for (double step = pi / parts / 2; step > 1e-4; step /= 2)
+    for (const double offset : {best.offset - step, best.offset + step}) consider(best.sign, offset);
+  return best;
+}
+
+// Turning the RCM frame by pi about its x axis changes the signs of theta and phi, and psi by pi.
+void turn_over(Rigid3& camera_from_rcm, Joints& joints) {
+  camera_from_rcm.rotation = camera_from_rcm.rotation * Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitX());
+  // theta' = -theta - (what keeps its offset the rig's) is a turn about z.
+  camera_from_rcm.rotation =
+      camera_from_rcm.rotation * Eigen::AngleAxisd(-2 * joints.offset[0], Eigen::Vector3d::UnitZ());
+  joints.sign[0] *= -1, joints.sign[1] *= -1;
+  joints.offset[1] = pi - joints.offset[1];
+}
+
+// psi as the joint's sign makes it agree with the turns seen: direction and length of the mean of exp(i difference).
+std::complex<double> mean_turn(const std::vector<TimedPose>& poses, const std::vector<std::array<double, 4>>& joints,
+                               const Marker& marker, const ArmGuess& guess, double sign) {
+  std::complex<double> sum = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const auto q = JointVector::from_vector(q_from_joints(guess.joints, Eigen::Vector4d(joints[i].data())));
+    const Rigid3 unturned = camera_from_marker(marker, guess.camera_from_rcm * rcm_from_unrolled(q), 0);
+    const Eigen::Matrix3d turn =
+        (unturned.rotation.conjugate() * poses[i].marker.camera_from_marker.rotation).toRotationMatrix();
+    const double psi_rad = std::atan2(turn(1, 0) - turn(0, 1), turn(0, 0) + turn(1, 1));
+    sum += std::polar(1.0, psi_rad - sign * joints[i][3]);
+  }
+  return sum / static_cast<double>(poses.size());
+}
+
+}  // namespace
+
+ArmGuess guess_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
+                   const std::vector<std::array<double, 4>>& joints, const Eigen::Vector3d& rcm_m,
+                   double rho_per_joint) {
+  ArmGuess guess;
+  guess.joints = instrument.joints.value();
+  const Swing swing = best_swing(poses, joints, guess.joints);
+  guess.misfit_rad = std::sqrt(std::max(0.0, swing.turned.misfit));
+  guess.camera_from_rcm = {Eigen::Quaterniond(swing.turned.rotation).normalized(), rcm_m};
+  guess.joints.sign[1] = swing.sign, guess.joints.offset[1] = swing.offset;
+  if (instrument.camera_from_rcm) {
+    ArmGuess over = guess;
+    turn_over(over.camera_from_rcm, over.joints);
+    const Eigen::Quaterniond& given = instrument.camera_from_rcm->rotation;
+    if (given.angularDistance(over.camera_from_rcm.rotation) < given.angularDistance(guess.camera_from_rcm.rotation))
+      guess = over;
+  }
+
+  double low = joints[0][2], high = low;
+  for (const auto& at : joints) low = std::min(low, at[2]), high = std::max(high, at[2]);
+  constexpr double least_travel_m = 0.003;
+  if (high - low > least_travel_m) guess.joints.sign[2] = rho_per_joint < 0 ? -1 : 1;
+  std::vector<double> offsets_m;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    offsets_m.push_back((poses[i].origin() - rcm_m).dot(poses[i].axis()) - guess.joints.sign[2] * joints[i][2]);
+  guess.joints.offset[2] = median(offsets_m);
+
+  const double given = guess.joints.sign[3];
+  auto turn = mean_turn(poses, joints, instrument.marker, guess, given);
+  if (const auto other = mean_turn(poses, joints, instrument.marker, guess, -given);
+      std::abs(other) > std::abs(turn) + 0.02)
+    turn = other, guess.joints.sign[3] = -given;
+  const double offset = instrument.joints->offset[3];
+  guess.joints.offset[3] = offset + wrap_pi(std::arg(turn) - offset);
+  return guess;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "lapservo/calibration/marker/frame_fit.h"
+#include "lapservo/calibration/recording/joint_recording.h"
+#include "lapservo/calibration/registration/arm_start.h"
+#include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// Times sigma: what goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor
+/// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/calibration.md).
+inline constexpr double unmodelled_sigmas = 2;
+
+/// Which faults an arm's model may have beside a wrong registration.
+struct ArmFaults {
+  bool focal = false;  ///< the camera's focal length is another: needs TimedPose::by_focal
+  bool drift = false;  ///< what the RCM frame moves by in the camera over the recording, steadily
+};
+
+/// Where a marker is seen, as its arm's joints have it.
+class ArmModel {
+ public:
+  /// The numbers x of a fit.
+  struct Blocks {
+    Block rotation;     ///< about the RCM frame's axes (3), beyond the guess
+    Block translation;  ///< of the RCM frame (3)
+    Block offsets;      ///< of phi, rho, psi
+    Block delay;
+    /// What frames have in common and no number of them averages out: the scale of distances, the axis' tilt along the
+    /// view.
+    Block scale, tilt;
+    Block backlash;  ///< of those joints that move
+    Block focal;     ///< relative change of the focal length; empty without this fault, as the next
+    Block drift;     ///< of the RCM frame from the first pose to the last: place (3, camera frame), turn (3, RCM frame)
+  };
+
+  ArmModel(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
+           const ArmFaults& faults = {});
+
+  const Blocks& blocks() const { return blocks_; }
+  const std::vector<Unknown>& unknowns() const { return unknowns_; }
+  /// In the middle of the recording, where it drifts.
+  Rigid3 camera_from_rcm(const Eigen::VectorXd& x) const;
+  Joints joints(const Eigen::VectorXd& x) const;
+  std::array<double, 4> backlash_of(const Eigen::VectorXd& x) const;
+
+  /// Off across the view (2) and along it; the axis turned in the picture and tilted along the view; turned about it.
+  Eigen::MatrixXd residuals(const Eigen::VectorXd& x) const;
+
+  const std::vector<TimedPose>& poses() const { return poses_; }
+
+ private:
+  JointRecording behind_backlash(const Eigen::VectorXd& x) const;
+  void add_unknowns(double delay_s, const ArmFaults& faults);
+  Rigid3 camera_from_rcm_at(const Eigen::VectorXd& x, double time_s) const;
+  Eigen::Matrix<double, 6, 1> difference(const TimedPose& pose, const Rigid3& camera_from_rcm, const JointVector& q,
+                                         const Eigen::VectorXd& x) const;
+
+  Marker marker_;
+  std::vector<TimedPose> poses_;
+  JointRecording recording_;
+  ArmGuess guess_;
+  std::vector<std::size_t> moving_;
+  std::vector<Unknown> unknowns_;
+  Blocks blocks_;
+};
+
+}  // namespace lapservo::internal

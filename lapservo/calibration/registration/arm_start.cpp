@@ -1,0 +1,78 @@
+#include "lapservo/calibration/registration/arm_start.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "lapservo/calibration/registration/axes_meeting_point.h"
+#include "lapservo/calibration/registration/delay_search.h"
+#include "lapservo/core/error.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double largest_delay_s = 3.2;
+
+// Frames that the recording covers whichever way the fit moves the delay, and the joints there.
+void keep_common(const std::vector<TimedPose>& poses, const JointRecording& recording, ArmStart& start) {
+  constexpr double margin_s = 0.1;
+  for (const TimedPose& pose : poses) {
+    const double time_s = pose.time_s - start.delay_s;
+    const auto at = recording.at(time_s);
+    if (!at || !recording.at(time_s - margin_s) || !recording.at(time_s + margin_s)) continue;
+    start.poses.push_back(pose), start.joints.push_back(*at);
+  }
+}
+
+void refuse_apart(const std::vector<TimedPose>& poses, const JointRecording& recording, double about_s,
+                  const std::string& source) {
+  const double first_s = poses.front().time_s - about_s, last_s = poses.back().time_s - about_s;
+  const double shared_s = std::min(last_s, recording.time_s.back()) - std::max(first_s, recording.time_s.front());
+  if (shared_s > -largest_delay_s) return;
+  throw InputError(source,
+                   fmt::format("has no time in common with the frames: they run from {:.2f} to {:.2f} s, it from "
+                               "{:.2f} to {:.2f} s",
+                               first_s, last_s, recording.time_s.front(), recording.time_s.back()));
+}
+
+}  // namespace
+
+std::string too_few_poses(std::size_t poses) {
+  return fmt::format("the marker was found in {} frames, at least {} are needed", poses, min_registration_poses);
+}
+
+ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& poses, const JointRecording& recording,
+                   const std::string& source) {
+  ArmStart start;
+  if (poses.size() < min_registration_poses) return start.refusal = too_few_poses(poses.size()), start;
+  const double about_s = instrument.image_delay_s.value_or(0);
+  refuse_apart(poses, recording, about_s, source);
+  const auto meeting = axes_meeting_point(poses);
+  if (!meeting)
+    return start.refusal = std::string("the shaft's axes are too alike to tell where they meet: ") + swing_more, start;
+  std::vector<double> rho_m;
+  for (const TimedPose& pose : poses) rho_m.push_back((pose.origin() - meeting->point_m).dot(pose.axis()));
+
+  constexpr double least_explained = 0.5, max_misfit_rad = 0.1;
+  const auto foreign = [&](const std::string& how) {
+    start.refusal = "the joints do not move as the marker does (" + how +
+                    "): is it this arm's recording, are names in the order theta, phi, rho, psi, do both clocks run "
+                    "within 3 s of each other";
+    return start;
+  };
+  const DelaySearch search = search_delay(poses, rho_m, recording, about_s, largest_delay_s);
+  if (search.explained < least_explained)
+    return foreign(fmt::format("{:.0f} % of the motion is explained", 100 * search.explained));
+  start.delay_s = search.delay_s;
+  keep_common(poses, recording, start);
+  if (start.poses.size() < min_registration_poses)
+    return start.refusal = fmt::format("{} frames lie within the recording of the joints, at least {} are needed",
+                                       start.poses.size(), min_registration_poses),
+           start;
+  start.guess = guess_arm(instrument, start.poses, start.joints, meeting->point_m, search.rho_per_joint);
+  if (start.guess.misfit_rad > max_misfit_rad)
+    return foreign(fmt::format("axes miss by {:.2f} rad", start.guess.misfit_rad));
+  return start;
+}
+
+}  // namespace lapservo::internal

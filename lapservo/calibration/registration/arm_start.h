@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "lapservo/calibration/recording/joint_recording.h"
+#include "lapservo/calibration/registration/arm_guess.h"
+#include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// Poses that a registration needs at least, and what to do where their motion tells too little.
+inline constexpr std::size_t min_registration_poses = 40;
+inline constexpr auto swing_more =
+    "swing the instrument by 0.5 rad in both directions, insert it by 20 mm and turn it, in 20 s or more";
+std::string too_few_poses(std::size_t poses);
+
+/// What a fit of an arm starts from.
+struct ArmStart {
+  /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
+  std::string refusal;
+  /// Those that the recording covers whichever way the fit moves the delay, and the joints there.
+  std::vector<TimedPose> poses;
+  std::vector<std::array<double, 4>> joints;
+  ArmGuess guess;
+  double delay_s = 0;
+};
+
+/// Delay, signs and a first registration, whatever of them the instrument knows. Throws InputError when the recording
+/// and the frames have no time in common, naming `source`.
+ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& poses, const JointRecording& recording,
+                   const std::string& source);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,153 @@
+#include "lapservo/calibration/registration/registration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "lapservo/calibration/marker/frame_fit.h"
+#include "lapservo/calibration/registration/arm_model.h"
+#include "lapservo/calibration/registration/arm_start.h"
+#include "lapservo/calibration/registration/axes_meeting_point.h"
+#include "lapservo/core/statistics.h"
+
+namespace lapservo::internal {
+namespace {
+
+// What a registration that is worth writing is known to.
+constexpr double max_sigma_m = 3e-3, max_sigma_rad = 0.02;
+
+constexpr double unmodelled = unmodelled_sigmas * unmodelled_sigmas;  // times the variance
+
+// Of the four numbers x y z w, for a small turn about the frame's own axes.
+Eigen::Vector4d quaternion_sigma(const Eigen::Quaterniond& q, const Eigen::Matrix3d& turn_covariance) {
+  Eigen::Matrix<double, 4, 3> slopes;
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    Eigen::Quaterniond turn(0, 0, 0, 0);
+    turn.vec()[i] = 0.5;
+    slopes.col(i) = (q * turn).coeffs();
+  }
+  return (slopes * turn_covariance * slopes.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+}
+
+std::string travel_of(const std::vector<std::array<double, 4>>& joints) {
+  std::array<double, 4> low = joints.front(), high = low;
+  for (const auto& at : joints)
+    for (std::size_t j = 0; j < 4; ++j) low[j] = std::min(low[j], at[j]), high[j] = std::max(high[j], at[j]);
+  return fmt::format("theta's joint moved by {:.2f} rad, phi's by {:.2f} rad, rho's by {:.1f} mm, psi's by {:.2f} rad",
+                     high[0] - low[0], high[1] - low[1], 1e3 * (high[2] - low[2]), high[3] - low[3]);
+}
+
+// Where the axes meet when all of them are wrong alike: in distance, and tilted along the view.
+Eigen::Matrix3d common_covariance(const std::vector<TimedPose>& poses, const Eigen::Vector3d& rcm_m) {
+  constexpr double common_fraction = 0.5;
+  std::vector<double> scales, tilts_m;
+  Eigen::Vector3d ray = Eigen::Vector3d::Zero();
+  for (const TimedPose& pose : poses) {
+    scales.push_back(pose.marker.sigma_z_m / pose.origin().norm());
+    tilts_m.push_back(pose.marker.sigma_axis_rad * (pose.origin() - rcm_m).norm());
+    ray += pose.origin();
+  }
+  const Eigen::Vector3d stretched = common_fraction * median(scales) * rcm_m;
+  const Eigen::Vector3d tilted = common_fraction * median(tilts_m) * ray.normalized();
+  return stretched * stretched.transpose() + tilted * tilted.transpose();
+}
+
+Eigen::Quaterniond usual_rotation(const std::vector<TimedPose>& poses) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const TimedPose& pose : poses) mean += pose.axis();
+  const Eigen::Vector3d x = mean.normalized(), up = -Eigen::Vector3d::UnitY();
+  const Eigen::Vector3d across = up - up.dot(x) * x;
+  const Eigen::Vector3d z = across.norm() > 0.1 ? across.normalized() : x.unitOrthogonal();
+  Eigen::Matrix3d axes;
+  axes << x, z.cross(x), z;
+  return Eigen::Quaterniond(axes).normalized();
+}
+
+// Half of what a frame says of its turn about the axis is the film's, the print's and the picture's processing: common
+// to all frames, and not told from psi's offset.
+double common_turn_rad(const std::vector<TimedPose>& poses) {
+  std::vector<double> sigmas_rad;
+  for (const TimedPose& pose : poses) sigmas_rad.push_back(pose.marker.sigma_roll_rad);
+  return 0.5 * median(sigmas_rad);
+}
+
+void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result) {
+  result.camera_from_rcm = model.camera_from_rcm(fit.x);
+  const Eigen::MatrixXd covariance = unmodelled * fit.covariance;
+  const Eigen::VectorXd sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const ArmModel::Blocks& blocks = model.blocks();
+  const Eigen::Matrix3d turn = blocks.rotation.of(covariance);
+  result.sigma_translation_m = blocks.translation.of(sigma);
+  result.sigma_quaternion = quaternion_sigma(result.camera_from_rcm.rotation, turn);
+  result.sigma_rotation_rad = std::sqrt(turn.trace());
+  Registration::Arm arm;
+  arm.joints = model.joints(fit.x);
+  for (Eigen::Index i = 0; i < 3; ++i) arm.sigma_offset[static_cast<std::size_t>(i) + 1] = blocks.offsets.of(sigma)[i];
+  arm.sigma_offset[3] = std::hypot(arm.sigma_offset[3], common_turn_rad(model.poses()));
+  arm.image_delay_s = blocks.delay.of(fit.x)[0], arm.sigma_image_delay_s = blocks.delay.of(sigma)[0];
+  arm.backlash = model.backlash_of(fit.x);
+  result.arm = arm;
+  for (std::size_t i = 0; i < model.poses().size(); ++i) {
+    const TimedPose& pose = model.poses()[i];
+    const auto r = fit.residuals.col(static_cast<Eigen::Index>(i));
+    result.residuals.push_back({pose.time_s,
+                                std::hypot(r.head<2>().norm() * pose.marker.sigma_xy_m, r[2] * pose.marker.sigma_z_m),
+                                r.segment<2>(3).norm() * pose.marker.sigma_axis_rad / std::sqrt(2.0),
+                                std::abs(r[5]) * pose.marker.sigma_roll_rad});
+  }
+}
+
+}  // namespace
+
+Registration register_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses,
+                          const AtIteration& at_iteration) {
+  Registration result;
+  if (poses.size() < min_registration_poses) return result.refusal = too_few_poses(poses.size()), result;
+  const auto meeting = axes_meeting_point(poses, at_iteration);
+  Eigen::Vector3d sigma_m = Eigen::Vector3d::Zero();
+  if (meeting) {
+    const Eigen::Matrix3d covariance = unmodelled * meeting->covariance + common_covariance(poses, meeting->point_m);
+    sigma_m = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  }
+  if (!meeting || sigma_m.norm() > max_sigma_m)
+    return result.refusal = std::string("the shaft's axes are too alike to tell where they meet: ") + swing_more,
+           result;
+  const bool known = instrument.camera_from_rcm.has_value();
+  result.camera_from_rcm = {known ? instrument.camera_from_rcm->rotation : usual_rotation(poses), meeting->point_m};
+  result.sigma_translation_m = sigma_m;
+  result.unknown.push_back(known ? "camera_from_rcm's rotation is the rig's: it takes --joints to measure it"
+                                 : "camera_from_rcm's rotation is a convention (x along the mean shaft, z up in the "
+                                   "image), not the arm's: theta, phi and psi differ from the joints' by constants");
+  result.unknown.emplace_back("joints and image_delay_s stay as the rig has them: they take --joints");
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Eigen::Vector3d arm_m = poses[i].origin() - meeting->point_m;
+    const double axis_rad = std::asin(std::min(1.0, meeting->misses_m[i] / std::max(1e-6, arm_m.norm())));
+    result.residuals.push_back({poses[i].time_s, meeting->misses_m[i], axis_rad, 0});
+  }
+  return result;
+}
+
+Registration register_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
+                          const JointRecording& recording, const std::string& source, const AtIteration& at_iteration) {
+  Registration result;
+  const ArmStart start = start_arm(instrument, poses, recording, source);
+  if (!start.refusal.empty()) return result.refusal = start.refusal, result;
+  const ArmModel model(instrument, start, recording);
+  const auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
+                              2 * poses_per_second(start.poses), at_iteration);
+  if (!fit)
+    return result.refusal = "the motion leaves the registration open: " + travel_of(start.joints) + ": " + swing_more,
+           result;
+  report_arm(model, *fit, result);
+  if (result.sigma_translation_m.norm() > max_sigma_m || result.sigma_rotation_rad > max_sigma_rad)
+    result.refusal = fmt::format("it would be known to {:.1f} mm and {:.2f} degrees only; {}: {}",
+                                 1e3 * result.sigma_translation_m.norm(), 57.3 * result.sigma_rotation_rad,
+                                 travel_of(start.joints), swing_more);
+  result.unknown.emplace_back("theta's offset is the rig's: camera_from_rcm turns with it");
+  return result;
+}
+
+}  // namespace lapservo::internal

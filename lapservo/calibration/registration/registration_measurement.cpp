@@ -1,0 +1,96 @@
+#include "lapservo/calibration/registration/registration_measurement.h"
+
+#include <array>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lapservo/calibration/registration/pose_table.h"
+#include "lapservo/core/rounded_sigma.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int enough_images = 3600;
+constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+
+template <std::size_t N, typename Numbers>
+std::array<double, N> rounded_sigmas(const Numbers& sigmas) {
+  std::array<double, N> rounded;
+  std::transform(sigmas.begin(), sigmas.end(), rounded.begin(), rounded_sigma);
+  return rounded;
+}
+
+}  // namespace
+
+MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
+                              const JobWatch& watch) {
+  Rig free = rig;
+  for (Instrument& each : free.instruments) each.camera_from_rcm.reset();
+  Tracker tracker(free, {.frame_budget = std::nullopt});
+  const std::string& name = rig.instruments[instrument].name;
+  MeasuredPoses poses;
+  poses.read = read_frames(recording, free, every_of(recording.source, enough_images), watch,
+                           [&](const cv::Mat& bgr, double time_s) {
+                             const Observation& seen = tracker.track(bgr)[instrument];
+                             if (seen.status == Status::ok && seen.marker) poses.all.push_back({time_s, *seen.marker});
+                             return fmt::format(", {} in {}", name, poses.all.size());
+                           });
+  if (poses.all.empty())
+    poses.none = fmt::format("{} is in none of {} frames{}", name, poses.read.looked_at, poses.read.damaged());
+  return poses;
+}
+
+MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::string& instrument) {
+  PoseTable table = read_poses(path, instrument);
+  MeasuredPoses poses;
+  poses.all = std::move(table.poses);
+  if (table.with_rcm > 0 && poses.all.empty())
+    poses.none = fmt::format(
+        "its {} rows were measured with a camera_from_rcm, through which their axes pass whether it is right or not: "
+        "give the pictures, or track them with a rig without it",
+        table.with_rcm);
+  else if (table.rows == 0)
+    poses.none = fmt::format("has no row of {}", instrument);
+  return poses;
+}
+
+Instrument registered(Instrument instrument, const Registration& registration) {
+  instrument.camera_from_rcm = registration.camera_from_rcm;
+  instrument.sigma_translation_m = rounded_sigmas<3>(registration.sigma_translation_m);
+  instrument.sigma_quaternion_xyzw.reset();
+  if (registration.sigma_quaternion)
+    instrument.sigma_quaternion_xyzw = rounded_sigmas<4>(*registration.sigma_quaternion);
+  if (!registration.arm) return instrument;
+  instrument.joints = registration.arm->joints;
+  instrument.joints->sigma_offset = rounded_sigmas<4>(registration.arm->sigma_offset);
+  instrument.image_delay_s = registration.arm->image_delay_s;
+  instrument.sigma_image_delay_s = rounded_sigma(registration.arm->sigma_image_delay_s);
+  return instrument;
+}
+
+std::vector<CalibratedNumber> registered_numbers(const Instrument& before, const Registration& registration) {
+  std::vector<CalibratedNumber> numbers;
+  const auto add = [&](const std::string& name, double was, double is, double sigma) {
+    numbers.push_back({name, 1e3 * was, 1e3 * is, 1e3 * sigma});
+  };
+  constexpr std::array<const char*, 3> axes{"x", "y", "z"};
+  const auto& was = before.camera_from_rcm;
+  for (Eigen::Index i = 0; i < 3; ++i)
+    add(fmt::format("camera_from_rcm {} [mm]", axes[static_cast<std::size_t>(i)]), was ? was->translation[i] : unknown,
+        registration.camera_from_rcm.translation[i], registration.sigma_translation_m[i]);
+  if (registration.sigma_quaternion)
+    add("its rotation [mrad]", was ? was->rotation.angularDistance(registration.camera_from_rcm.rotation) : unknown, 0,
+        registration.sigma_rotation_rad);
+  if (!registration.arm) return numbers;
+  const Registration::Arm& arm = *registration.arm;
+  constexpr std::array<const char*, 4> units{"theta [mrad]", "phi [mrad]", "rho [mm]", "psi [mrad]"};
+  for (std::size_t i = 1; i < 4; ++i)
+    add(fmt::format("offset of {}", units[i]), before.joints->offset[i], arm.joints.offset[i], arm.sigma_offset[i]);
+  add("image_delay_s [ms]", before.image_delay_s.value_or(unknown), arm.image_delay_s, arm.sigma_image_delay_s);
+  return numbers;
+}
+
+}  // namespace lapservo::internal

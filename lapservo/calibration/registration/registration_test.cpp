@@ -1,0 +1,257 @@
+#include "lapservo/calibration/registration/registration.h"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "lapservo/calibration/registration/pose_table.h"
+#include "lapservo/core/angles.h"
+#include "lapservo/core/atomic_file.h"
+#include "lapservo/core/random.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/robot/backlash.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/rigs.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo::internal {
+namespace {
+
+// An arm in smooth motion, its joints read at 100 Hz, its marker seen 30 times a second with the noise that its sigmas
+// say.
+struct Motion {
+  double seconds = 20, delay_s = 0.08, swing = 1;
+  std::array<double, 4> sign{1, -1, 1, -1}, offset{0.2, 1.5, -0.02, 0.7}, backlash{};
+  std::uint64_t seed = 1;
+};
+
+struct Recorded {
+  Instrument truth;
+  std::vector<TimedPose> poses;
+  JointRecording recording;
+};
+
+JointVector motion_at(double t, double swing, std::uint64_t seed) {
+  const double p = 0.3 * static_cast<double>(seed);
+  return {0.2 + swing * 0.35 * std::sin(0.9 * t + p), 1.45 + swing * 0.25 * std::sin(1.3 * t + 2 * p),
+          0.11 + swing * 0.02 * std::sin(0.7 * t + 3 * p), swing * 1.2 * std::sin(0.8 * t + p)};
+}
+
+Recorded recorded(const Motion& motion) {
+  Recorded result;
+  result.truth = lapservo::testing::paper_test_rig().instruments[0];
+  result.truth.joints = Joints{{"yaw", "pitch", "insertion", "roll"}, motion.sign, motion.offset};
+  result.truth.image_delay_s = motion.delay_s;
+  const Joints& joints = *result.truth.joints;
+  Random random(motion.seed);
+  std::array<Backlash, 4> gaps;
+  std::vector<std::array<double, 4>> shaft;
+  constexpr double dt = 1e-3;
+  const int count = static_cast<int>(motion.seconds / dt);
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector4d q = motion_at(i * dt, motion.swing, motion.seed).vector();
+    std::array<double, 4> reading, behind;
+    for (std::size_t j = 0; j < 4; ++j) {
+      reading[j] = (q[static_cast<Eigen::Index>(j)] - joints.offset[j]) / joints.sign[j];
+      if (i == 0) gaps[j] = Backlash(reading[j]);
+      gaps[j].follow(reading[j], motion.backlash[j]);
+      behind[j] = joints.sign[j] * gaps[j].instrument(motion.backlash[j]) + joints.offset[j];
+    }
+    shaft.push_back(behind);
+    if (i % 10 == 0) result.recording.time_s.push_back(i * dt), result.recording.joints.push_back(reading);
+  }
+  for (int i = 0; i < count; i += 33) {
+    const auto& q = shaft[static_cast<std::size_t>(i)];
+    const Rigid3 exact = camera_from_marker(
+        result.truth.marker, *result.truth.camera_from_rcm * rcm_from_unrolled({q[0], q[1], q[2], q[3]}), q[3]);
+    TimedPose pose;
+    pose.time_s = i * dt + motion.delay_s;
+    Observation::MarkerPose& seen = pose.marker;
+    seen.sigma_xy_m = 1e-5, seen.sigma_z_m = 1e-4, seen.sigma_axis_rad = 1e-3, seen.sigma_roll_rad = 1e-3;
+    const Eigen::Vector3d ray = exact.translation.normalized(), side = ray.unitOrthogonal();
+    const auto n = [&] { return random.normal(); };
+    seen.camera_from_marker.translation =
+        exact.translation + 1e-4 * n() * ray + 1e-5 * (n() * side + n() * ray.cross(side));
+    const Eigen::Vector3d turn(7e-4 * n(), 7e-4 * n(), 1e-3 * n());
+    seen.camera_from_marker.rotation = exact.rotation * Eigen::AngleAxisd(turn.norm(), turn.normalized());
+    result.poses.push_back(pose);
+  }
+  return result;
+}
+
+// What a user has: names only.
+Instrument with_names_only(Instrument instrument) {
+  const double theta_offset = instrument.joints->offset[0];
+  instrument.camera_from_rcm.reset(), instrument.image_delay_s.reset();
+  instrument.joints->sign = {instrument.joints->sign[0], 1, 1, 1};
+  instrument.joints->offset = {theta_offset, 0, 0, 0};
+  return instrument;
+}
+
+struct Errors {
+  double position_m, rotation_rad, phi_rad, rho_m, psi_rad, delay_s;
+};
+
+Errors errors_of(const Registration& found, const Instrument& truth) {
+  const Rigid3& expected = *truth.camera_from_rcm;
+  const auto& arm = found.arm.value();
+  return {(found.camera_from_rcm.translation - expected.translation).norm(),
+          found.camera_from_rcm.rotation.angularDistance(expected.rotation),
+          arm.joints.offset[1] - truth.joints->offset[1],
+          arm.joints.offset[2] - truth.joints->offset[2],
+          wrap_pi(arm.joints.offset[3] - truth.joints->offset[3]),
+          arm.image_delay_s - truth.image_delay_s.value()};
+}
+
+TEST(RegisterArm, FindsAllOfItFromNamesAlone) {
+  for (const double delay_s : {-2.7, 0.08, 0.25, 3.0})
+    for (const double phi_sign : {1.0, -1.0}) {
+      Motion motion;
+      motion.delay_s = delay_s, motion.sign[1] = phi_sign, motion.sign[2] = -phi_sign;
+      const Recorded data = recorded(motion);
+      const auto found = register_arm(with_names_only(data.truth), data.poses, data.recording, "joints.csv");
+      ASSERT_EQ(found.refusal, "");
+      EXPECT_EQ(found.arm->joints.sign, data.truth.joints->sign);
+      const Errors e = errors_of(found, data.truth);
+      EXPECT_LT(e.position_m, 2e-4);
+      EXPECT_LT(e.rotation_rad, 1e-3);
+      EXPECT_NEAR(e.phi_rad, 0, 1e-3);
+      EXPECT_NEAR(e.rho_m, 0, 2e-4);
+      EXPECT_NEAR(e.psi_rad, 0, 1e-3);
+      EXPECT_NEAR(e.delay_s, 0, 1e-3);
+      EXPECT_DOUBLE_EQ(found.arm->joints.offset[0], data.truth.joints->offset[0]);
+    }
+}
+
+TEST(RegisterArm, OfTwoDescriptionsTakesTheRigs) {
+  Motion motion;
+  motion.sign = {-1, 1, 1, 1};
+  const Recorded data = recorded(motion);
+  Instrument known = data.truth;
+  known.camera_from_rcm->rotation =
+      known.camera_from_rcm->rotation * Eigen::AngleAxisd(0.15, Eigen::Vector3d(1, 2, 3).normalized());
+  known.camera_from_rcm->translation += Eigen::Vector3d(5e-3, -5e-3, 8e-3);
+  known.joints->sign[0] = 1;  // wrong: the rig's rotation tells
+  const auto found = register_arm(known, data.poses, data.recording, "joints.csv");
+  ASSERT_EQ(found.refusal, "");
+  EXPECT_EQ(found.arm->joints.sign, data.truth.joints->sign);
+  EXPECT_LT(errors_of(found, data.truth).rotation_rad, 1e-3);
+}
+
+TEST(RegisterArm, ErrorsAreAsTheirSigmasSayBacklashOrNot) {
+  double squares = 0, count = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    Motion motion;
+    motion.seed = seed, motion.seconds = 10;
+    if (seed % 2) motion.backlash = {0.01, 0.01, 1e-3, 0.03};
+    const Recorded data = recorded(motion);
+    const auto found = register_arm(with_names_only(data.truth), data.poses, data.recording, "joints.csv");
+    ASSERT_EQ(found.refusal, "");
+    const Errors e = errors_of(found, data.truth);
+    EXPECT_LT(e.position_m, 5e-4);
+    EXPECT_LT(e.rotation_rad, 2.6e-3);
+    EXPECT_NEAR(e.delay_s, 0, 5e-3);
+    EXPECT_NEAR(found.arm->backlash[3], motion.backlash[3], 3e-3);
+    const auto& arm = *found.arm;
+    const auto add = [&](double error, double sigma) { squares += error * error / (sigma * sigma), ++count; };
+    add(e.phi_rad, arm.sigma_offset[1]), add(e.rho_m, arm.sigma_offset[2]), add(e.psi_rad, arm.sigma_offset[3]);
+    add(e.delay_s, arm.sigma_image_delay_s), add(e.rotation_rad, found.sigma_rotation_rad);
+    add(e.position_m, found.sigma_translation_m.norm());
+  }
+  const double z = std::sqrt(squares / count);
+  EXPECT_GT(z, 0.5);
+  EXPECT_LT(z, 1.5);
+}
+
+TEST(RegisterArm, RefusesWhatCanNotTell) {
+  Motion still;
+  still.swing = 0.01;
+  const Recorded little = recorded(still);
+  EXPECT_NE(register_arm(with_names_only(little.truth), little.poses, little.recording, "j").refusal.find("swing"),
+            std::string::npos);
+
+  Recorded data = recorded({});
+  Instrument swapped = with_names_only(data.truth);
+  for (auto& joints : data.recording.joints) std::swap(joints[0], joints[2]);
+  EXPECT_NE(register_arm(swapped, data.poses, data.recording, "j").refusal, "");
+  for (auto& joints : data.recording.joints) std::swap(joints[0], joints[2]);
+
+  for (double& time_s : data.recording.time_s) time_s += 100;
+  EXPECT_NE(lapservo::testing::input_error([&] {
+              register_arm(swapped, data.poses, data.recording, "joints.csv");
+            }).find("has no time in common"),
+            std::string::npos);
+  data.poses.resize(10);
+  EXPECT_NE(register_arm(swapped, data.poses, data.recording, "j").refusal.find("found in 10 frames"),
+            std::string::npos);
+}
+
+TEST(JointRecording, IsRefinedSmoothlyAndKeepsItsPauses) {
+  JointRecording coarse;
+  for (int i = 0; i < 40; ++i) {
+    const double time_s = 0.05 * i + (i >= 20 ? 2 : 0);
+    coarse.time_s.push_back(time_s), coarse.joints.push_back({std::sin(3 * time_s), 0, 0, 1});
+  }
+  const JointRecording fine = refined(coarse, 5e-3);
+  for (std::size_t i = 0; i < fine.time_s.size(); ++i) {
+    if (i > 0) {
+      EXPECT_GT(fine.time_s[i], fine.time_s[i - 1]);
+    }
+    EXPECT_NEAR(fine.joints[i][0], std::sin(3 * fine.time_s[i]), 2e-3);
+  }
+  EXPECT_TRUE(fine.at(0.501));
+  EXPECT_FALSE(fine.at(1.5) || fine.at(-0.1) || fine.at(9));
+}
+
+TEST(PoseTable, LeavesOutWhatACameraFromRcmBent) {
+  const lapservo::testing::TemporaryFolder folder;
+  const std::string header =
+      "time_s,instrument,status,theta_rad,marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
+      "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad\n";
+  const std::string pose = "0.01,0.02,0.1,0,0,0,1,1e-5,1e-4,1e-3,2e-3\n";
+  const auto path = folder / "obs.csv";
+  const auto read = [&](const std::string& rows) {
+    lapservo::testing::write_file(path, header + rows);
+    return read_poses(path, "A");
+  };
+  const PoseTable table = read("0,A,ok,," + pose + "1,A,ok,0.3," + pose + "1,B,ok,," + pose + "2,A,cut,,,,,,,,,,,,\n");
+  ASSERT_EQ(table.poses.size(), 1U);
+  EXPECT_EQ(table.rows, 3U);
+  EXPECT_EQ(table.with_rcm, 1U);
+  EXPECT_DOUBLE_EQ(table.poses[0].marker.sigma_roll_rad, 2e-3);
+  EXPECT_NE(lapservo::testing::input_error([&] { read("1,A,ok,," + pose + "0,A,ok,," + pose); }).find("clock jumps"),
+            std::string::npos);
+  EXPECT_NE(lapservo::testing::input_error([&] { read("0,A,ok,,0,0,1,0,0,0,2,1,1,1,1\n"); }).find("no pose"),
+            std::string::npos);
+}
+
+TEST(RegisterRcm, PutsItWhereTheAxesMeet) {
+  double squares = 0, count = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    Motion motion;
+    motion.seed = seed;
+    const Recorded data = recorded(motion);
+    Instrument unknown = data.truth;
+    unknown.camera_from_rcm.reset();
+    const auto found = register_rcm(unknown, data.poses);
+    ASSERT_EQ(found.refusal, "");
+    EXPECT_FALSE(found.arm || found.sigma_quaternion);
+    const Eigen::Vector3d off_m = found.camera_from_rcm.translation - data.truth.camera_from_rcm->translation;
+    EXPECT_LT(off_m.norm(), 5e-4);
+    squares += off_m.cwiseQuotient(found.sigma_translation_m).squaredNorm(), count += 3;
+    // theta and phi are usable: no axis near the RCM frame's z.
+    for (const TimedPose& pose : data.poses)
+      EXPECT_GT((found.camera_from_rcm.rotation * Eigen::Vector3d::UnitZ()).cross(pose.axis()).norm(), 0.5);
+  }
+  EXPECT_GT(std::sqrt(squares / count), 0.05) << "sigma counts what frames have in common; these have nothing";
+  EXPECT_LT(std::sqrt(squares / count), 1);
+  Motion still;
+  still.swing = 0.05;
+  EXPECT_NE(register_rcm(recorded(still).truth, recorded(still).poses).refusal.find("too alike"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

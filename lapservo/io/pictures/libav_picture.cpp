@@ -1,0 +1,208 @@
+#include "lapservo/io/pictures/libav_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <string_view>
+
+extern "C" {
+#include <libavutil/opt.h>
+#include <libavutil/pixdesc.h>
+}
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/io/video/libav.h"
+
+namespace lapservo::internal {
+namespace {
+using namespace std::string_view_literals;
+
+constexpr std::int64_t max_pixels = std::int64_t{16384} * 16384;
+
+struct Format {
+  std::string_view magic, name;
+  AVCodecID codec;
+};
+constexpr std::array formats{Format{"BM"sv, "BMP", AV_CODEC_ID_BMP},      Format{"P1"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P2"sv, "PNM", AV_CODEC_ID_PPM},      Format{"P3"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P4"sv, "PNM", AV_CODEC_ID_PPM},      Format{"P5"sv, "PNM", AV_CODEC_ID_PPM},
+                             Format{"P6"sv, "PNM", AV_CODEC_ID_PPM},      Format{"II*\0"sv, "TIFF", AV_CODEC_ID_TIFF},
+                             Format{"MM\0*"sv, "TIFF", AV_CODEC_ID_TIFF}, Format{"RIFF"sv, "WebP", AV_CODEC_ID_WEBP}};
+
+const Format* format_of(std::span<const std::uint8_t> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const auto found = std::find_if(formats.begin(), formats.end(),
+                                  [&](const Format& format) { return text.starts_with(format.magic); });
+  return found == formats.end() ? nullptr : &*found;
+}
+
+libav::Packet packet_of(std::span<const std::uint8_t> bytes) {
+  libav::Packet packet(av_packet_alloc());
+  if (!packet || av_new_packet(packet.get(), static_cast<int>(bytes.size())) < 0) return nullptr;
+  std::memcpy(packet->data, bytes.data(), bytes.size());
+  return packet;
+}
+
+// Where a decoder leaves out pixels without a word, what it left shows.
+int filled_buffer(AVCodecContext* context, AVFrame* frame, int flags) {
+  const int result = avcodec_default_get_buffer2(context, frame, flags);
+  for (const AVBufferRef* buffer : frame->buf)
+    if (result >= 0 && buffer)
+      std::memset(buffer->data, *static_cast<const std::uint8_t*>(context->opaque), buffer->size);
+  return result;
+}
+
+// Its pixels are fill at first, which has to outlive it.
+libav::Codec open_decoder(AVCodecID id, std::uint8_t& fill) {
+  const AVCodec* codec = avcodec_find_decoder(id);
+  libav::Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
+  if (!context) return nullptr;
+  context->thread_count = 1;
+  context->max_pixels = max_pixels;
+  context->opaque = &fill;
+  context->get_buffer2 = filled_buffer;
+  context->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER;
+  if (id != AV_CODEC_ID_TIFF) context->err_recognition |= AV_EF_EXPLODE;  // which refuses tags that it does not know
+  return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
+}
+
+libav::Frame decoded_frame(AVCodecID id, std::span<const std::uint8_t> bytes, std::uint8_t fill) {
+  av_log_set_level(AV_LOG_QUIET);
+  const libav::Codec decoder = open_decoder(id, fill);
+  const libav::Packet packet = packet_of(bytes);
+  libav::Frame frame(av_frame_alloc());
+  if (!decoder || !packet || !frame || avcodec_send_packet(decoder.get(), packet.get()) < 0) return nullptr;
+  avcodec_send_packet(decoder.get(), nullptr);
+  if (avcodec_receive_frame(decoder.get(), frame.get()) < 0) return nullptr;
+  const bool flawed = (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame->decode_error_flags != 0;
+  return flawed ? nullptr : std::move(frame);
+}
+
+// Grey or BGR of 8 or 16 bits.
+struct Layout {
+  AVPixelFormat format;
+  int type;
+};
+
+Layout layout_of(AVPixelFormat format) {
+  const AVPixFmtDescriptor& of = *av_pix_fmt_desc_get(format);
+  const bool grey = of.nb_components <= 2 && (of.flags & AV_PIX_FMT_FLAG_PAL) == 0;
+  const bool deep = of.comp[0].depth > 8;
+  if (grey) return deep ? Layout{AV_PIX_FMT_GRAY16, CV_16UC1} : Layout{AV_PIX_FMT_GRAY8, CV_8UC1};
+  return deep ? Layout{AV_PIX_FMT_BGR48, CV_16UC3} : Layout{AV_PIX_FMT_BGR24, CV_8UC3};
+}
+
+cv::Mat pixels_of(const libav::Frame& decoded) {
+  if (!decoded) return {};
+  const AVFrame& frame = *decoded;
+  const auto format = static_cast<AVPixelFormat>(frame.format);
+  const Layout layout = layout_of(format);
+  const libav::Scaler scaler(sws_getContext(frame.width, frame.height, format, frame.width, frame.height, layout.format,
+                                            SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP,
+                                            nullptr, nullptr, nullptr));
+  if (!scaler) return {};
+  cv::Mat pixels(frame.height, frame.width, layout.type);
+  std::uint8_t* rows[4] = {pixels.data};
+  const int steps[4] = {static_cast<int>(pixels.step)};
+  sws_scale(scaler.get(), frame.data, frame.linesize, 0, frame.height, rows, steps);
+  return pixels;
+}
+
+struct Encoding {
+  std::string_view extension;
+  const char* encoder;
+  AVPixelFormat color, grey;  ///< none: grey is written as colour, or colour as grey
+  const char *option = nullptr, *value = nullptr;
+};
+constexpr std::array encodings{
+    Encoding{".bmp", "bmp", AV_PIX_FMT_BGR24, AV_PIX_FMT_GRAY8},
+    Encoding{".tif", "tiff", AV_PIX_FMT_RGB24, AV_PIX_FMT_GRAY8, "compression_algo", "lzw"},
+    Encoding{".tiff", "tiff", AV_PIX_FMT_RGB24, AV_PIX_FMT_GRAY8, "compression_algo", "lzw"},
+    Encoding{".webp", "libwebp", AV_PIX_FMT_RGB32, AV_PIX_FMT_NONE, "lossless", "1"},
+    Encoding{".ppm", "ppm", AV_PIX_FMT_RGB24, AV_PIX_FMT_NONE},
+    Encoding{".pgm", "pgm", AV_PIX_FMT_NONE, AV_PIX_FMT_GRAY8},
+};
+
+cv::Mat recoloured(const cv::Mat& pixels, int conversion) {
+  cv::Mat result;
+  cv::cvtColor(pixels, result, conversion);
+  return result;
+}
+
+cv::Mat laid_out(const cv::Mat& image, AVPixelFormat format) {
+  const bool is_grey = image.channels() == 1;
+  switch (format) {
+    case AV_PIX_FMT_GRAY8:
+      return is_grey ? image : recoloured(image, cv::COLOR_BGR2GRAY);
+    case AV_PIX_FMT_RGB32:
+      return recoloured(image, is_grey ? cv::COLOR_GRAY2BGRA : cv::COLOR_BGR2BGRA);
+    case AV_PIX_FMT_RGB24:
+      return recoloured(image, is_grey ? cv::COLOR_GRAY2RGB : cv::COLOR_BGR2RGB);
+    default:
+      return is_grey ? recoloured(image, cv::COLOR_GRAY2BGR) : image;
+  }
+}
+
+AVPixelFormat format_of(const Encoding& encoding, bool is_grey) {
+  if (is_grey) return encoding.grey != AV_PIX_FMT_NONE ? encoding.grey : encoding.color;
+  return encoding.color != AV_PIX_FMT_NONE ? encoding.color : encoding.grey;
+}
+
+libav::Codec open_encoder(const Encoding& encoding, AVPixelFormat format, const cv::Mat& pixels) {
+  const AVCodec* codec = avcodec_find_encoder_by_name(encoding.encoder);
+  libav::Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
+  if (!context) return nullptr;
+  context->width = pixels.cols;
+  context->height = pixels.rows;
+  context->pix_fmt = format;
+  context->time_base = {1, 1};
+  context->thread_count = 1;
+  if (encoding.option && av_opt_set(context->priv_data, encoding.option, encoding.value, 0) < 0) return nullptr;
+  return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
+}
+
+libav::Frame frame_around(const cv::Mat& pixels, AVPixelFormat format) {
+  libav::Frame frame(av_frame_alloc());
+  if (!frame) return nullptr;
+  frame->width = pixels.cols;
+  frame->height = pixels.rows;
+  frame->format = format;
+  frame->data[0] = pixels.data;
+  frame->linesize[0] = static_cast<int>(pixels.step);
+  return frame;
+}
+
+}  // namespace
+
+std::string libav_format(std::span<const std::uint8_t> bytes) {
+  const Format* format = format_of(bytes);
+  return format ? std::string(format->name) : "";
+}
+
+cv::Mat libav_decode(std::span<const std::uint8_t> bytes) {
+  const Format* format = format_of(bytes);
+  if (!format) return {};
+  const cv::Mat pixels = pixels_of(decoded_frame(format->codec, bytes, 0));
+  const cv::Mat again = pixels_of(decoded_frame(format->codec, bytes, 255));
+  const bool whole = !pixels.empty() && pixels.size() == again.size() && pixels.type() == again.type() &&
+                     cv::norm(pixels, again, cv::NORM_INF) == 0;
+  return whole ? pixels : cv::Mat();
+}
+
+std::vector<std::uint8_t> libav_encode(const std::string& extension, const cv::Mat& image) {
+  const auto encoding =
+      std::find_if(encodings.begin(), encodings.end(), [&](const Encoding& e) { return e.extension == extension; });
+  if (encoding == encodings.end() || image.empty() || (image.type() != CV_8UC1 && image.type() != CV_8UC3)) return {};
+  av_log_set_level(AV_LOG_QUIET);
+  const AVPixelFormat format = format_of(*encoding, image.channels() == 1);
+  const cv::Mat pixels = laid_out(image, format);
+  const libav::Codec encoder = open_encoder(*encoding, format, pixels);
+  const libav::Frame frame = frame_around(pixels, format);
+  const libav::Packet packet(av_packet_alloc());
+  if (!encoder || !frame || !packet || avcodec_send_frame(encoder.get(), frame.get()) < 0) return {};
+  avcodec_send_frame(encoder.get(), nullptr);
+  if (avcodec_receive_packet(encoder.get(), packet.get()) < 0) return {};
+  return {packet->data, packet->data + packet->size};
+}
+
+}  // namespace lapservo::internal

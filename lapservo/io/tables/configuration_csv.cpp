@@ -1,0 +1,45 @@
+#include "lapservo/io/tables/configuration_csv.h"
+
+#include <cstddef>
+#include <string>
+
+#include "lapservo/core/error.h"
+#include "lapservo/rig/instrument_index.h"
+
+namespace lapservo::internal {
+namespace {
+
+std::size_t index_of(const std::string& name, const Rig& rig, const std::string& source) {
+  const auto index = instrument_index(rig, name);
+  if (!index) throw InputError(source, "instrument", name, "an instrument of the rig");
+  return *index;
+}
+
+}  // namespace
+
+std::vector<Configurations> configurations_from(const CsvTable& table, const Rig& rig, const std::string& source) {
+  const std::size_t instruments = rig.instruments.size();
+  if (table.rows() == 0 || table.rows() % instruments != 0)
+    throw InputError(source, "rows", std::to_string(table.rows()),
+                     "a row per frame and instrument (" + std::to_string(instruments) + ")");
+  std::vector<Configurations> frames(table.rows() / instruments, Configurations(instruments));
+  std::vector<std::size_t> named_in(instruments, frames.size());  // the last frame that has it
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    const std::size_t frame = row / instruments;
+    const std::size_t index =
+        table.has("instrument") ? index_of(table.text(row, "instrument"), rig, source) : row % instruments;
+    if (named_in[index] == frame)
+      throw InputError(source, "instrument", rig.instruments[index].name + " twice in frame " + std::to_string(frame),
+                       "every instrument once a frame");
+    named_in[index] = frame;
+    frames[frame][index] = {table.number(row, "theta_rad"), table.number(row, "phi_rad"), table.number(row, "rho_m"),
+                            table.number(row, "psi_rad")};
+  }
+  return frames;
+}
+
+std::vector<Configurations> read_configurations(const std::filesystem::path& path, const Rig& rig) {
+  return configurations_from(CsvTable::read(path), rig, path.string());
+}
+
+}  // namespace lapservo::internal

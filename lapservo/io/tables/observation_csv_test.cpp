@@ -1,0 +1,210 @@
+#include "lapservo/io/tables/observation_csv.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/random.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo::internal {
+namespace observation_csv_test {
+
+constexpr std::uint64_t seed = 59;
+
+Observation random_observation(Random& random) {
+  Observation o;
+  o.instrument = "PSM1";
+  o.status = Status::ok;
+  o.rcm = Observation::Rcm{};
+  o.rcm->q = {random.uniform(-pi, pi), random.uniform(0, pi), random.uniform(0.05, 0.2), random.uniform(-pi, pi)};
+  for (Eigen::Index i = 0; i < 4; ++i) o.rcm->covariance(i, i) = std::pow(10.0, random.uniform(-12, -4));
+  o.marker = Observation::MarkerPose{};
+  o.marker->camera_from_marker = {Eigen::Quaterniond(0.5, 0.1, -0.7, 0.5).normalized(),
+                                  {random.uniform(-0.1, 0.1), random.uniform(-0.1, 0.1), random.uniform(0.05, 0.2)}};
+  o.marker->sigma_xy_m = 1e-5, o.marker->sigma_z_m = 2e-4, o.marker->sigma_axis_rad = 3e-4;
+  o.marker->sigma_roll_rad = 4e-4;
+  o.tau_rad = random.uniform(0, two_pi);
+  o.sigma_tau_rad = std::pow(10.0, random.uniform(-6, -2));
+  for (std::size_t k = 0; k < 4; ++k) {
+    o.edges_raw_px[k] = {random.uniform(0, 1280), random.uniform(0, 720)};
+    o.edges_ideal_px[k] = {random.uniform(0, 1280), random.uniform(0, 720)};
+  }
+  o.features = {random.uniform(-pi, pi), random.uniform(0, 2000), random.uniform(50, 400), random.uniform(20, 300),
+                random.uniform(1, 2)};
+  return o;
+}
+
+CsvTable table_of(const std::vector<std::string>& rows) {
+  std::string text = observation_csv_header;
+  for (const std::string& row : rows) text.append("\n").append(row);
+  return CsvTable::parse(text, "obs.csv");
+}
+
+CsvTable table_of(const Observation& observation) {
+  return table_of({observation_csv_row(3, 0.1, "0003.png", observation)});
+}
+
+// docs/conventions.md, "Observations", word by word.
+TEST(ObservationCsv, HasTheColumnsOfTheConventions) {
+  EXPECT_EQ(std::string(observation_csv_header),
+            "frame,time_s,file,instrument,status,"
+            "theta_rad,phi_rad,rho_m,psi_rad,tau_rad,"
+            "sigma_theta_rad,sigma_phi_rad,sigma_rho_m,sigma_psi_rad,sigma_tau_rad,"
+            "e0_u_px,e0_v_px,e1_u_px,e1_v_px,e2_u_px,e2_v_px,e3_u_px,e3_v_px,"
+            "s_rad,r_px,l_px,d_px,cross_ratio,"
+            "marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
+            "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad");
+}
+
+TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
+  Random random(seed);
+  for (int i = 0; i < 200; ++i) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Observation o = random_observation(random);
+    const CsvTable table = table_of(o);
+    const auto value = [&](const std::string& column) { return table.number(0, column); };
+    EXPECT_EQ(value("frame"), 3);
+    EXPECT_EQ(value("time_s"), 0.1);
+    EXPECT_EQ(table.text(0, "file"), "0003.png");
+    EXPECT_EQ(table.text(0, "instrument"), "PSM1");
+    EXPECT_EQ(table.text(0, "status"), "ok");
+    EXPECT_NEAR(value("theta_rad"), o.rcm->q.theta_rad, 1e-7);
+    EXPECT_NEAR(value("phi_rad"), o.rcm->q.phi_rad, 1e-7);
+    EXPECT_NEAR(value("rho_m"), o.rcm->q.rho_m, 1e-8);
+    EXPECT_NEAR(value("psi_rad"), o.rcm->q.psi_rad, 1e-7);
+    EXPECT_NEAR(value("tau_rad"), o.tau_rad, 1e-7);
+    const char* const sigmas[] = {"sigma_theta_rad", "sigma_phi_rad", "sigma_rho_m", "sigma_psi_rad"};
+    for (Eigen::Index k = 0; k < 4; ++k)
+      EXPECT_NEAR(value(sigmas[k]) / std::sqrt(o.rcm->covariance(k, k)), 1, 1e-3) << sigmas[k];
+    EXPECT_NEAR(value("sigma_tau_rad") / o.sigma_tau_rad, 1, 1e-3);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::string edge = "e" + std::to_string(k);
+      EXPECT_NEAR(value(edge + "_u_px"), o.edges_raw_px[k].x(), 1e-4) << "raw pixels, for drawing";
+      EXPECT_NEAR(value(edge + "_v_px"), o.edges_raw_px[k].y(), 1e-4);
+    }
+    EXPECT_NEAR(value("s_rad"), o.features.s_rad, 1e-7);
+    EXPECT_NEAR(value("r_px"), o.features.r_px.value(), 1e-4);
+    EXPECT_NEAR(value("l_px"), o.features.l_px, 1e-4);
+    EXPECT_NEAR(value("d_px"), o.features.d_px, 1e-4);
+    EXPECT_NEAR(value("cross_ratio"), o.features.cross_ratio, 1e-7);
+    const Rigid3& pose = o.marker->camera_from_marker;
+    EXPECT_NEAR(value("marker_y_m"), pose.translation.y(), 1e-8);
+    EXPECT_NEAR(value("marker_z_m"), pose.translation.z(), 1e-8);
+    EXPECT_NEAR(value("marker_qx"), pose.rotation.x(), 1e-8);
+    EXPECT_NEAR(value("marker_qw"), pose.rotation.w(), 1e-8);
+    EXPECT_NEAR(value("sigma_marker_xy_m"), 1e-5, 1e-8);
+    EXPECT_NEAR(value("sigma_marker_z_m"), 2e-4, 1e-7);
+    EXPECT_NEAR(value("sigma_axis_rad"), 3e-4, 1e-7);
+    EXPECT_NEAR(value("sigma_roll_rad"), 4e-4, 1e-7);
+  }
+}
+
+std::vector<std::string> empty_columns(const CsvTable& table) {
+  std::vector<std::string> empty;
+  const CsvTable header = CsvTable::parse(
+      "name\n" +
+          [] {
+            std::string names = observation_csv_header;
+            std::replace(names.begin(), names.end(), ',', '\n');
+            return names;
+          }(),
+      "names");
+  for (std::size_t i = 0; i < header.rows(); ++i)
+    if (table.text(0, header.text(i, "name")).empty()) empty.push_back(header.text(i, "name"));
+  return empty;
+}
+
+TEST(ObservationCsv, WithoutARegistrationTheRcmsColumnsAreEmpty) {
+  Random random(seed);
+  Observation o = random_observation(random);
+  o.rcm.reset(), o.features.r_px.reset();
+  EXPECT_EQ(empty_columns(table_of(o)),
+            (std::vector<std::string>{"theta_rad", "phi_rad", "rho_m", "psi_rad", "sigma_theta_rad", "sigma_phi_rad",
+                                      "sigma_rho_m", "sigma_psi_rad", "r_px"}));
+}
+
+TEST(ObservationCsv, WithoutAPoseTheMarkersColumnsAreEmpty) {
+  Random random(seed);
+  Observation o = random_observation(random);
+  o.marker.reset();
+  EXPECT_EQ(empty_columns(table_of(o)).size(), 11U);
+}
+
+TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
+  Random random(seed);
+  for (const auto& [status, word] :
+       {std::pair(Status::no_marker, "no_marker"), std::pair(Status::cut, "cut"),
+        std::pair(Status::occluded, "occluded"), std::pair(Status::ambiguous, "ambiguous"),
+        std::pair(Status::poor_fit, "poor_fit"), std::pair(Status::uncertain, "uncertain"),
+        std::pair(Status::marker_mismatch, "marker_mismatch"), std::pair(Status::interlaced, "interlaced")}) {
+    Observation o = random_observation(random);
+    o.status = status;
+    const CsvTable table = table_of(o);
+    EXPECT_EQ(table.text(0, "status"), word);
+    EXPECT_EQ(table.text(0, "instrument"), "PSM1");
+    EXPECT_EQ(empty_columns(table).size(), 34U) << word;
+  }
+}
+
+TEST(ObservationCsv, WhatIsNotFiniteIsUnknown) {
+  Random random(seed);
+  Observation o = random_observation(random);
+  o.rcm->q.psi_rad = std::nan("");
+  o.rcm->covariance(1, 1) = -1;  // whose root is NaN
+  o.sigma_tau_rad = std::numeric_limits<double>::infinity();
+  o.edges_raw_px[2].y() = std::nan("");
+  EXPECT_EQ(empty_columns(table_of(o)),
+            (std::vector<std::string>{"psi_rad", "sigma_phi_rad", "sigma_tau_rad", "e2_v_px"}));
+}
+
+TEST(ObservationCsv, NamesMayHoldCommasAndQuotes) {
+  Observation observation;
+  observation.instrument = "PSM \"1\", left";
+  const CsvTable table = table_of({observation_csv_row(0, 0, "left, \"new\".png", observation)});
+  EXPECT_EQ(table.text(0, "file"), "left, \"new\".png");
+  EXPECT_EQ(table.text(0, "instrument"), observation.instrument);
+}
+
+TEST(ObservationCsv, AppearsWholeWhenCommittedAndElseNotAtAll) {
+  const testing::TemporaryFolder folder;
+  Random random(seed);
+  {
+    ObservationCsv csv(folder / "dropped.csv");
+    csv.add(0, 0, "", random_observation(random));
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+  ObservationCsv csv(folder / "obs.csv");
+  csv.add(0, 0, "", random_observation(random));
+  Observation other;
+  other.instrument = "PSM2";
+  csv.add(0, 0, "", other);
+  csv.add(1, 1.0 / 30, "", random_observation(random));
+  EXPECT_FALSE(std::filesystem::exists(folder / "obs.csv"));
+  csv.commit();
+  const CsvTable table = CsvTable::read(folder / "obs.csv");
+  ASSERT_EQ(table.rows(), 3U);
+  EXPECT_EQ(table.text(1, "instrument"), "PSM2");
+  EXPECT_EQ(table.number(2, "time_s"), 0.033333);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the result";
+}
+
+TEST(ObservationCsv, SaysAtOnceThatItCanNotBeWritten) {
+  const testing::TemporaryFolder folder;
+  const std::string path = (folder / "none/obs.csv").string();
+  EXPECT_TRUE(testing::input_error([&] { ObservationCsv csv(path); }).starts_with(path + ": can't be written"));
+}
+
+}  // namespace observation_csv_test
+}  // namespace lapservo::internal

@@ -1,0 +1,177 @@
+#include "lapservo/io/video/video_encoder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+extern "C" {
+#include <libavutil/opt.h>
+}
+
+#include "lapservo/core/error.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Tried on rendered frames with a sensor's noise (docs/design.md): as large, as near to the picture and as fast to read
+// as MPEG-4 part 2 was.
+constexpr int ticks_per_second =
+    60'000;  // whole periods of 24, 25, 30, 50 and 60 frames a second; MPEG-4's largest: 65535
+
+constexpr const char *preset = "ultrafast", *crf = "22";
+
+// Not containers of several files, as playlists are. Those that list no codecs (MPEG-TS) take it, unless they are
+// nothing but bytes.
+bool takes(const AVOutputFormat* container, const AVCodec* codec) {
+  if (!codec || (container->flags & AVFMT_NOFILE) != 0) return false;
+  const int answer = avformat_query_codec(container, codec->id, FF_COMPLIANCE_NORMAL);
+  return answer == 1 || (answer < 0 && (container->flags & AVFMT_NOTIMESTAMPS) == 0);
+}
+
+const AVCodec* encoder_for(const AVOutputFormat* container) {
+  const AVCodec* const h264 = avcodec_find_encoder_by_name("libx264");
+  const AVCodec* const mpeg4 = avcodec_find_encoder(AV_CODEC_ID_MPEG4);
+  return takes(container, h264) ? h264 : takes(container, mpeg4) ? mpeg4 : nullptr;
+}
+
+void set_quality(AVCodecContext& codec) {
+  if (codec.codec_id == AV_CODEC_ID_H264) {
+    av_opt_set(codec.priv_data, "preset", preset, 0);
+    av_opt_set(codec.priv_data, "crf", crf, 0);
+  } else {
+    constexpr int fine = 2;  // of 1 to 31
+    codec.flags |= AV_CODEC_FLAG_QSCALE;
+    codec.global_quality = FF_QP2LAMBDA * fine;
+  }
+}
+
+// What sRGB becomes by Rec. 601's matrix: what swscale makes of BGR unless told otherwise, and reads back as. Chroma's
+// samples lie amid four pixels, which is not what a reader takes for granted.
+void set_colors(AVCodecContext& codec) {
+  codec.color_range = AVCOL_RANGE_MPEG;
+  codec.colorspace = AVCOL_SPC_SMPTE170M;
+  codec.color_primaries = AVCOL_PRI_BT709;
+  codec.color_trc = AVCOL_TRC_IEC61966_2_1;
+  if (codec.pix_fmt == AV_PIX_FMT_YUV420P) codec.chroma_sample_location = AVCHROMA_LOC_CENTER;
+}
+
+}  // namespace
+
+std::string video_remark() {
+  return avcodec_find_encoder_by_name("libx264")
+             ? ""
+             : "in MPEG-4 part 2, as FFmpeg here lacks libx264: browsers don't play it";
+}
+
+void VideoEncoder::FreedFile::operator()(AVFormatContext* file) const {
+  if (file->pb) avio_closep(&file->pb);
+  avformat_free_context(file);
+}
+
+VideoEncoder::VideoEncoder(const std::filesystem::path& path, const std::string& shown, const cv::Size& size,
+                           double frames_per_second)
+    : shown_(shown) {
+  av_log_set_level(AV_LOG_QUIET);
+  AVFormatContext* file = nullptr;
+  avformat_alloc_output_context2(&file, av_guess_format(nullptr, shown.c_str(), nullptr), nullptr, path.c_str());
+  if (!file) refuse();
+  file_.reset(file);
+  open_codec(size, frames_per_second);
+  open_file(path);
+}
+
+void VideoEncoder::refuse() const {
+  throw InputError(shown_, "can't be written as a video, expected a name like overlay.mp4");
+}
+
+void VideoEncoder::need(int result) const {
+  if (result < 0 || (file_->pb && file_->pb->error < 0))
+    throw InputError(shown_, "could not be written to its end (is the disk full?)");
+}
+
+void VideoEncoder::open_codec(const cv::Size& size, double frames_per_second) {
+  constexpr int finest = 1'001'000;  // 30000/1001 is one of its fractions
+  const AVCodec* encoder = encoder_for(file_->oformat);
+  codec_.reset(encoder ? avcodec_alloc_context3(encoder) : nullptr);
+  if (!codec_) refuse();
+  const bool even = size.width % 2 == 0 && size.height % 2 == 0;
+  codec_->width = size.width;
+  codec_->height = size.height;
+  codec_->pix_fmt = even || encoder->id != AV_CODEC_ID_H264 ? AV_PIX_FMT_YUV420P : AV_PIX_FMT_YUV444P;
+  codec_->framerate = av_d2q(frames_per_second, finest);
+  codec_->time_base = av_inv_q(codec_->framerate);
+  if (!constant_rate()) {
+    codec_->time_base = {1, ticks_per_second};
+    period_ = std::max<std::int64_t>(1, std::llround(ticks_per_second / frames_per_second));
+  }
+  codec_->gop_size = std::max(1, static_cast<int>(std::lround(frames_per_second)));  // a second, to be stepped to
+  codec_->max_b_frames = 0;  // so that times are in order in containers that know no other
+  if (file_->oformat->flags & AVFMT_GLOBALHEADER) codec_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  set_quality(*codec_);
+  set_colors(*codec_);
+  if (avcodec_open2(codec_.get(), encoder, nullptr) < 0) refuse();
+}
+
+void VideoEncoder::open_file(const std::filesystem::path& path) {
+  AVStream* stream = avformat_new_stream(file_.get(), nullptr);
+  if (!stream || avcodec_parameters_from_context(stream->codecpar, codec_.get()) < 0) refuse();
+  stream->time_base = codec_->time_base;
+  stream->avg_frame_rate = codec_->framerate;
+  need(avio_open(&file_->pb, ("file:" + path.string()).c_str(), AVIO_FLAG_WRITE));
+  AVDictionary* options = nullptr;
+  av_dict_set(&options, "movflags", "+faststart", 0);  // the index first, for who plays it while it comes
+  const int written = avformat_write_header(file_.get(), &options);
+  av_dict_free(&options);
+  if (written < 0 && file_->pb->error >= 0) refuse();
+  need(written);
+}
+
+// Both rows and columns of chroma are means, not samples.
+void VideoEncoder::convert(const cv::Mat& bgr) {
+  scaler_.reset(sws_getCachedContext(scaler_.release(), codec_->width, codec_->height, AV_PIX_FMT_BGR24, codec_->width,
+                                     codec_->height, codec_->pix_fmt, SWS_BICUBIC | SWS_ACCURATE_RND, nullptr, nullptr,
+                                     nullptr));
+  frame_->width = codec_->width;
+  frame_->height = codec_->height;
+  frame_->format = codec_->pix_fmt;
+  if (!frame_->buf[0]) need(av_frame_get_buffer(frame_.get(), 0));
+  need(av_frame_make_writable(frame_.get()));
+  const std::uint8_t* rows[4] = {bgr.data};
+  const int steps[4] = {static_cast<int>(bgr.step)};
+  if (!scaler_) refuse();
+  sws_scale(scaler_.get(), rows, steps, 0, codec_->height, frame_->data, frame_->linesize);
+}
+
+bool VideoEncoder::constant_rate() const {
+  return std::string_view(file_->oformat->name) == "avi";
+}
+
+void VideoEncoder::add(const cv::Mat& bgr, std::optional<double> time_s) {
+  convert(bgr);
+  const double unit_s = av_q2d(codec_->time_base);
+  const std::int64_t at = time_s ? std::llround(*time_s / unit_s) : 0;
+  frame_->pts = at > last_ ? at : last_ + period_;
+  if (last_ < 0) frame_->pts = std::max<std::int64_t>(0, at);
+  last_ = frame_->pts;
+  need(avcodec_send_frame(codec_.get(), frame_.get()));
+  write_packets();
+}
+
+void VideoEncoder::write_packets() {
+  AVStream* const stream = file_->streams[0];
+  while (avcodec_receive_packet(codec_.get(), packet_.get()) == 0) {
+    packet_->duration = period_;
+    av_packet_rescale_ts(packet_.get(), codec_->time_base, stream->time_base);
+    packet_->stream_index = stream->index;
+    need(av_interleaved_write_frame(file_.get(), packet_.get()));
+  }
+}
+
+void VideoEncoder::finish() {
+  need(avcodec_send_frame(codec_.get(), nullptr));
+  write_packets();
+  need(av_write_trailer(file_.get()));
+  need(avio_closep(&file_->pb));
+}
+
+}  // namespace lapservo::internal

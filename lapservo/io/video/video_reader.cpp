@@ -1,0 +1,294 @@
+#include "lapservo/io/video/video_reader.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+extern "C" {
+#include <libavutil/display.h>
+#include <libavutil/opt.h>
+#include <libavutil/pixdesc.h>
+}
+
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/video/libav.h"
+#include "lapservo/io/video/yuv_colors.h"
+
+namespace lapservo::internal {
+namespace {
+using Clock = std::chrono::steady_clock;
+
+constexpr std::int64_t transport_packet_bytes = 188;
+
+int past(void* deadline) {
+  return Clock::now() > *static_cast<Clock::time_point*>(deadline) ? 1 : 0;
+}
+
+bool turned(const AVStream& stream) {
+  const std::uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
+  return matrix && std::abs(av_display_rotation_get(reinterpret_cast<const std::int32_t*>(matrix))) > 1;
+}
+
+}  // namespace
+
+class VideoReader::State {
+ public:
+  State(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind, bool fields)
+      : source_(path.string()), kind_(kind), patience_(patience), fields_(fields) {
+    av_log_set_level(AV_LOG_QUIET);
+    open();
+    stream_ = format_->streams[choose_stream()];
+    if (turned(*stream_))
+      throw InputError(source_, "is to be turned for display, expected the camera's pixels upright");
+    open_decoder();
+  }
+
+  std::optional<Image> next() {
+    while (true) {
+      const int got = avcodec_receive_frame(decoder_.get(), frame_.get());
+      if (got == 0) return delivered();
+      if (got == AVERROR_EOF) return std::nullopt;
+      if (got != AVERROR(EAGAIN)) return lost();
+      if (!feed()) return lost();
+    }
+  }
+
+  // Where the container doesn't hold the count: from its duration, unless that is a guess from the last packet.
+  std::optional<int> frame_count() const {
+    if (stream_->nb_frames > 0) return static_cast<int>(std::min<std::int64_t>(stream_->nb_frames, 1'000'000'000));
+    if (format_->duration_estimation_method != AVFMT_DURATION_FROM_STREAM || format_->duration <= 0)
+      return std::nullopt;
+    const double count = static_cast<double>(format_->duration) / AV_TIME_BASE * frames_per_second();
+    return count > 0 && count < 1e9 ? std::optional(static_cast<int>(std::lround(count))) : std::nullopt;
+  }
+
+  double frames_per_second() const {
+    const double fps = av_q2d(av_guess_frame_rate(format_.get(), stream_, nullptr));
+    return fps > 0 && fps < 10000 ? fps : 30;
+  }
+
+  std::string complaint() const {
+    constexpr double slack = 0.01;  // durations are rounded, and sound may last longer
+    const double frames_s = 2 / frames_per_second();
+    if (const auto announced_s = duration_s(); announced_s && end_s_ < (1 - slack) * *announced_s - frames_s)
+      return fmt::format("ends early, after {:.2f} of {:.2f} s", end_s_, *announced_s);
+    const bool transport = std::string_view(format_->iformat->name) == "mpegts";
+    if (transport && format_->pb && avio_size(format_->pb) % transport_packet_bytes != 0) return "ends within a frame";
+    return damaged_ > 0 ? "is damaged in " + std::to_string(damaged_) + " of " + std::to_string(frames_) + " frames"
+                        : "";
+  }
+
+ private:
+  void open() {
+    deadline_ = Clock::now() + patience_;
+    AVFormatContext* format = avformat_alloc_context();
+    format->interrupt_callback = {past, &deadline_};
+    AVDictionary* options = nullptr;
+    if (kind_ == Kind::stream) av_dict_set(&options, "rtsp_transport", "tcp", 0);  // which loses nothing
+    const bool opened = avformat_open_input(&format, url().c_str(), nullptr, &options) == 0;
+    av_dict_free(&options);
+    format_.reset(opened ? format : nullptr);
+    if (!opened || avformat_find_stream_info(format, nullptr) < 0)
+      throw InputError(source_, kind_ == Kind::file ? "can't be read, expected a picture or a video"
+                                                    : "can't be opened, expected a camera or stream");
+    deadline_ = Clock::time_point::max();  // the file keeps asking; whoever measures slowly is not late
+  }
+
+  // A file may have a colon in its name.
+  std::string url() const { return kind_ == Kind::file ? "file:" + source_ : source_; }
+
+  std::size_t choose_stream() const {
+    const int chosen = av_find_best_stream(format_.get(), AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+    if (chosen < 0) throw InputError(source_, "has no frames, expected a video");
+    return static_cast<std::size_t>(chosen);
+  }
+
+  void open_decoder() {
+    const AVCodec* codec = avcodec_find_decoder(stream_->codecpar->codec_id);
+    decoder_.reset(codec ? avcodec_alloc_context3(codec) : nullptr);
+    if (!decoder_ || avcodec_parameters_to_context(decoder_.get(), stream_->codecpar) < 0)
+      throw InputError(source_, "can't be decoded, expected a video");
+    // With frames in parallel nobody knows whose error it is; with slices FFmpeg's decoders of H.264 and H.265 forget
+    // what they complained of, that of MPEG-2 does not.
+    decoder_->thread_count = codec->id == AV_CODEC_ID_MPEG2VIDEO ? 0 : 1;
+    decoder_->thread_type = FF_THREAD_SLICE;
+    decoder_->err_recognition = AV_EF_CRCCHECK | AV_EF_BITSTREAM | AV_EF_BUFFER | AV_EF_EXPLODE;
+    if (codec->id == AV_CODEC_ID_H264) decoder_->err_recognition |= AV_EF_AGGRESSIVE;
+    if (avcodec_open2(decoder_.get(), codec, nullptr) < 0)
+      throw InputError(source_, "can't be decoded, expected a video");
+  }
+
+  // Gives the decoder its next packet; false when it complains of it.
+  bool feed() {
+    if (kind_ == Kind::stream) deadline_ = Clock::now() + patience_;
+    while (av_read_frame(format_.get(), packet_.get()) >= 0) {
+      const bool ours = packet_->stream_index == stream_->index;
+      if (ours && ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0 || is_damaged_jpeg(*packet_))) tainted_ = true;
+      const int sent = ours ? avcodec_send_packet(decoder_.get(), packet_.get()) : 0;
+      av_packet_unref(packet_.get());
+      if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
+    }
+    return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
+  }
+
+  // FFmpeg's decoder of motion JPEG says nothing where the data go on after the last row: rows are shifted then.
+  bool is_damaged_jpeg(const AVPacket& packet) const {
+    return stream_->codecpar->codec_id == AV_CODEC_ID_MJPEG &&
+           !jpeg_complaint({packet.data, static_cast<std::size_t>(std::max(0, packet.size))}).empty();
+  }
+
+  // What is predicted from a damaged frame is damaged too, up to the next that stands alone.
+  Image delivered() {
+    const bool flawed = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
+    const bool packet_flawed = std::exchange(tainted_, false);
+    spoiled_ = flawed || packet_flawed || (spoiled_ && frame_->key_frame == 0);
+    convert();
+    advance(frame_->best_effort_timestamp, libav::duration_of(*frame_));
+    av_frame_unref(frame_.get());
+    return counted(spoiled_);
+  }
+  Image lost() {
+    spoiled_ = true;
+    if (last_.empty())
+      last_ = cv::Mat::zeros(std::max(1, stream_->codecpar->height), std::max(1, stream_->codecpar->width), CV_8UC3);
+    advance(AV_NOPTS_VALUE, 0);
+    return counted(true);
+  }
+  Image counted(bool damaged) {
+    ++frames_;
+    damaged_ += damaged ? 1 : 0;
+    return {last_.clone(), damaged, time_s_.value_or(0)};
+  }
+
+  // Frames that the container gives no time, or none later than the frame before, follow at the stream's rate.
+  void advance(std::int64_t stamp, std::int64_t duration) {
+    const double unit_s = av_q2d(stream_->time_base), period_s = 1 / frames_per_second();
+    const double by_rate_s = time_s_ ? *time_s_ + period_s : 0;
+    const double at_s = stamp == AV_NOPTS_VALUE ? by_rate_s : static_cast<double>(stamp) * unit_s - first_s_;
+    if (stamp != AV_NOPTS_VALUE && !std::exchange(stamped_, true)) {
+      first_s_ = at_s - by_rate_s;
+      time_s_ = by_rate_s;
+    } else {
+      time_s_ = time_s_ && !(at_s > *time_s_) ? by_rate_s : at_s;
+    }
+    end_s_ = *time_s_ + std::max(period_s, static_cast<double>(duration) * unit_s);
+  }
+
+  // As the container announces it, of the video alone where it knows that.
+  std::optional<double> duration_s() const {
+    if (stream_->duration > 0) return static_cast<double>(stream_->duration) * av_q2d(stream_->time_base);
+    if (format_->duration_estimation_method == AVFMT_DURATION_FROM_STREAM && format_->duration > 0)
+      return static_cast<double>(format_->duration) / AV_TIME_BASE;
+    return std::nullopt;
+  }
+
+  // The scaler that reads such frames, by each frame's own tags: a stream's may change.
+  void update_scaler() {
+    const AVPixelFormat format = pixel_format_of(*frame_);
+    const AVPixFmtDescriptor* const description = av_pix_fmt_desc_get(format);
+    const bool is_rgb = description && (description->flags & AV_PIX_FMT_FLAG_RGB) != 0;
+    const auto colors = is_rgb ? YuvColors() : yuv_colors_of(*frame_);
+    if (!colors)
+      throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
+                       "bt709, smpte170m, bt470bg, bt2020nc, fcc or smpte240m (convert it: ffmpeg -i IN -vf "
+                       "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
+    const bool by_field = fields_ && description && description->log2_chroma_h == 1 && frame_->height % 4 == 0;
+    const Scaled scaled{frame_->width, frame_->height, format, *colors, by_field};
+    if (!scalers_.empty() && scaled == scaled_) return;
+    scalers_.clear();
+    // Where a field's chroma lies between two of its rows, in 1/256 of a row: of the even rows, of the odd ones.
+    for (const int row : by_field ? std::vector{64, 192} : std::vector{default_row}) {
+      libav::Scaler scaler = scaler_of(scaled, row);
+      if (!scaler) throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
+      if (!is_rgb) set_colors(*scaler, *colors);
+      scalers_.push_back(std::move(scaler));
+    }
+    scaled_ = scaled;
+  }
+
+  // The whole frame by one scaler, or each of its fields by one.
+  void convert() {
+    update_scaler();
+    last_.create(frame_->height, frame_->width, CV_8UC3);
+    const int fields = static_cast<int>(scalers_.size());
+    for (int field = 0; field < fields; ++field) {
+      const std::uint8_t* from[4];
+      int from_steps[4];
+      for (int plane = 0; plane < 4; ++plane) {
+        from[plane] = frame_->data[plane] ? frame_->data[plane] + field * frame_->linesize[plane] : nullptr;
+        from_steps[plane] = fields * frame_->linesize[plane];
+      }
+      std::uint8_t* const rows[4] = {last_.ptr(field)};
+      const int steps[4] = {fields * static_cast<int>(last_.step)};
+      sws_scale(scalers_[field].get(), from, from_steps, 0, frame_->height / fields, rows, steps);
+    }
+  }
+
+  struct Scaled {
+    int width_px = 0, height_px = 0;
+    AVPixelFormat format = AV_PIX_FMT_NONE;
+    YuvColors colors;
+    bool by_field = false;
+    bool operator==(const Scaled&) const = default;
+  };
+  static constexpr int default_row = -513;  // swscale's
+
+  // `chroma_row`: where chroma lies between two rows of luma.
+  static libav::Scaler scaler_of(const Scaled& scaled, int chroma_row) {
+    libav::Scaler scaler(sws_alloc_context());
+    if (!scaler) return nullptr;
+    const int height_px = scaled.by_field ? scaled.height_px / 2 : scaled.height_px;
+    const auto set = [&](const char* name, int value) { av_opt_set_int(scaler.get(), name, value, 0); };
+    set("srcw", scaled.width_px), set("srch", height_px), set("src_format", scaled.format);
+    set("dstw", scaled.width_px), set("dsth", height_px), set("dst_format", AV_PIX_FMT_BGR24);
+    set("sws_flags", SWS_BICUBIC), set("src_v_chr_pos", chroma_row);
+    return sws_init_context(scaler.get(), nullptr, nullptr) < 0 ? nullptr : std::move(scaler);
+  }
+
+  std::string source_;
+  Kind kind_;
+  std::chrono::milliseconds patience_;
+  Clock::time_point deadline_;
+  std::unique_ptr<AVFormatContext, libav::Freed<avformat_close_input>> format_;
+  libav::Codec decoder_;
+  libav::Packet packet_{av_packet_alloc()};
+  libav::Frame frame_{av_frame_alloc()};
+  bool fields_;
+  std::vector<libav::Scaler> scalers_;  // of the whole frame, or of its two fields
+  Scaled scaled_;                       // what they read
+  AVStream* stream_ = nullptr;
+  cv::Mat last_;
+  std::optional<double> time_s_;  // of the last frame, since the first
+  double end_s_ = 0;              // of the last frame
+  double first_s_ = 0;            // the first frame's stamp
+  bool stamped_ = false;          // a frame had a stamp
+  int frames_ = 0, damaged_ = 0;
+  bool tainted_ = false;  // a packet since the last frame was damaged on its way
+  bool spoiled_ = false;  // the last frame is damaged
+};
+
+VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind, bool fields)
+    : state_(std::make_unique<State>(path, patience, kind, fields)) {}
+VideoReader::~VideoReader() = default;
+
+std::optional<VideoReader::Image> VideoReader::next() {
+  return state_->next();
+}
+std::optional<int> VideoReader::frame_count() const {
+  return state_->frame_count();
+}
+double VideoReader::frames_per_second() const {
+  return state_->frames_per_second();
+}
+std::string VideoReader::complaint() const {
+  return state_->complaint();
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,81 @@
+// Times of videos that FFmpeg writes: frames dropped, and cut without being encoded again.
+#include <cstddef>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/io/frame_source.h"
+#include "lapservo/io/video/video_writer.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo {
+namespace {
+
+struct TimesRead {
+  std::vector<double> s;
+  std::string complaint;
+};
+
+TimesRead read_times(const std::filesystem::path& path) {
+  const auto source = open_frame_source(path.string(), 30);
+  TimesRead times;
+  while (const auto frame = source->next()) times.s.push_back(frame->time_s);
+  times.complaint = source->complaint();
+  return times;
+}
+
+bool ffmpeg(const std::string& arguments) {
+  return std::system(("ffmpeg -v quiet -y " + arguments).c_str()) == 0;
+}
+
+TEST(VideoTimes, AreTheContainersWhereFramesWereDropped) {
+  const testing::TemporaryFolder folder;
+  constexpr double fps = 25;
+  for (const char* name : {"a.mp4", "a.mkv", "a.mov", "a.flv", "a.wmv", "a.webm"}) {
+    const auto path = folder / name;
+    if (!ffmpeg("-f lavfi -i testsrc=s=64x48:r=25:d=4 -vf \"select='lt(n,30)+gt(n,74)'\" -vsync vfr " + path.string()))
+      continue;  // an encoder is missing
+    const TimesRead times = read_times(path);
+    ASSERT_EQ(times.s.size(), 55U) << name;
+    for (std::size_t i = 0; i < times.s.size(); ++i)
+      EXPECT_NEAR(times.s[i], static_cast<double>(i < 30 ? i : i + 45) / fps, 1.01e-3) << name << ", frame " << i;
+    EXPECT_EQ(times.complaint, "") << name;
+  }
+}
+
+TEST(VideoTimes, AreWrittenAsTheyAreRead) {
+  const testing::TemporaryFolder folder;
+  const std::vector<double> times{0, 0.04, 0.5, 0.533, 2};
+  const cv::Mat frame(48, 64, CV_8UC3, cv::Scalar(40, 90, 200));
+  for (const auto& [name, within_s] : {std::pair{"a.mp4", 1e-3}, {"a.mkv", 1e-3}, {"a.mov", 1e-3}, {"a.avi", 0.04}}) {
+    const auto path = folder / name;
+    internal::VideoWriter video(path, 25);
+    for (const double time_s : times) video.add(frame, time_s);
+    video.commit();
+    const TimesRead read = read_times(path);
+    ASSERT_EQ(read.s.size(), times.size()) << name;
+    for (std::size_t i = 0; i < times.size(); ++i)
+      EXPECT_NEAR(read.s[i], times[i], within_s + 1e-9) << name << ", frame " << i;
+    EXPECT_EQ(read.complaint, "") << name;
+  }
+}
+
+// An edit list leaves out the frames before the cut that those after it are predicted from.
+TEST(VideoTimes, OfACutVideoBeginAtTheCut) {
+  const testing::TemporaryFolder folder;
+  const auto path = folder / "a.mp4", cut = folder / "cut.mp4";
+  if (!ffmpeg("-f lavfi -i testsrc=s=64x48:r=25:d=6 -g 100 " + path.string())) GTEST_SKIP() << "no ffmpeg";
+  ASSERT_TRUE(ffmpeg("-ss 1.5 -i " + path.string() + " -c copy " + cut.string()));
+  const TimesRead times = read_times(cut);
+  ASSERT_GT(times.s.size(), 100U);
+  EXPECT_EQ(times.s[0], 0);
+  for (std::size_t i = 1; i < times.s.size(); ++i) EXPECT_NEAR(times.s[i] - times.s[i - 1], 0.04, 1e-4) << i;
+  EXPECT_EQ(times.complaint, "");
+}
+
+}  // namespace
+}  // namespace lapservo

@@ -1,0 +1,110 @@
+#include "lapservo/io/video/video_writer.h"
+
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <sys/resource.h>
+#include <sys/stat.h>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/io/video/libav.h"
+#include "lapservo/testing/input_error.h"
+#include "lapservo/testing/temporary_folder.h"
+
+namespace lapservo::internal {
+namespace {
+namespace fs = std::filesystem;
+using testing::input_error;
+using testing::TemporaryFolder;
+
+void write_noise(VideoWriter& video, int frames) {
+  cv::RNG random(1);
+  cv::Mat noise(120, 160, CV_8UC3);
+  for (int i = 0; i < frames; ++i) {
+    random.fill(noise, cv::RNG::UNIFORM, 0, 255);
+    video.add(noise);
+  }
+  video.commit();
+}
+
+TEST(VideoWriter, IsWholeInEveryContainerAndReplacesThroughALink) {
+  const TemporaryFolder folder;
+  for (const std::string extension : {".mp4", ".avi", ".mkv", ".mov", ".ts"}) {
+    for (const int frames : {1, 2, 25}) {
+      VideoWriter video(folder / ("a" + extension), 30);
+      EXPECT_EQ(input_error([&] { write_noise(video, frames); }), "") << extension << " " << frames;
+    }
+    EXPECT_GT(fs::file_size(folder / ("a" + extension)), 1000U);
+  }
+  fs::create_symlink("a.mp4", folder / "link.mp4");
+  VideoWriter video(folder / "link.mp4", 29.97);
+  write_noise(video, 3);
+  EXPECT_TRUE(fs::is_symlink(folder / "link.mp4"));
+}
+
+// H.264 that says nothing has them on the left pixels' columns.
+TEST(VideoWriter, SaysThatChromasSamplesLieAmidFourPixels) {
+  if (!video_remark().empty()) GTEST_SKIP() << "FFmpeg here lacks libx264";
+  const TemporaryFolder folder;
+  for (const std::string extension : {".mp4", ".mkv", ".ts"}) {
+    const fs::path path = folder / ("a" + extension);
+    VideoWriter video(path, 30);
+    write_noise(video, 3);
+    AVFormatContext* opened = nullptr;
+    ASSERT_EQ(avformat_open_input(&opened, path.c_str(), nullptr, nullptr), 0);
+    const std::unique_ptr<AVFormatContext, libav::Freed<avformat_close_input>> file(opened);
+    ASSERT_GE(avformat_find_stream_info(file.get(), nullptr), 0);
+    EXPECT_EQ(file->streams[0]->codecpar->chroma_location, AVCHROMA_LOC_CENTER) << extension;
+  }
+}
+
+TEST(VideoWriter, OnAFullDiskIsNoSuccess) {
+  const TemporaryFolder folder;
+  const auto previous = std::signal(SIGXFSZ, SIG_IGN);
+  struct rlimit old {};
+  ::getrlimit(RLIMIT_FSIZE, &old);
+  for (const std::string extension : {".mp4", ".avi", ".mkv", ".ts"}) {
+    const fs::path path = folder / ("a" + extension);
+    std::uintmax_t whole = 0;
+    {
+      VideoWriter video(path, 30);
+      write_noise(video, 20);
+      whole = fs::file_size(path);
+    }
+    for (const double part : {0.0, 0.3, 0.9}) {
+      const struct rlimit small { static_cast<rlim_t>(part* static_cast<double>(whole)), old.rlim_max };
+      const std::string said = input_error([&] {
+        VideoWriter video(path, 30);
+        ::setrlimit(RLIMIT_FSIZE, &small);
+        write_noise(video, 20);
+      });
+      ::setrlimit(RLIMIT_FSIZE, &old);
+      EXPECT_TRUE(said.starts_with(path.string() + ": c")) << extension << " " << part << ": " << said;
+      EXPECT_EQ(fs::file_size(path), whole) << "the old one stays";
+    }
+    fs::remove(path);
+    EXPECT_TRUE(fs::is_empty(folder.path()));
+  }
+  std::signal(SIGXFSZ, previous);
+}
+
+TEST(VideoWriter, RefusesWhatCanNotHoldOne) {
+  const TemporaryFolder folder;
+  const auto said = [&](const fs::path& path) {
+    return input_error([&] {
+      VideoWriter video(path, 30);
+      write_noise(video, 1);
+    });
+  };
+  ASSERT_EQ(::mkfifo((folder / "fifo.mp4").c_str(), 0600), 0);
+  EXPECT_EQ(said(folder / "fifo.mp4"),
+            (folder / "fifo.mp4").string() + ": is no regular file, expected a video to write, like overlay.mp4");
+  EXPECT_EQ(said(folder / "a.xyz"),
+            (folder / "a.xyz").string() + ": can't be written as a video, expected a name like overlay.mp4");
+  EXPECT_FALSE(fs::exists(folder / "a.xyz"));
+}
+
+}  // namespace
+}  // namespace lapservo::internal
