@@ -419,7 +419,6 @@ TEST(VisualController, ProbesInTheImageFromTheEdgeOfTheWindow) {
     const Flaws flaws = usual_flaws();
     ControllerConfig config = testing::test_config(flaws);
     config.mode = ControlMode::uncalibrated;
-    config.probing.distance *= 2;
     Random random(seed);
     const Eigen::Vector4d start = testing::random_start({}, config, flaws, random, beside_px);
     TestSimulator simulator({}, flaws, start, seed);

@@ -18,9 +18,7 @@ const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
 // Offsets from so long ago are those of before the endoscope began to move.
 constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
 
-// The endoscope rests when no edge moves farther in so long; a hundredth of a millimetre or two.
-constexpr double rest_s = 0.3, rest_px = 1.5;
-constexpr std::size_t min_rest_images = 5, min_images = 30, max_images = 200;
+constexpr std::size_t min_images = 30, max_images = 200;
 
 // Sightings differ by one of these at least (rad, m), however fast the camera and slow the operator is.
 const Eigen::Vector4d min_motion(3e-3, 3e-3, 2e-4, 8e-3);
@@ -34,15 +32,25 @@ Eigen::Matrix<double, 8, 1> edges_of(const ImageMeasurement& image) {
   return edges;
 }
 
-// Where there are many already, half of them are enough to begin with.
-void add_where_moved(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen) {
-  if (!((seen.q - sightings.back().q).array().abs() >= min_motion.array()).any()) return;
+bool moved(const MarkerSighting& from, const MarkerSighting& to) {
+  return ((to.q - from.q).array().abs() >= min_motion.array()).any();
+}
+
+// The last one is always the newest, so that what an endoscope does while the instrument rests leaves one sighting
+// only. Where there are many, half of them are enough to go on with.
+void add(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen) {
+  const std::size_t count = sightings.size();
+  if (count >= 2 && !moved(sightings[count - 2], seen)) sightings.pop_back();
   if (sightings.size() == max_images) {
     std::size_t kept = 0;
-    for (std::size_t i = 0; i < sightings.size(); i += 2) sightings[kept++] = sightings[i];
+    for (std::size_t k = 0; k < max_images; k += 2) sightings[kept++] = sightings[k];
     sightings.resize(kept);
   }
   sightings.push_back(seen);
+}
+
+bool contradicts_itself(const RegistrationFit& fit) {
+  return !(fit.rms_px < max_rms_px && fit.newest_rms_px < max_newest_rms_px);
 }
 
 bool is_certain(const RegistrationFit& fit) {
@@ -100,7 +108,7 @@ void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
   agreeing_ = 0;
   drop_suspicion(controller);
   auto* watching = std::get_if<Watching>(&state_);
-  if (!watching) return rest_again(controller);
+  if (!watching) return measure(controller);
   if (reason == HoldReason::wild_joints) watching->offsets.clear();
 }
 
@@ -136,19 +144,11 @@ bool EndoscopeRecovery::collects() const {
 
 void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step, VisualController& controller) {
   if (auto* watching = std::get_if<Watching>(&state_)) return trust(*watching, input, step);
-  if (!input.image) return;
+  if (!input.image || input.image->repetition != Repetition::none) return;
   const auto seen = sighting_of(*input.image);
-  if (auto* rest = std::get_if<WaitingForRest>(&state_)) {
-    if (seen) return wait_for_rest(*rest, *seen);
-    rest->sightings.clear();
-  } else if (input.image->repetition != Repetition::none) {
-    return;
-  } else if (auto* motion = std::get_if<WaitingForMotion>(&state_)) {
-    if (seen) wait_for_motion(*motion, *seen, controller);
-  } else if (auto* waiting = std::get_if<WaitingForStart>(&state_); seen) {
-    add_where_moved(waiting->sightings, *seen);
-    waiting->newest = *seen;
-  }
+  if (!seen) return;
+  if (auto* waiting = std::get_if<WaitingForStart>(&state_)) return add(waiting->sightings, *seen);
+  wait_for_motion(std::get<WaitingForMotion>(state_), *seen, controller);
 }
 
 void EndoscopeRecovery::trust(Watching& watching, const ServoInput& input, const ControlStep& step) {
@@ -165,7 +165,7 @@ void EndoscopeRecovery::notice(Watching& watching, VisualController& controller)
   if (!watching.offsets.empty()) trust_before(std::move(watching.offsets));
   camera_from_rcm_.reset();
   ++registration_;
-  rest_again(controller);
+  measure(controller);
 }
 
 void EndoscopeRecovery::trust_before(std::deque<Offset> offsets) {
@@ -183,8 +183,8 @@ void EndoscopeRecovery::trust_before(std::deque<Offset> offsets) {
   path_.joints.emplace_back(measured_->q.tail<2>());
 }
 
-void EndoscopeRecovery::rest_again(VisualController& controller) {
-  state_ = WaitingForRest{};
+void EndoscopeRecovery::measure(VisualController& controller) {
+  state_ = WaitingForMotion{{}, min_images};
   controller.suspend(HoldReason::endoscope_moved);
 }
 
@@ -199,44 +199,30 @@ std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurem
   return sighting;
 }
 
-void EndoscopeRecovery::wait_for_rest(WaitingForRest& waiting, const MarkerSighting& seen) {
-  Sightings& sightings = waiting.sightings;
-  if (sightings.empty() || !((seen.edges_px - sightings.front().edges_px).cwiseAbs().maxCoeff() < rest_px)) {
-    sightings.clear();
-    waiting.since_s = measured_->stamp_s;
-  }
-  sightings.push_back(seen);
-  if (sightings.size() < min_rest_images || measured_->stamp_s - waiting.since_s < rest_s) return;
-  // Those before may still show the end of a motion that ends smoothly.
-  sightings.erase(sightings.begin(), sightings.end() - min_rest_images);
-  state_ = WaitingForMotion{std::move(sightings), min_images};
-}
-
 void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen,
                                         VisualController& controller) {
-  add_where_moved(waiting.sightings, seen);
-  if (waiting.sightings.size() < waiting.fit_at) return;
-  const auto found = fit(waiting.sightings);
-  if (found && !(found->rms_px < max_rms_px)) return rest_again(controller);
-  if (!found || !is_certain(*found)) {
-    waiting.fit_at = std::min(waiting.sightings.size() * 3 / 2, max_images);
-    return;
+  Sightings& sightings = waiting.sightings;
+  add(sightings, seen);
+  if (sightings.size() < waiting.fit_at) return;
+  const auto found = fit(sightings);
+  const bool contradicts = found && contradicts_itself(*found);
+  if (found && !contradicts && is_certain(*found)) {
+    state_ = WaitingForStart{std::move(sightings)};
+    return controller.suspend(HoldReason::endoscope_measured);
   }
-  state_ = WaitingForStart{std::move(waiting.sightings), seen};
-  controller.suspend(HoldReason::endoscope_measured);
+  // The endoscope moved once more: the newer ones may all be of where it is now.
+  if (contradicts) sightings.erase(sightings.begin(), sightings.begin() + static_cast<long>(sightings.size() / 2));
+  waiting.fit_at = std::clamp(sightings.size() * 3 / 2, min_images, max_images);
 }
 
 std::optional<RegistrationFit> EndoscopeRecovery::fit(const Sightings& sightings) const {
   const Marker& marker = rig_.instruments.front().marker;
-  return fit_registration(rig_.camera, marker, sightings, path_, camera_from_rcm_by(marker, sightings.front()));
+  return fit_registration(rig_.camera, marker, sightings, path_, camera_from_rcm_by(marker, sightings.back()));
 }
 
 void EndoscopeRecovery::start(const WaitingForStart& waiting, VisualController& controller) {
-  Sightings sightings = waiting.sightings;
-  sightings.push_back(waiting.newest);
-  const auto found = fit(sightings);
-  if (!found || !(found->rms_px < max_rms_px) || !(found->newest_rms_px < max_newest_rms_px))
-    return rest_again(controller);
+  const auto found = fit(waiting.sightings);
+  if (!found || contradicts_itself(*found)) return measure(controller);
   state_ = Watching{};
   agreeing_ = agreed_after;
   camera_from_rcm_ = found->camera_from_rcm;

@@ -37,17 +37,12 @@ struct Watching {
   int contradicting = 0;       ///< images in a row
   std::deque<Offset> offsets;  ///< while images agreed, in order of time
 };
-struct WaitingForRest {
-  Sightings sightings;
-  double since_s = 0;  ///< the marker rests
-};
 struct WaitingForMotion {
-  Sightings sightings;
+  Sightings sightings;     ///< of the motion that the operator makes
   std::size_t fit_at = 0;  ///< so many
 };
 struct WaitingForStart {
   Sightings sightings;
-  MarkerSighting newest;
 };
 
 }  // namespace endoscope
@@ -55,9 +50,8 @@ struct WaitingForStart {
 /// Notices that the endoscope moved, and measures camera_from_rcm anew. Noticed is that images which showed q, in
 /// agreement with the joints, show the marker as well as before but nowhere where its shaft passes the RCM, or where
 /// the joints are not: not what hides a marker, freezes a picture, sets an encoder or blocks a joint does. From then on
-/// the arm is the operator's. When the marker's place in the image rests, images and measured joints of the motion that
-/// the operator makes give camera_from_rcm; the loop goes by it after JointState::started, unless the newest image
-/// contradicts it.
+/// the arm is the operator's. Images and measured joints of the motion that the operator makes give camera_from_rcm;
+/// the loop goes by it after JointState::started, unless the newest image contradicts it.
 class EndoscopeRecovery {
  public:
   explicit EndoscopeRecovery(const Rig& rig);
@@ -78,7 +72,6 @@ class EndoscopeRecovery {
 
  private:
   using Watching = endoscope::Watching;
-  using WaitingForRest = endoscope::WaitingForRest;
   using WaitingForMotion = endoscope::WaitingForMotion;
   using WaitingForStart = endoscope::WaitingForStart;
 
@@ -91,8 +84,7 @@ class EndoscopeRecovery {
   bool collects() const;
   bool follow_joints(const ImageMeasurement& image, VisualController& controller);
   void trust(Watching& watching, const ServoInput& input, const ControlStep& step);
-  void rest_again(VisualController& controller);
-  void wait_for_rest(WaitingForRest& waiting, const MarkerSighting& seen);
+  void measure(VisualController& controller);
   void wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen, VisualController& controller);
   void start(const WaitingForStart& waiting, VisualController& controller);
   std::optional<RegistrationFit> fit(const endoscope::Sightings& sightings) const;
@@ -101,7 +93,7 @@ class EndoscopeRecovery {
   Rig rig_;
   int registration_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
-  std::variant<Watching, WaitingForRest, WaitingForMotion, WaitingForStart> state_;
+  std::variant<Watching, WaitingForMotion, WaitingForStart> state_;
   int agreeing_ = 0;                             ///< images so far, at most 10
   std::optional<endoscope::Measured> measured_;  ///< at the latest image
   OffsetSteps steps_;                            ///< of images that showed q

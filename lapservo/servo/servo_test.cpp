@@ -507,8 +507,11 @@ TEST(MovedEndoscope, IsNotMeasuredByAPictureThatFreezesMeanwhile) {
   ASSERT_TRUE(world.until(released) && world.until_measured());
   world.frozen = true;
   EXPECT_EQ(world.steps(2).control.reason, HoldReason::endoscope_measured);
-  world.push({0.01, 0, 0, 0});
-  EXPECT_EQ(world.steps(30).control.reason, HoldReason::frozen_image);
+  for (int k = 0; k < 30; ++k) {
+    world.push({0.001, 0, 0, 0});
+    world.step();
+  }
+  EXPECT_EQ(world.step().control.reason, HoldReason::frozen_image);
   world.move();
   world.frozen = false;
   EXPECT_EQ(world.start_anew().control.reason, HoldReason::endoscope_moved);
