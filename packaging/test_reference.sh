@@ -27,7 +27,7 @@ expect_page() {
 }
 
 check_command() {
-  local help options line choices sub subcommands
+  local help options option choices sub subcommands
   count=$((count + 1))
   help=$("$tool" "$@" --help)
   options=$(grep -oE '^  (-[a-z],)?--[a-z-]+' <<<"$help" | tr -d ' ' | tr ',' '\n' | sort)
