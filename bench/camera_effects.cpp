@@ -1,7 +1,7 @@
 // camera_effects [POSES [SEED [CONDITION...]]]: how well and how honestly the tracker does on pictures as cameras give
-// them, rendered; a row of docs/accuracy.md for each condition, with the camera as calibration would have it and as if
-// nobody had calibrated. A condition's strength is drawn anew for every frame. h264 is a marker in motion, tracked, as
-// a recorder keeps it. LAPSERVO_OFF=1: each frame's print is off in its bands, 2: in an ink that lies aside
+// them, rendered; a row of docs/notes/accuracy.md for each condition, with the camera as calibration would have it and
+// as if nobody had calibrated. A condition's strength is drawn anew for every frame. h264 is a marker in motion,
+// tracked, as a recorder keeps it. LAPSERVO_OFF=1: each frame's print is off in its bands, 2: in an ink that lies aside
 // (random_print.h). LAPSERVO_BLOOD: so much of the marker is hidden [%]. With "samples" for POSES it looks at the
 // ray-traced samples of rotation, illumination and tilt, where they are there (frame_sets.h).
 #include "lapservo/testing/camera_effects.h"

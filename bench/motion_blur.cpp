@@ -1,6 +1,6 @@
 // motion_blur [FRAMES [SEED [KIND...]]]: how well and how honestly the tracker does on single pictures of instruments
-// that move or turn while the shutter is open, rendered; a row of docs/accuracy.md for each kind. Psi's truth is that
-// in the middle of the exposure, less the seam's error, which no picture shows.
+// that move or turn while the shutter is open, rendered; a row of docs/notes/accuracy.md for each kind. Psi's truth is
+// that in the middle of the exposure, less the seam's error, which no picture shows.
 #include <array>
 #include <cmath>
 #include <cstdint>
