@@ -28,7 +28,7 @@ struct Instrument {
   std::optional<double> image_delay_s{};  ///< a frame's stamp minus the joints' clock at its exposure
 };
 
-/// What stands before the camera and which camera it is (docs/conventions.md, "rig.yaml").
+/// What stands before the camera and which camera it is (docs/rig.md).
 struct Rig {
   Camera camera;
   std::vector<Instrument> instruments;
