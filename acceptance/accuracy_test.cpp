@@ -1,4 +1,4 @@
-// The figures that lapservo promises, each as a test. docs/accuracy.md shows what is measured.
+// The figures that lapservo promises, each as a test. docs/notes/accuracy.md shows what is measured.
 
 #include <cmath>
 #include <cstdio>
@@ -224,7 +224,7 @@ TEST(Samples, AWrongRegistrationGivesFeaturesButNoRotation) {
 }
 
 // Frames that are in this repository (acceptance/frames/README.md), of 400x225 pixels: a marker 170 px long has twice
-// the errors of docs/accuracy.md.
+// the errors of docs/notes/accuracy.md.
 TEST(Stored, RotationIsFoundWithAnHonestSigma) {
   const auto frames = stored_frames("png");
   ASSERT_EQ(frames.size(), 7U);

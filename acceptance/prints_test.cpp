@@ -1,6 +1,6 @@
 // Markers that are not as the rig says: printed, cut and wrapped by hand. Rendered as they are, tracked with the rig's.
-// LAPSERVO_PRINTS, LAPSERVO_PRINT_POSES and LAPSERVO_PRINT_SEED set how many (20 and 3; the figures of docs/accuracy.md
-// are of 200 and 10) and which.
+// LAPSERVO_PRINTS, LAPSERVO_PRINT_POSES and LAPSERVO_PRINT_SEED set how many (20 and 3; the figures of
+// docs/notes/accuracy.md are of 200 and 10) and which.
 
 #include <array>
 #include <cstdint>
@@ -130,7 +130,7 @@ TEST_F(Prints, ThatAreTrackedOrAskewAreNotTrustedEither) {
 }
 
 // Where the print's errors show worse they are not taken for a turn: least of all both inner boundaries', alike. What
-// is left are those whose errors happen to be a turn (docs/accuracy.md).
+// is left are those whose errors happen to be a turn (docs/notes/accuracy.md).
 TEST_F(Prints, InPoorPicturesAreHardlyEverTrustedWhereTheyAreOff) {
   const Tally bands = seen_poorly(Off::bands), ink = seen_poorly(Off::middle_ink), exact = seen_poorly(Off::nowhere);
   EXPECT_LE(bands.fraction("ok"), 0.15);

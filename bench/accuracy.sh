@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# accuracy.sh [FRAMES]: measures the table of docs/accuracy.md on frames that lapservo renders itself, or, given the
+# accuracy.sh [FRAMES]: measures the table of docs/notes/accuracy.md on frames that lapservo renders itself, or, given the
 # folder of ray-traced samples, on those. Prints the rows. Needs build/lapservo.
 set -euo pipefail
 cd "$(dirname "$0")/.."

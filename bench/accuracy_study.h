@@ -10,7 +10,7 @@
 
 namespace lapservo::bench {
 
-/// A row of a table of docs/accuracy.md: the errors on so many frames that the seed draws.
+/// A row of a table of docs/notes/accuracy.md: the errors on so many frames that the seed draws.
 struct Row {
   std::string name;
   std::function<acceptance::Score(int frames, std::uint64_t seed)> measure;

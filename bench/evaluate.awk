@@ -1,5 +1,5 @@
 # awk -f evaluate.awk -v name=NAME TRUTH.csv OBS.csv [TRUTH.csv OBS.csv ...]: the errors of what `lapservo track` wrote
-# against what `lapservo render` drew, as one row of docs/accuracy.md. A video's rows go by the frame's number.
+# against what `lapservo render` drew, as one row of docs/notes/accuracy.md. A video's rows go by the frame's number.
 BEGIN { FS = ","; pi = atan2(0, -1) }
 function wrapped(x) { x = x - 2 * pi * int(x / (2 * pi)); return x > pi ? x - 2 * pi : x < -pi ? x + 2 * pi : x }
 function square(x) { return x * x }

@@ -1,6 +1,6 @@
 #pragma once
 
-/// All that a program which sees or steers an instrument calls. Units and frames: docs/conventions.md; a robot, a
+/// All that a program which sees or steers an instrument calls. Units and frames: docs/frames.md; a robot, a
 /// camera or a trajectory of your own: docs/extending.md. What stands in lapservo::internal may change any day.
 
 // What goes wrong with files and configurations; joints and image features by name.

@@ -36,16 +36,40 @@ html_last_updated_fmt = None
 linkcheck_timeout = 20
 
 
-def point_to_pages(_app, _page, text):
-    """Folders of examples are one page here."""
-    text[0] = re.sub(r"\]\(\.\./examples/[a-z_]+\)", "](examples.md)", text[0])
+def menu(index):
+    """The menu of the site: sections and links of the first page."""
+    sections = re.findall(r"^## (.*)\n((?:.*\n)*?)(?=^## |\Z)", index, re.MULTILINE)
+    for title, text in sections:
+        pages = "\n".join(re.findall(r"\]\(([a-z_-]+)\.md\)", text))
+        yield f"```{{toctree}}\n:hidden:\n:caption: {title}\n\n{pages}\n```\n"
 
 
-def list_headers(_app, page, text):
+def add_generated(_app, page, text):
+    """Pages are plain Markdown; here they get the menu, the commands, the headers and the files that they link to."""
+    if page == "index":
+        text[0] += "\n" + "\n".join(menu(text[0]))
+    if page == "cli":
+        commands = (SOURCE / "build" / "reference" / "cli.md").read_text()
+        text[0] = re.sub(r"<!--.*?-->", lambda _: re.sub(r"^(#.*)", r"#\1", commands, flags=re.MULTILINE), text[0], flags=re.DOTALL)
     if page == "cpp":
         text[0] = re.sub(r"<!--.*?-->", lambda _: public_api.page(SOURCE, os.environ["LAPSERVO_DOXYGEN_XML"]), text[0], flags=re.DOTALL)
+    text[0] = re.sub(r"^\[.*\]\(\.\./((?:examples|transports)/.*\.([a-z]+))\)$", show_file, text[0], flags=re.MULTILINE)
+
+
+def show_file(link):
+    language = {"py": "python", "txt": "cmake", "cpp": "cpp"}.get(link[2], "text")
+    return f"```{{literalinclude}} ../{link[1]}\n:language: {language}\n```"
+
+
+def leave_out_links(_app, page, text):
+    """Links to what is not part of the site: folders of examples are one page here, of others the name stays."""
+    outside = "../" * (page.count("/") + 1)
+    text[0] = re.sub(r"\]\(\.\./examples/[a-z_/.]+\)", "](examples.md)", text[0])
+    text[0] = re.sub(rf"\[([^\]]*)\]\({re.escape(outside)}[^)]*\)", r"\1", text[0])
+    if page.startswith("notes/"):  # not in the menu
+        text[0] = "---\norphan: true\n---\n\n" + text[0]
 
 
 def setup(app):
-    app.connect("source-read", point_to_pages)
-    app.connect("source-read", list_headers)
+    app.connect("source-read", add_generated)
+    app.connect("source-read", leave_out_links)

@@ -8,7 +8,7 @@
 
 namespace lapservo {
 
-/// The four degrees of freedom q of an instrument that pivots at its remote centre of motion (docs/conventions.md,
+/// The four degrees of freedom q of an instrument that pivots at its remote centre of motion (docs/frames.md,
 /// "Frames and coordinates"): instrument rotation Rz(theta) Ry(phi) Rz(psi) in the RCM frame, and the distance rho
 /// along the shaft from the RCM to the marker's proximal end. phi = 0 is singular. Also an arm's measured
 /// joints, which are q but for what is wrong with them.

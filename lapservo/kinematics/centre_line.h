@@ -13,7 +13,7 @@
 namespace lapservo::internal {
 
 /// The marker on the centre line: the images of e0..e3 on the facing generatrix, where the plane through the shaft's
-/// axis and the camera centre meets the surface (docs/conventions.md, "What the centre line shows").
+/// axis and the camera centre meets the surface (docs/frames.md, "Centre line").
 struct CentreLine {
   double facing_azimuth_rad;  ///< gamma, in the unrolled frame
   double tau_rad;             ///< gamma - psi - seam, in [0, 2 pi)

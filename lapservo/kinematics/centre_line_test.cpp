@@ -132,7 +132,7 @@ TEST(CentreLine, ASeamShiftsTauAsARotationDoes) {
       });
 }
 
-// docs/conventions.md: 10 / 20 / 40 mm of lateral motion at 100 mm depth turn gamma by 5.7 / 11.3 / 21.8 degrees.
+// docs/frames.md: 10 / 20 / 40 mm of lateral motion at 100 mm depth turn gamma by 5.7 / 11.3 / 21.8 degrees.
 TEST(CentreLine, LateralMotionTurnsTheFacingGeneratrix) {
   const Rig rig = example_rig();
   const Marker& marker = rig.instruments.front().marker;

@@ -4,7 +4,7 @@
 
 namespace lapservo::internal {
 
-/// tau, unwrapped, at an azimuth of the unrolled frame on an instrument that is turned by psi (docs/conventions.md,
+/// tau, unwrapped, at an azimuth of the unrolled frame on an instrument that is turned by psi (docs/frames.md,
 /// "What the centre line shows").
 inline double marker_azimuth_rad(const Marker& marker, double azimuth_rad, double psi_rad) {
   return azimuth_rad - psi_rad - marker.seam_rad;

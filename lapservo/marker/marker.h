@@ -18,7 +18,7 @@ struct MarkerSigmas {
   bool operator==(const MarkerSigmas&) const = default;
 };
 
-/// A printed three-colour marker, wrapped around a shaft (docs/conventions.md, "Marker"). The bands run from proximal
+/// A printed three-colour marker, wrapped around a shaft (docs/frames.md, "Marker"). The bands run from proximal
 /// to distal; tau in [0, 2 pi) is the azimuth on the marker from its seam, right-handed about the axis towards the tip.
 /// The print covers tau from 0 to covered_rad(); what is left is the shaft, bare.
 struct Marker {

@@ -5,7 +5,7 @@
 
 namespace lapservo::internal {
 
-/// A camera's `response` (docs/conventions.md, "rig.yaml"): srgb, rec709, linear, gamma:VALUE or a table; srgb when it
+/// A camera's `response` (docs/rig.md): srgb, rec709, linear, gamma:VALUE or a table; srgb when it
 /// is missing.
 Response parse_response(const YamlField& field);
 

@@ -35,7 +35,7 @@ struct Instrument {
   bool operator==(const Instrument&) const = default;
 };
 
-/// What stands before the camera and which camera it is (docs/conventions.md, "rig.yaml").
+/// What stands before the camera and which camera it is (docs/rig.md).
 struct Rig {
   Camera camera;
   std::vector<Instrument> instruments;

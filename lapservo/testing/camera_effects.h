@@ -35,8 +35,8 @@ cv::Mat seen_through(const CameraEffects& effects, const cv::Mat& srgb, const Ca
 /// The camera as calibration would have it: its response to grey, its chromatic aberration.
 Camera calibrated(const CameraEffects& effects, const Camera& camera);
 
-/// The names in docs/accuracy.md: none, ca, vignette, crosstalk, bayer, rec709, tone, sharpen, chroma420, jpeg, camera
-/// (many at once).
+/// The names in docs/notes/accuracy.md: none, ca, vignette, crosstalk, bayer, rec709, tone, sharpen, chroma420, jpeg,
+/// camera (many at once).
 const std::vector<std::string>& conditions();
 
 /// One of these, of a strength drawn by the seed; or strong_tone (contrast 0.3 to 0.5, saturation 1.3 to 1.7), or

@@ -6,8 +6,8 @@
 #include "lapservo/vision/coarse_fit.h"
 
 /// The thresholds by which vision decides, one struct a step: unit, reason and what they were measured on. Fractions
-/// run from 0 to 1. How finely something is sampled, and how often, stands where it is done. docs/accuracy.md has the
-/// sets that are named here (`bench/accuracy.sh`), docs/design.md what was tried instead.
+/// run from 0 to 1. How finely something is sampled, and how often, stands where it is done. docs/notes/accuracy.md has
+/// the sets that are named here (`bench/accuracy.sh`), docs/notes/decisions.md what was tried instead.
 namespace lapservo::internal {
 
 /// Which pixels have a colour (color_classes.cpp). Hues of the samples' tissue: red to yellow, vessels violet.
@@ -305,8 +305,8 @@ struct DisplacedLimits {
 inline constexpr DisplacedLimits displaced_limits;
 
 /// When a fit is good enough to move a robot by (verification.cpp). How far the limits are from what is found: 340 fits
-/// taken for ok in 340 rendered frames (usual, dark, blood, smoke, defocus, noise and JPEG of docs/accuracy.md, and
-/// --blood 0.4 --seed 71) have, but for one in a hundred each,
+/// taken for ok in 340 rendered frames (usual, dark, blood, smoke, defocus, noise and JPEG of docs/notes/accuracy.md,
+/// and --blood 0.4 --seed 71) have, but for one in a hundred each,
 ///   matching >= 0.44, wrong <= 0.024, beyond <= 0.47, beside <= 0.15, located fraction >= 0.44, rms <= 1.29 sigma,
 ///   an end on >= 10 lines, sides at >= 14 places, blur <= 2.4 px, sigma of psi <= 18 mrad;
 /// half of the 71 fits refused there have matching <= 0.54, located fraction <= 0.50, rms >= 1.6 sigma, sigma >= 33

@@ -14,7 +14,7 @@ import pytest
 from conftest import SOURCE
 from doc_blocks import BLOCKS, PAGES
 from doc_shell import BUILD, Shell
-from recordings import TOOL, Recordings, board_pictures, swinging
+from recordings import Recordings, board_pictures, swinging
 
 import lapservo
 
@@ -23,7 +23,8 @@ ELSEWHERE = {"tutorial.md": ("acceptance/tutorial_test.cpp", ["yaml", "sh", "sh"
              "quickstart.md": ("debian/tests/quickstart", ["text", "sh", "python", "cpp", "sh", "sh"])}
 
 #: Blocks that are no code, by page and first line.
-TEXT = {("README.md", "lapservo/core geometry marker kinematics rcm   no pictures, no control"): "what the folders are",
+TEXT = {("README.md", "lapservo/core geometry marker kinematics rcm rig   values: no images, no control"): "the folders",
+        ("README.md", "@software{lapservo,"): "BibTeX",
         ("quickstart.md", "./dev package"): "makes and installs the packages: `./dev package test` does"}
 
 #: Lines that can't be run here, by how they begin.
@@ -41,6 +42,9 @@ NOT_RUN = {
 #: Files that pages show, by how their paths begin, and the test that runs them or reads them.
 SHOWN = {"examples/cpp/": "cmake/test_install.cmake", "examples/own_robot/": "cmake/test_install.cmake",
          "examples/python/": "python/tests/test_examples.py", "transports/ros2/msg/": "transports/ros2/CMakeLists.txt"}
+
+#: A line that is a link to a file, which docs/site/conf.py replaces by the file.
+SHOWN_FILE = re.compile(r"^\[.*\]\(\.\./((?:examples|transports)/.*\.[a-z]+)\)$", re.MULTILINE)
 
 RUN = ("sh", "python", "cpp", "yaml")
 WIRE = re.compile(r"ros[12]:|sim-robot")  # in real time
@@ -65,19 +69,18 @@ def test_every_block_says_what_it_is():
     for block in BLOCKS:
         if block.language == "text":
             assert (block.page.name, block.text.splitlines()[0]) in TEXT, block.where
-        elif not block.language.startswith(("{toctree}", "{include} ../build/reference/", "{literalinclude} ../")):
+        else:
             assert block.language in RUN, block.where
 
 
 def test_what_pages_show_is_run_by_a_test():
-    for block in BLOCKS:
-        if not block.language.startswith("{literalinclude}"):
-            continue
-        path = block.language.split("../")[1]
+    shown = [(page, path) for page in PAGES for path in SHOWN_FILE.findall(page.read_text())]
+    assert len(shown) > 10
+    for page, path in shown:
         test = next(test for begin, test in SHOWN.items() if path.startswith(begin))
         file = SOURCE / path
         name = file.parent.name if file.name == "CMakeLists.txt" else file.stem
-        assert file.is_file() and re.search(rf"\b{name}\b", (SOURCE / test).read_text()), f"{block.where}: {test}"
+        assert file.is_file() and re.search(rf"\b{name}\b", (SOURCE / test).read_text()), f"{page.name}: {test}"
 
 
 def test_the_lists_name_what_there_is():
@@ -130,10 +133,6 @@ def run_cpp(block, folder):
 
 
 def run_python(block, folder, environment):
-    if "video.mp4" in block.text:
-        subprocess.run([TOOL, "render", "--rig", "configs/paper.yaml", "--count", "3", "--video", "--out", "rendered"], cwd=folder,
-                       check=True, capture_output=True)
-        (folder / "video.mp4").symlink_to("rendered/video.mp4")
     subprocess.run([sys.executable, "-c", block.text], cwd=folder, env=environment, check=True)
 
 

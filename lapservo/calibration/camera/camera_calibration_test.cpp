@@ -84,7 +84,7 @@ void expect_found(const Camera& camera, const CameraCalibration& found) {
   EXPECT_NEAR(found.camera.chromatic_aberration.red, camera.chromatic_aberration.red, 5e-5);
 }
 
-// LAPSERVO_BOARD_CAMERAS cameras, from LAPSERVO_BOARD_SEED on, for docs/calibration.md.
+// LAPSERVO_BOARD_CAMERAS cameras, from LAPSERVO_BOARD_SEED on, for docs/notes/calibration.md.
 TEST(CalibrateCamera, FindsLensAberrationAndResponse) {
   const int cameras = testing::from_environment("LAPSERVO_BOARD_CAMERAS", 1),
             first = testing::from_environment("LAPSERVO_BOARD_SEED", 40);

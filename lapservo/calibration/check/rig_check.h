@@ -12,8 +12,8 @@
 
 namespace lapservo::internal {
 
-/// From when on a rig is not good enough. One number each, below which the loop's own errors (docs/accuracy.md) or its
-/// limits are larger.
+/// From when on a rig is not good enough. One number each, below which the loop's own errors (docs/notes/accuracy.md)
+/// or its limits are larger.
 struct RigLimits {
   double found = 0.95;                                          ///< fraction of the frames
   double dark_value = 70, dark_chroma = 45, dark_picture = 40;  ///< of 255

@@ -22,7 +22,7 @@ struct JointRecording {
   std::optional<std::array<double, 4>> at(double time_s) const;
 };
 
-/// A CSV of `time_s` and a column a joint (docs/conventions.md). Throws InputError for columns that are missing,
+/// A CSV of `time_s` and a column a joint (docs/calibration.md). Throws InputError for columns that are missing,
 /// numbers that are none, fewer than two rows and times that do not rise. A row that repeats the one before is passed
 /// over.
 JointRecording read_joint_recording(const std::filesystem::path& path, const Joints& joints);

@@ -13,7 +13,7 @@
 namespace lapservo::internal {
 
 /// Times sigma: what goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor
-/// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/calibration.md).
+/// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/notes/calibration.md).
 inline constexpr double unmodelled_sigmas = 2;
 
 /// Which faults an arm's model may have beside a wrong registration.

@@ -8,7 +8,7 @@
 
 namespace lapservo::internal {
 
-/// The poses of one instrument's marker in an observation CSV (docs/conventions.md). Rows that were measured with a
+/// The poses of one instrument's marker in an observation CSV (docs/output.md). Rows that were measured with a
 /// camera_from_rcm are left out: their axes pass through it whether it is right or not. Throws InputError for a table
 /// of another kind, for numbers that are none and for times that fall.
 struct PoseTable {

@@ -8,7 +8,7 @@
 
 namespace lapservo::internal {
 
-/// The header line of an observation CSV (docs/conventions.md, "lapservo track"), without the line's end.
+/// The header line of an observation CSV (docs/output.md), without the line's end.
 extern const char* const observation_csv_header;
 
 /// One row of it, without the line's end. Unknown values are empty fields.

@@ -56,7 +56,7 @@ CsvTable table_of(const Observation& observation) {
   return table_of({observation_csv_row(3, 0.1, "0003.png", observation)});
 }
 
-// docs/conventions.md, "Observations", word by word.
+// docs/output.md, in this order.
 TEST(ObservationCsv, HasTheColumnsOfTheConventions) {
   EXPECT_EQ(std::string(observation_csv_header),
             "frame,time_s,file,instrument,status,"

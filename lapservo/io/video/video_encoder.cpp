@@ -13,8 +13,8 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 
-// Tried on rendered frames with a sensor's noise (docs/design.md): as large, as near to the picture and as fast to read
-// as MPEG-4 part 2 was.
+// Tried on rendered frames with a sensor's noise (docs/notes/decisions.md): as large, as near to the picture and as
+// fast to read as MPEG-4 part 2 was.
 constexpr int ticks_per_second =
     60'000;  // whole periods of 24, 25, 30, 50 and 60 frames a second; MPEG-4's largest: 65535
 

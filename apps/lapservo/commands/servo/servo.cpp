@@ -185,7 +185,7 @@ void add_arm_options(Command command, ServoOptions& options) {
   command.add_option("--rig", options.rig, "Camera, marker and camera_from_rcm");
   command.add_option(
       "--robot", options.robot,
-      "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/robots.md");
+      "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/dvrk.md");
   command.add_option(
       "--camera", options.camera,
       "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
