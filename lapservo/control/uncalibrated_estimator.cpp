@@ -5,10 +5,11 @@
 namespace lapservo::internal {
 namespace {
 
-bool contains(const ImageWindow& window, const Eigen::Vector4d& ends_px) {
+// By how much the farthest end lies outside the window; 0 inside.
+double beyond_px(const ImageWindow& window, const Eigen::Vector4d& ends_px) {
   const Eigen::Array2d u(ends_px[0], ends_px[2]), v(ends_px[1], ends_px[3]);
-  return u.minCoeff() >= window.u_min_px && u.maxCoeff() <= window.u_max_px && v.minCoeff() >= window.v_min_px &&
-         v.maxCoeff() <= window.v_max_px;
+  return std::max({0.0, window.u_min_px - u.minCoeff(), u.maxCoeff() - window.u_max_px, window.v_min_px - v.minCoeff(),
+                   v.maxCoeff() - window.v_max_px});
 }
 
 }  // namespace
@@ -22,7 +23,7 @@ HoldReason UncalibratedEstimator::update(const ImageMeasurement& image, const Jo
 }
 
 HoldReason UncalibratedEstimator::learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history) {
-  if (config_.window && !contains(*config_.window, image.ends_px)) turn_back(probing);
+  if (config_.window) stay_inside(probing, *config_.window, image.ends_px);
   probing.fit.add(image.time_s, image.features, image.ends_px, history);
   if (probing.probed_s < probing.motion.duration_s()) return HoldReason::none;
   const auto model = probing.fit.solve();
@@ -36,12 +37,15 @@ HoldReason UncalibratedEstimator::learn(Probing& probing, const ImageMeasurement
   return HoldReason::none;
 }
 
-// Nothing is known yet of what a joint does in the image but that it just left the window: back, and next time to the
-// other side.
-void UncalibratedEstimator::turn_back(Probing& probing) {
-  const double back_s = probing.motion.way_back_s(probing.probed_s);
-  if (back_s == probing.probed_s) return;
+// Nothing is known yet of what a joint does in the image, but one that takes the marker out of the window has to go
+// back, and to the other side next time. It may begin outside, where the one before has left the marker.
+void UncalibratedEstimator::stay_inside(Probing& probing, const ImageWindow& window, const Eigen::Vector4d& ends_px) {
+  constexpr double noise_px = 1;
+  const double beyond = beyond_px(window, ends_px), back_s = probing.motion.way_back_s(probing.probed_s);
   const auto joint = static_cast<Eigen::Index>(probing.probed_s / config_.probing.joint_time_s);
+  if (joint != probing.joint) probing.beyond_at_first_px = beyond;
+  probing.joint = joint;
+  if (back_s == probing.probed_s || beyond < probing.beyond_at_first_px + noise_px) return;
   side_[joint] = -side_[joint];
   probing.probed_s = back_s;
 }

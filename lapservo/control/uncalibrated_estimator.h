@@ -26,6 +26,8 @@ class UncalibratedEstimator : public Estimator {
     ProbingMotion motion;
     ProbingFit fit;
     double probed_s = 0;
+    Eigen::Index joint = -1;        ///< that is probed
+    double beyond_at_first_px = 0;  ///< of the window, in the first image of that joint's motion
   };
   struct Learnt {
     JacobianEstimator jacobian;
@@ -34,7 +36,7 @@ class UncalibratedEstimator : public Estimator {
   };
 
   HoldReason learn(Probing& probing, const ImageMeasurement& image, const JointHistory& history);
-  void turn_back(Probing& probing);
+  void stay_inside(Probing& probing, const ImageWindow& window, const Eigen::Vector4d& ends_px);
   HoldReason follow(Learnt& learnt, const ImageMeasurement& image, const JointHistory& history) const;
 
   ControllerConfig config_;

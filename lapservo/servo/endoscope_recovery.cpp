@@ -24,7 +24,7 @@ constexpr std::size_t min_images = 30, max_images = 200;
 const Eigen::Vector4d min_motion(3e-3, 3e-3, 2e-4, 8e-3);
 
 // A registration within these is good enough; images that are farther off contradict each other.
-constexpr double max_rms_px = 1, max_newest_rms_px = 3, max_sigma_m = 1e-3, max_sigma_rad = 0.01;
+constexpr double max_rms_px = 1, max_newest_rms_px = 3, max_sigma_m = 1e-3, max_sigma_rad = 0.02;
 
 Eigen::Matrix<double, 8, 1> edges_of(const ImageMeasurement& image) {
   Eigen::Matrix<double, 8, 1> edges;
