@@ -250,6 +250,12 @@ TEST_F(CommandLine, NothingFoundIsOne) {
   EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "status"), "no_marker");
 }
 
+TEST_F(CommandLine, UnknownWordsGetTheNearestKnownOne) {
+  expect_refused("trak in/a.png", {"trak is unknown, the nearest is track"});
+  expect_refused("track in/a.png --rigg=rig.yaml", {"--rigg is unknown, the nearest is --rig"});
+  expect_refused("calibrate color in/a.png", {"color is unknown, the nearest is colour"});
+}
+
 TEST_F(CommandLine, PicturesThatAreNone) {
   cv::Mat noise(720, 1280, CV_8UC3);
   cv::randu(noise, 0, 255);

@@ -1,16 +1,20 @@
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <fcntl.h>
 #include <filesystem>
+#include <string>
 #include <unistd.h>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <opencv2/core/utils/logger.hpp>
 
 #include "apps/lapservo/cli/subcommands.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/nearest_word.h"
 
 namespace {
 
@@ -35,6 +39,28 @@ int flushed(int exit_code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return exit_code;
   std::fprintf(stderr, "lapservo: standard output: could not be written to its end\n");
   return bad_input;
+}
+
+// The first word of a command line that is no command or option, with the nearest that is one: "; trak is unknown, the
+// nearest is track"; empty where all are known.
+std::string suggestion(const CLI::App& program, int argc, char** argv) {
+  const CLI::App* command = &program;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = std::string(argv[i]).substr(0, std::string(argv[i]).find('='));
+    std::vector<std::string> known;
+    if (word.starts_with("--")) {
+      for (const CLI::Option* option : command->get_options())
+        for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    } else if (command->get_require_subcommand_min() > 0) {
+      for (const CLI::App* subcommand : command->get_subcommands([](const CLI::App*) { return true; }))
+        known.push_back(subcommand->get_name());
+    }
+    if (known.empty()) continue;
+    if (std::find(known.begin(), known.end(), word) == known.end())
+      return "; " + word + " is unknown, the nearest is " + lapservo::internal::nearest_word(word, known);
+    if (!word.starts_with("--")) command = command->get_subcommand(word);
+  }
+  return "";
 }
 
 int parse_and_run(int argc, char** argv) {
@@ -64,7 +90,7 @@ int parse_and_run(int argc, char** argv) {
   } catch (const CLI::Success& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    std::fprintf(stderr, "lapservo: %s (try --help)\n", error.what());
+    std::fprintf(stderr, "lapservo: %s%s (try --help)\n", error.what(), suggestion(app, argc, argv).c_str());
     return bad_input;
   }
   return run();

@@ -3,43 +3,21 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
-#include <numeric>
 #include <string>
 #include <utility>
+
+#include "lapservo/core/nearest_word.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr std::string_view sigma_prefix = "sigma_";
 
-// Insertions, deletions and changes of one letter that lead from one word to the other (Levenshtein).
-std::size_t edit_distance(std::string_view from, std::string_view to) {
-  std::vector<std::size_t> row(to.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t k = 0; k < to.size(); ++k) {
-      const std::size_t changed = diagonal + (from[i] == to[k] ? 0 : 1);
-      diagonal = row[k + 1];
-      row[k + 1] = std::min({changed, row[k] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
 std::vector<std::string> all_names(const KnownKeys& known) {
   std::vector<std::string> names(known.words.begin(), known.words.end());
   names.insert(names.end(), known.measured.begin(), known.measured.end());
   for (const std::string_view key : known.measured) names.push_back(std::string(sigma_prefix).append(key));
   return names;
-}
-
-const std::string& nearest(std::string_view key, const std::vector<std::string>& names) {
-  constexpr std::size_t longest = 64;  // no key of ours is longer, and the time goes with the product of the lengths
-  key = key.substr(0, longest);
-  return *std::min_element(names.begin(), names.end(), [&](const std::string& a, const std::string& b) {
-    return edit_distance(key, a) < edit_distance(key, b);
-  });
 }
 
 void expect_sigma(const YamlField& field) {
@@ -70,7 +48,8 @@ void refuse_unknown(const std::vector<std::pair<std::string, YamlField>>& entrie
   int count = 0;
   for (auto entry = std::next(first); entry != entries.end() && count < most_others; ++entry)
     if (is_unknown(*entry)) others += (count++ == 0 ? "; unknown too: " : ", ") + entry->first;
-  first->second.fail("unknown", "a known key, of which " + nearest(first->first, names) + " is the nearest" + others);
+  first->second.fail("unknown",
+                     "a known key, of which " + nearest_word(first->first, names) + " is the nearest" + others);
 }
 
 }  // namespace

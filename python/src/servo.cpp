@@ -306,6 +306,9 @@ void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared
   config.rcm_px = rcm_px;
   config.tracking_thread = own_thread ? TrackingThread::own : TrackingThread::callers;
   if (config.controller.mode == ControlMode::paper) config.tracker.method = Method::centerline;
+  const JointVector start = robot.state().q;
+  if (rig->instruments.front().camera_from_rcm && start.vector().allFinite())
+    refuse_infeasible(trajectory, duration_s, feature_model(*rig), config.controller, start, "trajectory");
   PythonObserver observer(std::move(on_tick), rig);
   const py::gil_scoped_release others_run;
   run(robot, images, clock, config, trajectory, duration_s, observer);
@@ -334,8 +337,9 @@ void bind_servo(py::module_& m) {
 
 It holds by itself, within the tick, on a missing or stale image, a lost marker, an outlier, numbers that are not finite
 or an arm that is not enabled, and goes on when all is well again. own_thread: vision in a thread of its own, so that
-set-points never wait for it (for real arms). on_tick(ControlTick) may return False, which ends the run. At the end the
-arm brakes to rest.)");
+setpoints never wait for it (for real arms). on_tick(ControlTick) may return False, which ends the run. At the end the
+arm brakes to rest. With camera_from_rcm a trajectory that can't be followed from the arm's joints, by reach, limits or
+the image's window, raises InputError before anything moves.)");
 }
 
 }  // namespace lapservo::python

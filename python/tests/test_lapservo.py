@@ -303,6 +303,15 @@ def test_a_run_ends_when_told(rig):
     assert ticks[0].action == "hold" and ticks[0].hold_reason == "no_image_yet" and ticks[0].error is None
 
 
+def test_a_goal_that_can_not_be_reached_is_refused(rig):
+    for features in ([0, 0, 0, 0], [3, 1e4, 1e4, 1e4]):
+        simulator = lapservo.Simulator(rig, Q)
+        arm = Arm(simulator)
+        with pytest.raises(lapservo.InputError, match="can't be followed"):
+            lapservo.run(arm, simulator, simulator, rig, lapservo.set_point(features), 1)
+        assert arm.sent == 0
+
+
 def test_a_covered_marker_makes_it_hold(rig):
     simulator, reasons = lapservo.Simulator(rig, Q), []
     simulator.cover_marker(0.6, 2)

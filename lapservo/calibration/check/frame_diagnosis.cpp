@@ -64,8 +64,7 @@ struct Reading {
 const std::vector<Reading>& readings() {
   static const std::vector<Reading> all{
       {"the instrument is found when red and blue are exchanged: the source writes RGB where BGR is expected (in "
-       "Python "
-       "cv2.cvtColor(image, cv2.COLOR_RGB2BGR))",
+       "Python cv2.cvtColor(image, cv2.COLOR_RGB2BGR))",
        [](const cv::Mat& bgr) {
          cv::Mat exchanged;
          cv::cvtColor(bgr, exchanged, cv::COLOR_BGR2RGB);
@@ -113,10 +112,19 @@ void FrameDiagnosis::keep(const cv::Mat& bgr) {
 std::string FrameDiagnosis::text() const {
   if (frames_ == 0) return "no frame came: see whether the source sends images";
   const bool any = std::any_of(seen_.begin(), seen_.end(), [](const auto& entry) { return entry.second.ok > 0; });
-  return any ? text_of_missed_rcm() : text_without_instrument();
+  if (any) return text_of_missed_rcm();
+  const std::string shown = cause();
+  return shown.empty() ? "no instrument was found: look at the status column, and whether the rig's hues_deg are the "
+                         "print's (lapservo calibrate colour measures them)"
+                       : shown.substr(2);
 }
 
-std::string FrameDiagnosis::text_without_instrument() const {
+std::string FrameDiagnosis::cause() const {
+  const std::string shown = cause_in_frames();
+  return shown.empty() ? "" : "; " + shown;
+}
+
+std::string FrameDiagnosis::cause_in_frames() const {
   if (!deinterlaced_ && 2 * interlaced_ > frames_)
     return fmt::format("{} of {} frames are interlaced: --deinterlace tracks one field of each", interlaced_, frames_);
   if (std::all_of(kept_.begin(), kept_.end(), is_dark))
@@ -131,8 +139,7 @@ std::string FrameDiagnosis::text_without_instrument() const {
   for (const Reading& reading : readings())
     if (2 * found_in(kept_, rig_, deinterlaced_, reading.read) > static_cast<int>(kept_.size()))
       return reading.cause_and_remedy;
-  return "no instrument was found: look at the status column, and whether the rig's hues_deg are the print's (lapservo "
-         "calibrate colour measures them)";
+  return "";
 }
 
 std::string FrameDiagnosis::text_of_missed_rcm() const {

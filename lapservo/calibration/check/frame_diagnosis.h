@@ -19,12 +19,15 @@ class FrameDiagnosis {
   /// `deinterlaced`: one field of each frame is tracked.
   explicit FrameDiagnosis(const Rig& rig, bool deinterlaced = false);
 
-  /// A frame, 8-bit BGR of the rig's size, and what the tracker returns for it.
+  /// A frame, 8-bit BGR of the rig's size, and what the tracker returns for it; nothing where no instrument is found.
   void add(const cv::Mat& bgr, const std::vector<Observation>& observations);
 
   /// One line that names the most probable cause and its remedy, without a full stop; empty where at least half of the
   /// frames that show an instrument give q, or give features where the rig has no camera_from_rcm.
   std::string text() const;
+
+  /// For frames without an instrument: "; " and the cause where the frames show one, else nothing.
+  std::string cause() const;
 
  private:
   struct Seen {
@@ -32,7 +35,7 @@ class FrameDiagnosis {
     std::vector<double> misses_m;  ///< distances of the shaft's axis from the rig's RCM, where q is missing
   };
   void keep(const cv::Mat& bgr);
-  std::string text_without_instrument() const;
+  std::string cause_in_frames() const;
   std::string text_of_missed_rcm() const;
 
   Rig rig_;

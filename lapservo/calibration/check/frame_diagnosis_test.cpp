@@ -53,6 +53,17 @@ TEST_F(FrameDiagnosisTest, NamesTheCauseWhereNothingIsFound) {
   expect_names(FrameDiagnosis(rig).text(), "no frame");
 }
 
+TEST_F(FrameDiagnosisTest, GivesNoCauseWhereTheFramesShowNone) {
+  FrameDiagnosis diagnosis(rig);
+  diagnosis.add(scenes::render_nothing(rig, 7), {});
+  EXPECT_EQ(diagnosis.cause(), "");
+  cv::Mat bgr = scenes::render_nothing(rig, 7);
+  bgr /= 16;
+  FrameDiagnosis dark(rig);
+  dark.add(bgr, {});
+  expect_names(dark.cause(), "; the frames are nearly black");
+}
+
 TEST_F(FrameDiagnosisTest, PointsAtTheHuesWhereTheMarkerIsAnother) {
   Rig other = rig;
   for (double& hue_deg : other.instruments[0].marker.hues_deg) hue_deg += 60;

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/core/rounded_sigma.h"
 
 namespace lapservo::internal {
@@ -28,6 +29,11 @@ ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const F
   measured.calibration =
       calibrate_colour(rig, instrument, measured.frames, keep_response,
                        [&](const std::string& what) { watch.tell(std::nullopt, ++step, ": " + what); });
+  if (!measured.calibration.refusal.empty()) {
+    FrameDiagnosis diagnosis(rig);
+    for (const cv::Mat& bgr : measured.frames) diagnosis.add(bgr, {});
+    measured.calibration.refusal += diagnosis.cause();
+  }
   return measured;
 }
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/registration/seam_registration.h"
 #include "lapservo/core/error.h"
 
@@ -26,18 +27,20 @@ MarkerMeasurement measure_marker(const Rig& rig, std::size_t index, const FrameR
                                  const std::optional<JointsOfTurn>& joints, const JobWatch& watch) {
   const Instrument& instrument = rig.instruments[index];
   KeyFrames key_frames(rig, index);
+  FrameDiagnosis diagnosis(rig);
   MarkerMeasurement measured;
   measured.read =
       read_frames(recording, rig, every_of(recording.source, enough), watch, [&](const cv::Mat& bgr, double time_s) {
         key_frames.add(bgr, time_s);
+        if (key_frames.found() == 0) diagnosis.add(bgr, {});
         return fmt::format(", {} in {}", instrument.name, key_frames.found());
       });
   measured.found = key_frames.found();
   if (measured.read.stopped) return measured.calibration.refusal = "stopped", measured;
   if (measured.found == 0) {
     measured.calibration.refusal =
-        fmt::format("{} is in none of {} frames{}: look at the rig's hues_deg and diameter_m", instrument.name,
-                    measured.read.looked_at, measured.read.damaged());
+        fmt::format("{} is in none of {} frames{}: look at the rig's hues_deg and diameter_m{}", instrument.name,
+                    measured.read.looked_at, measured.read.damaged(), diagnosis.cause());
     return measured;
   }
   const auto progress = [&](int round, int most) {

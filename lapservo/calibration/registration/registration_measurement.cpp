@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/calibration/registration/pose_table.h"
 #include "lapservo/core/rounded_sigma.h"
 #include "lapservo/vision/tracker.h"
@@ -31,15 +32,19 @@ MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const Fram
   for (Instrument& each : free.instruments) each.camera_from_rcm.reset();
   Tracker tracker(free, {.frame_budget = std::nullopt});
   const std::string& name = rig.instruments[instrument].name;
+  FrameDiagnosis diagnosis(free);
   MeasuredPoses poses;
   poses.read = read_frames(recording, free, every_of(recording.source, enough_images), watch,
                            [&](const cv::Mat& bgr, double time_s) {
-                             const Observation& seen = tracker.track(bgr)[instrument];
+                             const auto& observations = tracker.track(bgr);
+                             diagnosis.add(bgr, observations);
+                             const Observation& seen = observations[instrument];
                              if (seen.status == Status::ok && seen.marker) poses.all.push_back({time_s, *seen.marker});
                              return fmt::format(", {} in {}", name, poses.all.size());
                            });
   if (poses.all.empty())
-    poses.none = fmt::format("{} is in none of {} frames{}", name, poses.read.looked_at, poses.read.damaged());
+    poses.none = fmt::format("{} is in none of {} frames{}{}", name, poses.read.looked_at, poses.read.damaged(),
+                             diagnosis.cause());
   return poses;
 }
 
