@@ -147,7 +147,8 @@ TEST(GstCamera, WhatGivesNoImagesIsRefusedInOneLine) {
          {"/dev/video-none: gives no images (v4l2src", "No such file", "plugged in", "group video"}},
         {"/dev/video-none", {640, 480}, {"and that gives 640x480 as in the rig"}},
         {"/dev/video/../null", {}, {"expected a camera"}}}) {
-    const std::string refusal = testing::input_error([&] { open_camera(camera, size); });
+    const std::string refusal =
+        testing::input_error([&, &camera = camera, &size = size] { open_camera(camera, size); });
     for (const std::string& part : said) EXPECT_NE(refusal.find(part), std::string::npos) << camera << ": " << refusal;
     EXPECT_EQ(refusal.find('\n'), std::string::npos) << refusal;
   }
