@@ -1,7 +1,5 @@
 #include "recordings/bag_recorder.h"
 
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
 #include <limits>
 #include <thread>
 #include <variant>
@@ -10,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "lapservo/crtk/test_messages.h"
+#include "lapservo/testing/fast_cdr.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "recordings/open_bag.h"
@@ -41,7 +40,7 @@ std::vector<BagMessage> all(const Bag& bag, const std::string& name) {
 TEST(CdrEncoder, IsReadByFastCdr) {
   std::vector<std::uint8_t> bytes = encode_cdr(joints_at(begin_s + 0.25));
   eprosima::fastcdr::FastBuffer buffer(reinterpret_cast<char*>(bytes.data()), bytes.size());
-  Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
+  Cdr cdr(buffer, Cdr::LITTLE_ENDIANNESS, lapservo::testing::ros2_cdr);
   cdr.read_encapsulation();
   std::int32_t sec = 0;
   std::uint32_t nanosec = 0;
@@ -55,7 +54,7 @@ TEST(CdrEncoder, IsReadByFastCdr) {
   EXPECT_EQ(names, joints_at(0).names);
   EXPECT_EQ(positions, (std::vector<double>{0.5, -1.5, 0.25}));
   EXPECT_TRUE(velocities.empty() && efforts.empty());
-  EXPECT_EQ(cdr.getSerializedDataLength(), bytes.size());
+  EXPECT_EQ(lapservo::testing::bytes_of(cdr), bytes.size());
 }
 
 TEST(CdrEncoder, RoundsStampsUpToTheNextSecond) {

@@ -1,8 +1,6 @@
 #include "recordings/test_bags.h"
 
 #include <cmath>
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -10,6 +8,7 @@
 #include <sqlite3.h>
 #include <stdexcept>
 
+#include "lapservo/testing/fast_cdr.h"
 #include "recordings/test_ros1_bag.h"
 #include "transports/ros1/ros1_messages.h"
 
@@ -31,14 +30,14 @@ std::vector<std::uint8_t> bytes_of(const Type& wire) {
 template <typename... Fields>
 std::vector<std::uint8_t> written(double stamp_s, bool big_endian, const Fields&... fields) {
   eprosima::fastcdr::FastBuffer buffer;
-  Cdr cdr(buffer, big_endian ? Cdr::BIG_ENDIANNESS : Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR);
+  Cdr cdr(buffer, big_endian ? Cdr::BIG_ENDIANNESS : Cdr::LITTLE_ENDIANNESS, lapservo::testing::ros2_cdr);
   cdr.serialize_encapsulation();
   const double whole_s = std::floor(stamp_s);
   cdr << static_cast<std::int32_t>(whole_s) << static_cast<std::uint32_t>(std::lround(1e9 * (stamp_s - whole_s)))
       << std::string("frame");
   (cdr << ... << fields);
   const auto* const begin = reinterpret_cast<const std::uint8_t*>(buffer.getBuffer());
-  return {begin, begin + cdr.getSerializedDataLength()};
+  return {begin, begin + lapservo::testing::bytes_of(cdr)};
 }
 
 class Database {

@@ -3,8 +3,6 @@
 
 #include <cstdlib>
 #include <dds/ddsi/ddsi_serdata.h>
-#include <fastcdr/Cdr.h>
-#include <fastcdr/FastBuffer.h>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -16,6 +14,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "lapservo/testing/fast_cdr.h"
 #include "lapservo/testing/sample_frames.h"
 #include "transports/ros2/cdr_decoder.h"
 #include "transports/ros2/dds_node.h"
@@ -33,13 +32,13 @@ class MessageReader {
   explicit MessageReader(std::vector<char> bytes)
       : bytes_(std::move(bytes)),
         buffer_(bytes_.data(), bytes_.size()),
-        cdr_(buffer_, Cdr::LITTLE_ENDIANNESS, Cdr::DDS_CDR) {
+        cdr_(buffer_, Cdr::LITTLE_ENDIANNESS, lapservo::testing::ros2_cdr) {
     cdr_.read_encapsulation();
   }
 
   Fields read(const std::string& type) {
     read_message(type, "");
-    EXPECT_LT(bytes_.size() - cdr_.getSerializedDataLength(), 4u) << "left over";
+    EXPECT_LT(bytes_.size() - lapservo::testing::bytes_of(cdr_), 4u) << "left over";
     return fields_;
   }
 
