@@ -29,8 +29,9 @@ Canvas::Canvas(const std::filesystem::path& path, double width_mm, double height
   } else if (extension == ".pdf") {
     unit = points_per_mm;
     surface_ = cairo_pdf_surface_create_for_stream(write_to_stream, &file_.stream(), width_mm * unit, height_mm * unit);
-    cairo_pdf_surface_set_metadata(surface_, CAIRO_PDF_METADATA_CREATE_DATE,
-                                   nullptr);  // the same marker, the same bytes
+    cairo_pdf_surface_restrict_to_version(surface_, CAIRO_PDF_VERSION_1_4);  // which every printer reads
+    // Without a date the same marker gives the same bytes.
+    cairo_pdf_surface_set_metadata(surface_, CAIRO_PDF_METADATA_CREATE_DATE, nullptr);
   } else if (extension == ".png") {
     unit = png_px_per_mm;
     png_ = true;

@@ -89,7 +89,7 @@ Page read_svg(const std::filesystem::path& path) {
   if (!std::regex_search(text, size, header)) throw std::runtime_error("the SVG has no size in millimetres");
   Page page{number(size[1]), number(size[2]), {}};
   const Vector2d mm_per_unit(page.width_mm / number(size[3]), page.height_mm / number(size[4]));
-  static const std::regex polygon(R"re(fill:rgb\(([\d.]+)%,([\d.]+)%,([\d.]+)%\)[^>]* d="(M [^C"]*?) Z)re");
+  static const std::regex polygon(R"re(fill(?::|=")rgb\(([\d.]+)%, ?([\d.]+)%, ?([\d.]+)%\)[^>]* d="(M [^C"]*?) Z)re");
   static const std::regex point(R"re([ML] ([-\d.]+) ([-\d.]+))re");
   for (const auto& match : matches(text, polygon)) {
     page.polygons.push_back({Vector3d(number(match[1]), number(match[2]), number(match[3])) / 100, {}});
