@@ -24,10 +24,10 @@ std::vector<std::string> columns_of(const std::string& path) {
 
 // Reports on stderr how many readings are passed over.
 JointInput reported(JointInput input) {
-  const auto& [repeated, of_other_arms] = std::pair{input.recording.repeated, input.recording.of_other_arms};
-  if (repeated > 0 || of_other_arms > 0)
+  const JointRecording& recording = input.recording;
+  if (recording.repeated > 0 || recording.of_other_arms > 0)
     std::fprintf(stderr, "lapservo: %s: %d repeated readings and %d of other arms' joints are passed over\n",
-                 input.source.c_str(), repeated, of_other_arms);
+                 input.source.c_str(), recording.repeated, recording.of_other_arms);
   return input;
 }
 

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/vision/tracker.h"
 
@@ -38,12 +39,6 @@ bool is_dark(const cv::Mat& bgr) {
 bool is_grey(const cv::Mat& bgr) {
   const auto [largest, smallest] = extremes(bgr);
   return share_below(largest - smallest, grey_range) >= pixel_share;
-}
-
-double miss_m(const Observation& observation, const Rigid3& camera_from_rcm) {
-  const Rigid3& camera_from_marker = observation.marker->camera_from_marker;
-  const Eigen::Vector3d axis = camera_from_marker.rotation * Eigen::Vector3d::UnitZ();
-  return axis.cross(camera_from_rcm.translation - camera_from_marker.translation).norm();
 }
 
 // How often an instrument is found in frames that are read in another way.
@@ -96,7 +91,7 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
     seen.with_q += observation.rcm ? 1 : 0;
     const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
     if (camera_from_rcm && !observation.rcm && observation.marker)
-      seen.misses_m.push_back(miss_m(observation, *camera_from_rcm));
+      seen.misses_m.push_back(TimedPose{0, *observation.marker}.miss_m(camera_from_rcm->translation));
   }
   interlaced_ += interlaced ? 1 : 0;
   if (!any_ok) keep(bgr);
@@ -104,7 +99,7 @@ void FrameDiagnosis::add(const cv::Mat& bgr, const std::vector<Observation>& obs
 
 // Frames 1, 2, 4, 8 ... of those without a result: early ones, and some from all over a long recording.
 void FrameDiagnosis::keep(const cv::Mat& bgr) {
-  if (const int count = ++next_kept_; (count & (count - 1)) != 0) return;
+  if (const int count = ++without_result_; (count & (count - 1)) != 0) return;
   if (kept_.size() == most_kept) kept_.erase(kept_.begin() + 1);
   kept_.push_back(bgr.clone());
 }
@@ -113,10 +108,10 @@ std::string FrameDiagnosis::text() const {
   if (frames_ == 0) return "no frame came: see whether the source sends images";
   const bool any = std::any_of(seen_.begin(), seen_.end(), [](const auto& entry) { return entry.second.ok > 0; });
   if (any) return text_of_missed_rcm();
-  const std::string shown = cause();
+  const std::string shown = cause_in_frames();
   return shown.empty() ? "no instrument was found: look at the status column, and whether the rig's hues_deg are the "
                          "print's (lapservo calibrate colour measures them)"
-                       : shown.substr(2);
+                       : shown;
 }
 
 std::string FrameDiagnosis::cause() const {
@@ -130,8 +125,7 @@ std::string FrameDiagnosis::cause_in_frames() const {
   if (std::all_of(kept_.begin(), kept_.end(), is_dark))
     return fmt::format(
         "the frames are nearly black (values up to {:.0f} of 255): look at the light; 16-bit pictures that hold 8 to "
-        "12 "
-        "bits are to be scaled to the whole range",
+        "12 bits are to be scaled to the whole range",
         dark_level);
   if (std::all_of(kept_.begin(), kept_.end(), is_grey))
     return "the frames are grey, and the marker is found by its colours: see whether the camera or its driver sends "

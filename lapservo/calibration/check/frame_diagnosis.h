@@ -13,7 +13,7 @@ namespace lapservo::internal {
 
 /// Why frames of a recording show no instrument of a rig, or an instrument that misses the rig's RCM. Frames are added
 /// as they are tracked; a few of those without a result are kept and tried again in other readings (red and blue
-/// exchanged, mirrored, without distortion) when text() is called.
+/// exchanged, mirrored) when text() or cause() is called.
 class FrameDiagnosis {
  public:
   /// `deinterlaced`: one field of each frame is tracked.
@@ -26,7 +26,7 @@ class FrameDiagnosis {
   /// frames that show an instrument give q, or give features where the rig has no camera_from_rcm.
   std::string text() const;
 
-  /// For frames without an instrument: "; " and the cause where the frames show one, else nothing.
+  /// To append to a refusal: "; " and the cause where frames without an instrument show one, else nothing.
   std::string cause() const;
 
  private:
@@ -43,7 +43,7 @@ class FrameDiagnosis {
   int frames_ = 0, interlaced_ = 0;
   std::map<std::string, Seen> seen_;
   std::vector<cv::Mat> kept_;
-  int next_kept_ = 0;
+  int without_result_ = 0;  ///< frames
 };
 
 }  // namespace lapservo::internal

@@ -58,8 +58,7 @@ std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>&
                               poses_per_second(poses), at_iteration);
   if (!fit) return std::nullopt;
   AxesMeetingPoint result{fit->x, fit->covariance, {}};
-  for (const TimedPose& pose : poses)
-    result.misses_m.push_back((pose.origin() - result.point_m).cross(pose.axis()).norm());
+  for (const TimedPose& pose : poses) result.misses_m.push_back(pose.miss_m(result.point_m));
   return result;
 }
 

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "lapservo/vision/observation.h"
 
 namespace lapservo::internal {
@@ -22,6 +24,8 @@ struct TimedPose {
 
   Eigen::Vector3d origin() const { return marker.camera_from_marker.translation; }  ///< in the camera frame
   Eigen::Vector3d axis() const { return marker.camera_from_marker.rotation * Eigen::Vector3d::UnitZ(); }
+  /// How far the axis passes a point in the camera frame.
+  double miss_m(const Eigen::Vector3d& point_m) const { return (origin() - point_m).cross(axis()).norm(); }
 };
 
 /// How many of them there are in a second: over about as many, what is wrong with them stays alike.

@@ -142,6 +142,7 @@ void VideoEncoder::convert(const cv::Mat& bgr) {
   sws_scale(scaler_.get(), rows, steps, 0, codec_->height, frame_->data, frame_->linesize);
 }
 
+// FFmpeg's flag for containers of variable rate (AVFMT_VARIABLE_FPS) is not set for mp4 and mov, which take it.
 bool VideoEncoder::constant_rate() const {
   return std::string_view(file_->oformat->name) == "avi";
 }
@@ -150,9 +151,8 @@ void VideoEncoder::add(const cv::Mat& bgr, std::optional<double> time_s) {
   convert(bgr);
   const double unit_s = av_q2d(codec_->time_base);
   const std::int64_t at = time_s ? std::llround(*time_s / unit_s) : 0;
-  frame_->pts = at > last_ ? at : last_ + period_;
-  if (last_ < 0) frame_->pts = std::max<std::int64_t>(0, at);
-  last_ = frame_->pts;
+  last_ = at > last_ ? at : last_ + period_;
+  frame_->pts = last_;
   need(avcodec_send_frame(codec_.get(), frame_.get()));
   write_packets();
 }
