@@ -308,7 +308,7 @@ TEST(Rendered, Stress) {
   sets["warm"].options.sensor.gains = Light(0.8F, 1, 1.2F);
   sets["jpeg"].after = [](const cv::Mat& image) {
     constexpr int quality = 85;
-    return decode_image(encode_jpeg(image, quality), "a rendered picture");
+    return decode_image(encode_jpeg(image, quality), "a rendered image");
   };
   Score all;
   for (const auto& [name, set] : sets)

@@ -1,9 +1,9 @@
-// Prints as hands make them (bands off by 0.3 mm, 3 degrees of wrap, 1 mm of gap), rendered over a slow turn,
-// calibrated, and tracked in other places with the calibrated rig. LAPSERVO_PRINTS, LAPSERVO_PRINT_SEED and
-// LAPSERVO_TURN_FRAMES set how many (1), which, and of how many frames (90). LAPSERVO_TURN_WAY is there, back, or both
-// one after the other. LAPSERVO_PRINT_CAMERA names what the camera does to all pictures (camera_effects.h; none), or is
-// h264, video or recorder: then the turn is a video, by OpenCV's encoder, by lapservo's or by the command ffmpeg, and
-// the other places are not compressed. Also told is what the tracker makes of these places by the true print.
+// Handmade prints (bands off by 0.3 mm, 3 degrees of wrap, 1 mm of gap), rendered over a slow rotation, calibrated, and
+// tracked in other places with the calibrated rig. LAPSERVO_PRINTS, LAPSERVO_PRINT_SEED and LAPSERVO_TURN_FRAMES set
+// their number (1), the seed, and the frames of each (90). LAPSERVO_TURN_WAY is there, back, or both one after the
+// other. LAPSERVO_PRINT_CAMERA names the camera's processing of all images (camera_effects.h; none), or is h264, video
+// or recorder: then the rotation is a video, by OpenCV's encoder, by lapservo's or by the command ffmpeg, and the other
+// places are not compressed. The tracker's results at these places with the true print are printed too.
 
 #include <cmath>
 #include <cstdio>
@@ -193,7 +193,7 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
       "error / sigma %.2f\n",
       1e3 * rms(before_rad), 1e3 * rms(after_rad), 1e3 * rms(true_rad), rms(after_sigmas),
       text_of(after_statuses).c_str(), rms(written_sigmas));
-  // Of some prints nothing is ok before: then there is nothing to compare with.
+  // With some prints nothing is ok before: then there is nothing to compare with.
   if (GetParam().bands_m > 0 && !before_rad.empty()) {
     EXPECT_LE(rms(after_rad), 0.1 * rms(before_rad));
   }

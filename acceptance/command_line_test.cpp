@@ -95,7 +95,7 @@ class CommandLine : public acceptance::ToolTest {
     lapservo::testing::write_ros2_bag("in/run/run_0.db3", ros2);
     lapservo::testing::write_ros2_metadata("in/run", {"run_0.db3"});
   }
-  // Every number as in a run on the pictures themselves, but for the last digits of times.
+  // Every number as in a run on the images themselves, except for the last digits of times.
   void expect_tracked_as(const std::string& observations, const std::string& bag, const std::string& rig) {
     expect_done("track " + bag + " --fps 8 --rig " + rig + " --out out/bag.csv");
     const CsvTable expected = CsvTable::read(observations), found = CsvTable::read("out/bag.csv");
@@ -143,7 +143,7 @@ TEST_F(CommandLine, RenderThenTrack) {
   }
 }
 
-// Of such a print nothing is told but what to do.
+// Such a print gives no numbers, only the remedy.
 TEST_F(CommandLine, SaysWhatToDoAboutAPrintThatIsOff) {
   std::string printed = read_file("configs/example.yaml");
   for (const auto& [of_rig, off] :
@@ -413,7 +413,8 @@ TEST_F(CommandLine, NumbersThatAreNone) {
   expect_refused(frames + " --count 1.5", {"--count", "1.5"});
 }
 
-// A flipped bit that the decoder notices, a picture of a palette, one that is to be turned: never a row that is ok.
+// A flipped bit that the decoder notices, an image with a palette, an image with an orientation: never a row that is
+// ok.
 TEST_F(CommandLine, FlawedPicturesHaveAWordOfTheirOwn) {
   expect_done("render --rig configs/example.yaml --out out/frames --count 1 --seed 5 --format jpg");
   const std::string whole = read_file("out/frames/0000.jpg");
@@ -582,7 +583,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   const std::string delay = "\n    image_delay_s: ";
   EXPECT_NEAR(std::stod(written.substr(written.find(delay) + delay.size())), clock_s, 5e-3);
 
-  // The same swing judges both rigs: the first knows nothing yet.
+  // The same swing tests both rigs: the first has no calibration yet.
   const std::string check = "check in/swing --fps 8 --joints in/joints.csv --rig ";
   expect_done(check + "out/rig.yaml --out out/check.html");
   expect_in(output(), "\ngood enough\n");
@@ -676,7 +677,7 @@ TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
   const CsvTable observed = CsvTable::read("out/obs.csv");
   for (std::size_t row = 0; row < observed.rows(); ++row) EXPECT_EQ(observed.text(row, "status"), "ok") << row;
 
-  // What can't tell leaves what was there.
+  // A refused calibration leaves the existing file.
   const std::string before = written;
   fs::create_directories("in/few");
   for (const char* name : {"0000.png", "0010.png", "0020.png"})

@@ -82,10 +82,10 @@ cv::Mat make_colourful(cv::Size size, Random& random) {
   return light;
 }
 
-// How the instruments of a pair are, and their picture.
+// The instruments of a pair, and their image.
 struct Kind {
   std::string name;
-  bool exact = false;  // the rig is right, and the picture a good one
+  bool exact = false;  // the rig is right, and the image a good one
   double steepest_rad = 0.35;
   std::function<void(std::vector<ShaftModel>&, RenderOptions&, Random&)> spoil = [](auto&, auto&, auto&) {};
   bool colourful = false;
@@ -188,7 +188,7 @@ class Pair {
       q.psi_rad += 0.03, q.rho_m += 0.2 * mm * way, q.theta_rad += 0.004 * way;
     }
   }
-  // The seam's error is none that a picture could show.
+  // The seam's error is invisible.
   double true_psi_rad(std::size_t k) const {
     return pair_.q[k].psi_rad + shafts_[k].marker.seam_rad - rig_.instruments[k].marker.seam_rad;
   }
@@ -261,8 +261,8 @@ class Crossing : public ::testing::Test {
   }
 };
 
-// Of one of whose inner boundaries little shows psi can hardly be told, and where a print that is off would not show
-// either, it is refused.
+// Psi can hardly be measured where little of an inner boundary is visible; it is refused where a misprint would not
+// show either.
 TEST_F(Crossing, BothInstrumentsAreFound) {
   Tally exact, exact_in_front, all;
   int number = 0;
@@ -285,7 +285,7 @@ TEST_F(Crossing, BothInstrumentsAreFound) {
   EXPECT_LT(exact.error_by_sigma(), 1.5);
 }
 
-// What is hidden is told as of the first frame.
+// Hidden parts are reported from the first frame on.
 TEST_F(Crossing, BothAreFollowed) {
   Tally exact, all;
   int number = 0;

@@ -18,7 +18,7 @@
 namespace lapservo::testing {
 using namespace internal;
 
-/// What one tick decided, and what came of it.
+/// The decision of one tick, and its result.
 struct DynamicTick {
   double time_s = 0;
   ServoDecision decision;
@@ -27,7 +27,7 @@ struct DynamicTick {
   Eigen::Vector4d setpoint_ahead = Eigen::Vector4d::Zero();  ///< of the measured joints, when it ended
 };
 
-/// The servo loop around MuJoCo's arm, with a camera that gives features instead of pictures: 60 ticks and 30 frames a
+/// The servo loop around MuJoCo's arm, with a camera that gives features instead of images: 60 ticks and 30 frames a
 /// second, so that a test takes milliseconds.
 class DynamicLoop {
  public:
@@ -44,7 +44,7 @@ class DynamicLoop {
   std::function<void(double time_s, MujocoArm& arm)> meddle = [](double, MujocoArm&) {};
   /// The image from its beginning arrives again and again, from a camera whose noise is known.
   std::optional<Interval> frozen{};
-  /// What of the configuration an image tells, as where a registration fits.
+  /// The part of the configuration that an image determines, as where a registration fits.
   bool images_know_q = true;
 
   std::vector<DynamicTick> run(const Trajectory& trajectory, double duration_s) {

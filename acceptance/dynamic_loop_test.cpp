@@ -97,7 +97,7 @@ TEST(DynamicLoop, OneWildReadingLeavesTheDelayAlone) {
   }
 }
 
-// Held until an image tells where the instrument is; the rest is what the desired motion goes on by meanwhile.
+// Holds until an image gives the instrument's place; the rest is the desired motion of that time.
 TEST(DynamicLoop, AnEncoderThatIsSetIsFoundOut) {
   for (int joint = 0; joint < 4; ++joint) {
     for (const double by : {0.01, 0.03}) {
@@ -135,7 +135,7 @@ TEST(DynamicLoop, DoesNotOvershootWhileTheDelayIsUnknown) {
   }
 }
 
-// Its servos are a quarter as stiff: it hangs more than a leash below its set-points.
+// Its servos are a quarter as stiff: it hangs below its setpoints by more than the following-error limit.
 TEST(DynamicLoop, AnArmThatHangsLowIsNotTakenForBlocked) {
   DynamicLoop loop;
   loop.arm_config.proportional_gain[2] /= 4;

@@ -19,7 +19,7 @@
 
 namespace lapservo::acceptance {
 
-/// What is truly in a frame.
+/// The truth of a frame.
 struct Truth {
   std::string instrument, condition;
   JointVector q;
@@ -33,7 +33,7 @@ struct TrueFrame {
   std::vector<Truth> truths;
 };
 
-/// Of an instrument's marker as the rig has it; needs one before the camera.
+/// The truth of an instrument's marker as the rig has it; needs one before the camera.
 Truth truth_of(const Rig& rig, std::size_t instrument, const JointVector& q);
 
 /// Errors of observations against truth, over a set.

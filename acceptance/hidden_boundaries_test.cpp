@@ -1,6 +1,6 @@
-// Prints that are off and not calibrated, on which blood hides the whole of an inner boundary or most of it: what is
-// left may look like a turn. LAPSERVO_HIDDEN and LAPSERVO_HIDDEN_SEED set how many of each kind (4; a fourth of them
-// moving) and which (seed 1); LAPSERVO_HIDDEN_LIST=1 says what becomes of each.
+// Misprinted markers without calibration, on which blood hides an inner boundary or most of it: the visible rest may
+// look like a rotation. LAPSERVO_HIDDEN and LAPSERVO_HIDDEN_SEED set the number of each kind (4; a fourth of them
+// moving) and the seed (1); LAPSERVO_HIDDEN_LIST=1 prints the result of each.
 
 #include <cmath>
 #include <cstdint>
@@ -27,7 +27,7 @@ namespace {
 constexpr double mm = 1e-3, mrad = 1e-3;
 constexpr double steepest_rad = 0.35;
 
-// What blood hides.
+// The parts that blood hides.
 struct Kind {
   std::string name;
   std::vector<std::size_t> hidden;  // boundaries 0 to 3
@@ -134,7 +134,7 @@ TEST_F(HiddenBoundaries, OfPrintsThatAreOffGiveNoneWhileTracked) {
   EXPECT_EQ(all.wrong, 0);
 }
 
-// What is asked of the others costs some of those that are as the rig says.
+// The refusals of misprinted markers cost some exact ones.
 TEST_F(HiddenBoundaries, OfExactPrintsAreNotGuessedEither) {
   const Tally all = all_kinds(pictures, 1, Off::nowhere);
   EXPECT_EQ(all.wrong, 0);

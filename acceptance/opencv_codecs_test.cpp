@@ -1,4 +1,4 @@
-// Pictures and videos beside OpenCV's codecs, which share nothing with ours but libjpeg and libpng.
+// Compares images and videos with OpenCV's codecs, which share nothing with ours but libjpeg and libpng.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -156,7 +156,7 @@ TEST(OpenCvsVideo, ThatEndsEarlySaysSo) {
   }
 }
 
-// Of damage within its data the decoder learns most of the time; then the frame says so and the video as a whole.
+// The decoder notices damage within its data most of the time; then the frame and the video as a whole say so.
 TEST(OpenCvsVideo, HasItsDamagedFramesMarked) {
   const testing::TemporaryFolder folder;
   for (const auto& [name, codec] : {std::pair{"a.mp4", "mp4v"}, {"a.avi", "MJPG"}}) {
@@ -229,8 +229,8 @@ std::array<double, 3> places_px(const cv::Mat& bgr, bool down) {
   return places;
 }
 
-// Colour differences, which a video has for four pixels together, don't move in it: a reader that takes their samples
-// for such on the left pixels' columns, as H.264 has it unless told, would put them half a pixel off.
+// Colour differences, which a video has for four pixels together, keep their place: a reader that places their samples
+// on the left pixels' columns, as H.264 has it by default, would shift them by half a pixel.
 TEST(Videos, LeaveColorsWhereTheyAre) {
   constexpr double farthest_px = 0.2;  // by compression
   const testing::TemporaryFolder folder;

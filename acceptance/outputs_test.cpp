@@ -1,5 +1,5 @@
-// What the tool writes, as its user meets it: nobody's file is lost, no success is claimed that is none, nothing that
-// was measured goes with a killed process.
+// The tool's output files: no file of anybody is lost, no success is claimed falsely, and measurements survive a killed
+// process.
 
 #include <algorithm>
 #include <chrono>
@@ -179,7 +179,7 @@ TEST_F(Outputs, FoldersOfARunAreReplacedOnlyWhenAsked) {
   }
   EXPECT_TRUE(fs::is_symlink("link"));
   EXPECT_EQ(read_file("frames/notes.txt") + read_file("frames.part/mine"), "minemine");
-  EXPECT_EQ(std::distance(fs::directory_iterator("frames"), {}), 5);  // picture, truth, rig, notes and the run's mark
+  EXPECT_EQ(std::distance(fs::directory_iterator("frames"), {}), 5);  // image, truth, rig, notes and the run's mark
   write_file("frames/0001.png", "mine");
   expect_refused("render --rig " + rig_ + " --seed 3 --count 2 --force --out frames",
                  {"frames/0001.png", "the results are in frames/unfinished"});

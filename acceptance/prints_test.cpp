@@ -43,7 +43,7 @@ class Prints : public ::testing::Test {
     return all;
   }
 
-  // What is seen of a print by a tracker that takes it for that of `believed`.
+  // The measurements of a print by a tracker whose rig has `believed`.
   Tally seen(const Marker& print, const Rig& believed, int number, bool moving, const Sensor& sensor = {}) const {
     RenderedSet set;
     set.rig = rig;
@@ -103,8 +103,8 @@ TEST_F(Prints, ThatAreOffAreNotTrusted) {
   EXPECT_GE(all.fraction("marker_mismatch"), 0.8);
 }
 
-// Nearly all that are ok are off by less than 0.05 mm: a few happen to be off as a turn would move them, and the
-// picture shows little of it. Sigma was too small for them by 2.19 in this draw.
+// Nearly all that are ok are off by less than 0.05 mm: the errors of a few look like a rotation, and the image shows
+// little of them. Sigma was too small for them by 2.19 in this draw.
 TEST_F(Prints, ThatLookLikeATurnHaveASigmaThatHolds) {
   constexpr int drawn = 200;
   constexpr double most_m = 0.05 * mm;
@@ -129,8 +129,8 @@ TEST_F(Prints, ThatAreTrackedOrAskewAreNotTrustedEither) {
   }
 }
 
-// Where the print's errors show worse they are not taken for a turn: least of all both inner boundaries', alike. What
-// is left are those whose errors happen to be a turn (docs/notes/accuracy.md).
+// Errors of a print that show worse are not taken for a rotation: least of all those of both inner boundaries, alike.
+// The errors of the rest equal a rotation (docs/notes/accuracy.md).
 TEST_F(Prints, InPoorPicturesAreHardlyEverTrustedWhereTheyAreOff) {
   const Tally bands = seen_poorly(Off::bands), ink = seen_poorly(Off::middle_ink), exact = seen_poorly(Off::nowhere);
   EXPECT_LE(bands.fraction("ok"), 0.15);

@@ -12,8 +12,8 @@ struct Print {
   double error_m;  ///< standard deviation of the bands' lengths
 };
 
-/// Every band is off by itself, at either edge; the last takes up what keeps the ends circles, unless wrapped askew.
-/// The seam is off by 0.05 rad, which no picture shows.
+/// Every band is off independently, at either edge; the last one absorbs the rest, so that the ends stay circles,
+/// unless wrapped askew. The seam is off by 0.05 rad, which no image shows.
 inline Print random_print(const Marker& nominal, double error_m, bool askew, internal::Random& random) {
   Print print{nominal, error_m};
   auto &upper = print.marker.bands_upper_m, &lower = print.marker.bands_lower_m;

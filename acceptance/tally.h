@@ -11,13 +11,13 @@
 
 namespace lapservo::acceptance {
 
-/// What became of pictures of markers that are not as the rig says: statuses, and psi's errors where it is `ok`.
+/// Results of images of markers that differ from the rig: statuses, and psi's errors where it is `ok`.
 struct Tally {
   int frames = 0, wrong = 0;  ///< wrong: psi off by more than 0.1 rad
   std::map<std::string, int> statuses;
   std::vector<double> errors_rad, errors_sigmas;
 
-  /// The seam's error is none that a picture could show.
+  /// The seam's error is invisible.
   void add(const Observation& o, double true_psi_rad, double seam_error_rad) {
     ++frames;
     ++statuses[std::string(to_string(o.status))];

@@ -45,7 +45,7 @@ Rig true_rig() {
   return rig;
 }
 
-// What stands in the data sheets.
+// The values of the data sheets.
 std::string designed_rig() {
   return R"(camera:
   image_width: 960

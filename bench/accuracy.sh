@@ -72,8 +72,8 @@ sample_set() {
   done
 }
 
-# What cameras do to a picture: response and aberration measured on boards of the same camera, where there are any; the
-# lens is the frames' own.
+# Processing of an image by cameras: response and aberration measured on boards of the same camera, where there are any;
+# the lens is the frames' own.
 pipeline_set() {
   local frames=$1 condition rig file stem pairs
   for condition in $(awk -F, 'NR > 1 && !seen[$3]++ { print $3 }' "$frames/pipeline/truth.csv"); do

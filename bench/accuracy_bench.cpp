@@ -67,7 +67,7 @@ void render_each(const std::vector<Scene>& all, const PrintedCells& print, const
     take(scene, renderer.render({placement_of(scene.rig.instruments[0], scene.q)}, scene.noise));
 }
 
-// What a camera's response did, undone: grey in linear light, as 8 bits of which the film's white takes nearly all.
+// Undoes a camera's response: grey in linear light, as 8 bits of which the film's white takes nearly all.
 cv::Mat linear_grey(const cv::Mat& bgr, const Camera& camera) {
   constexpr double gain = 1.6;
   const auto table = camera.response.table();

@@ -1,5 +1,5 @@
-// accuracy_study STUDY [FRAMES [SEED [ROW...]]]: how well and how honestly the tracker does, a row for each condition
-// of the study (camera, samples, blood or motion: accuracy_study.h), all of them without ROW. Tables of
+// accuracy_study STUDY [FRAMES [SEED [ROW...]]]: accuracy and normalised errors of the tracker, a row for each
+// condition of the study (camera, samples, blood or motion: accuracy_study.h), all of them without ROW. Tables of
 // docs/notes/accuracy.md.
 #include "bench/accuracy_study.h"
 

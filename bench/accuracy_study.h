@@ -28,8 +28,7 @@ std::vector<Row> blood_rows();
 /// Instruments that move or turn while the shutter is open, psi's truth being that in the middle of the exposure.
 std::vector<Row> motion_rows();
 
-/// As a tracker sees the frame whose rig takes its print for this one. What the seam's place differs by shows in no
-/// picture and counts for no error.
+/// The truth for a tracker whose rig has this print. The seam's displacement shows in no image and counts for no error.
 void take_print_for(acceptance::TrueFrame& frame, const Marker& marker);
 
 /// The frame's one instrument looked at on its own.

@@ -13,7 +13,7 @@ using namespace internal;
 struct Condition {
   std::string name;
   double steepest_rad = 0;  ///< anywhere in view; 0: near, as the samples of heavy blood are
-  bool tracked = false;     ///< ten frames of an instrument that turned in clear view before; else single pictures
+  bool tracked = false;     ///< ten frames of an instrument that rotated in clear view before; else single images
   Off off = Off::nowhere;
 };
 const std::vector<Condition> conditions{

@@ -17,7 +17,7 @@ Off how_prints_are_off() {
   return static_cast<Off>(from_environment("LAPSERVO_OFF", 0));
 }
 
-// Of a print each, which the tracker takes for the rig's.
+// Frames of one print each, whose rig has the tracker's print.
 std::vector<TrueFrame> frames_of_off_prints(const RenderedSet& all, Off off) {
   std::vector<TrueFrame> frames;
   for (const auto& q : all.configurations) {
@@ -43,7 +43,7 @@ std::vector<TrueFrame> still_frames(int count, std::uint64_t seed) {
   return off == Off::nowhere ? rendered_frames(set) : frames_of_off_prints(set, off);
 }
 
-// With prints that are off, it is the rig that is.
+// With misprinted markers, the rig is the wrong one.
 std::vector<TrueFrame> ray_traced_frames(int most, std::uint64_t seed) {
   std::vector<TrueFrame> frames;
   Random random(seed);

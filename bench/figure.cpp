@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
     if (!series.x.empty()) plot.series.push_back(series);
   }
   if (plot.series.empty()) return std::cerr << "figure: " << argv[1] << " holds no medians\n", 2;
-  // On its own a picture needs its rules, a name space, and a page behind it.
+  // A stand-alone image needs its rules, a name space, and a page behind it.
   std::string svg = svg_from(plot);
   svg.insert(svg.find(' '), " xmlns=\"http://www.w3.org/2000/svg\"");
   svg.insert(svg.find('>') + 1,

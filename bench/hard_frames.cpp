@@ -85,7 +85,7 @@ std::vector<ShaftPlacement> crossing_placements(const Rig& rig, int index) {
   return placed;
 }
 
-// Of each drawing of blood the frames, one after another.
+// The frames of each drawing of blood, one after another.
 void for_each_run(cv::Size size_px, const Sequence& sequence, int frames, std::uint64_t seed,
                   const std::function<void(const std::vector<cv::Mat>&)>& look) {
   constexpr int at_most = 25;  // frames of a drawing of blood
@@ -132,7 +132,7 @@ double memcpy_ms(cv::Size size_px) {
   return quantile_of(ms, 0.5);
 }
 
-// Of a run's frames, by trackers that know the runs before it.
+// The frames of a run, by trackers that know the runs before it.
 void track(std::array<Tracker, 3>& trackers, const std::vector<cv::Mat>& pictures, Times& times) {
   std::vector<double> ms(pictures.size(), std::numeric_limits<double>::infinity());
   for (Tracker& tracker : trackers)

@@ -21,7 +21,7 @@ struct Between {
   double draw(Random& random) const { return random.uniform(low, high); }
 };
 
-// What is drawn for each frame; nothing moves but what is given.
+// The drawn quantities of each frame; everything else stands still.
 struct Kind {
   std::string name;
   std::optional<Between> way_px = {};           ///< of the marker's middle, any way

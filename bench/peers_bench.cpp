@@ -1,4 +1,4 @@
-// What other ways cost on the same frames: copying them, converting their colours, and finding markers as is usual.
+// The cost of other operations on the same frames: copying them, converting their colours, and finding other markers.
 #include <benchmark/benchmark.h>
 #include <opencv2/imgproc.hpp>
 

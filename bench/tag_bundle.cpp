@@ -15,7 +15,7 @@ namespace lapservo::bench {
 using namespace internal;
 namespace {
 
-// Of a corner; what is farther off is another tag's, or a shadow's.
+// The reach of a corner; anything farther off is another tag's, or a shadow's.
 constexpr double loss_px = 0.5;
 
 struct CornerError {
@@ -136,7 +136,7 @@ Points points_of(const TagBundle& bundle, const std::vector<FoundTag>& found) {
   return points;
 }
 
-// Of a few that are wrong: the start must not be theirs.
+// Robust to a few wrong ones: the start must not be theirs.
 std::optional<Start> start_of(const Points& points, const Camera& camera) {
   const cv::Matx33d matrix(camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1);
   Start start;

@@ -27,11 +27,11 @@ class TagBundle {
   /// `around`: tags in a ring.
   TagBundle(const Marker& film, const std::vector<TagCells>& tags, int around);
 
-  /// What is printed on the film.
+  /// The print on the film.
   const PrintedCells& print() const { return print_; }
   std::size_t size() const { return corners_.size(); }
-  /// Of a tag's dark border, in the marker's frame (z along the axis from the proximal end, x towards tau = 0), in the
-  /// order of the print's (row, column): (0, 0), (0, n), (n, n), (n, 0).
+  /// Corners of a tag's dark border, in the marker's frame (z along the axis from the proximal end, x towards tau = 0),
+  /// in the order of the print's (row, column): (0, 0), (0, n), (n, n), (n, 0).
   const std::array<Eigen::Vector3d, 4>& corners_m(std::size_t tag) const { return corners_[tag]; }
   /// A point of the same border, `part` (0 to 1) of the way along the film from a corner to the next one.
   Eigen::Vector3d side_m(std::size_t tag, std::size_t corner, double part) const;
@@ -55,8 +55,8 @@ struct FoundTag {
   std::array<Eigen::Vector2d, 4> ideal_px;
 };
 
-/// What a detector takes for a tag's corner: the corner itself, or where straight lines along its sides meet, which
-/// on a shaft is elsewhere, as two of them are bent.
+/// The place that a detector reports as a tag's corner: the corner itself, or the intersection of straight lines along
+/// its sides, which differs on a shaft, as two of them are bent.
 enum class CornersBy { themselves, straight_sides };
 
 /// camera_from_marker by all corners of all tags, least squares with a Cauchy loss. Nullopt when there is none.

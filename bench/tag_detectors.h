@@ -24,7 +24,7 @@ struct TagDetector {
   std::function<std::vector<SeenTag>(const cv::Mat& grey)> detect;
 };
 
-/// What is printed, and the ways to see it.
+/// The prints, and the detectors of each.
 struct TagDictionary {
   std::string name;
   std::vector<TagCells> tags;

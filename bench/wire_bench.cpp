@@ -1,6 +1,6 @@
-// The closed loop through a robot's wire in real time: how long after an image's arrival the first set-point that goes
-// by it is on its way, and how regular set-points are. The arm and its camera, 1280x720 at 30 frames/s, are another
-// process. Usage: wire_bench ros2|ros1 raw|compressed SECONDS [TICKS_PER_SECOND]
+// The closed loop through a robot's wire in real time: the time from an image's arrival to the first setpoint that uses
+// it, and the regularity of setpoints. The arm and its camera, 1280x720 at 30 frames/s, are another process. Usage:
+// wire_bench ros2|ros1 raw|compressed SECONDS [TICKS_PER_SECOND]
 
 #include <algorithm>
 #include <chrono>
@@ -51,7 +51,7 @@ ControllerConfig controller_of(const Rig& rig, double ticks_per_s) {
 
 volatile std::sig_atomic_t ended = 0;
 
-// The other process: until SIGTERM, when it writes the set-points' stamps.
+// The other process: runs until SIGTERM, then writes the setpoints' stamps.
 void be_the_arm(const Options& options, const Rig& rig, int to) {
   std::signal(SIGTERM, [](int) { ended = 1; });
   SimulatorConfig simulated;
@@ -67,7 +67,7 @@ void be_the_arm(const Options& options, const Rig& rig, int to) {
   Transport::Publisher<CompressedImageMessage> say_compressed;
   if (options.images == "compressed") {
     say_compressed = transport->compressed_image_publisher(compressed_topic);
-    config.camera = "/nobody";  // whose raw images nobody asks for
+    config.camera = "/nobody";  // whose raw images nobody requests
     config.alter_image = [&](ImageMessage& image) {
       const cv::Mat bgr(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC3, image.data.data(),
                         image.step);
@@ -173,11 +173,11 @@ void report(const std::vector<Watcher::Seen>& seen, const std::vector<double>& s
     decisions_s.push_back(decided_s - arrival_s);
   }
   print("image arrival to decision", decisions_s);
-  print("image arrival to set-point out", waits_s);
-  print("set-point period", periods_s);
+  print("image arrival to setpoint out", waits_s);
+  print("setpoint period", periods_s);
 }
 
-// The set-points' stamps: when they were sent, by the computer's clock.
+// The setpoints' stamps: their send times by the computer's clock.
 std::vector<double> stamps_of(pid_t arm, int from) {
   ::kill(arm, SIGTERM);
   std::vector<double> stamps_s;

@@ -38,8 +38,8 @@ using CameraSink = std::function<void(ImageMessage&&)>;
 
 /// The camera at work on camera_pipeline(). Images are bgr8 by the colorimetry of the pipeline's caps, and stamped on
 /// the monotonic clock by their buffers' running times, NaN where there is none. Without a sink two images wait to be
-/// taken; of a live camera newer ones replace them. What is not live plays at its own speed. Throws InputError, naming
-/// the camera and what to do, when it gives no image within 10 s, or when this build lacks GStreamer.
+/// taken; newer images of a live camera replace them. Other sources play at their own speed. Throws InputError, naming
+/// the camera and the remedy, when it gives no image within 10 s, or when this build lacks GStreamer.
 std::unique_ptr<LiveCamera> open_camera(const std::string& camera, const cv::Size& size, CameraSink sink = nullptr);
 
 /// The frames of a camera, which end with it, when none comes for 15 s, or when `stop` returns true; of what names no

@@ -41,7 +41,7 @@ std::string one_line(std::string text) {
 }
 
 std::string text_of(GError* error) {
-  const std::string text = error ? one_line(error->message) : "for no reason that is told";
+  const std::string text = error ? one_line(error->message) : "without a reason";
   g_clear_error(&error);
   return text;
 }
@@ -148,7 +148,7 @@ class GstCamera : public LiveCamera {
     gst_app_sink_set_callbacks(app_sink(), &callbacks, this, nullptr);
   }
 
-  // What is live is taken as it comes; the rest at its own speed, and whole.
+  // Takes live images as they come; other sources at their own speed, and whole.
   void start() {
     const bool live = change_to(GST_STATE_PAUSED) == GST_STATE_CHANGE_NO_PREROLL;
     g_object_set(sink_element_.get(), "sync", !live, "drop", live, nullptr);

@@ -13,7 +13,7 @@
 #include "recordings/bag_topics.h"
 #include "recordings/open_bag.h"
 
-// Any bytes are a bag that is read to its end, or an InputError. What is read of them is finite.
+// Any bytes are a bag that is read to its end, or an InputError. All values read are finite.
 namespace {
 using namespace lapservo;
 using namespace lapservo::internal;
@@ -43,7 +43,7 @@ void read_frames(const std::shared_ptr<const Bag>& bag) {
   require(std::isfinite(frames.frames_per_second()), "a rate is finite");
   for (double last_s = -1; const auto frame = frames.next(); last_s = frame->time_s) {
     require(frame->time_s > last_s && std::isfinite(frame->time_s), "times grow");
-    require(frame->flaw || (frame->bgr.type() == CV_8UC3 && !frame->bgr.empty()), "a picture is 8-bit BGR");
+    require(frame->flaw || (frame->bgr.type() == CV_8UC3 && !frame->bgr.empty()), "an image is 8-bit BGR");
   }
 }
 

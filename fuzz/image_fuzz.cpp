@@ -9,7 +9,7 @@
 #include "lapservo/io/overlay.h"
 #include "lapservo/vision/tracker.h"
 
-// Any bytes are a picture in 8-bit BGR that can be tracked and drawn on, or an InputError.
+// Any bytes are an image in 8-bit BGR that can be tracked and drawn on, or an InputError.
 namespace {
 using namespace lapservo;
 using fuzz::require;
@@ -29,7 +29,7 @@ struct TrackedPicture {
     const auto& observations = tracker.track(image);
     require(observations.size() == rig.instruments.size(), "one observation an instrument");
     for (const Observation& observation : observations) fuzz::require_sound(observation);
-    require(draw_overlay(image, rig, observations).size() == image.size(), "an overlay has its picture's size");
+    require(draw_overlay(image, rig, observations).size() == image.size(), "an overlay has its image's size");
   }
 };
 
@@ -43,7 +43,7 @@ extern "C" int LLVMFuzzerInitialize(int*, char***) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     const cv::Mat image = decode_image({data, size}, "fuzz.png");
-    require(image.type() == CV_8UC3 && !image.empty(), "a picture is 8-bit BGR");
+    require(image.type() == CV_8UC3 && !image.empty(), "an image is 8-bit BGR");
     static TrackedPicture surface(Method::surface), centerline(Method::centerline);
     surface.track(image);  // an InputError unless it has the rig's size
     centerline.track(image);

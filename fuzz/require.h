@@ -8,7 +8,7 @@
 
 namespace lapservo::fuzz {
 
-/// What must hold for any input. Aborts, which libFuzzer reports with the input that did it.
+/// A law for any input. Aborts if it is broken, which libFuzzer reports with the input.
 inline void require(bool holds, const char* law) {
   if (holds) return;
   std::fprintf(stderr, "does not hold: %s\n", law);

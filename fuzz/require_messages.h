@@ -8,7 +8,7 @@
 
 namespace lapservo::fuzz {
 
-/// What `decode.operator()<Message>(bytes)` makes of joints and pictures holds no more than the bytes do.
+/// Joints and images that `decode.operator()<Message>(bytes)` makes hold no more than the bytes do.
 template <typename Decode>
 void require_messages_within(const Decode& decode, std::span<const std::uint8_t> bytes) {
   using namespace internal;
@@ -17,7 +17,7 @@ void require_messages_within(const Decode& decode, std::span<const std::uint8_t>
   if (const auto image = decode.template operator()<ImageMessage>(bytes))
     require(image->data.size() + image->encoding.size() < bytes.size(), "pixels are in the bytes");
   if (const auto image = decode.template operator()<CompressedImageMessage>(bytes))
-    require(image->data.size() + image->format.size() < bytes.size(), "a picture is in the bytes");
+    require(image->data.size() + image->format.size() < bytes.size(), "an image is in the bytes");
 }
 
 }  // namespace lapservo::fuzz

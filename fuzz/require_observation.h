@@ -9,7 +9,7 @@
 namespace lapservo::fuzz {
 using namespace internal;
 
-/// What an observation promises when its status is ok.
+/// The laws of an observation whose status is ok.
 inline void require_sound(const Observation& o) {
   if (o.status != Status::ok) return;
   require(o.tau_rad >= 0 && o.tau_rad <= two_pi, "tau is in [0, 2 pi]");

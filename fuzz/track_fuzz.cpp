@@ -17,9 +17,8 @@
 #include "lapservo/sim/tissue.h"
 #include "lapservo/vision/tracker.h"
 
-// Whatever is done to a picture of a marker, what is reported is finite and can be written and drawn. The first byte
-// chooses rig and method, the second the picture; every eight that follow paint over it, or show it to the tracker and
-// go on.
+// All results for any changed image of a marker are finite and can be written and drawn. The first byte chooses rig and
+// method, the second the image; every eight that follow paint over it, or show it to the tracker and go on.
 namespace {
 using namespace lapservo;
 using namespace lapservo::internal;
@@ -106,7 +105,7 @@ void track(TrackedRig& tracked, const cv::Mat& image) {
     require(std::count(row.begin(), row.end(), ',') == std::count(header.begin(), header.end(), ','),
             "a row has the header's fields");
   }
-  require(draw_overlay(image, rig, observations).size() == image.size(), "an overlay has its picture's size");
+  require(draw_overlay(image, rig, observations).size() == image.size(), "an overlay has its image's size");
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 #pragma once
 
-/// All that a program which sees or steers an instrument calls. Units and frames: docs/frames.md; a robot, a
-/// camera or a trajectory of your own: docs/extending.md. What stands in lapservo::internal may change any day.
+/// The public interface of programs that measure or steer an instrument. Units and frames: docs/frames.md; a robot, a
+/// camera or a trajectory of your own: docs/extending.md. Names in lapservo::internal may change at any time.
 
-// What goes wrong with files and configurations; joints and image features by name.
+// Errors of files and configurations; names of joints and image features.
 #include "lapservo/core/error.h"
 #include "lapservo/core/joint_vector.h"
 
-// What stands before the camera: load_rig(), Rig, Camera, Marker.
+// The scene before the camera: load_rig(), Rig, Camera, Marker.
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/response.h"
 #include "lapservo/geometry/rigid3.h"
@@ -21,7 +21,7 @@
 #include "lapservo/marker/drawing.h"
 #include "lapservo/marker/sensitivity.h"
 
-// Seeing: Tracker makes Observations of pictures, which come from files, videos and cameras.
+// Measurement: Tracker makes Observations of images, which come from files, videos and cameras.
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/overlay.h"
@@ -42,7 +42,7 @@
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/stream/image_stream.h"
 
-// Steering: run() follows a Trajectory as ControllerConfig says and tells a RunObserver of every ControlTick.
+// Control: run() follows a Trajectory with a ControllerConfig and passes each ControlTick to a RunObserver.
 #include "lapservo/control/control_step.h"
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/estimate.h"

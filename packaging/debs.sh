@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# debs.sh FOLDER [BUILD_TREE]: builds the Debian packages into FOLDER and lets lintian look at them. Of what is committed, with
-# the source package; or, given a build tree (see debian/rules), of what was built in it and the files as they are now.
+# debs.sh FOLDER [BUILD_TREE]: builds the Debian packages into FOLDER and runs lintian on them. Packages what is
+# committed, with the source package; or, given a build tree (see debian/rules), the files built in it and the present
+# files.
 set -euo pipefail
 mkdir -p "$1"
 out=$(realpath "$1")

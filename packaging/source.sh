@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# source.sh FOLDER: writes lapservo-VERSION.tar.xz there, of what is committed: the same bytes for the same commit, whoever
-# makes it where and when. `git get-tar-commit-id` tells the commit.
+# source.sh FOLDER: writes lapservo-VERSION.tar.xz of the committed files there: the same bytes for the same commit, on
+# any machine at any time. `git get-tar-commit-id` gives the commit.
 set -euo pipefail
 out=$(realpath "$1")
 cd "$(dirname "$0")/.."

@@ -36,7 +36,7 @@ class Bag {
   /// As it was named.
   virtual const std::string& path() const = 0;
   virtual const std::vector<BagTopic>& topics() const = 0;
-  /// Of one of topics(). The bag must outlive it.
+  /// The messages of one of topics(). The bag must outlive it.
   virtual std::unique_ptr<BagMessages> messages(const BagTopic& topic) const = 0;
 };
 
@@ -44,7 +44,7 @@ inline constexpr const char* joint_type = "sensor_msgs/JointState";
 inline constexpr const char* image_type = "sensor_msgs/Image";
 inline constexpr const char* compressed_image_type = "sensor_msgs/CompressedImage";
 
-/// What `decode.operator()<Message>(bytes)` makes of a message's bytes.
+/// The result of `decode.operator()<Message>(bytes)` for a message's bytes.
 template <typename Decode, typename Bytes>
 BagMessage decode_bag_message(const std::string& type, const Decode& decode, const Bytes& bytes) {
   const auto message = [](auto decoded) { return decoded ? BagMessage(std::move(*decoded)) : BagMessage(); };

@@ -9,8 +9,8 @@
 
 namespace lapservo::internal {
 
-/// The images of a bag's topic as frames, with the times of their headers' stamps. What can't be read, and what has no
-/// stamp or none later than the one before, is left out and said in complaint().
+/// The images of a bag's topic as frames, with the times of their headers' stamps. Unreadable images, and images
+/// without a stamp or with one not later than the previous, are left out and reported in complaint().
 class BagFrames : public FrameSource {
  public:
   /// `topic`: see image_topic_of(). Throws InputError when no image can be read.

@@ -14,7 +14,7 @@
 
 namespace lapservo::internal {
 
-/// What became of the messages of a recording.
+/// Counts of the messages of a recording.
 struct RecordedCounts {
   long images = 0, joints = 0;
   long dropped = 0;  ///< images that came faster than they could be written

@@ -38,7 +38,7 @@ BagKind kind_of_file(const std::string& path) {
   return ends_like(path, {".db3"}) ? BagKind::ros2 : BagKind::none;
 }
 
-// By what lies in it, so that pictures may have a metadata.yaml of their own.
+// Recognises a bag by its content, so that images may have a metadata.yaml of their own.
 BagKind kind_of_folder(const std::string& path) {
   std::error_code error;
   for (fs::directory_iterator entry(path, error), end; !error && entry != end; entry.increment(error))

@@ -30,7 +30,7 @@ class Ros2Messages : public BagMessages {
 
   std::optional<BagMessage> next() override {
     while (!rows_ || !rows_->next()) {
-      rows_.reset();  // a query that is asked on begins anew
+      rows_.reset();  // a query that runs past its end restarts
       if (next_ == parts_.size()) return std::nullopt;
       const Part& part = parts_[next_++];
       const auto number = part.numbers.find({topic_.name, topic_.type});

@@ -8,8 +8,8 @@
 
 namespace lapservo::internal {
 
-/// Writes a ROS 2 bag as rosbag2 does: a folder of metadata.yaml and a .db3. What was written stays when the program
-/// dies, in the .db3, but for the last half second.
+/// Writes a ROS 2 bag as rosbag2 does: a folder of metadata.yaml and a .db3. Written messages survive the program in
+/// the .db3, except for the last half second.
 class Ros2BagWriter {
  public:
   /// Throws InputError when `folder` holds something already or can't be written.
@@ -24,7 +24,7 @@ class Ros2BagWriter {
   void write(const std::string& topic, double time_s, const ImageMessage& message);
   void write(const std::string& topic, double time_s, const CompressedImageMessage& message);
 
-  /// Writes metadata.yaml; then the bag is whole. Of nothing no bag is made.
+  /// Writes metadata.yaml, which completes the bag. Without messages no bag is made.
   void finish();
 
  private:

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# build.sh BUILD [external]: the site from docs/*.md, the public headers and BUILD/reference/cli.md, into BUILD/docs/html. A warning
-# is an error, a dead link too; those to other sites are only asked for with `external`.
+# build.sh BUILD [external]: the site from docs/*.md, the public headers and BUILD/reference/cli.md, into
+# BUILD/docs/html. A warning is an error, a dead link too; links to other sites are checked only with `external`.
 set -euo pipefail
 build=$(realpath "$1")
 cd "$(dirname "$0")/../.."

@@ -7,7 +7,7 @@ int main(int argc, char** argv) {
   if (argc != 3) return 2;
   lapservo::Rig rig = lapservo::load_rig(argv[2]);
   for (lapservo::Instrument& instrument : rig.instruments)
-    instrument.camera_from_rcm.reset();  // tells where the RCM is
+    instrument.camera_from_rcm.reset();  // makes the tracker estimate the RCM
   lapservo::Tracker tracker(rig, {.frame_budget = std::nullopt});
   std::vector<lapservo::LineObservation> lines;
   const auto frames = lapservo::open_frame_source(argv[1], 30);

@@ -1,4 +1,4 @@
-// track_video INPUT RIG.yaml: prints where the instruments are in a video, a folder of pictures or a camera.
+// track_video INPUT RIG.yaml: prints where the instruments are in a video, a folder of images or a camera.
 #include <cstdio>
 #include <lapservo/io/frame_source.h>
 #include <lapservo/vision/tracker.h>

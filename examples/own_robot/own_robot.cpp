@@ -8,7 +8,7 @@
 
 using namespace lapservo;
 
-// A camera of one's own: 30 pictures a second of where the arm is, 50 ms late.
+// A camera of one's own: 30 images a second of the arm's place, 50 ms late.
 class Camera30 : public ImageStream {
  public:
   Camera30(const Rig& rig, SecondOrderArm& arm)
@@ -57,7 +57,7 @@ class ArmsClock : public Clock {
   Camera30& camera_;
 };
 
-// What is worth knowing of the run: the error in its last second.
+// The result of the run: the error in its last second.
 class LastSecond : public RunObserver {
  public:
   bool on_tick(const ControlTick& tick) override {

@@ -3,7 +3,7 @@
 #include <lapservo/robot/robot.h>
 #include <optional>
 
-// An arm of one's own: every joint is a mass on a damped spring whose other end the set-points move.
+// An arm of one's own: every joint is a mass on a damped spring whose other end the setpoints move.
 class SecondOrderArm : public lapservo::Robot {
  public:
   explicit SecondOrderArm(const lapservo::JointVector& start) : position_(start.vector()) {}
@@ -13,7 +13,7 @@ class SecondOrderArm : public lapservo::Robot {
   }
   void send(const lapservo::JointPath& path) override { path_ = path; }
 
-  // What the arm's own controller does, a thousand times a second.
+  // The arm's own controller, a thousand times a second.
   void advance(double step_s) {
     constexpr double omega_rad_s = 60, damping = 0.8;
     time_s_ += step_s;

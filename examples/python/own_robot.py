@@ -27,7 +27,7 @@ class Arm(lapservo.Robot):
 
 
 class Camera(lapservo.ImageStream):
-    """30 pictures a second of where the arm is, 50 ms late."""
+    """30 images a second of where the arm is, 50 ms late."""
 
     def __init__(self, rig, arm):
         super().__init__()

@@ -1,4 +1,4 @@
-"""track_video.py INPUT RIG.yaml: prints where the instruments are in a video, a folder of pictures or a camera."""
+"""track_video.py INPUT RIG.yaml: prints where the instruments are in a video, a folder of images or a camera."""
 
 import sys
 

@@ -1,6 +1,6 @@
-// Rigs, pictures, videos and command lines as hostile, unlucky and impatient users bring them, made by mutations of
-// good ones. Prints how many of each came to what; exits with 1 when a law is broken. campaign RIGS PICTURES COMMANDS
-// [SEED]: case i has the seed SEED + i, so a long campaign can be run in parts and one case again by its seed.
+// Rigs, images, videos and command lines as hostile, unlucky and impatient users bring them, made by mutations of good
+// ones. Prints the counts of their results; exits with 1 when a law is broken. campaign RIGS IMAGES COMMANDS [SEED]:
+// case i has the seed SEED + i, so a long campaign can be run in parts and one case again by its seed.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -55,7 +55,7 @@ double computed_s() {
   return sum_s;
 }
 
-// What the cases of one kind came to.
+// The results of the cases of one kind.
 class Counts {
  public:
   explicit Counts(std::string kind) : kind_(std::move(kind)) {}
@@ -194,7 +194,7 @@ std::string track_file(const fs::path& path, const Rig& rig, const Sample& sampl
 }
 
 void try_pictures(int count, std::uint64_t seed) {
-  Counts counts("pictures and videos");
+  Counts counts("images and videos");
   const lapservo::testing::TemporaryFolder folder;
   const Rig rig = lapservo::testing::small_test_rig();
   const std::vector<Sample> good = samples(rig, folder.path());
@@ -269,7 +269,7 @@ void try_commands(int count, std::uint64_t seed) {
 
 int main(int argc, char** argv) {
   if (argc < 4) {
-    std::fprintf(stderr, "campaign RIGS PICTURES COMMANDS [SEED]\n");
+    std::fprintf(stderr, "campaign RIGS IMAGES COMMANDS [SEED]\n");
     return 2;
   }
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);

@@ -20,14 +20,14 @@ void ArmResponse::restart() {
   drive_.load.setZero();
   drive_.load_known.fill(false);
   standing_load_.setZero();
-  // What was seen of lag and friction stays, as if the load had been known then.
+  // The estimates of lag and friction stay: they do not depend on the load's value.
   normal_.middleRows<4>(1).setZero();
   normal_.middleCols<4>(1).setZero();
   cross_ = normal_ * (Unknowns() << lag_s_, drive_.load, drive_.friction.cwiseQuotient(scales_.joints)).finished();
 }
 
-// A blocked joint's motor winds up its transmission: it goes a small part of the way, and still goes a little when the
-// set-point has come to rest.
+// The motor of a blocked joint winds up the transmission: the joint moves a small part of the way, and moves on a
+// little after the setpoint has come to rest.
 bool ArmResponse::follows(int joint, double setpoint_velocity) const {
   constexpr double nearly = 0.7;
   const double slowest = 0.02 * scales_.joints[joint];  // per second
@@ -57,7 +57,7 @@ void ArmResponse::add(const MotionState& setpoint, const Eigen::Vector4d& q_join
     bool& follows_now = drive_.follows[static_cast<std::size_t>(i)];
     follows_now = follows(i, setpoint.velocity[i]);
     if (!follows_now) {
-      // An arm that has not been asked to move hangs where it hangs.
+      // An arm without a commanded motion hangs in its present place.
       const double most = max_load * scales_.joints[i];
       if (!asked_) drive_.load[i] = standing_load_[i] = std::clamp(setpoint.position[i] - q_joint[i], -most, most);
       continue;

@@ -9,36 +9,36 @@
 
 namespace lapservo::internal {
 
-/// What lies between set-points and measured joints, joint by joint.
+/// The difference between setpoints and measured joints, per joint.
 struct DriveState {
-  /// Half of what a set-point goes after it has turned before the joint follows: Coulomb friction over the servo's
-  /// gain.
+  /// Half of the distance by which a setpoint moves after a reversal before the joint follows: Coulomb friction over
+  /// the servo's gain.
   Eigen::Vector4d friction = Eigen::Vector4d::Zero();
-  /// Set-point less measured joint in the middle of that: what the arm sags by under its weight.
+  /// Setpoint less measured joint in the middle of that interval: the sag of the arm under its weight.
   Eigen::Vector4d load = Eigen::Vector4d::Zero();
-  /// The joint has gone both ways, and some way since set-points began anew. Before, it may hang on its friction, and
-  /// `load` be off by as much.
+  /// The joint has moved in both directions, and some distance since the setpoints restarted. Before that it may hang
+  /// on its friction, and `load` may be wrong by as much.
   std::array<bool, 4> load_known{};
-  /// Of the measured joints, between the last two.
+  /// Rates of the measured joints between the last two readings.
   Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
-  /// The joint goes where its set-point goes, nearly as fast.
+  /// The joint follows its setpoint at nearly the same rate.
   std::array<bool, 4> follows{};
 };
 
-/// What an arm makes of its set-points: least squares of set-point - measured joint = lag * velocity + load + friction
-/// * direction over the last seconds of motion, one lag for all joints. Only joints that move count: one that is
-/// blocked tells nothing of these. Friction counts from when a joint has gone both ways.
+/// Estimates how an arm responds to setpoints: least squares of setpoint - measured joint = lag * velocity + load +
+/// friction * direction over the last seconds of motion, one lag for all joints. Only joints that move count: a blocked
+/// joint carries no information. Friction counts once a joint has moved in both directions.
 class ArmResponse {
  public:
   explicit ArmResponse(const Scales& scales) : scales_(scales) {}
 
-  /// Set-point and measured joints of one time, `interval_s` after the ones before.
+  /// Setpoint and measured joints of one time, `interval_s` after the previous ones.
   void add(const MotionState& setpoint, const Eigen::Vector4d& q_joint, double interval_s);
-  /// Set-points start anew at the measured joints: load and velocity are not known any more.
+  /// Setpoints restart at the measured joints: load and velocity become unknown.
   void restart();
 
-  /// How far the arm lags behind moving set-points: 0 before there was motion, never more than 0.1 s. The desired
-  /// motion is fed forward that much earlier.
+  /// Lag of the arm behind moving setpoints: 0 before any motion, at most 0.1 s. The desired motion is fed forward by
+  /// that time.
   double lag_s() const { return lag_s_; }
   const DriveState& drive() const { return drive_; }
 

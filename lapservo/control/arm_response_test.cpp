@@ -42,7 +42,7 @@ TEST(ArmResponse, LagIsZeroWithoutMotionAndBounded) {
   EXPECT_LE(lag_found(2, 0.5, 5), 0.1);
 }
 
-// Coulomb friction and gravity before a PD servo: set-points go `friction` to either side of `load` before joints
+// Coulomb friction and gravity before a PD servo: setpoints move `friction` to either side of `load` before joints
 // follow.
 struct StickingArm {
   Eigen::Vector4d friction{3e-4, 3e-4, 2e-4, 8e-3}, load{-1e-3, 1e-3, -4e-4, 0}, q = Eigen::Vector4d::Zero();
@@ -69,7 +69,7 @@ TEST(ArmResponse, FindsFrictionAndLoad) {
   EXPECT_TRUE(((response.drive().friction - arm.friction).cwiseAbs().array() < 0.05 * arm.friction.array()).all());
 }
 
-// One that is blocked tells nothing.
+// A blocked joint changes no estimate.
 TEST(ArmResponse, LearnsNothingFromABlockedJoint) {
   ArmResponse response{Scales{}};
   for (int k = 0; k < 300; ++k) {
@@ -81,8 +81,8 @@ TEST(ArmResponse, LearnsNothingFromABlockedJoint) {
   EXPECT_TRUE(response.drive().friction.isZero());
 }
 
-// Nor what its motor winds up of the transmission, an eighth of the way and 40 ms late, when the set-point slows down
-// at the end of its leash.
+// Neither does the wound-up transmission, an eighth of the way and 40 ms late, when the setpoint slows down at the
+// following-error limit.
 TEST(ArmResponse, AWoundTransmissionIsNoLoad) {
   constexpr double lag_s = 0.04, wound = 0.125;
   ArmResponse response{Scales{}};

@@ -94,7 +94,7 @@ std::optional<BacklashEstimate> BacklashEstimator::estimate(int index) const {
   const double curvature = (left - 2 * centre + right) / (step * step);
   if (!(curvature > 0)) return std::nullopt;
   const double shift = (left - right) / (2 * step * curvature);
-  // A sum of squares grows by 1 at one sigma. What nothing explains is taken as noise that persists over several
+  // A sum of squares grows by 1 at one sigma. An unexplained residual counts as noise that persists over several
   // frames.
   constexpr double frames_alike = 4;
   const double misfit = std::max(1.0, squares[lowest] / joint.weight);

@@ -17,13 +17,12 @@ struct BacklashEstimate {
   double sigma = 0;
 };
 
-/// How wide the gaps between motors and instrument are, from the data. What the image shows beyond the measured joints
-/// is compared with what each of a grid of widths would have done to the measured joints so far; the lowest sum of
-/// squares is the likeliest width, refined by a parabola. Other things make image and measured joints differ too, so
-/// each sum is the least over what they can explain: an offset (a running mean is removed from everything alike), a
-/// wrong model (it adds multiples of the joints' positions) and a wrong delay (of the joint's velocity, which looks
-/// like backlash but for its shape). Measured joints that never reverse make all widths alike: then there is no
-/// estimate.
+/// Estimates the widths of the gaps between motors and instrument. The difference between image and measured joints is
+/// compared with the response of each of a grid of widths to the measured joints so far; the lowest sum of squares is
+/// the likeliest width, refined by a parabola. Each sum is the minimum over other causes of a difference: an offset (a
+/// running mean is removed from everything alike), a wrong model (it adds multiples of the joints' positions) and a
+/// wrong delay (a multiple of the joint's velocity, which differs from backlash in shape only). Measured joints that
+/// never reverse make all widths alike: then there is no estimate.
 class BacklashEstimator {
  public:
   static constexpr std::size_t candidates = 21;  ///< 0 to the largest
@@ -42,7 +41,7 @@ class BacklashEstimator {
   std::optional<BacklashEstimate> estimate(int joint) const;
 
  private:
-  /// What may differ without backlash: the joints' positions and the joint's own velocity.
+  /// Causes of a difference other than backlash: the joints' positions and the joint's own velocity.
   using Nuisance = Eigen::Matrix<double, 5, 1>;
   struct Candidate {
     Backlash backlash;

@@ -31,7 +31,7 @@ double travelled(double time_s, double distance, double rate, double ramp_s) {
 }  // namespace
 
 JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s) {
-  // Of the rates: what growing and fading take, and what the swings take.
+  // Shares of the rate limit: fading in and out, and the swings.
   constexpr double share_of_easing = 0.25, share_of_swinging = 0.55;
   const double ease_s = duration_s / 4;
   const Eigen::Array4d wanted = scale * Eigen::Array4d(0.25, 0.2, 0.01, 1);
@@ -41,7 +41,7 @@ JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits
                                        .min(share_of_easing * ease_s / eased_rate * rate)
                                        .min(0.15 * ease_s * ease_s / eased_acceleration * acceleration)
                                        .max(1e-9);
-  // Of the accelerations 0.3 for the swings, 0.15 for easing, and 0.33 at most for what both make together.
+  // Shares of the acceleration limit: 0.3 for the swings, 0.15 for easing, and at most 0.33 for both together.
   const Eigen::Array4d fastest = (share_of_swinging * rate / amplitude).min((0.3 * acceleration / amplitude).sqrt());
   const Eigen::Array4d omega = fastest.min(two_pi / duration_s * Eigen::Array4d(3, 4, 5, 2));
   return {duration_s, [=](double time_s) -> Eigen::Vector4d {

@@ -20,7 +20,7 @@ enum class ControlAction {
 /// "track", "probe", "hold".
 std::string_view to_string(ControlAction action);
 
-/// What to do in the coming period.
+/// The command of the coming period.
 struct ControlStep {
   ControlAction action = ControlAction::hold;
   HoldReason reason = HoldReason::none;                ///< none unless holding
@@ -30,7 +30,7 @@ struct ControlStep {
   bool limited = false;                                ///< a limit keeps the motion from what the law wants
   std::optional<Estimate> estimate;                 ///< the instrument now; given while holding too, when there is one
   Eigen::Vector4d error = Eigen::Vector4d::Zero();  ///< estimated features minus desired ones; zero without estimate
-  double delay_s = 0;                               ///< of the image, as believed now
+  double delay_s = 0;                               ///< estimated delay of the image
 };
 
 }  // namespace lapservo

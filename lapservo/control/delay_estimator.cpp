@@ -42,8 +42,8 @@ std::optional<DelayEstimate> DelayEstimator::estimate() const {
   if (!(curvature > 0)) return std::nullopt;
   const double shift_s = (left - right) / (2 * step_s * curvature);
   const double delay_s = std::clamp(step_s * static_cast<double>(middle) + shift_s, 0.0, step_s * (candidates - 1));
-  // A sum of squares grows by 1 at one sigma. What the measured joints don't explain is taken as noise that persists
-  // over several frames.
+  // A sum of squares grows by 1 at one sigma. A residual that the measured joints do not explain counts as noise that
+  // persists over several frames.
   constexpr double frames_alike = 4;
   const double misfit = std::max(1.0, lowest->squares / (4 * weight_));
   const double sigma_s = std::sqrt(2 / curvature * misfit * frames_alike);

@@ -65,7 +65,7 @@ TEST(DelayEstimator, ErrorsMatchItsSigma) {
     ASSERT_TRUE(found) << "seed " << seed;
     squares += std::pow((found->delay_s - 0.083) / found->sigma_s, 2);
   }
-  // Honest to cautious: what it takes for persistent misfit is margin here, where noise is white.
+  // Between calibrated and cautious: the allowance for persistent misfit is a margin here, where noise is white.
   EXPECT_LT(std::sqrt(squares / runs), 1.5);
   EXPECT_GT(std::sqrt(squares / runs), 0.1);
 }

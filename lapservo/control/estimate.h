@@ -4,7 +4,7 @@
 
 namespace lapservo {
 
-/// Where the joints are in their gaps, as believed.
+/// The estimated places of the joints in their gaps.
 struct GapState {
   Eigen::Vector4d width = Eigen::Vector4d::Zero();  ///< full backlash of each joint
   Eigen::Vector4d shift = Eigen::Vector4d::Zero();  ///< what it adds to the measured joints: -width/2 to width/2

@@ -27,13 +27,12 @@ class Estimator {
   /// The instrument at `time_s`, the joints being measured there at `q_joint`; nullopt while nothing is known.
   virtual std::optional<Estimate> at(double time_s, const Eigen::Vector4d& q_joint) const = 0;
 
-  /// The images' delay as believed now, known or estimated.
+  /// The images' delay, known or estimated.
   virtual double delay_s() const = 0;
-  /// False while it is a guess that motion will tell better.
+  /// False while it is a first guess that motion will improve.
   virtual bool delay_is_known() const { return true; }
 
-  /// Another camera_from_rcm: what was learnt of delay and backlash holds, where the instrument is the next image
-  /// tells.
+  /// Another camera_from_rcm: the estimates of delay and backlash stay, the next image gives the instrument's place.
   virtual void set_model(const FeatureModel& model);
 
   /// The measured joints jumped: nothing is to be learnt across.

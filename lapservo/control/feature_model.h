@@ -7,7 +7,8 @@
 
 namespace lapservo {
 
-/// What the camera would see at q = [theta_rad, phi_rad, rho_m, psi_rad], and how it changes with q. Pixels are ideal.
+/// The features that the camera sees at q = [theta_rad, phi_rad, rho_m, psi_rad], and their derivatives by q. Pixels
+/// are ideal.
 struct FeatureState {
   Eigen::Vector4d features = Eigen::Vector4d::Zero();       ///< s_rad, r_px, l_px, d_px
   Eigen::Matrix4d jacobian = Eigen::Matrix4d::Zero();       ///< d features / d q (eq. 20)

@@ -8,8 +8,8 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double same = 0.02;  // of the feature scales: 0.1 mrad, 0.02 px
-// Theta and phi have no backlash worth its name; rho and psi count beyond the widest that is looked for. A tenth of a
-// pixel changes some of a picture's.
+// Theta and phi have no considerable backlash; rho and psi count beyond the widest gap of the search. A tenth of a
+// pixel changes some pixels of an image.
 const Eigen::Vector4d moved(5e-4, 5e-4, 6e-4, 0.12), moved_by_pixels(1e-4, 1e-4, 6e-4, 0.12);
 constexpr double doubled_s = 0.045;
 
@@ -29,7 +29,7 @@ FrozenImage::Verdict FrozenImage::add(const ImageMeasurement& image, const Joint
     return Verdict::fresh;
   }
   same_pixels_ = same_pixels_ && same_pixels;
-  // Of a picture from before the first readings nobody can tell where the joints were.
+  // An image from before the first readings has no known joints.
   if (!std::all_of(joints_then_.begin(), joints_then_.end(), [](const auto& q) { return q.has_value(); }))
     joints_then_ = joints_at(image, history);
   const bool known = image.repetition == Repetition::of_a_noisy_camera;

@@ -12,17 +12,18 @@
 
 namespace lapservo::internal {
 
-/// Tells a picture that is shown again under a new stamp from one of an instrument that stands still. Of a camera with
-/// noise it is the same in every pixel. Else its features are the same to a small part of what noise makes of them, or
-/// all its pixels are, while the measured joints moved between the exposures, however long the delay is: so a camera
-/// without noise before an arm at rest, or one that just starts, is not taken for frozen, nor a joint that crosses its
-/// backlash. Nor is a stream that shows each picture twice, at a multiple of its camera's rate.
+/// Distinguishes an image that arrives again under a new stamp from an image of an instrument at rest. An image of a
+/// camera with noise repeats if it is the same in every pixel. Otherwise it repeats if its features are the same to a
+/// small part of their noise, or all its pixels are, while the measured joints moved between the exposures, whatever
+/// the delay: a camera without noise before an arm at rest, an arm that just starts and a joint that crosses its
+/// backlash are not taken for frozen. A stream that repeats each image, at a multiple of its camera's rate, is not
+/// frozen either.
 class FrozenImage {
  public:
   enum class Verdict {
     fresh,
-    again,   ///< the picture before: it tells nothing
-    frozen,  ///< and has been so for longer than a stream doubles its pictures
+    again,   ///< the previous image: it carries no information
+    frozen,  ///< repeated for longer than a stream repeats its images
   };
   explicit FrozenImage(const Scales& scales) : scales_(scales) {}
 

@@ -20,8 +20,8 @@ Eigen::Vector4d cross_gaps(const JointLimits& limits, const MotionState& motion,
   for (int i = 0; i < 4; ++i) {
     const double side = feed_forward[i] > 0 ? 1 : -1;
     if (side * feed_forward[i] * slow_s <= gap.width[i] + 2 * drive.friction[i] || side * wanted[i] <= 0) continue;
-    // To where the instrument moves: the setpoint first leads the motor by what friction asks, then the motor crosses
-    // its gap; nothing if it presses already.
+    // In the instrument's direction of motion: the setpoint first leads the motor by the friction, then the motor
+    // crosses its gap; zero if it presses already.
     const double lead = side * (motion.position[i] - q_joint[i] - drive.load[i]);
     const bool follows = side * drive.velocity[i] > std::max(0.0, side * motion.velocity[i]) * following;
     const double to_motor = std::min(follows ? 0 : 2 * drive.friction[i], drive.friction[i] - lead);

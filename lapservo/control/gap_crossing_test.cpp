@@ -12,7 +12,7 @@ namespace gap_crossing_test {
 
 constexpr double period_s = 1.0 / 60;
 
-/// Psi asked to fall at a slow, steady rate after it rose: motor and instrument, without noise or lag.
+/// Psi has to fall at a slow, steady rate after it rose: motor and instrument, without noise or lag.
 struct Crossing {
   double width = 0.02, motor = 1, velocity = 0;
   Backlash backlash{1, 1};
@@ -40,14 +40,14 @@ TEST(CrossGaps, CrossesTheGapFastAndEndsSoftly) {
   for (int k = 1; k <= 60; ++k) {
     world.advance(wanted);
     if (world.instrument() > 0.9899) crossed_s = k * period_s;
-    // Once pressed, the instrument does not run ahead of what is asked.
+    // Once pressed, the instrument does not run ahead of the desired motion.
     EXPECT_GT(world.instrument(), 0.99 + wanted * k * period_s - 0.001) << k;
   }
   EXPECT_LT(crossed_s, 0.25);  // one second by the wanted motion alone
   EXPECT_NEAR(world.velocity, wanted, 1e-3);
 }
 
-// The set-point of a joint that stands goes on beyond load and friction, and no faster once the joint follows.
+// The setpoint of a joint at rest moves on beyond load and friction, and no faster once the joint follows.
 TEST(CrossGaps, CrossesFriction) {
   const JointLimits limits;
   DriveState drive;
@@ -80,7 +80,7 @@ TEST(CrossGaps, LeavesAloneWhatHasNoDirection) {
     for (int i = 0; i < 4; ++i) noise[i] = 0.01 * random.normal();
     const MotionState rest{q, Eigen::Vector4d::Zero()};
     EXPECT_EQ(cross_gaps(limits, rest, gap, DriveState{}, q, Eigen::Vector4d::Zero(), noise, period_s), noise)
-        << "a set-point";
+        << "a setpoint";
     const MotionState elsewhere{q - noise, Eigen::Vector4d::Zero()};
     EXPECT_EQ(cross_gaps(limits, elsewhere, GapState{}, DriveState{}, q, noise, noise, period_s), noise) << "no gap";
     GapState pressed = gap;

@@ -17,7 +17,7 @@ struct SeenMarker {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
 };
 
-/// Whether a picture is the one before in every pixel.
+/// Whether an image equals the previous one in every pixel.
 enum class Repetition {
   none,               ///< it differs
   possible_at_rest,   ///< the same, and it is not known that the camera's noise forbids that
@@ -27,8 +27,8 @@ enum class Repetition {
 std::string_view to_string(Repetition repetition);
 std::optional<Repetition> repetition_from_string(std::string_view word);
 
-/// What one frame tells the controller. The image stamped `time_s` shows the scene at time_s - delay: stamp it when it
-/// arrives and the delay is the whole chain's, or when it was exposed and the delay is zero.
+/// The measurement that one frame gives the controller. The image stamped `time_s` shows the scene at time_s - delay:
+/// stamp it on arrival if the delay is that of the whole chain, or at exposure if the delay is zero.
 struct ImageMeasurement {
   bool found = false;  ///< false: the marker was not seen; nothing else counts then
   double time_s = 0;

@@ -18,13 +18,13 @@ class MotionFollower {
     done,             ///< from here on the motion has ended
     blocked,          ///< the arm was not enabled for 3 s
     moved_meanwhile,  ///< while it was not, it went farther from the motion than max_lead
-    does_not_follow,  ///< its joints stayed farther than max_lead from the set-points, which have gone back to them
+    does_not_follow,  ///< its joints stayed farther than max_lead from the setpoints, which have returned to them
   };
 
   /// At rest where the motion begins. `max_lead`: of each joint, rad and m.
   MotionFollower(JointMotion motion, const JointLimits& limits, const Eigen::Vector4d& max_lead, double now_s);
 
-  /// To be asked every `period_s` or so. Where `path` is there it is to be sent.
+  /// Call it about every `period_s`. Send `path` where it is present.
   struct Step {
     Progress progress = Progress::moving;
     std::optional<JointPath> path{};

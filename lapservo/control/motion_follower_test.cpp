@@ -14,7 +14,7 @@ using Progress = MotionFollower::Progress;
 constexpr double tick_s = 0.002;
 const Eigen::Vector4d start(0, 1.5, 0.1, 0), max_lead(0.05, 0.05, 0.005, 0.2);
 
-// An arm that follows its set-points with a lag, and forgets its path when it is not enabled, as an interlock does.
+// An arm that follows its setpoints with a lag, and drops its path when it is not enabled, as an interlock does.
 struct SimulatedRun {
   double now_s = 0;
   Eigen::Vector4d q = start, set_point = start, velocity = Eigen::Vector4d::Zero();
@@ -35,7 +35,7 @@ struct SimulatedRun {
   }
 };
 
-// Until it ends; `state` says what the loop is told.
+// Runs to the end; the loop receives `state`.
 Progress follow(MotionFollower& follower, SimulatedRun& run, const std::function<void(SimulatedRun&)>& disturb,
                 const std::function<void(const SimulatedRun&, JointState&)>& state) {
   for (int i = 0; i < 100000; ++i) {

@@ -195,7 +195,7 @@ TEST(OffsetObserver, RejectsAnOutlierAndReacquires) {
   EXPECT_LT((world.observer.offset() - world.offset).norm(), 0.02);
 }
 
-// An image tells the rotation within one turn, the measured joints count turns.
+// An image gives the rotation within one turn, the measured joints count turns.
 TEST(OffsetObserver, TakesTheTurnOfTheMeasuredJoints) {
   const TestRig rig;
   const Scales scales;

@@ -46,8 +46,8 @@ Trajectory decay_to(const Trajectory& goal, const Eigen::Vector4d& from, const T
           }};
 }
 
-// What keeps the arm from following from here; with the paper's law on its own way too, where the truth is what the law
-// sees and what it moves.
+// The reason why the arm can't follow from here; also on the paper's law's own way, where the law sees and moves the
+// true instrument.
 std::optional<Infeasible> find_problem(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
                                        const ControllerConfig& config, const Eigen::Vector4d& q,
                                        const Eigen::Vector4d& q_true) {

@@ -41,7 +41,7 @@ inline FeatureModel model_of(const TestRig& rig) {
   return [rig](const Eigen::Vector4d& q) { return exact_map(rig, q); };
 }
 
-/// What is wrong between the controller and the instrument.
+/// The model errors between the controller and the instrument.
 struct Flaws {
   double latency_s = 0.08;
   bool delay_known = true;

@@ -10,7 +10,7 @@
 
 namespace lapservo {
 
-/// What the features ought to be and how they ought to move: s_rad, r_px, l_px, d_px and their derivatives by time.
+/// Desired features and their derivatives by time: s_rad, r_px, l_px, d_px.
 struct DesiredFeatures {
   Eigen::Vector4d features = Eigen::Vector4d::Zero();
   Eigen::Vector4d rate = Eigen::Vector4d::Zero();

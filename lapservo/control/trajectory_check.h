@@ -19,11 +19,10 @@ struct Infeasible {
   std::string text() const;  ///< "can't be followed at 1.20 s: ..."
 };
 
-/// Walks along the trajectory from 0 to `duration_s` in steps of `step_s`, finding the configuration at each by the
-/// inverse of the model from the one before, starting near `q_start`, and asks: are the features reachable there, is
-/// the Jacobian regular, are joints and their rates within limits, are the marker's ends within the window? nullopt
-/// when all is well. The model is the rig's: what offsets between measured joints and truth take away is not known
-/// beforehand.
+/// Walks along the trajectory from 0 to `duration_s` in steps of `step_s`, finds the configuration at each step by the
+/// inverse of the model from the previous one, starting near `q_start`, and checks: the features are reachable, the
+/// Jacobian is regular, joints and their rates are within limits, the marker's ends are within the window. nullopt when
+/// all hold. The model is the rig's: offsets between measured joints and truth are unknown beforehand.
 std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
                                           const ControllerConfig& config, const Eigen::Vector4d& q_start,
                                           double step_s = 0.02);

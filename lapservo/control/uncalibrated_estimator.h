@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-/// Without any model: a small probing motion tells the Jacobian and the delay, and JacobianEstimator keeps learning.
+/// Without a model: a small probing motion gives the Jacobian and the delay, and JacobianEstimator keeps learning.
 class UncalibratedEstimator : public Estimator {
  public:
   explicit UncalibratedEstimator(const ControllerConfig& config) : config_(config) {}

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "lapservo/control/following_error_limit.h"
 #include "lapservo/control/gap_crossing.h"
 #include "lapservo/control/motion_limits.h"
-#include "lapservo/control/setpoint_leash.h"
 #include "lapservo/control/tracking_law.h"
 
 namespace lapservo::internal {
@@ -37,7 +37,7 @@ VisualController::VisualController(const ControllerConfig& config, FeatureModel 
       exact_gains_(exact_gains(config)),
       estimator_(make_estimator(config, std::move(model))),
       arm_response_(config.scales),
-      leash_(config.limits),
+      following_error_limit_(config.limits),
       frozen_image_(config.scales),
       wild_joints_(config.limits.rate),
       path_(config.limits.acceleration) {}
@@ -45,7 +45,7 @@ VisualController::VisualController(const ControllerConfig& config, FeatureModel 
 void VisualController::reset(double time_s, const Eigen::Vector4d& q_joint) {
   path_.reset(time_s, q_joint);
   arm_response_.restart();
-  leash_.restart();
+  following_error_limit_.restart();
   now_s_ = time_s;
   usable_s_ = time_s;
   started_ = true;
@@ -56,7 +56,7 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
   const Eigen::Vector4d position = q_joint + drive.load;
   const Eigen::Vector4d lower = config_.limits.lower.cwiseMin(q_joint), upper = config_.limits.upper.cwiseMax(q_joint);
   path_.reset(time_s, position.cwiseMax(lower).cwiseMin(upper));
-  leash_ = SetpointLeash(config_.limits);
+  following_error_limit_ = FollowingErrorLimit(config_.limits);
   now_s_ = time_s;
   usable_s_ = time_s;
 }
@@ -86,7 +86,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
   if (step.reason == HoldReason::none) {
     limit(law, q_joint, step);
   } else if (measured_) {
-    step.velocity = leashed_hold(step.velocity);
+    step.velocity = limited_hold(step.velocity);
   }
   if (step.action == ControlAction::probe) estimator_->advance_probing(config_.period_s);
 
@@ -118,21 +118,21 @@ HoldReason VisualController::read(double time_s, const Eigen::Vector4d& q_joint,
     history_.clear();
     estimator_->interrupt();
     arm_response_.restart();
-    leash_.restart();
+    following_error_limit_.restart();
     frozen_image_ = FrozenImage(config_.scales);
-    image_reason_ = HoldReason::wild_joints;  // until an image tells where the instrument is
+    image_reason_ = HoldReason::wild_joints;  // until an image gives the instrument's place
   }
   if (!follows_) path_.move_to(time_s, q_joint);
   const MotionState setpoint = path_.at(time_s);
   if (follows_) arm_response_.add(setpoint, q_joint, time_s - now_s_);
-  leash_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), time_s - now_s_);
+  following_error_limit_.update(setpoint, q_joint, arm_response_.drive(), arm_response_.lag_s(), time_s - now_s_);
   remember(time_s, q_joint, readings);
   now_s_ = time_s;
   measured_ = true;
   if (!all_finite(desired)) return HoldReason::non_finite;
   const Eigen::Array4d behind = (setpoint.position - q_joint).array().abs();
   const bool far = (behind > config_.max_following_error.array()).any();
-  return far || leash_.taut() ? HoldReason::not_following : HoldReason::none;
+  return far || following_error_limit_.is_reached() ? HoldReason::not_following : HoldReason::none;
 }
 
 void VisualController::remember(double time_s, const Eigen::Vector4d& q_joint, std::span<const JointReading> readings) {
@@ -151,7 +151,7 @@ HoldReason VisualController::update(const ImageMeasurement& image) {
   const bool suspended = suspended_ != HoldReason::none;
   if (!image.found && !(suspended && image.marker)) return HoldReason::marker_lost;
   if (now_s_ - image.time_s > config_.max_image_age_s) return HoldReason::stale_image;
-  // The same stamp again, or an older one, tells nothing: the age of what was told before goes on growing.
+  // A repeated or older stamp carries no information: the age of the last measurement goes on growing.
   if (image_s_ && image.time_s <= *image_s_) return image_reason_;
   image_s_ = image.time_s;
   const FrozenImage::Verdict verdict = frozen_image_.add(image, history_);
@@ -216,7 +216,7 @@ VisualController::Law VisualController::tracking_law(const std::optional<Estimat
   return law;
 }
 
-/// What the law wants, as far as the limits allow it.
+/// The law's velocity, as far as the limits allow it.
 void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const {
   const MotionState motion = path_.at(now_s_);
   const Eigen::Vector4d slowed = slow_to_rate(law.velocity);
@@ -228,7 +228,7 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
     wanted = cross_gaps(config_.limits, motion, now.gap, arm_response_.drive(), q_joint, law.feed_forward, slowed,
                         config_.period_s);
   }
-  wanted = leash_.limit(motion.velocity, wanted, config_.period_s);
+  wanted = following_error_limit_.apply(motion.velocity, wanted, config_.period_s);
   const auto limited =
       limit_velocity(config_.limits, config_.window, motion, ends, wanted, law.weight, config_.period_s);
   if (!limited.velocity.allFinite()) {
@@ -240,10 +240,10 @@ void VisualController::limit(const Law& law, const Eigen::Vector4d& q_joint, Con
   step.action = law.action;
 }
 
-/// Braking, unless set-points have to come back to a joint that did not come along.
-Eigen::Vector4d VisualController::leashed_hold(const Eigen::Vector4d& braking) const {
+/// Brakes, except where setpoints have to come back to a joint that did not follow.
+Eigen::Vector4d VisualController::limited_hold(const Eigen::Vector4d& braking) const {
   const MotionState motion = path_.at(now_s_);
-  const Eigen::Vector4d wanted = leash_.limit(motion.velocity, braking, config_.period_s);
+  const Eigen::Vector4d wanted = following_error_limit_.apply(motion.velocity, braking, config_.period_s);
   if (wanted == braking) return braking;
   const Eigen::Matrix4d weight = config_.scales.joints.cwiseAbs2().cwiseInverse().asDiagonal();
   return limit_velocity(config_.limits, {}, motion, {}, wanted, weight, config_.period_s).velocity;

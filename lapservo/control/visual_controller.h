@@ -12,11 +12,11 @@
 #include "lapservo/control/controller_config.h"
 #include "lapservo/control/estimator.h"
 #include "lapservo/control/feature_model.h"
+#include "lapservo/control/following_error_limit.h"
 #include "lapservo/control/frozen_image.h"
 #include "lapservo/control/hold_reason.h"
 #include "lapservo/control/image_measurement.h"
 #include "lapservo/control/joint_history.h"
-#include "lapservo/control/setpoint_leash.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/wild_joints.h"
 #include "lapservo/robot/joint_path.h"
@@ -62,7 +62,7 @@ class VisualController {
   /// The setpoints from the latest step on.
   const JointPath& path() const { return path_; }
   const ControllerConfig& config() const { return config_; }
-  /// The delay as believed now, known or estimated.
+  /// The delay, known or estimated.
   double delay_s() const { return estimator_->delay_s(); }
   /// Whether it is more than a guess.
   bool delay_is_known() const { return estimator_->delay_is_known(); }
@@ -72,7 +72,7 @@ class VisualController {
     HoldReason reason = HoldReason::none;
     ControlAction action = ControlAction::track;
     Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
-    Eigen::Vector4d feed_forward = Eigen::Vector4d::Zero();  ///< what of it the desired motion alone asks for
+    Eigen::Vector4d feed_forward = Eigen::Vector4d::Zero();  ///< the part of it that the desired motion alone requires
     Eigen::Matrix4d weight = Eigen::Matrix4d::Identity();    ///< of deviations from it
   };
 
@@ -85,7 +85,7 @@ class VisualController {
   Law probing_law(const Eigen::Vector4d& velocity) const;
   Law tracking_law(const std::optional<Estimate>& estimate, const DesiredFeatures& desired) const;
   void limit(const Law& law, const Eigen::Vector4d& q_joint, ControlStep& step) const;
-  Eigen::Vector4d leashed_hold(const Eigen::Vector4d& braking) const;
+  Eigen::Vector4d limited_hold(const Eigen::Vector4d& braking) const;
   Eigen::Matrix4d deviation_weight(const Eigen::Matrix4d& jacobian) const;
   Eigen::Vector4d slow_to_rate(const Eigen::Vector4d& velocity) const;
 
@@ -94,14 +94,14 @@ class VisualController {
   std::unique_ptr<Estimator> estimator_;
   JointHistory history_;
   ArmResponse arm_response_;
-  SetpointLeash leash_;
+  FollowingErrorLimit following_error_limit_;
   FrozenImage frozen_image_;
   WildJoints wild_joints_;
   JointPath path_;
   HoldReason suspended_ = HoldReason::none;
   bool started_ = false;
   bool follows_ = true;
-  bool measured_ = false;      ///< the joints of this tick are believed
+  bool measured_ = false;      ///< the joints of this tick are plausible
   bool has_readings_ = false;  ///< between ticks
   double now_s_ = 0;
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image

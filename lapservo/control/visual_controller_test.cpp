@@ -34,7 +34,7 @@ Flaws usual_flaws() {
   return flaws;
 }
 
-/// Of a marker that is seen there.
+/// Features of a marker that is visible there.
 ImageMeasurement image_of(const FeatureState& state, double stamp_s) {
   ImageMeasurement image;
   image.found = true;
@@ -128,8 +128,9 @@ std::optional<double> decay_per_s(const std::vector<Moment>& moments, int featur
   return -(n * ty - t * y) / (n * tt - t * t);
 }
 
-/// Eq. (22): with the true model and no latency every feature's error decays with its own K, at a set-point and along
-/// the trajectory. The errors are measured while they are large beside what feed-forward of a period ago leaves.
+/// Eq. (22): with the true model and no latency every feature's error decays with its own K, at a setpoint and along
+/// the trajectory. The errors are measured while they are large beside the remainder of the feed-forward of a period
+/// ago.
 TEST(PaperLaw, EachFeaturesErrorDecaysWithItsOwnK) {
   Flaws flaws;
   flaws.latency_s = 0;
@@ -368,7 +369,7 @@ TEST(VisualController, RestsAtASetPointWithBacklashLearnt) {
   EXPECT_LT(travel, 10 * flaws.backlash[3]);
 }
 
-/// The widest gap ever believed in, in fractions of what is there: rho's and psi's.
+/// The widest estimate of a gap, in fractions of the true one: rho's and psi's.
 Eigen::Vector2d widest_gap(const std::vector<Moment>& moments, const Eigen::Vector2d& unit) {
   Eigen::Vector2d widest = Eigen::Vector2d::Zero();
   for (const Moment& m : moments) {
@@ -411,7 +412,7 @@ TEST(VisualController, ConvergesUncalibratedFromRandomStarts) {
   }
 }
 
-// With what the picture's age lets it move beyond the window, whose margin is there for that.
+// Includes the motion beyond the window that the image's age allows; the window's margin covers it.
 TEST(VisualController, ProbesInTheImageFromTheEdgeOfTheWindow) {
   constexpr double beside_px = 2;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
@@ -487,7 +488,7 @@ TEST(VisualController, KeepsReadingsThatComeATickLate) {
   }
 }
 
-// The arm stands, and so does a picture without noise, once the measured joints reach back to before it.
+// The arm stands, and so does an image without noise, once the measured joints reach back to before it.
 TEST(VisualController, JointsThatWereSetFreezeNoPicture) {
   const ControllerConfig config = testing::test_config({});
   const FeatureModel model = testing::model_of({});
@@ -626,7 +627,7 @@ TEST_P(Holding, AnImageOfAnOldStampIsNotFresh) {
   EXPECT_EQ(reason, HoldReason::stale_image);
 }
 
-// Somebody else leads it, faster and farther than its own set-points would: 0.4 rad to and fro.
+// Another command source moves it, faster and farther than its own setpoints would: 0.4 rad to and fro.
 TEST_P(Holding, NotForAnArmThatIsOnlyObserved) {
   const ControllerConfig config = config_for({});
   const auto led = [&](bool follows, std::set<HoldReason>& reasons) {

@@ -4,11 +4,12 @@
 
 namespace lapservo::internal {
 
-/// Tells measured joints that no arm can have come to since the last ones: a bit that fell over, an encoder that was
-/// set. What only flashes up is passed over; where the joints stay three times in a row, they are.
+/// Detects measured joints that no arm can have reached since the last ones: a flipped bit, or an encoder that was set.
+/// A single outlier is ignored; joints that stay three readings in a row are accepted.
 class WildJoints {
  public:
-  /// `rate`: the joints' largest wanted speeds; three times as fast is believed, where the speed does not jump.
+  /// `rate`: the joints' largest commanded speeds; up to three times as fast is plausible, where the speed does not
+  /// jump.
   explicit WildJoints(const Eigen::Vector4d& rate) : rate_(rate) {}
 
   enum class Verdict {
@@ -18,7 +19,7 @@ class WildJoints {
   };
   /// Times that increase, finite joints.
   Verdict validate(double time_s, const Eigen::Vector4d& q);
-  /// Whether the arm can have been there then, and where it is believed to be now.
+  /// Whether the arm can have been there then, and its accepted place now.
   bool reaches(double time_s, const Eigen::Vector4d& q) const { return reachable({time_s, q}, believed_); }
 
  private:
@@ -31,10 +32,10 @@ class WildJoints {
 
   Eigen::Vector4d rate_;
   Reading believed_, latest_;
-  Eigen::Vector4d velocity_ = Eigen::Vector4d::Zero();  // of what is believed
+  Eigen::Vector4d velocity_ = Eigen::Vector4d::Zero();  // of the accepted joints
   double interval_s_ = 0;                               // between the last two that were
   bool started_ = false;
-  int staying_ = 0;  // measured joints in a row that agree with each other and not with what is believed
+  int staying_ = 0;  // consecutive readings that agree with each other and not with the accepted joints
 };
 
 }  // namespace lapservo::internal

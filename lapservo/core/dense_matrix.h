@@ -12,7 +12,7 @@ Eigen::MatrixXd product(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 /// singular, directions of which it says nothing may get 0.
 Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right);
 
-/// Of a symmetric positive definite matrix; NaN where it is none.
+/// The inverse of a symmetric positive definite matrix; NaN for other matrices.
 Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& matrix);
 
 /// The upper triangular W with W^T W = covariance^-1, which makes errors of unit size of such errors.

@@ -7,7 +7,7 @@
 
 namespace lapservo {
 
-/// What is wrong with one field of something.
+/// A problem with one field of a configuration.
 struct FieldProblem {
   std::string field, value, expectation;
 

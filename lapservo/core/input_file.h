@@ -7,9 +7,9 @@
 
 namespace lapservo::internal {
 
-/// The whole content of a file that others wrote. A pipe or device is read to its end, as long as it gives something
-/// every five seconds. Throws InputError, naming what was `expected` ("a picture"), when it is a folder, can't be
-/// opened, holds more than `max_bytes` or gives nothing for five seconds.
+/// Reads the whole content of a file of another program. A pipe or device is read to its end, as long as it delivers
+/// something every five seconds. Throws InputError, naming the `expected` content ("an image"), for a folder, a file
+/// that can't be opened, more than `max_bytes`, or five seconds without data.
 std::string read_input(const std::filesystem::path& path, std::size_t max_bytes, std::string_view expected);
 
 }  // namespace lapservo::internal

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t limit = 1 << 20;
 
 std::string refusal(const fs::path& path) {
-  return testing::input_error([&] { read_input(path, limit, "a picture"); });
+  return testing::input_error([&] { read_input(path, limit, "an image"); });
 }
 
 TEST(ReadInput, GivesAllBytesUpToTheLimit) {
@@ -27,25 +27,25 @@ TEST(ReadInput, GivesAllBytesUpToTheLimit) {
   std::string bytes(limit, '\0');
   for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * 31);
   testing::write_file(folder / "a", bytes);
-  EXPECT_EQ(read_input(folder / "a", limit, "a picture"), bytes);
+  EXPECT_EQ(read_input(folder / "a", limit, "an image"), bytes);
   testing::write_file(folder / "b", bytes + "x");
-  EXPECT_EQ(refusal(folder / "b"), (folder / "b").string() + ": is larger than 1 MiB, expected a picture");
+  EXPECT_EQ(refusal(folder / "b"), (folder / "b").string() + ": is larger than 1 MiB, expected an image");
   testing::write_file(folder / "c", "");
-  EXPECT_EQ(read_input(folder / "c", limit, "a picture"), "");
+  EXPECT_EQ(read_input(folder / "c", limit, "an image"), "");
 }
 
 TEST(ReadInput, RefusesWhatHasNoEndAndWhatIsEnormous) {
   const testing::TemporaryFolder folder;
-  EXPECT_EQ(refusal("/dev/zero"), "/dev/zero: is larger than 1 MiB, expected a picture");
+  EXPECT_EQ(refusal("/dev/zero"), "/dev/zero: is larger than 1 MiB, expected an image");
   testing::write_file(folder / "sparse", "x");
   fs::resize_file(folder / "sparse", std::uintmax_t{8} << 30);
-  EXPECT_EQ(refusal(folder / "sparse"), (folder / "sparse").string() + ": is larger than 1 MiB, expected a picture");
+  EXPECT_EQ(refusal(folder / "sparse"), (folder / "sparse").string() + ": is larger than 1 MiB, expected an image");
 }
 
 TEST(ReadInput, RefusesWhatIsNoFile) {
   const testing::TemporaryFolder folder;
-  EXPECT_EQ(refusal(folder.path()), folder.path().string() + ": is a folder, expected a picture");
-  EXPECT_EQ(refusal(folder / "none"), (folder / "none").string() + ": can't be opened, expected a picture");
+  EXPECT_EQ(refusal(folder.path()), folder.path().string() + ": is a folder, expected an image");
+  EXPECT_EQ(refusal(folder / "none"), (folder / "none").string() + ": can't be opened, expected an image");
 }
 
 TEST(ReadInput, WaitsForAPipeButNotForEver) {
@@ -60,9 +60,9 @@ TEST(ReadInput, WaitsForAPipeButNotForEver) {
     }
     ::close(out);
   });
-  EXPECT_EQ(read_input(pipe, limit, "a picture"), "one two");
+  EXPECT_EQ(read_input(pipe, limit, "an image"), "one two");
   writer.join();
-  EXPECT_EQ(refusal(pipe), pipe.string() + ": gives nothing for 5 seconds, expected a picture");
+  EXPECT_EQ(refusal(pipe), pipe.string() + ": gives nothing for 5 seconds, expected an image");
 }
 
 }  // namespace

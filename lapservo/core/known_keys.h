@@ -12,13 +12,13 @@ inline constexpr auto sigmas_expected = "standard deviations: numbers from 0 up,
 /// The keys that a map may have.
 struct KnownKeys {
   std::vector<std::string_view> words;
-  /// Of these, `sigma_KEY` too: one standard deviation of each of KEY's numbers.
+  /// For these keys `sigma_KEY` is known, too: one standard deviation of each of KEY's numbers.
   std::vector<std::string_view> measured;
 };
 
-/// What is not read must not stand in a file as if it were. Throws InputError when the map has an unknown key (naming
-/// the nearest known one), a key twice, a key without a value, or a sigma that is none or stands alone. Where `map` is
-/// missing or no map, nothing is said: who reads its fields will.
+/// Refuses keys that no reader uses. Throws InputError when the map has an unknown key (naming the nearest known one),
+/// a repeated key, a key without a value, or a sigma that is invalid or stands alone. Accepts a `map` that is missing
+/// or no map: the reader of its fields reports that.
 void expect_keys(const YamlField& map, const KnownKeys& known);
 
 }  // namespace lapservo::internal

@@ -6,7 +6,7 @@
 
 namespace lapservo::internal {
 
-/// Of at least one word the one with the fewest insertions, deletions and changes of a letter between (Levenshtein).
+/// The word of a non-empty list with the fewest insertions, deletions and changes of a letter (Levenshtein distance).
 const std::string& nearest_word(std::string_view word, const std::vector<std::string>& words);
 
 }  // namespace lapservo::internal

@@ -11,12 +11,12 @@
 
 namespace lapservo::internal {
 
-/// Does tasks one after the other in a thread of its own, in the order they came, or without one, in the order in which
-/// their results are asked for. For one caller.
+/// Runs tasks one after the other in a thread of its own, in the order of their arrival, or without a thread, in the
+/// order in which results are requested. For one caller.
 class SerialWorker {
  public:
   enum class Thread { none, own };
-  /// Without a thread a task is done when its result is asked for.
+  /// Without a thread a task runs when its result is requested.
   explicit SerialWorker(Thread thread) {
     if (thread == Thread::own) thread_ = std::thread([this] { work(); });
   }

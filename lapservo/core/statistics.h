@@ -17,7 +17,7 @@ auto quantile(Values&& values, double fraction) {
   return *at;
 }
 
-/// Of at least one value; of an even number of them the upper one of both in the middle. Reorders the values.
+/// Median of at least one value; the upper one of the middle pair of an even number of values. Reorders the values.
 template <typename Values>
 auto median(Values&& values) {
   return quantile(values, 0.5);

@@ -14,7 +14,7 @@ struct Word {
   std::string_view text;
 };
 
-/// What to_string() writes and ..._from_string() reads, as one table. Of several words of a value the first is written.
+/// The words of to_string() and ..._from_string() in one table. If a value has several words, the first is written.
 template <typename Enum, std::size_t N>
 using Words = std::array<Word<Enum>, N>;
 

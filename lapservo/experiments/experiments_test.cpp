@@ -145,7 +145,7 @@ TEST(Rcm, IsBroughtIntoViewUnlessItIs) {
             moved.instruments[0].camera_from_rcm->translation);
 }
 
-// Of each point the largest distance, and only where all four measurements are there.
+// The largest distance of each point, only for points with all four measurements.
 TEST(Illumination, TakesTheLargestOfFour) {
   std::vector<IlluminationResult::Point> points;
   for (int position = 0; position < 2; ++position)
@@ -212,7 +212,7 @@ TEST(Illumination, EndToEnd) {
   EXPECT_EQ(text(measure_illumination(setup)), first);
 
   const ReportSection section = section_of(result, setup);
-  EXPECT_EQ(section.comparisons[0].centerline, "") << "was not asked for";
+  EXPECT_EQ(section.comparisons[0].centerline, "") << "was not requested";
   EXPECT_NE(section.comparisons[0].surface, "");
 
   setup.keep_going = [](int done, int) { return done < 3; };

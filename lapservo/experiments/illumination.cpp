@@ -27,7 +27,7 @@ std::size_t frame_of(int position, int light) {
   return static_cast<std::size_t>(light * IlluminationResult::positions + position);
 }
 
-// What was seen of one position: each point against its own centroid over the lights.
+// The measurements at one position: each point relative to its own centroid over the lights.
 void add_position(std::vector<IlluminationResult::Point>& points, const Sightings& sightings, std::size_t method,
                   int position, const CentreLine& truth, const Camera& camera) {
   for (int k = 0; k < 4; ++k) {
@@ -260,7 +260,7 @@ ReportSection section_of(const IlluminationResult& result, const ExperimentSetup
       {Picture{"One position under the four lights", result.example_bgr},
        percents() + " of the power, with what " + method_title(result.methods.back().method) + " saw."});
   section.notes = {
-      fmt::format("The lamps are turned down, the camera\u2019s exposure stays: the shading and the gloss of the film "
+      fmt::format("The lamps are turned down, the camera\u2019s exposure stays: diffuse and specular light of the film "
                   "fade, what saturated near the lamps does no more, and there is less light over the same read noise. "
                   "{:.0f} % of the full light comes from elsewhere and stays, so the shading changes its shape too.",
                   100 * Stage::ambient_fraction),

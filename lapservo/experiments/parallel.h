@@ -4,10 +4,10 @@
 
 namespace lapservo::internal {
 
-/// Thrown when the user asked to stop.
+/// Thrown when the user stops the run.
 struct Interrupted {};
 
-/// How far a job is; false asks it to stop.
+/// Receives the progress of a job; returns false to stop it.
 using KeepGoing = std::function<bool(int done, int total)>;
 
 /// Calls work(index) once for each index in [0, count), on all cores but at most eight. make_worker is called once on

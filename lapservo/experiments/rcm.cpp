@@ -20,7 +20,7 @@ namespace {
 
 constexpr int all_frames = RcmResult::sets * RcmResult::positions;
 constexpr double nominal_sigma_px = 0.1;  // only its being the same for all lines counts
-// What all lines share, as `lapservo estimate-rcm` has it: the sides of the shaft are lit unequally.
+// The common offset of all lines, as in `lapservo estimate-rcm`: the sides of the shaft are lit unequally.
 constexpr double common_px = 0.01;
 
 // Pairs of lines that cross at less make up the long tail of the intersections.
@@ -100,7 +100,7 @@ Figure cloud_of_estimates(const RcmResult::OfMethod& of_method) {
       fmt::format("One estimate from each of {} sets; both estimators, the same lines.", RcmResult::sets));
 }
 
-// What fraction of the intersections lies within a distance.
+// The fraction of the intersections within a distance.
 Plot fractions_within(const RcmResult& result) {
   Plot plot{"Distances of the intersections from the true RCM",
             {"distance", "px", {}, {}, true},
@@ -308,11 +308,11 @@ ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) 
       fmt::format(
           "Every centre line, extended, passes through the image of the remote centre of motion (RCM), here in view at "
           "({:.1f}, {:.1f}) px. {} positions give {} lines and {} intersections of two; the paper\u2019s figure is the "
-          "distance of each intersection from the RCM as seen in the picture. Here: {} sets of {} positions, pooled, "
+          "distance of each intersection from the RCM in the image. Here: {} sets of {} positions, pooled, "
           "against the exact RCM.",
           result.true_px.x(), result.true_px.y(), RcmResult::positions, RcmResult::positions, RcmResult::pairs,
           RcmResult::sets, RcmResult::positions),
-      "What the loop goes by is one estimate from all lines, whose error the paper does not give: its mean of the "
+      "The loop uses one estimate from all lines, whose error the paper does not give: its mean of the "
       "intersections (eq. 9), or the default\u2019s weighted total least squares, which leaves outliers out and states "
       "its covariance."};
   section.comparisons = comparisons_of(result);

@@ -38,7 +38,7 @@ struct RcmResult {
   struct Estimates {
     std::vector<Estimate> estimates;
     Spread distance;       ///< of the errors' lengths, pixels
-    double in_sigmas = 0;  ///< rms of the error in units of its own covariance, by coordinate: 1 when honest
+    double in_sigmas = 0;  ///< rms of the error in units of its own covariance, by coordinate: ideally 1
   };
   struct OfMethod {
     Method method;
@@ -53,8 +53,8 @@ struct RcmResult {
   std::vector<OfMethod> methods;
 };
 
-/// The rig itself when its RCM lies in the picture; else the same with the RCM moved to 100 mm before the camera, near
-/// the upper left corner, not turned.
+/// The rig itself when its RCM lies in the image; otherwise the same rig with the RCM moved to 100 mm before the
+/// camera, near the upper left corner, without rotation.
 Rig with_rcm_in_view(Rig rig);
 
 /// On with_rcm_in_view(setup.rig). The trackers do not know camera_from_rcm here.

@@ -176,7 +176,7 @@ std::vector<Comparison> comparisons_of(const RotationResult& result) {
           row("largest error", "", [](const auto& m) { return mrad(m.all.largest) + " mrad"; }),
           row("errors under 0.1 rad", "half", [](const auto& m) { return percent(m.under_100mrad); }),
           row("errors under 0.2 rad", "most", [](const auto& m) { return percent(m.under_200mrad); }),
-          row("rms of error / stated sigma (1 is honest)", "",
+          row("normalised error (rms of error / sigma, ideally 1)", "",
               [](const auto& m) { return fmt::format("{:.2f}", m.in_sigmas.rms); }),
           row("frames in which it was found", "",
               [](const auto& m) { return fmt::format("{} of {}", m.samples.size(), frames); })};

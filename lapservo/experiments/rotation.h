@@ -51,7 +51,7 @@ ReportSection section_of(const RotationResult& result, const ExperimentSetup& se
 /// The initial rotation of a trial.
 double initial_rotation_rad(int trial);
 
-/// Of errors of which each part's mean and deviation are known, the parts being equally long.
+/// Mean and deviation of the union of equally long parts, given each part's mean and deviation.
 struct Pooled {
   double mean, deviation, rms;
 };

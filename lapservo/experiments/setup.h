@@ -11,7 +11,7 @@
 
 namespace lapservo::internal {
 
-/// What every experiment is given.
+/// Input of every experiment.
 struct ExperimentSetup {
   Rig rig;  ///< one instrument, with camera_from_rcm: see single_instrument()
   std::uint64_t seed = 1;

@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-/// One standard deviation of the rotation about the shaft, over the picture at one depth.
+/// One standard deviation of the roll about the shaft, over the image at one depth.
 struct SigmaMap {
   static constexpr int columns = 7, rows = 5;
   double depth_m = 0;  ///< of the marker's middle
@@ -20,7 +20,7 @@ struct SigmaMap {
   std::array<bool, cells> lost{};
 };
 
-/// What a rig is to be judged by at a place: its marker there, and what the camera really said of it.
+/// A rig with its marker at a place, and the camera's estimate of it.
 struct MeasuredSigma {
   Rigid3 camera_from_unrolled;
   double psi_rad = 0, sigma_rad = 0;

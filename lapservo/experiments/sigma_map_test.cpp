@@ -30,7 +30,7 @@ TEST(SigmaMaps, GrowWithDepthAndWithWhatTheCameraAdds) {
   EXPECT_GT(near_rad, 1e-4);
   EXPECT_GT(far_rad, 1.3 * near_rad);
   EXPECT_LT(far_rad, 20e-3);
-  // Out of the picture's corners the marker would hang.
+  // The marker would extend beyond the image's corners.
   EXPECT_FALSE(maps[0].sigma_rad.front() && maps[0].sigma_rad.back());
   measured.sigma_rad *= 3;
   EXPECT_NEAR(mean_of(sigma_maps(rig, 0, {0.08}, {measured})[0]), 3 * near_rad, 1e-6);

@@ -17,13 +17,13 @@ namespace lapservo::internal {
 /// The camera's exposure stays as it is; the lamps beside it can be turned down.
 class Stage {
  public:
-  /// Of the light at full power, what comes from elsewhere (the room, through the port) and does not change.
+  /// The part of the light at full power that comes from elsewhere (the room, through the port) and does not change.
   static constexpr double ambient_fraction = 0.04;
 
   /// `tissue`: make_tissue() of the camera's size, shared by the stages of an experiment.
   Stage(const Rig& rig, cv::Mat tissue);
 
-  /// `lamp_power`: 1 is full. The same arguments give the same picture.
+  /// `lamp_power`: 1 is full. The same arguments give the same image.
   cv::Mat render(const JointVector& q, double lamp_power, std::uint64_t seed);
 
  private:

@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-/// Of a list of numbers: all zero when it is empty.
+/// Statistics of a list of numbers: all zero when it is empty.
 struct Spread {
   std::size_t count = 0;
   double mean = 0;
@@ -20,10 +20,10 @@ struct Spread {
 };
 Spread spread_of(std::vector<double> values);
 
-/// Of the magnitudes, the fraction that is smaller than a bound; 0 when there are none.
+/// The fraction of the magnitudes that is smaller than a bound; 0 for an empty list.
 double fraction_within(const std::vector<double>& values, double bound);
 
-/// A number with as many digits as asked for, or more where it takes more to say whole numbers; no exponent.
+/// A number with the given count of digits, or more where a whole number has more; no exponent.
 std::string with_digits(double value, int digits);
 
 /// Distance of each point to the centroid of all.

@@ -47,7 +47,7 @@ std::vector<TrackingScenario> scenarios() {
   return all;
 }
 
-// What the uncalibrated loop knows of the RCM: its image, from where the centre lines of 20 frames meet.
+// The uncalibrated loop's estimate of the RCM: its image, the intersection of the centre lines of 20 frames.
 Eigen::Vector2d estimate_rcm_px(const ExperimentSetup& setup) {
   constexpr int positions = 20;
   constexpr double nominal_sigma_px = 0.1;
@@ -125,8 +125,8 @@ Eigen::Vector4d error_at(const TimeTable& table, std::size_t i) {
   return error;
 }
 
-// Slope of the logarithm of a feature's error, from the last limited motion of the start until feed-forward of a late
-// image is no longer small beside it.
+// Slope of the logarithm of a feature's error, from the last limited motion at the start until the feed-forward of a
+// late image is no longer small beside it.
 std::optional<double> decay_per_s(const TrackingRun& run, int feature) {
   const Eigen::Vector4d least(0.01, 10, 8, 8);
   constexpr double start_s = 5;  // motions are limited in it, if ever

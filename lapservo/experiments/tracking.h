@@ -29,11 +29,11 @@ struct TrackingRun {
   TrackingScenario scenario;
   TimeTable table;                    ///< what tracking_ID.csv holds
   std::optional<double> converged_s;  ///< true errors get within 1 px and 5 mrad and stay there for a second
-  /// Of the true errors s_rad, r, l, d px over the last third, or from the hidden marker's return on.
+  /// True errors s_rad, r, l, d px over the last third, or from the hidden marker's return on.
   Eigen::Vector4d steady_rms = Eigen::Vector4d::Zero(), steady_mean = Eigen::Vector4d::Zero(),
                   steady_largest = Eigen::Vector4d::Zero();
   Eigen::Vector4d decay_per_s = Eigen::Vector4d::Zero();  ///< of each feature's error at the start; NaN: not measured
-  double delay_s = 0;                                     ///< as believed at the end
+  double delay_s = 0;                                     ///< the estimate at the end
   double rate_fraction = 0;                               ///< largest setpoint rate as a fraction of its limit
   std::optional<double> held_s, resumed_s;                ///< after the marker was hidden, after it was back
   std::optional<double> back_s;                           ///< from the marker's return to within 1 px and 5 mrad
@@ -49,7 +49,7 @@ struct TrackingResult {
 };
 
 inline constexpr double tracking_period_s = 1.0 / 60;
-/// What steers a run.
+/// The controller of a run.
 ControllerConfig tracking_controller(const TrackingScenario& scenario, const Camera& camera);
 
 /// Stopped, it has the runs that were finished. Throws Interrupted when there is none.

@@ -1,4 +1,4 @@
-// What the report says of section V-D. Its numbers come from the configuration and the runs.
+// The report's text of section V-D. Its numbers come from the configuration and the runs.
 
 #include <algorithm>
 #include <array>
@@ -28,7 +28,7 @@ const TrackingRun* run_of(const TrackingResult& result, const std::string& id) {
   return run == result.runs.end() ? nullptr : &*run;
 }
 
-// What a finished run has to say.
+// The results of a finished run.
 template <class Say>
 std::string text_of(const TrackingResult& result, const std::string& id, Say say) {
   const TrackingRun* run = run_of(result, id);
@@ -83,7 +83,7 @@ Plot feature_plot(const TrackingRun& run, const FeatureName& feature) {
                     over_time(run.table, "true_" + column, "reached", 0)});
 }
 
-// Of r, l and d, on the scale of what they are from a time on.
+// Plot of r, l and d, scaled to their range from a time on.
 Plot error_plot(const TrackingRun& run, double from_s) {
   double max_px = 0;
   for (const char* column : {"error_r_px", "error_l_px", "error_d_px"})
@@ -99,7 +99,7 @@ Plot error_plot(const TrackingRun& run, double from_s) {
 
 Table run_table(const TrackingResult& result) {
   Table table{"All runs; rms, mean and largest error over the last third, with the hidden marker from its return on",
-              {"run", "latency [ms]", "believed [ms]", "converged", "rms s [mrad]", "rms r, l, d [px]",
+              {"run", "latency [ms]", "estimated [ms]", "converged", "rms s [mrad]", "rms r, l, d [px]",
                "mean r, l, d [px]", "largest r, l, d [px]", "largest rate / limit"},
               {}};
   const auto three = [](const Eigen::Vector4d& v, bool sign) {

@@ -43,7 +43,7 @@ struct Camera {
 
   bool operator==(const Camera&) const = default;
   bool distorted() const {
-    int some = 0;  // asked for every sample: no branches
+    int some = 0;  // evaluated for every sample: no branches
     for (const double k : distortion) some |= static_cast<int>(k != 0);
     return some != 0;
   }

@@ -15,7 +15,7 @@ struct Features {
   double cross_ratio = 0;      ///< of |e1 - e0|, |e2 - e1|, |e3 - e2|
 };
 
-/// Of four points as one vector, e0 u, v to e3 u, v [px^2].
+/// Covariance of four points as one vector, e0 u, v to e3 u, v [px^2].
 using EdgesCovariance = Eigen::Matrix<double, 8, 8>;
 
 }  // namespace lapservo

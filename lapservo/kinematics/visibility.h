@@ -19,7 +19,7 @@ struct ViewLimits {
 bool marker_in_view(const Camera& camera, const Marker& marker, const Rigid3& camera_from_unrolled,
                     const ViewLimits& limits);
 
-/// Where configurations are drawn from: the depth of the marker's proximal end, and what marker_in_view asks.
+/// Region of the configurations to draw: the depth of the marker's proximal end, and the conditions of marker_in_view.
 struct ViewRange {
   double nearest_m, farthest_m;
   ViewLimits limits;

@@ -16,7 +16,7 @@
 
 namespace lapservo::internal {
 
-/// What others want of the loop.
+/// Commands of other programs to the loop.
 struct LoopWishes {
   std::optional<bool> hold;                  ///< true: stop; false: start
   std::optional<Eigen::Vector4d> set_point;  ///< s_rad, r_px, l_px, d_px
@@ -39,7 +39,7 @@ class LoopTopics {
 
   /// `state`: the loop's, in words; empty where it tracks.
   void publish(const ControlTick& tick, const std::string& state);
-  /// What came since the last call. Messages that don't make sense are dropped and counted.
+  /// Messages since the last call. Invalid messages are dropped and counted.
   LoopWishes wishes();
   long malformed() const;
 

@@ -45,7 +45,7 @@ TEST(LoopTopics, TellsWhatWasSeenAndDecided) {
   const auto observations = transport.observations("/lapservo/PSM1/observation");
   ASSERT_EQ(observations.size(), 1u);
   const ObservationMessage& seen = observations.front();
-  EXPECT_NEAR(seen.stamp_s, transport.stamp_s - 0.02, 1e-9);  // when the image was, not when it was told
+  EXPECT_NEAR(seen.stamp_s, transport.stamp_s - 0.02, 1e-9);  // the stamp of the image, not of the message
   EXPECT_EQ(seen.status, "ok");
   EXPECT_EQ(seen.action, "track");
   EXPECT_EQ(seen.frame, "endoscope");

@@ -15,7 +15,7 @@ constexpr double points_per_mm = 72 / 25.4, png_px_per_mm = 8;
 
 cairo_status_t write_to_stream(void* stream, const unsigned char* bytes, unsigned int count) {
   static_cast<std::ostream*>(stream)->write(reinterpret_cast<const char*>(bytes), count);
-  return CAIRO_STATUS_SUCCESS;  // the stream knows better, and is asked in the end
+  return CAIRO_STATUS_SUCCESS;  // the stream reports errors at the end
 }
 
 }  // namespace

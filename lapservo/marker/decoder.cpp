@@ -12,8 +12,8 @@
 namespace lapservo::internal {
 namespace {
 
-// With t the fraction of the print: l_i = upper_i + t slope_i, L = total + t total_slope, and r - 1 = l1 l3 / (l2 L).
-// What moves all boundaries alike, as a wrap that is not square does, leaves it as it is.
+// With t the fraction of the print: l_i = upper_i + t slope_i, L = total + t total_slope, and r - 1 = l1 l3 / (l2 L). A
+// shift of all boundaries alike, as by an oblique wrap, leaves it unchanged.
 struct Lengths {
   std::array<double, 3> upper, slope;
   double total, total_slope;

@@ -118,7 +118,7 @@ TEST(CrossRatioDecoder, InvertsAskewPrints) {
   EXPECT_GT(decodable, 300);
 }
 
-// What moves every boundary alike is nothing to the cross-ratio.
+// The cross-ratio does not depend on a common shift of all boundaries.
 TEST(CrossRatioDecoder, DoesNotSeeTheWrap) {
   Marker marker = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
   const CrossRatioDecoder square(marker);

@@ -25,7 +25,7 @@ enum class Paper { a4, letter };
 void write_print_sheet(const std::filesystem::path& path, const std::string& instrument, const Marker& marker,
                        Paper paper, int copies);
 
-/// A picture of the marker unrolled, with its axes and the cross-ratio and predicted sigma over tau. SVG, PDF or PNG.
+/// A drawing of the marker unrolled, with its axes and the cross-ratio and predicted sigma over tau. SVG, PDF or PNG.
 void write_marker_picture(const std::filesystem::path& path, const std::string& instrument, const Marker& marker,
                           const Viewing& viewing);
 

@@ -41,7 +41,7 @@ using testing::marker_with;
 using testing::TemporaryFolder;
 
 const Marker example = marker_with({0.0035, 0.0035, 0.017}, {0.0095, 0.0095, 0.005});
-// Of cairo's fixed-point coordinates.
+// A unit of cairo's fixed-point coordinates.
 constexpr double rounding_mm = 0.01;
 
 // A filled polygon on a page, millimetres from its top left corner, y down.
@@ -278,7 +278,7 @@ std::vector<Vector2d> letters(const std::string& svg) {
   return found;
 }
 
-// Each copy tells, once it is cut out, whose it is and which way it goes on; the bands stay clean.
+// Each copy, once cut out, has its name and its direction; the bands stay clean.
 TEST(PrintSheet, EveryCopysTabHasTheNameAndAnArrowToTheTip) {
   const TemporaryFolder folder;
   for (const std::string name : {"PSM1", "needle driver with a long name"}) {

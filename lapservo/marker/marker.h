@@ -51,7 +51,7 @@ std::array<double, 4> boundary_slopes_m(const Marker& marker);
 /// in every perspective image of them.
 double cross_ratio(double l1, double l2, double l3);
 
-/// Cross-ratio of the marker's boundaries at an azimuth, from which eq. (18) tells it.
+/// Cross-ratio of the marker's boundaries at an azimuth, which eq. (18) inverts.
 double cross_ratio_at(const Marker& marker, double tau_rad);
 
 /// Whether boundary 0..3 comes back at another place: at the seam it jumps.
@@ -67,7 +67,7 @@ bool is_printed(const Marker& marker, double tau_rad);
 /// ask whether the cross-ratio can be decoded: see CrossRatioDecoder.
 std::optional<FieldProblem> marker_problem(const Marker& marker);
 
-/// Two markers whose bands have the same hues in the same places can't be told apart by colour.
+/// Two markers whose bands have the same hues in the same places can't be distinguished by colour.
 bool same_colour_order(const Marker& a, const Marker& b);
 
 /// Nor can two whose orders are reversals of one another: each looks like the other turned end for end.

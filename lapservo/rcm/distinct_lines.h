@@ -8,9 +8,9 @@
 
 namespace lapservo {
 
-/// One line a position: those whose ends lie within `apart_px` of another's become their mean, with the covariance of
-/// one of them, as frames of a shaft at rest share their errors. Of more than `most` positions nearer and nearer ones
-/// are put together until no more are left. Unusable lines are left out. Takes linear time.
+/// One line per position: lines whose ends lie within `apart_px` of another's become their mean, with the covariance of
+/// one of them, as frames of a shaft at rest share their errors. More than `most` positions are merged, nearest first,
+/// until `most` are left. Unusable lines are left out. Takes linear time.
 std::vector<LineObservation> distinct_lines(std::span<const LineObservation> lines, double apart_px = 2,
                                             std::size_t most = 1000);
 

@@ -154,7 +154,7 @@ RobustFit fit_robustly(const Lines& lines, const Start& start, NoiseScale scale)
   return robust;
 }
 
-// Of the estimate, from an error of one pixel that the lines share at their first ends, and one at their second.
+// Error of the estimate for an error of one pixel that the lines share at their first ends, and one at their second.
 Eigen::Matrix2d common_covariance(const Lines& lines, const Eigen::Vector2d& o, const Eigen::Matrix2d& covariance) {
   Eigen::Matrix2d pull = Eigen::Matrix2d::Zero();
   for (const LineObservation& line : lines) {

@@ -12,9 +12,9 @@
 
 namespace lapservo {
 
-/// Whether the lines' covariances are to be believed, or only their proportions.
+/// Whether the lines' covariances are absolute, or only their proportions are valid.
 enum class NoiseScale {
-  known,      ///< chi2 then tells whether they are right
+  known,      ///< chi2 then tests them
   estimated,  ///< one factor for all is estimated from how badly the lines meet
 };
 

@@ -65,7 +65,7 @@ TEST(ProjectedRcm, IsExactWithoutNoise) {
   }
 }
 
-// The picture turned, scaled and moved: the estimate and its covariance follow.
+// The image rotated, scaled and moved: the estimate and its covariance follow.
 TEST(ProjectedRcm, FollowsASimilarity) {
   constexpr std::uint64_t seed = 72;
   Random random(seed);

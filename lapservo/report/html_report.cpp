@@ -87,7 +87,7 @@ std::string base64(std::span<const std::uint8_t> bytes) {
 std::string html_from(const Picture& picture) {
   constexpr int quality = 88;
   const auto bytes = encode_jpeg(picture.bgr, quality);
-  if (bytes.empty()) throw std::runtime_error("a picture of the report could not be encoded");
+  if (bytes.empty()) throw std::runtime_error("an image of the report could not be encoded");
   return fmt::format("<img alt=\"{}\" width=\"{}\" height=\"{}\" src=\"data:image/jpeg;base64,{}\"/>",
                      escaped(picture.title), picture.bgr.cols, picture.bgr.rows, base64(bytes));
 }

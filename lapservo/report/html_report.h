@@ -58,8 +58,8 @@ struct Report {
 /// The comparisons that have a figure of the paper's.
 std::vector<Comparison> with_paper(const ReportSection& section);
 
-/// One HTML file that needs nothing else: no network, figures as SVG, pictures within. Well-formed as XML too. The same
-/// report gives the same bytes.
+/// One HTML file without external resources: no network, figures as SVG, images embedded. Well-formed as XML too. The
+/// same report gives the same bytes.
 std::string html_from(const Report& report);
 
 /// Appears whole or not at all. Throws InputError when it can't be written.

@@ -23,8 +23,8 @@ Report sample_report(const std::string& word = "word") {
   Plot plot{word, {"time", "s", {}, {}}, {word, "px", {}, {}}, {}, {}, false};
   plot.series.push_back({word, {0, 1, 2}, {1, 3, 2}, Draw::line_and_points, 0});
   section.figures.push_back({plot, word});
-  cv::Mat picture(40, 60, CV_8UC3, cv::Scalar(200, 40, 20));
-  section.figures.push_back({Picture{word, picture}, word});
+  cv::Mat image(40, 60, CV_8UC3, cv::Scalar(200, 40, 20));
+  section.figures.push_back({Picture{word, image}, word});
   section.tables = {{word, {word, "b"}, {{"1", word}, {"2", "3"}}}};
   section.notes = {word};
   section.command = "lapservo experiment " + word;
@@ -77,7 +77,7 @@ TEST(HtmlReport, SaysEverythingOnceAndThePapersFiguresInTheSummaryToo) {
   EXPECT_EQ(html, html_from(report)) << "the same report, the same bytes";
 }
 
-// The picture comes back out of the page.
+// The image decodes from the page.
 TEST(HtmlReport, EmbedsPictures) {
   const std::string html = html_from(sample_report()), start = "data:image/jpeg;base64,";
   const std::size_t begin = html.find(start) + start.size(), end = html.find('"', begin);
@@ -93,10 +93,10 @@ TEST(HtmlReport, EmbedsPictures) {
     bits = bits << 6 | static_cast<std::uint32_t>(digits.find(c));
     if ((held += 6) >= 8) bytes.push_back(static_cast<std::uint8_t>(bits >> (held -= 8)));
   }
-  const cv::Mat picture = decode_image(bytes, "the report's picture");
-  ASSERT_EQ(picture.size(), cv::Size(60, 40));
-  EXPECT_NEAR(picture.at<cv::Vec3b>(20, 30)[0], 200, 6);
-  EXPECT_NEAR(picture.at<cv::Vec3b>(20, 30)[2], 20, 6);
+  const cv::Mat image = decode_image(bytes, "the report's image");
+  ASSERT_EQ(image.size(), cv::Size(60, 40));
+  EXPECT_NEAR(image.at<cv::Vec3b>(20, 30)[0], 200, 6);
+  EXPECT_NEAR(image.at<cv::Vec3b>(20, 30)[2], 20, 6);
 }
 
 TEST(HtmlReport, AppearsWholeOrNotAtAll) {

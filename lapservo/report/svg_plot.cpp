@@ -162,7 +162,7 @@ std::string points_of(const Plot& plot, const Layout& layout, const Series& seri
   return text;
 }
 
-// What a box shows of its values.
+// The statistics that a box shows.
 struct Box {
   double low_whisker, low, median, high, high_whisker;
 };
@@ -203,7 +203,7 @@ std::string boxes_of(const Plot& plot, const Layout& layout, const Series& serie
   return text + points_of(plot, layout, beyond);
 }
 
-// A line's points have no marks, but tell their numbers all the same.
+// A line's points have no marks, but show their numbers all the same.
 std::string hover_points_of(const Plot& plot, const Layout& layout, const Series& series) {
   std::string text;
   const std::size_t step = std::max<std::size_t>(1, (series.x.size() + max_hover_points - 1) / max_hover_points);

@@ -42,8 +42,8 @@ struct Plot {
 /// Over time: the x axis is "time [s]".
 Plot time_plot(std::string title, std::string label, std::string unit, std::vector<Series> series);
 
-/// The plot as an <svg> element for an HTML page that has plot_css(). Made to be read at 340 px of width; every point
-/// tells its numbers when pointed at. Lines of many points are thinned to what can be seen.
+/// The plot as an <svg> element for an HTML page that has plot_css(). Readable at 340 px of width; every point shows
+/// its numbers under the pointer. Lines of many points are thinned to the visible resolution.
 std::string svg_from(const Plot& plot);
 
 /// How many points the axes of svg_from() leave out, because a limit is nearer than the data.
@@ -53,8 +53,8 @@ std::size_t points_outside(const Plot& plot);
 /// distance from (0, 0) that nine tenths of all points keep, if any lies beyond that.
 void limit_to_most(Plot& plot, double room = 1.5);
 
-/// The style rules that the elements of svg_from() need, and the palette for light and dark (Okabe and Ito's, told
-/// apart by the colour-blind).
+/// The style rules that the elements of svg_from() need, and the palette for light and dark (Okabe and Ito's, which the
+/// colour-blind can distinguish).
 std::string plot_css();
 
 /// Round numbers (1, 2 or 5 times a power of ten apart) in [low, high], at most `most` (5 or more) and at least two.
@@ -64,7 +64,7 @@ std::vector<double> nice_ticks(double low, double high, int most);
 /// The same for a logarithmic axis, low > 0: powers of ten, with 2 and 5 times them where few powers fit.
 std::vector<double> nice_logarithmic_ticks(double low, double high);
 
-/// Labels of ticks, as short as tells them apart.
+/// Labels of ticks, as short as they stay distinct.
 std::vector<std::string> tick_labels(const std::vector<double>& ticks);
 
 /// A line with at most four points for each of `columns` parts of its x range (first, lowest, highest, last): looks the

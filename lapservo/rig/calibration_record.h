@@ -20,7 +20,7 @@ struct CalibrationStep {
   std::string when;     ///< UTC, ISO 8601
 };
 
-/// What was done to a rig, in that order, and the rig's content as the last of it left it: RIG.calibration.yaml beside
+/// The calibrations of a rig in their order, and the rig's content after the last of them: RIG.calibration.yaml beside
 /// the rig.
 struct CalibrationRecord {
   std::string rig;  ///< content_state() of the rig file; empty when nothing was done
@@ -41,7 +41,7 @@ CalibrationRecord read_record(const std::filesystem::path& path);
 /// Appears whole or not at all. Throws InputError when it can't be written.
 void write_record(const std::filesystem::path& path, const CalibrationRecord& record);
 
-/// Tells whether a file is the same as then: from its bytes (FNV-1a). Empty when it can't be read.
+/// A fingerprint of a file's bytes (FNV-1a), to find out whether it has changed. Empty when it can't be read.
 std::string content_state(const std::filesystem::path& path);
 
 /// The same for recordings, which are large, by size and time of change: of a file, or of a folder's files together.

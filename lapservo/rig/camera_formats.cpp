@@ -25,7 +25,7 @@ struct CameraTexts {
   std::vector<std::string> matrix, distortion;
 };
 
-// Of a file: its fields, and the names of those that are missing.
+// The fields of a file, and the names of missing ones.
 class Fields {
  public:
   Fields(YamlField map, std::string source, std::string format)
@@ -42,7 +42,7 @@ class Fields {
     if (!field) missing_.emplace_back(*keys.begin());
     return field ? field->text("a number") : "";
   }
-  // Of a list, or of an OpenCV matrix's data.
+  // Numbers of a list, or of an OpenCV matrix's data.
   std::vector<std::string> texts(std::initializer_list<const char*> keys) {
     auto field = find(keys);
     if (field && field->is_map()) field = (*field)["data"];

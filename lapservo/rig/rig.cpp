@@ -94,8 +94,8 @@ void check_distortion_model(const YamlField& field) {
   }
 }
 
-// What belongs to rectified images is not used, but must be what it says; parts and bins of the sensor would be other
-// pixels than those of camera_matrix.
+// Keys of rectified images are not used, but must be valid; regions and bins of the sensor would have other pixels than
+// those of camera_matrix.
 void check_unused(const YamlField& field) {
   if (const YamlField rectification = field["rectification_matrix"]; rectification.present()) {
     const auto r = parse_matrix<9>(rectification, 3, 3, "nine numbers of a rotation");
@@ -226,7 +226,7 @@ Rigid3 parse_transform(const YamlField& field) {
   const Eigen::Quaterniond rotation(q[3], q[0], q[1], q[2]);
   if (!(std::abs(rotation.norm() - 1) < rotation_tolerance))
     quaternion.fail("of norm " + std::to_string(rotation.norm()), "x y z w of a unit quaternion, to four digits");
-  // What is normalised already keeps its bits, however often a rig is written and read.
+  // A normalised quaternion keeps its bits, however often a rig is written and read.
   const bool unit = std::abs(rotation.squaredNorm() - 1) < 1e-14;
   return {unit ? rotation : rotation.normalized(), {t[0], t[1], t[2]}};
 }

@@ -35,7 +35,7 @@ struct Instrument {
   bool operator==(const Instrument&) const = default;
 };
 
-/// What stands before the camera and which camera it is (docs/rig.md).
+/// The scene before the camera, and the camera (docs/rig.md).
 struct Rig {
   Camera camera;
   std::vector<Instrument> instruments;

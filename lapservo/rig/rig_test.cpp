@@ -143,7 +143,7 @@ TEST(Rig, ReadsJointsAndTheImagesDelay) {
   EXPECT_FALSE(parse_rig(good, "rig.yaml").instruments.front().joints);
 }
 
-// What ROS's camera_calibration and calibrate write beside what we need.
+// Keys that ROS's camera_calibration and calibrate write beside those that a rig needs.
 TEST(Rig, TakesTheOtherKeysOfACameraInfoAndSigmas) {
   EXPECT_EQ(error_of(with("  response", R"(  camera_name: endoscope
   header: {frame_id: endoscope}
@@ -275,7 +275,7 @@ const Complaints impossible_cameras{
     {with("gamma:2.2", "gamma:0"), "camera.response: is gamma:0, " + response},
 };
 
-// Of what makes no marker, MarkerProblem tests the rest.
+// Some rigs with an invalid marker; MarkerProblem tests the rest.
 const Complaints impossible_instruments{
     {with("0.0084", "8.4"), marker + "diameter_m: is 8.4, " + diameter},
     {with("0.0001", "-0.0001"), marker + "tolerance_m: is -0.0001, expected 0 to 0.005 (metres)"},
@@ -296,7 +296,7 @@ const Complaints impossible_instruments{
      "instruments[0].name: is PSM 1, expected a name without commas and control characters"},
 };
 
-// What would be ignored or taken for something else; more of it in the tests of KnownKeys.
+// Keys that would be ignored or misread; more of them in the tests of KnownKeys.
 const Complaints misunderstandings{
     {with("seam_rad", "seem_rad"), unknown(marker + "seem_rad", "seam_rad")},
     {with("response", "respons"), unknown("camera.respons", "response")},

@@ -37,7 +37,7 @@ std::string matrix_text(int rows, const Numbers& numbers) {
                      text_of(numbers));
 }
 
-// Of Camera and of CameraSigmas.
+// The fields of Camera and of CameraSigmas.
 template <typename Pinhole>
 std::string pinhole_text(const Pinhole& k, double last) {
   return matrix_text(3, std::array{k.fx_px, 0.0, k.cx_px, 0.0, k.fy_px, k.cy_px, 0.0, 0.0, last});

@@ -6,7 +6,7 @@
 
 namespace lapservo {
 
-/// What a real arm does to its setpoints. Joints: theta_rad, phi_rad, rho_m, psi_rad.
+/// The response of a real arm to its setpoints. Joints: theta_rad, phi_rad, rho_m, psi_rad.
 struct ArmConfig {
   Eigen::Vector4d lower{-1.2, 0.5, 0.02, -4.6};  ///< of the measured joints
   Eigen::Vector4d upper{1.2, 2.6, 0.22, 4.6};

@@ -12,9 +12,9 @@
 
 namespace lapservo::internal {
 
-// For tests: looks at pictures without any of the vision code.
+// For tests: measures images without any of the vision code.
 
-/// Linear light of an 8-bit picture, CV_32FC3.
+/// Linear light of an 8-bit image, CV_32FC3.
 inline cv::Mat light_of(const cv::Mat& bgr, const Response& response) {
   const auto table = response.table();
   cv::Mat light(bgr.size(), CV_32FC3);
@@ -35,9 +35,9 @@ inline Light light_at(const cv::Mat& light, const Eigen::Vector2d& px) {
   return (1 - fv) * ((1 - fu) * at(v, u) + fu * at(v, u + 1)) + fv * ((1 - fu) * at(v + 1, u) + fu * at(v + 1, u + 1));
 }
 
-/// Where along `direction` (a unit vector), from `px`, light is half way between that 4 to 6 px before and that 4 to 6
-/// px beyond, averaged over 6 px across; nullopt without contrast. The light's slope on both sides moves it by some
-/// hundredths of a pixel, in any two pictures of the same alike.
+/// The place along `direction` (a unit vector), from `px`, where light is half way between that 4 to 6 px before and
+/// that 4 to 6 px beyond, averaged over 6 px across; nullopt without contrast. The light's slope on both sides moves it
+/// by some hundredths of a pixel, in any two images of the same scene alike.
 inline std::optional<double> crossing_px(const cv::Mat& light, const Eigen::Vector2d& px,
                                          const Eigen::Vector2d& direction) {
   constexpr double step_px = 0.25, reach_px = 6, plateau_px = 4;

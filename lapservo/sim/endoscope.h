@@ -20,9 +20,9 @@ struct EndoscopeConfig {
   double latency_s = 0.08;          ///< from the middle of the exposure to arrival
   double jitter_s = 0.001;          ///< arrival is evenly up to this much earlier or later
   double dropped_fraction = 0.005;  ///< of the frames that never arrive
-  int render_threads = 2;           ///< frames are rendered while they are on their way; 0: when they are asked for
-  bool real_time = false;           ///< a picture that is not rendered in time arrives late, and nobody waits for it
-  bool pictures = true;             ///< false: frames arrive without a picture, for studies that need only their times
+  int render_threads = 2;           ///< frames are rendered while they are on their way; 0: on request
+  bool real_time = false;           ///< an image that is not rendered in time arrives late, and nobody waits for it
+  bool pictures = true;             ///< false: frames arrive without an image, for studies that need only their times
 
   /// Returns itself if all its numbers make sense; else throws InputError naming the first field that doesn't.
   const EndoscopeConfig& checked() const;
@@ -36,8 +36,8 @@ struct EndoscopePicture {
   cv::Mat bgr;
 };
 
-/// A camera with frame rate, exposure, latency, jitter and lost frames on simulated time. Frame k's shutter opens at
-/// k / frame_rate_hz. Pictures depend on the seed and on what stands before the camera, never on threads or real time.
+/// A camera with frame rate, exposure, latency, jitter and lost frames on simulated time. Frame k's shutter opens at k
+/// / frame_rate_hz. Images depend on the seed and on the scene before the camera, never on threads or real time.
 class Endoscope {
  public:
   Endoscope(const Camera& camera, const std::vector<ShaftModel>& shafts, const cv::Mat& background,

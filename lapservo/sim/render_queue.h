@@ -18,16 +18,16 @@ struct RenderJob {
   Light gains = Light(1, 1, 1);
 };
 
-/// Renders in the background, in whichever thread is free. A picture depends on its job alone.
+/// Renders in the background, in whichever thread is free. An image depends on its job alone.
 class RenderQueue {
  public:
-  /// Every thread renders with a copy of `renderer`. Without threads a job is done when its result is asked for.
+  /// Every thread renders with a copy of `renderer`. Without threads a job runs when its result is requested.
   RenderQueue(Renderer renderer, int threads);
   ~RenderQueue();
   RenderQueue(const RenderQueue&) = delete;
   RenderQueue& operator=(const RenderQueue&) = delete;
 
-  /// Results that nobody waits for are thrown away; those asked for must be taken before the queue goes.
+  /// Unrequested results are dropped; requested ones must be taken before the queue is destroyed.
   std::future<cv::Mat> render(RenderJob job);
 
  private:

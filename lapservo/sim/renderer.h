@@ -17,7 +17,7 @@ struct RenderOptions {
   float smoke = 0;  ///< fraction of grey veil in front of everything, 0 to 1
 };
 
-/// What one exposure sees: the shafts at one or, for motion blur, several moments of it.
+/// The scene of one exposure: the shafts at one or, for motion blur, several moments of it.
 using Exposure = std::vector<std::vector<ShaftPlacement>>;
 
 /// Renders shafts with markers in front of a background, from physical geometry: rays against cylinders, area-sampled

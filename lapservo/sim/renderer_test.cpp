@@ -165,7 +165,7 @@ TEST(Renderer, AFullTurnChangesNothing) {
   }
 }
 
-// No aliasing: a shift of any part of a pixel moves the picture's centre of light by as much.
+// No aliasing: a shift of any part of a pixel moves the image's centre of light by as much.
 TEST(Renderer, ASubPixelShiftMovesTheLightByAsMuch) {
   Camera camera = small_camera();
   camera.response = {Response::Kind::power, 1};
@@ -251,7 +251,7 @@ TEST(Renderer, TheNearerShaftHidesTheFarther) {
   EXPECT_GT(max_difference(a, only_near), 50);
 }
 
-// What the lamps add goes with their power, matt and gloss; what is ambient stays.
+// The lamps' light, diffuse and specular, is proportional to their power; ambient light stays.
 TEST(Lighting, TurnedDownLampsLeaveTheAmbientPart) {
   Lighting full;
   full.ambient = 0.05F;

@@ -1,4 +1,4 @@
-// The renderer beside ray-traced pictures of the same scenes (another program's work; see ../shared/frames).
+// The renderer beside ray-traced images of the same scenes (another program's work; see ../shared/frames).
 #include <cmath>
 #include <filesystem>
 #include <string>

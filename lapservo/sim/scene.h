@@ -31,8 +31,8 @@ struct Blotch {
   double azimuth_rad, along_m, radius_m;  ///< azimuth on the marker (tau)
 };
 
-/// What else may be printed on the film in the place of the bands: cells, dark or bright, a row after the other. Rows
-/// go round from tau = 0, columns along from the proximal end, all of one size.
+/// A print on the film in the place of the bands: cells, dark or bright, row by row. Rows go round from tau = 0,
+/// columns along from the proximal end, all of one size.
 struct PrintedCells {
   int rows = 0, columns = 0;
   std::vector<std::uint8_t> dark;  ///< rows * columns; 0: bright
@@ -58,7 +58,7 @@ struct ShaftPlacement {
   bool covered = false;  ///< something dark lies over the whole marker
 };
 
-/// What the camera's chip adds, in linear light with 1 at white.
+/// The noise of the camera's sensor, in linear light with 1 at white.
 struct Sensor {
   double blur_px = 0.8;
   double read_noise = 0.0036;

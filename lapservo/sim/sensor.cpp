@@ -18,7 +18,7 @@ constexpr std::size_t deviate_count = std::size_t{1} << 17;
 constexpr std::uint64_t deviate_seed = 20240229;
 constexpr double most = 32767;
 
-// Of sigma `deviate_unit`, the same for every sensor: to make them takes as long as a picture.
+// Deviates of sigma `deviate_unit`, shared by all sensors: making them takes as long as an image.
 const std::vector<std::int16_t>& normal_deviates() {
   static const std::vector<std::int16_t> all = [] {
     Random random(deviate_seed);

@@ -9,13 +9,13 @@
 
 namespace lapservo::internal {
 
-/// Light that leaves a point towards the camera: reflectance * matt + gloss.
+/// Light that leaves a point towards the camera: reflectance * diffuse + specular.
 struct Lit {
   float matt = 0, gloss = 0;
 };
 
-/// Light on one shaft in one pose. Over a cylinder it changes slowly, so it is worked out on a grid of azimuth and
-/// length, rows of it when first asked for, and interpolated (to 0.2 % of white).
+/// Light on one shaft in one pose. Over a cylinder it changes slowly, so it is computed on a grid of azimuth and
+/// length, row by row on first use, and interpolated (to 0.2 % of white).
 class ShaftLighting {
  public:
   ShaftLighting(const Lighting& lighting, const ShaftTracer& tracer);
@@ -39,7 +39,7 @@ class ShaftLighting {
   std::vector<Lit> grid_;
 };
 
-/// The lamps turned down to `power`, 1 being full: their shading and their gloss fade, the ambient part stays.
+/// The lamps dimmed to `power`, 1 being full: their diffuse and specular light scales, the ambient part stays.
 Lighting at_power(Lighting lighting, float power);
 
 /// Reflectance in linear light of each Part of a shaft.

@@ -139,7 +139,8 @@ void ShaftPainter::paint(const PixelRays& rays, const cv::Rect& part, const cv::
   }
 }
 
-// Of corners on the sides: whether the print's seam, and a gap that may be narrower than the pixel, lies between them.
+// Whether, for corners on the contours, the print's seam, and a gap that may be narrower than the pixel, lies between
+// them.
 bool ShaftPainter::spans_seam(const Corners& at) const {
   const auto tau = [&](std::size_t i) { return tracer_.tau_rad(at.azimuth_rad[i]); };
   for (std::size_t i = 1; i < 4; ++i)

@@ -41,7 +41,7 @@ class ShaftPainter {
   void paint(const PixelRays& rays, const cv::Rect& part, const cv::Mat& behind, SceneLight& scene);
 
  private:
-  /// What a pixel receives from this shaft: light, already weighted with the fraction of the pixel that it covers.
+  /// The light that a pixel receives from this shaft, weighted with the fraction of the pixel that it covers.
   struct Paint {
     Light light = Light::Zero();
     float cover = 0;

@@ -10,8 +10,8 @@
 
 namespace lapservo::internal {
 
-/// What a camera ray meets first on a shaft. Of printed cells the bright ones are band_0, the dark ones band_2.
-/// `film_edge` is the face of the film at the marker's two ends.
+/// The first intersection of a camera ray with a shaft. Bright printed cells are band_0, dark ones band_2. `film_edge`
+/// is the face of the film at the marker's two ends.
 enum class Part : std::uint8_t { nothing, band_0, band_1, band_2, shaft, film_edge, tip, blood };
 
 constexpr bool is_band(Part part) {

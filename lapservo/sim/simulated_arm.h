@@ -15,7 +15,7 @@ class SimulatedArm {
   virtual void servo_jp(const Eigen::Vector4d& setpoint) = 0;
   virtual void step(double dt_s) = 0;
 
-  /// What the encoders say: the motors' positions, rounded.
+  /// The encoders' readings: the motors' positions, rounded.
   virtual Eigen::Vector4d measured_jp() const = 0;
   /// Where the instrument is.
   virtual Eigen::Vector4d true_jp() const = 0;

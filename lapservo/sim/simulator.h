@@ -63,8 +63,8 @@ struct SimulatedFrame {
 /// bit.
 class Simulator : public Robot, public ImageStream, public Clock {
  public:
-  /// `rig` is how things really are; what a program believes may differ. Its first instrument needs camera_from_rcm
-  /// (else InputError). The arm starts at rest with these measured joints.
+  /// `rig` is the true scene; a program's rig may differ. Its first instrument needs camera_from_rcm (else InputError).
+  /// The arm starts at rest with these measured joints.
   Simulator(const Rig& rig, const SimulatorConfig& config, const JointVector& q_measured);
   /// With an arm of another kind; of SimulatorConfig::arm only rcm_offset_m counts.
   Simulator(const Rig& rig, const SimulatorConfig& config, std::unique_ptr<SimulatedArm> arm);
@@ -97,7 +97,7 @@ class Simulator : public Robot, public ImageStream, public Clock {
 
   /// Motions that overlap in time add up in the order in which they were given.
   void move_endoscope(const EndoscopeMotion& motion) { endoscope_motions_.push_back(motion.checked()); }
-  /// What stood in the camera's frame at the beginning stands there now.
+  /// The present place of a point that was given in the camera's frame at the beginning.
   Rigid3 camera_from_first_camera() const;
 
   /// The instrument in the camera's truth, now.

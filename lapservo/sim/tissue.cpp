@@ -27,7 +27,7 @@ cv::Mat octaves(int width_px, int height_px, int cells, int count, Random& rando
   return sum / total * 2;
 }
 
-// What a pixel's noises make of it. Rows are coloured by such loops over plain arrays, which compilers vectorise.
+// The colour of a pixel from its noises. Rows are coloured by such loops over plain arrays, which compilers vectorise.
 struct NoiseRow {
   const float *organ, *fold, *grain, *vessel;
 };

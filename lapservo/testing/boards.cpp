@@ -123,7 +123,7 @@ std::vector<Rigid3> different_poses(const BoardScene& scene, const Camera& camer
     Rigid3 pose;
     pose.rotation = Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(direction), std::sin(direction), 0)) *
                     Eigen::AngleAxisd(random.uniform(-0.3, 0.3), Eigen::Vector3d::UnitZ());
-    const double share = random.uniform(0.4, 0.6);  // of the picture's width
+    const double share = random.uniform(0.4, 0.6);  // of the image's width
     const double depth_m = camera.fx_px * scene.square_m * (scene.columns + 1) / (share * camera.width_px);
     const Eigen::Vector2d at(random.uniform(0.2, 0.8) * camera.width_px, random.uniform(0.2, 0.8) * camera.height_px);
     pose.translation = depth_m * camera.ray_from_ideal(at) - pose.rotation * middle_m;

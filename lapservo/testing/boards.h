@@ -24,7 +24,7 @@ struct BoardScene {
 /// 8-bit BGR. The camera's response, distortion and chromatic aberration count.
 cv::Mat render(const BoardScene& scene, const Camera& camera, const Rigid3& camera_from_board, std::uint64_t seed);
 
-/// Poses that fill the picture, tilted by 15 to 35 degrees.
+/// Poses that fill the image, tilted by 15 to 35 degrees.
 std::vector<Rigid3> different_poses(const BoardScene& scene, const Camera& camera, int count, std::uint64_t seed);
 
 }  // namespace lapservo::boards

@@ -16,7 +16,7 @@ namespace lapservo::effects {
 using namespace internal;
 namespace {
 
-// Each value of a float picture through a function.
+// Applies a function to each value of a float image.
 void map_values(cv::Mat& picture, const std::function<double(double)>& function) {
   constexpr int levels = 4096;
   std::vector<float> table(levels + 2);
@@ -134,10 +134,10 @@ void subsample(cv::Mat& picture, bool left_sited) {
 
 cv::Mat compressed(const cv::Mat& picture, int quality) {
   if (quality == 0) return picture;
-  return decode_image(encode_jpeg(picture, quality), "a picture of a test");
+  return decode_image(encode_jpeg(picture, quality), "an image of a test");
 }
 
-// Linear light of an sRGB picture.
+// Linear light of an sRGB image.
 cv::Mat light_of(const cv::Mat& srgb) {
   std::array<float, 256> table = Response{}.table();
   cv::Mat light;

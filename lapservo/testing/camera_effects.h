@@ -9,7 +9,7 @@
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/response.h"
 
-/// What cameras and recorders do to a picture before anyone sees it, in the order in which they do. For tests.
+/// Processing by cameras and recorders, in its order. For tests.
 namespace lapservo::effects {
 
 /// Strengths; those of the default do nothing.
@@ -29,7 +29,7 @@ struct CameraEffects {
   int jpeg_quality = 0;  ///< 1 to 100; 0: not compressed
 };
 
-/// An sRGB picture, 8-bit BGR, as that camera gives it.
+/// An sRGB image, 8-bit BGR, as that camera gives it.
 cv::Mat seen_through(const CameraEffects& effects, const cv::Mat& srgb, const Camera& camera);
 
 /// The camera as calibration would have it: its response to grey, its chromatic aberration.

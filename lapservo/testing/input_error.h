@@ -6,7 +6,7 @@
 
 namespace lapservo::testing {
 
-/// What the InputError that `call` throws says; another exception passes, and none gives an empty text.
+/// The message of the InputError that `call` throws; another exception passes, and none gives an empty text.
 template <typename Call>
 std::string input_error(const Call& call) {
   try {

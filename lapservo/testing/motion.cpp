@@ -8,7 +8,7 @@ namespace lapservo::scenes {
 using namespace internal;
 namespace {
 
-// Of theta, phi and rho: what moves the marker's middle so in the image, of such motions the smallest.
+// The smallest change of theta, phi and rho that moves the marker's middle so in the image.
 Eigen::Vector3d joints_of(const Rig& rig, const Eigen::Vector4d& q, const Eigen::Vector2d& along_and_across_px) {
   const Instrument& instrument = rig.instruments[0];
   const auto place_px = [&](const Eigen::Vector4d& at, double along_m) {

@@ -9,7 +9,7 @@
 /// Instruments that move while the shutter is open. For tests.
 namespace lapservo::scenes {
 
-/// What moves during an exposure, and how.
+/// The moving part during an exposure, and its motion.
 struct Motion {
   Eigen::Vector2d along_and_across_px =
       Eigen::Vector2d::Zero();  ///< of the marker's middle, along the shaft and across

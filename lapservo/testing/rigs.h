@@ -10,7 +10,7 @@ inline Rig paper_test_rig() {
   return load_rig(source_folder() / "configs" / "paper.yaml");
 }
 
-/// The same view on a camera of half the width and height: pixels, and with them pictures, cost a quarter.
+/// The same view on a camera of half the width and height: images cost a quarter.
 inline Rig small_test_rig() {
   Rig rig = paper_test_rig();
   Camera& camera = rig.camera;

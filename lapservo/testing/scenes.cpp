@@ -29,7 +29,7 @@ const std::array<Port, 3> ports{{{{90, 180, 270}, {-0.078, 0.067, 0.059}, {-0.02
 
 constexpr double border_px = 30;
 
-// Less than marker_in_view() asks: here the silhouettes' ends alone count, as a lens without distortion shows them.
+// Less than marker_in_view() requires: the apparent contour's ends alone count, by a lens without distortion.
 bool wholly_in_view(const Rig& rig, const Marker& marker, const Rigid3& pose, double steepest_rad) {
   const auto view = view_cylinder(pose, marker.radius_m());
   if (!view) return false;
@@ -83,7 +83,7 @@ ShaftPose pose_of(const Rig& rig, std::size_t i, const JointVector& q) {
 
 namespace {
 
-// Of the first shaft's axis from the second one's, as lines.
+// Distance of the first shaft's axis from the second one's, as lines.
 double apart_m(const Rigid3& a, const Rigid3& b) {
   const Eigen::Vector3d along_a = a.rotation * Eigen::Vector3d::UnitZ(),
                         along_b = b.rotation * Eigen::Vector3d::UnitZ();
@@ -99,8 +99,8 @@ bool hides(const Rigid3& shaft, double radius_m, const Eigen::Vector3d& point) {
   return (from + nearest * way).norm() < radius_m;
 }
 
-// Of what shows of a marker without the other shaft, the fractions that it hides: of the surface, and of e1 or e2,
-// whichever is more.
+// The fractions of a marker's visible part that the other shaft hides: of the surface, and of e1 or e2, whichever is
+// more.
 std::array<double, 2> hidden_fractions(const ShaftPose& pose, const Rigid3& other, const Marker& marker) {
   constexpr int lines = 16, places = 24;
   const Rigid3& shaft = pose.camera_from_unrolled;
@@ -145,7 +145,7 @@ CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad) 
 
 namespace {
 
-// Made once for each size of pictures.
+// Made once for each size of images.
 cv::Mat usual_tissue(const Camera& camera) {
   static std::mutex mutex;
   static std::map<std::pair<int, int>, cv::Mat> tissues;

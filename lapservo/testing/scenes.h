@@ -32,7 +32,7 @@ struct CrossingPair {
   std::vector<JointVector> q;
   std::array<double, 2> hidden{};        ///< of each marker's visible side, the fraction that the other's shaft hides
   std::array<double, 2> hidden_inner{};  ///< the same of its inner boundaries, of the one that is hidden more
-  /// Whether both inner boundaries show well: where one is left, a print that is off looks like a turn.
+  /// Whether both inner boundaries are visible: with only one, a misprinted marker looks like a rotated one.
   bool tells_psi(std::size_t instrument) const { return hidden_inner[instrument] < 0.6; }
 };
 CrossingPair crossing_pair(const Rig& rig, Random& random, double steepest_rad = 0.35);
@@ -77,8 +77,8 @@ struct Shot {
   CentreLine line() const;  ///< the true one
 };
 
-/// A picture of the first instrument by a lens with lateral chromatic aberration: a channel's is that of a camera with
-/// another focal length.
+/// An image of the first instrument by a lens with lateral chromatic aberration: each channel has a camera with another
+/// focal length.
 cv::Mat render_aberrated(const Rig& rig, const JointVector& q, std::uint64_t seed,
                          const ChromaticAberration& aberration);
 

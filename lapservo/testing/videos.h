@@ -16,7 +16,7 @@ namespace lapservo::testing {
 inline constexpr int video_frames = 20;
 inline const cv::Size video_size(320, 240);
 
-/// A square that moves over noise: hands each of video_frames pictures of video_size to `write`.
+/// A square that moves over noise: passes each of video_frames images of video_size to `write`.
 template <typename Write>
 void for_each_picture(const Write& write) {
   cv::RNG random(7);
@@ -28,7 +28,7 @@ void for_each_picture(const Write& write) {
   }
 }
 
-/// What a video of such pictures gives.
+/// The decoded content of a video of such images.
 struct VideoRead {
   int frames = 0, damaged = 0;
   std::string complaint;

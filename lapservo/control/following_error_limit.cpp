@@ -1,4 +1,4 @@
-#include "lapservo/control/setpoint_leash.h"
+#include "lapservo/control/following_error_limit.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 
 namespace lapservo::internal {
 
-void SetpointLeash::update(const MotionState& setpoint, const Eigen::Vector4d& q_joint, const DriveState& drive,
-                           double lag_s, double interval_s) {
+void FollowingErrorLimit::update(const MotionState& setpoint, const Eigen::Vector4d& q_joint, const DriveState& drive,
+                                 double lag_s, double interval_s) {
   constexpr double nearly = 0.9;
   constexpr double known = 0.9, unknown = 0.7, least_lag_s = 0.02;  // an arm lags at least by about this
   drive_ = drive;
@@ -34,16 +34,16 @@ void SetpointLeash::update(const MotionState& setpoint, const Eigen::Vector4d& q
   bool at_end = false;
   for (int i = 0; i < 4; ++i)
     at_end |= std::abs(ahead_[i]) > nearly * allowed_[i] && !drive.follows[static_cast<std::size_t>(i)];
-  taut_s_ = at_end ? taut_s_ + interval_s : 0;
+  reached_s_ = at_end ? reached_s_ + interval_s : 0;
 }
 
-bool SetpointLeash::taut() const {
+bool FollowingErrorLimit::is_reached() const {
   constexpr double some_s = 0.3;
-  return taut_s_ > some_s;
+  return reached_s_ > some_s;
 }
 
-Eigen::Vector4d SetpointLeash::limit(const Eigen::Vector4d& setpoint_velocity, const Eigen::Vector4d& wanted,
-                                     double period_s) const {
+Eigen::Vector4d FollowingErrorLimit::apply(const Eigen::Vector4d& setpoint_velocity, const Eigen::Vector4d& wanted,
+                                           double period_s) const {
   Eigen::Vector4d velocity = wanted;
   for (int i = 0; i < 4; ++i) {
     if (drive_.follows[static_cast<std::size_t>(i)]) continue;

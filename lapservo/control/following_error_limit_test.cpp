@@ -1,4 +1,4 @@
-#include "lapservo/control/setpoint_leash.h"
+#include "lapservo/control/following_error_limit.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,15 +8,15 @@
 #include "lapservo/core/random.h"
 
 namespace lapservo::internal {
-namespace setpoint_leash_test {
+namespace following_error_limit_test {
 
 constexpr double period_s = 1.0 / 60, lag_s = 0.03;
 const JointLimits limits;
 const Eigen::Vector4d q(0, 1, 0.1, 0);
 
-// Set-points at full speed, joints that follow with their lag, then stand.
-TEST(SetpointLeash, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
-  SetpointLeash leash(limits);
+// Setpoints at full speed, joints that follow with their lag, then stand.
+TEST(FollowingErrorLimit, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
+  FollowingErrorLimit limit(limits);
   MotionState setpoint{q, Eigen::Vector4d::Zero()};
   DriveState drive;
   drive.load << 0.001, -0.001, 0.0005, 0.01;
@@ -27,16 +27,16 @@ TEST(SetpointLeash, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
     const Eigen::Vector4d before = joint;
     const Eigen::Vector4d change = limits.acceleration * period_s;
     const Eigen::Vector4d wanted = limits.rate.cwiseMin(setpoint.velocity + change);
-    leash.update(setpoint, joint, drive, lag_s, period_s);
-    const Eigen::Vector4d velocity = leash.limit(setpoint.velocity, wanted, period_s);
+    limit.update(setpoint, joint, drive, lag_s, period_s);
+    const Eigen::Vector4d velocity = limit.apply(setpoint.velocity, wanted, period_s);
     if (!stands) {
       EXPECT_EQ(velocity, wanted) << k;
     }
     if (k < 75) {
-      EXPECT_FALSE(leash.taut()) << k;
+      EXPECT_FALSE(limit.is_reached()) << k;
     }
     if (k > 120) {
-      EXPECT_TRUE(leash.taut()) << k;
+      EXPECT_TRUE(limit.is_reached()) << k;
     }
     EXPECT_LE(((velocity - setpoint.velocity).cwiseAbs() - change).maxCoeff(), 1e-12);
     EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
@@ -55,16 +55,16 @@ TEST(SetpointLeash, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
 }
 
 // Its load may be off by its friction, in whose direction nobody knows.
-TEST(SetpointLeash, IsShorterForAJointThatHasNotGoneBothWays) {
-  SetpointLeash leash(limits);
+TEST(FollowingErrorLimit, IsShorterForAJointThatHasNotGoneBothWays) {
+  FollowingErrorLimit limit(limits);
   MotionState setpoint{q, Eigen::Vector4d::Zero()};
   DriveState drive;
   drive.load_known = {true, false, true, false};
   for (int k = 0; k < 240; ++k) {
-    leash.update(setpoint, q, drive, lag_s, period_s);
+    limit.update(setpoint, q, drive, lag_s, period_s);
     const Eigen::Vector4d change = limits.acceleration * period_s;
     const Eigen::Vector4d velocity =
-        leash.limit(setpoint.velocity, (setpoint.velocity + change).cwiseMin(limits.rate), period_s);
+        limit.apply(setpoint.velocity, (setpoint.velocity + change).cwiseMin(limits.rate), period_s);
     setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
     setpoint.velocity = velocity;
   }
@@ -72,17 +72,17 @@ TEST(SetpointLeash, IsShorterForAJointThatHasNotGoneBothWays) {
   EXPECT_TRUE(lead.isApprox(Eigen::Vector4d(0.9, 0.7, 0.9, 0.7), 0.01)) << lead.transpose();
 }
 
-// An arm that hangs far below its set-points follows them nevertheless: it is not pulled down and down.
-TEST(SetpointLeash, DoesNotTakeALoadForABlockedJoint) {
-  SetpointLeash leash(limits);
+// An arm that hangs far below its setpoints follows them nevertheless: it is not pulled down step by step.
+TEST(FollowingErrorLimit, DoesNotTakeALoadForABlockedJoint) {
+  FollowingErrorLimit limit(limits);
   MotionState setpoint{q, Eigen::Vector4d::Zero()};
   DriveState drive;
   const Eigen::Vector4d sag = 5 * lag_s * limits.rate;
   Eigen::Vector4d joint = q - sag;
   for (int k = 0; k < 240; ++k) {
     const Eigen::Vector4d before = joint;
-    leash.update(setpoint, joint, drive, lag_s, period_s);
-    const Eigen::Vector4d velocity = leash.limit(setpoint.velocity, Eigen::Vector4d::Zero(), period_s);
+    limit.update(setpoint, joint, drive, lag_s, period_s);
+    const Eigen::Vector4d velocity = limit.apply(setpoint.velocity, Eigen::Vector4d::Zero(), period_s);
     setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
     setpoint.velocity = velocity;
     joint += -std::expm1(-period_s / lag_s) * (setpoint.position - sag - joint);
@@ -95,7 +95,7 @@ TEST(SetpointLeash, DoesNotTakeALoadForABlockedJoint) {
   EXPECT_LE(setpoint.velocity.norm(), 1e-3);
 }
 
-TEST(SetpointLeash, StaysWithinTheLimitsWhateverIsWanted) {
+TEST(FollowingErrorLimit, StaysWithinTheLimitsWhateverIsWanted) {
   Random random(3);
   for (int k = 0; k < 1000; ++k) {
     MotionState setpoint;
@@ -108,13 +108,13 @@ TEST(SetpointLeash, StaysWithinTheLimitsWhateverIsWanted) {
       const double change = limits.acceleration[i] * period_s;
       wanted[i] = std::clamp(setpoint.velocity[i] + random.uniform(-1, 1) * change, -limits.rate[i], limits.rate[i]);
     }
-    SetpointLeash leash(limits);
-    leash.update(setpoint, q, drive, lag_s, period_s);
-    const Eigen::Vector4d velocity = leash.limit(setpoint.velocity, wanted, period_s);
+    FollowingErrorLimit limit(limits);
+    limit.update(setpoint, q, drive, lag_s, period_s);
+    const Eigen::Vector4d velocity = limit.apply(setpoint.velocity, wanted, period_s);
     EXPECT_LE(((velocity - setpoint.velocity).cwiseAbs() - limits.acceleration * period_s).maxCoeff(), 1e-12);
     EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
   }
 }
 
-}  // namespace setpoint_leash_test
+}  // namespace following_error_limit_test
 }  // namespace lapservo::internal
