@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -10,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <fmt/format.h>
 
 #include "apps/lapservo/cli/progress.h"
@@ -22,8 +21,8 @@
 #include "lapservo/core/error.h"
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rcm/distinct_lines.h"
-#include "lapservo/rcm/pairwise_mean.h"
 #include "lapservo/rcm/projected_rcm.h"
+#include "lapservo/rcm/rcm_result.h"
 #include "lapservo/rig/instrument_index.h"
 #include "lapservo/rig/rig.h"
 
@@ -36,17 +35,6 @@ struct EstimateRcmOptions {
   std::string observations, rig, out;
   double sigma_px = 0;  // 0: to be estimated
   double common_px = 0.01;
-};
-
-// One estimate as it is printed and written. `point_px` is empty when there is none, for the reason in `status`.
-struct Result {
-  std::string instrument, method, status;
-  std::size_t lines = 0, outliers = 0;
-  std::optional<Eigen::Vector2d> point_px;
-  std::optional<Eigen::Matrix2d> covariance_px2;
-  std::optional<double> noise_px, chi2, spread_rad;
-  bool near_parallel = false;
-  std::optional<Eigen::Vector2d> rig_px;  // where the rig's camera_from_rcm has it
 };
 
 using LinesByInstrument = std::map<std::string, std::vector<LineObservation>>;
@@ -91,49 +79,15 @@ LinesByInstrument read_lines(const EstimateRcmOptions& options, const std::optio
   return lines;
 }
 
-Result weighted_result(const std::vector<LineObservation>& lines, const EstimateRcmOptions& options) {
-  const bool known = options.sigma_px > 0;
-  const RcmEstimate estimate =
-      estimate_projected_rcm(lines, {known ? NoiseScale::known : NoiseScale::estimated, options.common_px});
-  Result result;
-  result.method = "weighted";
-  result.status = to_string(estimate.status);
-  result.lines = estimate.lines, result.outliers = estimate.outliers;
-  if (estimate.status != RcmStatus::ok) return result;
-  result.point_px = estimate.point_px;
-  result.covariance_px2 = estimate.covariance_px2;
-  result.chi2 = known ? std::optional(estimate.chi2) : std::nullopt;
-  if (estimate.degrees_of_freedom > 0)
-    result.noise_px = (known ? options.sigma_px : 1) * std::sqrt(estimate.chi2 / estimate.degrees_of_freedom);
-  result.spread_rad = estimate.direction_spread_rad;
-  result.near_parallel = estimate.near_parallel;
-  return result;
-}
-
-// Of parallel lines the pairs meet anywhere.
-Result pairwise_result(const std::vector<LineObservation>& lines, const Result& weighted) {
-  Result result;
-  result.method = "pairwise";
-  result.lines = static_cast<std::size_t>(std::count_if(lines.begin(), lines.end(), is_usable));
-  const bool parallel = weighted.status == to_string(RcmStatus::parallel);
-  const auto mean = parallel ? std::nullopt : mean_of_intersections(lines);
-  result.status = to_string(mean ? RcmStatus::ok : result.lines < 2 ? RcmStatus::too_few_lines : RcmStatus::parallel);
-  if (!mean) return result;
-  result.point_px = mean->point_px;
-  result.covariance_px2 = mean->covariance_px2;
-  return result;
-}
-
-std::vector<Result> estimate_all(const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
-  std::vector<Result> results;
+std::vector<RcmResult> estimate_all(const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
+  std::vector<RcmResult> results;
   for (const auto& [name, rows] : read_lines(options, rig)) {
     const Instrument* instrument = find_instrument(rig, name);
     const std::vector<LineObservation> lines = distinct_lines(rows);
     if (lines.size() < rows.size())
       std::fprintf(stderr, "lapservo: note: %s: %zu rows of %zu positions that differ: a position counts once\n",
                    name.c_str(), rows.size(), lines.size());
-    const Result weighted = weighted_result(lines, options);
-    for (Result result : std::array{weighted, pairwise_result(lines, weighted)}) {
+    for (RcmResult result : estimate_rcm(lines, options.sigma_px, options.common_px)) {
       result.instrument = name;
       if (instrument && instrument->camera_from_rcm)
         result.rig_px = projected_rcm_px(rig->camera, *instrument->camera_from_rcm);
@@ -143,40 +97,7 @@ std::vector<Result> estimate_all(const EstimateRcmOptions& options, const std::o
   return results;
 }
 
-std::string number_or_empty(std::optional<double> value) {
-  return value ? fmt::format("{:.6g}", *value) : "";
-}
-
-void write_report(AtomicFile& file, const std::vector<Result>& results) {
-  file.stream()
-      << "instrument,method,status,lines,outliers,rcm_u_px,rcm_v_px,sigma_u_px,sigma_v_px,correlation,noise_px,"
-         "chi2,direction_spread_rad,near_parallel,rig_u_px,rig_v_px,distance_px\n";
-  for (const Result& r : results) {
-    const auto of = [](const auto& optional, auto get) {
-      return optional ? std::optional<double>(get(*optional)) : std::nullopt;
-    };
-    const auto sigma = [&](Eigen::Index i) {
-      return of(r.covariance_px2, [&](const Eigen::Matrix2d& c) { return std::sqrt(c(i, i)); });
-    };
-    const auto u = [](const Eigen::Vector2d& p) { return p.x(); };
-    const auto v = [](const Eigen::Vector2d& p) { return p.y(); };
-    std::string row = fmt::format("{},{},{},{},{}", csv_field(r.instrument), r.method, r.status, r.lines, r.outliers);
-    const auto correlation = [](const Eigen::Matrix2d& c) {
-      const double scale = std::sqrt(c(0, 0) * c(1, 1));
-      return scale > 0 ? c(0, 1) / scale : 0;
-    };
-    const auto distance = r.point_px && r.rig_px ? std::optional((*r.point_px - *r.rig_px).norm()) : std::nullopt;
-    for (const auto& value : {of(r.point_px, u), of(r.point_px, v), sigma(0), sigma(1),
-                              of(r.covariance_px2, correlation), r.noise_px, r.chi2, r.spread_rad})
-      row += "," + number_or_empty(value);
-    row += r.near_parallel ? ",1" : ",0";
-    for (const auto& value : {of(r.rig_px, u), of(r.rig_px, v), distance}) row += "," + number_or_empty(value);
-    file.stream() << row << '\n';
-  }
-  file.commit();
-}
-
-void print(const Result& r) {
+void print(const RcmResult& r) {
   const std::string head = fmt::format("{} {:<9}", r.instrument, r.method + ":");
   if (!r.point_px) {
     const char* why = r.status == "parallel" ? ": turn the instrument farther between frames" : "";
@@ -195,9 +116,9 @@ void print(const Result& r) {
   std::printf("%s %s\n", head.c_str(), line.c_str());
 }
 
-// What the numbers alone don't tell.
-void warn(const Result& r) {
-  constexpr double suspiciously_small_px = 0.005;
+// Warns of lines that make the numbers unreliable.
+void warn(const RcmResult& r) {
+  constexpr double implausibly_small_px = 0.005;
   if (r.near_parallel)
     std::fprintf(stderr,
                  "lapservo: warning: %s: the lines are nearly parallel (their directions spread by %.1f degrees): the "
@@ -208,7 +129,7 @@ void warn(const Result& r) {
                  "lapservo: warning: %s: %zu of %zu lines don't fit: --sigma-px is too small, or something else moved "
                  "(the port, the camera)\n",
                  r.instrument.c_str(), r.outliers, r.lines);
-  if (r.noise_px && *r.noise_px < suspiciously_small_px)
+  if (r.noise_px && *r.noise_px < implausibly_small_px)
     std::fprintf(
         stderr,
         "lapservo: warning: %s: the lines meet almost exactly: if they were tracked with camera_from_rcm in the "
@@ -225,15 +146,18 @@ int run(const EstimateRcmOptions& options) {
   inputs.refuse_as_output(options.out);
   std::optional<AtomicFile> report;
   if (!options.out.empty()) report.emplace(options.out);
-  const std::vector<Result> results = estimate_all(options, rig);
-  if (report) write_report(*report, results);
-  for (const Result& result : results) {
+  const std::vector<RcmResult> results = estimate_all(options, rig);
+  if (report) {
+    write_rcm_results(report->stream(), results);
+    report->commit();
+  }
+  for (const RcmResult& result : results) {
     print(result);
     warn(result);
   }
   if (!rig) std::fprintf(stderr, "lapservo: note: without --rig the lens is taken to have no distortion\n");
   if (!options.out.empty()) std::printf("report: %s\n", options.out.c_str());
-  if (std::any_of(results.begin(), results.end(), [](const Result& r) { return r.point_px.has_value(); })) return 0;
+  if (std::any_of(results.begin(), results.end(), [](const RcmResult& r) { return r.point_px.has_value(); })) return 0;
   std::fprintf(stderr, "lapservo: no RCM was estimated: it takes two observations or more, in different directions\n");
   return 1;
 }
