@@ -30,7 +30,7 @@ def microseconds(call, calls=2000, blocks=9):
 
 
 def refused_frame():
-    """A picture with a palette's few colours, which is refused unseen."""
+    """An image with a palette, which is refused before it is decoded."""
     import struct
     import zlib
 

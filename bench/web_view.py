@@ -1,8 +1,8 @@
-"""What the live page costs the loop, and how old its pictures are: web_view.py LAPSERVO RIG [SECONDS].
+"""The cost of the live page for the loop, and the age of its images: web_view.py LAPSERVO RIG [SECONDS].
 
 `lapservo sim-robot` and `lapservo servo` over ROS 2 on this computer, at the rig's size and 30 frames/s: without the page, with
 one viewer, and with a crowd of a thousand connections as well. Printed: how late the loop's ticks begin (of log.csv), and the
-age of each picture, from when the image came to the loop to when a viewer on this computer has it whole.
+age of each image, from when the image came to the loop to when a viewer on this computer has it whole.
 """
 
 import csv
@@ -26,7 +26,7 @@ def quantile(values, fraction):
 
 
 def lateness_ms(log):
-    """Of the loop's ticks: where each lies in its period, from the earliest place of a second's ticks on."""
+    """The place of each of the loop's ticks in its period, from the earliest place of a second's ticks on."""
     with open(log, newline="") as file:
         times = [float(row["time_s"]) for row in csv.DictReader(file)]
     begin = times[0]
@@ -34,7 +34,7 @@ def lateness_ms(log):
 
 
 class Viewer(threading.Thread):
-    """Asks for the next picture as soon as it has one, as the page does."""
+    """Requests the next image as soon as it has one, as the page does."""
 
     def __init__(self, port):
         super().__init__(daemon=True)
@@ -111,7 +111,7 @@ def main():
         print(f"{name:28} tick late p50 {quantile(late_ms, 0.5):.2f}, p99 {quantile(late_ms, 0.99):.2f} ms", end="")
         if ages_ms:
             seen_s = duration_s - SETTLING_S
-            print(f"; picture age p50 {quantile(ages_ms, 0.5):.0f}, p95 {quantile(ages_ms, 0.95):.0f} ms, {len(ages_ms) / seen_s:.1f} pictures/s", end="")
+            print(f"; image age p50 {quantile(ages_ms, 0.5):.0f}, p95 {quantile(ages_ms, 0.95):.0f} ms, {len(ages_ms) / seen_s:.1f} images/s", end="")
         print(flush=True)
 
 

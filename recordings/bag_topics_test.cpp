@@ -16,7 +16,7 @@ class ListedBag : public Bag {
   explicit ListedBag(std::vector<BagTopic> topics) : topics_(std::move(topics)) {}
   const std::string& path() const override { return path_; }
   const std::vector<BagTopic>& topics() const override { return topics_; }
-  std::unique_ptr<BagMessages> messages(const BagTopic&) const override { throw std::logic_error("not asked for"); }
+  std::unique_ptr<BagMessages> messages(const BagTopic&) const override { throw std::logic_error("not requested"); }
 
  private:
   std::string path_ = "run.bag";

@@ -126,7 +126,7 @@ Eigen::Vector4d error_at(const TimeTable& table, std::size_t i) {
 }
 
 // Slope of the logarithm of a feature's error, from the last limited motion at the start until the feed-forward of a
-// late image is as large.
+// late image is as large as the error.
 std::optional<double> decay_per_s(const TrackingRun& run, int feature) {
   const Eigen::Vector4d least(0.01, 10, 8, 8);
   constexpr double start_s = 5;  // motions are limited in it, if ever

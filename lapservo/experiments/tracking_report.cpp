@@ -190,8 +190,8 @@ std::vector<std::string> notes(const TrackingResult& result, const Eigen::Vector
               two_pi / paper_sinusoids().omega_rad_s[0], 1 / tracking_period_s),
           fmt::format(
               "The paper\u2019s law takes the late image for the present. At its own gains (at most {:.2f} /s) that "
-              "makes s decay faster than K; at ours ({:.0f} /s) it would swing. What stays of r, l and d is "
-              "what the desired features do in the meantime.",
+              "makes s decay faster than K; at ours ({:.0f} /s) it would swing. The remaining errors of r, l and d are "
+              "the desired features\u2019 motion of that time.",
               papers_per_s.maxCoeff(), ours_per_s.maxCoeff()),
           "Starts lie where the paper\u2019s law can lead home: on its way each feature has a pace of its own, and all "
           "four "

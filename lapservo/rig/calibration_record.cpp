@@ -77,8 +77,10 @@ void write_record(const fs::path& path, const CalibrationRecord& record) {
     out << YAML::Key << "when" << YAML::Value << step.when << YAML::EndMap;
   }
   out << YAML::EndSeq << YAML::EndMap;
-  write_file(path, std::string("# What `lapservo calibrate all` did to the rig beside this, and when.\n") +
-                       out.c_str() + "\n");
+  write_file(
+      path,
+      std::string("# The calibrations by `lapservo calibrate all` of the rig beside this file, with their times.\n") +
+          out.c_str() + "\n");
 }
 
 std::string content_state(const fs::path& path) {

@@ -29,10 +29,10 @@ struct SimRobotConfig {
   std::function<void(ImageMessage&)> alter_image{};
 };
 
-/// What came over servo_jp while the arm was enabled.
+/// Setpoints that arrived over servo_jp while the arm was enabled.
 struct ServoStatistics {
   long count = 0;
-  Eigen::Vector4d max_step = Eigen::Vector4d::Zero();  ///< of q, from the set-point before: rad, m
+  Eigen::Vector4d max_step = Eigen::Vector4d::Zero();  ///< of q, from the previous setpoint: rad, m
   double last_s = 0;                                   ///< when the last one came, on the simulator's time
   long wrist_moved = 0, malformed = 0;
 };
@@ -42,7 +42,7 @@ struct ServoStatistics {
 /// wrist joints more than the rig names. Starts ENABLED and homed.
 class SimRobot {
  public:
-  /// The rig's first instrument; its `joints`, or default_joints(). What is passed must outlive it.
+  /// The rig's first instrument; its `joints`, or default_joints(). The arguments must outlive it.
   SimRobot(Transport& transport, const Rig& rig, Simulator& simulator, const SimRobotConfig& config);
 
   /// Lets the simulator's time pass and says what is due.
