@@ -19,8 +19,8 @@ struct BandSample {
   std::array<std::uint8_t, 3> bgr;
 };
 
-/// Of the side that faces the camera, clear of boundaries and sides by `clear_px`; `bgr` is 8-bit, of the camera's
-/// size.
+/// Samples of the side that faces the camera, clear of boundaries and apparent contours by `clear_px`; `bgr` is 8-bit,
+/// of the camera's size.
 std::vector<BandSample> band_samples(const cv::Mat& bgr, const Camera& camera, const Marker& marker,
                                      const ShaftPose& pose, double clear_px = 3);
 
@@ -33,7 +33,7 @@ struct MarkerLight {
   std::array<double, 3> hues_deg{};  ///< of the bands: medians of what has a hue, near the marker's own
 };
 
-/// Of at least one sample.
+/// Median colour of at least one sample.
 MarkerLight light_of(const std::vector<BandSample>& samples, const Marker& marker);
 
 }  // namespace lapservo::internal

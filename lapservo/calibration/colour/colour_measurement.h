@@ -19,8 +19,8 @@ struct ColourMeasurement {
   FramesRead read;
 };
 
-/// Of a marker in motion; `look` sees every frame, a live camera's until it is stopped. keep_response: as
-/// calibrate_colour() has it. Throws InputError as read_frames().
+/// Calibrates by a marker in motion; `look` receives every frame, a live camera's until it is stopped. keep_response:
+/// see calibrate_colour(). Throws InputError as read_frames().
 ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
                                  bool keep_response, const JobWatch& watch,
                                  const std::function<void(const cv::Mat&)>& look = {});

@@ -25,7 +25,7 @@ struct Place {
   Eigen::Vector2d centre_px, direction;
 };
 
-// Points of the inner boundaries that face the camera, and the shaft's direction in the picture there.
+// Points of the inner boundaries that face the camera, and the shaft's direction in the image there.
 std::vector<Place> places_of(const Camera& camera, const Marker& marker, const ShaftPose& pose) {
   constexpr int lines = 9;
   constexpr double reach = 0.6, seam_m = 0.5e-3;
@@ -142,7 +142,7 @@ std::optional<MarkerResponse::Result> MarkerResponse::result() const {
   if (own.size() < least_edges) return std::nullopt;
   Result result{{}, candidates_.front().name, typical_px(own), typical_px(own), own.size()};
   for (const Candidate& candidate : candidates_) {
-    // Gains edge by edge: what an edge has of its own (gloss, a drop) both have alike.
+    // Gains edge by edge: a property of one edge (specular light, a drop) is common to both.
     std::vector<double> gains;
     for (std::size_t i = 0; i < own.size(); ++i) gains.push_back(std::abs(own[i]) - std::abs(candidate.apart_px[i]));
     const double gain_px = median(std::vector(gains)), now_px = typical_px(candidate.apart_px);

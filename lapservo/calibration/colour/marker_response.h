@@ -18,7 +18,7 @@ namespace lapservo::internal {
 /// darker side.
 class MarkerResponse {
  public:
-  /// Judges the camera's own response and the usual ones.
+  /// Compares the camera's own response and the usual ones.
   explicit MarkerResponse(const Camera& camera);
 
   /// 8-bit BGR of the camera's size, with the marker at a pose that is good to a pixel.
@@ -32,7 +32,7 @@ class MarkerResponse {
     double before_px = 0, after_px = 0;
     std::size_t edges = 0;
   };
-  /// Nullopt when edges are too few to tell.
+  /// Nullopt with too few edges.
   std::optional<Result> result() const;
 
  private:

@@ -31,7 +31,7 @@ struct Linearisation {
     }
   }
 
-  // Of one frame: channels x numbers.
+  // Derivatives of one frame: channels x numbers.
   Eigen::MatrixXd jacobian(Eigen::Index frame) const {
     Eigen::MatrixXd result(residuals.rows(), static_cast<Eigen::Index>(slopes.size()));
     for (Eigen::Index i = 0; i < result.cols(); ++i) result.col(i) = slopes[static_cast<std::size_t>(i)].col(frame);
@@ -71,7 +71,7 @@ class FrameCost : public ceres::CostFunction {
   const Eigen::VectorXd& weights_;
 };
 
-// What is known of numbers beforehand: their size in its standard deviations.
+// Prior of the numbers: their size in their standard deviations.
 class PriorCost : public ceres::CostFunction {
  public:
   explicit PriorCost(const Eigen::VectorXd& inverse_sigmas) : inverse_sigmas_(inverse_sigmas) {
@@ -157,7 +157,7 @@ std::optional<Eigen::MatrixXd> covariance(const Linearisation& at, const Eigen::
     scatter += weight * (shifted + shifted.transpose());
   }
   scatter.diagonal() += priors;
-  // What the fit and the window of lags take off the scatter.
+  // The fit and the window of lags take a part of the scatter away.
   const double taken = static_cast<double>(numbers) + static_cast<double>(alike_frames);
   const double freedom = static_cast<double>(frames) / std::max(1.0, static_cast<double>(frames) - taken);
   const Eigen::MatrixXd inverse = units.asDiagonal() * inverse_of_symmetric(normed) * units.asDiagonal();

@@ -25,15 +25,15 @@ constexpr double max_time_s = 1e9;
 
 constexpr std::size_t min_edges = 40, min_turn_frames = 12, min_seam_views = 3;
 constexpr double widest_unseen_rad = 0.9;  // between neighbouring facing azimuths; a view measures +-0.9 rad
-// Of the diameter's image. Of 0.01 sides are found to 0.05 px, of 0.024 (--blur-px 2.2) 0.8 px inside, and all lengths
-// with them.
+// Blur as a fraction of the diameter's image. At 0.01 contours lie within 0.05 px, at 0.024 (--blur-px 2.2) 0.8 px
+// inside, and all lengths with them.
 constexpr double max_blur_diameters = 0.02;
 constexpr int max_rounds = 16, gap_round = 7;
 constexpr double settled_m = 1e-6;
 // A gap narrower than this, or than three sigma, is none.
 constexpr double min_gap_m = 0.04e-3, min_gap_sigmas = 3;
 
-// How far boundaries and the seam may lie from where a round believes them, and how much an outlier counts.
+// Search range of boundaries and the seam about a round's estimate, and the weight of an outlier.
 struct Round {
   double reach_m, seam_reach_m, loss_scale_sigmas;
   bool ask_processing = false;  // which wants edges that are located
@@ -57,8 +57,8 @@ double worth(const Sighting& sighting) {
   return (sighting.settled ? 100 : 0) - sighting.blur.boundaries_px - sighting.blur.sides_px;
 }
 
-// Whether a frame tells a pose by itself: of one boundary and the sides a turn and a shift along the shaft look alike,
-// and both ends tell no turn. With one such frame the print has no covariance.
+// Whether a frame determines a pose by itself: with one boundary and the contours a roll and a shift along the shaft
+// look alike, and both ends do not determine the roll. With one such frame the print has no covariance.
 bool tells_pose(const EdgeMeasurements& edges) {
   constexpr int min_lines = 5, min_boundaries = 2;
   std::array<int, 4> lines{};
@@ -123,7 +123,7 @@ class TurnFit {
     return adjustment;
   }
 
-  // Asks of some frames, once they are measured, whether their camera is plain but for a video's compression.
+  // Tests some measured frames: whether their camera is plain except for a video's compression.
   void judge_video() {
     constexpr std::size_t asked = 24;
     if (frames_.empty() || ChannelGeometry(frames_[0].view.camera).differs()) return;
@@ -189,7 +189,8 @@ std::size_t seam_views(const std::vector<ViewMeasurements>& measured) {
   }));
 }
 
-// Whether most frames are too blurred; empty when they are not. Of a frame that did not settle only the rounds tell it.
+// Whether most frames are too blurred; empty when they are not. Only the rounds show it for a frame that did not
+// settle.
 std::string blur_refusal(const std::vector<KeyFrame>& frames, const Marker& marker) {
   const auto blurred = std::count_if(frames.begin(), frames.end(), [&](const KeyFrame& frame) {
     const double depth_m = frame.sighting.unknowns.pose().camera_from_unrolled.translation.z();
@@ -208,7 +209,7 @@ std::string blur_refusal(const std::vector<KeyFrame>& frames, const Marker& mark
   return {};
 }
 
-// Why these frames can't tell the print; empty when they may.
+// The reason why these frames do not determine the print; empty when they do.
 std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker) {
   char text[240];
   if (frames.size() < min_turn_frames) {
@@ -247,7 +248,7 @@ struct ResidualSummary {
   std::vector<PrintResidual> residuals;
 };
 
-// Of the boundaries; what lies beyond five sigma and a print's errors is no boundary.
+// Range of the boundaries; anything beyond five sigma and a print's errors is no boundary.
 ResidualSummary summary_of(const Adjustment& adjustment, const std::vector<ViewMeasurements>& measured,
                            const Marker& marker, double max_px) {
   ResidualSummary summary;
@@ -318,7 +319,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   TurnFit fit(rig, instrument, std::move(frames), at_iteration);
   MarkerCalibration calibration;
 
-  // The rig's print first, to start the poses and to tell what it leaves.
+  // The rig's print first, to start the poses and to measure its residuals.
   constexpr double max_before_px = 20;
   auto before = fit.round(rounds[0], false);
   if (before) before = fit.round(rounds[0], false);
@@ -339,7 +340,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
     if (fit.frames().size() < min_turn_frames) return refused(unsolvable);
     settled = last->covariance && is_settled(*last, nominal.radius_m());
     if (gap_judged || !(settled || i == gap_round)) continue;
-    // A gap that can't be told from none is none: then the print's ends meet in one edge.
+    // A gap that is insignificant counts as none: then the print's ends meet in one edge.
     gap_judged = true;
     const double gap_m = fit.marker().gap_rad * nominal.radius_m();
     const double sigma_m = std::sqrt((*last->covariance)(print_numbers - 1, print_numbers - 1)) * nominal.radius_m();

@@ -55,17 +55,19 @@ struct MarkerCalibration {
   Marker marker;               ///< with its sigmas; tolerance_m is what they leave
   std::size_t frames = 0;      ///< that were used
   std::size_t seam_views = 0;  ///< of them, those that show the seam
-  /// Compressed pictures of a turn of one way: the seam may lie behind in all of them. There and back would tell.
+  /// Compressed images of a rotation in one direction: the seam may lag in all of them. A rotation there and back would
+  /// show it.
   bool seam_may_lag = false;
-  /// Of boundaries' points about a fit of the poses, for the rig's print and for the calibrated one: rms of what is no
-  /// outlier to the latter.
+  /// Residuals of the boundaries' points about a fit of the poses, for the rig's print and for the calibrated one: rms
+  /// of the points that are inliers of the latter.
   double before_px = 0, after_px = 0;
   std::vector<PrintResidual> before;  ///< for the rig's print
   std::vector<KeyFrame> key_frames;   ///< those used, where the calibrated marker has them
 };
 
-/// Bands, wrap, skew and gap of the rig's marker from frames of a full turn. The diameter stays: pictures tell lengths
-/// in diameters, since a smaller shaft nearer by looks the same. `progress` is told rounds done and at most to come.
+/// Bands, wrap, skew and gap of the rig's marker from frames of a full rotation. The diameter stays: images give
+/// lengths in diameters, since a smaller shaft nearer by looks the same. `progress` receives the rounds done and the
+/// most to come.
 MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::vector<KeyFrame> frames,
                                    const std::function<void(int, int)>& progress = {},
                                    const AtIteration& at_iteration = {});

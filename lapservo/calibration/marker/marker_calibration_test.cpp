@@ -29,7 +29,7 @@ struct Turn {
   double blur_px = 0.8;
 };
 
-// Frames of a turn of a print, as who believes the usual rig's chooses them.
+// Frames of a rotating print, chosen with the usual rig.
 KeyFrames turned(const Rig& nominal, const Marker& print, const Turn& turn) {
   Rig real = nominal;
   real.instruments[0].marker = print;
@@ -81,7 +81,7 @@ TEST_F(CalibrateMarker, FindsThePrintAsItIs) {
     EXPECT_EQ(calibration.marker.seam_rad, nominal.seam_rad);
     EXPECT_GE(calibration.seam_views, 5U);
 
-    // And the tracker believes it where it did not believe the rig's.
+    // And the tracker accepts it where it refused the rig's.
     Rig better = rig, real = rig;
     better.instruments[0].marker = calibration.marker, real.instruments[0].marker = print;
     Random random(8);
@@ -105,7 +105,7 @@ TEST_F(CalibrateMarker, AnExactPrintStaysAsItIs) {
   EXPECT_EQ(calibration.marker.gap_rad, 0);
 }
 
-// What a video leaves behind differs between the two.
+// The lag of a video differs between the two.
 TEST_F(CalibrateMarker, KeepsFramesOfEitherWayOfTheTurn) {
   Random random(4);
   const JointVector start = scenes::random_configuration(rig, 0, random);

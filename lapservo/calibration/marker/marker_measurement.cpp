@@ -11,7 +11,7 @@
 namespace lapservo::internal {
 namespace {
 
-// Frames of a video lie close together: so many tell as much as all.
+// Frames of a video lie close together: more of them add no information.
 constexpr int enough = 400;
 
 void add_seam(const Instrument& instrument, const JointsOfTurn& joints, MarkerCalibration& calibration) {

@@ -19,14 +19,14 @@ struct MarkerMeasurement {
   FramesRead read;
 };
 
-/// What else the joints tell: where the seam lies.
+/// A further result with joints: the place of the seam.
 struct JointsOfTurn {
   JointRecording recording;
   std::string source;  ///< for complaints
 };
 
-/// Of a turn about the shaft's axis, by a few hundred of its frames. Throws InputError as read_frames(), and naming the
-/// joints' source where they don't tell the seam.
+/// Calibrates by some hundred frames of a rotation about the shaft's axis. Throws InputError as read_frames(), and
+/// naming the joints' source where they don't determine the seam.
 MarkerMeasurement measure_marker(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
                                  const std::optional<JointsOfTurn>& joints, const JobWatch& watch);
 

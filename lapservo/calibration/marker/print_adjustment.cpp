@@ -20,13 +20,13 @@ constexpr double mm = 1e-3;
 constexpr int pose_numbers = 6;
 constexpr std::size_t upper_group = measurement_groups, groups = measurement_groups + 2;
 
-// Before the fit, one sigma: how far a print may be off; and what the model leaves out of every frame alike, which is
-// taken for zero: to tell it from so many frames would be to believe the model to a thousandth of a pixel.
+// Before the fit, one sigma: the manufacturing error of a print; and model errors common to all frames, which are fixed
+// at zero: estimating them from so many frames would trust the model to a thousandth of a pixel.
 constexpr double print_prior_mm = 2, gap_prior_rad = 0.5;
 constexpr double zero = 1e-3;            // of the sigmas of these
 constexpr double common_seam_px = 0.03;  // of one frame
-// Compressed video leaves the seam's edges 0.05 to 0.14 px behind and the bands' boundaries, which move less, 0.02 px
-// at most. A turn there and back tells by how much; one of one way can't tell it from a seam that lies elsewhere.
+// Compressed video leaves the seam's edges 0.05 to 0.14 px behind and the bands' boundaries, which move less, at most
+// 0.02 px. A rotation there and back shows by how much; in one direction a lag looks like a displaced seam.
 constexpr double seam_lag_px = 0.1, seam_lag_from_px = 0.2;
 constexpr std::ptrdiff_t min_seam_views_each_way = 3;
 constexpr double min_noise_of_lag = 0.3;  // of edges, beyond the usual
@@ -62,7 +62,8 @@ struct SharedUnknowns {
   }
 };
 
-// Of a frame: its pose, its film as in every fit of the tracker, and what one group of its measurements has in common.
+// Unknowns of a frame: its pose, its film as in every fit of the tracker, and the common error of each group of its
+// measurements.
 struct FrameUnknowns {
   std::array<double, pose_numbers> pose{};
   double film_sigmas = 0;
@@ -191,7 +192,7 @@ std::vector<EdgeCost> add_frame(ceres::Problem& problem, const ViewMeasurements&
   return edges;
 }
 
-// Views that hardly moved tell no lag, and which way they did is their poses' error as well.
+// Views that hardly moved carry no information on a lag, and their direction of motion depends on their poses' errors.
 bool tells_lag(const std::vector<ViewMeasurements>& frames) {
   const auto views = [&](double way) {
     return std::count_if(frames.begin(), frames.end(), [=](const ViewMeasurements& frame) {
@@ -218,7 +219,7 @@ double sigma_of_edges_px(const std::vector<ViewMeasurements>& frames) {
   return sigmas_px.empty() ? fine_fit_limits.usual_sigma_px : median(sigmas_px);
 }
 
-// By how much edges are noisier than usual: those of compressed pictures are.
+// The ratio of the edges' noise to the usual noise: it is higher in compressed images.
 double noise_beyond_usual(double sigma_px) {
   return std::max(0.0, sigma_px / fine_fit_limits.usual_sigma_px - 1);
 }
@@ -234,14 +235,15 @@ double common_doubt_scale(const std::vector<ViewMeasurements>& frames, double ed
   return doubt_scale(edges_px, median(blurs_px), median(biases_px));
 }
 
-// What was taken for zero in all frames, by one sigma of what it may be.
+// Effects of the fixed common errors, at one sigma of their prior.
 std::vector<TakenForZero> common_errors(SharedUnknowns& shared, const std::vector<ViewMeasurements>& frames,
                                         double edges_px, bool free_lag) {
   const auto taken = shared.taken_for_zero();
   std::vector<TakenForZero> errors(taken.begin(), taken.end());
   const double scale = common_doubt_scale(frames, edges_px);
   for (TakenForZero& error : errors)
-    if (error.unknown != &shared.film_sigmas) error.sigma *= scale;  // the film is as thick in any picture
+    if (error.unknown != &shared.film_sigmas)
+      error.sigma *= scale;  // the film's thickness does not depend on the image
   if (!free_lag) errors.push_back({&shared.seam_lag_px, seam_lag_px * std::min(1.0, noise_beyond_usual(edges_px))});
   return errors;
 }

@@ -16,23 +16,23 @@ struct AdjustmentOptions {
   bool with_covariance = false;
 };
 
-/// What one round of a bundle adjustment changes.
+/// Changes by one round of a bundle adjustment.
 struct Adjustment {
-  /// Of each frame's pose and, last, of its film in film_sigma_m.
+  /// Changes of each frame's pose and, last, of its film in film_sigma_m.
   std::vector<UnknownVector> steps;
   PrintNumbers print = PrintNumbers::Zero();
   /// Residuals that are left, in the order of each frame's edges [px].
   std::vector<std::vector<double>> residuals_px;
   /// How many times what the measurements say of themselves their scatter is; robust.
   double noise_scale = 1;
-  std::optional<PrintCovariance> covariance;  ///< of the print, when asked for
-  /// The pictures look compressed and turn one way: the seam may stay behind, by what nobody knows.
+  std::optional<PrintCovariance> covariance;  ///< of the print, when requested
+  /// The images look compressed and rotate in one direction: the seam may lag by an unknown amount.
   bool lags = false;
 };
 
-/// Fits the poses of all frames and one print to what was measured near the believed ones, linearised there, with a
-/// robust loss. `film_m` is the film's thickness that the edges were measured with, `marker` the print. Nullopt when
-/// the solver fails.
+/// Fits the poses of all frames and one print to measurements near the estimated ones, linearised there, with a robust
+/// loss. `film_m` is the film's thickness with which the edges were measured, `marker` the print. Nullopt when the
+/// solver fails.
 std::optional<Adjustment> adjust(const std::vector<ViewMeasurements>& frames, const Marker& marker,
                                  const AdjustmentOptions& options, const AtIteration& at_iteration = {});
 

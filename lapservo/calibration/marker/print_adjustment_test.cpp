@@ -12,7 +12,7 @@
 namespace lapservo::internal {
 namespace print_adjustment_test {
 
-// Of a turn, seen as it is.
+// Exact measurements of a rotation.
 std::vector<ViewMeasurements> seen_turn(const Rig& rig) {
   constexpr int frames = 20;
   Random random(4);
@@ -101,7 +101,7 @@ TEST_F(SeamLag, IsDoubtedInACompressedTurnOfOneWay) {
     for (ViewMeasurements& view : views)
       for (Measurement& m : view.edges.all) m.sigma_px *= noisier;
     const auto adjustment = adjust(views, marker, {.with_covariance = true});
-    // Of a print that is turned as a whole.
+    // A print that is rotated as a whole.
     const auto slopes_m = boundary_slopes_m(marker);
     PrintNumbers turned = PrintNumbers::Zero();
     for (int k = 0; k < 4; ++k) {

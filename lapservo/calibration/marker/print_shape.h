@@ -8,8 +8,8 @@
 
 namespace lapservo::internal {
 
-/// What pictures tell of a print: where the four boundaries lie at its upper edge (tau = 0) and at its lower one, from
-/// the proximal end at tau = 0, and the gap between the edges.
+/// The measurable shape of a print: the places of the four boundaries at its upper edge (tau = 0) and at its lower one,
+/// from the proximal end at tau = 0, and the gap between the edges.
 struct PrintShape {
   std::array<double, 4> upper_m{}, lower_m{};  ///< upper_m[0] is 0
   double gap_rad = 0;
@@ -30,8 +30,8 @@ PrintShape changed_by(const PrintShape& shape, const PrintNumbers& change);
 /// Standard deviations of the marker's entries that on() writes.
 MarkerSigmas sigmas_of(const PrintCovariance& covariance, MarkerSigmas others);
 
-/// What a rig's tolerance_m would be for this print: the standard deviation of every boundary, at either edge by
-/// itself, that leaves tau on the centre line as uncertain as the covariance does, over the turn.
+/// The tolerance_m of a rig for this print: the standard deviation of every boundary, at either edge independently,
+/// that leaves tau on the centre line as uncertain as the covariance does, over the roll.
 double tolerance_of(const PrintShape& shape, const PrintCovariance& covariance, const Marker& marker);
 
 }  // namespace lapservo::internal

@@ -18,10 +18,10 @@ struct FrameRecording {
   bool deinterlace = false;  ///< the field of the even rows, whatever the rig says
 };
 
-/// What a job of seconds to minutes is asked and tells; either may be empty.
+/// Interface of a job of seconds to minutes with its caller; either may be empty.
 struct JobWatch {
   std::function<bool()> is_stopped;
-  /// Of how many, where that is known; done; a remark.
+  /// Total, where known; done; a remark.
   std::function<void(std::optional<int>, int, const std::string&)> progress;
 
   bool stopped() const { return is_stopped && is_stopped(); }
@@ -30,7 +30,7 @@ struct JobWatch {
   }
 };
 
-/// What became of a recording's frames.
+/// Counts of a recording's frames.
 struct FramesRead {
   int looked_at = 0, flawed = 0;
   int jpegs = 0;          ///< of those looked at: what compressed them saw no frame before
@@ -46,7 +46,7 @@ void check_frame_size(const Frame& frame, const std::string& recording, const cv
                       const std::string& whose);
 
 /// Shows every `every`-th frame to `look`, as the tracker would see it, with its time; `look` may keep it, and returns
-/// what is told beside the progress. Throws InputError at a frame that is not of the rig's size.
+/// a remark beside the progress. Throws InputError at a frame that is not of the rig's size.
 FramesRead read_frames(const FrameRecording& recording, const Rig& rig, int every, const JobWatch& watch,
                        const std::function<std::string(const cv::Mat&, double)>& look);
 
