@@ -67,7 +67,7 @@ TEST(Samples, Rotation) {
   expect_rotation_figures(score_single(sample_frames("rotation")));
 }
 
-// Of the marker's pose in the camera frame, over frames: errors, and by their sigmas.
+// Errors of the marker's pose in the camera frame, over frames: errors, and by their sigmas.
 struct PoseErrors {
   std::vector<double> axis_rad, roll_rad, position_m, axis_sigmas, roll_sigmas, across_sigmas, depth_sigmas;
 

@@ -240,7 +240,7 @@ TEST(CalibrateMarkerByVideo, OneWayMayLeaveTheSeamBehind) {
   for (const auto* calibration : {&plain, &video, &pictures}) ASSERT_EQ(calibration->refusal, "");
   EXPECT_FALSE(plain.seam_may_lag);
   EXPECT_TRUE(video.seam_may_lag);
-  EXPECT_FALSE(pictures.seam_may_lag) << "no encoder saw the picture before";
+  EXPECT_FALSE(pictures.seam_may_lag) << "no encoder processed the image before";
 }
 
 INSTANTIATE_TEST_SUITE_P(

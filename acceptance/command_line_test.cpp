@@ -67,7 +67,7 @@ class CommandLine : public acceptance::ToolTest {
   }
 
 #ifdef LAPSERVO_TEST_BAGS
-  // in/run.bag and in/run, a bag of ROS 2: a folder's pictures as PNG, and joints by the same clock.
+  // in/run.bag and in/run, a bag of ROS 2: a folder's images as PNG, and joints by the same clock.
   void write_bags_of(const std::string& pictures, double fps, const CsvTable& joints) {
     constexpr double begin_s = 1700000000;
     std::vector<lapservo::testing::BagEntry> ros1, ros2;

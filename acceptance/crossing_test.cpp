@@ -63,7 +63,8 @@ struct Tally {
 
 void print_head() {
   std::printf(
-      "| | markers | found | of which psi can be told | found | psi rms [mrad] | largest | error / sigma | wrong |\n"
+      "| | markers | detected | with observable psi | detected | psi rms [mrad] | largest | normalised error | false "
+      "accepts |\n"
       "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
 }
 

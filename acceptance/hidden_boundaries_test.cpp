@@ -138,7 +138,7 @@ TEST_F(HiddenBoundaries, OfPrintsThatAreOffGiveNoneWhileTracked) {
 TEST_F(HiddenBoundaries, OfExactPrintsAreNotGuessedEither) {
   const Tally all = all_kinds(pictures, 1, Off::nowhere);
   EXPECT_EQ(all.wrong, 0);
-  EXPECT_GE(all.errors_rad.size(), 2U * static_cast<std::size_t>(pictures)) << "of 13 a picture";
+  EXPECT_GE(all.errors_rad.size(), 2U * static_cast<std::size_t>(pictures)) << "of 13 an image";
   EXPECT_LE(rms(all.errors_sigmas), 2);
 }
 

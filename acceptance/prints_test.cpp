@@ -43,7 +43,7 @@ class Prints : public ::testing::Test {
     return all;
   }
 
-  // The measurements of a print by a tracker whose rig has `believed`.
+  // The measurements of a print by a tracker with the rig `believed`.
   Tally seen(const Marker& print, const Rig& believed, int number, bool moving, const Sensor& sensor = {}) const {
     RenderedSet set;
     set.rig = rig;
@@ -80,7 +80,7 @@ class Prints : public ::testing::Test {
       tally.show(kind.name);
       all.add(tally);
     }
-    all.show("poor pictures");
+    all.show("poor images");
     return all;
   }
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """check_links.py HTML_FOLDER|- CHECKOUT: links of a site within itself, to pages and to places in them, and relative links of the
-checkout's Markdown files. Asks nobody else."""
+checkout's Markdown files. Requests nothing from the network."""
 
 import html.parser
 import pathlib
