@@ -23,7 +23,7 @@ def prose_of_page(text: str) -> list[tuple[int, str]]:
         if re.match(" *```", line):
             code = not code
         elif not code and not re.match(r" {4}[^-*0-9 ]", line):
-            lines.append((number, re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", "`", line))))
+            lines.append((number, re.sub(r"\]\([^)]*\)", "]", line)))
     return lines
 
 
@@ -68,6 +68,7 @@ def main() -> int:
         else:
             continue
         for number, text in prose:
+            text = re.sub(r"`[^`]*`", "`", text)
             found = WORDS.search(text) or BEGINNINGS.search(text)
             if found:
                 hits.append(f"{name}:{number}: {found[0].strip()}: {text}")
