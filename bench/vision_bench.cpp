@@ -1,7 +1,7 @@
 #include <benchmark/benchmark.h>
 
 #include "bench/frames.h"
-#include "lapservo/vision/fine_fit.h"
+#include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::bench {

@@ -1,7 +1,7 @@
 # What lapservo_module() was told, kept for check_boundaries.cmake, which compares what the files include with it.
-function(lapservo_remember_module name)
+function(lapservo_remember_module name folder)
   cmake_parse_arguments(M "" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;LONG_TESTS;TEST_USES" ${ARGN})
-  set(text "list(APPEND modules ${name})\n")
+  set(text "list(APPEND modules ${name})\nset(${name}_FOLDER lapservo/${folder})\n")
   foreach(what IN ITEMS PUBLIC_HEADERS USES PRIVATE TESTS LONG_TESTS TEST_USES)
     string(APPEND text "set(${name}_${what} \"${M_${what}}\")\n")
   endforeach()

@@ -1,10 +1,10 @@
-# One folder of lapservo/ is one target. lapservo_module(NAME SOURCES ... USES ... TESTS ...) declares what the folder
-# compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE), its tests,
-# which stand beside the sources (LONG_TESTS: those with something that is too slow under sanitizers), and the headers that
-# are installed (PUBLIC_HEADERS); all other headers are internal. The linker and the test `boundaries`
+# One folder of lapservo/, or one room in it, is one target. lapservo_module(NAME SOURCES ... USES ... TESTS ...) declares what
+# the folder compiles, the only targets it may include (USES, passed on to its users), what it needs privately (PRIVATE: not in
+# public headers), its tests, which stand beside the sources (LONG_TESTS: those with something that is too slow under sanitizers),
+# and the headers that are installed (PUBLIC_HEADERS); all other headers are internal. The linker and the test `boundaries`
 # (LapservoBoundaries.cmake) enforce the direction of dependencies.
-# What has no public header is nobody's library: it goes into the tool. All libraries are static; LapservoShared.cmake makes
-# one shared library of those with public headers. GLUE: lapservo_compile_glue().
+# What has no public header and is no room is nobody's library: it goes into the tool. All libraries are static;
+# LapservoShared.cmake makes one shared library of the others. GLUE: lapservo_compile_glue().
 function(lapservo_module name)
   cmake_parse_arguments(M "GLUE" "" "PUBLIC_HEADERS;SOURCES;USES;PRIVATE;TESTS;LONG_TESTS;TEST_USES" ${ARGN})
   set(target lapservo_${name})
@@ -29,11 +29,12 @@ function(lapservo_module name)
   elseif(M_SOURCES)
     lapservo_precompile(${target})
   endif()
-  if(M_PUBLIC_HEADERS)
+  cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY ${PROJECT_SOURCE_DIR}/lapservo OUTPUT_VARIABLE folder)
+  if(M_PUBLIC_HEADERS OR folder MATCHES "/")
     lapservo_install(${target} ${M_PUBLIC_HEADERS})
     set_property(GLOBAL APPEND PROPERTY LAPSERVO_PUBLIC_MODULES ${name})
   endif()
-  lapservo_remember_module(${name} ${ARGN})
+  lapservo_remember_module(${name} ${folder} ${ARGN})
   set(tests ${M_LONG_TESTS})
   if(LAPSERVO_SHORT_TESTS)
     list(APPEND tests ${M_TESTS})

@@ -26,6 +26,7 @@
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/vision/observation.h"
+#include "lapservo/vision/status.h"
 #include "lapservo/vision/tracker.h"
 
 // Where the RCM appears in the image, from the lines on which an instrument was seen.

@@ -4,7 +4,7 @@
 
 #include "lapservo/kinematics/centre_line.h"
 #include "lapservo/testing/rigs.h"
-#include "lapservo/vision/shaft_pose.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
 namespace {

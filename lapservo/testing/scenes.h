@@ -9,10 +9,10 @@
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/sim/renderer.h"
-#include "lapservo/vision/fine_fit.h"
-#include "lapservo/vision/light_image.h"
-#include "lapservo/vision/scene.h"
-#include "lapservo/vision/shaft_pose.h"
+#include "lapservo/vision/image/light_image.h"
+#include "lapservo/vision/model/fine_fit.h"
+#include "lapservo/vision/shaft/scene.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
 
 /// Rendered frames of the simulator with known truth, and what vision takes apart of them. For tests.
 namespace lapservo::scenes {

@@ -5,15 +5,12 @@
 #include <cstddef>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/geometry/cylinder.h"
-#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/marker/azimuths.h"
-#include "lapservo/vision/blob_search.h"
-#include "lapservo/vision/blurred_edges.h"
-#include "lapservo/vision/light_image.h"
-#include "lapservo/vision/limits.h"
-#include "lapservo/vision/marker_pose.h"
-#include "lapservo/vision/verification.h"
+#include "lapservo/vision/accept/verification.h"
+#include "lapservo/vision/colour/blob_search.h"
+#include "lapservo/vision/edges/blurred_edges.h"
+#include "lapservo/vision/image/light_image.h"
+#include "lapservo/vision/result/fit_observation.h"
 
 namespace lapservo::internal {
 namespace {
@@ -25,103 +22,6 @@ LookSchedule schedule_after(const FineFit& fit, LookSchedule schedule) {
   else
     schedule.passed();
   return schedule;
-}
-
-// How sure the fit is of what the centre line shows.
-struct LineSigma {
-  double tau_rad = 0;
-  EdgesCovariance edges_px2;
-};
-
-// To first order, by differences: gamma moves with the pose, psi is its last unknown.
-LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fit) {
-  const int n = fit.unknowns.size();
-  UnknownVector tau = UnknownVector::Zero(n);
-  Eigen::Matrix<double, 8, Eigen::Dynamic, 0, 8, max_unknowns> edges;
-  edges.setZero(8, n);
-  const auto after = [&](int unknown, double step) {
-    UnknownVector change = UnknownVector::Zero(n);
-    change[unknown] = step;
-    const ShaftPose pose = fit.unknowns.changed_by(change).pose();
-    return centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
-  };
-  for (int i = 0; i < n; ++i) {
-    double step = 1e-6;
-    auto moved = after(i, step);
-    // Over the seam the inner boundaries jump.
-    if (moved && std::abs(moved->tau_rad - line.tau_rad) > pi) moved = after(i, step = -step);
-    if (!moved) continue;
-    tau[i] = wrap_pi(moved->tau_rad - line.tau_rad) / step;
-    for (std::size_t k = 0; k < 4; ++k)
-      edges.block<2, 1>(2 * static_cast<Eigen::Index>(k), i) = (moved->ideal_px[k] - line.ideal_px[k]) / step;
-  }
-  LineSigma sigma;
-  sigma.tau_rad = std::sqrt(tau.dot(fit.covariance * tau));
-  const Eigen::Matrix<double, 8, Eigen::Dynamic, 0, 8, max_unknowns> weighted = edges.lazyProduct(fit.covariance);
-  sigma.edges_px2 = weighted.lazyProduct(edges.transpose());
-  return sigma;
-}
-
-// q of a freely fitted shaft that misses the RCM: the shaft from the RCM to the marker's proximal end. The angle
-// between it and the fitted axis is how wrong each angle may be; where that is too much, q is unknown.
-std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scene, const FineFit& fit,
-                                                               const Rigid3& camera_from_rcm, double tau_rad) {
-  const Rigid3& fitted = fit.unknowns.pose().camera_from_unrolled;
-  auto q = configuration_through(camera_from_rcm, fitted.translation);
-  if (!q) return std::nullopt;
-  const Rigid3 through_rcm = camera_from_rcm * rcm_from_unrolled(*q);
-  const auto view = view_cylinder(through_rcm, scene.marker.radius_m());
-  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  const double mismatch_rad = std::atan2((fitted.rotation * z).cross(through_rcm.rotation * z).norm(),
-                                         (fitted.rotation * z).dot(through_rcm.rotation * z));
-  if (!view || !(mismatch_rad < registration_limits.max_mismatch_rad)) return std::nullopt;
-  q->psi_rad = rotation_rad(scene.marker, view->facing_azimuth_rad, tau_rad);
-  const double angle_variance =
-      mismatch_rad * mismatch_rad + fit.covariance(fit.unknowns.size() - 1, fit.unknowns.size() - 1);
-  const double rho_variance = mismatch_rad * mismatch_rad * q->rho_m * q->rho_m + fit.covariance(4, 4);
-  const Eigen::Vector4d variances(angle_variance, angle_variance, rho_variance, angle_variance);
-  return Observation::Rcm{*q, variances.asDiagonal()};
-}
-
-Observation observation_of(const Scene& scene, const FineFit& fit, const std::optional<Rigid3>& camera_from_rcm) {
-  Observation observation;
-  const ShaftPose& pose = fit.unknowns.pose();
-  const auto line = centre_line(scene.camera, scene.marker, pose.camera_from_unrolled, pose.psi_rad);
-  if (!line) {
-    observation.status = Status::poor_fit;
-    return observation;
-  }
-  observation.status = Status::ok;
-  const LineSigma sigma = sigma_of(*line, scene, fit);
-  observation.tau_rad = line->tau_rad;
-  observation.sigma_tau_rad = sigma.tau_rad;
-  observation.edges_ideal_px = line->ideal_px;
-  observation.edges_covariance_px2 = sigma.edges_px2;
-  for (std::size_t k = 0; k < 4; ++k) observation.edges_raw_px[k] = scene.camera.raw_from_ideal(line->ideal_px[k]);
-  observation.features =
-      features_of(line->ideal_px, camera_from_rcm ? projected_rcm_px(scene.camera, *camera_from_rcm) : std::nullopt);
-  observation.camera_from_unrolled = pose.camera_from_unrolled;
-  observation.psi_rad = pose.psi_rad;
-  observation.marker = marker_pose_of(scene.marker, fit.unknowns, fit.covariance);
-  if (fit.unknowns.q()) {
-    observation.rcm = Observation::Rcm{*fit.unknowns.q(), fit.covariance};
-  } else if (camera_from_rcm) {
-    observation.rcm = configuration_despite_mismatch(scene, fit, *camera_from_rcm, line->tau_rad);
-  }
-  if (observation.rcm) {
-    observation.rcm->q.theta_rad = wrap_pi(observation.rcm->q.theta_rad);
-    observation.rcm->q.psi_rad = wrap_pi(observation.rcm->q.psi_rad);
-  }
-  return observation;
-}
-
-Observation refused(Status why, const ShaftPose& pose) {
-  Observation observation;
-  observation.status = why;
-  observation.refused.what = Observation::Refused::What::pose;
-  observation.refused.camera_from_unrolled = pose.camera_from_unrolled;
-  observation.refused.psi_rad = pose.psi_rad;
-  return observation;
 }
 
 }  // namespace
@@ -322,14 +222,14 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     learn_print(i);
     observations_[i] = {};
     observations_[i].status = found.status;
-    if (found.refused) observations_[i] = refused(found.status, *found.refused);
+    if (found.refused) observations_[i] = refused_observation(found.status, *found.refused);
     if (!found.fit) continue;
     // The fit was judged without: a turn that is off by a twelfth of itself at most is no reason to refuse it.
     const Eigen::Index psi = found.fit->unknowns.size() - 1;
     found.fit->covariance(psi, psi) += variance_of_uneven_turn(found.fit->turn, turn_change_rad(i, *found.fit));
     remember(i, found);
     if (!rig_.instruments[i].marker.bands_are_measured() && prints_[i].is_off()) {
-      observations_[i] = refused(Status::marker_mismatch, found.fit->unknowns.pose());
+      observations_[i] = refused_observation(Status::marker_mismatch, found.fit->unknowns.pose());
       continue;
     }
     observations_[i] = observation_of(scene_of(image, i), *found.fit, rig_.instruments[i].camera_from_rcm);

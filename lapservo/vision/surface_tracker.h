@@ -7,13 +7,13 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/rig/rig.h"
-#include "lapservo/vision/color_classes.h"
-#include "lapservo/vision/fine_fit.h"
-#include "lapservo/vision/look_schedule.h"
-#include "lapservo/vision/marker_search.h"
+#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/memory/look_schedule.h"
+#include "lapservo/vision/memory/print_record.h"
+#include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/observation.h"
-#include "lapservo/vision/print_record.h"
-#include "lapservo/vision/shaft_cover.h"
+#include "lapservo/vision/search/marker_search.h"
+#include "lapservo/vision/shaft/shaft_cover.h"
 
 namespace lapservo::internal {
 

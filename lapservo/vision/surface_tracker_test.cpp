@@ -22,7 +22,7 @@
 #include "lapservo/testing/ink_aside.h"
 #include "lapservo/testing/motion.h"
 #include "lapservo/testing/scenes.h"
-#include "lapservo/vision/blob_search.h"
+#include "lapservo/vision/colour/blob_search.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {

@@ -5,9 +5,9 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/words.h"
-#include "lapservo/vision/centerline.h"
-#include "lapservo/vision/image_view.h"
-#include "lapservo/vision/interlacing.h"
+#include "lapservo/vision/image/image_view.h"
+#include "lapservo/vision/image/interlacing.h"
+#include "lapservo/vision/paper/centerline.h"
 #include "lapservo/vision/surface_tracker.h"
 
 namespace lapservo {

@@ -25,7 +25,7 @@ def enumerators(header, name):
 
 
 @pytest.mark.parametrize(("header", "name", "title"), [
-    ("lapservo/vision/observation.h", "Status", "Status of an observation"),
+    ("lapservo/vision/status.h", "Status", "Status of an observation"),
     ("lapservo/control/hold_reason.h", "HoldReason", "Hold reasons of the loop"),
     ("lapservo/crtk/interlock.h", "Blocked", "Reasons of the interlock"),
 ])

@@ -11,7 +11,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/marker/sensitivity.h"
-#include "lapservo/vision/color_classes.h"
+#include "lapservo/vision/colour/color_classes.h"
 
 namespace lapservo::internal {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
-#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/image/light_image.h"
 
 namespace lapservo::internal {
 namespace {

@@ -6,8 +6,8 @@
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
-#include "lapservo/vision/color_classes.h"
-#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/image/light_image.h"
 
 namespace lapservo::internal {
 

@@ -11,7 +11,7 @@
 #include "lapservo/calibration/colour/marker_response.h"
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/vision/color_classes.h"
+#include "lapservo/vision/colour/color_classes.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {

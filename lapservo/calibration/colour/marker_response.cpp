@@ -8,8 +8,8 @@
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
-#include "lapservo/vision/edge_profile.h"
-#include "lapservo/vision/light_image.h"
+#include "lapservo/vision/edges/edge_profile.h"
+#include "lapservo/vision/image/light_image.h"
 
 namespace lapservo::internal {
 namespace {

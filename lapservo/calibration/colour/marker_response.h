@@ -9,7 +9,7 @@
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/marker/marker.h"
-#include "lapservo/vision/shaft_pose.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
 
 namespace lapservo::internal {
 

@@ -12,9 +12,8 @@
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
 #include "lapservo/marker/decoder.h"
-#include "lapservo/vision/edge_measurements.h"
-#include "lapservo/vision/light_image.h"
-#include "lapservo/vision/limits.h"
+#include "lapservo/vision/edges/edge_measurements.h"
+#include "lapservo/vision/image/light_image.h"
 
 namespace lapservo::internal {
 namespace {

@@ -10,8 +10,7 @@
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/calibration/fit/solve_quietly.h"
 #include "lapservo/core/dense_matrix.h"
-#include "lapservo/vision/common_errors.h"
-#include "lapservo/vision/limits.h"
+#include "lapservo/vision/model/common_errors.h"
 
 namespace lapservo::internal {
 namespace {
@@ -162,11 +161,10 @@ struct EdgeCost {
 };
 
 double common_sigma_px(std::size_t group, const ViewMeasurements& frame) {
-  const double more_px =
-      fine_fit_limits.common_fraction_of_blur * std::max(0.0, frame.blur_px - fine_fit_limits.usual_blur_px);
+  const double more_px = usual_errors.common_fraction_of_blur * std::max(0.0, frame.blur_px - usual_blur_px);
   if (group >= measurement_groups) return common_seam_px + more_px;
-  const double usual_px = group < 4 ? fine_fit_limits.common_boundary_px : fine_fit_limits.common_side_px;
-  return std::hypot(usual_px + more_px, fine_fit_limits.fraction_of_processing * frame.bias_px[group]);
+  const double usual_px = group < 4 ? usual_errors.common_boundary_px : usual_errors.common_side_px;
+  return std::hypot(usual_px + more_px, usual_errors.fraction_of_processing * frame.bias_px[group]);
 }
 
 std::vector<EdgeCost> add_frame(ceres::Problem& problem, const ViewMeasurements& measured, const PrintShape& shape,
@@ -216,12 +214,12 @@ double sigma_of_edges_px(const std::vector<ViewMeasurements>& frames) {
   for (const ViewMeasurements& frame : frames)
     for (const Measurement& m : frame.edges.all)
       if (m.group < 4) sigmas_px.push_back(m.sigma_px);
-  return sigmas_px.empty() ? fine_fit_limits.usual_sigma_px : median(sigmas_px);
+  return sigmas_px.empty() ? usual_errors.usual_sigma_px : median(sigmas_px);
 }
 
 // The ratio of the edges' noise to the usual noise: it is higher in compressed images.
 double noise_beyond_usual(double sigma_px) {
-  return std::max(0.0, sigma_px / fine_fit_limits.usual_sigma_px - 1);
+  return std::max(0.0, sigma_px / usual_errors.usual_sigma_px - 1);
 }
 
 // As the tracker has it, in all frames alike.

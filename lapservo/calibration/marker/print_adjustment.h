@@ -5,7 +5,7 @@
 
 #include "lapservo/calibration/fit/at_iteration.h"
 #include "lapservo/calibration/marker/print_shape.h"
-#include "lapservo/vision/marker_survey.h"
+#include "lapservo/vision/survey/marker_survey.h"
 
 namespace lapservo::internal {
 

@@ -6,7 +6,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/pictures/image_encoding.h"
-#include "lapservo/vision/interlacing.h"
+#include "lapservo/vision/image/interlacing.h"
 
 namespace lapservo::internal {
 

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <cstddef>
+
+#include "lapservo/vision/shaft/scene.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
+
+namespace lapservo::internal {
+
+// What pixels' colours say of a fit that would be refused without.
+
+/// On how many of so many lines along the marker both of an inner boundary's colours show beside it. An edge of blood
+/// has one of them at most.
+int lines_with_both_colors(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
+
+/// And on how many nothing hides a boundary: colours of the marker, whichever, show on both sides, of an end inside.
+int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
+
+/// Of the ring beyond an end, the fraction with that end's colour, of both ends the larger; what shows it in patches,
+/// since noise in the dark does in single pixels.
+double spilled_in_patches(const Scene& scene, const ShaftPose& pose);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,269 @@
+#include "lapservo/vision/accept/verification.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/accept/color_evidence.h"
+#include "lapservo/vision/memory/print_record.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr const ValidationLimits& limits = validation_limits;
+
+// Of the marker; at least a pixel.
+double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
+  const auto px = [&](double along_m) {
+    return scene.camera.raw_from_point(pose.camera_from_unrolled *
+                                       surface_point(scene.marker.radius_m(), azimuth_rad, along_m));
+  };
+  const double length_px = (px(scene.marker.length_m()) - px(0)).norm();
+  return std::isfinite(length_px) ? std::max(1.0, length_px) : 1.0;
+}
+
+// The print's fault, not the scene's: a boundary is not where it should be on lines on which nothing hides it.
+bool misses_a_boundary(const Scene& scene, const FineFit& fit, const ColorAgreement& agreement) {
+  if (agreement.matching <= limits.unhidden_matching || fit.blur.boundaries_px >= limits.unblurred_px) return false;
+  for (std::size_t k = 0; k < 4; ++k) {
+    if (fit.in_image[k] < limits.enough_lines || fit.used[k] >= limits.missed_fraction * fit.in_image[k]) continue;
+    const int clear = lines_in_clear_view(scene, fit.unknowns.pose(), k, fit.lines);
+    if (clear >= limits.enough_lines && fit.used[k] < limits.missed_fraction * clear) return true;
+  }
+  return false;
+}
+
+// Of how many of its lines a boundary is located.
+double located_of_lines(const FineFit& fit, std::size_t boundary) {
+  return static_cast<double>(fit.used[boundary]) / std::max(1, fit.lines);
+}
+
+// Whether what shows of three boundaries holds the fourth, an end, as well.
+bool needs_no_other_end(const FineFit& fit) {
+  return fit.located_fraction() > limits.less_hidden &&
+         std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) > limits.well_located &&
+         std::max(located_of_lines(fit, 0), located_of_lines(fit, 3)) > limits.wholly_located;
+}
+
+double max_spilled(const FineFit& fit) {
+  const bool located = std::min(located_of_lines(fit, 0), located_of_lines(fit, 3)) > limits.half_located;
+  return located ? limits.max_spilled_of_located : limits.max_spilled;
+}
+
+// A boundary on fewer lines may be the blood's.
+int fewest_lines(const FineFit& fit) {
+  return std::max(limits.min_of_end, fit.lines / limits.end_one_in);
+}
+
+// Whether an inner boundary is located on so many lines, or so plainly, that it is the marker's and no edge of blood.
+bool is_the_markers(const Scene& scene, const FineFit& fit, std::size_t boundary) {
+  if (fit.used[boundary] >= fewest_lines(fit)) return true;
+  return fit.used[boundary] >= limits.confirmed_lines &&
+         lines_with_both_colors(scene, fit.unknowns.pose(), boundary, fit.lines) >= limits.confirmed_lines;
+}
+
+// Whether points are missed since the camera's processing scatters them, as clipped colours do, and not since blood
+// hides them.
+bool is_scattered(const FineFit& fit) {
+  const auto& moved_px = fit.bias_px;
+  return fit.processing == Processing::found &&
+         *std::max_element(moved_px.begin(), moved_px.end()) > limits.scattering_processing_px;
+}
+
+// Whether earlier frames showed that the print is the rig's from there.
+bool is_known(const Scene& scene, const FineFit& fit) {
+  if (!scene.print) return false;
+  const auto tau_rad = facing_tau_rad(scene.marker, fit.unknowns.pose());
+  return tau_rad && scene.print->is_the_rigs(*tau_rad);
+}
+
+// Whether a print that is off would show. Where one inner boundary is left, or few lines of the other that may as well
+// be an edge of blood, its error looks like a turn. One whose bands were measured is not off, and a tolerance of that
+// size is in sigma. Where another instrument hides a part, it is asked even if both inner boundaries show: one of 13000
+// rows, with blood, was 0.13 rad wrong.
+bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool hidden_by_another) {
+  if (scene.marker.bands_are_measured()) return true;
+  if (scene.marker.tolerance_m >= limits.tolerance_of_prints_m) return true;
+  const bool few = std::min(located_of_lines(fit, 1), located_of_lines(fit, 2)) <= limits.missed_fraction;
+  const bool both_show = (fit.located_fraction() > limits.hardly_hidden || is_scattered(fit)) && !few;
+  if (both_show && !hidden_by_another) return true;
+  if (is_known(scene, fit)) return true;
+  // What another instrument hides is known: no edge of it is taken for a boundary, as one of blood may be.
+  const bool may_be_bloods = few && !hidden_by_another;
+  return fit.inner_off_m < (may_be_bloods ? limits.max_inner_off_of_few_m : limits.max_inner_off_m) &&
+         is_the_markers(scene, fit, 1) && is_the_markers(scene, fit, 2);
+}
+
+// Another instrument's colours beside a marker that shows as it should are no reason to doubt it.
+bool shows_wholly_among_others(const Scene& scene, const ColorAgreement& agreement, const FineFit& fit) {
+  return scene.among_others && agreement.matching > limits.matching_among_others &&
+         fit.located_fraction() > limits.located_among_others;
+}
+
+// Motion and turns move boundaries as a print's errors would; defocus is alike along the shaft and across it.
+bool has_moved(const FineFit& fit) {
+  if (variance_of_uneven_turn(fit.turn, std::nullopt) > 0) return true;
+  const auto [narrower_px, wider_px] = std::minmax(fit.blur.boundaries_px, fit.blur.sides_px);
+  const bool even =
+      wider_px < limits.even_blur * narrower_px && std::abs(fit.blur.correlation) < limits.even_correlation;
+  return fit.blur.widest_px() > limits.unblurred_px && !even;
+}
+
+// How far a print that is suspicious may let psi be off, one sigma. The smaller the marker, the less a picture tells;
+// and what compression does to boundaries scatters their points, too.
+double max_sigma_suspected_rad(const FineFit& fit) {
+  if (!is_well_seen(fit) || has_moved(fit) || fit.inlier_rms_sigmas > limits.scattered_rms_sigmas)
+    return limits.max_sigma_suspected_of_poor_rad;
+  const double scale = std::max(1.0, limits.usual_radius_px / fit.blur.radius_px);
+  return std::min(scale * limits.max_sigma_suspected_rad, limits.max_sigma_suspected_of_poor_rad);
+}
+
+// Sigma of psi, and whom to blame when it is too large: the print or the picture.
+Status validate_sigma(const Scene& scene, const FineFit& fit, const ColorAgreement& agreement) {
+  const auto squared = [](double x) { return x * x; };
+  const bool off = fit.print_off_probability > limits.certainly_off;
+  const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
+  const double told_times = fit.psi_variance_suspected > 0 ? print_limits.suspected_told : 1;
+  const double told_limit = squared(told_times * limits.max_sigma_told_rad);
+  const double by_tolerance = fit.psi_variance_by_tolerance;
+  const double variance = fit.psi_variance, told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
+  if (by_tolerance < limit && misses_a_boundary(scene, fit, agreement)) return Status::marker_mismatch;
+  const double slack = limits.tolerance_slack * by_tolerance;
+  const bool well_seen = is_well_seen(fit);
+  if (!(variance < limit + slack && told < told_limit + slack))
+    return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
+  const double suspected = variance - fit.psi_variance_by_print + fit.psi_variance_suspected;
+  // Without the RCM it is in sigma only: there a picture tells less of the print, and no psi.
+  if (!fit.unknowns.q() || !(fit.psi_variance_suspected > 0) ||
+      suspected < squared(max_sigma_suspected_rad(fit)) + slack)
+    return Status::ok;
+  return well_seen ? Status::marker_mismatch : Status::uncertain;
+}
+
+}  // namespace
+
+bool is_well_seen(const FineFit& fit) {
+  return fit.located_fraction() > limits.well_seen_fraction;
+}
+
+ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
+  constexpr int azimuths = 13, places = 40, margin = 5;
+  constexpr double beside_radii = 1.2;
+  ColorAgreement agreement;
+  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
+  if (!view) return agreement;
+  const double length_m = scene.marker.length_m(), ring_m = 0.1 * length_m;
+  const double guard_m =
+      length_m *
+      std::max(limits.min_guard, limits.blurred_px / length_in_image_px(scene, pose, view->facing_azimuth_rad));
+  int total = 0, inside = 0, matching = 0, wrong = 0, outer = 0, beyond = 0, flank = 0, beside = 0;
+  std::array<int, 2> ring{}, spilled{};
+  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  for (int i = 0; i < azimuths; ++i) {
+    const double azimuth_rad = visible_azimuth_rad(*view, 0.8, i, azimuths);
+    const double tau_rad = marker_azimuth_rad(scene.marker, azimuth_rad, pose.psi_rad);
+    if (scene.marker.gap_rad > 0 && distance_to_seam_rad(scene.marker, tau_rad) * scene.marker.radius_m() < guard_m)
+      continue;
+    const auto ends_m = boundaries_m(scene.marker, tau_rad);
+    const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(scene.marker.radius_m(), azimuth_rad, 0);
+    for (int k = -margin; k < places + margin; ++k) {
+      const double along_m = length_m * (k + 0.5) / places;
+      bool near_boundary = false;
+      int band = 0;
+      for (const double end_m : ends_m) near_boundary |= std::abs(end_m - along_m) < guard_m, band += along_m >= end_m;
+      if (near_boundary) continue;
+      const bool on_marker = band >= 1 && band <= 3;
+      total += on_marker;
+      const Eigen::Vector3d point = base + along_m * axis;
+      const std::uint8_t color = on_marker ? scene.class_on_shaft(point) : scene.class_at_point(point);
+      if (color == Scene::outside) continue;
+      const bool ours = scene.is_ours(color);
+      if (!on_marker) {
+        const std::size_t end = band < 1 ? 0 : 1;
+        const double past_m = end == 0 ? ends_m[0] - along_m : along_m - ends_m[3];
+        if (past_m < ring_m) ++ring[end], spilled[end] += color == scene.bands[2 * end];
+        ++outer, beyond += ours;
+        continue;
+      }
+      ++inside;
+      const bool match = color == scene.bands[static_cast<std::size_t>(band - 1)];
+      matching += match, wrong += ours && !match;
+    }
+  }
+  for (const double side : {-1.0, 1.0}) {
+    const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(beside_radii * scene.marker.radius_m(),
+                                                                           view->facing_azimuth_rad + side * pi / 2, 0);
+    for (int k = 0; k < places; ++k) {
+      const std::uint8_t color = scene.class_at_point(base + length_m * (k + 0.5) / places * axis);
+      if (color != Scene::outside) ++flank, beside += scene.is_ours(color);
+    }
+  }
+  const auto fraction = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
+  return {fraction(matching, inside), fraction(wrong, inside),
+          fraction(inside, total),    fraction(beyond, outer),
+          fraction(beside, flank),    std::max(fraction(spilled[0], ring[0]), fraction(spilled[1], ring[1]))};
+}
+
+Status validate(const Scene& scene, const FineFit& fit) {
+  if (!fit.converged) return Status::poor_fit;
+  const ColorAgreement agreement = color_agreement(scene, fit.unknowns.pose());
+  const bool in_image = agreement.in_image > limits.wholly_in_image;
+  const Status too_little = in_image || !scene.others.empty() ? Status::occluded : Status::cut;
+  if (agreement.in_image < limits.min_in_image) return too_little;
+
+  // Colours where they should not be.
+  const double fraction = fit.located_fraction();
+  const bool complete = agreement.matching > limits.complete_matching && fraction > limits.complete_fraction;
+  const double tolerance = complete ? limits.tolerance_of_complete : 1;
+  const bool surrounded =
+      agreement.beyond > tolerance * limits.max_beyond || agreement.beside > tolerance * limits.max_beside;
+  if (agreement.wrong > tolerance * limits.max_wrong ||
+      (surrounded && !shows_wholly_among_others(scene, agreement, fit)))
+    return Status::poor_fit;
+
+  // Too little of the marker.
+  if (agreement.matching < limits.min_matching) return Status::occluded;
+  const int inner_used = fit.used[1] + fit.used[2], outer_used = fit.used[0] + fit.used[3];
+  if (inner_used < std::max(limits.min_inner, fit.lines / limits.inner_one_in) || outer_used < limits.min_outer)
+    return Status::occluded;
+  // With the RCM both ends confirm what is left of a hidden marker; without it they are needed always.
+  const bool hidden_by_another = !in_image && !scene.others.empty();
+  const bool needs_both_ends = !fit.unknowns.q() ||
+                               (fraction < limits.mostly_hidden && in_image && !needs_no_other_end(fit)) ||
+                               (fraction < limits.well_located_beside_another && hidden_by_another);
+  if (needs_both_ends && std::min(fit.used[0], fit.used[3]) < fewest_lines(fit)) return too_little;
+
+  // Boundaries and sides that agree badly.
+  if (fraction < limits.partly_hidden && agreement.spilled > max_spilled(fit) &&
+      spilled_in_patches(scene, fit.unknowns.pose()) > max_spilled(fit))
+    return Status::poor_fit;
+  const bool all_show = 4 == std::count_if(fit.used.begin(), fit.used.end(),
+                                           [&](int used) { return used > limits.missed_fraction * fit.lines; });
+  const double max_rms_sigmas = all_show ? limits.max_rms_of_all_sigmas : limits.max_rms_sigmas;
+  const bool few_sides = limits.sides_one_in * fit.sides_used < fit.sides_in_image;
+  const double more_rms_sigmas = few_sides ? 0
+                                           : limits.rms_per_fraction * std::clamp(fraction - limits.rms_from_fraction,
+                                                                                  0.0, limits.rms_most_fraction);
+  if (fraction < limits.min_fraction || fit.inlier_rms_sigmas > max_rms_sigmas + more_rms_sigmas)
+    return Status::poor_fit;
+
+  // Motion blur.
+  const double motion_blur_px = fit.blur.widest_px();
+  if (motion_blur_px > limits.lost_px) return Status::uncertain;
+  const bool blurred = motion_blur_px > limits.motion_blurred_px;
+  const int min_used = *std::min_element(fit.used.begin(), fit.used.end());
+  if (blurred && limits.motion_blurred_end_of * min_used < limits.motion_blurred_end_parts * fit.lines)
+    return Status::uncertain;
+  // Few boundaries need the sides beside them.
+  if ((blurred || fraction < limits.mostly_hidden) && fit.sides_used < limits.min_sides) return Status::uncertain;
+  const Status status = validate_sigma(scene, fit, agreement);
+  if (status != Status::ok || would_show_a_print_that_is_off(scene, fit, hidden_by_another)) return status;
+  return too_little;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,243 @@
+#include "lapservo/vision/accept/verification.h"
+
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/testing/ink_aside.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+using scenes::fit_from;
+using scenes::Shot;
+using scenes::Sight;
+using scenes::usual_shot;
+
+FineFit fit_from_truth(const Shot& shot) {
+  return fit_from(shot, shot.truth(true));
+}
+
+UnknownVector change(double theta_rad, double phi_rad, double rho_m, double psi_rad) {
+  return Eigen::Vector4d(theta_rad, phi_rad, rho_m, psi_rad);
+}
+
+TEST(Verification, ARightPoseIsOk) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    EXPECT_EQ(validate(shot.sight.scene(), fit_from_truth(shot)), Status::ok);
+    const ColorAgreement agreement = color_agreement(shot.sight.scene(), scenes::pose_of(shot.rig, 0, shot.q));
+    EXPECT_GT(agreement.matching, 0.85);
+    EXPECT_LT(agreement.wrong, 0.02);
+    EXPECT_EQ(agreement.in_image, 1);
+    EXPECT_LT(agreement.beyond, 0.05);
+  }
+}
+
+// Started wrong, a fit may find back; what is called ok is right.
+TEST(Verification, WhatAWrongStartLeadsToIsRightOrNotOk) {
+  int refused = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    for (const UnknownVector& wrong :
+         {change(0, 0, 0, 0.5), change(0, 0, 0, -0.5), change(0, 0, 0, 1.5), change(0, 0, 0, -1.5), change(0, 0, 0, pi),
+          change(0, 0, 2e-3, 0), change(0, 0, -2e-3, 0), change(0, 0, 6e-3, 0), change(0.03, 0, 0, 0),
+          change(0.15, 0, 0, 0), change(0, 0.03, 0, 0), change(0, -0.15, 0, 0)}) {
+      const FineFit fit = fit_from(shot, shot.truth(true).changed_by(wrong));
+      if (validate(shot.sight.scene(), fit) != Status::ok) {
+        ++refused;
+        continue;
+      }
+      const UnknownVector error = fit.unknowns.q()->vector() - shot.q.vector();
+      EXPECT_LT(std::abs(wrap_pi(error[3])), 0.1) << wrong.transpose();
+      EXPECT_LT(std::abs(error[2]), 0.2e-3) << wrong.transpose();
+    }
+  }
+  EXPECT_GT(refused, 8 * 6);
+}
+
+// Even when all else about the fit looks well.
+TEST(Verification, APoseThatTheColoursContradictIsNotOk) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    const Scene scene = shot.sight.scene();
+    const FineFit right = fit_from_truth(shot);
+    const double matching = color_agreement(scene, right.unknowns.pose()).matching;
+    for (const UnknownVector& wrong : {change(0, 0, 0, 2.5), change(0, 0, 8e-3, 0), change(0, 0, -8e-3, 0),
+                                       change(0.3, 0, 0, 0), change(-0.3, 0, 0, 0)}) {
+      FineFit fit = right;
+      fit.unknowns = right.unknowns.changed_by(wrong);
+      EXPECT_NE(validate(scene, fit), Status::ok) << wrong.transpose();
+      EXPECT_LT(color_agreement(scene, fit.unknowns.pose()).matching, matching - 0.1) << wrong.transpose();
+    }
+  }
+}
+
+TEST(Verification, AFitWithoutSupportIsNotOk) {
+  const Shot& shot = usual_shot(1);
+  const FineFit right = fit_from_truth(shot);
+  const Scene scene = shot.sight.scene();
+  ASSERT_EQ(validate(scene, right), Status::ok);
+  FineFit fit = right;
+  fit.converged = false;
+  EXPECT_EQ(validate(scene, fit), Status::poor_fit);
+  fit = right;
+  fit.used[1] = fit.used[2] = 0;
+  EXPECT_EQ(validate(scene, fit), Status::occluded);
+  fit = right;
+  fit.used[0] = fit.used[3] = 0;
+  EXPECT_EQ(validate(scene, fit), Status::occluded);
+  fit = right;
+  fit.psi_variance = 0.01;
+  EXPECT_EQ(validate(scene, fit), Status::uncertain);
+  fit = right;
+  fit.inlier_rms_sigmas = 4;
+  EXPECT_EQ(validate(scene, fit), Status::poor_fit);
+}
+
+// Where nothing shows whether the print is off, its rig has to say that it is measured.
+TEST(Verification, AnInnerBoundaryThatIsHiddenLeavesThePrintInDoubt) {
+  const Shot& shot = usual_shot(1);
+  const FineFit right = fit_from_truth(shot);
+  EXPECT_LT(right.inner_off_m, 2e-5);
+  Rig measured = shot.rig;
+  MarkerSigmas& sigmas = measured.instruments[0].marker.sigmas;
+  sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
+  const Sight of_measured(measured, shot.bgr);
+  for (const std::size_t boundary : {1U, 2U}) {
+    FineFit fit = right;
+    fit.used[boundary] = fit.in_image[boundary] = fit.lines / 5;
+    EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok);
+    fit.inner_off_m = 3e-4;
+    EXPECT_EQ(validate(shot.sight.scene(), fit), Status::occluded);
+    EXPECT_EQ(validate(of_measured.scene(), fit), Status::ok);
+    fit = right;
+    fit.used[boundary] = fit.in_image[boundary] = validation_limits.confirmed_lines;
+    EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "both of its colours show beside it";
+    fit.used[boundary] = 2, fit.in_image[boundary] = 2;
+    EXPECT_EQ(validate(shot.sight.scene(), fit), Status::occluded);
+    EXPECT_EQ(validate(of_measured.scene(), fit), Status::ok);
+  }
+}
+
+// Where few lines of one show, they may be an edge of blood, with which a print that is off looks nearly exact.
+TEST(Verification, FewLinesOfAnInnerBoundaryMustHoldItsPlace) {
+  const Shot& shot = usual_shot(1);
+  const Scene scene = shot.sight.scene();
+  for (const std::size_t boundary : {1U, 2U}) {
+    FineFit fit = fit_from_truth(shot);
+    fit.inner_off_m = 8e-5;
+    fit.in_image.fill(fit.lines), fit.used.fill(fit.lines / 2);
+    EXPECT_EQ(validate(scene, fit), Status::ok) << "half of each shows";
+    fit.used[boundary] = fit.in_image[boundary] = fit.lines / 5;
+    EXPECT_EQ(validate(scene, fit), Status::occluded);
+    fit.inner_off_m = 6e-5;
+    EXPECT_EQ(validate(scene, fit), Status::ok);
+  }
+}
+
+// A fit of which each boundary was located on so much of its lines.
+FineFit with_located(FineFit fit, double fraction) {
+  fit.in_image.fill(fit.lines);
+  fit.used.fill(static_cast<int>(fraction * fit.lines));
+  return fit;
+}
+
+// Clipped colours scatter points, blood hides them: only then nothing shows whether the print is off.
+TEST(Verification, WhatProcessingScattersIsNotHidden) {
+  const Shot& shot = usual_shot(1);
+  const Scene scene = shot.sight.scene();
+  FineFit scattered = with_located(fit_from_truth(shot), 0.6);
+  scattered.inner_off_m = 3e-4;
+  EXPECT_EQ(validate(scene, scattered), Status::occluded);
+  scattered.processing = Processing::found;
+  scattered.bias_px.fill(0.1);
+  EXPECT_EQ(validate(scene, scattered), Status::occluded) << "so little scatters nothing";
+  scattered.bias_px[1] = 0.5;
+  EXPECT_EQ(validate(scene, scattered), Status::ok);
+  scattered.used[1] = scattered.in_image[1] = scattered.lines / 5;
+  EXPECT_EQ(validate(scene, scattered), Status::occluded) << "hidden as well";
+  scattered = with_located(scattered, 0.6);
+  scattered.processing = Processing::unknown;
+  EXPECT_EQ(validate(scene, scattered), Status::occluded) << "nothing tells that it is processing";
+}
+
+// Blood leaves few boundaries, which agree well; translucent blood leaves them all, which agree worse.
+TEST(Verification, BoundariesMayAgreeWorseWhereAllShow) {
+  const Shot& shot = usual_shot(1);
+  const Scene scene = shot.sight.scene();
+  FineFit fit = with_located(fit_from_truth(shot), 0.6);
+  fit.inlier_rms_sigmas = 1.4;
+  EXPECT_EQ(validate(scene, fit), Status::ok);
+  fit.inlier_rms_sigmas = 1.5;
+  EXPECT_EQ(validate(scene, fit), Status::poor_fit);
+  for (const std::size_t boundary : {0U, 3U}) {
+    FineFit hidden = with_located(fit, 0.6);
+    hidden.used[boundary] = hidden.in_image[boundary] = hidden.lines / 5;
+    hidden.inlier_rms_sigmas = 1.25;
+    EXPECT_EQ(validate(scene, hidden), Status::ok) << "boundary " << boundary;
+    hidden.inlier_rms_sigmas = 1.4;
+    EXPECT_EQ(validate(scene, hidden), Status::poor_fit) << "boundary " << boundary;
+  }
+}
+
+// What a picture does not exclude may be the print's: psi is not told then.
+TEST(Verification, APrintThatMayWellBeOffIsNotTrusted) {
+  const Shot& shot = usual_shot(1);
+  const FineFit right = fit_from_truth(shot);
+  EXPECT_EQ(right.psi_variance_suspected, 0);
+  FineFit fit = right;
+  fit.psi_variance_suspected = 0.015 * 0.015;
+  EXPECT_EQ(validate(shot.sight.scene(), fit), Status::marker_mismatch);
+  EXPECT_EQ(validate(shot.sight.scene(), with_located(fit, 0.6)), Status::ok) << "blood leaves less to tell it by";
+  fit.psi_variance_suspected = 0.04 * 0.04;
+  EXPECT_EQ(validate(shot.sight.scene(), with_located(fit, 0.6)), Status::uncertain) << "as likely as the print";
+  fit.psi_variance_suspected = 0.01 * 0.01;
+  EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "off, it would make little of psi";
+}
+
+// The same picture says more to one who measured the print: who did knows where its boundaries lie.
+TEST(Verification, ThePrintIsNeverSuspiciousWhereItsBandsWereMeasured) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    Rig printed = scenes::usual_rig();
+    Marker& print = printed.instruments[0].marker;
+    print = scenes::with_ink_aside(print, 1e-4);
+    const Shot shot(seed, {}, printed);
+    const auto fit_with = [&](const Rig& rig) {
+      const Sight sight(rig, shot.bgr);
+      return fit_finely(sight.scene(), sight.light(), shot.truth(true), {});
+    };
+    Rig rig = scenes::usual_rig();
+    EXPECT_GT(fit_with(rig).psi_variance_suspected, 0);
+    MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;
+    sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
+    EXPECT_EQ(fit_with(rig).psi_variance_suspected, 0);
+  }
+}
+
+TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
+  const Shot& shot = usual_shot(1);
+  FineFit fit = fit_from_truth(shot);
+  ShaftPose aside = fit.unknowns.pose();
+  aside.camera_from_unrolled.translation.x() += 0.2;
+  fit.unknowns = PoseUnknowns::free(aside);
+  EXPECT_EQ(validate(shot.sight.scene(), fit), Status::cut);
+  EXPECT_EQ(color_agreement(shot.sight.scene(), aside).in_image, 0);
+}
+
+TEST(Verification, TissueIsNotOk) {
+  const Shot& shot = usual_shot(1);
+  const Sight empty(shot.rig, scenes::render_nothing(shot.rig, 2));
+  EXPECT_NE(validate(empty.scene(), fit_from_truth(shot)), Status::ok);
+  EXPECT_LT(color_agreement(empty.scene(), scenes::pose_of(shot.rig, 0, shot.q)).matching, 0.05);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,304 @@
+#include "lapservo/vision/camera/camera_departure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+#include <Eigen/LU>
+
+#include "lapservo/vision/edges/blurred_edges.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr const DepartureLimits& believed = departure_limits;
+constexpr Look in_light{24, 1, Between::light};
+
+std::array<float, 256> raised(const std::array<float, 256>& light_of_value, double exponent) {
+  std::array<float, 256> out;
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = std::pow(light_of_value[i], static_cast<float>(exponent));
+  return out;
+}
+
+// A step at the samples of an edge, about its mean; and its density, which moves it, apart from step and mean.
+struct StepColumns {
+  std::array<float, PooledEdge::samples> step, density;
+  std::size_t first, last;
+  float step_square = 0, density_square = 0;
+
+  StepColumns(const PooledEdge& edge, float blur_px) {
+    const int reach = std::min(edge.clear_px, believed.reach_px);
+    first = static_cast<std::size_t>(PooledEdge::reach - reach);
+    last = static_cast<std::size_t>(PooledEdge::reach + reach);
+    const BlurredEdges& edges = BlurredEdges::instance();
+    const float from_edge = static_cast<float>(-PooledEdge::reach) - static_cast<float>(edge.residual_px);
+    float step_sum = 0, density_sum = 0, both = 0;
+    for (std::size_t i = first; i <= last; ++i) {
+      const BlurredEdge at = edges.at((from_edge + static_cast<float>(i)) / blur_px);
+      step[i] = at.step, density[i] = at.density;
+      step_sum += at.step, density_sum += at.density;
+    }
+    const float per_sample = 1 / static_cast<float>(last - first + 1);
+    for (std::size_t i = first; i <= last; ++i) {
+      step[i] -= per_sample * step_sum, density[i] -= per_sample * density_sum;
+      step_square += step[i] * step[i], both += step[i] * density[i];
+    }
+    for (std::size_t i = first; i <= last; ++i) {
+      density[i] -= both / step_square * step[i];
+      density_square += density[i] * density[i];
+    }
+  }
+};
+
+using Channels = Eigen::Array3d;  // b, g, r
+
+// Where each channel shows an edge, from where all of them do, and how much its light changes there.
+struct ChannelSteps {
+  Channels offset_px, step;
+  Channels gloss_px = Channels::Zero();  // by how much gloss and shading may move each
+};
+
+template <typename LightOf>
+ChannelSteps channel_steps(const StepColumns& columns, const PooledEdge& edge, float blur_px, const LightOf& light_of) {
+  Channels step, density;
+  for (std::size_t c = 0; c < 3; ++c) {
+    float by_step = 0, by_density = 0;
+    for (std::size_t i = columns.first; i <= columns.last; ++i) {
+      const float light = light_of(edge.value[c][i]);
+      by_step += columns.step[i] * light, by_density += columns.density[i] * light;
+    }
+    const auto channel = static_cast<Eigen::Index>(c);
+    step[channel] = static_cast<double>(by_step / columns.step_square);
+    density[channel] = static_cast<double>(by_density / columns.density_square);
+  }
+  ChannelSteps out{-static_cast<double>(blur_px) * density / step, step};
+  // Gloss is white: it shows alone in a channel in which both sides of the edge look alike.
+  Eigen::Index alike = 0;
+  if (step.abs().minCoeff(&alike) < believed.least_step * step.abs().maxCoeff())
+    out.gloss_px = static_cast<double>(blur_px) * std::abs(density[alike]) / step.abs();
+  return out;
+}
+
+struct SeenBoundary {
+  const PooledEdge* edge;
+  double radial_px;                            // how far from the principal point it lies along its normal
+  Channels offset_px, weight, share;           // share: of what fit_step sees there
+  Channels by_exponent_px = Channels::Zero();  // d(offset)/d(exponent)
+  int channels;                                // that show it
+
+  SeenBoundary(const PooledEdge& of_edge, double of_radial_px, const ChannelSteps& steps)
+      : edge(&of_edge), radial_px(of_radial_px), offset_px(steps.offset_px) {
+    const Channels of_most = steps.step.abs() / steps.step.abs().maxCoeff();
+    const Eigen::Array<bool, 3, 1> shown = of_most > believed.least_step && offset_px.abs() < believed.farthest_px;
+    const Channels variance_px2 =
+        believed.floor_px * believed.floor_px + (believed.sigma_px / of_most).square() + steps.gloss_px.square();
+    weight = shown.select(variance_px2.inverse(), 0);
+    offset_px = shown.select(offset_px, 0);
+    share = of_most.square() / of_most.square().sum();
+    channels = static_cast<int>(shown.count());
+  }
+  // A pattern of offsets less its mean.
+  Channels apart(const Channels& pattern) const { return pattern - (weight * pattern).sum() / weight.sum(); }
+};
+using SeenBoundaries = InplaceVector<SeenBoundary, 4>;
+
+struct Disagreement {
+  double squares = 0;  // of channels about each boundary's mean, in squared sigmas
+  int degrees = 0;
+
+  explicit Disagreement(const SeenBoundaries& seen) {
+    for (const SeenBoundary& boundary : seen) {
+      squares += (boundary.weight * boundary.apart(boundary.offset_px).square()).sum();
+      degrees += boundary.channels - 1;
+    }
+  }
+  bool is_plain() const { return degrees >= believed.least_degrees && squares > believed.least_squares; }
+};
+
+// What a few numbers explain of the offsets.
+template <int Numbers>
+struct Explanation {
+  using Vector = Eigen::Matrix<double, Numbers, 1>;
+  Vector found, sigma;
+  double scatter = 0;  // of what is left a degree, in squared sigmas
+  double gain = 0;     // of a number, by the scatter
+};
+
+// `pattern(boundary, number)`: the offsets by one of it; `usual`: one sigma of it before the frame is seen;
+// `told_of_scatter`: what part of the scatter its sigma takes in.
+template <int Numbers, typename Pattern>
+Explanation<Numbers> explained(const SeenBoundaries& seen, const Disagreement& all, double usual,
+                               double told_of_scatter, const Pattern& pattern) {
+  using Explained = Explanation<Numbers>;
+  Eigen::Matrix<double, Numbers, Numbers> information = decltype(information)::Identity() / (usual * usual);
+  typename Explained::Vector gradient = Explained::Vector::Zero();
+  for (const SeenBoundary& boundary : seen)
+    for (int i = 0; i < Numbers; ++i) {
+      const Channels apart = boundary.weight * boundary.apart(pattern(boundary, i));
+      for (int j = 0; j < Numbers; ++j) information(i, j) += (apart * pattern(boundary, j)).sum();
+      gradient[i] += (apart * boundary.offset_px).sum();
+    }
+  const Eigen::Matrix<double, Numbers, Numbers> covariance = information.inverse();
+  Explained out;
+  out.found = covariance * gradient;
+  const double of_all = out.found.dot(gradient);
+  out.scatter = (all.squares - of_all) / (all.degrees - Numbers);
+  const double told_scatter = told_of_scatter * std::max(out.scatter, believed.least_told_scatter);
+  out.sigma = (told_scatter * covariance.diagonal()).cwiseSqrt();
+  out.gain = of_all / Numbers / std::max(out.scatter, believed.least_scatter);
+  return out;
+}
+
+Channels by_aberration_px(const SeenBoundary& boundary, int number) {
+  return boundary.radial_px * Eigen::Vector3d::Unit(number == 0 ? 0 : 2).array();
+}
+
+// One that is not seen has what the worst of the others has.
+template <typename DoubtOf>
+std::array<double, 4> of_each_boundary(const SeenBoundaries& seen, const DoubtOf& doubt_of) {
+  double worst = 0;
+  for (const SeenBoundary& boundary : seen) worst = std::max(worst, doubt_of(boundary));
+  std::array<double, 4> doubts;
+  doubts.fill(worst);
+  for (const SeenBoundary& boundary : seen) doubts[boundary.edge->boundary] = doubt_of(boundary);
+  return doubts;
+}
+
+CameraDeparture by_aberration(const SeenBoundaries& seen, const Explanation<2>& explanation) {
+  CameraDeparture out;
+  out.aberration = {1 + explanation.found[0], 1 + explanation.found[1]};
+  out.sigma_aberration = {explanation.sigma[0], explanation.sigma[1]};
+  out.doubt_of_radial = of_each_boundary(seen, [&](const SeenBoundary& boundary) {
+    return std::hypot(explanation.sigma[0] * boundary.share[0], explanation.sigma[1] * boundary.share[2]);
+  });
+  return out;
+}
+
+// It may be gloss or shading as well.
+CameraDeparture doubted_aberration(const SeenBoundaries& seen, Explanation<2> explanation) {
+  explanation.sigma = explanation.sigma.cwiseMax(explanation.found.cwiseAbs());
+  explanation.found.setZero();
+  return by_aberration(seen, explanation);
+}
+
+CameraDeparture by_exponent(const SeenBoundaries& seen, const Explanation<1>& explanation) {
+  CameraDeparture out;
+  // The offsets are what an exponent of less than 1 left: they vanish with the opposite.
+  out.exponent = 1 - explanation.found[0];
+  out.sigma_exponent = std::hypot(explanation.sigma[0], believed.doubted_of_response * explanation.found[0]);
+  out.doubt_of_response_px = of_each_boundary(seen, [&](const SeenBoundary& boundary) {
+    return std::abs(out.sigma_exponent * (boundary.share * boundary.by_exponent_px).sum());
+  });
+  return out;
+}
+
+template <typename LightOf>
+SeenBoundaries seen_in(const ChannelGeometry& channels, const PooledEdges& edges, double blur_px,
+                       const LightOf& light_of) {
+  const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
+  const auto blur = static_cast<float>(blur_px);
+  SeenBoundaries seen;
+  for (const PooledEdge& edge : edges.all) {
+    if (!edge.is_seen()) continue;
+    const double radial_px = static_cast<double>((edge.place_px - centre).dot(edge.normal));
+    const SeenBoundary boundary(edge, radial_px, channel_steps(StepColumns(edge, blur), edge, blur, light_of));
+    if (boundary.channels > 1) seen.push_back(boundary);
+  }
+  return seen;
+}
+
+// Of values on the way between two pixels: along straight lines, too.
+float light_between(const std::array<float, 256>& light_of_value, float value) {
+  const float place = std::clamp(255 * value, 0.0F, 254.99F);
+  const auto i = static_cast<std::size_t>(place);
+  return light_of_value[i] + (place - static_cast<float>(i)) * (light_of_value[i + 1] - light_of_value[i]);
+}
+
+float as_it_is(float light) {
+  return light;
+}
+
+void differ_by_exponent(double blur_px, SeenBoundaries& seen) {
+  const auto blur = static_cast<float>(blur_px);
+  const auto raised = [](float light) { return std::pow(light, 1 + believed.exponent_step); };
+  for (SeenBoundary& boundary : seen) {
+    const PooledEdge& edge = *boundary.edge;
+    const Channels there_px = channel_steps(StepColumns(edge, blur), edge, blur, raised).offset_px;
+    boundary.by_exponent_px = (boundary.weight > 0).select((there_px - boundary.offset_px) / believed.exponent_step, 0);
+  }
+}
+
+// Gloss beside one boundary looks like another response there; a camera's shows at all: most of it without any of them.
+bool is_at_more_than_one(const SeenBoundaries& seen, double exponent) {
+  double information = 1 / (believed.usual_exponent * believed.usual_exponent), gradient = 0;
+  const auto add = [&](const SeenBoundary& boundary, double sign) {
+    const Channels apart = boundary.weight * boundary.apart(boundary.by_exponent_px);
+    information += sign * (apart * boundary.by_exponent_px).sum();
+    gradient += sign * (apart * boundary.offset_px).sum();
+  };
+  for (const SeenBoundary& boundary : seen) add(boundary, 1);
+  return std::all_of(seen.begin(), seen.end(), [&](const SeenBoundary& boundary) {
+    add(boundary, -1);
+    const double of_others = gradient / information;
+    add(boundary, 1);
+    return of_others / exponent > believed.least_of_others;
+  });
+}
+
+bool is_response(const SeenBoundaries& seen, const Explanation<1>& response) {
+  return response.gain > believed.least_response_gain && response.scatter < believed.most_response_scatter &&
+         std::abs(response.found[0]) > believed.least_exponent && is_at_more_than_one(seen, response.found[0]);
+}
+
+}  // namespace
+
+std::optional<CameraDeparture> CameraDeparture::then(const CameraDeparture& more) const {
+  CameraDeparture out = *this;
+  if (more.aberration != ChromaticAberration{} || more.sigma_aberration != ChromaticAberration{0, 0}) {
+    out.aberration.blue *= more.aberration.blue, out.aberration.red *= more.aberration.red;
+    out.sigma_aberration = more.sigma_aberration, out.doubt_of_radial = more.doubt_of_radial;
+  }
+  if (more.exponent != 1) {
+    out.exponent *= more.exponent;
+    out.sigma_exponent = more.sigma_exponent, out.doubt_of_response_px = more.doubt_of_response_px;
+  }
+  // So near to the rig's response nothing would have been believed.
+  if (std::abs(out.exponent - 1) < believed.least_exponent)
+    out.exponent = 1, out.sigma_exponent = 0, out.doubt_of_response_px = {};
+  const double magnified = std::max(std::abs(out.aberration.blue - 1), std::abs(out.aberration.red - 1));
+  if (magnified > believed.most_aberration || std::abs(out.exponent - 1) > believed.most_exponent) return std::nullopt;
+  return out;
+}
+
+DepartedLight::DepartedLight(const LightImage& light, const CameraDeparture& departure) : light_(light) {
+  if (departure.aberration != ChromaticAberration{}) light_ = light_.magnified(departure.aberration);
+  if (departure.exponent == 1) return;
+  light_of_value_ = raised(light.light_of_value(), departure.exponent);
+  light_ = LightImage(light.image(), light_of_value_, light_.channels());
+}
+
+std::optional<CameraDeparture> find_departure(const LightImage& light, std::span<const Measurement> measurements,
+                                              const PooledEdges& glance, double blur_px) {
+  const ChannelGeometry& channels = light.channels();
+  if (!(channels.corner_px > 0)) return std::nullopt;  // of a frame whose middle nobody told
+  const auto light_of = [&](float value) { return light_between(light.light_of_value(), value); };
+  if (!Disagreement(seen_in(channels, glance, blur_px, light_of)).is_plain()) return std::nullopt;
+  // Means of values have dark edges, which look like another response.
+  const PooledEdges edges = pool_edges(light, measurements, in_light);
+  SeenBoundaries seen = seen_in(channels, edges, blur_px, as_it_is);
+  const Disagreement all(seen);
+  if (!all.is_plain()) return std::nullopt;
+  differ_by_exponent(blur_px, seen);
+  const auto aberration =
+      explained<2>(seen, all, believed.usual_aberration, believed.told_of_scatter, by_aberration_px);
+  const auto response = explained<1>(seen, all, believed.usual_exponent, believed.told_of_response_scatter,
+                                     [](const SeenBoundary& boundary, int) { return boundary.by_exponent_px; });
+  if (response.scatter < aberration.scatter && is_response(seen, response)) return by_exponent(seen, response);
+  if (aberration.gain > believed.least_gain) return by_aberration(seen, aberration);
+  if (aberration.gain > believed.least_doubted_gain && aberration.scatter < believed.most_doubted_scatter)
+    return doubted_aberration(seen, aberration);
+  return std::nullopt;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,194 @@
+#include "lapservo/vision/camera/camera_departure.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/statistics.h"
+#include "lapservo/testing/camera_effects.h"
+#include "lapservo/testing/scenes.h"
+#include "lapservo/vision/model/fine_fit.h"
+#include "lapservo/vision/tracker.h"
+
+namespace lapservo::internal {
+namespace {
+
+using effects::CameraEffects;
+using scenes::Shot;
+using scenes::Sight;
+using scenes::usual_shot;
+
+constexpr std::uint64_t frames = 12;
+
+CameraEffects aberrated(const ChromaticAberration& aberration) {
+  CameraEffects camera;
+  camera.aberration = aberration;
+  return camera;
+}
+
+CameraEffects rec709() {
+  CameraEffects camera;
+  camera.rec709 = true;
+  return camera;
+}
+
+FineFit fit_to(const Shot& shot, const cv::Mat& bgr, const ExpectedProcessing& expected = {}) {
+  const Sight sight(shot.rig, bgr);
+  return fit_finely(sight.scene(), sight.light(), shot.truth(true), {}, expected);
+}
+
+double psi_error_rad(const Shot& shot, const FineFit& fit) {
+  return std::abs(wrap_pi(fit.unknowns.q().value().psi_rad - shot.q.psi_rad));
+}
+
+// psi of frames through a camera that the rig does not know, beside that of fits that do not ask.
+struct Errors {
+  std::vector<double> asked_rad, unasked_rad, sigmas;
+
+  void add(const Shot& shot, const cv::Mat& seen, const FineFit& fit) {
+    const Eigen::Index psi = fit.unknowns.size() - 1;
+    asked_rad.push_back(psi_error_rad(shot, fit));
+    sigmas.push_back(asked_rad.back() / std::sqrt(fit.covariance(psi, psi)));
+    unasked_rad.push_back(psi_error_rad(shot, fit_to(shot, seen, {.ask = false})));
+  }
+};
+
+TEST(CameraDeparture, MagnificationsThatTheRigDoesNotKnowAreFound) {
+  constexpr ChromaticAberration aberration{1.0015, 0.9985};
+  Errors errors;
+  for (std::uint64_t seed = 1; seed <= frames; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    const cv::Mat seen = effects::seen_through(aberrated(aberration), shot.bgr, shot.rig.camera);
+    const FineFit fit = fit_to(shot, seen);
+    ASSERT_TRUE(fit.converged);
+    errors.add(shot, seen, fit);
+    const CameraDeparture& found = fit.departure;
+    EXPECT_EQ(found.exponent, 1);
+    if (found.aberration == ChromaticAberration{}) continue;  // near the middle of the picture there is none
+    EXPECT_LT(std::abs(found.aberration.blue - aberration.blue), 3 * found.sigma_aberration.blue);
+    EXPECT_LT(std::abs(found.aberration.red - aberration.red), 3 * found.sigma_aberration.red);
+  }
+  EXPECT_LT(median(errors.asked_rad), 0.3 * median(errors.unasked_rad));
+  EXPECT_LT(*std::max_element(errors.sigmas.begin(), errors.sigmas.end()), 3);
+}
+
+// Rec. 709's light is sRGB's to the power of 0.85 to 0.89.
+TEST(CameraDeparture, AResponseThatIsNotTheRigsIsFound) {
+  Errors errors;
+  std::uint64_t found = 0;
+  for (std::uint64_t seed = 1; seed <= frames; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    const cv::Mat seen = effects::seen_through(rec709(), shot.bgr, shot.rig.camera);
+    const FineFit fit = fit_to(shot, seen);
+    ASSERT_TRUE(fit.converged);
+    EXPECT_EQ(fit.departure.aberration, ChromaticAberration{});
+    errors.add(shot, seen, fit);
+    if (fit.departure.exponent == 1) continue;  // too little of it shows
+    ++found;
+    EXPECT_NEAR(fit.departure.exponent, 0.87, 3 * fit.departure.sigma_exponent);
+  }
+  EXPECT_GE(4 * found, 3 * frames);
+  EXPECT_LT(median(errors.asked_rad), 0.5 * median(errors.unasked_rad));
+  EXPECT_LT(*std::max_element(errors.sigmas.begin(), errors.sigmas.end()), 3);
+}
+
+// Nor does what a camera does beyond its response look like one.
+TEST(CameraDeparture, CamerasAsTheRigSaysShowNone) {
+  for (std::uint64_t seed = 1; seed <= frames; ++seed) {
+    const Shot& shot = usual_shot(seed);
+    EXPECT_FALSE(fit_to(shot, shot.bgr).departure.any()) << "seed " << seed;
+    for (const char* condition : {"bayer", "vignette", "crosstalk", "chroma420"}) {
+      const cv::Mat seen = effects::seen_through(effects::draw(condition, seed), shot.bgr, shot.rig.camera);
+      EXPECT_FALSE(fit_to(shot, seen).departure.any()) << condition << ", seed " << seed;
+    }
+  }
+}
+
+TEST(CameraDeparture, IsKeptByFramesThatAreNotAsked) {
+  const Shot& shot = usual_shot(3);
+  const cv::Mat seen = effects::seen_through(aberrated({1.0015, 0.9985}), shot.bgr, shot.rig.camera);
+  const FineFit first = fit_to(shot, seen);
+  ASSERT_TRUE(first.departure.any());
+  const FineFit next = fit_to(shot, seen, {.ask = false, .departure = first.departure});
+  EXPECT_EQ(next.departure.aberration, first.departure.aberration);
+  EXPECT_NEAR(next.unknowns.q().value().psi_rad, first.unknowns.q().value().psi_rad, 3e-4);
+  const FineFit again = fit_to(shot, seen, {.ask = true, .departure = first.departure});
+  EXPECT_NEAR(again.departure.aberration.blue, first.departure.aberration.blue, 3e-4);
+}
+
+// What is undone twice is undone by both.
+TEST(CameraDeparture, OneAfterAnotherIsBoth) {
+  const CameraDeparture first{.aberration = {1.001, 0.999}, .exponent = 0.9},
+      more{.aberration = {1.002, 1}, .exponent = 0.95};
+  const CameraDeparture both = first.then(more).value();
+  const Shot& shot = usual_shot(1);
+  const DepartedLight by_first(shot.sight.light(), first), by_more(by_first.light(), more);
+  const DepartedLight by_both(shot.sight.light(), both);
+  for (const float u : {100.0F, 333.3F, 700.7F})
+    for (std::size_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(by_more.light().at(u, 250).light[c], by_both.light().at(u, 250).light[c], 1e-5);
+}
+
+// So is one that an earlier frame showed: of a camera that is as the rig says, by what is seen through it; of one that
+// sharpens, whose channels are not asked where they lie, by a picture that looks better without.
+TEST(CameraDeparture, IsWithdrawnWhereAFrameShowsItIsNone) {
+  constexpr ChromaticAberration as_the_rig_says;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    const Shot& shot = usual_shot(seed);
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const CameraDeparture wrong{.exponent = 0.8};
+    const FineFit clean = fit_to(shot, shot.bgr, {.departure = wrong});
+    ASSERT_TRUE(clean.converged);
+    EXPECT_EQ(clean.departure.exponent, 1);
+    EXPECT_EQ(clean.departure.aberration, as_the_rig_says);
+    EXPECT_LT(psi_error_rad(shot, clean), 3e-3);
+    const cv::Mat sharpened = effects::seen_through(effects::draw("sharpen", seed), shot.bgr, shot.rig.camera);
+    const FineFit fit = fit_to(shot, sharpened, {.departure = wrong});
+    const FineFit without = fit_to(shot, sharpened);
+    ASSERT_TRUE(fit.converged);
+    EXPECT_FALSE(fit.departure.any());
+    EXPECT_NEAR(psi_error_rad(shot, fit), psi_error_rad(shot, without), 1e-3);
+  }
+}
+
+TEST(CameraDeparture, IsNoneBeyondWhatCamerasHave) {
+  const CameraDeparture dark{.exponent = 0.7}, aberrated{.aberration = {1.006, 1}};
+  EXPECT_FALSE(dark.then(dark));
+  EXPECT_FALSE(aberrated.then(aberrated));
+  EXPECT_FALSE(CameraDeparture{}.then({.aberration = {1, 0.98}}));
+  EXPECT_EQ(dark.then({.exponent = 1.4})->exponent, 1);
+}
+
+// What one frame tells of one kind says nothing of the other.
+TEST(CameraDeparture, DoubtOfBothKindsIsKept) {
+  const CameraDeparture aberrated{.aberration = {1.001, 1}, .sigma_aberration = {1e-4, 0}, .doubt_of_radial = {1e-4}};
+  const auto both = aberrated.then({.exponent = 0.85, .sigma_exponent = 0.01, .doubt_of_response_px = {0.03}});
+  ASSERT_TRUE(both);
+  EXPECT_EQ(both->sigma_aberration.blue, 1e-4);
+  EXPECT_EQ(both->sigma_exponent, 0.01);
+  EXPECT_NEAR(both->doubt_px(0, 400), 0.05, 1e-12);
+  EXPECT_EQ(both->doubt_px(1, 400), 0);
+}
+
+// The frames between those that ask see through what those showed.
+TEST(CameraDeparture, IsKeptWhileTracking) {
+  const Shot& shot = usual_shot(3);
+  const cv::Mat seen = effects::seen_through(rec709(), shot.bgr, shot.rig.camera);
+  Tracker tracker(shot.rig);
+  for (int frame = 0; frame < 30; ++frame) {
+    const Observation& o = tracker.track(seen)[0];
+    ASSERT_EQ(o.status, Status::ok);
+    const double error_rad = std::abs(wrap_pi(o.rcm->q.psi_rad - shot.q.psi_rad));
+    EXPECT_LT(error_rad, 1.5e-3) << "frame " << frame;
+    EXPECT_LT(error_rad, 3 * std::sqrt(o.rcm->covariance(3, 3))) << "frame " << frame;
+  }
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "lapservo/vision/camera/pooled_edges.h"
+
+namespace lapservo::internal {
+
+/// What a camera does to a picture, the same everywhere in a frame, in this order.
+struct PictureProcessing {
+  double blur_px = 1;              ///< of the light
+  double log_mosaic = 0;           ///< log of how much wider red and blue light is blurred than green: demosaicing
+  double chroma_variance_px2 = 0;  ///< of the blur of encoded colour differences: subsampling, compression
+  double saturation = 1;           ///< by which colour differences (Rec. 601) are multiplied
+  double sharpening = 0;           ///< unsharp mask: so much of what the blur takes away is added
+  double sharpening_px = 1.2;      ///< that blur
+};
+
+/// The same as unknowns of a fit.
+enum class ProcessingUnknown { log_blur, chroma_variance, saturation, sharpening, log_radius, log_mosaic };
+inline constexpr int processing_unknowns = 6;
+using ProcessingVector = Eigen::Matrix<double, processing_unknowns, 1>;
+PictureProcessing processing_of(const ProcessingVector& unknowns);
+
+/// The light across one boundary: where it is [px from the middle sample], b, g, r of both sides as they would be shown
+/// were nothing clipped, and by which share light grows along the normal [1/px].
+using EdgeVector = Eigen::Matrix<double, 8, 1>;
+inline constexpr int edge_unknowns = EdgeVector::RowsAtCompileTime;
+inline constexpr int edge_offset = 0, edge_before = 1, edge_after = 4, edge_gradient = 7;
+/// Of encoded b, g, r as they are before `processing`.
+EdgeVector edge_of(const PictureProcessing& processing, const Eigen::Vector3d& before, const Eigen::Vector3d& after,
+                   double offset_px);
+
+/// Samples of a channel, a pixel apart, then those of the next; rows beyond the samples fill a register.
+inline constexpr int edge_rows = 16, all_edge_rows = 3 * edge_rows;
+using EdgeSamples = Eigen::Matrix<float, all_edge_rows, 1>;
+
+// Filters of encoded values, symmetric: the taps from the middle on, a pixel apart. One of an unsharp mask or of
+// chroma's blur reaches 4 px, both together 8.
+inline constexpr int filter_reach = 4, both_filters_reach = 2 * filter_reach;
+using Filter = std::array<double, filter_reach + 1>;
+using BothFilters = std::array<double, both_filters_reach + 1>;
+
+/// What the processing does to encoded luma and to colour differences, and with `derivatives` how that changes.
+struct ProcessingFilters {
+  Filter luma, luma_by_sharpening, luma_by_radius;
+  BothFilters chroma, chroma_by_sharpening, chroma_by_radius, chroma_by_variance;
+
+  ProcessingFilters(const PictureProcessing& processing, bool derivatives);
+};
+
+/// What a camera shows of a step of light.
+class ProcessedEdge {
+ public:
+  explicit ProcessedEdge(const std::array<float, 256>& light_of_value) : light_of_value_(light_of_value) {}
+
+  EdgeSamples values(const ProcessingFilters& filters, const PictureProcessing& processing,
+                     const EdgeVector& edge) const;
+
+  struct Linearised {
+    EdgeSamples values;
+    Eigen::Matrix<float, all_edge_rows, processing_unknowns + edge_unknowns> jacobian;
+  };
+  Linearised linearised(const ProcessingFilters& filters, const PictureProcessing& processing,
+                        const EdgeVector& edge) const;
+
+ private:
+  const std::array<float, 256>& light_of_value_;
+};
+
+/// Light along a line, a pixel apart, as it looks after blurred colour differences and sharpening. What is even stays
+/// as it is, so light is as the camera shows it: `saturation` has been at work. `luma` is the same without colour
+/// differences: what a grey picture made of it shows, in all channels alike.
+struct FilteredLight {
+  std::vector<std::array<double, 3>> light;
+  std::vector<double> luma;
+};
+FilteredLight filtered_light(const std::array<float, 256>& light_of_value, const PictureProcessing& processing,
+                             std::span<const std::array<double, 3>> light);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,84 @@
+#include "lapservo/vision/camera/processed_edge.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/geometry/response.h"
+
+namespace lapservo::internal {
+namespace processed_edge_test {
+namespace {
+
+const Eigen::Vector3d green(0.25, 0.75, 0.5), pink(0.8, 0.3, 0.6), grey(0.15, 0.16, 0.15);
+
+ProcessingVector everything() {
+  ProcessingVector unknowns;
+  using enum ProcessingUnknown;
+  unknowns[static_cast<int>(log_blur)] = std::log(1.1), unknowns[static_cast<int>(chroma_variance)] = 0.8;
+  unknowns[static_cast<int>(saturation)] = 1.3, unknowns[static_cast<int>(sharpening)] = 0.5;
+  unknowns[static_cast<int>(log_radius)] = std::log(1.3), unknowns[static_cast<int>(log_mosaic)] = 0.1;
+  return unknowns;
+}
+
+EdgeSamples shown(const ProcessingVector& unknowns, const EdgeVector& edge) {
+  const auto table = Response{}.table();
+  const PictureProcessing processing = processing_of(unknowns);
+  return ProcessedEdge(table).values(ProcessingFilters(processing, false), processing, edge);
+}
+
+// Also where some of it is clipped: red is at black on one side.
+TEST(ProcessedEdge, DerivativesAreThoseOfTheValues) {
+  const ProcessingVector unknowns = everything();
+  const PictureProcessing processing = processing_of(unknowns);
+  EdgeVector edge = edge_of(processing, green, Eigen::Vector3d(0.7, 0.6, 0.14), 0.13);
+  edge[edge_gradient] = 0.01;
+  const auto table = Response{}.table();
+  const auto model = ProcessedEdge(table).linearised(ProcessingFilters(processing, true), processing, edge);
+  EXPECT_LT((model.values - shown(unknowns, edge)).cwiseAbs().maxCoeff(), 1e-5F);
+  constexpr double step = 4e-3;
+  for (int i = 0; i < processing_unknowns + edge_unknowns; ++i) {
+    ProcessingVector more = unknowns, less = unknowns;
+    EdgeVector edge_more = edge, edge_less = edge;
+    (i < processing_unknowns ? more[i] : edge_more[i - processing_unknowns]) += step;
+    (i < processing_unknowns ? less[i] : edge_less[i - processing_unknowns]) -= step;
+    const EdgeSamples numeric = (shown(more, edge_more) - shown(less, edge_less)) / static_cast<float>(2 * step);
+    const EdgeSamples analytic = model.jacobian.col(i);
+    for (int c = 0; c < 3; ++c)
+      for (int k = 0; k < PooledEdge::samples; ++k) {
+        const int row = edge_rows * c + k;
+        EXPECT_NEAR(analytic[row], numeric[row], 0.02 * numeric.cwiseAbs().maxCoeff() + 2e-3) << i << ", " << row;
+      }
+  }
+}
+
+// What saturation does to even light is in what is shown, so a change of it moves no plateau.
+TEST(ProcessedEdge, PlateausAreAsShown) {
+  ProcessingVector unknowns = everything();
+  EdgeVector edge;
+  edge << 0, pink, grey, 0;
+  for (const double saturation : {0.8, 1.0, 1.6}) {
+    unknowns[static_cast<int>(ProcessingUnknown::saturation)] = saturation;
+    const EdgeSamples values = shown(unknowns, edge);
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(values[edge_rows * c], pink[c], 3e-3);
+      EXPECT_NEAR(values[edge_rows * c + PooledEdge::samples - 1], grey[c], 3e-3);
+    }
+  }
+}
+
+TEST(ProcessedEdge, ShowsNothingBelowBlackOrAboveWhite) {
+  ProcessingVector unknowns = everything();
+  unknowns[static_cast<int>(ProcessingUnknown::saturation)] = 2;
+  const EdgeVector edge = edge_of(processing_of(unknowns), Eigen::Vector3d(0.02, 0.95, 0.9), pink, 0);
+  EXPECT_LT(edge.minCoeff(), -0.3);
+  EXPECT_GT(edge.maxCoeff(), 1);
+  const EdgeSamples values = shown(unknowns, edge);
+  EXPECT_GE(values.minCoeff(), 0);
+  EXPECT_LE(values.maxCoeff(), 1);
+}
+
+}  // namespace
+}  // namespace processed_edge_test
+}  // namespace lapservo::internal

@@ -1,0 +1,166 @@
+#include "lapservo/vision/colour/blob_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <utility>
+
+namespace lapservo::internal {
+
+namespace {
+
+// Classes of the grid's samples, framed by cells without colour, so that a cell's neighbourhood always exists.
+class Grid {
+ public:
+  static constexpr int reach = 2;  // cells: bridges a highlight along the shaft and blotches of blood
+  static constexpr int around = 2 * reach + 1;
+
+  Grid(const ImageView& image, const ColorClasses& classes, int grid_px)
+      : grid_px_(grid_px), columns_(image.width_px / grid_px), rows_(image.height_px / grid_px) {
+    cells_.resize(static_cast<std::size_t>(stride()) * static_cast<std::size_t>(rows_ + 2 * reach));
+    for (int row = 0; row < rows_; ++row) {
+      const int first = (row + reach) * stride() + reach;
+      const std::span<std::uint8_t> line(&at(first), static_cast<std::size_t>(columns_));
+      classes.classify(image.pixel(grid_px / 2, grid_px / 2 + row * grid_px), 3 * static_cast<std::ptrdiff_t>(grid_px),
+                       line);
+      add_colored(line, first);
+    }
+  }
+
+  /// Cells that had a colour at first.
+  const std::vector<int>& colored() const { return colored_; }
+  std::uint8_t& at(int cell) { return cells_[static_cast<std::size_t>(cell)]; }
+  /// `around` cells from the left to the right of a neighbour `rows` further down.
+  std::uint8_t* row_around(int cell, int rows) { return &at(cell + rows * stride() - reach); }
+  int cell_of(const std::uint8_t* place) const { return static_cast<int>(place - cells_.data()); }
+  Blob::Sample sample(int cell) {
+    const int column = cell % stride() - reach, row = cell / stride() - reach;
+    return {grid_px_ / 2 + column * grid_px_, grid_px_ / 2 + row * grid_px_, at(cell)};
+  }
+
+ private:
+  void add_colored(std::span<const std::uint8_t> line, int first) {
+    constexpr std::size_t at_once = 8;  // few have a colour
+    for (std::size_t i = 0; i < line.size(); i += at_once) {
+      const std::size_t count = std::min(at_once, line.size() - i);
+      std::uint64_t any = 0;
+      std::memcpy(&any, &line[i], count);
+      for (std::size_t j = i; any && j < i + count; ++j)
+        if (line[j]) colored_.push_back(first + static_cast<int>(j));
+    }
+  }
+
+  int stride() const { return columns_ + 2 * reach; }
+  int grid_px_, columns_, rows_;
+  std::vector<std::uint8_t> cells_;
+  std::vector<int> colored_;
+};
+
+// Sensor noise in the dark has colours too, but neighbours do not share them.
+void drop_lonely(Grid& grid) {
+  constexpr int least_alike = 3;
+  std::vector<int> lonely;
+  for (const int cell : grid.colored()) {
+    int count = -1;  // itself
+    for (int row = -1; row <= 1; ++row) {
+      const std::uint8_t* places = grid.row_around(cell, row);
+      for (int i = Grid::reach - 1; i <= Grid::reach + 1; ++i) count += places[i] == grid.at(cell);
+    }
+    if (count < least_alike) lonely.push_back(cell);
+  }
+  for (const int cell : lonely) grid.at(cell) = 0;
+}
+
+// Moves what hangs together with a cell out of the grid.
+Blob take_blob(Grid& grid, int seed, std::vector<int>& stack) {
+  Blob blob;
+  const auto take = [&](int cell) {
+    blob.samples.push_back(grid.sample(cell));
+    grid.at(cell) = 0;
+    stack.push_back(cell);
+  };
+  take(seed);
+  while (!stack.empty()) {
+    const int cell = stack.back();
+    stack.pop_back();
+    for (int row = -Grid::reach; row <= Grid::reach; ++row) {
+      const std::uint8_t* places = grid.row_around(cell, row);
+      std::uint64_t any = 0;  // most are taken already: look at all at once
+      std::memcpy(&any, places, Grid::around);
+      if (!any) continue;
+      for (int i = 0; i < Grid::around; ++i)
+        if (places[i]) take(grid.cell_of(places + i));
+    }
+  }
+  return blob;
+}
+
+struct Box {
+  int left, right, top, bottom;
+  double diagonal_px() const { return std::hypot(right - left, bottom - top); }
+};
+
+Box box_about(const Blob& blob) {
+  Box box{blob.samples[0].u, blob.samples[0].u, blob.samples[0].v, blob.samples[0].v};
+  for (const Blob::Sample& s : blob.samples) {
+    box.left = std::min(box.left, s.u), box.right = std::max(box.right, s.u);
+    box.top = std::min(box.top, s.v), box.bottom = std::max(box.bottom, s.v);
+  }
+  return box;
+}
+
+bool lie_near(const Box& a, const Box& b) {
+  constexpr double of_length = 0.5;
+  const int aside = std::max({0, b.left - a.right, a.left - b.right});
+  const int above = std::max({0, b.top - a.bottom, a.top - b.bottom});
+  return std::hypot(aside, above) < of_length * std::max(a.diagonal_px(), b.diagonal_px());
+}
+
+}  // namespace
+
+std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int min_samples) {
+  Grid grid(image, classes, grid_px);
+  drop_lonely(grid);
+  std::vector<Blob> blobs;
+  std::vector<int> stack;
+  for (const int seed : grid.colored()) {
+    if (!grid.at(seed)) continue;
+    Blob blob = take_blob(grid, seed, stack);
+    blob.grid_px = grid_px;
+    if (static_cast<int>(blob.samples.size()) >= min_samples) blobs.push_back(std::move(blob));
+  }
+  std::sort(blobs.begin(), blobs.end(),
+            [](const Blob& a, const Blob& b) { return a.samples.size() > b.samples.size(); });
+  return blobs;
+}
+
+std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& classes) {
+  constexpr int grid_px = 8;
+  constexpr std::size_t max_blobs = 6;  // bounds the time that tissue with the marker's colours costs
+  auto blobs = find_blobs(image, classes, grid_px, min_blob_samples);
+  if (blobs.size() > max_blobs) blobs.resize(max_blobs);
+  return blobs;
+}
+
+std::vector<Blob> joined_blobs(const std::vector<Blob>& blobs) {
+  std::vector<Box> boxes;
+  std::vector<std::size_t> group_of;
+  for (const Blob& blob : blobs) group_of.push_back(group_of.size()), boxes.push_back(box_about(blob));
+  for (std::size_t i = 0; i < blobs.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (group_of[i] != group_of[j] && lie_near(boxes[i], boxes[j]))
+        std::replace(group_of.begin(), group_of.end(), group_of[i], group_of[j]);
+  std::vector<Blob> joined;
+  for (std::size_t group = 0; group < blobs.size(); ++group) {
+    Blob together{{}, blobs[group].grid_px};
+    for (std::size_t i = 0; i < blobs.size(); ++i)
+      if (group_of[i] == group)
+        together.samples.insert(together.samples.end(), blobs[i].samples.begin(), blobs[i].samples.end());
+    if (!together.samples.empty()) joined.push_back(std::move(together));
+  }
+  return joined;
+}
+
+}  // namespace lapservo::internal

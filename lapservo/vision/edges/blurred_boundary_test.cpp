@@ -1,0 +1,98 @@
+#include "lapservo/vision/edges/blurred_boundary.h"
+
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/sim/instrument_shaft.h"
+#include "lapservo/sim/tissue.h"
+#include "lapservo/testing/motion.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+using scenes::Shot;
+using scenes::usual_shot;
+
+// Where a boundary appears on the line along the shaft, by blurring it numerically: light from each place beside it
+// moves the boundary there, as it lies, and as bright as it is.
+double blurred_place_px(const BoundaryCourse& course, const BlurEllipse& blur) {
+  constexpr int half = 60;
+  constexpr double reach_sigmas = 4;
+  Eigen::Matrix2d covariance;
+  covariance << blur.along_px2, blur.oblique_px2, blur.oblique_px2, blur.across_px2;
+  const Eigen::Matrix2d root = covariance.llt().matrixL();
+  double light = 0, place_px = 0;
+  for (int i = -half; i <= half; ++i)
+    for (int j = -half; j <= half; ++j) {
+      const Eigen::Vector2d sigmas = reach_sigmas / half * Eigen::Vector2d(i, j), from_px = root * sigmas;
+      const double weight = std::exp(-sigmas.squaredNorm() / 2) * (1 + course.light_change_per_px * from_px.y());
+      const double boundary_px = course.slope * from_px.y() + 0.5 * course.curvature_per_px * from_px.y() * from_px.y();
+      light += weight, place_px += weight * (boundary_px - from_px.x());
+    }
+  return place_px / light;
+}
+
+TEST(BlurredBoundary, LiesWhereItsBlurredPictureHasIt) {
+  for (const BoundaryCourse& course : {BoundaryCourse{0.2, 0, 0.02}, BoundaryCourse{-0.3, 0.01, 0.03},
+                                       BoundaryCourse{0, -0.02, 0}, BoundaryCourse{0.1, 0.01, -0.05}})
+    for (const BlurEllipse& blur : {BlurEllipse{4, 4, 0}, BlurEllipse{9, 4, 4}, BlurEllipse{1, 9, -2}})
+      EXPECT_NEAR(moved_by_blur_px(course, blur), blurred_place_px(course, blur), 0.005);
+}
+
+// With the marker's middle moving evenly by so many pixels along the shaft and across it.
+cv::Mat render_moving(const Shot& shot, const Eigen::Vector2d& along_and_across_px) {
+  const cv::Mat tissue = make_tissue(shot.rig.camera.width_px, shot.rig.camera.height_px, 5);
+  return Renderer(shot.rig.camera, {shaft_of(shot.rig.instruments[0])}, tissue)
+      .render_exposure(scenes::moving_exposure(shot.rig, shot.q, {.along_and_across_px = along_and_across_px}), 1);
+}
+
+// What else psi is off by (the film's thickness) is alike for two motions that are mirrored at the shaft: only what the
+// fit makes of their direction tells them apart.
+TEST(BlurredBoundary, PsiDoesNotFollowMotionObliqueToTheShaft) {
+  constexpr int shots = 3;
+  double apart_rad = 0;
+  for (std::uint64_t seed = 1; seed <= shots; ++seed)
+    for (const double across_px : {-6.0, 6.0}) {
+      const Shot& shot = usual_shot(seed);
+      const scenes::Sight sight(shot.rig, render_moving(shot, {6, across_px}));
+      const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {2, 2});
+      ASSERT_TRUE(fit.converged) << "seed " << seed << ", across " << across_px;
+      EXPECT_GT(fit.blur.correlation * across_px, 0.7 * 6) << "seed " << seed;
+      const double error_rad = wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad);
+      EXPECT_LT(error_rad * error_rad, 2.5 * 2.5 * fit.psi_variance) << "seed " << seed << ", across " << across_px;
+      apart_rad += (across_px > 0 ? 1 : -1) * error_rad / shots;
+    }
+  EXPECT_LT(std::abs(apart_rad), 0.004);
+}
+
+// Psi's error by its sigma, of fits to motion oblique to the shaft.
+double error_over_sigma(const Rig& rig, double along_px, double across_px) {
+  constexpr int shots = 4;
+  double squares = 0;
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    const Shot shot(seed, {}, rig);
+    for (const double way : {-1.0, 1.0}) {
+      const scenes::Sight sight(shot.rig, render_moving(shot, {along_px, way * across_px}));
+      const FineFit fit = fit_finely(sight.scene(), sight.light(), shot.truth(true), {1.2, 1.2});
+      EXPECT_TRUE(fit.converged) << "seed " << seed;
+      const double error_rad = wrap_pi(fit.unknowns.pose().psi_rad - shot.q.psi_rad);
+      squares += error_rad * error_rad / fit.covariance(3, 3) / (2 * shots);
+    }
+  }
+  return std::sqrt(squares);
+}
+
+// Neither surer than they are nor less sure by far.
+TEST(BlurredBoundary, FitsToMotionKnowHowSureTheyAre) {
+  const double sigmas = error_over_sigma(scenes::usual_rig(), 7, 5);
+  EXPECT_GT(sigmas, 0.4);
+  EXPECT_LT(sigmas, 1.5);
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,64 @@
+#include "lapservo/vision/edges/blurred_edges.h"
+
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+namespace lapservo::internal {
+namespace {
+
+// The normal density convolved with `edge` at u, by Simpson's rule in s with t = s^2, which smooths the kink at 0.
+template <typename Edge>
+double convolved(double u, const Edge& edge) {
+  constexpr int intervals = 4000;
+  const double longest = std::sqrt(std::max(u, 0.0) + 12), step = longest / intervals;
+  double sum = 0;
+  for (int i = 0; i <= intervals; ++i) {
+    const double s = i * step, t = s * s;
+    const double weight = i == 0 || i == intervals ? 1 : (i % 2 ? 4 : 2);
+    sum += weight * edge(t) * std::exp(-(u - t) * (u - t) / 2) * 2 * s;
+  }
+  return sum * step / 3 / std::sqrt(2 * std::numbers::pi);
+}
+
+constexpr double promised_error = 1e-4;
+
+TEST(BlurredEdges, AreTheConvolutionsWithTheNormalDensity) {
+  const BlurredEdges& edges = BlurredEdges::instance();
+  for (double u = -7; u < 14; u += 0.0137) {
+    const BlurredEdge edge = edges.at(static_cast<float>(u));
+    const double root = convolved(u, [](double t) { return std::sqrt(t); });
+    const double three_halves = convolved(u, [](double t) { return t * std::sqrt(t); });
+    EXPECT_NEAR(edge.density, std::exp(-u * u / 2) / std::sqrt(2 * std::numbers::pi), promised_error) << u;
+    EXPECT_NEAR(edge.step, convolved(u, [](double) { return 1.0; }), promised_error) << u;
+    EXPECT_NEAR(edge.root, root, promised_error) << u;
+    EXPECT_NEAR(edge.three_halves, three_halves, promised_error * std::max(1.0, three_halves)) << u;
+  }
+}
+
+// d(step)/du is the density, d(three halves)/du is 3/2 of the root, and the root has its slope: convolution and
+// derivative commute. The tolerance is that of differences of values that are right to 1e-4.
+TEST(BlurredEdges, AreEachOthersDerivatives) {
+  const BlurredEdges& edges = BlurredEdges::instance();
+  constexpr float h = 0.05F;
+  for (float u = -5; u < 12; u += 0.0173F) {
+    const BlurredEdge ahead = edges.at(u + h), behind = edges.at(u - h), here = edges.at(u);
+    EXPECT_NEAR((ahead.step - behind.step) / (2 * h), here.density, 1e-3) << u;
+    EXPECT_NEAR((ahead.root - behind.root) / (2 * h), here.root_slope, 2e-3) << u;
+    EXPECT_NEAR((ahead.three_halves - behind.three_halves) / (2 * h), 1.5F * here.root, 5e-3) << u;
+  }
+}
+
+TEST(BlurredEdges, AreNothingFarOutside) {
+  for (const float u : {-6.0F, -8.0F, -1e6F}) {
+    const BlurredEdge edge = BlurredEdges::instance().at(u);
+    EXPECT_EQ(edge.density, 0) << u;
+    EXPECT_EQ(edge.step, 0) << u;
+    EXPECT_EQ(edge.root, 0) << u;
+    EXPECT_EQ(edge.three_halves, 0) << u;
+    EXPECT_EQ(edge.root_slope, 0) << u;
+  }
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,501 @@
+#include "lapservo/vision/edges/edge_lines.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "lapservo/vision/edges/blurred_edges.h"
+
+// What follows up to HWY_ONCE is compiled once for every instruction set that differs much from the others and whose
+// vectors may stand in arrays.
+#define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "lapservo/vision/edges/edge_lines.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace lapservo::internal {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr std::size_t max_lanes = 16;
+using Floats = hn::CappedTag<float, max_lanes>;
+using Ints = hn::RebindToSigned<Floats>;
+using V = hn::Vec<Floats>;
+using VI = hn::Vec<Ints>;
+using Mask = hn::Mask<Floats>;
+
+// A value for every lane.
+struct Lanes {
+  alignas(64) std::array<float, max_lanes> value;
+  V load() const { return hn::Load(Floats(), value.data()); }
+  void store(V values) { hn::Store(values, Floats(), value.data()); }
+};
+
+// A value for every sample and lane.
+using Column = std::array<Lanes, EdgeProfile::max_samples>;
+
+// Lines side by side: lane j is one of them.
+struct LineLanes {
+  Lanes u, v, du, dv, first, last, blur, radius;
+  std::size_t samples = 0;  // of the longest
+};
+
+// How many samples each line has.
+V samples_of(const LineLanes& lines) {
+  return hn::Add(hn::Sub(lines.last.load(), lines.first.load()), hn::Set(Floats(), 1));
+}
+
+LineLanes lanes_of(std::span<const EdgeLine> lines, std::size_t lanes) {
+  LineLanes out;
+  for (std::size_t j = 0; j < lanes; ++j) {
+    const EdgeLine& line = lines[std::min(j, lines.size() - 1)];
+    out.u.value[j] = line.u_px, out.v.value[j] = line.v_px;
+    out.du.value[j] = line.du, out.dv.value[j] = line.dv;
+    out.first.value[j] = static_cast<float>(-line.before), out.last.value[j] = static_cast<float>(line.after);
+    out.blur.value[j] = line.blur_px, out.radius.value[j] = line.contour_radius_px;
+    out.samples = std::max(out.samples, static_cast<std::size_t>(line.before + line.after + 1));
+  }
+  return out;
+}
+
+struct SampledLanes {
+  std::array<Column, 3> light;
+  Lanes brightest;  // encoded value met on the way
+};
+
+// The four pixels around a place, in each lane: two words a row hold blue, green and red of both.
+struct Neighbours {
+  alignas(64) std::array<std::array<std::int32_t, max_lanes>, 4> words;
+
+  void load(const ImageView& image, VI u, VI v, std::size_t lanes) {
+    alignas(64) std::array<std::int32_t, max_lanes> us, vs;
+    hn::Store(u, Ints(), us.data());
+    hn::Store(v, Ints(), vs.data());
+    for (std::size_t j = 0; j < lanes; ++j) {
+      const std::uint8_t* top = image.pixel(us[j], vs[j]);
+      const std::uint8_t* bottom = top + image.row_bytes;
+      std::memcpy(&words[0][j], top, 4);
+      std::memcpy(&words[1][j], top + 2, 4);
+      std::memcpy(&words[2][j], bottom, 4);
+      std::memcpy(&words[3][j], bottom + 2, 4);
+    }
+  }
+  // Channel c of the left or right pixel of the upper or lower row.
+  VI value(std::size_t c, std::size_t right, std::size_t lower) const {
+    const std::size_t byte = c + 3 * right;
+    const VI word = hn::Load(Ints(), words[2 * lower + (byte > 3 ? 1 : 0)].data());
+    const VI low = hn::Set(Ints(), 255);
+    switch (byte > 3 ? byte - 2 : byte) {
+      case 0:
+        return hn::And(word, low);
+      case 1:
+        return hn::And(hn::ShiftRight<8>(word), low);
+      case 2:
+        return hn::And(hn::ShiftRight<16>(word), low);
+      default:
+        return hn::And(hn::ShiftRight<24>(word), low);
+    }
+  }
+};
+
+// LightImage::at() in every lane and at every sample; nothing beyond a line's end.
+template <bool Chromatic>
+SampledLanes sample(const LightImage& light, const LineLanes& lines, const Column& present) {
+  const Floats d;
+  const std::size_t lanes = hn::Lanes(d);
+  SampledLanes out;
+  Neighbours around;
+  VI brightest = hn::Zero(Ints());
+  V t = lines.first.load();
+  for (std::size_t i = 0; i < lines.samples; ++i) {
+    const V green_u = hn::MulAdd(t, lines.du.load(), lines.u.load());
+    const V green_v = hn::MulAdd(t, lines.dv.load(), lines.v.load());
+    V fu, fv;
+    const auto look_at = [&](V u, V v) HWY_ATTR {
+      const VI left = hn::ConvertTo(Ints(), u), top = hn::ConvertTo(Ints(), v);
+      fu = hn::Sub(u, hn::ConvertTo(d, left)), fv = hn::Sub(v, hn::ConvertTo(d, top));
+      around.load(light.image(), left, top, lanes);
+    };
+    if constexpr (!Chromatic) look_at(green_u, green_v);
+    for (std::size_t c = 0; c < 3; ++c) {
+      if constexpr (Chromatic) {
+        const ChannelGeometry& channels = light.channels();
+        const V magnification = hn::Set(d, channels.magnification[c]);
+        const V centre_u = hn::Set(d, channels.centre_u), centre_v = hn::Set(d, channels.centre_v);
+        look_at(hn::MulAdd(magnification, hn::Sub(green_u, centre_u), centre_u),
+                hn::MulAdd(magnification, hn::Sub(green_v, centre_v), centre_v));
+      }
+      const auto at = [&](std::size_t right, std::size_t lower) HWY_ATTR {
+        const VI value = around.value(c, right, lower);
+        brightest = hn::Max(brightest, value);
+        return hn::GatherIndex(Floats(), light.light_of_value().data(), value);
+      };
+      const V a = at(0, 0), b = at(1, 0), e = at(0, 1), f = at(1, 1);
+      const V upper = hn::MulAdd(fu, hn::Sub(b, a), a), lower = hn::MulAdd(fu, hn::Sub(f, e), e);
+      out.light[c][i].store(hn::Mul(present[i].load(), hn::MulAdd(fv, hn::Sub(lower, upper), upper)));
+    }
+    t = hn::Min(hn::Add(t, hn::Set(d, 1)), lines.last.load());
+  }
+  out.brightest.store(hn::ConvertTo(d, brightest));
+  return out;
+}
+
+// BlurredEdges::at() in every lane.
+struct BlurredLanes {
+  V density, step, root, three_halves, root_slope;
+};
+
+template <bool WithRoots>
+HWY_INLINE BlurredLanes blurred_at(const BlurredEdge* table, V u) {
+  const Floats d;
+  const V first = hn::Set(d, BlurredEdges::first_u), last = hn::Set(d, BlurredEdges::last_u);
+  const V per_sigma = hn::Set(d, static_cast<float>(BlurredEdges::per_sigma));
+  const V place = hn::Mul(hn::Sub(hn::Min(hn::Max(u, first), last), first), per_sigma);
+  const VI i = hn::ConvertTo(Ints(), place);
+  const V f = hn::Sub(place, hn::ConvertTo(d, i));
+  constexpr int stride = sizeof(BlurredEdge) / sizeof(float);
+  const VI index = hn::Mul(i, hn::Set(Ints(), stride));
+  const auto field = [&](int offset) HWY_ATTR {
+    const float* entries = &table->density + offset;
+    const V here = hn::GatherIndex(d, entries, index), next = hn::GatherIndex(d, entries + stride, index);
+    return hn::MulAdd(f, hn::Sub(next, here), here);
+  };
+  BlurredLanes edge{field(0), field(1), V(), V(), V()};
+  if constexpr (WithRoots) {
+    const Mask far = hn::Gt(u, last);
+    const V safe = hn::Max(u, last), root = hn::Sqrt(safe),
+            correction = hn::Div(hn::Set(d, 0.125F), hn::Mul(safe, safe));
+    const V one = hn::Set(d, 1), three = hn::Set(d, 3);
+    edge.root = hn::IfThenElse(far, hn::Mul(root, hn::Sub(one, correction)), field(2));
+    edge.three_halves = hn::IfThenElse(far, hn::Mul(hn::Mul(root, safe), hn::MulAdd(three, correction, one)), field(3));
+    edge.root_slope = hn::IfThenElse(far, hn::Div(hn::MulAdd(three, correction, one), hn::Add(root, root)), field(4));
+  }
+  return edge;
+}
+
+// The dot products of columns with one, which is read once.
+template <std::size_t Count>
+HWY_INLINE std::array<V, Count> dots(const std::array<const Column*, Count>& columns, const Column& with,
+                                     std::size_t samples) {
+  std::array<V, Count> sums;
+  sums.fill(hn::Zero(Floats()));
+  for (std::size_t i = 0; i < samples; ++i) {
+    const V here = with[i].load();
+    for (std::size_t k = 0; k < Count; ++k) sums[k] = hn::MulAdd((*columns[k])[i].load(), here, sums[k]);
+  }
+  return sums;
+}
+
+HWY_INLINE V dot(const Column& a, const Column& b, std::size_t samples) {
+  return dots<1>({&a}, b, samples)[0];
+}
+
+void subtract(Column& from, V factor, const Column& column, std::size_t samples) {
+  for (std::size_t i = 0; i < samples; ++i) from[i].store(hn::NegMulAdd(factor, column[i].load(), from[i].load()));
+}
+
+void scale(Column& column, V factor, std::size_t samples) {
+  for (std::size_t i = 0; i < samples; ++i) column[i].store(hn::Mul(factor, column[i].load()));
+}
+
+// The model's linear basis, a constant and then the shapes, made orthonormal; and the shapes' derivatives by the edge's
+// position and by the blur, with the Gram matrices of what the basis can't imitate of them. Common to the three
+// channels.
+template <std::size_t Shapes>
+struct Basis {
+  static constexpr std::size_t linear = Shapes + 1;
+  using Columns = std::array<Column, Shapes>;
+  using Imitated = std::array<std::array<V, linear>, Shapes>;  // of each derivative, along each unit
+  using Gram = std::array<std::array<V, Shapes>, Shapes>;
+
+  std::array<Column, linear> unit;
+  std::array<std::array<V, linear>, linear> triangle;  // of the orthogonalisation
+  Columns by_position, by_blur;
+  Imitated position_imitated, blur_imitated;
+  Gram position_gram, blur_gram;
+  Mask independent;
+
+  Basis(const LineLanes& lines, const Column& present, V edge_px) {
+    fill(lines, present, edge_px);
+    orthogonalise(lines, present);
+    tell_apart(by_position, lines.samples, position_imitated, position_gram);
+    tell_apart(by_blur, lines.samples, blur_imitated, blur_gram);
+  }
+
+ private:
+  // The shapes of edge_profile.cpp.
+  void fill(const LineLanes& lines, const Column& present, V edge_px) {
+    const Floats d;
+    const V one = hn::Set(d, 1), blur = lines.blur.load(), inverse_blur = hn::Div(one, blur);
+    V rise = one, fall = one, bend = one;
+    if constexpr (Shapes == 2) {
+      const V radius = lines.radius.load(), root_blur = hn::Sqrt(blur);
+      const V root_scale = hn::Sqrt(hn::Div(hn::Set(d, 2), radius));
+      rise = hn::Mul(root_scale, root_blur), fall = hn::Div(root_scale, root_blur);
+      bend = hn::Div(blur, hn::Mul(hn::Set(d, 4), radius));
+    }
+    const BlurredEdge* table = BlurredEdges::instance().entries();
+    V from_edge = hn::Sub(lines.first.load(), edge_px);
+    for (std::size_t i = 0; i < lines.samples; ++i, from_edge = hn::Add(from_edge, one)) {
+      const V here = present[i].load(), u = hn::Mul(from_edge, inverse_blur);
+      const BlurredLanes edge = blurred_at<Shapes == 2>(table, u);
+      const V slope = hn::Neg(hn::Mul(hn::Mul(here, edge.density), inverse_blur));
+      unit[1][i].store(hn::Mul(here, edge.step));
+      by_position[0][i].store(slope);
+      by_blur[0][i].store(hn::Mul(slope, u));
+      if constexpr (Shapes == 2) {
+        const V up = hn::Mul(here, rise), down = hn::Mul(here, fall);
+        const V bent = hn::Mul(hn::Mul(bend, hn::Set(d, 1.5F)), edge.root);
+        unit[2][i].store(hn::Mul(up, hn::NegMulAdd(bend, edge.three_halves, edge.root)));
+        by_position[1][i].store(hn::Mul(down, hn::Sub(bent, edge.root_slope)));
+        by_blur[1][i].store(hn::Mul(down, hn::NegMulAdd(u, edge.root_slope, hn::Mul(hn::Set(d, 0.5F), edge.root))));
+      }
+    }
+  }
+
+  void orthogonalise(const LineLanes& lines, const Column& present) {
+    const Floats d;
+    const std::size_t samples = lines.samples;
+    triangle[0][0] = hn::Sqrt(samples_of(lines));
+    const V constant = hn::Div(hn::Set(d, 1), triangle[0][0]);
+    for (std::size_t i = 0; i < samples; ++i) unit[0][i].store(hn::Mul(constant, present[i].load()));
+    independent = hn::Eq(constant, constant);
+    for (std::size_t j = 1; j < linear; ++j) {
+      Column& column = unit[j];
+      const V before = dot(column, column, samples);
+      for (std::size_t k = 0; k < j; ++k) {
+        triangle[k][j] = dot(unit[k], column, samples);
+        subtract(column, triangle[k][j], unit[k], samples);
+      }
+      const V square = dot(column, column, samples);
+      independent = hn::And(independent, hn::Gt(square, hn::Mul(hn::Set(d, 1e-5F), before)));
+      triangle[j][j] = hn::Sqrt(square);
+      scale(column, hn::Div(hn::Set(d, 1), triangle[j][j]), samples);
+    }
+  }
+
+  void tell_apart(const Columns& derivatives, std::size_t samples, Imitated& imitated, Gram& gram) const {
+    for (std::size_t s = 0; s < Shapes; ++s) {
+      std::array<const Column*, linear + Shapes> columns;
+      for (std::size_t j = 0; j < linear; ++j) columns[j] = &unit[j];
+      for (std::size_t r = 0; r < Shapes; ++r) columns[linear + r] = &derivatives[r];
+      const auto products = dots(columns, derivatives[s], samples);
+      std::copy_n(products.begin(), linear, imitated[s].begin());
+      for (std::size_t r = 0; r <= s; ++r) {
+        V left = products[linear + r];
+        for (std::size_t j = 0; j < linear; ++j) left = hn::NegMulAdd(imitated[s][j], imitated[r][j], left);
+        gram[s][r] = gram[r][s] = left;
+      }
+    }
+  }
+};
+
+// EdgeFit in every lane.
+struct FitLanes {
+  V offset, information, residual_variance, blur_gradient, blur_information;
+  std::array<V, 3> step, before;
+  Mask converged;
+};
+
+// What a line shows: light by channel, and the sums of its squares.
+struct LineLight {
+  const std::array<Column, 3>& light;
+  V squares;
+
+  LineLight(const std::array<Column, 3>& of_light, std::size_t samples) : light(of_light), squares(hn::Zero(Floats())) {
+    for (const Column& channel : light) squares = hn::Add(squares, dot(channel, channel, samples));
+  }
+};
+
+// One variable-projection step: linear amplitudes per channel, then the position in what they leave.
+template <std::size_t Shapes>
+FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& present, V edge_px) {
+  const Floats d;
+  const V zero = hn::Zero(d);
+  const Basis<Shapes> basis(lines, present, edge_px);
+  constexpr std::size_t linear = Basis<Shapes>::linear;
+  std::array<const Column*, linear + 2 * Shapes> columns;
+  for (std::size_t j = 0; j < linear; ++j) columns[j] = &basis.unit[j];
+  for (std::size_t s = 0; s < Shapes; ++s) {
+    columns[linear + s] = &basis.by_position[s];
+    columns[linear + Shapes + s] = &basis.by_blur[s];
+  }
+  FitLanes fit{zero, zero, zero, zero, zero, {zero, zero, zero}, {zero, zero, zero}, basis.independent};
+  V position_gradient = zero, squares = seen.squares;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto products = dots(columns, seen.light[c], lines.samples);
+    std::array<V, linear> amplitude;
+    for (std::size_t j = 0; j < linear; ++j) {
+      amplitude[j] = products[j];
+      squares = hn::NegMulAdd(amplitude[j], amplitude[j], squares);
+    }
+    for (std::size_t j = linear; j-- > 0;) {
+      for (std::size_t k = j + 1; k < linear; ++k)
+        amplitude[j] = hn::NegMulAdd(basis.triangle[j][k], amplitude[k], amplitude[j]);
+      amplitude[j] = hn::Div(amplitude[j], basis.triangle[j][j]);
+    }
+    fit.before[c] = amplitude[0];
+    for (std::size_t s = 0; s < Shapes; ++s) {
+      const V a = amplitude[s + 1];
+      V by_position = products[linear + s], by_blur = products[linear + Shapes + s];
+      for (std::size_t j = 0; j < linear; ++j) {
+        by_position = hn::NegMulAdd(basis.position_imitated[s][j], products[j], by_position);
+        by_blur = hn::NegMulAdd(basis.blur_imitated[s][j], products[j], by_blur);
+      }
+      position_gradient = hn::MulAdd(a, by_position, position_gradient);
+      fit.blur_gradient = hn::MulAdd(a, by_blur, fit.blur_gradient);
+      for (std::size_t t = 0; t < Shapes; ++t) {
+        const V both = hn::Mul(a, amplitude[t + 1]);
+        fit.information = hn::MulAdd(both, basis.position_gram[s][t], fit.information);
+        fit.blur_information = hn::MulAdd(both, basis.blur_gram[s][t], fit.blur_information);
+      }
+      fit.step[c] = hn::Add(fit.step[c], a);
+    }
+  }
+  const V degrees =
+      hn::MulAdd(hn::Set(d, 3), hn::Sub(samples_of(lines), hn::Set(d, static_cast<float>(linear))), hn::Set(d, -1));
+  fit.offset = hn::Div(position_gradient, fit.information);
+  fit.residual_variance = hn::Div(hn::Max(zero, squares), degrees);
+  // Comparisons with what is not finite are false.
+  const V huge = hn::Set(d, 1e30F);
+  fit.converged = hn::And(hn::And(fit.converged, hn::Gt(fit.information, hn::Set(d, min_edge_information))),
+                          hn::And(hn::Ge(degrees, hn::Set(d, 3)),
+                                  hn::And(hn::Lt(hn::Abs(fit.offset), huge), hn::Lt(fit.residual_variance, huge))));
+  return fit;
+}
+
+FitLanes select(Mask mask, const FitLanes& yes, const FitLanes& no) {
+  FitLanes out;
+  out.offset = hn::IfThenElse(mask, yes.offset, no.offset);
+  out.information = hn::IfThenElse(mask, yes.information, no.information);
+  out.residual_variance = hn::IfThenElse(mask, yes.residual_variance, no.residual_variance);
+  out.blur_gradient = hn::IfThenElse(mask, yes.blur_gradient, no.blur_gradient);
+  out.blur_information = hn::IfThenElse(mask, yes.blur_information, no.blur_information);
+  for (std::size_t c = 0; c < 3; ++c) {
+    out.step[c] = hn::IfThenElse(mask, yes.step[c], no.step[c]);
+    out.before[c] = hn::IfThenElse(mask, yes.before[c], no.before[c]);
+  }
+  out.converged = hn::Or(hn::And(mask, yes.converged), hn::AndNot(mask, no.converged));
+  return out;
+}
+
+// iterate() of edge_profile.cpp in every lane.
+template <std::size_t Shapes>
+FitLanes iterate(const LineLanes& lines, const LineLight& light, const Column& present, int iterations) {
+  const Floats d;
+  const V reach = hn::Mul(hn::Set(d, 0.5F), samples_of(lines));
+  V edge_px = hn::Zero(d);
+  FitLanes fit{};
+  Mask active = hn::Eq(edge_px, edge_px);
+  for (int iteration = 0; iteration < iterations && !hn::AllFalse(d, active); ++iteration) {
+    fit = select(active, project<Shapes>(lines, light, present, edge_px), fit);
+    active = hn::And(active, fit.converged);
+    const V step = hn::Min(hn::Max(fit.offset, hn::Set(d, -2)), hn::Set(d, 2));
+    edge_px = hn::IfThenElse(active, hn::Add(edge_px, step), edge_px);
+    fit.converged = hn::And(fit.converged, hn::Le(hn::Abs(edge_px), reach));
+    active = hn::And(hn::And(active, fit.converged), hn::Ge(hn::Abs(step), hn::Set(d, edge_tolerance_px)));
+  }
+  const V largest = hn::Set(d, iterations > 1 ? max_last_step_px : max_only_step_px);
+  fit.converged = hn::And(fit.converged, hn::Lt(hn::Abs(fit.offset), largest));
+  fit.offset = edge_px;
+  return fit;
+}
+
+template <std::size_t Shapes>
+void locate(const LightImage& image, std::span<const EdgeLine> lines, int iterations, EdgeFits& fits) {
+  const Floats d;
+  const LineLanes lanes = lanes_of(lines, hn::Lanes(d));
+  Column present;
+  V t = lanes.first.load();
+  for (std::size_t i = 0; i < lanes.samples; ++i, t = hn::Add(t, hn::Set(d, 1)))
+    present[i].store(hn::IfThenElseZero(hn::Le(t, lanes.last.load()), hn::Set(d, 1)));
+  const SampledLanes sampled =
+      image.channels().differs() ? sample<true>(image, lanes, present) : sample<false>(image, lanes, present);
+  const FitLanes fit = iterate<Shapes>(lanes, LineLight(sampled.light, lanes.samples), present, iterations);
+  Lanes offset, information, variance, blur_gradient, blur_information, converged;
+  std::array<Lanes, 3> step, before;
+  offset.store(fit.offset), information.store(fit.information), variance.store(fit.residual_variance);
+  blur_gradient.store(fit.blur_gradient), blur_information.store(fit.blur_information);
+  for (std::size_t c = 0; c < 3; ++c) step[c].store(fit.step[c]), before[c].store(fit.before[c]);
+  converged.store(hn::IfThenElseZero(fit.converged, hn::Set(d, 1)));
+  for (std::size_t j = 0; j < lines.size(); ++j) {
+    const auto of = [j](const Lanes& lane) { return lane.value[j]; };
+    if (of(sampled.brightest) >= LightImage::saturated_value) {
+      fits.push_back(Shapes == 1 ? locate_step(image, lines[j], iterations)
+                                 : locate_contour(image, lines[j], iterations));
+    } else {
+      fits.push_back({of(converged) > 0,
+                      of(offset),
+                      of(information),
+                      of(variance),
+                      {of(step[0]), of(step[1]), of(step[2])},
+                      {of(before[0]), of(before[1]), of(before[2])},
+                      of(blur_gradient),
+                      of(blur_information)});
+    }
+  }
+}
+
+template <std::size_t Shapes>
+EdgeFits locate_all(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
+  EdgeFits fits;
+  const std::size_t lanes = hn::Lanes(Floats());
+  for (std::size_t i = 0; i < lines.size(); i += lanes)
+    locate<Shapes>(image, lines.subspan(i, std::min(lanes, lines.size() - i)), iterations, fits);
+  return fits;
+}
+
+EdgeFits locate_steps(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
+  return locate_all<1>(image, lines, iterations);
+}
+EdgeFits locate_contours(const LightImage& image, std::span<const EdgeLine> lines, int iterations) {
+  return locate_all<2>(image, lines, iterations);
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace lapservo::internal
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace lapservo::internal {
+
+HWY_EXPORT(locate_steps);
+HWY_EXPORT(locate_contours);
+
+EdgeProfile sample_profile(const LightImage& light, const EdgeLine& line) {
+  EdgeProfile profile;
+  profile.first_px = static_cast<float>(-line.before);
+  profile.count = static_cast<std::size_t>(line.before + line.after + 1);
+  for (std::size_t i = 0; i < profile.count; ++i) {
+    const float t = profile.first_px + static_cast<float>(i);
+    const LightImage::Sample sample = light.at(line.u_px + t * line.du, line.v_px + t * line.dv);
+    for (std::size_t c = 0; c < 3; ++c) {
+      profile.light[c][i] = sample.light[c];
+      profile.usable[c][i] = !sample.saturated[c];
+    }
+  }
+  return profile;
+}
+
+EdgeFit locate_step(const LightImage& light, const EdgeLine& line, int iterations) {
+  return fit_step(sample_profile(light, line), line.blur_px, iterations);
+}
+
+EdgeFit locate_contour(const LightImage& light, const EdgeLine& line, int iterations) {
+  return fit_contour(sample_profile(light, line), line.blur_px, line.contour_radius_px, iterations);
+}
+
+EdgeFits locate_steps(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
+  return HWY_DYNAMIC_DISPATCH(locate_steps)(light, lines, iterations);
+}
+
+EdgeFits locate_contours(const LightImage& light, std::span<const EdgeLine> lines, int iterations) {
+  return HWY_DYNAMIC_DISPATCH(locate_contours)(light, lines, iterations);
+}
+
+}  // namespace lapservo::internal
+#endif

@@ -1,0 +1,500 @@
+#include "lapservo/vision/edges/edge_measurements.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/statistics.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/edges/blurred_boundary.h"
+#include "lapservo/vision/edges/edge_lines.h"
+#include "lapservo/vision/edges/film_edge.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int max_lines = EdgeMeasurements::max_lines, stations = EdgeMeasurements::max_stations;
+
+// A direction around the shaft, in the unrolled frame and in the camera's, and where its line begins.
+struct Generatrix {
+  double azimuth_rad;
+  Eigen::Vector3d outwards_unrolled, outwards, around, begin;
+};
+
+// What a pass measures with.
+struct Frame {
+  const Scene& scene;
+  const LightImage& light;
+  const PoseUnknowns& unknowns;
+  double film_m;
+  CylinderView view;
+  Eigen::Matrix3d axes;                // of the unrolled frame, in the camera
+  Eigen::Vector3d camera_in_unrolled;  // [m]
+
+  Frame(const Scene& of_scene, const LightImage& of_light, const PoseUnknowns& of_unknowns, double of_film_m,
+        const CylinderView& of_view)
+      : scene(of_scene),
+        light(of_light),
+        unknowns(of_unknowns),
+        film_m(of_film_m),
+        view(of_view),
+        axes(unknowns.pose().camera_from_unrolled.rotation.toRotationMatrix()),
+        camera_in_unrolled(-axes.transpose() * unknowns.pose().camera_from_unrolled.translation) {}
+
+  const Marker& marker() const { return scene.marker; }
+  Generatrix generatrix(double azimuth_rad) const {
+    const double cosine = std::cos(azimuth_rad), sine = std::sin(azimuth_rad);
+    const Eigen::Vector3d outwards = cosine * axes.col(0) + sine * axes.col(1);
+    return {azimuth_rad,
+            {cosine, sine, 0},
+            outwards,
+            cosine * axes.col(1) - sine * axes.col(0),
+            unknowns.pose().camera_from_unrolled.translation + marker().radius_m() * outwards};
+  }
+  Eigen::Vector3d point(const Generatrix& line, double along_m) const { return line.begin + along_m * axes.col(2); }
+  Facing facing(std::size_t k, const Generatrix& line, double along_m) const {
+    Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
+    to_camera.z() -= along_m;
+    const double beyond_m = k == 0 ? -to_camera.z() : k == 3 ? to_camera.z() : 0, per_m = 1 / to_camera.norm();
+    return {line.outwards_unrolled.dot(to_camera) * per_m, std::max(0.0, beyond_m * per_m)};
+  }
+  double diffuse_light(const Generatrix& line, double along_m) const {
+    Eigen::Vector3d to_camera = camera_in_unrolled - marker().radius_m() * line.outwards_unrolled;
+    to_camera.z() -= along_m;
+    const double ambient = edge_limits.blurred_ambient_fraction;
+    return ambient + (1 - ambient) * std::max(0.0, line.outwards_unrolled.dot(to_camera) / to_camera.norm());
+  }
+  double tau(double azimuth_rad) const { return marker_azimuth_rad(marker(), azimuth_rad, unknowns.pose().psi_rad); }
+
+  // The line through a point of the image, when all of it can be sampled.
+  std::optional<EdgeLine> edge_line(const Eigen::Vector2d& centre_px, const Eigen::Vector2d& direction, int before,
+                                    int after, double blur_px) const {
+    if (!light.contains(centre_px - before * direction) || !light.contains(centre_px + after * direction))
+      return std::nullopt;
+    EdgeLine line;
+    line.u_px = static_cast<float>(centre_px.x()), line.v_px = static_cast<float>(centre_px.y());
+    line.du = static_cast<float>(direction.x()), line.dv = static_cast<float>(direction.y());
+    line.before = before, line.after = after;
+    line.blur_px = static_cast<float>(blur_px);
+    return line;
+  }
+};
+
+// Whether another instrument lies before a line through a point of the shaft, or before a part of it.
+bool lies_behind_another(const Frame& frame, const EdgeLine& line, const Generatrix& generatrix, double along_m) {
+  const double depth_m = frame.point(generatrix, along_m).z();
+  const Eigen::Vector2d centre_px(line.u_px, line.v_px), direction(line.du, line.dv);
+  return frame.scene.hidden(centre_px, depth_m) || frame.scene.hidden(centre_px - line.before * direction, depth_m) ||
+         frame.scene.hidden(centre_px + line.after * direction, depth_m);
+}
+
+// Measurement::row of a point, moving along `pull` [px/m], with its parts by psi and by the film.
+UnknownVector row_of(const PoseUnknowns& unknowns, const Eigen::Vector3d& point, const Eigen::Vector3d& pull,
+                     double by_psi, double by_film) {
+  UnknownVector row = unknowns.row(point, pull, 1);
+  row[unknowns.size() - 1] = by_psi;
+  row[unknowns.size()] = by_film;
+  return row;
+}
+
+// The course of boundary `k` in the image, in the directions of `along`, by how it goes on around the shaft on either
+// side, `depth_m` below the outside. The light is the camera's, diffuse: so the ends' films are seen, too.
+BoundaryCourse course_of(const Frame& frame, const Generatrix& generatrix, double along_m, double slope_m,
+                         double depth_m, const Eigen::Vector2d& point_px, const Eigen::Vector2d& along) {
+  constexpr double aside_rad = 0.05;
+  const Eigen::Vector2d across(-along.y(), along.x());
+  std::array<Eigen::Vector2d, 2> places_px;
+  std::array<double, 2> light;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const double turn_rad = i == 0 ? -aside_rad : aside_rad;
+    const Generatrix aside = frame.generatrix(generatrix.azimuth_rad + turn_rad);
+    const double there_m = along_m + turn_rad * slope_m;
+    const Eigen::Vector2d from_px =
+        frame.scene.camera.raw_from_point(frame.point(aside, there_m) - depth_m * aside.outwards) - point_px;
+    places_px[i] = {from_px.dot(along), from_px.dot(across)};
+    light[i] = frame.diffuse_light(aside, there_m);
+  }
+  const Eigen::Vector2d &a = places_px[0], &b = places_px[1];
+  const double slope_a = a.x() / a.y(), slope_b = b.x() / b.y(), apart_px = b.y() - a.y();
+  BoundaryCourse course;
+  course.curvature_per_px = 2 * (slope_b - slope_a) / apart_px;
+  course.slope = slope_a - 0.5 * course.curvature_per_px * a.y();
+  course.light_change_per_px = std::log(light[1] / light[0]) / apart_px;
+  return course;
+}
+
+// A boundary on a generatrix, where it is expected; all of the measurement but residual and sigma.
+struct BoundaryPlace {
+  Measurement measurement;
+  Eigen::Vector2d point_px, along;
+  double normal_cosine;
+  EdgeLine line;
+  Facing facing;
+  double film_shift;         // by which fraction of its projected width the film's edge is expected to move it
+  double film_px_per_m;      // that width by the film's thickness, along the normal
+  double film_moved_px = 0;  // how far it moves it beyond what was expected, and one sigma of that
+  double film_sigma_px = 0;
+
+  bool shows_film() const { return facing.film_edge > 0; }
+};
+
+// What a wide blur does to it: `ellipse` is the boundary's.
+struct InWideBlur {
+  BlurEllipse ellipse;
+  Eigen::Vector2d normal;  // its parts along the line and across it
+  double moved_px;         // along the line
+};
+
+// Whether the pixels on both sides have the colours that should be there. A blurred band tints the shaft beyond its
+// end.
+bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_px) {
+  const std::size_t k = place.measurement.group;
+  const Eigen::Vector2d at_px = place.point_px + static_cast<double>(offset_px) * place.along;
+  const double on_band_px = 0.8 * place.line.before, on_shaft_px = on_band_px + 1.5 * place.line.blur_px;
+  const std::uint8_t before = frame.scene.class_at(at_px - (k == 0 ? on_shaft_px : on_band_px) * place.along);
+  const std::uint8_t after = frame.scene.class_at(at_px + (k == 3 ? on_shaft_px : on_band_px) * place.along);
+  return before == (k == 0 ? 0 : frame.scene.bands[k - 1]) && after == (k == 3 ? 0 : frame.scene.bands[k]);
+}
+
+// False where it can't be looked for.
+bool place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
+                    const std::array<double, 4>& along_m, double slope_m, const Effort& effort, double blur_px,
+                    InWideBlur* wide, BoundaryPlace& place) {
+  place.facing = frame.facing(k, generatrix, along_m[k]);
+  place.film_shift = place.shows_film() ? film_edge_level(place.facing, film_edge_limits.usual_even_light) : 0;
+  Eigen::Vector3d point = frame.point(generatrix, along_m[k]);
+  if (place.shows_film()) point -= place.film_shift * frame.film_m * generatrix.outwards;
+  if (!(point.z() > 1e-3)) return false;
+  const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
+  const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
+  const double px_per_m = axis_px.norm();
+  place.point_px = image.point_px;
+  place.along = axis_px / px_per_m;
+  const Eigen::Vector2d tangent =
+      (frame.marker().radius_m() * (image.d_px_d_point * generatrix.around) + slope_m * axis_px).normalized();
+  const Eigen::Vector2d normal(-tangent.y(), tangent.x());
+  place.normal_cosine = normal.dot(place.along);
+  if (!(std::abs(place.normal_cosine) > edge_limits.min_normal_cosine)) return false;
+  if (wide) {
+    wide->normal = {place.normal_cosine, normal.dot(Eigen::Vector2d(-place.along.y(), place.along.x()))};
+    blur_px = wide->ellipse.along_normal_px(wide->normal);
+    wide->moved_px = moved_by_blur_px(
+        course_of(frame, generatrix, along_m[k], slope_m, place.film_shift * frame.film_m, image.point_px, place.along),
+        wide->ellipse);
+  }
+
+  double gap_px = 1e9;
+  if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
+  if (k < 3) gap_px = std::min(gap_px, (along_m[k + 1] - along_m[k]) * px_per_m);
+  const double line_blur_px = blur_px / std::abs(place.normal_cosine);
+  const int reach =
+      static_cast<int>(std::min({2.5 * line_blur_px + effort.extra_px, 0.6 * gap_px - line_blur_px, 22.0}));
+  if (reach < 3) return false;
+  const auto line = frame.edge_line(image.point_px, place.along, reach, reach, line_blur_px);
+  if (!line) return false;
+  place.line = *line;
+  const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
+  place.film_px_per_m = -pull.dot(generatrix.outwards);
+  place.measurement.row = row_of(frame.unknowns, point, pull, -slope_m * pull.dot(frame.axes.col(2)),
+                                 place.film_shift * film_sigma_m * place.film_px_per_m);
+  place.measurement.group = k;
+  place.measurement.turn_fraction = wrap_two_pi(frame.tau(generatrix.azimuth_rad)) / frame.marker().covered_rad();
+  place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
+  place.measurement.expected_px = image.point_px.cast<float>();
+  place.measurement.normal = normal.cast<float>();
+  place.measurement.clear_px = static_cast<float>(0.6 * gap_px * std::abs(place.normal_cosine) - blur_px);
+  return true;
+}
+
+float dot(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// The sum of the steps at a boundary, and the points that were located there; of an end, that show the film.
+struct LocatedSteps {
+  std::array<float, 3> sum{};
+  InplaceVector<std::size_t, max_lines> points;
+
+  LocatedSteps(std::size_t k, std::span<const BoundaryPlace> places, std::span<const EdgeFit> edges) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (places[i].measurement.group != k || !edges[i].converged) continue;
+      if ((k == 0 || k == 3) && !places[i].shows_film()) continue;
+      points.push_back(i);
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += edges[i].step[c];
+    }
+  }
+};
+
+double even_light_in(std::span<const BoundaryPlace> places, std::span<const EdgeFit> edges) {
+  InplaceVector<EvenLight, 2> seen;
+  for (const std::size_t k : {1U, 2U}) {
+    const LocatedSteps steps(k, places, edges);
+    InplaceVector<FadingPoint, max_lines> points;
+    for (std::size_t at = 0; at < steps.points.size(); at += 2) {  // half of them tell enough
+      const std::size_t i = steps.points[at];
+      points.push_back({places[i].facing.outside, dot(edges[i].step, steps.sum)});
+    }
+    seen.push_back(even_light_of(points));
+  }
+  return usual_or_seen(seen);
+}
+
+// Tells from the located points of an end how far the film's edge, where it shows, moves them.
+void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBlur& blur,
+              std::span<BoundaryPlace> places, std::span<const EdgeFit> edges) {
+  const LocatedSteps steps(k, places, edges);
+  if (steps.points.size() < edge_limits.min_alike) return;
+  InplaceVector<EndPoint, max_lines> points;
+  for (const std::size_t i : steps.points) {
+    const float before = dot(edges[i].before, steps.sum), step = dot(edges[i].step, steps.sum);
+    points.push_back(k == 0 ? EndPoint{before, step} : EndPoint{-before - step, step});
+  }
+  static_assert(max_end_points >= max_lines);
+  const auto gloss = gloss_of(points);
+  for (std::size_t at = 0; at < points.size(); ++at) {
+    BoundaryPlace& place = places[steps.points[at]];
+    const double matt = film_edge_level(place.facing, even_light);
+    const double width_px = frame.film_m * place.film_px_per_m, blur_px = blur.along_px[k];
+    const FilmShift shift = film_shift(matt - gloss.begin()[at], std::abs(width_px) / blur_px);
+    const double shift_px = shift.fraction * width_px;
+    Measurement& m = place.measurement;
+    m.row[m.row.size() - 1] += (shift.by_width - place.film_shift) * film_sigma_m * place.film_px_per_m;
+    place.film_moved_px = shift_px - place.film_shift * width_px;
+    // What gloss takes off is no better known.
+    const double doubted_px = std::max(std::abs(shift_px), std::abs(matt * width_px));
+    place.film_sigma_px = edge_limits.film_doubt * doubted_px * doubted_px / blur_px;
+    m.expected_px += static_cast<float>(place.film_moved_px) * m.normal;
+  }
+}
+
+// A boundary point that was located.
+struct Candidate {
+  const BoundaryPlace* place;
+  const InWideBlur* wide;  // nullptr in usual blur
+  const EdgeFit* edge;
+  bool colors_agree;
+};
+
+// Keeps the candidates of one boundary whose change of light is what most see where the colours agree; gives each its
+// sigma from the noise that the lines show.
+void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeasurements& out) {
+  std::array<float, 3> typical{};
+  InplaceVector<float, max_lines> values;
+  for (std::size_t c = 0; c < 3; ++c) {
+    values.clear();
+    for (const Candidate& candidate : candidates)
+      if (candidate.colors_agree) values.push_back(candidate.edge->step[c]);
+    if (values.size() < edge_limits.min_alike) return;
+    typical[c] = median(values);
+  }
+  values.clear();
+  for (const Candidate& candidate : candidates)
+    if (candidate.colors_agree) values.push_back(candidate.edge->residual_variance);
+  const double typical_variance = median(values);
+  const float typical_square = dot(typical, typical);
+  for (const auto& [place, wide, edge, agree] : candidates) {
+    const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
+    const bool alike = projection > edge_limits.min_step * typical_square &&
+                       projection * projection > edge_limits.least_alike * square * typical_square;
+    if (!alike || edge->residual_variance >
+                      edge_limits.max_residual * square + edge_limits.max_residual_variances * typical_variance)
+      continue;
+    const double variance = 0.5 * (edge->residual_variance + typical_variance) * edge_limits.interpolation_noise;
+    const double cosine = place->normal_cosine;
+    out.all.push_back(place->measurement);
+    Measurement& measurement = out.all.end()[-1];
+    measurement.residual_px = edge->offset_px * cosine - place->film_moved_px;
+    if (wide) {
+      measurement.residual_px -= wide->moved_px * cosine;
+      out.wide_blur.add(*edge, variance, blur, measurement.group, wide->normal);
+    }
+    measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
+                                     edge_limits.single_floor_px * edge_limits.single_floor_px +
+                                     place->film_sigma_px * place->film_sigma_px);
+    out.boundary_blurs[measurement.group].add(*edge, variance);
+  }
+}
+
+// Of the visible half width: wide blur mixes what lies beside the shaft into what is near its sides.
+double line_reach(const EdgeBlur& blur, double radius_px) {
+  if (!blur.wide()) return edge_limits.line_reach;
+  return std::clamp(1 - edge_limits.blurs_from_side * blur.sides_px / radius_px, edge_limits.least_line_reach,
+                    edge_limits.line_reach);
+}
+
+void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur& blur, EdgeMeasurements& out) {
+  const double radius_px = frame.marker().radius_m() / frame.view.camera_to_axis_m * frame.scene.camera.fx_px;
+  out.radius_px = radius_px;
+  out.lines = std::max(edge_limits.min_lines, std::min(static_cast<int>(1.2 * radius_px), max_lines) / effort.thinning);
+  const auto slopes_m = boundary_slopes_m(frame.marker());
+  const bool wide = blur.wide();
+  std::array<bool, 4> jumps{};
+  for (std::size_t k = 0; k < 4; ++k) jumps[k] = jumps_at_seam(frame.marker(), k);
+  const double sine_of_half = std::sin(frame.view.half_visible_rad), reach = line_reach(blur, radius_px);
+  InplaceVector<BoundaryPlace, 4 * max_lines> places;
+  InplaceVector<InWideBlur, 4 * max_lines> in_wide_blur;
+  InplaceVector<EdgeLine, 4 * max_lines> lines;
+  for (int i = 0; i < out.lines; ++i) {
+    const double sine = reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
+    const Generatrix generatrix = frame.generatrix(frame.view.facing_azimuth_rad + std::asin(sine));
+    const double tau_rad = frame.tau(generatrix.azimuth_rad);
+    const auto along_m = boundaries_m(frame.marker(), tau_rad);
+    const double seam_px = distance_to_seam_rad(frame.marker(), tau_rad) * radius_px * std::sqrt(1 - sine * sine);
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (jumps[k] && seam_px < edge_limits.seam_blurs * blur.boundaries_px + edge_limits.seam_px) continue;
+      InWideBlur blurred;
+      if (wide) blurred.ellipse = blur.ellipse(k);
+      BoundaryPlace& place = places.emplace_back();
+      if (!place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur.boundaries_px,
+                          wide ? &blurred : nullptr, place) ||
+          (!frame.scene.others.empty() && lies_behind_another(frame, place.line, generatrix, along_m[k]))) {
+        places.pop_back();
+        continue;
+      }
+      if (wide) in_wide_blur.push_back(blurred);
+      ++out.in_image[k];
+      place.measurement.across = sine / sine_of_half;
+      lines.push_back(place.line);
+    }
+  }
+  const EdgeFits edges = locate_steps(frame.light, lines, effort.iterations);
+  if (effort.thinning == 1) {
+    const double even_light = even_light_in(places, edges);
+    for (const std::size_t end : {0U, 3U}) see_film(frame, end, even_light, blur, places, edges);
+  }
+  for (std::size_t k = 0; k < 4; ++k) {
+    InplaceVector<Candidate, max_lines> candidates;
+    for (std::size_t i = 0; i < places.size(); ++i)
+      if (places[i].measurement.group == k && edges[i].converged)
+        candidates.push_back({&places[i], wide ? &in_wide_blur[i] : nullptr, &edges[i],
+                              colors_agree(frame, places[i], edges[i].offset_px)});
+    trust(candidates, blur, out);
+  }
+}
+
+// Whether one band fills the section between two azimuths at a place, with some room.
+bool one_band(const Frame& frame, double azimuth_a_rad, double azimuth_b_rad, double along_m, double room_m) {
+  const double tau_a = wrap_two_pi(frame.tau(azimuth_a_rad)), tau_b = wrap_two_pi(frame.tau(azimuth_b_rad));
+  if (std::abs(tau_a - tau_b) > pi) return false;  // the seam lies between
+  if (!is_printed(frame.marker(), tau_a) || !is_printed(frame.marker(), tau_b)) return false;
+  const auto a = boundaries_m(frame.marker(), tau_a), b = boundaries_m(frame.marker(), tau_b);
+  const auto band = [](const std::array<double, 4>& e, double x) {
+    return std::upper_bound(e.begin(), e.end(), x) - e.begin();
+  };
+  const auto first = band(a, along_m - room_m);
+  return first >= 1 && first <= 3 && first == band(a, along_m + room_m) && first == band(b, along_m - room_m) &&
+         first == band(b, along_m + room_m);
+}
+
+// One of the shaft's sides, and a generatrix as deep inside as the occluding contour's model holds.
+struct Side {
+  static constexpr double deep_rad = 0.87;  // where d = R (1 - cos 0.87) = 0.35 R
+  Generatrix contour, deep;
+  std::size_t group;
+
+  Side(const Frame& frame, double sign)
+      : contour(frame.generatrix(frame.view.facing_azimuth_rad + sign * frame.view.half_visible_rad)),
+        deep(frame.generatrix(contour.azimuth_rad - sign * deep_rad)),
+        group(sign < 0 ? 4 : 5) {}
+};
+
+// A point of a side where it is expected.
+struct SidePlace {
+  Measurement measurement;
+  EdgeLine line;
+};
+
+// False where it can't be looked for.
+bool place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort, double blur_px,
+                SidePlace& place) {
+  const Eigen::Vector3d point = frame.point(side.contour, along_m);
+  if (!(point.z() > 1e-3)) return false;
+  const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
+  const Eigen::Vector2d along = (image.d_px_d_point * frame.axes.col(2)).normalized();
+  Eigen::Vector2d inwards(-along.y(), along.x());
+  if (inwards.dot(frame.scene.camera.raw_from_point(frame.point(side.deep, along_m)) - image.point_px) < 0)
+    inwards = -inwards;
+  const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
+  const int inside = inside_of_side_px(radius_px), outside = outside_of_side_px(blur_px, effort.extra_px);
+  if (inside < 3) return false;
+  const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
+  if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return false;
+  const auto line = frame.edge_line(image.point_px, inwards, outside, inside, blur_px);
+  if (!line) return false;
+  place.line = *line;
+  place.line.contour_radius_px = static_cast<float>(radius_px);
+  place.measurement.row = row_of(frame.unknowns, point, image.d_px_d_point.transpose() * inwards, 0, 0);
+  place.measurement.group = side.group;
+  place.measurement.expected_px = image.point_px.cast<float>();
+  place.measurement.normal = inwards.cast<float>();
+  return true;
+}
+
+void measure_sides(const Frame& frame, const Effort& effort, double blur_px, EdgeMeasurements& out) {
+  const int count = stations / effort.thinning;
+  const std::array<Side, 2> sides{Side(frame, -1), Side(frame, 1)};
+  InplaceVector<SidePlace, 2 * stations> places;
+  InplaceVector<EdgeLine, 2 * stations> lines;
+  for (int station = 0; station < count; ++station)
+    for (const Side& side : sides) {
+      const double along_m = frame.marker().length_m() * (station + 0.5) / count;
+      SidePlace& place = places.emplace_back();
+      if (place_side(frame, side, along_m, effort, blur_px, place) &&
+          (frame.scene.others.empty() || !lies_behind_another(frame, place.line, side.contour, along_m)))
+        lines.push_back(place.line);
+      else
+        places.pop_back();
+    }
+  out.sides_in_image = static_cast<int>(places.size());
+  const EdgeFits edges = locate_contours(frame.light, lines, effort.iterations);
+  InplaceVector<float, 2 * stations> variances;
+  for (const EdgeFit& edge : edges)
+    if (edge.converged) variances.push_back(edge.residual_variance);
+  if (variances.size() < edge_limits.min_side_edges) return;
+  const double typical_variance = median(variances);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const EdgeFit& edge = edges[i];
+    if (!edge.converged) continue;
+    const double variance = 0.5 * (edge.residual_variance + typical_variance) * edge_limits.interpolation_noise;
+    const double sigma_px =
+        std::sqrt(variance / edge.information + 4 * edge_limits.single_floor_px * edge_limits.single_floor_px);
+    if (sigma_px > edge_limits.max_side_sigma_px) continue;
+    out.all.push_back(places[i].measurement);
+    Measurement& measurement = out.all.end()[-1];
+    measurement.residual_px = edge.offset_px;
+    measurement.sigma_px = sigma_px;
+    out.side_blur.add(edge, variance);
+  }
+}
+
+}  // namespace
+
+EdgeBlur EdgeMeasurements::improved(const EdgeBlur& blur) const {
+  BlurEvidence boundary_blur;
+  for (const BlurEvidence& each : boundary_blurs) boundary_blur.add(each);
+  const double sides_px = side_blur.improved(blur.sides_px);
+  const bool wide = blur.wide();
+  EdgeBlur next = wide ? wide_blur.improved(blur) : EdgeBlur{boundary_blur.improved(blur.boundaries_px)};
+  next.sides_px = sides_px;
+  next.radius_px = radius_px;
+  if (!wide || next.wide()) return next;
+  EdgeBlur usual{next.boundaries_px, sides_px};
+  usual.radius_px = radius_px;
+  return usual;
+}
+
+EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,
+                               const Effort& effort, const EdgeBlur& blur) {
+  EdgeMeasurements out;
+  const auto view = view_cylinder(unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
+  if (!view) return out;
+  const Frame frame(scene, light, unknowns, film_m, *view);
+  measure_boundaries(frame, effort, blur, out);
+  measure_sides(frame, effort, blur.sides_px, out);
+  return out;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,96 @@
+#include "lapservo/vision/edges/film_edge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "lapservo/core/statistics.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Least squares: step = at_zero + slope * facing.
+struct FadingLine {
+  double at_zero = 0, slope = 0, variance = std::numeric_limits<double>::infinity();
+  double count = 0, mean_square_lever = 0;  // of at_zero's error
+
+  double off(const FadingPoint& p) const { return p.step - at_zero - slope * p.outside_facing; }
+};
+
+// Of the points within three sigma of the line before.
+FadingLine fading_line(std::span<const FadingPoint> points, const FadingLine& before) {
+  constexpr double inlier_variances = 9, least_spread = 1e-6;
+  double x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  FadingLine line;
+  for (const FadingPoint& p : points) {
+    const double off = before.off(p);
+    if (off * off > inlier_variances * before.variance) continue;
+    line.count += 1;
+    x += p.outside_facing, y += p.step;
+    xx += p.outside_facing * p.outside_facing, xy += p.outside_facing * p.step, yy += p.step * p.step;
+  }
+  const double n = line.count, middle = x / n, spread = std::max(least_spread, xx / n - middle * middle);
+  line.slope = (xy - middle * y) / (n * spread);
+  line.at_zero = y / n - line.slope * middle;
+  line.variance = std::max(0.0, yy - line.at_zero * y - line.slope * xy) / std::max(1.0, n - 2);
+  line.mean_square_lever = 1 + middle * middle / spread;
+  return line;
+}
+
+}  // namespace
+
+EvenLight even_light_of(std::span<const FadingPoint> points) {
+  const FilmEdgeLimits& limits = film_edge_limits;
+  if (points.size() < limits.min_fading_points) return {};
+  const FadingLine line = fading_line(points, fading_line(points, {}));
+  const double whole = line.at_zero + line.slope;
+  const double sigma2 = limits.told_even_light_sigma * limits.told_even_light_sigma +
+                        line.variance * line.mean_square_lever / (line.count * whole * whole);
+  if (!(line.count >= 3 && std::isfinite(sigma2))) return {};
+  return {line.at_zero / whole, 1 / sigma2};
+}
+
+double usual_or_seen(std::span<const EvenLight> seen) {
+  double certainty = 1 / (film_edge_limits.even_light_sigma * film_edge_limits.even_light_sigma);
+  double sum = certainty * film_edge_limits.usual_even_light;
+  for (const EvenLight& light : seen) certainty += light.certainty, sum += light.certainty * light.fraction;
+  return std::clamp(sum / certainty, 0.0, film_edge_limits.most_even_light);
+}
+
+double film_edge_level(const Facing& facing, double even_light) {
+  const auto lit = [even_light](double cosine) { return even_light + (1 - even_light) * std::max(0.0, cosine); };
+  const double light = std::min(lit(facing.film_edge) / lit(facing.outside), film_edge_limits.most_lit);
+  return light - (1 - light) * film_edge_limits.bare_shaft_light;
+}
+
+InplaceVector<double, max_end_points> gloss_of(std::span<const EndPoint> points) {
+  constexpr double veil_quantile = 0.2;
+  InplaceVector<float, max_end_points> shafts;
+  for (const EndPoint& point : points) shafts.push_back(point.shaft);
+  InplaceVector<double, max_end_points> gloss;
+  if (points.empty()) return gloss;
+  const float veil = quantile(shafts, veil_quantile);
+  for (const EndPoint& point : points) {
+    const double beyond = std::max(0.0F, point.shaft - veil) / std::max(point.step, 1e-9F);
+    gloss.push_back(std::min(beyond, film_edge_limits.most_gloss));
+  }
+  return gloss;
+}
+
+// A step of the same blur, by least squares: the fraction f of the width w solves (1 - s) P(f w) + s P((f - 1) w) = 1/2
+// with P the integral of a Gaussian of sqrt(2) blurs, to third order in w; what bounds that is fitted to the whole
+// solution, to 2 % up to w = 2 and s = 2.7. Beyond three blurs the series means nothing; the fraction changes little.
+FilmShift film_shift(double level, double width_blurs) {
+  constexpr double bound = 0.175, widest = 3;
+  if (width_blurs > widest) {
+    const double fraction = film_shift(level, widest).fraction;
+    return {fraction, fraction};
+  }
+  const double square = width_blurs * width_blurs;
+  const double bend = level * (1 - level) * (2 * level - 1) / 12;
+  const double bounded = bound * std::max({0.0, level * level - 1, (1 - level) * (1 - level) - 1});
+  const double less = 1 / (1 + bounded * square);
+  return {level + bend * square * less, level + bend * square * (3 + bounded * square) * less * less};
+}
+
+}  // namespace lapservo::internal

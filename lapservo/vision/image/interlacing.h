@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/geometry/response.h"
+#include "lapservo/marker/marker.h"
+#include "lapservo/vision/image/image_view.h"
+#include "lapservo/vision/observation.h"
+
+namespace lapservo::internal {
+
+/// Pixels u_begin <= u < u_end, v_begin <= v < v_end.
+struct PixelBox {
+  int u_begin = 0, v_begin = 0, u_end = 0, v_end = 0;
+};
+
+/// At how many pixels of a box four neighbours alternate: the two of one parity both brighter than the two of the
+/// other. Where two fields saw something in two places, columns alternate; noise, texture and compression make columns
+/// and rows alternate alike.
+struct Alternation {
+  int down = 0;    ///< (u, v) to (u, v + 3)
+  int across = 0;  ///< (u, v) to (u + 3, v)
+};
+
+/// In luma, which chroma subsampling spares, where the parities differ by more than `min_gap` levels.
+Alternation luma_alternation(const ImageView& image, const PixelBox& box, std::uint8_t min_gap);
+
+/// Whether two fields are woven in the box that saw something in two places, some pixels apart. Looks at some thousand
+/// pixels, and at all only where those look suspicious. Allocates nothing.
+bool is_combed(const ImageView& image, const PixelBox& box);
+
+/// Whether it is so about what was found, or refused, as the marker; false where nothing was.
+bool is_combed(const ImageView& image, const Camera& camera, const Marker& marker, const Observation& observation);
+
+/// The field of a frame's even rows, the others interpolated between them: the geometry stays that of the frame.
+class EvenField {
+ public:
+  /// Light is interpolated, as the lens blurs it; means of encoded values would shift edges towards the brighter side.
+  explicit EvenField(const Response& response);
+
+  /// `frame_bgr`: 8-bit, 3 channels. What it gives lives until the next call; allocates when the size changes.
+  const cv::Mat& of(const cv::Mat& frame_bgr);
+
+ private:
+  std::uint8_t mean(std::uint8_t a, std::uint8_t b) const;
+
+  std::array<float, 256> light_of_value_;
+  std::array<std::uint8_t, 16384> value_of_light_{};
+  cv::Mat field_bgr_;
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/geometry/response.h"
+#include "lapservo/vision/image/image_view.h"
+
+namespace lapservo::internal {
+
+/// Where in a raw image each channel shows what green shows at a place.
+struct ChannelGeometry {
+  float centre_u = 0, centre_v = 0;
+  std::array<float, 3> magnification{1, 1, 1};  ///< b, g, r, about the centre
+  float reach_px = 0;                           ///< how far a channel's place lies from green's, at most
+  float corner_px = 0;                          ///< from the centre
+
+  ChannelGeometry() = default;
+  explicit ChannelGeometry(const Camera& camera)
+      : centre_u(static_cast<float>(camera.cx_px)), centre_v(static_cast<float>(camera.cy_px)) {
+    corner_px = static_cast<float>(std::hypot(std::max(camera.cx_px, camera.width_px - camera.cx_px),
+                                              std::max(camera.cy_px, camera.height_px - camera.cy_px)));
+    if (camera.chromatic_aberration != ChromaticAberration{}) magnify(camera.chromatic_aberration);
+  }
+  /// By so much more.
+  void magnify(const ChromaticAberration& more) {
+    magnification[0] *= static_cast<float>(more.blue), magnification[2] *= static_cast<float>(more.red);
+    reach_px = corner_px * std::max(std::abs(magnification[0] - 1), std::abs(magnification[2] - 1));
+  }
+  bool differs() const { return reach_px > 0; }
+};
+
+/// A frame in linear light, decoded where it is looked at. Optical blur acts on light, so edges are located in it.
+/// Places are green's; those of blue and red are found by the camera's chromatic aberration.
+class LightImage {
+ public:
+  LightImage(const ImageView& image, const std::array<float, 256>& light_of_value, const ChannelGeometry& channels = {})
+      : image_(&image), light_(&light_of_value), channels_(channels) {}
+
+  /// The same frame where channels are magnified by so much more.
+  LightImage magnified(const ChromaticAberration& more) const {
+    LightImage out = *this;
+    out.channels_.magnify(more);
+    return out;
+  }
+
+  const ImageView& image() const { return *image_; }
+  const ChannelGeometry& channels() const { return channels_; }
+  const std::array<float, 256>& light_of_value() const { return *light_; }
+
+  /// Encoded values at and above this are taken for saturated: the light there is unknown.
+  static constexpr std::uint8_t saturated_value = 252;
+
+  struct Sample {
+    std::array<float, 3> light;  ///< b, g, r in [0, 1]
+    std::array<bool, 3> saturated;
+  };
+
+  /// Bilinear; contains() the point.
+  Sample at(float u, float v) const {
+    Sample sample;
+    if (!channels_.differs()) {
+      read<0, 3>(u, v, sample);
+      return sample;
+    }
+    const auto place = [&](std::size_t c, float centre, float x) {
+      return centre + channels_.magnification[c] * (x - centre);
+    };
+    read<0, 1>(place(0, channels_.centre_u, u), place(0, channels_.centre_v, v), sample);
+    read<1, 2>(u, v, sample);
+    read<2, 3>(place(2, channels_.centre_u, u), place(2, channels_.centre_v, v), sample);
+    return sample;
+  }
+  /// Whether at() can sample there. A place that rounds onto the last pixel in single precision counts as outside.
+  bool contains(const Eigen::Vector2d& raw_px) const {
+    constexpr double rounding_px = 0.01;
+    const double border_px = channels_.reach_px;
+    return raw_px.x() >= border_px && raw_px.y() >= border_px &&
+           raw_px.x() < image_->width_px - 1 - border_px - rounding_px &&
+           raw_px.y() < image_->height_px - 1 - border_px - rounding_px;
+  }
+
+ private:
+  // Channels First to Last at one place.
+  template <std::size_t First, std::size_t Last>
+  void read(float u, float v, Sample& sample) const {
+    const int iu = static_cast<int>(u), iv = static_cast<int>(v);
+    const float fu = u - static_cast<float>(iu), fv = v - static_cast<float>(iv);
+    const std::uint8_t* top = image_->pixel(iu, iv);
+    const std::uint8_t* bottom = top + image_->row_bytes;
+    const std::array<float, 256>& light = *light_;
+    const float w00 = (1 - fu) * (1 - fv), w01 = fu * (1 - fv), w10 = (1 - fu) * fv, w11 = fu * fv;
+    for (std::size_t c = First; c < Last; ++c) {
+      sample.light[c] =
+          w00 * light[top[c]] + w01 * light[top[c + 3]] + w10 * light[bottom[c]] + w11 * light[bottom[c + 3]];
+      sample.saturated[c] = (top[c] >= saturated_value) | (top[c + 3] >= saturated_value) |
+                            (bottom[c] >= saturated_value) | (bottom[c + 3] >= saturated_value);
+    }
+  }
+
+  const ImageView* image_;
+  const std::array<float, 256>* light_;
+  ChannelGeometry channels_;
+};
+
+}  // namespace lapservo::internal

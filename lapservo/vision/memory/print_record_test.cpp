@@ -1,0 +1,65 @@
+#include "lapservo/vision/memory/print_record.h"
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+
+namespace lapservo::internal {
+namespace print_record_test {
+
+using View = PrintRecord::View;
+
+TEST(PrintRecord, KnowsNothingAtFirst) {
+  const PrintRecord record;
+  EXPECT_FALSE(record.is_off());
+  for (double tau_rad = -7; tau_rad < 7; tau_rad += 0.1) EXPECT_FALSE(record.is_the_rigs(tau_rad));
+}
+
+// From two sides, each time it comes round, and not from behind.
+TEST(PrintRecord, IsTheRigsWhereItWasSeenToBe) {
+  PrintRecord record;
+  record.add(1, View::the_rigs);
+  EXPECT_FALSE(record.is_the_rigs(1)) << "one side may be chance";
+  record.add(1.01, View::the_rigs);
+  EXPECT_FALSE(record.is_the_rigs(1)) << "the same side";
+  record.add(1.6, View::the_rigs);
+  for (const double turns : {-1.0, 0.0, 2.0})
+    for (const double tau_rad : {0.7, 1.0, 1.3, 1.6, 1.9}) {
+      EXPECT_TRUE(record.is_the_rigs(tau_rad + two_pi * turns)) << tau_rad;
+      EXPECT_FALSE(record.is_the_rigs(tau_rad + pi + two_pi * turns)) << tau_rad;
+    }
+  record.add(4, View::off);
+  EXPECT_FALSE(record.is_the_rigs(1.3)) << "the same print is off elsewhere";
+  record.add(4, View::the_rigs);
+  EXPECT_TRUE(record.is_the_rigs(1.3)) << "the latest counts";
+}
+
+TEST(PrintRecord, TheSeamIsNoBorder) {
+  PrintRecord record;
+  record.add(-0.2, View::the_rigs), record.add(0.2, View::the_rigs);
+  EXPECT_TRUE(record.is_the_rigs(0));
+  EXPECT_TRUE(record.is_the_rigs(two_pi));
+}
+
+TEST(PrintRecord, IsOffFromSeveralSidesUnlessItMostlyIsTheRigs) {
+  PrintRecord record;
+  for (const double tau_rad : {1.1, 1.2, 2.0}) record.add(tau_rad, View::off);
+  EXPECT_FALSE(record.is_off()) << "two sides";
+  record.add(3, View::off);
+  EXPECT_TRUE(record.is_off());
+  record.add(4, View::the_rigs);
+  EXPECT_TRUE(record.is_off()) << "a turn looks like it from there";
+  record.add(5, View::possible);
+  EXPECT_FALSE(record.is_off()) << "who knows";
+}
+
+TEST(PrintRecord, APictureThatCanNotTellIsNoNews) {
+  PrintRecord record;
+  record.add(1, View::the_rigs), record.add(1.6, View::the_rigs);
+  for (const double tau_rad : {1.0, 1.6, 2.2}) record.add(tau_rad, View::possible);
+  EXPECT_TRUE(record.is_the_rigs(1.3));
+  EXPECT_FALSE(record.is_the_rigs(2.8)) << "near what could not tell, and one other";
+}
+
+}  // namespace print_record_test
+}  // namespace lapservo::internal

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "lapservo/vision/camera/picture_processing.h"
+#include "lapservo/vision/edges/edge_blur.h"
+#include "lapservo/vision/edges/edge_measurements.h"
+#include "lapservo/vision/model/print_doubt.h"
+#include "lapservo/vision/model/residual_lines.h"
+
+namespace lapservo::internal {
+
+/// How large the errors are that measurements share, and what is doubted of a picture. Fractions are of pixels.
+struct UsualErrors {
+  /// What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole: it does not
+  /// average over lines. With it error over sigma is 0.7 on the rotation samples, 1.3 on rendered ones (usual).
+  double common_boundary_px = 0.007, common_side_px = 0.02;
+  /// Of that, what is doubted of a print but not told of the pose. One pose rendered 25 times (16 poses leaning by up
+  /// to 20 degrees): psi scatters by 0.21 mrad and is 0.25 mrad off (rms), where a picture says 0.4.
+  double untold_boundary_px = 0.004, untold_side_px = 0.01;
+  /// And as a fraction of the blur beyond the usual: defocus and motion do not blur like a Gaussian. All boundaries
+  /// move together by more, mostly where the light comes from aside.
+  double common_fraction_of_blur = 0.008, whole_fraction_of_blur = 0.02;
+  /// And of the blur's square beyond a lens's, by the shaft's radius: how far sides, which are no steps, are off, and
+  /// by how much all boundaries lean alike: what blur does to them where it is not modelled (blurred_boundary.h), and
+  /// what the model leaves. Of sharp pictures sides have a blur of usual_side_blur_px.
+  double usual_side_blur_px = 1.05, side_of_blur = 1.4, leaning_of_blur = 0.4, leaning_of_wide_blur = 0.035;
+  /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are
+  /// clipped beside boundaries, the larger one. A processing that moves them by doubted_processing_px (rms) doubles the
+  /// noise where a hidden boundary's print is asked for, and what `calibrate marker` says.
+  double fraction_of_processing = 0.13, fraction_of_clipped = 0.3, doubted_processing_px = 0.1;
+  /// By so much of it (rms) sides are off, too, and what is left of all boundaries is moved, leaning and bowed alike,
+  /// of which psi feels little: without, phi had up to 2.5 of its sigmas in pictures with 4:2:0, and theta 2.2.
+  double side_fraction_of_processing = 0.5, whole_fraction_of_processing = 0.4, leaning_fraction_of_processing = 0.1,
+         bowed_fraction_of_processing = 0.3;
+  /// And what of that is doubted before the print is blamed: of exact prints 0 to 0.1 px of 0.3 to 0.7 px are left.
+  double doubted_of_processing = 0.12;
+  /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
+  double usual_misfit = 0.004, px_per_misfit = 8;
+  /// What single points may be off (EdgeLimits::single_floor_px) is told of the pose as far as their scatter shows it,
+  /// of clean frames 0.4 to 0.5 of a sigma; neighbours share pixels, so no less than this, which psi's scatter has
+  /// there.
+  double least_noise_scale = 0.47;
+  double usual_sigma_px = 0.05;  ///< of an edge; compressed ones (--format jpg) have three times that
+
+  /// What is doubted before the print is blamed (PrintDoubt): by what is beyond the usual sigma of an edge, by the blur
+  /// beyond a lens's and by what the processing moved. Residuals of exact prints, each about the pose: boundaries 0.03
+  /// px in JPEG, 0.09 in H.264, 0.007 in defocus (2 to 3.2 px); their tilts 0.03, 0.08, 0.05; the marker looks shorter
+  /// by 0.5 % in defocus. In the dark and in noise nothing is left of it.
+  double doubted_of_sigma = 0.8, doubted_length_of_sigma = 0.1;
+  double doubted_tilt_of_blur = 0.025, doubted_length_of_blur = 0.001;
+  /// And what a processing that a blurred picture can't tell moves boundaries by.
+  double doubted_boundary_of_blur = 0.04;
+};
+inline constexpr UsualErrors usual_errors;
+
+/// Errors that all measurements of a group share (one sigma), by how much all noise is larger than each measurement
+/// says, and what is doubted before the print is blamed.
+struct CommonErrors {
+  std::array<double, measurement_groups> px{};
+  /// Of all boundaries alike (rms): moved along the shaft, leaning from side to side, bowed.
+  double whole_px = 0, leaning_px = 0, bowed_px = 0;
+  double noise_scale = 1;
+  /// And what of all that is told of the pose, once the print was judged: what a group shares, and, 1 or less, by how
+  /// much noise is smaller.
+  std::array<double, measurement_groups> told_px{};
+  double told_noise_scale = 1;
+  PrintDoubt doubt;
+  double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_off_m
+};
+
+/// By how much noise is to be taken larger before a print is blamed: compression, motion blur and a camera's processing
+/// move edges of this sigma, which were blurred by this and moved by this.
+double doubt_scale(double sigma_px, double blur_px, double bias_px);
+
+/// What each boundary and side as a whole may be off, and the noise as it is. `bias_px`: by how much the camera's
+/// processing may have moved each boundary; of those that `processed` tells, it is corrected. `departure_px`: what is
+/// left of a departure from the rig's camera.
+CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& lines, const EdgeBlur& blur,
+                           const std::optional<ProcessedEdges>& processed, const std::array<double, 4>& bias_px,
+                           const std::array<double, 4>& departure_px);
+
+}  // namespace lapservo::internal

@@ -1,0 +1,256 @@
+#include "lapservo/vision/model/fine_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "lapservo/vision/camera/camera_look.h"
+#include "lapservo/vision/model/common_errors.h"
+#include "lapservo/vision/model/normal_equations.h"
+#include "lapservo/vision/model/residual_lines.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int max_passes = 3, max_wide_passes = 5, most_departures = 2, passes_of_departure = 2;
+
+double robust_weight(const Measurement& m, double residual_px) {
+  return cauchy_weight(residual_px / m.sigma_px, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
+}
+
+// Minimises the robust cost of linearised measurements: iteratively reweighted. The unknowns are the pose's, then the
+// film's thickness in film_sigma_m; `film_prior` is what that lies below its expected one.
+template <int Size>
+UnknownVector solve(std::span<const Measurement> measurements, double film_prior) {
+  constexpr int max_iterations = 4;
+  using Row = Eigen::Matrix<double, Size, 1>;
+  Row step = Row::Zero();
+  for (int i = 0; i < max_iterations; ++i) {
+    NormalEquations equations(Size);
+    equations.add(Row::Unit(Size - 1), film_prior, 1);
+    for (const Measurement& m : measurements) {
+      const Row row = m.row.head<Size>();
+      equations.add(row, m.residual_px, robust_weight(m, m.residual_px - row.dot(step)));
+    }
+    const Row next = equations.solve(1e-9), change = next - step;
+    step = next;
+    if (change.dot(equations.information() * change) < fine_fit_limits.settled_sigmas * fine_fit_limits.settled_sigmas)
+      break;
+  }
+  return step;
+}
+
+// What a pass changed.
+struct Change {
+  double points_px = 0;       // how far the farthest measured point moved
+  double blur_fraction = 0;   // by how much the blur did, of what it was
+  double motion_blur_px = 0;  // by how much a blur beyond a lens's did
+  double oblique_px2 = 0;     // by how much its covariance along the shaft and across it did, at most
+
+  void add_blur(double before_px, double after_px) {
+    blur_fraction = std::max(blur_fraction, std::abs(after_px / before_px - 1));
+    if (std::max(before_px, after_px) > fine_fit_limits.sharp_blur_px)
+      motion_blur_px = std::max(motion_blur_px, std::abs(after_px - before_px));
+  }
+  // Motion blur may be no blur, which then never settles.
+  bool settled() const {
+    return std::max(points_px, fine_fit_limits.motion_blur_weight * motion_blur_px) < fine_fit_limits.settled_px;
+  }
+  // Whether the blur's covariance is known, which moves boundaries.
+  bool ellipse_settled() const { return oblique_px2 < fine_fit_limits.settled_oblique_px2; }
+  // Whether edges located with the blur before are good enough for the last pass.
+  bool sharp() const { return blur_fraction < fine_fit_limits.settled_blur; }
+};
+
+// One fit: passes of locating edges and moving there, a look at what the camera did, and the print.
+class Fitter {
+ public:
+  // `fit` holds what it starts from, and the result.
+  Fitter(const Scene& scene, const LightImage& light, FineFit& fit) : scene_(scene), light_(light), fit_(fit) {}
+  // Each returns whether to go on; what is known by then is in the result.
+  bool settle();
+  bool see_camera(const ExpectedProcessing& expected);
+  void judge();
+
+ private:
+  static constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
+
+  int unknowns() const { return fit_.unknowns.size(); }
+  double film_prior() const { return (film_mean_m - film_m_) / film_sigma_m; }
+  double move();
+  Change take_blur(const EdgeBlur& improved);
+  std::optional<Change> refine(const Effort& effort);
+  bool refine_until_settled(int least_passes);
+  void take_processing_off(const ProcessedEdges& edges);
+  std::array<double, 4> departure_px() const;
+  void count_inliers();
+  void tell(const PrintFit& print);
+
+  const Scene& scene_;
+  const LightImage& light_;
+  FineFit& fit_;
+  double film_m_ = film_mean_m;
+  EdgeMeasurements pass_;
+  EdgeBlur located_with_;
+  std::optional<ProcessedEdges> processed_;
+};
+
+// To where the measurements are; how far the farthest of them moved [px].
+double Fitter::move() {
+  const UnknownVector step = unknowns() == 4 ? solve<5>(pass_.all, film_prior()) : solve<7>(pass_.all, film_prior());
+  double farthest_px = 0;
+  for (Measurement& m : pass_.all) {
+    const double shift_px = m.row.dot(step);
+    m.residual_px -= shift_px;
+    m.expected_px += static_cast<float>(shift_px) * m.normal;
+    farthest_px = std::max(farthest_px, std::abs(shift_px));
+  }
+  fit_.unknowns = fit_.unknowns.changed_by(step.head(unknowns()));
+  film_m_ = std::clamp(film_m_ + step[unknowns()] * film_sigma_m, 0.0, film_mean_m + 4 * film_sigma_m);
+  return farthest_px;
+}
+
+Change Fitter::take_blur(const EdgeBlur& improved) {
+  Change change;
+  const EdgeBlur& before = fit_.blur;
+  for (std::size_t k = 0; k < 4; ++k) change.add_blur(before.along_px[k], improved.along_px[k]);
+  change.add_blur(before.sides_px, improved.sides_px);
+  change.oblique_px2 = before.widest_px() * before.widest_px() * std::abs(improved.correlation - before.correlation);
+  fit_.blur = improved;
+  return change;
+}
+
+// Nullopt when too little was seen.
+std::optional<Change> Fitter::refine(const Effort& effort) {
+  ++fit_.passes;
+  located_with_ = fit_.blur;
+  const DepartedLight seen(light_, fit_.departure);
+  pass_ = measure_edges(scene_, seen.light(), fit_.unknowns, film_m_, effort, located_with_);
+  if (static_cast<int>(pass_.all.size()) < 2 * unknowns()) return std::nullopt;
+  const double moved_px = move();
+  Change change = take_blur(pass_.improved(fit_.blur));
+  change.points_px = moved_px;
+  if (!fit_.unknowns.pose().camera_from_unrolled.translation.allFinite()) return std::nullopt;
+  return change;
+}
+
+bool Fitter::settle() {
+  auto change = refine(capture);
+  if (change && !(change->settled() && change->sharp())) change = refine(approach);
+  return change && refine_until_settled(1);
+}
+
+bool Fitter::refine_until_settled(int least_passes) {
+  bool settled = false;
+  for (int i = 1; i <= (fit_.blur.wide() ? max_wide_passes : max_passes); ++i) {
+    const auto change = refine(measure_all);
+    if (!change) return false;
+    settled = change->settled();
+    // Of a blur that has just become wide the ellipse was not asked yet.
+    const bool as_wide = located_with_.wide() == fit_.blur.wide();
+    if (i >= least_passes && settled && change->ellipse_settled() && as_wide) break;
+  }
+  return settled;
+}
+
+bool Fitter::see_camera(const ExpectedProcessing& expected) {
+  for (int i = 0; expected.ask; ++i) {
+    SeenCamera camera = look_at_camera(light_, pass_.all, located_with_.boundaries_px, fit_.departure);
+    fit_.processing = camera.evidence.processing;
+    processed_ = std::move(camera.evidence.edges);
+    fit_.processing_explained += camera.explained, fit_.asked_for_departure += camera.asked_for_departure;
+    const bool as_known = camera.departure.moves_alike(fit_.departure);
+    if (as_known || i < most_departures) fit_.departure = camera.departure;
+    if (as_known || i == most_departures) break;
+    if (!refine_until_settled(passes_of_departure)) return false;
+  }
+  if (fit_.processing == Processing::unknown) fit_.bias_px = expected.bias_px;
+  if (processed_) take_processing_off(*processed_);
+  return true;
+}
+
+void Fitter::take_processing_off(const ProcessedEdges& edges) {
+  fit_.bias_px = bias_magnitudes_px(edges);
+  for (std::size_t i = 0; i < pass_.all.size(); ++i)
+    pass_.all[i].residual_px -= static_cast<double>(edges.measurement_bias_px[i]);
+  move();
+}
+
+void Fitter::judge() {
+  fit_.turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
+  fit_.lines = pass_.lines;
+  fit_.in_image = pass_.in_image;
+  fit_.sides_in_image = pass_.sides_in_image;
+  const ResidualLines lines = residual_lines(pass_.all);
+  const auto print = fit_print(pass_.all, lines, unknowns(), film_prior(), scene_.marker,
+                               common_errors(pass_, lines, fit_.blur, processed_, fit_.bias_px, departure_px()));
+  if (!print) return;
+  fit_.unknowns = fit_.unknowns.changed_by(print->step.head(unknowns()));
+  count_inliers();
+  tell(*print);
+}
+
+// By how much what is left of the departure may move each boundary.
+std::array<double, 4> Fitter::departure_px() const {
+  std::array<double, 4> radial_px{}, doubt_px{};
+  if (!fit_.departure.doubted()) return doubt_px;
+  const ChannelGeometry& channels = light_.channels();
+  const Eigen::Vector2f centre(channels.centre_u, channels.centre_v);
+  std::array<int, 4> places{};
+  for (const Measurement& m : pass_.all) {
+    if (m.group >= 4) continue;
+    radial_px[m.group] += static_cast<double>((m.expected_px - centre).dot(m.normal)), ++places[m.group];
+  }
+  for (std::size_t k = 0; k < 4; ++k) doubt_px[k] = fit_.departure.doubt_px(k, radial_px[k] / std::max(1, places[k]));
+  return doubt_px;
+}
+
+void Fitter::count_inliers() {
+  double squares = 0;
+  int inliers = 0;
+  for (const Measurement& m : pass_.all) {
+    const double sigmas = std::abs(m.residual_px) / m.sigma_px;
+    if (sigmas > inlier_sigmas) continue;
+    m.group < 4 ? ++fit_.used[m.group] : ++fit_.sides_used;
+    if (m.group < 4) squares += sigmas * sigmas, ++inliers;
+  }
+  fit_.inlier_rms_sigmas = inliers ? std::sqrt(squares / inliers) : 0;
+}
+
+void Fitter::tell(const PrintFit& print) {
+  const double doubt =
+      1 + fine_fit_limits.doubt_of_hidden * std::max(0.0, fine_fit_limits.usual_fraction - fit_.located_fraction());
+  fit_.covariance = doubt * doubt * print.covariance;
+  fit_.inner_off_m = print.inner_off_m;
+  fit_.print_off_probability = print.off_probability;
+  // What the print may add goes by how often prints are off, not by what this picture shows.
+  fit_.psi_variance_by_print = print.psi_variance_by_print;
+  fit_.far_off_probability = print.far_off_probability;
+  fit_.psi_variance_suspected = print.psi_variance_suspected;
+  fit_.psi_variance = doubt * doubt * (print.psi_variance - print.psi_variance_by_print) + print.psi_variance_by_print;
+  fit_.psi_variance_by_tolerance = doubt * doubt * print.psi_variance_by_tolerance;
+  fit_.converged = true;
+}
+
+}  // namespace
+
+double FineFit::located_fraction() const {
+  const int located = used[0] + used[1] + used[2] + used[3];
+  return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);
+}
+
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
+                   const ExpectedProcessing& expected) {
+  FineFit fit;
+  fit.unknowns = start;
+  fit.blur = blur;
+  fit.departure = expected.departure;
+  Fitter fitter(scene, light, fit);
+  if (fitter.settle() && fitter.see_camera(expected)) fitter.judge();
+  return fit;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+
+#include "lapservo/vision/camera/camera_departure.h"
+#include "lapservo/vision/camera/picture_processing.h"
+#include "lapservo/vision/edges/edge_measurements.h"
+#include "lapservo/vision/image/light_image.h"
+#include "lapservo/vision/model/print_fit.h"
+#include "lapservo/vision/model/turn_blur.h"
+#include "lapservo/vision/shaft/scene.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
+
+namespace lapservo::internal {
+
+/// How a fine fit settles, and how sure it is of what is hidden.
+struct FineFitLimits {
+  /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
+  /// sigma grows by so much for all that is missing.
+  double usual_fraction = 0.7, doubt_of_hidden = 4;
+  double settled_px = 1.5;    ///< a pass that moves no point farther is the last
+  double settled_blur = 0.1;  ///< change of the blur, a fraction of it, below which edges need not be located again
+  double motion_blur_weight =
+      5;  ///< a motion blur's change by that of a point: motion's may be no blur, and never settles
+  double settled_oblique_px2 = 0.3;  ///< of a blur's covariance, which moves boundaries by a twentieth of it in px
+  double sharp_blur_px = 1.8;        ///< a blur below it may flicker where few sides are left
+  double settled_sigmas = 0.01;      ///< a reweighting that moves the unknowns by less is the last
+};
+inline constexpr FineFitLimits fine_fit_limits;
+
+struct FineFit {
+  bool converged = false;
+  PoseUnknowns unknowns;
+  UnknownMatrix covariance;  ///< of the unknowns, one sigma squared
+  EdgeBlur blur;
+  int lines = 0;                         ///< generatrices looked at
+  std::array<int, 4> used{};             ///< of them, lines on which the boundary was located and agrees with the fit
+  std::array<int, 4> in_image{};         ///< lines on which the boundary lies inside the image and off the seam
+  int sides_in_image = 0;                ///< places at which the shaft's sides were looked for
+  int sides_used = 0;                    ///< of them, those at which the side was located and agrees with the fit
+  double inlier_rms_sigmas = 0;          ///< of the boundaries' residuals, print errors taken out
+  double print_off_probability = 0;      ///< that the print is off by more than the rig's tolerance
+  double psi_variance = 0;               ///< by which picture and print are judged (print_fit.h)
+  double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
+  double psi_variance_by_print = 0;      ///< and what the print adds beyond that
+  double far_off_probability = 1;        ///< where many prints are off (print_fit.h)
+  double psi_variance_suspected = 0;     ///< and what one that is suspicious adds (print_fit.h)
+  double inner_off_m = 3;                ///< how far off an inner boundary of the print may lie (print_fit.h)
+  Processing processing = Processing::unknown;  ///< as far as asked
+  int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
+  int asked_for_departure = 0;                  ///< how often find_departure() was
+  int passes = 0;                               ///< in which edges were located
+  std::array<double, 4> bias_px{};              ///< by how much that may have moved each boundary
+  CameraDeparture departure;                    ///< from the rig's camera, as far as known
+  TurnBlur turn;                                ///< within the exposure, which the covariance knows nothing of
+
+  /// Of the boundary points that the image could show, the fraction that was located.
+  double located_fraction() const;
+};
+
+/// Whether to ask what the camera did to the picture beyond its response (picture_processing.h), which costs a tenth of
+/// a tracked frame's time where it did nothing. It does the same in all frames: bias_px, an earlier frame's, is what a
+/// frame that can't tell is in doubt by. `departure` is what earlier frames showed of the
+/// camera.
+struct ExpectedProcessing {
+  bool ask = true;
+  std::array<double, 4> bias_px{};
+  CameraDeparture departure = {};
+};
+
+/// Fits the pose to all boundaries on all visible generatrices and to the shaft's sides, located to a fraction of a
+/// pixel in linear light, with a robust loss. `start` must be good to some pixels.
+FineFit fit_finely(const Scene& scene, const LightImage& light, const PoseUnknowns& start, EdgeBlur blur,
+                   const ExpectedProcessing& expected = {});
+
+}  // namespace lapservo::internal

@@ -1,0 +1,160 @@
+#include "lapservo/vision/model/fine_fit.h"
+
+#include <cmath>
+#include <string>
+
+#include <Eigen/Cholesky>
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+using scenes::fit_from;
+using scenes::Shot;
+using scenes::Sight;
+using scenes::usual_shot;
+
+// As far off as a coarse fit may leave it: up to three pixels.
+UnknownVector random_offset(Random& random, int unknowns) {
+  const auto within = [&](double reach) { return random.uniform(-reach, reach); };
+  UnknownVector offset(unknowns);
+  if (unknowns == 4) {
+    offset << within(1e-3), within(1e-3), within(0.3e-3), within(0.03);
+  } else {
+    offset << within(0.01), within(0.01), within(0.15e-3), within(0.15e-3), within(0.3e-3), within(0.03);
+  }
+  return offset;
+}
+
+// What takes `from` to `to`, to first order.
+UnknownVector difference(const PoseUnknowns& from, const PoseUnknowns& to) {
+  UnknownVector step(from.size());
+  if (from.q()) {
+    step = to.q()->vector() - from.q()->vector();
+  } else {
+    const Rigid3 move = from.pose().camera_from_unrolled.inverse() * to.pose().camera_from_unrolled;
+    // A turn about the shaft's own axis is no unknown but psi's.
+    const Eigen::Vector3d axis = move.rotation * Eigen::Vector3d::UnitZ();
+    const Eigen::AngleAxisd turn(move.rotation);
+    step << -axis.y(), axis.x(), move.translation,
+        to.pose().psi_rad - from.pose().psi_rad + turn.angle() * turn.axis().z();
+  }
+  step[step.size() - 1] = wrap_pi(step[step.size() - 1]);
+  return step;
+}
+
+double normalised_square(const UnknownVector& error, const UnknownMatrix& covariance) {
+  return error.dot(covariance.ldlt().solve(error)) / static_cast<double>(error.size());
+}
+
+// The sigmas include floors for what a renderer has none of (lens, print), so errors here stay somewhat below them.
+void expect_honest(bool rcm) {
+  constexpr int frames = 16;
+  double squares = 0, psi_squares = 0, psi_sum = 0;
+  for (std::uint64_t seed = 1; seed <= frames; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    Random random(seed + 100);
+    const PoseUnknowns truth = shot.truth(rcm);
+    const FineFit fit = fit_from(shot, truth.changed_by(random_offset(random, truth.size())));
+    ASSERT_TRUE(fit.converged);
+    const UnknownVector error = difference(truth, fit.unknowns);
+    const Eigen::Index psi = error.size() - 1;
+    EXPECT_LT(std::abs(error[psi]), 6e-3);
+    EXPECT_LT(normalised_square(error, fit.covariance), 4);
+    squares += normalised_square(error, fit.covariance);
+    psi_squares += error[psi] * error[psi] / fit.covariance(psi, psi);
+    psi_sum += error[psi];
+  }
+  for (const double sum : {squares, psi_squares}) {
+    EXPECT_GT(std::sqrt(sum / frames), 0.45);
+    EXPECT_LT(std::sqrt(sum / frames), 1.2);
+  }
+  EXPECT_NEAR(psi_sum / frames, 0, 1.5e-3);
+}
+TEST(FineFit, ErrorsAreAsPredictedThroughTheRcm) {
+  expect_honest(true);
+}
+TEST(FineFit, ErrorsAreAsPredictedWithoutTheRcm) {
+  expect_honest(false);
+}
+
+// Whichever side it comes from: Gauss-Newton with right derivatives ends at the same place.
+TEST(FineFit, ForgetsItsStart) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed)
+    for (const bool rcm : {true, false}) {
+      SCOPED_TRACE("seed " + std::to_string(seed) + (rcm ? " through the RCM" : " free"));
+      const Shot& shot = usual_shot(seed);
+      Random random(seed + 200);
+      const PoseUnknowns truth = shot.truth(rcm);
+      const FineFit from_truth = fit_from(shot, truth);
+      ASSERT_TRUE(from_truth.converged);
+      const UnknownVector offset = random_offset(random, truth.size());
+      for (const double side : {-1.0, 1.0}) {
+        const FineFit fit = fit_from(shot, truth.changed_by(side * offset));
+        ASSERT_TRUE(fit.converged);
+        EXPECT_LT(normalised_square(difference(from_truth.unknowns, fit.unknowns), from_truth.covariance), 0.02);
+      }
+    }
+}
+
+// The colours are looked up about where a boundary was found, on either side of where it was expected.
+TEST(FineFit, FindsBackAlongTheShaftFromEitherSide) {
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    const PoseUnknowns truth = shot.truth(true);
+    const double px_per_m = shot.rig.camera.fx_px / truth.pose().camera_from_unrolled.translation.z();
+    for (const double off_px : {-4.5, 4.5}) {
+      const FineFit fit = fit_from(shot, truth.changed_by(off_px / px_per_m * UnknownVector::Unit(4, 2)));
+      ASSERT_TRUE(fit.converged) << off_px;
+      EXPECT_LT(normalised_square(difference(truth, fit.unknowns), fit.covariance), 4) << off_px;
+    }
+  }
+}
+
+TEST(FineFit, FindsTheBlurOfTheCamera) {
+  for (const double blur_px : {0.8, 1.3, 1.8}) {
+    RenderOptions options;
+    options.sensor.blur_px = blur_px;
+    const Shot shot(3, options);
+    const FineFit fit = fit_from(shot, shot.truth(true));
+    ASSERT_TRUE(fit.converged) << blur_px;
+    // A pixel's own area, and the interpolation between pixels, blur too.
+    const double expected_px = std::sqrt(blur_px * blur_px + 1 / 12.0 + 1 / 6.0);
+    EXPECT_NEAR(fit.blur.boundaries_px, expected_px, 0.1) << blur_px;
+    EXPECT_NEAR(fit.blur.sides_px, expected_px, 0.2) << blur_px;
+  }
+}
+
+TEST(FineFit, SigmasGrowWithTheNoise) {
+  RenderOptions noisy;
+  noisy.sensor.read_noise *= 12;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& clear = usual_shot(seed);
+    const Shot rough(seed, noisy);
+    const FineFit in_clear = fit_from(clear, clear.truth(true)), in_rough = fit_from(rough, rough.truth(true));
+    ASSERT_TRUE(in_clear.converged && in_rough.converged);
+    EXPECT_GT(in_rough.covariance(3, 3), 1.5 * in_clear.covariance(3, 3));
+  }
+}
+
+TEST(FineFit, DoesNotConvergeWhereNothingIs) {
+  const Rig rig = scenes::usual_rig();
+  const Sight sight(rig, scenes::render_nothing(rig, 4));
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    Random random(seed);
+    const JointVector q = scenes::random_configuration(rig, 0, random);
+    const auto start = PoseUnknowns::rcm(*rig.instruments[0].camera_from_rcm, q);
+    const FineFit fit = fit_finely(sight.scene(), sight.light(), start, {});
+    const int located = fit.used[0] + fit.used[1] + fit.used[2] + fit.used[3];
+    EXPECT_TRUE(!fit.converged || located < fit.lines / 4) << "seed " << seed;
+  }
+}
+
+}  // namespace
+}  // namespace lapservo::internal

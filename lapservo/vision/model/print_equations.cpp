@@ -1,0 +1,191 @@
+#include "lapservo/vision/model/print_equations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "lapservo/vision/model/normal_equations.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Sums over a group of the weighted products of: the row of pose and film, that of the print's errors at its two
+// edges, the residual, and 1. Of fixed size, which is several times faster; symmetric, of which the lower half is
+// summed.
+template <int Unknowns>
+class Products {
+ public:
+  static constexpr int at_print = Unknowns, at_residual = at_print + 2, at_one = at_print + 3;
+
+  void add(const Measurement& m, double weight) {
+    Row row = Row::Zero();
+    row.template head<Unknowns>() = m.row.head<Unknowns>();
+    row.template segment<2>(at_print) = print_row(m);
+    row[at_residual] = m.residual_px;
+    row[at_one] = 1;
+    add_columns(row, weight, std::make_integer_sequence<int, at_one + 1>());
+  }
+  Eigen::Matrix<double, Unknowns, Unknowns> xx() const {
+    return sums_.template topLeftCorner<Unknowns, Unknowns>().template selfadjointView<Eigen::Lower>();
+  }
+  auto x(int by) const { return sums_.row(by).template head<Unknowns>(); }
+  auto nx(int edge) const { return x(at_print + edge); }
+  double nn(int edge, int other) const {
+    return sums_(at_print + std::max(edge, other), at_print + std::min(edge, other));
+  }
+  double n(int by, int edge) const { return sums_(by, at_print + edge); }
+  double weight() const { return sums_(at_one, at_one); }
+  double residual() const { return sums_(at_one, at_residual); }
+
+ private:
+  static constexpr int size = at_one + 1 + (at_one + 1) % 2;  // a whole number of registers
+  using Row = Eigen::Matrix<double, size, 1>;
+
+  template <int... Columns>
+  void add_columns(const Row& row, double weight, std::integer_sequence<int, Columns...>) {
+    (add_column<Columns>(row, weight), ...);
+  }
+  template <int Column>
+  void add_column(const Row& row, double weight) {
+    constexpr int count = size - (Column - Column % 2);  // from a register's first on
+    sums_.col(Column).template tail<count>() += (weight * row[Column]) * row.template tail<count>();
+  }
+
+  Eigen::Matrix<double, size, size> sums_ = Eigen::Matrix<double, size, size>::Zero();
+};
+
+// Adds a group's products to the sums of all, and tells its pull.
+template <int Unknowns>
+GroupPull gathered(const Products<Unknowns>& products, std::size_t group, PrintEquations& all) {
+  using Of = Products<Unknowns>;
+  GroupPull pull;
+  pull.x = products.x(Of::at_one);
+  pull.weight = products.weight();
+  pull.residual = products.residual();
+  all.xx += products.xx();
+  all.x += products.x(Of::at_residual).transpose();
+  if (group >= errors_of_boundary.size()) return pull;
+  const auto& errors = errors_of_boundary[group];
+  for (const int edge : {0, 1}) {
+    const int error = errors[static_cast<std::size_t>(edge)];
+    all.nx.row(error) += products.nx(edge);
+    for (const int other : {0, 1}) all.nn(error, errors[static_cast<std::size_t>(other)]) += products.nn(edge, other);
+    all.n[error] += products.n(Of::at_residual, edge);
+    pull.n[error] += products.n(Of::at_one, edge);
+  }
+  return pull;
+}
+
+double robust_certainty(const Measurement& m, const ResidualLines& lines, double certainty) {
+  const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
+  return certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
+}
+
+// All boundaries moved alike, leaning alike, or bowed alike.
+void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, double certainty,
+                      const CommonErrors& errors, PrintSums& sums) {
+  const auto unknowns = sums.equations.x.size();
+  const std::array<double, 3> patterns_px{errors.whole_px, errors.leaning_px, errors.bowed_px};
+  std::array<GroupPull, 3> pulls;
+  std::array<double, 3> squares{};
+  for (GroupPull& pull : pulls) pull.x = UnknownVector::Zero(unknowns);
+  double all = 0;
+  for (const Measurement& m : measurements) {
+    if (m.group >= errors_of_boundary.size()) continue;
+    const double weight = robust_certainty(m, lines, certainty);
+    const auto& edges = errors_of_boundary[m.group];
+    const Eigen::Vector2d by_print = print_row(m);
+    const std::array<double, 3> moved{1, m.across, m.across * m.across - 1.0 / 3};
+    for (std::size_t i = 0; i < pulls.size(); ++i) {
+      const double part = weight * moved[i];
+      pulls[i].x += part * m.row.head(unknowns);
+      for (std::size_t edge = 0; edge < 2; ++edge)
+        pulls[i].n[edges[edge]] += part * by_print[static_cast<Eigen::Index>(edge)];
+      squares[i] += part * moved[i];
+    }
+    all += weight;
+  }
+  for (std::size_t i = 0; i < pulls.size(); ++i) {
+    if (!(squares[i] > 0 && patterns_px[i] > 0)) continue;
+    pulls[i].error_px = pulls[i].told_px = std::sqrt(1 / certainty) * patterns_px[i] * std::sqrt(all / squares[i]);
+    sums.of_all_boundaries.push_back(pulls[i]);
+  }
+}
+
+template <int Unknowns>
+PrintSums print_sums_of(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
+                        const CommonErrors& errors) {
+  const double certainty = 1 / (errors.noise_scale * errors.noise_scale);
+  std::array<Products<Unknowns>, measurement_groups> products;
+  for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, certainty));
+  PrintSums sums{PrintEquations(Unknowns), {}, {}, {}};
+  for (std::size_t group = 0; group < measurement_groups; ++group) {
+    if (group == errors_of_boundary.size()) sums.of_boundaries = sums.equations.xx;
+    sums.pulls[group] = gathered(products[group], group, sums.equations);
+    sums.pulls[group].error_px = errors.noise_scale * errors.px[group];
+    sums.pulls[group].told_px = errors.noise_scale * errors.told_px[group];
+  }
+  sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), certainty, film_prior);
+  if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0)
+    add_pulls_of_all(measurements, lines, certainty, errors, sums);
+  return sums;
+}
+
+}  // namespace
+
+PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
+                     double film_prior, const CommonErrors& errors) {
+  return pose_unknowns == 4 ? print_sums_of<5>(measurements, lines, film_prior, errors)
+                            : print_sums_of<7>(measurements, lines, film_prior, errors);
+}
+
+std::optional<PrintInformation> information_of(const PrintSums& sums) {
+  PrintEquations e = sums.equations;
+  for (const GroupPull& pull : sums.pulls)
+    if (pull.weight > 0) e.add(pull.x, pull.n, -1 / (pull.weight + 1 / (pull.error_px * pull.error_px)), pull.residual);
+  const auto inverse = inverse_of(e.xx);
+  if (!inverse) return std::nullopt;
+  const PrintCrossMatrix through = e.nx.lazyProduct(*inverse);
+  return PrintInformation{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
+}
+
+std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior, ToldCovariance* told) {
+  const PrintEquations& e = sums.equations;
+  const PrintMatrix print_covariance = covariance_of(e.nn, prior);
+  const PrintCrossMatrix by_x = print_covariance.lazyProduct(e.nx);
+  const auto inverted = inverse_of(e.xx - e.nx.transpose().lazyProduct(by_x));
+  if (!inverted) return std::nullopt;
+  const UnknownMatrix& inverse = *inverted;
+  PrintSolution solution;
+  solution.step = inverse * (e.x - by_x.transpose() * e.n);
+  solution.print_mm = print_covariance * (e.n - e.nx * solution.step);
+  solution.covariance = inverse;
+  const auto widen = [&](const GroupPull& pull) {
+    const UnknownVector shift = inverse * (pull.x - by_x.transpose() * pull.n);
+    const UnknownVector error = pull.error_px * shift;
+    solution.covariance.noalias() += error * error.transpose();
+    if (!told) return;
+    const UnknownVector told_error = pull.told_px * shift;
+    told->covariance.noalias() += told_error * told_error.transpose();
+  };
+  if (told) told->covariance = told->without_common = inverse;
+  for (const GroupPull& pull : sums.pulls) widen(pull);
+  for (const GroupPull& pull : sums.of_all_boundaries) widen(pull);
+  const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
+  return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
+}
+
+UnknownMatrix covariance_of_less_noise(const UnknownMatrix& all, double noise_scale) {
+  const UnknownVector by_film = all.col(all.cols() - 1);
+  return (1 - noise_scale * noise_scale) * (all - by_film * by_film.transpose());
+}
+
+UnknownMatrix covariance_of_less_boundary_noise(const PrintSums& sums, const UnknownMatrix& all, double noise_scale) {
+  const UnknownMatrix by_boundaries = all.lazyProduct(sums.of_boundaries);
+  UnknownMatrix less = by_boundaries.lazyProduct(all);
+  less *= (1 - noise_scale * noise_scale) / 2;
+  return less;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,106 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+
+#include "lapservo/core/inplace_vector.h"
+#include "lapservo/vision/edges/edge_measurements.h"
+#include "lapservo/vision/model/common_errors.h"
+#include "lapservo/vision/model/print_evidence.h"
+#include "lapservo/vision/model/residual_lines.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
+
+namespace lapservo::internal {
+
+inline constexpr double mm_in_m = 1e-3;
+
+/// d(residual)/d(print's errors at its upper and at its lower edge) [px/mm].
+inline Eigen::Vector2d print_row(const Measurement& m) {
+  const double along = mm_in_m * m.along_px_per_m;
+  return {along * (1 - m.turn_fraction), along * m.turn_fraction};
+}
+
+using PrintCrossMatrix = Eigen::Matrix<double, print_errors, Eigen::Dynamic, 0, print_errors, max_unknowns>;
+
+/// Normal equations of the pose and film (x) and of the print's errors (n).
+struct PrintEquations {
+  UnknownMatrix xx;
+  PrintCrossMatrix nx;
+  PrintMatrix nn = PrintMatrix::Zero();
+  UnknownVector x;
+  PrintVector n = PrintVector::Zero();
+
+  explicit PrintEquations(int unknowns)
+      : xx(UnknownMatrix::Zero(unknowns, unknowns)),
+        nx(PrintCrossMatrix::Zero(print_errors, unknowns)),
+        x(UnknownVector::Zero(unknowns)) {}
+
+  /// Adds weight * row * row^T, and of the residual.
+  void add(const UnknownVector& row_x, const PrintVector& row_n, double weight, double residual) {
+    const UnknownVector weighted_x = weight * row_x;
+    const PrintVector weighted_n = weight * row_n;
+    xx.noalias() += row_x * weighted_x.transpose();
+    nx.noalias() += weighted_n * row_x.transpose();
+    nn.noalias() += row_n * weighted_n.transpose();
+    x += residual * weighted_x;
+    n += residual * weighted_n;
+  }
+};
+
+/// What a group of measurements says together: sums of weighted rows and residuals.
+struct GroupPull {
+  UnknownVector x;
+  PrintVector n = PrintVector::Zero();
+  double weight = 0, residual = 0, error_px = 0, told_px = 0;
+};
+
+/// Of all measurements; what each group says, and what all boundaries together do.
+struct PrintSums {
+  PrintEquations equations;
+  UnknownMatrix of_boundaries;  ///< what boundaries alone say about pose and film
+  std::array<GroupPull, measurement_groups> pulls;
+  InplaceVector<GroupPull, 3> of_all_boundaries;
+};
+
+/// Weighted robustly about `lines`. `film_prior` as the fit has it.
+PrintSums print_sums(std::span<const Measurement> measurements, const ResidualLines& lines, int pose_unknowns,
+                     double film_prior, const CommonErrors& errors);
+
+/// What the residuals say about the print's errors, whatever the pose, the film and the common errors are. Nullopt when
+/// they say nothing.
+std::optional<PrintInformation> information_of(const PrintSums& sums);
+
+/// By how much the print's errors move a measurement.
+inline double print_shift_px(const Measurement& m, const PrintVector& print_mm) {
+  if (m.group >= errors_of_boundary.size()) return 0;
+  const auto& errors = errors_of_boundary[m.group];
+  return print_row(m).dot(Eigen::Vector2d(print_mm[errors[0]], print_mm[errors[1]]));
+}
+
+/// Of pose and film, and of the print's errors.
+struct PrintSolution {
+  UnknownVector step;
+  PrintVector print_mm = PrintVector::Zero();
+  UnknownMatrix covariance;
+};
+
+/// A solution's covariance by the common errors that are told, and without any.
+struct ToldCovariance {
+  UnknownMatrix covariance, without_common;
+};
+
+/// The likeliest pose when the print's errors are so, and how sure it is; `told`: by the common errors that are told.
+/// Nullopt when a direction is not seen at all.
+std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior,
+                                               ToldCovariance* told = nullptr);
+
+/// What is less uncertain of an exact print's pose where noise is smaller by this scale; the film's prior leaves what
+/// it does. `all`: ToldCovariance::without_common.
+UnknownMatrix covariance_of_less_noise(const UnknownMatrix& all, double noise_scale);
+
+/// The same of the whole pose, by half of what boundaries' noise is smaller: their scatter says less of angles, which
+/// neighbours tell, than of places.
+UnknownMatrix covariance_of_less_boundary_noise(const PrintSums& sums, const UnknownMatrix& all, double noise_scale);
+
+}  // namespace lapservo::internal

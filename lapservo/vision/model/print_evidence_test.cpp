@@ -1,0 +1,101 @@
+#include "lapservo/vision/model/print_evidence.h"
+
+#include <cmath>
+
+#include <Eigen/LU>
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+
+namespace lapservo::internal {
+namespace print_evidence_test {
+
+PrintVector random_vector(Random& random) {
+  PrintVector v;
+  for (double& x : v) x = random.normal();
+  return v;
+}
+
+// Of so many measurements; fewer than six leave directions of which nothing is known.
+PrintInformation random_information(Random& random, int measurements) {
+  PrintInformation print;
+  for (int i = 0; i < measurements; ++i) {
+    const PrintVector row = 30 * random_vector(random);
+    print.information += row * row.transpose();
+    print.gradient += 30 * random.normal() * row;
+  }
+  return print;
+}
+
+PrintMatrix covariance_of_prior(const PrintPrior& prior) {
+  PrintVector inner = PrintVector::Zero();
+  if (prior.ink_aside) inner.segment<4>(1).setOnes();
+  return prior.sigma_mm * prior.sigma_mm * (PrintMatrix::Identity() + inner * inner.transpose());
+}
+
+TEST(PrintEvidence, OfDoubtedShapesIsThatOfALargerCovariance) {
+  Random random(1);
+  for (int i = 0; i < 20; ++i) {
+    const PrintInformation print = random_information(random, 10);
+    PrintShapes shapes;
+    PrintMatrix grown = print.information.inverse();
+    for (int k = 0; k < 7; ++k) {
+      shapes.push_back(0.1 * random_vector(random));
+      grown += shapes[static_cast<std::size_t>(k)] * shapes[static_cast<std::size_t>(k)].transpose();
+    }
+    const PrintInformation less = doubted(print, shapes);
+    EXPECT_TRUE(less.information.isApprox(grown.inverse(), 1e-8));
+    // The likeliest errors stay where they are.
+    EXPECT_TRUE((grown * less.gradient).isApprox(print.information.inverse() * print.gradient, 1e-8));
+  }
+}
+
+TEST(PrintEvidence, IsThatOfTheMarginalLikelihood) {
+  Random random(2);
+  for (const bool ink_aside : {false, true})
+    for (const double sigma_mm : {0.0, 0.01, 0.16, 0.64}) {
+      const PrintInformation print = random_information(random, 12);
+      const PrintPrior prior{sigma_mm, ink_aside};
+      // What is measured of the errors is normal: by the noise alone, or with a print of the prior beneath it.
+      const PrintMatrix noise = print.information.inverse(), both = noise + covariance_of_prior(prior);
+      const PrintVector measured = noise * print.gradient;
+      const auto log_likelihood = [&](const PrintMatrix& covariance) {
+        return -0.5 * (measured.dot(covariance.inverse() * measured) + std::log(covariance.determinant()));
+      };
+      const double expected = log_likelihood(both) - log_likelihood(noise);
+      EXPECT_NEAR(PrintEvidence(print).gain(prior), expected, 1e-6 * (1 + std::abs(expected)));
+    }
+}
+
+TEST(PrintEvidence, OfWhatTellsNothingIsNone) {
+  const PrintEvidence evidence({});
+  for (const bool ink_aside : {false, true}) EXPECT_EQ(evidence.gain({0.3, ink_aside}), 0);
+}
+
+TEST(PrintEvidence, CanBeHadWhereSomeErrorsDoNotShow) {
+  Random random(3);
+  for (int measurements = 1; measurements < print_errors; ++measurements) {
+    const PrintEvidence evidence(random_information(random, measurements));
+    for (const bool ink_aside : {false, true}) EXPECT_TRUE(std::isfinite(evidence.gain({0.64, ink_aside})));
+  }
+}
+
+TEST(PrintEvidence, AndThePriorLeaveTheirCommonCovariance) {
+  Random random(4);
+  for (const bool ink_aside : {false, true})
+    for (const double sigma_mm : {0.02, 0.3}) {
+      PrintMatrix information = PrintMatrix::Zero();
+      for (const auto& [upper, lower] : errors_of_boundary)
+        for (int i = 0; i < 3; ++i) {
+          PrintVector row = PrintVector::Zero();
+          row[upper] = 30 * random.normal(), row[lower] = 30 * random.normal();
+          information += row * row.transpose();
+        }
+      const PrintPrior prior{sigma_mm, ink_aside};
+      const PrintMatrix expected = (information + covariance_of_prior(prior).inverse()).inverse();
+      EXPECT_TRUE(covariance_of(information, prior).isApprox(expected, 1e-9));
+    }
+}
+
+}  // namespace print_evidence_test
+}  // namespace lapservo::internal

@@ -1,0 +1,103 @@
+#include "lapservo/vision/model/turn_blur.h"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include <gtest/gtest.h>
+
+namespace lapservo::internal {
+namespace turn_blur_test {
+namespace {
+
+constexpr double lens_px = 0.95;
+
+// Twenty points of each boundary, whose blur is known to 0.005 px and has these variances beyond the lens's.
+EdgeMeasurements boundaries_blurred_by(const std::array<double, 4>& beyond_px2) {
+  constexpr std::array<double, 4> steepness{0, 7, 14, 0};
+  EdgeMeasurements pass;
+  for (std::size_t k = 0; k < 4; ++k) {
+    for (int i = 0; i < 20; ++i) {
+      Measurement m;
+      m.row = UnknownVector::Zero(5);
+      m.row[3] = steepness[k];
+      m.group = k;
+      pass.all.push_back(m);
+    }
+    pass.boundary_blurs[k].information = 4e4;
+    pass.boundary_blurs[k].gradient = 4e4 * beyond_px2[k] / (2 * lens_px);
+  }
+  return pass;
+}
+
+EdgeBlur lens() {
+  EdgeBlur blur{lens_px, 1};
+  blur.along_px.fill(lens_px);
+  return blur;
+}
+
+TurnBlur blur_of_turn(double psi_variance, bool processed = false) {
+  return turn_blur(boundaries_blurred_by({0, 49 * psi_variance, 196 * psi_variance, 0}), lens(), processed);
+}
+
+double of_from_rest(double turn_rad) {
+  return 4.0 / 45 * turn_rad * turn_rad;
+}
+
+TEST(TurnBlur, TellsHowMuchPsiVaried) {
+  for (const double variance : {0.0, 1e-4, 1e-3}) {
+    const TurnBlur blur = blur_of_turn(variance);
+    EXPECT_NEAR(blur.variance_rad2, variance, 1e-9);
+    EXPECT_GT(blur.sigma_rad2, 2e-5);
+    EXPECT_LT(blur.sigma_rad2, 2e-4);
+  }
+}
+
+TEST(TurnBlur, DoubtsWhatIsNoTurn) {
+  const double sigma = blur_of_turn(1e-3).sigma_rad2;
+  EXPECT_GT(blur_of_turn(1e-3, true).sigma_rad2, 5 * sigma) << "a camera's processing blurs by colours";
+  const auto of = [](const std::array<double, 4>& beyond_px2, double sides_px = 1) {
+    EdgeBlur blur = lens();
+    blur.sides_px = sides_px;
+    const TurnBlur told = turn_blur(boundaries_blurred_by(beyond_px2), blur, false);
+    return variance_of_uneven_turn(told, std::nullopt);
+  };
+  const double turn = of({0, 0.05, 0.2, 0});
+  EXPECT_NEAR(turn, 0.05 / 49 / 12.8, 1e-8);
+  EXPECT_LT(of({-0.25, 0.47, 0.1, 0.25}), 0.01 * turn) << "4:2:0 that nobody noticed";
+  EXPECT_LT(of({1.2, 1.25, 1.4, 1.2}), 0.1 * turn) << "motion along the shaft";
+  EXPECT_LT(of({0, 0.05, 0.2, 0}, 1.5), 0.1 * turn) << "motion across the shaft";
+}
+
+TEST(TurnBlur, TellsNothingWithoutBothInnerBoundariesAndAnEnd) {
+  for (const std::size_t hidden : {0, 1, 2}) {
+    EdgeMeasurements pass = boundaries_blurred_by({0, 0.05, 0.2, 0});
+    pass.boundary_blurs[hidden] = {};
+    if (hidden == 0) pass.boundary_blurs[3] = {};
+    const TurnBlur blur = turn_blur(pass, lens(), false);
+    EXPECT_EQ(blur.sigma_rad2, 0) << hidden;
+    EXPECT_EQ(variance_of_uneven_turn(blur, 0.1), 0) << hidden;
+  }
+}
+
+TEST(TurnBlur, IsTakenForAStartFromRest) {
+  constexpr double turn_rad = 0.1;
+  const TurnBlur blur{of_from_rest(turn_rad), 5e-5};
+  EXPECT_NEAR(std::sqrt(variance_of_uneven_turn(blur, std::nullopt)), turn_rad / 12, 1e-5);
+  for (const double noise : {-2.0, -1.0, 0.0, 1.0, 2.0})
+    EXPECT_EQ(variance_of_uneven_turn({noise * 5e-5, 5e-5}, std::nullopt), 0) << noise;
+}
+
+// A third of the turn within the exposure has been made in its mean.
+TEST(TurnBlur, IsBoundedByWhatTheTurnChangedFromFrameToFrame) {
+  constexpr double turn_rad = 0.1;
+  const TurnBlur blur{of_from_rest(turn_rad), 5e-5};
+  EXPECT_LT(std::sqrt(variance_of_uneven_turn(blur, 1e-4)), 1e-4);
+  EXPECT_NEAR(std::sqrt(variance_of_uneven_turn(blur, turn_rad / 3)), turn_rad / 12, 1e-5);
+  EXPECT_EQ(variance_of_uneven_turn({1e-5, 5e-5}, turn_rad / 3), 0) << "noise";
+}
+
+}  // namespace
+}  // namespace turn_blur_test
+}  // namespace lapservo::internal

@@ -1,0 +1,332 @@
+#include "lapservo/vision/paper/centerline.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include <Eigen/Cholesky>
+#include <opencv2/imgproc.hpp>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/centre_line.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
+
+namespace lapservo::internal {
+namespace {
+
+// Of a boundary along the line, and of the line across itself at either end: medians of absolute errors (as one sigma)
+// of `lapservo render --rig configs/example.yaml --count 60 --seed 101`, 0.6 (inner boundaries) and 0.5. In dark, noisy
+// and compressed frames the latter is 0.5 to 0.9.
+constexpr double boundary_sigma_px = 0.7, across_sigma_px = 0.5;
+constexpr double widest_hue_deg = 30;
+constexpr int min_saturation = 60, min_value = 40, min_area_px = 150;
+
+using BandMasks = std::array<cv::Mat, 3>;
+using Edges = std::array<Eigen::Vector2d, 4>;
+
+cv::Mat hue_mask(const cv::Mat& hsv, double hue_deg, double reach_deg) {
+  const auto in_range = [&](double low_deg, double high_deg) {
+    cv::Mat mask;
+    cv::inRange(hsv, cv::Scalar(low_deg / 2, min_saturation, min_value), cv::Scalar(high_deg / 2, 255, 255), mask);
+    return mask;
+  };
+  const double low = hue_deg - reach_deg, high = hue_deg + reach_deg;
+  cv::Mat mask = in_range(std::max(0.0, low), std::min(359.0, high));
+  if (low < 0) mask |= in_range(low + 360, 359);
+  if (high > 359) mask |= in_range(0, high - 360);
+  return mask;
+}
+
+BandMasks segment(const cv::Mat& hsv, const Marker& marker) {
+  double reach_deg = widest_hue_deg;
+  for (std::size_t i = 0; i < 3; ++i)
+    reach_deg =
+        std::min(reach_deg, std::abs(std::remainder(marker.hues_deg[i] - marker.hues_deg[(i + 1) % 3], 360.0)) / 2);
+  static const cv::Mat kernel = cv::getStructuringElement(cv::MORPH_ELLIPSE, {5, 5});
+  BandMasks masks;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const cv::Mat mask = hue_mask(hsv, marker.hues_deg[i], reach_deg);
+    cv::morphologyEx(mask, masks[i], cv::MORPH_OPEN, kernel);
+  }
+  return masks;
+}
+
+struct Region {
+  cv::Mat pixels;  // 255 inside
+  cv::Rect box;
+};
+
+// Connected regions of the three colours together, largest first.
+std::vector<Region> regions_of(const BandMasks& masks) {
+  cv::Mat together = masks[0] | masks[1] | masks[2], joined, labels, stats, centroids;
+  cv::morphologyEx(together, joined, cv::MORPH_CLOSE, cv::getStructuringElement(cv::MORPH_ELLIPSE, {9, 9}));
+  const int count = cv::connectedComponentsWithStats(joined, labels, stats, centroids);
+  std::vector<int> order;
+  for (int i = 1; i < count; ++i)
+    if (stats.at<int>(i, cv::CC_STAT_AREA) >= min_area_px) order.push_back(i);
+  std::sort(order.begin(), order.end(),
+            [&](int a, int b) { return stats.at<int>(a, cv::CC_STAT_AREA) > stats.at<int>(b, cv::CC_STAT_AREA); });
+  std::vector<Region> regions;
+  for (const int i : order) {
+    const cv::Rect box(stats.at<int>(i, cv::CC_STAT_LEFT), stats.at<int>(i, cv::CC_STAT_TOP),
+                       stats.at<int>(i, cv::CC_STAT_WIDTH), stats.at<int>(i, cv::CC_STAT_HEIGHT));
+    regions.push_back({labels == i, box});
+  }
+  return regions;
+}
+
+Eigen::Vector2d centroid(const cv::Mat& mask, const Region& region, double& area) {
+  const cv::Moments m = cv::moments(mask(region.box) & region.pixels(region.box), true);
+  area = m.m00;
+  return m.m00 > 0 ? Eigen::Vector2d(region.box.x + m.m10 / m.m00, region.box.y + m.m01 / m.m00)
+                   : Eigen::Vector2d::Zero();
+}
+
+// The axis' image: the middle between lines fitted to the region's two sides, directed by the order of the colours.
+struct MiddleLine {
+  Eigen::Vector2d origin_px, along;  // ideal pixels
+};
+std::optional<MiddleLine> middle_line(const Camera& camera, const BandMasks& masks, const Region& region) {
+  std::array<Eigen::Vector2d, 3> centres;
+  for (std::size_t band = 0; band < 3; ++band) {
+    double area = 0;
+    centres[band] = centroid(masks[band], region, area);
+    if (area < 20) return std::nullopt;
+  }
+  const cv::Moments m = cv::moments(region.pixels(region.box), true);
+  const double turn = 0.5 * std::atan2(2 * m.mu11, m.mu20 - m.mu02);
+  Eigen::Vector2d along(std::cos(turn), std::sin(turn));
+  if (along.dot(centres[2] - centres[0]) < 0) along = -along;
+  // The middle colour must lie in the middle: otherwise these are another instrument's bands.
+  if (along.dot(centres[1] - centres[0]) <= 0 || along.dot(centres[2] - centres[1]) <= 0) return std::nullopt;
+
+  std::vector<cv::Point> pixels;
+  cv::findNonZero(region.pixels(region.box), pixels);
+  const Eigen::Vector2d origin(region.box.x + m.m10 / m.m00, region.box.y + m.m01 / m.m00),
+      across(-along.y(), along.x());
+  struct Extent {
+    double low = 1e9, high = -1e9;
+  };
+  std::vector<Extent> sections(4096);
+  double first = 1e9, last = -1e9;
+  for (const cv::Point& pixel : pixels) {
+    const Eigen::Vector2d offset = Eigen::Vector2d(pixel.x + region.box.x, pixel.y + region.box.y) - origin;
+    const double x = offset.dot(along);
+    first = std::min(first, x), last = std::max(last, x);
+    const double index = std::clamp(x + 2048, 0.0, 4095.0);
+    Extent& section = sections[static_cast<std::size_t>(index)];
+    section.low = std::min(section.low, offset.dot(across)), section.high = std::max(section.high, offset.dot(across));
+  }
+  const double widest = 0.15 * (last - first);  // the ends are round
+  std::vector<cv::Point2f> low, high;
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    const double x = static_cast<double>(i) - 2048 + 0.5;
+    if (sections[i].low > sections[i].high || x < first + widest || x > last - widest) continue;
+    const auto ideal = [&](double y) { return camera.ideal_from_raw(origin + x * along + y * across); };
+    const auto a = ideal(sections[i].low), b = ideal(sections[i].high);
+    if (!a || !b) continue;
+    low.emplace_back(static_cast<float>(a->x()), static_cast<float>(a->y()));
+    high.emplace_back(static_cast<float>(b->x()), static_cast<float>(b->y()));
+  }
+  if (low.size() < 8) return std::nullopt;
+  cv::Vec4f low_line, high_line;
+  cv::fitLine(low, low_line, cv::DIST_HUBER, 0, 0.01, 0.01);
+  cv::fitLine(high, high_line, cv::DIST_HUBER, 0, 0.01, 0.01);
+  const auto direction = [&](const cv::Vec4f& line) {
+    const Eigen::Vector2d d(line[0], line[1]);
+    return d.dot(along) < 0 ? Eigen::Vector2d(-d) : d;
+  };
+  const Eigen::Vector2d middle_direction = (direction(low_line) + direction(high_line)).normalized();
+  const Eigen::Vector2d middle_origin(0.5 * (low_line[2] + high_line[2]), 0.5 * (low_line[3] + high_line[3]));
+  return MiddleLine{middle_origin, middle_direction};
+}
+
+// Where the line enters and leaves each colour.
+std::optional<Edges> boundaries_on(const MiddleLine& line, const Camera& camera, const BandMasks& masks) {
+  constexpr double step_px = 0.5;
+  const int reach = 4 * std::max(camera.width_px, camera.height_px);
+  std::array<double, 3> first, last;
+  first.fill(1e9), last.fill(-1e9);
+  for (int i = -reach; i <= reach; ++i) {
+    const double x = i * step_px;
+    const Eigen::Vector2d ideal = line.origin_px + x * line.along;
+    if (!camera.contains(ideal, -0.25 * camera.width_px)) continue;
+    const Eigen::Vector2d raw = camera.raw_from_ideal(ideal);
+    const int u = static_cast<int>(std::lround(raw.x())), v = static_cast<int>(std::lround(raw.y()));
+    if (u < 0 || v < 0 || u >= camera.width_px || v >= camera.height_px) continue;
+    for (std::size_t band = 0; band < 3; ++band)
+      if (masks[band].at<std::uint8_t>(v, u))
+        first[band] = std::min(first[band], x), last[band] = std::max(last[band], x);
+  }
+  const std::array<double, 4> x{first[0], (last[0] + first[1]) / 2, (last[1] + first[2]) / 2, last[2]};
+  for (std::size_t k = 0; k < 4; ++k)
+    if (std::abs(x[k]) > reach || (k > 0 && !(x[k] > x[k - 1] + 1))) return std::nullopt;
+  Edges edges;
+  for (std::size_t k = 0; k < 4; ++k) edges[k] = line.origin_px + x[k] * line.along;
+  return edges;
+}
+
+// theta, phi and rho from e0 and e3 on the facing generatrix, for a known tau: Gauss-Newton with numeric derivatives.
+std::optional<JointVector> configuration_from(const Camera& camera, const Instrument& instrument, const Edges& edges,
+                                              double tau_rad) {
+  const Rigid3& camera_from_rcm = *instrument.camera_from_rcm;
+  const double depth_m = camera.fx_px * instrument.marker.length_m() / std::max(1.0, (edges[3] - edges[0]).norm());
+  auto start = configuration_through(camera_from_rcm, camera.ray_from_ideal(edges[0]) * depth_m);
+  if (!start) return std::nullopt;
+  Eigen::Vector3d x(start->theta_rad, start->phi_rad, start->rho_m);
+  const auto seen = [&](const Eigen::Vector3d& p) -> std::optional<Eigen::Vector4d> {
+    const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled({p[0], p[1], p[2], 0});
+    const auto line = centre_line(camera, instrument.marker, unrolled, 0);  // the ends don't depend on psi
+    if (!line) return std::nullopt;
+    return Eigen::Vector4d(line->ideal_px[0].x(), line->ideal_px[0].y(), line->ideal_px[3].x(), line->ideal_px[3].y());
+  };
+  const Eigen::Vector4d measured(edges[0].x(), edges[0].y(), edges[3].x(), edges[3].y());
+  double miss_px = 1e9;
+  for (int iteration = 0; iteration < 15; ++iteration) {
+    const auto at = seen(x);
+    if (!at) return std::nullopt;
+    miss_px = (measured - *at).norm();
+    Eigen::Matrix<double, 4, 3> jacobian;
+    for (int i = 0; i < 3; ++i) {
+      const auto ahead = seen(x + 1e-6 * Eigen::Vector3d::Unit(i));
+      if (!ahead) return std::nullopt;
+      jacobian.col(i) = (*ahead - *at) / 1e-6;
+    }
+    Eigen::Matrix3d normal = jacobian.transpose() * jacobian;
+    normal.diagonal() *= 1 + 1e-6;
+    const Eigen::Vector3d step = normal.ldlt().solve(jacobian.transpose() * (measured - *at));
+    if (!step.allFinite()) return std::nullopt;
+    x += step.cwiseMax(Eigen::Vector3d(-0.2, -0.2, -0.02)).cwiseMin(Eigen::Vector3d(0.2, 0.2, 0.02));
+  }
+  if (miss_px > 10) return std::nullopt;  // no shaft through the RCM looks like this
+  const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled({x[0], x[1], x[2], 0});
+  const auto line = centre_line(camera, instrument.marker, unrolled, 0);
+  if (!line) return std::nullopt;
+  return JointVector{wrap_pi(x[0]), x[1], x[2],
+                     wrap_pi(rotation_rad(instrument.marker, line->facing_azimuth_rad, tau_rad))};
+}
+
+double tau_from(const CrossRatioDecoder& decoder, const Edges& e) {
+  return decoder.tau_rad(cross_ratio((e[1] - e[0]).norm(), (e[2] - e[1]).norm(), (e[3] - e[2]).norm()));
+}
+
+// One boundary moved along the line by one sigma.
+Edges moved(const Edges& edges, std::size_t k) {
+  Edges changed = edges;
+  changed[k] += boundary_sigma_px * (edges[3] - edges[0]).normalized();
+  return changed;
+}
+
+// Each boundary errs along the line by itself; all turn and shift across with it.
+EdgesCovariance covariance_of(const Edges& edges) {
+  const double length_px = (edges[3] - edges[0]).norm();
+  const Eigen::Vector2d along = (edges[3] - edges[0]) / length_px, across(-along.y(), along.x());
+  EdgesCovariance covariance = EdgesCovariance::Zero();
+  const auto add = [&](const Eigen::Matrix<double, 8, 1>& error) { covariance += error * error.transpose(); };
+  Eigen::Matrix<double, 8, 1> at_first, at_last;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Eigen::Index place = 2 * static_cast<Eigen::Index>(k);
+    Eigen::Matrix<double, 8, 1> own = Eigen::Matrix<double, 8, 1>::Zero();
+    own.segment<2>(place) = boundary_sigma_px * along;
+    add(own);
+    const double fraction = (edges[k] - edges[0]).norm() / length_px;
+    at_first.segment<2>(place) = (1 - fraction) * across_sigma_px * across;
+    at_last.segment<2>(place) = fraction * across_sigma_px * across;
+  }
+  add(at_first), add(at_last);
+  return covariance;
+}
+
+std::optional<Observation> observe_edges(const Camera& camera, const Instrument& instrument,
+                                         const CrossRatioDecoder& decoder, const Edges& edges) {
+  Observation o;
+  o.status = Status::ok;
+  o.edges_ideal_px = edges;
+  o.edges_covariance_px2 = covariance_of(edges);
+  for (std::size_t k = 0; k < 4; ++k) o.edges_raw_px[k] = camera.raw_from_ideal(edges[k]);
+  const auto& camera_from_rcm = instrument.camera_from_rcm;
+  o.features = features_of(edges, camera_from_rcm ? projected_rcm_px(camera, *camera_from_rcm) : std::nullopt);
+  const double room = 0.1 * (decoder.highest_cross_ratio() - decoder.lowest_cross_ratio());
+  if (o.features.cross_ratio < decoder.lowest_cross_ratio() - room ||
+      o.features.cross_ratio > decoder.highest_cross_ratio() + room)
+    return std::nullopt;
+  o.tau_rad = tau_from(decoder, edges);
+  double tau_variance = 0;
+  for (std::size_t k = 0; k < 4; ++k) tau_variance += std::pow(tau_from(decoder, moved(edges, k)) - o.tau_rad, 2);
+  // At the ends of its range tau is clamped and its derivative lost: there the mean slope over the turn stands in.
+  double ratio_variance = 0;
+  for (std::size_t k = 0; k < 4; ++k)
+    ratio_variance += std::pow(features_of(moved(edges, k), std::nullopt).cross_ratio - o.features.cross_ratio, 2);
+  const double mean_slope = two_pi / (decoder.highest_cross_ratio() - decoder.lowest_cross_ratio());
+  o.sigma_tau_rad = std::sqrt(std::max(tau_variance, mean_slope * mean_slope * ratio_variance));
+  if (!camera_from_rcm) {
+    const double depth_m = camera.fx_px * instrument.marker.length_m() / o.features.l_px;
+    const Eigen::Vector3d from = camera.ray_from_ideal(edges[0]) * depth_m,
+                          to = camera.ray_from_ideal(edges[3]) * depth_m;
+    o.camera_from_unrolled = {rotation_between(Eigen::Vector3d::UnitZ(), to - from), from};
+    return o;
+  }
+  const auto q = configuration_from(camera, instrument, edges, o.tau_rad);
+  if (!q) return std::nullopt;
+  Observation::Rcm rcm{*q, Eigen::Matrix4d::Zero()};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Edges changed = moved(edges, k);
+    const auto other = configuration_from(camera, instrument, changed, tau_from(decoder, changed));
+    if (!other) return std::nullopt;
+    Eigen::Vector4d change = other->vector() - q->vector();
+    change[3] = wrap_pi(change[3]);
+    rcm.covariance += change * change.transpose();
+  }
+  rcm.covariance(3, 3) = std::max(rcm.covariance(3, 3), o.sigma_tau_rad * o.sigma_tau_rad);
+  rcm.covariance.diagonal().array() += 1e-12;
+  o.rcm = rcm;
+  o.camera_from_unrolled = *camera_from_rcm * rcm_from_unrolled(*q);
+  o.psi_rad = q->psi_rad;
+  return o;
+}
+
+Observation::Refused refusal(const Camera& camera, const Edges& edges) {
+  Observation::Refused refused;
+  refused.what = Observation::Refused::What::edges;
+  for (std::size_t k = 0; k < 4; ++k) refused.edges_raw_px[k] = camera.raw_from_ideal(edges[k]);
+  return refused;
+}
+
+}  // namespace
+
+CenterlineMethod::CenterlineMethod(const Rig& rig) : rig_(rig) {
+  for (const Instrument& instrument : rig.instruments) decoders_.emplace_back(instrument.marker);
+}
+
+std::vector<Observation> CenterlineMethod::observe(const cv::Mat& image_bgr) const {
+  cv::Mat hsv;
+  cv::cvtColor(image_bgr, hsv, cv::COLOR_BGR2HSV);
+  std::vector<Observation> observations(rig_.instruments.size());
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const BandMasks masks = segment(hsv, rig_.instruments[i].marker);
+    for (const Region& region : regions_of(masks)) {
+      const auto line = middle_line(rig_.camera, masks, region);
+      if (!line) continue;
+      BandMasks inside;
+      for (std::size_t band = 0; band < 3; ++band) inside[band] = masks[band] & region.pixels;
+      const auto edges = boundaries_on(*line, rig_.camera, inside);
+      const auto observation =
+          edges ? observe_edges(rig_.camera, rig_.instruments[i], decoders_[i], *edges) : std::nullopt;
+      if (!observation) {
+        observations[i].status = Status::poor_fit;
+        if (edges) observations[i].refused = refusal(rig_.camera, *edges);
+        continue;
+      }
+      observations[i] = *observation;
+      break;
+    }
+  }
+  return observations;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,76 @@
+#include "lapservo/vision/paper/centerline.h"
+
+#include <cmath>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/kinematics/features.h"
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+using scenes::Shot;
+using scenes::usual_shot;
+
+// Where tau wraps, so does the cross-ratio: a pixel's noise may take the reading to the other end.
+bool near_the_seam(const Shot& shot) {
+  return std::abs(wrap_pi(shot.line().tau_rad)) < 0.5;
+}
+
+TEST(Centerline, FindsTheBoundariesToThePixelAndTauToItsSigma) {
+  double squares = 0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 16; ++seed) {
+    const Shot& shot = usual_shot(seed);
+    if (near_the_seam(shot)) continue;
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Observation o = CenterlineMethod(shot.rig).observe(shot.bgr)[0];
+    ASSERT_EQ(o.status, Status::ok);
+    for (std::size_t k = 0; k < 4; ++k) EXPECT_LT((o.edges_ideal_px[k] - shot.line().ideal_px[k]).norm(), 3.5) << k;
+    const double sigmas = wrap_pi(o.tau_rad - shot.line().tau_rad) / o.sigma_tau_rad;
+    EXPECT_LT(std::abs(sigmas), 5);
+    squares += sigmas * sigmas;
+    ++count;
+    ASSERT_TRUE(o.rcm);
+    EXPECT_NEAR(wrap_pi(o.rcm->q.theta_rad - shot.q.theta_rad), 0, 0.02);
+    EXPECT_NEAR(o.rcm->q.phi_rad, shot.q.phi_rad, 0.03);
+    EXPECT_NEAR(o.rcm->q.rho_m, shot.q.rho_m, 2e-3);
+    EXPECT_LT(std::abs(wrap_pi(o.rcm->q.psi_rad - shot.q.psi_rad)), 5 * std::sqrt(o.rcm->covariance(3, 3)));
+  }
+  ASSERT_GE(count, 10);
+  EXPECT_LT(std::sqrt(squares / count), 2);
+  EXPECT_GT(std::sqrt(squares / count), 0.3);
+}
+
+TEST(Centerline, WithoutTheRcmTellsTauAlone) {
+  const Shot& shot = usual_shot(2);
+  Rig rig = shot.rig;
+  rig.instruments[0].camera_from_rcm.reset();
+  const Observation with = CenterlineMethod(shot.rig).observe(shot.bgr)[0],
+                    without = CenterlineMethod(rig).observe(shot.bgr)[0];
+  ASSERT_EQ(without.status, Status::ok);
+  EXPECT_FALSE(without.rcm);
+  EXPECT_FALSE(without.features.r_px);
+  EXPECT_EQ(without.tau_rad, with.tau_rad);
+}
+
+TEST(Centerline, KnowsInstrumentsByTheirOrderOfColours) {
+  const Shot& shot = usual_shot(2);
+  Rig rig = scenes::usual_rig(3);
+  const auto observations = CenterlineMethod(rig).observe(shot.bgr);
+  EXPECT_EQ(observations[0].status, Status::ok);
+  EXPECT_NE(observations[1].status, Status::ok);
+  EXPECT_NE(observations[2].status, Status::ok);
+}
+
+TEST(Centerline, FindsNothingInTissue) {
+  const Rig rig = scenes::usual_rig();
+  for (const std::uint64_t seed : {1, 2, 3})
+    EXPECT_NE(CenterlineMethod(rig).observe(scenes::render_nothing(rig, seed))[0].status, Status::ok) << seed;
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "lapservo/core/random.h"
+#include "lapservo/vision/search/explained_colors.h"
+#include "lapservo/vision/search/work_budget.h"
+#include "lapservo/vision/shaft/scene.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
+
+namespace lapservo::internal {
+
+/// For markers that blood hides in large parts, where fitted sides and ends mislead: climbs to where a marker of any
+/// rotation explains most of the frame's colours (explained_colors.h), from the start's depth and nearer ones, and from
+/// there at the rotations that do. Only for unknowns with an RCM. May stop after every step of a climb and go on in the
+/// next frame: the marker moves less between them than a climb reaches.
+class AgreementSearch {
+ public:
+  AgreementSearch(const PoseUnknowns& start, const Rigid3& camera_from_rcm, double length_m);
+
+  /// Goes on in this frame. Whether it came to its end; false when the budget did first.
+  bool advance(const Scene& scene, WorkBudget& budget);
+
+  /// Of a search that came to its end: up to three results (of different rotations), the best last.
+  std::vector<PoseUnknowns> results() const;
+
+  /// One of them, good to a few pixels in this frame.
+  PoseUnknowns in_this_frame(const Scene& scene, const PoseUnknowns& result, WorkBudget& budget);
+
+ private:
+  // A configuration in the terms of the image: the shaft's direction turned across and along the line of sight.
+  struct ImageTerms {
+    Rigid3 camera_from_rcm;
+    Eigen::Vector3d axis, across, away;  // in the camera
+    Eigen::Vector4d values;              // turns across and away [rad], rho [m], psi [rad]
+
+    static ImageTerms of(const Rigid3& camera_from_rcm, const PoseUnknowns& start);
+    std::optional<PoseUnknowns> unknowns(const Eigen::Vector4d& at) const;
+  };
+  struct Climb {
+    ImageTerms terms;
+    Eigen::Vector4d steps;  // no rotation is looked for where psi's is 0
+    double score = 0;
+    int halvings = 0, moves = 0;  // done; moves since the last halving
+
+    bool with_rotation() const { return steps[3] > 0; }
+  };
+  struct Result {
+    double score;
+    PoseUnknowns unknowns;
+  };
+  double score_at(const Scene& scene, const Climb& climb, const Eigen::Vector4d& at, WorkBudget& budget,
+                  double above_px2 = no_area_px2) const;
+  bool move(const Scene& scene, Climb& climb, WorkBudget& budget);
+  bool finish(const Scene& scene, Climb& climb, WorkBudget& budget);
+
+  void turn(const Scene& scene, WorkBudget& budget);
+
+  Rigid3 camera_from_rcm_;
+  Random random_{1};
+  int frames_ = 0;
+  bool turned_ = false;         // the rotations are looked for
+  std::vector<Climb> waiting_;  // the next is the last
+  std::optional<Climb> climb_;
+  std::optional<Result> place_;  // the best of any rotation
+  std::vector<Result> results_;
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,293 @@
+#include "lapservo/vision/search/coarse_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/core/inplace_vector.h"
+#include "lapservo/geometry/cylinder.h"
+#include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/model/normal_equations.h"
+#include "lapservo/vision/search/heaviest_stretch.h"
+#include "lapservo/vision/search/line_segmentation.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr int line_count = 13, station_count = 15, samples_along = 128;
+constexpr int max_reach = 200;      // samples on each side of a section's middle
+constexpr double max_hidden = 0.8;  // of a section of the shaft: what the image's border leaves must have a side
+
+// Measured image points that lie on the marker's outline or boundaries, attached to where they belong on its surface.
+struct SidePoint {
+  Eigen::Vector2d raw_px;
+  double side;  // -1, +1: silhouette at gamma + side * half_visible
+  double along_m;
+};
+struct BoundaryPoint {
+  Eigen::Vector2d raw_px;
+  double azimuth_rad;
+  std::size_t boundary;
+};
+
+using SidePoints = InplaceVector<SidePoint, 2 * station_count>;
+using BoundaryPoints = InplaceVector<BoundaryPoint, 4 * line_count>;
+
+Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azimuth_rad, double along_m) {
+  return pose.camera_from_unrolled * surface_point(marker.radius_m(), azimuth_rad, along_m);
+}
+
+// The stretch of a section with the most marker colour in it.
+Stretch<float> most_colorful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
+  return heaviest_stretch(0, static_cast<int>(classes.size()), [&](int i) {
+    const std::uint8_t color = classes[static_cast<std::size_t>(i)];
+    return scene.is_ours(color) ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
+  });
+}
+
+// Sections across the shaft: where its colours begin and end.
+SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double reach_px) {
+  SidePoints points;
+  InplaceVector<std::uint8_t, 2 * max_reach + 1> classes;
+  for (int station = 0; station < station_count; ++station) {
+    const double along_m = scene.marker.length_m() * (0.04 + 0.92 * station / (station_count - 1));
+    const auto silhouette = [&](double side) {
+      return scene.camera.raw_from_point(
+          point_on(pose, scene.marker, view.facing_azimuth_rad + side * view.half_visible_rad, along_m));
+    };
+    const Eigen::Vector2d left = silhouette(-1), right = silhouette(1), middle = (left + right) / 2;
+    const double half_px = (right - left).norm() / 2;
+    if (!(half_px > 2) || half_px > 4000) continue;
+    const Eigen::Vector2d across = (right - left) / (2 * half_px);
+    const double step_px = std::max(1.0, half_px / 40);
+    const int reach = std::min(static_cast<int>((half_px + reach_px) / step_px), max_reach);
+    classes.clear();
+    double hidden_px = 0;  // of the shaft, beyond the image
+    for (int i = -reach; i <= reach; ++i) {
+      const std::uint8_t color = scene.class_beside(middle + i * step_px * across);
+      classes.push_back(color);
+      if (color == Scene::outside && std::abs(i) * step_px < half_px) hidden_px += step_px;
+    }
+    const Stretch<float> stretch = most_colorful_stretch(classes, scene);
+    const double width_px = (stretch.last - stretch.first + 1) * step_px;
+    if (hidden_px > max_hidden * 2 * half_px ||
+        width_px < coarse_fit_limits.narrowest_section * (2 * half_px - hidden_px) ||
+        width_px > coarse_fit_limits.widest_section * 2 * half_px)
+      continue;
+    const auto add = [&](int inner, int outer, double side) {
+      if (outer < 0 || outer >= static_cast<int>(classes.size())) return;
+      if (classes[static_cast<std::size_t>(outer)] == Scene::outside) return;
+      const double t_px = (inner - reach + 0.5 * side) * step_px + side * coarse_fit_limits.contour_inset_px;
+      points.push_back({middle + t_px * across, side, along_m});
+    };
+    add(stretch.first, stretch.first - 1, -1);
+    add(stretch.last, stretch.last + 1, 1);
+  }
+  return points;
+}
+
+// Lines along the shaft, sampled evenly in metres from the marker's proximal end.
+struct SampledLine {
+  double azimuth_rad;
+  std::array<std::uint8_t, samples_along> classes;
+};
+struct SampledSurface {
+  double first_m, step_m;
+  std::array<SampledLine, line_count> lines;
+};
+
+SampledSurface sample_surface(const Scene& scene, const ShaftPose& pose, const CylinderView& view, double reach) {
+  SampledSurface surface;
+  const double length_m = scene.marker.length_m();
+  surface.first_m = -reach * length_m;
+  surface.step_m = (1 + 2 * reach) * length_m / samples_along;
+  const Eigen::Vector3d axis = pose.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  for (int i = 0; i < line_count; ++i) {
+    SampledLine& line = surface.lines[static_cast<std::size_t>(i)];
+    const double fraction = coarse_fit_limits.line_reach * (2.0 * i / (line_count - 1) - 1);
+    line.azimuth_rad = view.facing_azimuth_rad + fraction * view.half_visible_rad;
+    const Eigen::Vector3d base = point_on(pose, scene.marker, line.azimuth_rad, 0);
+    for (int k = 0; k < samples_along; ++k) {
+      const Eigen::Vector3d point = base + (surface.first_m + (k + 0.5) * surface.step_m) * axis;
+      line.classes[static_cast<std::size_t>(k)] = scene.class_on_shaft(point);
+    }
+  }
+  return surface;
+}
+
+BoundaryPoints measure_boundaries(const Scene& scene, const ShaftPose& pose, const SampledSurface& surface) {
+  BoundaryPoints points;
+  for (const SampledLine& line : surface.lines) {
+    const LineSegmentation split = segment_line(line.classes, scene.bands);
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (!split.seen[k]) continue;
+      const double along_m = surface.first_m + split.position[k] * surface.step_m;
+      points.push_back(
+          {scene.camera.raw_from_point(point_on(pose, scene.marker, line.azimuth_rad, along_m)), line.azimuth_rad, k});
+    }
+  }
+  return points;
+}
+
+// Adds the image distance of a measured point from the curve through `point` with tangent `tangent` (camera frame).
+void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const Eigen::Vector3d& point,
+                        const Eigen::Vector3d& tangent, double psi_speed_m, const Eigen::Vector2d& measured_px,
+                        double sigma_px, NormalEquations& equations) {
+  if (!(point.z() > 1e-3)) return;
+  const ProjectionWithJacobian image = scene.camera.raw_with_jacobian(point);
+  const Eigen::Vector2d along = (image.d_px_d_point * tangent).normalized();
+  const Eigen::Vector2d normal(-along.y(), along.x());
+  if (!normal.allFinite()) return;
+  const double residual_px = normal.dot(measured_px - image.point_px);
+  const Eigen::Vector3d pull = image.d_px_d_point.transpose() * normal;
+  UnknownVector row = unknowns.row(point, pull);
+  const Eigen::Vector3d axis = unknowns.pose().camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  row[row.size() - 1] = psi_speed_m * pull.dot(axis);
+  equations.add(row, residual_px, cauchy_weight(residual_px / sigma_px, cauchy_scale_sigmas) / (sigma_px * sigma_px));
+}
+
+// Where a boundary lies on a generatrix, and how that changes with tau. Of a rotation that is not known yet, ends in
+// the middle of where they lie over the turn.
+struct Place {
+  double along_m, slope_m;
+};
+Place place_of(const Marker& marker, std::size_t boundary, double azimuth_rad, double psi_rad, bool with_rotation) {
+  if (with_rotation)
+    return {boundaries_m(marker, marker_azimuth_rad(marker, azimuth_rad, psi_rad))[boundary],
+            boundary_slopes_m(marker)[boundary]};
+  return {boundaries_m(marker, marker.covered_rad() / 2)[boundary], 0};
+}
+
+// One Gauss-Newton step on measured points. Inner boundaries count only once the rotation is known.
+std::optional<PoseUnknowns> stepped(const Scene& scene, const PoseUnknowns& unknowns, std::span<const SidePoint> sides,
+                                    std::span<const BoundaryPoint> boundaries, bool with_rotation) {
+  const ShaftPose& pose = unknowns.pose();
+  const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
+  if (!view) return std::nullopt;
+  const Eigen::Matrix3d axes = pose.camera_from_unrolled.rotation.toRotationMatrix();
+  const auto azimuth_direction = [&](double azimuth_rad) -> Eigen::Vector3d {
+    return axes * Eigen::Vector3d(-std::sin(azimuth_rad), std::cos(azimuth_rad), 0);
+  };
+  NormalEquations equations(unknowns.size());
+  for (const SidePoint& side : sides) {
+    const double azimuth_rad = view->facing_azimuth_rad + side.side * view->half_visible_rad;
+    add_curve_distance(scene, unknowns, point_on(pose, scene.marker, azimuth_rad, side.along_m), axes.col(2), 0,
+                       side.raw_px, coarse_fit_limits.side_sigma_px, equations);
+  }
+  for (const BoundaryPoint& b : boundaries) {
+    const bool inner = b.boundary == 1 || b.boundary == 2;
+    if (inner && !with_rotation) continue;
+    const auto [along_m, slope_m] = place_of(scene.marker, b.boundary, b.azimuth_rad, pose.psi_rad, with_rotation);
+    const Eigen::Vector3d tangent = scene.marker.radius_m() * azimuth_direction(b.azimuth_rad) + slope_m * axes.col(2);
+    add_curve_distance(scene, unknowns, point_on(pose, scene.marker, b.azimuth_rad, along_m), tangent, -slope_m,
+                       b.raw_px, coarse_fit_limits.boundary_sigma_px, equations);
+  }
+  const PoseUnknowns next = unknowns.changed_by(equations.solve(1e-4));
+  return next.pose().camera_from_unrolled.translation.allFinite() ? std::optional(next) : std::nullopt;
+}
+
+// Agreement of the sampled colours with the marker's at a rotation: matches minus wrong colours, over all colours seen.
+class RotationScore {
+ public:
+  RotationScore(const Scene& scene, const SampledSurface& surface) : scene_(scene), surface_(surface) {
+    const auto upper_m = boundaries_m(scene.marker, 0), slopes_m = boundary_slopes_m(scene.marker);
+    for (std::size_t k = 0; k < 4; ++k) {
+      upper_[k] = (upper_m[k] - surface.first_m) / surface.step_m + 0.5;
+      slope_[k] = slopes_m[k] / surface.step_m;
+    }
+    for (std::size_t i = 0; i < line_count; ++i) {
+      std::array<int, 3> sums{};
+      sums_[i][0] = sums;
+      for (std::size_t k = 0; k < samples_along; ++k) {
+        const std::uint8_t color = surface.lines[i].classes[k];
+        const bool ours = scene.is_ours(color);
+        for (std::size_t band = 0; band < 3; ++band) sums[band] += 2 * (color == scene.bands[band]) - ours;
+        sums_[i][k + 1] = sums;
+        seen_ += ours;
+      }
+    }
+  }
+
+  double at(double psi_rad) const {
+    int score = 0;
+    for (std::size_t i = 0; i < line_count; ++i) {
+      const double tau_rad = wrap_two_pi(marker_azimuth_rad(scene_.marker, surface_.lines[i].azimuth_rad, psi_rad));
+      if (!is_printed(scene_.marker, tau_rad)) continue;
+      std::array<const std::array<int, 3>*, 4> sums;
+      for (std::size_t k = 0; k < 4; ++k) sums[k] = &sums_[i][index(upper_[k] + tau_rad * slope_[k])];
+      for (std::size_t band = 0; band < 3; ++band) score += (*sums[band + 1])[band] - (*sums[band])[band];
+    }
+    return seen_ ? static_cast<double>(score) / seen_ : 0;
+  }
+
+ private:
+  static std::size_t index(double along_steps) {
+    return static_cast<std::size_t>(std::clamp(along_steps, 0.0, static_cast<double>(samples_along)));
+  }
+
+  const Scene& scene_;
+  const SampledSurface& surface_;
+  std::array<double, 4> upper_, slope_;  // of the boundaries, in steps of the surface: at the seam and per radian
+  std::array<std::array<std::array<int, 3>, samples_along + 1>, line_count> sums_;  // over samples before, per band
+  int seen_ = 0;
+};
+
+struct RotationSearch {
+  double psi_rad, score, rival_score;
+};
+RotationSearch search_rotation(const Scene& scene, const SampledSurface& surface) {
+  constexpr int steps = 90, rival_gap = 10;  // 0.7 rad
+  const RotationScore score(scene, surface);
+  std::array<double, steps> scores{};
+  for (int i = 0; i < steps; ++i) scores[static_cast<std::size_t>(i)] = score.at(two_pi * i / steps);
+  const int best = static_cast<int>(std::max_element(scores.begin(), scores.end()) - scores.begin());
+  double rival = -1;
+  for (int i = 0; i < steps; ++i) {
+    const int gap = std::abs(i - best);
+    if (std::min(gap, steps - gap) > rival_gap) rival = std::max(rival, scores[static_cast<std::size_t>(i)]);
+  }
+  return {two_pi * best / steps, scores[static_cast<std::size_t>(best)], rival};
+}
+
+}  // namespace
+
+CoarseFit fit_coarsely(const Scene& scene, PoseUnknowns start, const CoarseFitOptions& options) {
+  constexpr int steps_per_round = 4;
+  CoarseFit fit;
+  fit.unknowns = std::move(start);
+  bool rotation_known = !options.search_rotation;
+  for (int round = 0; round < options.rounds; ++round) {
+    const auto view = view_cylinder(fit.unknowns.pose().camera_from_unrolled, scene.marker.radius_m());
+    if (!view) return fit;
+    const double narrowing = round == 0 ? 1 : 0.5;
+    const auto sides =
+        measure_sides(scene, fit.unknowns.pose(), *view, std::max(8.0, options.lateral_reach_px * narrowing));
+    const auto surface =
+        sample_surface(scene, fit.unknowns.pose(), *view, std::max(0.12, options.along_reach * narrowing));
+    const auto boundaries = measure_boundaries(scene, fit.unknowns.pose(), surface);
+    fit.boundaries_seen = static_cast<int>(boundaries.size());
+    if (fit.boundaries_seen < coarse_fit_limits.min_boundaries || sides.size() < coarse_fit_limits.min_sides)
+      return fit;
+    if (options.search_rotation && round == 1) {
+      const RotationSearch search = search_rotation(scene, surface);
+      fit.unknowns = fit.unknowns.with_psi(search.psi_rad);
+      fit.rotation_score = search.score;
+      fit.rival_score = search.rival_score;
+      rotation_known = true;
+    }
+    for (int step = 0; step < steps_per_round; ++step) {
+      const auto next = stepped(scene, fit.unknowns, sides, boundaries, rotation_known);
+      if (!next) return fit;
+      fit.unknowns = *next;
+    }
+  }
+  fit.found = true;
+  return fit;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,352 @@
+#include "lapservo/vision/search/initial_pose.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include <Eigen/Eigenvalues>
+
+#include "lapservo/core/statistics.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/centre_line.h"
+#include "lapservo/vision/search/coarse_fit.h"
+#include "lapservo/vision/search/heaviest_stretch.h"
+#include "lapservo/vision/search/line_segmentation.h"
+
+namespace lapservo::internal {
+namespace {
+
+// The shaft in the ideal image: x along its axis from `origin` (towards the tip), y across.
+struct ImageFrame {
+  Eigen::Vector2d origin, along;
+  Eigen::Vector2d across() const { return {-along.y(), along.x()}; }
+  Eigen::Vector2d at(double x, double y) const { return origin + x * along + y * across(); }
+};
+
+// y = offset + slope x, robustly.
+struct SideLine {
+  double offset = 0, slope = 0;
+  double at(double x) const { return offset + slope * x; }
+};
+
+struct Outline {
+  ImageFrame frame;
+  SideLine low, high;      // the sides, low.at(x) < high.at(x)
+  double first_x, last_x;  // extent of the blob
+  // Where one side alone lies in the image, the other one's line is where the image ends: low's or high's sign.
+  double only_side = 0;
+};
+
+struct BlobShape {
+  std::vector<Eigen::Vector2d> ideal_px;
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  std::array<Eigen::Vector2d, 3> band_centres;
+  std::array<int, 3> band_samples{};
+  Eigen::Vector2d main_direction;
+};
+
+std::optional<BlobShape> shape_of(const Scene& scene, const Blob& blob) {
+  BlobShape shape;
+  shape.band_centres.fill(Eigen::Vector2d::Zero());
+  for (const Blob::Sample& sample : blob.samples) {
+    const auto band = std::find(scene.bands.begin(), scene.bands.end(), sample.color);
+    const auto ideal = scene.camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
+    if (band == scene.bands.end() || !ideal) continue;
+    const auto index = static_cast<std::size_t>(band - scene.bands.begin());
+    shape.ideal_px.push_back(*ideal);
+    shape.centre += *ideal;
+    shape.band_centres[index] += *ideal;
+    ++shape.band_samples[index];
+  }
+  constexpr int min_of_a_band = 2;
+  if (std::count_if(shape.band_samples.begin(), shape.band_samples.end(), [](int n) { return n >= min_of_a_band; }) <
+          2 ||
+      shape.band_samples[1] < min_of_a_band)
+    return std::nullopt;
+  shape.centre /= static_cast<double>(shape.ideal_px.size());
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector2d& p : shape.ideal_px) scatter += (p - shape.centre) * (p - shape.centre).transpose();
+  shape.main_direction = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(scatter).eigenvectors().col(1);
+  for (std::size_t i = 0; i < 3; ++i)
+    if (shape.band_samples[i]) shape.band_centres[i] /= shape.band_samples[i];
+  return shape;
+}
+
+// Proximal to distal along a given line, by the order of the colours; nullopt when they contradict it.
+std::optional<Eigen::Vector2d> directed(const BlobShape& shape, Eigen::Vector2d line) {
+  const auto x = [&](std::size_t band) { return line.dot(shape.band_centres[band]); };
+  double forward = 0, backward = 0;
+  for (std::size_t band = 0; band < 2; ++band) {
+    if (shape.band_samples[band] < 2 || shape.band_samples[band + 1] < 2) continue;
+    (x(band + 1) > x(band) ? forward : backward) += 1;
+  }
+  if (forward == backward) return std::nullopt;
+  return forward > backward ? line : Eigen::Vector2d(-line);
+}
+
+// `outwards`: +1 or -1, where the shaft ends. Blood hides parts of a side but adds none: points inside the line weigh
+// less.
+SideLine fit_side(const std::vector<Eigen::Vector2d>& points, double outwards) {
+  SideLine line;
+  double scale = 1e9;
+  for (int round = 0; round < 6; ++round) {
+    double w = 0, wx = 0, wy = 0, wxx = 0, wxy = 0;
+    std::vector<double> misses;
+    for (const Eigen::Vector2d& p : points) {
+      const double miss = p.y() - line.at(p.x());
+      const double x = outwards * miss > 0 ? miss / (2 * scale) : miss / (0.5 * scale);
+      const double weight = round == 0 ? 1 : 1 / (1 + x * x);
+      w += weight, wx += weight * p.x(), wy += weight * p.y();
+      wxx += weight * p.x() * p.x(), wxy += weight * p.x() * p.y();
+    }
+    const double spread = w * wxx - wx * wx;
+    line.slope = spread > 1e-9 ? (w * wxy - wx * wy) / spread : 0;
+    line.offset = (wy - line.slope * wx) / w;
+    for (const Eigen::Vector2d& p : points) misses.push_back(std::abs(p.y() - line.at(p.x())));
+    scale = std::max(1.0, 2 * median(misses));
+  }
+  return line;
+}
+
+// Where the marker's colours begin and end on a section at x, and whether that is where the image does.
+struct Section {
+  double low, high;
+  bool low_outside, high_outside;
+};
+std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, double x, double reach_px,
+                                  double step_px) {
+  const int reach = static_cast<int>(reach_px / step_px);
+  const auto color_at = [&](int i) { return scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px))); };
+  const Stretch<double> colored =
+      heaviest_stretch(-reach, reach + 1, [&](int i) { return scene.is_ours(color_at(i)) ? 1 : -0.8; });
+  if (colored.sum * step_px < 4) return std::nullopt;
+  return Section{(colored.first - 0.5) * step_px - coarse_fit_limits.contour_inset_px,
+                 (colored.last + 0.5) * step_px + coarse_fit_limits.contour_inset_px,
+                 color_at(colored.first - 1) == Scene::outside, color_at(colored.last + 1) == Scene::outside};
+}
+
+// Points on the sides, in the outline's frame.
+struct OutlineSides {
+  std::vector<Eigen::Vector2d> low, high;
+};
+
+// The blob's extent along the shaft, and sections across it: of the shaft as wide as it is, or where that gives too
+// few, with what the image's border leaves of it. Round 0 and 1 only turn and shift the frame.
+std::optional<OutlineSides> find_sides(const Scene& scene, const BlobShape& shape, Outline& outline, bool last_round) {
+  constexpr int sections = 13;
+  constexpr std::size_t enough = 4;
+  double widest = 0;
+  outline.first_x = outline.last_x = 0;
+  for (const Eigen::Vector2d& p : shape.ideal_px) {
+    const Eigen::Vector2d offset = p - outline.frame.origin;
+    outline.first_x = std::min(outline.first_x, offset.dot(outline.frame.along));
+    outline.last_x = std::max(outline.last_x, offset.dot(outline.frame.along));
+    widest = std::max(widest, std::abs(offset.dot(outline.frame.across())));
+  }
+  const double reach_px = widest * 1.3 + 12, finest_px = std::max(1.0, reach_px / 150);
+  const double step_px = last_round ? finest_px : std::max(finest_px, reach_px / 40);
+  OutlineSides whole, cut;
+  int low_cut = 0, high_cut = 0;
+  for (int i = 0; i < sections; ++i) {
+    const double x = outline.first_x + (outline.last_x - outline.first_x) * (i + 0.5) / sections;
+    const auto section = section_at(scene, outline.frame, x, reach_px, step_px);
+    if (!section || (section->low_outside && section->high_outside)) continue;
+    cut.low.emplace_back(x, section->low), cut.high.emplace_back(x, section->high);
+    low_cut += section->low_outside, high_cut += section->high_outside;
+    if (section->low_outside || section->high_outside) continue;
+    whole.low.emplace_back(x, section->low), whole.high.emplace_back(x, section->high);
+  }
+  outline.only_side = 0;
+  if (whole.low.size() >= enough) return whole;
+  // The same side everywhere.
+  if (cut.low.size() < enough || (low_cut > 0) == (high_cut > 0)) return std::nullopt;
+  outline.only_side = low_cut > 0 ? 1 : -1;
+  return cut;
+}
+
+std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, Eigen::Vector2d along) {
+  Outline outline;
+  outline.frame = {shape.centre, along};
+  constexpr int rounds = 3;
+  for (int round = 0; round < rounds; ++round) {
+    const auto sides = find_sides(scene, shape, outline, round + 1 == rounds);
+    if (!sides) return std::nullopt;
+    outline.low = fit_side(sides->low, -1), outline.high = fit_side(sides->high, 1);
+    if (round + 1 == rounds) break;
+    const double slope = outline.only_side < 0   ? outline.low.slope
+                         : outline.only_side > 0 ? outline.high.slope
+                                                 : (outline.low.slope + outline.high.slope) / 2;
+    const double turn = std::atan(slope), shift = (outline.low.at(0) + outline.high.at(0)) / 2;
+    outline.frame.origin += shift * outline.frame.across();
+    outline.frame.along = (std::cos(turn) * outline.frame.along + std::sin(turn) * outline.frame.across()).normalized();
+  }
+  return outline;
+}
+
+// The colours' ends along the shaft: medians over some lines between the sides.
+struct Ends {
+  std::optional<double> first_x, last_x;
+};
+Ends find_ends(const Scene& scene, const Outline& outline) {
+  constexpr int lines = 9;
+  constexpr std::size_t samples = 200;
+  const double length = outline.last_x - outline.first_x, margin = 0.25 * length + 10;
+  const double start = outline.first_x - margin, step = (length + 2 * margin) / samples;
+  std::vector<double> first, last;
+  for (int i = 0; i < lines; ++i) {
+    const double fraction = 0.5 + 0.35 * (2.0 * i / (lines - 1) - 1);
+    std::array<std::uint8_t, samples> classes{};
+    for (std::size_t k = 0; k < samples; ++k) {
+      const double x = start + (static_cast<double>(k) + 0.5) * step;
+      const double y = outline.low.at(x) + fraction * (outline.high.at(x) - outline.low.at(x));
+      classes[k] = scene.class_at(scene.camera.raw_from_ideal(outline.frame.at(x, y)));
+    }
+    const LineSegmentation split = segment_line(classes, scene.bands);
+    if (split.seen[0]) first.push_back(start + split.position[0] * step);
+    if (split.seen[3]) last.push_back(start + split.position[3] * step);
+  }
+  const auto of_two_or_more = [](std::vector<double>& values) -> std::optional<double> {
+    return values.size() < 2 ? std::nullopt : std::optional(median(values));
+  };
+  return {of_two_or_more(first), of_two_or_more(last)};
+}
+
+// Point of the axis behind a place on the centre line, from the width of the shaft there.
+std::optional<Eigen::Vector3d> axis_point(const Scene& scene, const Outline& outline, double x) {
+  const auto ray = [&](double y) { return scene.camera.ray_from_ideal(outline.frame.at(x, y)).normalized(); };
+  const Eigen::Vector3d low = ray(outline.low.at(x)), high = ray(outline.high.at(x));
+  const double half_angle = std::asin(std::min(1.0, (high - low).norm() / 2));
+  if (!(half_angle > 1e-4)) return std::nullopt;
+  return scene.marker.radius_m() / std::sin(half_angle) * (low + high).normalized();
+}
+
+// A frame at `origin` whose z axis is `axis`.
+Rigid3 frame_along(const Eigen::Vector3d& origin, const Eigen::Vector3d& axis) {
+  return {rotation_between(Eigen::Vector3d::UnitZ(), axis), origin};
+}
+
+// Depth of the proximal end at which a shaft through the RCM shows its distal end where it is seen.
+double depth_from_length(const Scene& scene, const Rigid3& camera_from_rcm, const Eigen::Vector3d& proximal_end,
+                         const Eigen::Vector2d& distal_ideal_px) {
+  constexpr int steps = 60;
+  double best_m = proximal_end.z(), best_miss_px = 1e9;
+  for (int i = 0; i <= steps; ++i) {
+    const double depth_m = proximal_end.z() * std::exp(0.6 * (2.0 * i / steps - 1));
+    const Eigen::Vector3d proximal = proximal_end * (depth_m / proximal_end.z());
+    const Eigen::Vector3d axis = (proximal - camera_from_rcm.translation).normalized();
+    const Eigen::Vector3d distal = proximal + scene.marker.length_m() * axis;
+    if (!(distal.z() > 1e-3)) continue;
+    const double miss_px = (scene.camera.ideal_from_point(distal) - distal_ideal_px).norm();
+    if (miss_px < best_miss_px) best_miss_px = miss_px, best_m = depth_m;
+  }
+  return best_m;
+}
+
+// Of a shaft of which one side shows: points of the axis whose side is seen at x, as the shaft is nearer or farther.
+class AxisBesideContour {
+ public:
+  AxisBesideContour(const Scene& scene, const Outline& outline, double x) : radius_m_(scene.marker.radius_m()) {
+    const SideLine& side = outline.only_side < 0 ? outline.low : outline.high;
+    const auto ray = [&](double y) { return scene.camera.ray_from_ideal(outline.frame.at(x, y)).normalized(); };
+    contour_ = ray(side.at(x));
+    inwards_ = ray(side.at(x) - outline.only_side) - contour_;
+    inwards_ = (inwards_ - inwards_.dot(contour_) * contour_).normalized();
+  }
+  Eigen::Vector3d at(double distance_m) const {
+    const double sine = std::min(0.9, radius_m_ / distance_m);
+    return distance_m * (std::sqrt(1 - sine * sine) * contour_ + sine * inwards_);
+  }
+
+ private:
+  double radius_m_;
+  Eigen::Vector3d contour_, inwards_;
+};
+
+// The proximal end, by one side, both ends of the colours and the RCM: at the depth at which the marker is as long as
+// it looks.
+std::optional<Eigen::Vector3d> proximal_end_beside_contour(const Scene& scene, const Outline& outline, const Ends& ends,
+                                                           const Rigid3& camera_from_rcm) {
+  if (!ends.first_x || !ends.last_x) return std::nullopt;
+  const AxisBesideContour proximal(scene, outline, *ends.first_x), distal(scene, outline, *ends.last_x);
+  constexpr int steps = 120;
+  constexpr double nearest_m = 0.03, farthest_m = 0.4;
+  double least_miss_px = 1e9;
+  std::optional<Eigen::Vector3d> best;
+  for (int i = 0; i <= steps; ++i) {
+    const Eigen::Vector3d start = proximal.at(nearest_m * std::pow(farthest_m / nearest_m, 1.0 * i / steps));
+    const Eigen::Vector3d axis = (start - camera_from_rcm.translation).normalized();
+    const Eigen::Vector3d end = start + scene.marker.length_m() * axis;
+    if (!(start.z() > 1e-3) || !(end.z() > 1e-3)) continue;
+    const Eigen::Vector3d seen = distal.at(end.norm());
+    if (!(seen.z() > 1e-3)) continue;
+    const double miss_px = (scene.camera.ideal_from_point(end) - scene.camera.ideal_from_point(seen)).norm();
+    if (miss_px < least_miss_px) least_miss_px = miss_px, best = start;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
+                                        const std::optional<Rigid3>& camera_from_rcm) {
+  const auto shape = shape_of(scene, blob);
+  if (!shape) return {};
+  Eigen::Vector2d line = shape->main_direction;
+  if (camera_from_rcm)
+    if (const auto rcm_px = projected_rcm_px(scene.camera, *camera_from_rcm))
+      if ((shape->centre - *rcm_px).norm() > 50) line = (shape->centre - *rcm_px).normalized();
+  const auto along = directed(*shape, line);
+  if (!along) return {};
+  const auto outline = find_outline(scene, *shape, *along);
+  if (!outline) return {};
+  const Ends ends = find_ends(scene, *outline);
+  if (outline->only_side != 0) {
+    if (!camera_from_rcm) return {};
+    const auto end = proximal_end_beside_contour(scene, *outline, ends, *camera_from_rcm);
+    const auto q = end ? configuration_through(*camera_from_rcm, *end) : std::nullopt;
+    return q ? std::vector{PoseUnknowns::rcm(*camera_from_rcm, *q)} : std::vector<PoseUnknowns>{};
+  }
+  const double middle_x = (outline->first_x + outline->last_x) / 2;
+  const auto middle = axis_point(scene, *outline, middle_x);
+  if (!middle) return {};
+  const auto at_depth = [&](double x, double depth_m) -> Eigen::Vector3d {
+    const double y = (outline->low.at(x) + outline->high.at(x)) / 2;
+    return scene.camera.ray_from_ideal(outline->frame.at(x, y)) * depth_m;
+  };
+  const double length_m = scene.marker.length_m(), depth_m = middle->z();
+  const Eigen::Vector3d image_axis = (at_depth(middle_x + 1, depth_m) - at_depth(middle_x, depth_m)).normalized();
+  const auto proximal_at = [&](double z_m) -> Eigen::Vector3d {
+    if (ends.first_x) return at_depth(*ends.first_x, z_m);
+    if (ends.last_x) return at_depth(*ends.last_x, z_m) - length_m * image_axis;
+    return at_depth(outline->first_x, z_m);
+  };
+  std::vector<PoseUnknowns> poses;
+  const auto add_through_rcm = [&](const Eigen::Vector3d& proximal_end) {
+    if (const auto q = configuration_through(*camera_from_rcm, proximal_end))
+      poses.push_back(PoseUnknowns::rcm(*camera_from_rcm, *q));
+  };
+  if (camera_from_rcm) {
+    if (ends.first_x && ends.last_x) {
+      const double z_m =
+          depth_from_length(scene, *camera_from_rcm, proximal_at(depth_m), outline->frame.at(*ends.last_x, 0));
+      add_through_rcm(proximal_at(z_m));
+    }
+    add_through_rcm(proximal_at(depth_m));
+    return poses;
+  }
+  double tilt = 0;
+  if (ends.first_x && ends.last_x)
+    tilt = std::acos(
+        std::min(1.0, (at_depth(*ends.last_x, depth_m) - at_depth(*ends.first_x, depth_m)).norm() / length_m));
+  for (const double sign : {1.0, -1.0}) {
+    const Eigen::Vector3d axis =
+        std::cos(tilt) * image_axis + sign * std::sin(tilt) * Eigen::Vector3d(middle->normalized());
+    const Eigen::Vector3d proximal = proximal_at(depth_m - sign * std::sin(tilt) * length_m / 2);
+    poses.push_back(PoseUnknowns::free({frame_along(proximal, axis.normalized()), 0}));
+    if (tilt < 0.05) break;
+  }
+  return poses;
+}
+
+}  // namespace lapservo::internal

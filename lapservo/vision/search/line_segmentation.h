@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "lapservo/vision/shaft/scene.h"
+
+namespace lapservo::internal {
+
+/// The four colour boundaries along a line of colour classes: position[k] samples lie before boundary k, all of them
+/// before one that the line does not reach. `seen` when the samples on both its sides are what they should be.
+struct LineSegmentation {
+  std::array<double, 4> position{};
+  std::array<bool, 4> seen{};
+};
+
+/// The most likely split of the line into shaft, three bands and shaft, by dynamic programming over the five states:
+/// blood, highlights and noise inside a band cost a little but do not break it. `classes` run from proximal to distal;
+/// Scene::outside counts for nothing. At most 512 samples.
+LineSegmentation segment_line(std::span<const std::uint8_t> classes, const std::array<std::uint8_t, 3>& bands);
+
+/// What segment_line gains from a sample of a colour in a state: 0 shaft, 1..3 the bands, 4 shaft. Internal.
+inline float line_reward(std::size_t state, std::uint8_t color, const std::array<std::uint8_t, 3>& bands) {
+  if (color == Scene::outside) return 0;
+  if (state == 0 || state == 4) return color == 0 ? 0.3F : -0.7F;
+  if (color == bands[state - 1]) return 1;
+  return color == 0 ? -0.35F : -1;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,392 @@
+#include "lapservo/vision/search/marker_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/vision/accept/displaced_boundary.h"
+#include "lapservo/vision/accept/verification.h"
+#include "lapservo/vision/search/coarse_fit.h"
+#include "lapservo/vision/search/initial_pose.h"
+#include "lapservo/vision/search/rcm_starts.h"
+#include "lapservo/vision/shaft/cut_shaft.h"
+
+namespace lapservo::internal {
+namespace {
+
+constexpr const SearchCosts& costs = search_costs;
+
+constexpr double rival_apart_radii = 1;  // two places nearer than this are one
+// Of psi's variance: a print that is off contradicts any registration.
+constexpr double max_print_fraction = 0.25;
+
+Found refusal(Status status, const PoseUnknowns& unknowns) {
+  const ShaftPose& pose = unknowns.pose();
+  const bool finite = pose.camera_from_unrolled.translation.allFinite() &&
+                      pose.camera_from_unrolled.rotation.coeffs().allFinite() && std::isfinite(pose.psi_rad);
+  return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
+}
+
+bool contradicts_registration(const FineFit& free) {
+  return is_well_seen(free) && free.psi_variance_by_print <= max_print_fraction * free.psi_variance;
+}
+
+// What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.
+Found with_doubt_of_one_side(const Scene& scene, FineFit fit) {
+  constexpr double doubt = 1.5;
+  const Status status = validate(scene, fit);
+  // Of psi what the print is judged by: boundaries, whose scatter it is otherwise told by, say nothing of one side.
+  const Eigen::Index psi = fit.unknowns.size() - 1;
+  const double widened = std::max(1.0, std::sqrt(fit.psi_variance / fit.covariance(psi, psi)));
+  fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
+  fit.covariance *= doubt * doubt;
+  return status == Status::ok ? Found{status, std::move(fit), {}} : refusal(status, fit.unknowns);
+}
+
+CoarseFit fitted_coarsely(const Scene& scene, const PoseUnknowns& start, const CoarseFitOptions& options,
+                          WorkBudget& budget) {
+  const CoarseFit fit = fit_coarsely(scene, start, options);
+  budget.spend(fit.found ? costs.coarse_fit : costs.no_coarse_fit);
+  return fit;
+}
+
+FineFit fitted(const Scene& scene, const LightImage& light, const PoseUnknowns& start, const EdgeBlur& blur,
+               const ExpectedProcessing& processing, WorkBudget& budget) {
+  FineFit fit = fit_finely(scene, light, start, blur, processing);
+  budget.spend(fit.passes * costs.fine_pass + (fit.converged ? costs.fine_end : 0) +
+               fit.processing_explained * costs.processing + fit.asked_for_departure * costs.departure);
+  return fit;
+}
+
+// A fit that is ok, unless a boundary shows elsewhere. One side alone holds the place of a shaft that is cut along, and
+// where the robust loss takes that for an outlier at first, fits stop short of it by 20 mrad, six sigma: they go on
+// until psi rests and the side agrees.
+Found accepted(const Scene& scene, const LightImage& light, FineFit fit, const ExpectedProcessing& processing,
+               WorkBudget& budget) {
+  if (may_be_displaced(fit)) {
+    budget.spend(costs.fine_pass);
+    if (is_displaced(scene, light, fit)) return refusal(Status::marker_mismatch, fit.unknowns);
+  }
+  if (!cut_along(scene, fit.unknowns.pose())) return {Status::ok, std::move(fit), {}};
+  constexpr int most = 4;
+  constexpr double rest_sigmas = 0.2, least_sides = 0.8;
+  for (int i = 0; i < most; ++i) {
+    const double before_rad = fit.unknowns.pose().psi_rad;
+    fit = fitted(scene, light, fit.unknowns, fit.blur, {processing.ask, fit.bias_px, fit.departure}, budget);
+    if (const Status status = validate(scene, fit); status != Status::ok) return refusal(status, fit.unknowns);
+    const double moved_rad = std::abs(wrap_pi(fit.unknowns.pose().psi_rad - before_rad));
+    if (moved_rad < rest_sigmas * std::sqrt(fit.psi_variance) && fit.sides_used >= least_sides * fit.sides_in_image)
+      return with_doubt_of_one_side(scene, fit);
+  }
+  return refusal(Status::uncertain, fit.unknowns);
+}
+
+Found try_start(const Scene& scene, const LightImage& light, const PoseUnknowns& start, WorkBudget& budget) {
+  const CoarseFit coarse = fitted_coarsely(scene, start, {}, budget);
+  if (!coarse.shows_rotation()) return {};
+  if (coarse.has_rival()) return refusal(Status::ambiguous, coarse.unknowns);
+  const FineFit first = fitted(scene, light, coarse.unknowns, {}, {}, budget);
+  const Status validated = validate(scene, first);
+  if (validated == Status::ok) return accepted(scene, light, first, {}, budget);
+  if (validated == Status::marker_mismatch) return refusal(validated, first.unknowns);
+  const CoarseFit nearer = fitted_coarsely(scene, coarse.unknowns, near_by, budget);
+  if (!nearer.found) return {};
+  const FineFit fit = fitted(scene, light, nearer.unknowns, {}, {}, budget);
+  const Status status = validate(scene, fit);
+  return status == Status::ok ? accepted(scene, light, fit, {}, budget) : refusal(status, fit.unknowns);
+}
+
+// Two fits of one marker that are both ok: of what blood leaves both can't be sure.
+bool are_rivals(const FineFit& fit, const FineFit& other) {
+  constexpr double apart_sigmas = 5;  // of the least certain fit that is ok
+  const double turn_rad = wrap_pi(fit.unknowns.pose().psi_rad - other.unknowns.pose().psi_rad);
+  return std::abs(turn_rad) > apart_sigmas * validation_limits.max_sigma_psi_rad;
+}
+
+// No marker moves farther from frame to frame.
+double reach_px(const SearchFrame& frame) {
+  constexpr double of_width = 0.05;
+  return of_width * frame.scene.image.width_px;
+}
+
+std::vector<PoseUnknowns> starts_in(const SearchFrame& frame, const Blob& blob,
+                                    const std::optional<Rigid3>& camera_from_rcm, WorkBudget& budget) {
+  auto starts = initial_poses(frame.scene, blob, camera_from_rcm);
+  budget.spend(starts.empty() ? costs.no_initial_poses : costs.initial_poses);
+  return starts;
+}
+
+std::vector<PoseUnknowns> rcm_starts_in(const SearchFrame& frame, const Blob& blob, WorkBudget& budget) {
+  budget.spend(costs.starts_through_rcm(!frame.scene.others.empty()));
+  return starts_through_rcm(frame.scene, blob, *frame.camera_from_rcm);
+}
+
+}  // namespace
+
+Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
+             const ExpectedProcessing& processing, WorkBudget& budget) {
+  const FineFit near = fitted(scene, light, expected, blur, processing, budget);
+  const Status nearby = validate(scene, near);
+  if (nearby == Status::ok) return accepted(scene, light, near, processing, budget);
+  const CoarseFit coarse = fitted_coarsely(scene, expected, from_memory, budget);
+  if (!coarse.found) return {};
+  const FineFit fit = fitted(scene, light, coarse.unknowns, blur, processing, budget);
+  const Status status = validate(scene, fit);
+  return status == Status::ok ? accepted(scene, light, fit, processing, budget) : refusal(status, fit.unknowns);
+}
+
+// The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
+Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm,
+                                   const Blob& blob, Walk& walk, WorkBudget& budget) {
+  Found best;
+  const auto starts = starts_in(frame, blob, camera_from_rcm, budget);
+  for (std::size_t i = walk.blobs.start(); i < starts.size(); ++i) {
+    if ((camera_from_rcm || i == 0) && !budget.allows(costs.try_start())) {
+      walk.blobs.stop(blob, i);
+      return best;
+    }
+    Found found = try_start(frame.scene, frame.light, starts[i], budget);
+    if (!found.fit) {
+      // A print that is off is no reason to look for it elsewhere, with a boundary less.
+      if (found.status == Status::marker_mismatch) return found;
+      if (!best.fit && found.status != Status::no_marker) best = found;
+      continue;
+    }
+    if (!best.fit || found.fit->inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = std::move(found);
+    if (camera_from_rcm) break;  // the starts are ways to one solution
+  }
+  walk.blobs.finish(blob);
+  return best;
+}
+
+Found MarkerSearch::detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
+                           WorkBudget& budget) {
+  Found best;
+  for (const Blob* blob : walk.blobs.rest(frame.blobs, reach_px(frame))) {
+    Found found = detect_in_blob(frame, camera_from_rcm, *blob, walk, budget);
+    if (found.fit || found.status == Status::marker_mismatch) {
+      walk.done = true;
+      return found;
+    }
+    if (found.status != Status::no_marker) best = std::move(found);
+    if (walk.blobs.stopped()) return best;
+  }
+  walk.done = true;
+  return best;
+}
+
+// Whether the marker shows in another place as well: a second print, a reflection, a picture of tiles. The RCM would
+// tell which is ours. All in one frame: in another one a rival may be where none was.
+MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget) {
+  const Scene& scene = frame.scene;
+  const auto middle = [&](const PoseUnknowns& unknowns) {
+    const Eigen::Vector3d along(0, 0, scene.marker.length_m() / 2);
+    return scene.camera.raw_from_point(unknowns.pose().camera_from_unrolled * along);
+  };
+  const double apart_px = rival_apart_radii * scene.marker.radius_m() /
+                          fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
+  for (const Blob& blob : frame.blobs)
+    for (const PoseUnknowns& start : starts_in(frame, blob, std::nullopt, budget)) {
+      if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
+      if (!budget.allows(costs.try_start())) return Rival::not_known_yet;
+      const Found other = try_start(scene, frame.light, start, budget);
+      if (other.status == Status::marker_mismatch) return Rival::found;
+      if (other.fit && (middle(other.fit->unknowns) - middle(fit.unknowns)).norm() > apart_px) return Rival::found;
+    }
+  return Rival::none;
+}
+
+// The candidate as it shows in this frame; whether it doesn't.
+bool MarkerSearch::lost_candidate(const SearchFrame& frame, WorkBudget& budget) {
+  const FineFit before = *candidate_;
+  candidate_ =
+      follow(frame.scene, frame.light, before.unknowns, before.blur, {true, before.bias_px, before.departure}, budget)
+          .fit;
+  return !candidate_;
+}
+
+void MarkerSearch::begin_anew(Status status) {
+  *this = MarkerSearch();
+  status_ = status;
+}
+
+// A candidate whose rivals the budget leaves no time for waits for the next frame, in which they take what they take.
+Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budget) {
+  const bool waited = candidate_.has_value();
+  if (waited && lost_candidate(frame, budget)) begin_anew(status_);
+  if (!candidate_) {
+    Found plain = detect(frame, std::nullopt, plain_, budget);
+    if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
+    plain.status = status_;
+    if (plain_.done) plain_ = {};
+    if (!plain.fit) return plain;
+    candidate_ = plain.fit;
+  }
+  if (waited) budget.allow(WorkBudget::Beyond::all);
+  const Rival rival = look_for_rival(frame, *candidate_, budget);
+  Found found{Status::ambiguous, std::nullopt, std::nullopt};
+  if (rival == Rival::none) found = {Status::ok, std::move(candidate_), {}};
+  // What was found says nothing of a later frame in which it is lost.
+  if (rival != Rival::not_known_yet) begin_anew(rival == Rival::none ? Status::no_marker : found.status);
+  return found;
+}
+
+// What shows plainly, but elsewhere than the RCM allows.
+Found MarkerSearch::despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget) {
+  Found free = detect(frame, std::nullopt, free_, budget);
+  if (!free.fit || !contradicts_registration(*free.fit)) return {};
+  if (plain_is_known) return free;
+  // In this frame a fit through the RCM may be possible where none was before.
+  Walk again;
+  budget.allow(WorkBudget::Beyond::all);
+  Found through_rcm = detect(frame, frame.camera_from_rcm, again, budget);
+  return through_rcm.fit ? through_rcm : free;
+}
+
+// False when the budget ends first.
+bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) {
+  if (!results_) results_ = agreement_->results();
+  for (; !results_->empty(); results_->pop_back()) {
+    if (!budget.allows(costs.fit_to_result())) return false;
+    const PoseUnknowns start = agreement_->in_this_frame(frame.scene, results_->back(), budget);
+    const FineFit first = fitted(frame.scene, frame.light, start, {}, {}, budget);
+    if (validate(frame.scene, first) != Status::ok) continue;
+    const Found found = accepted(frame.scene, frame.light, first, {}, budget);
+    if (!found.fit) continue;
+    has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
+    if (!candidate_ || found.fit->inlier_rms_sigmas < candidate_->inlier_rms_sigmas) candidate_ = found.fit;
+  }
+  results_.reset();
+  return true;
+}
+
+bool MarkerSearch::finish_agreement(const SearchFrame& frame, WorkBudget& budget) {
+  if (!agreement_->advance(frame.scene, budget) || !fit_to_results(frame, budget)) return false;
+  agreement_.reset();
+  return true;
+}
+
+// The best of all that the blobs' starts lead to.
+Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
+  const std::vector<Blob> blobs = joined_blobs(frame.blobs);
+  const auto rest = hidden_.blobs.rest(blobs, reach_px(frame));
+  if (agreement_ && !finish_agreement(frame, budget)) return {};
+  for (const Blob* blob : rest) {
+    auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget);
+    if (!frame.scene.others.empty()) {
+      const auto more = rcm_starts_in(frame, *blob, budget);
+      starts.insert(starts.end(), more.begin(), more.end());
+    }
+    for (std::size_t i = hidden_.blobs.start(); i < starts.size(); ++i) {
+      agreement_ = AgreementSearch(starts[i], *frame.camera_from_rcm, frame.scene.marker.length_m());
+      hidden_.blobs.stop(*blob, i + 1);
+      if (!finish_agreement(frame, budget)) return {};
+    }
+    hidden_.blobs.finish(*blob);
+  }
+  hidden_.done = true;
+  if (!candidate_) return {};
+  if (has_rivals_) return refusal(Status::ambiguous, candidate_->unknowns);
+  return {Status::ok, std::move(candidate_), {}};
+}
+
+// The starts of a shared blob, until one fits. One behind another that was found needs not show all bands.
+Found MarkerSearch::among_others_in(const SearchFrame& frame, const Scene& scene, const Blob& blob,
+                                    WorkBudget& budget) {
+  Found best;
+  budget.spend(costs.bands_in_order);
+  const bool may_show = !scene.others.empty() || shows_bands_in_order(scene, blob, *frame.camera_from_rcm);
+  const std::size_t first = among_others_.blobs.start();
+  if (may_show && !budget.allows(costs.starts_through_rcm(!scene.others.empty()) + costs.try_start())) {
+    among_others_.blobs.stop(blob, first);
+    return best;
+  }
+  std::vector<PoseUnknowns> starts;
+  if (may_show) starts = rcm_starts_in(frame, blob, budget);
+  for (std::size_t i = first; i < starts.size(); ++i) {
+    if (i > first && !budget.allows(costs.try_start())) {
+      among_others_.blobs.stop(blob, i);
+      return best;
+    }
+    Found found = try_start(scene, frame.light, starts[i], budget);
+    if (found.fit || found.status == Status::marker_mismatch) return found;
+    if (found.status != Status::no_marker) best = std::move(found);
+  }
+  among_others_.blobs.finish(blob);
+  return best;
+}
+
+Found MarkerSearch::among_others(const SearchFrame& frame, WorkBudget& budget) {
+  Scene scene = frame.scene;
+  scene.among_others = true;
+  Found best;
+  for (const Blob* blob : among_others_.blobs.rest(frame.shared, reach_px(frame))) {
+    Found found = among_others_in(frame, scene, *blob, budget);
+    if (found.fit || found.status == Status::marker_mismatch) {
+      among_others_.done = found.among_others = true;
+      return found;
+    }
+    if (found.status != Status::no_marker) best = std::move(found);
+    if (among_others_.blobs.stopped()) return best;
+  }
+  among_others_.done = true;
+  return best;
+}
+
+Found MarkerSearch::look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget) {
+  Found seen;
+  // Instruments part while hidden markers are looked for, so shared blobs are looked at again by turns with that.
+  if (among_others_.done && !frame.shared.empty() && hidden_.blobs.begun() && !mismatch_among_others_ &&
+      (others_turn_ = !others_turn_))
+    among_others_ = {};
+  if (!among_others_.done && !is_mismatch) {
+    seen = among_others(frame, budget);
+    if (seen.fit || !among_others_.done) return seen;
+    mismatch_among_others_ = seen.status == Status::marker_mismatch;
+  }
+  is_mismatch |= mismatch_among_others_;
+  if (!free_.done)
+    if (Found found = despite_registration(frame, plain_is_known, budget); found.fit) return found;
+  if (!free_.done) return seen;
+  // Such a print is not hidden: this is what the search came to.
+  if (is_mismatch) hidden_.done = true;
+  if (hidden_.done) return seen;
+  Found found = hidden(frame, budget);
+  return found.fit || found.status == Status::ambiguous ? found : seen;
+}
+
+Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) {
+  // What other blobs gave was worse than it, and is gone with it.
+  if (candidate_ && lost_candidate(frame, budget))
+    hidden_ = {}, agreement_.reset(), results_.reset(), has_rivals_ = false;
+  const bool from_the_first = !plain_.blobs.begun();
+  const WorkBudget::Beyond step = budget.allowed();
+  // Half the budget, or by turns what a start takes, is for what shows plainly.
+  longs_turn_ = searches_long_ && !longs_turn_;
+  const double half = budget.left() / 2, one_start = costs.initial_poses + costs.try_start();
+  const double share = !searches_long_ ? budget.left() : longs_turn_ ? half : std::max(half, one_start);
+  Found plain = budget.share(share, longs_turn_ ? WorkBudget::Beyond::none : step,
+                             [&](WorkBudget& part) { return detect(frame, frame.camera_from_rcm, plain_, part); });
+  if (plain.fit) {
+    begin_anew(Status::no_marker);
+    return plain;
+  }
+  const bool plain_is_known = plain_.done && from_the_first;
+  const bool is_mismatch = plain.status == Status::marker_mismatch;
+  if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
+  plain.status = status_;
+  if (plain_.done) plain_ = {}, searches_long_ = true;
+  if (!searches_long_) return plain;
+  budget.allow(longs_turn_ ? step : WorkBudget::Beyond::none);
+  Found found = look_long(frame, is_mismatch, plain_is_known, budget);
+  if (found.fit || hidden_.done) begin_anew(status_);
+  if (found.fit || plain.status == Status::no_marker) return found;
+  return plain;
+}
+
+Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {
+  return frame.camera_from_rcm ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "lapservo/geometry/rigid3.h"
+#include "lapservo/vision/colour/blob_search.h"
+#include "lapservo/vision/image/light_image.h"
+#include "lapservo/vision/model/fine_fit.h"
+#include "lapservo/vision/search/agreement_search.h"
+#include "lapservo/vision/search/blob_walk.h"
+#include "lapservo/vision/search/work_budget.h"
+#include "lapservo/vision/shaft/scene.h"
+#include "lapservo/vision/status.h"
+
+namespace lapservo::internal {
+
+/// What looking for a marker came to.
+struct Found {
+  Status status = Status::no_marker;
+  std::optional<FineFit> fit;        ///< when ok
+  std::optional<ShaftPose> refused;  ///< to draw, when there was something
+  bool among_others = false;         ///< it touches or crosses another instrument
+};
+
+/// A frame in which one marker is looked for. Borrows everything.
+struct SearchFrame {
+  const Scene& scene;
+  const LightImage& light;
+  const std::vector<Blob>& blobs;  ///< of the whole frame, largest first
+  const std::optional<Rigid3>& camera_from_rcm;
+  const std::vector<Blob>& shared;  ///< those that may show other instruments as well
+};
+
+/// The marker near where it is expected.
+Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
+             const ExpectedProcessing& processing, WorkBudget& budget);
+
+/// Looks for one marker all over a frame: first where a blob's outline says; with camera_from_rcm then along lines
+/// through it in blobs that are shared, without regard to it, and at last for markers that are hidden in large parts,
+/// which takes tens of milliseconds. What the budget does not allow is done in the frames to come, from where it
+/// stopped. What shows plainly is looked for in each of them.
+class MarkerSearch {
+ public:
+  /// While the search goes on, the status is what it knows so far, or the last whole search came to.
+  Found look(const SearchFrame& frame, WorkBudget& budget);
+
+ private:
+  // A search from blob to blob; done when none is left.
+  struct Walk {
+    BlobWalk blobs;
+    bool done = false;
+  };
+  enum class Rival { none, found, not_known_yet };
+
+  static Found detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, const Blob& blob,
+                              Walk& walk, WorkBudget& budget);
+  static Found detect(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm, Walk& walk,
+                      WorkBudget& budget);
+  static Rival look_for_rival(const SearchFrame& frame, const FineFit& fit, WorkBudget& budget);
+  Found look_without_rcm(const SearchFrame& frame, WorkBudget& budget);
+  Found look_with_rcm(const SearchFrame& frame, WorkBudget& budget);
+  Found look_long(const SearchFrame& frame, bool is_mismatch, bool plain_is_known, WorkBudget& budget);
+  Found despite_registration(const SearchFrame& frame, bool plain_is_known, WorkBudget& budget);
+  Found among_others(const SearchFrame& frame, WorkBudget& budget);
+  Found among_others_in(const SearchFrame& frame, const Scene& scene, const Blob& blob, WorkBudget& budget);
+  Found hidden(const SearchFrame& frame, WorkBudget& budget);
+  bool finish_agreement(const SearchFrame& frame, WorkBudget& budget);
+  bool fit_to_results(const SearchFrame& frame, WorkBudget& budget);
+  bool lost_candidate(const SearchFrame& frame, WorkBudget& budget);
+  void begin_anew(Status status);
+
+  Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
+  Walk plain_, among_others_, free_, hidden_;
+  bool mismatch_among_others_ = false;  // what is there is a print that is off
+  bool searches_long_ = false;          // what shows plainly was not found
+  bool longs_turn_ = false;
+  bool others_turn_ = false;  // of the long search's: shared blobs again
+  std::optional<AgreementSearch> agreement_;
+  std::optional<std::vector<PoseUnknowns>> results_;  // of agreement_, that are not fitted to yet; the next is the last
+  std::optional<FineFit> candidate_;                  // the best so far, while others are looked for
+  bool has_rivals_ = false;                           // another rotation is as ok as the candidate's
+};
+
+}  // namespace lapservo::internal

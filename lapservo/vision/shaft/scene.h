@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/marker/marker.h"
+#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/image/image_view.h"
+#include "lapservo/vision/shaft/shaft_cover.h"
+
+namespace lapservo::internal {
+
+class PrintRecord;
+
+/// One frame and the one instrument that is looked for in it. Borrows everything.
+struct Scene {
+  const ImageView& image;
+  const Camera& camera;
+  const ColorClasses& classes;
+  const Marker& marker;
+  std::array<std::uint8_t, 3> bands;            ///< colour class of each band
+  std::span<const ShaftCover* const> others{};  ///< that were found, near enough to hide it or to touch it
+  const PrintRecord* print = nullptr;           ///< what earlier frames showed of its print
+  bool among_others = false;                    ///< the colours of one that was not found may touch it
+
+  /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.
+  static constexpr std::uint8_t outside = 255;
+  /// Colour class of the nearest pixel, `outside` beyond the image.
+  std::uint8_t class_at(const Eigen::Vector2d& raw_px) const {
+    const double u = raw_px.x() + 0.5, v = raw_px.y() + 0.5;
+    if (!(u >= 0 && v >= 0 && u < image.width_px && v < image.height_px)) return outside;
+    return classes(image.pixel(static_cast<int>(u), static_cast<int>(v)));
+  }
+  /// The same, and `outside` where another instrument's marker shows.
+  std::uint8_t class_beside(const Eigen::Vector2d& raw_px) const {
+    const std::uint8_t color = class_at(raw_px);
+    return others.empty() ? color : unless_explained(raw_px, color);
+  }
+  /// The same at a point before the camera, [m] in its frame; `outside` also when it lies behind it or is hidden.
+  std::uint8_t class_at_point(const Eigen::Vector3d& point_in_camera) const {
+    if (!(point_in_camera.z() > 1e-3)) return outside;
+    const Eigen::Vector2d raw_px = camera.raw_from_point(point_in_camera);
+    return hidden(raw_px, point_in_camera.z()) ? outside : class_beside(raw_px);
+  }
+  /// The same of a point that would hide another instrument behind it.
+  std::uint8_t class_on_shaft(const Eigen::Vector3d& point_in_camera) const {
+    if (!(point_in_camera.z() > 1e-3)) return outside;
+    const Eigen::Vector2d raw_px = camera.raw_from_point(point_in_camera);
+    return hidden(raw_px, point_in_camera.z()) ? outside : class_at(raw_px);
+  }
+  /// Whether another instrument lies before what would be seen there at this depth (z in the camera's frame).
+  bool hidden(const Eigen::Vector2d& raw_px, double depth_m) const {
+    return !others.empty() && hidden_by_others(raw_px, depth_m);
+  }
+  /// Whether it is the class of one of the marker's bands.
+  bool is_ours(std::uint8_t color) const { return color == bands[0] || color == bands[1] || color == bands[2]; }
+
+ private:
+  // Not inline: they are needed seldom, and what looks at every pixel of a line is short without them.
+  std::uint8_t unless_explained(const Eigen::Vector2d& raw_px, std::uint8_t color) const;
+  bool hidden_by_others(const Eigen::Vector2d& raw_px, double depth_m) const;
+};
+
+}  // namespace lapservo::internal

@@ -1,0 +1,110 @@
+#include "lapservo/vision/shaft/shaft_cover.h"
+
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/testing/scenes.h"
+
+namespace lapservo::internal {
+namespace {
+
+// The marker's pixels, and where it is.
+struct Covered {
+  const scenes::Shot& shot;
+  ShaftPose pose = scenes::pose_of(shot.rig, 0, shot.q);
+  Scene scene = shot.sight.scene();
+  std::vector<Blob> blobs = largest_blobs(shot.sight.view(), shot.sight.classes());
+  ShaftCover cover;
+
+  explicit Covered(std::uint64_t seed) : shot(scenes::usual_shot(seed)) {
+    cover.draw(scene.camera, scene.marker, scene.bands, pose);
+  }
+};
+
+TEST(ShaftCover, ExplainsTheMarkersPixels) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    const Covered it(seed);
+    ASSERT_FALSE(it.blobs.empty());
+    std::size_t explained = 0;
+    for (const Blob::Sample& sample : it.blobs[0].samples)
+      explained += it.cover.explains(sample.u, sample.v, sample.color);
+    EXPECT_GT(static_cast<double>(explained), 0.95 * static_cast<double>(it.blobs[0].samples.size()));
+    EXPECT_FALSE(lies_beside(it.scene.camera, it.scene.marker, it.pose, it.blobs[0], it.scene.bands));
+  }
+}
+
+TEST(ShaftCover, LeavesWhatLiesBesideIt) {
+  Covered it(1);
+  Blob beside = it.blobs[0];
+  const auto middle_px = it.scene.camera.raw_from_point(it.pose.camera_from_unrolled *
+                                                        Eigen::Vector3d(0, 0, 1.8 * it.scene.marker.length_m()));
+  for (Blob::Sample& sample : beside.samples) {
+    sample.u = static_cast<int>(middle_px.x()), sample.v = static_cast<int>(middle_px.y());
+  }
+  const ShaftCover* cover = &it.cover;
+  EXPECT_EQ(without({beside}, {&cover, 1}).size(), 1U);
+  EXPECT_TRUE(lies_beside(it.scene.camera, it.scene.marker, it.pose, beside, it.scene.bands));
+  for (Blob::Sample& sample : beside.samples) sample.color = 200;
+  EXPECT_FALSE(lies_beside(it.scene.camera, it.scene.marker, it.pose, beside, it.scene.bands)) << "others' colours";
+}
+
+TEST(ShaftCover, HidesWhatLiesBehindIt) {
+  const Covered it(2);
+  for (const double along : {-0.5, 0.2, 0.8}) {
+    const Eigen::Vector3d point =
+        it.pose.camera_from_unrolled * Eigen::Vector3d(0, 0, along * it.scene.marker.length_m());
+    const Eigen::Vector2d px = it.scene.camera.raw_from_point(point);
+    EXPECT_TRUE(it.cover.hides(px.x(), px.y(), 1.1 * point.z())) << along;
+    EXPECT_FALSE(it.cover.hides(px.x(), px.y(), 0.9 * point.z())) << along;
+    EXPECT_FALSE(it.cover.hides(px.x() + 400, px.y() + 400, 1.1 * point.z())) << along;
+  }
+}
+
+// A lens's distortion is a polynomial that folds far places back into the image.
+TEST(ShaftCover, LiesUnderTheShaftAloneWhateverTheLens) {
+  for (const double k1 : {0.0, -0.1, -0.3, 0.2}) {
+    SCOPED_TRACE(k1);
+    Rig rig = scenes::usual_rig();
+    rig.camera.distortion = {k1, k1 < -0.2 ? 0.1 : 0, 0, 0, 0};
+    Random random(4);
+    const Marker& marker = rig.instruments[0].marker;
+    const ShaftPose pose = scenes::pose_of(rig, 0, scenes::random_configuration(rig, 0, random));
+    ShaftCover cover;
+    cover.draw(rig.camera, marker, {1, 2, 3}, pose);
+    const Rigid3 shaft_from_camera = pose.camera_from_unrolled.inverse();
+    int covered = 0, far = 0;
+    for (int v = 2; v < rig.camera.height_px; v += 4)
+      for (int u = 2; u < rig.camera.width_px; u += 4) {
+        if (!cover.hides(u, v, 10)) continue;
+        ++covered;
+        const Eigen::Vector3d ray = rig.camera.ray_from_ideal(rig.camera.ideal_from_raw(Eigen::Vector2d(u, v)).value());
+        const Eigen::Vector3d eye = shaft_from_camera.translation, way = shaft_from_camera.rotation * ray;
+        const double apart_m =
+            std::abs(way.head<2>().normalized().x() * eye.y() - way.head<2>().normalized().y() * eye.x());
+        far += apart_m > 1.5 * marker.radius_m();
+      }
+    EXPECT_GT(covered, 300);
+    EXPECT_LT(far, covered / 100 + 3);
+  }
+}
+
+TEST(ShaftCover, MayMeetOnlyWhatIsNear) {
+  const Rig rig = scenes::usual_rig(2);
+  Random random(1);
+  const scenes::CrossingPair pair = scenes::crossing_pair(rig, random);
+  const ShaftPose first = scenes::pose_of(rig, 0, pair.q[0]);
+  ShaftPose other = scenes::pose_of(rig, 1, pair.q[1]);
+  const Marker& marker = rig.instruments[0].marker;
+  EXPECT_TRUE(may_meet(rig.camera, marker, first, marker, other));
+  ShaftPose beside = first;
+  const Eigen::Vector3d axis = first.camera_from_unrolled.rotation * Eigen::Vector3d::UnitZ();
+  beside.camera_from_unrolled.translation +=
+      5 * marker.diameter_m * axis.cross(first.camera_from_unrolled.translation).normalized();
+  EXPECT_FALSE(may_meet(rig.camera, marker, first, marker, beside));
+}
+
+}  // namespace
+}  // namespace lapservo::internal
