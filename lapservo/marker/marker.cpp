@@ -26,6 +26,14 @@ FieldProblem problem(const std::string& field, double value, const std::string& 
 
 }  // namespace
 
+bool Marker::bands_are_measured() const {
+  constexpr double largest_sigma_m = 0.03e-3;
+  const auto known = [](const std::optional<std::array<double, 3>>& sigmas_m) {
+    return sigmas_m && *std::max_element(sigmas_m->begin(), sigmas_m->end()) <= largest_sigma_m;
+  };
+  return known(sigmas.bands_upper_m) && known(sigmas.bands_lower_m);
+}
+
 std::array<double, 4> boundaries_m(const Marker& marker, double tau_rad) {
   const double t = wrap_two_pi(tau_rad) / marker.covered_rad(), wrapped_m = t * marker.wrap_m;
   const auto& upper = marker.bands_upper_m;

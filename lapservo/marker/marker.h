@@ -36,7 +36,8 @@ struct Marker {
   bool operator==(const Marker&) const = default;
   double radius_m() const { return diameter_m / 2; }
   double covered_rad() const { return 2 * std::numbers::pi - gap_rad; }
-  bool bands_are_measured() const { return sigmas.bands_upper_m && sigmas.bands_lower_m; }
+  /// Whether all bands were measured to within 0.03 mm (one sigma), which is about 15 mrad of psi.
+  bool bands_are_measured() const;
   double length_m() const { return bands_upper_m[0] + bands_upper_m[1] + bands_upper_m[2]; }
 };
 

@@ -110,6 +110,8 @@ TEST(Verification, AnInnerBoundaryThatIsHiddenLeavesThePrintInDoubt) {
   MarkerSigmas& sigmas = measured.instruments[0].marker.sigmas;
   sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
   const Sight of_measured(measured, shot.bgr);
+  sigmas.bands_lower_m = std::array{1e-5, 1e-5, 3e-4};
+  const Sight of_hardly_measured(measured, shot.bgr);
   for (const std::size_t boundary : {1U, 2U}) {
     FineFit fit = right;
     fit.used[boundary] = fit.in_image[boundary] = fit.lines / 5;
@@ -117,6 +119,7 @@ TEST(Verification, AnInnerBoundaryThatIsHiddenLeavesThePrintInDoubt) {
     fit.inner_off_m = 3e-4;
     EXPECT_EQ(validate(shot.sight.scene(), fit), Status::occluded);
     EXPECT_EQ(validate(of_measured.scene(), fit), Status::ok);
+    EXPECT_EQ(validate(of_hardly_measured.scene(), fit), Status::occluded);
     fit = right;
     fit.used[boundary] = fit.in_image[boundary] = validation_limits.confirmed_lines;
     EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "both of its colours show beside it";
@@ -219,6 +222,8 @@ TEST(Verification, ThePrintIsNeverSuspiciousWhereItsBandsWereMeasured) {
     MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;
     sigmas.bands_upper_m = sigmas.bands_lower_m = std::array{1e-5, 1e-5, 1e-5};
     EXPECT_EQ(fit_with(rig).psi_variance_suspected, 0);
+    sigmas.bands_upper_m = std::array{1e-5, 3e-4, 1e-5};
+    EXPECT_GT(fit_with(rig).psi_variance_suspected, 0) << "not to within what matters";
   }
 }
 
