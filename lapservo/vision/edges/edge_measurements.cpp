@@ -167,7 +167,7 @@ bool place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_
   place.film_shift = place.shows_film() ? film_edge_level(place.facing, film_edge_limits.usual_even_light) : 0;
   Eigen::Vector3d point = frame.point(generatrix, along_m[k]);
   if (place.shows_film()) point -= place.film_shift * frame.film_m * generatrix.outwards;
-  if (!(point.z() > 1e-3)) return false;
+  if (!frame.scene.field.contains(point)) return false;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
   const double px_per_m = axis_px.norm();
@@ -411,7 +411,7 @@ struct SidePlace {
 bool place_side(const Frame& frame, const Side& side, double along_m, const Effort& effort, double blur_px,
                 SidePlace& place) {
   const Eigen::Vector3d point = frame.point(side.contour, along_m);
-  if (!(point.z() > 1e-3)) return false;
+  if (!frame.scene.field.contains(point)) return false;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d along = (image.d_px_d_point * frame.axes.col(2)).normalized();
   Eigen::Vector2d inwards(-along.y(), along.x());

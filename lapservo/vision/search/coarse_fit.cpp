@@ -138,7 +138,7 @@ BoundaryPoints measure_boundaries(const Scene& scene, const ShaftPose& pose, con
 void add_curve_distance(const Scene& scene, const PoseUnknowns& unknowns, const Eigen::Vector3d& point,
                         const Eigen::Vector3d& tangent, double psi_speed_m, const Eigen::Vector2d& measured_px,
                         double sigma_px, NormalEquations& equations) {
-  if (!(point.z() > 1e-3)) return;
+  if (!scene.field.contains(point)) return;
   const ProjectionWithJacobian image = scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d along = (image.d_px_d_point * tangent).normalized();
   const Eigen::Vector2d normal(-along.y(), along.x());

@@ -97,6 +97,7 @@ class LineInImage {
     }
     if (!camera.distorted()) return;
     for (std::size_t k = 0; k < count; ++k) {
+      if (!scene.field.contains(base + along_m[k] * axis)) depth_m_[k] = 0;
       const Eigen::Vector2d raw_px = camera.raw_from_ideal({u_px_[k], v_px_[k]});
       u_px_[k] = raw_px.x(), v_px_[k] = raw_px.y();
     }

@@ -131,7 +131,7 @@ Line line_at(const Scene& scene, const RaysFromRcm& rays, const Fan& fan, std::s
   for (std::size_t k = 0; k < line_samples; ++k) {
     const Eigen::Vector3d ray =
         rays.ray(fan.alpha_rad(static_cast<double>(i)), fan.beta_rad(static_cast<double>(k) + 0.5));
-    classes[k] = ray.z() > 1e-3 ? scene.class_beside(scene.camera.raw_from_point(ray)) : Scene::outside;
+    classes[k] = scene.field.contains(ray) ? scene.class_beside(scene.camera.raw_from_point(ray)) : Scene::outside;
   }
   Line line{segment_line(classes, scene.bands)};
   std::size_t state = 0;

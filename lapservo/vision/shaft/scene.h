@@ -8,6 +8,7 @@
 #include "lapservo/marker/marker.h"
 #include "lapservo/vision/colour/color_classes.h"
 #include "lapservo/vision/image/image_view.h"
+#include "lapservo/vision/image/lens_field.h"
 #include "lapservo/vision/shaft/shaft_cover.h"
 
 namespace lapservo::internal {
@@ -24,6 +25,7 @@ struct Scene {
   std::span<const ShaftCover* const> others{};  ///< that were found, near enough to hide it or to touch it
   const PrintRecord* print = nullptr;           ///< what earlier frames showed of its print
   bool among_others = false;                    ///< the colours of one that was not found may touch it
+  LensField field{camera};
 
   /// Where the image says nothing of this instrument: beyond its border, or since another one shows there.
   static constexpr std::uint8_t outside = 255;
@@ -40,13 +42,13 @@ struct Scene {
   }
   /// The same at a point before the camera, [m] in its frame; `outside` also when it lies behind it or is hidden.
   std::uint8_t class_at_point(const Eigen::Vector3d& point_in_camera) const {
-    if (!(point_in_camera.z() > 1e-3)) return outside;
+    if (!field.contains(point_in_camera)) return outside;
     const Eigen::Vector2d raw_px = camera.raw_from_point(point_in_camera);
     return hidden(raw_px, point_in_camera.z()) ? outside : class_beside(raw_px);
   }
   /// The same of a point that would hide another instrument behind it.
   std::uint8_t class_on_shaft(const Eigen::Vector3d& point_in_camera) const {
-    if (!(point_in_camera.z() > 1e-3)) return outside;
+    if (!field.contains(point_in_camera)) return outside;
     const Eigen::Vector2d raw_px = camera.raw_from_point(point_in_camera);
     return hidden(raw_px, point_in_camera.z()) ? outside : class_at(raw_px);
   }

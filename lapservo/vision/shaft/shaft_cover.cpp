@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "lapservo/geometry/cylinder.h"
-#include "lapservo/geometry/field_of_view.h"
 #include "lapservo/marker/azimuths.h"
+#include "lapservo/vision/image/lens_field.h"
 
 namespace lapservo::internal {
 namespace {
@@ -86,12 +86,8 @@ void ShaftCover::draw(const Camera& camera, const Marker& marker, const std::arr
     return pose.camera_from_unrolled *
            surface_point(marker.radius_m(), view->facing_azimuth_rad + side * view->half_visible_rad, along_m);
   };
-  // Beyond the field of view a lens's distortion is not known: it folds places back into the image.
-  constexpr double beyond_corner = 1.1;
-  const double widest = beyond_corner * std::tan(half_field_rad(camera));
-  const auto in_field = [&](const Eigen::Vector3d& point) {
-    return point.z() > nearest_m && point.head<2>().norm() < widest * point.z();
-  };
+  const LensField field(camera);
+  const auto in_field = [&](const Eigen::Vector3d& point) { return point.z() > nearest_m && field.contains(point); };
   const auto section_at = [&](double along_m) -> std::optional<Section> {
     const Eigen::Vector3d left = generatrix_at(-1, along_m), right = generatrix_at(1, along_m),
                           front = generatrix_at(0, along_m);

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "lapservo/geometry/camera.h"
+#include "lapservo/geometry/field_of_view.h"
+
+namespace lapservo::internal {
+
+/// Which points a camera can show: those before it, hardly farther from its axis than the image's corners. Beyond, a
+/// lens's distortion is not known: it folds places back into the image.
+class LensField {
+ public:
+  explicit LensField(const Camera& camera) {
+    constexpr double beyond_corner = 1.1;
+    const double widest = beyond_corner * std::tan(half_field_rad(camera));
+    widest_squared_ = widest * widest;
+  }
+  /// Of a point in the camera's frame, or of a ray to it.
+  bool contains(const Eigen::Vector3d& point) const {
+    constexpr double nearest = 1e-3;
+    return point.z() > nearest && point.head<2>().squaredNorm() < widest_squared_ * point.z() * point.z();
+  }
+
+ private:
+  double widest_squared_;
+};
+
+}  // namespace lapservo::internal
