@@ -9,7 +9,7 @@ int main(int argc, char** argv) {
   lapservo::Tracker tracker(rig, {.frame_budget = std::nullopt});
   const auto frames = lapservo::open_frame_source(argv[1], 30);
   while (const auto frame = frames->next()) {
-    const auto& seen = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
+    const auto& seen = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
     for (const lapservo::Observation& one : seen) {
       std::printf("%.3f s  %s: ", frame->time_s, one.instrument.c_str());
       if (one.status != lapservo::Status::ok || !one.rcm) {

@@ -23,7 +23,7 @@ class CallersTracking : public TrackedImageStream {
     auto image = images_.newest();
     if (!image) return std::nullopt;
     TrackedImage tracked{std::move(*image), {}, {}};
-    tracked.observations = tracker_.track(tracked.image.bgr);
+    tracked.observations = tracker_.track(tracked.image.bgr, tracked.image.time_s);
     tracked.measurement = measurement_of(tracked.observations[0], tracked.image.time_s, rcm_px_);
     tracked.measurement.registration = registration_;
     tracked.measurement.repetition = repeats_.add(tracked.image.bgr);

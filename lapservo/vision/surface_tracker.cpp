@@ -13,18 +13,6 @@
 #include "lapservo/vision/result/fit_observation.h"
 
 namespace lapservo::internal {
-namespace {
-
-// Whether or not the frame's fit looked at the camera.
-LookSchedule schedule_after(const FineFit& fit, LookSchedule schedule) {
-  if (schedule.is_due())
-    schedule.looked(fit.processing, fit.processing_explained > 0);
-  else
-    schedule.passed();
-  return schedule;
-}
-
-}  // namespace
 
 SurfaceTracker::SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget)
     : rig_(rig),
@@ -61,24 +49,6 @@ Scene SurfaceTracker::scene_of(const ImageView& image, std::size_t i) const {
   return {image, rig_.camera, classes_, rig_.instruments[i].marker, classes_.of_bands(i), others_, &prints_[i]};
 }
 
-// By how much psi's step differs from that before. Nullopt without two frames before.
-std::optional<double> SurfaceTracker::turn_change_rad(std::size_t i, const FineFit& fit) const {
-  if (!memory_[i] || !memory_[i]->followed || !fit.unknowns.q()) return std::nullopt;
-  const Eigen::Index psi = fit.unknowns.size() - 1;
-  const double expected_rad = memory_[i]->last.q()->psi_rad + memory_[i]->velocity[psi];
-  return wrap_pi(fit.unknowns.q()->psi_rad - expected_rad);
-}
-
-void SurfaceTracker::remember(std::size_t i, const Found& found) {
-  const FineFit& fit = *found.fit;
-  UnknownVector velocity = UnknownVector::Zero(fit.unknowns.size());
-  const bool followed = memory_[i] && memory_[i]->last.q() && fit.unknowns.q();
-  if (followed) velocity = fit.unknowns.q()->vector() - memory_[i]->last.q()->vector();
-  const LookSchedule looks = schedule_after(fit, memory_[i] ? memory_[i]->looks : LookSchedule{});
-  memory_[i] =
-      Memory{fit.unknowns, velocity, fit.blur, looks, fit.bias_px, fit.departure, found.among_others, followed};
-}
-
 // What this frame shows of the print.
 void SurfaceTracker::learn_print(std::size_t i) {
   const Found& found = found_[i];
@@ -88,10 +58,6 @@ void SurfaceTracker::learn_print(std::size_t i) {
   const ShaftPose& pose = off ? *found.refused : found.fit->unknowns.pose();
   if (const auto tau_rad = facing_tau_rad(rig_.instruments[i].marker, pose))
     prints_[i].add(*tau_rad, off ? View::off : shows_the_rigs_print(*found.fit) ? View::the_rigs : View::possible);
-}
-
-ExpectedProcessing SurfaceTracker::Memory::expected_processing() const {
-  return {looks.is_due(), bias_px, departure};
 }
 
 // To `others_`.
@@ -108,8 +74,8 @@ void SurfaceTracker::cover(std::size_t i, const ShaftPose& pose, WorkBudget& bud
 bool SurfaceTracker::cover_expected(std::size_t i, WorkBudget& budget) {
   for (std::size_t j = 0; j < rig_.instruments.size(); ++j) {
     if (j == i || !memory_[j] || !rig_.instruments[j].camera_from_rcm) continue;
-    const ShaftPose pose = found_[j].fit ? found_[j].fit->unknowns.pose() : memory_[j]->expected_pose().pose();
-    if (may_meet(rig_.camera, rig_.instruments[i].marker, memory_[i]->expected_pose().pose(),
+    const ShaftPose pose = found_[j].fit ? found_[j].fit->unknowns.pose() : memory_[j]->expected_pose(now_s_).pose();
+    if (may_meet(rig_.camera, rig_.instruments[i].marker, memory_[i]->expected_pose(now_s_).pose(),
                  rig_.instruments[j].marker, pose))
       cover(j, pose, budget);
   }
@@ -139,11 +105,11 @@ bool SurfaceTracker::may_touch_another_lost(std::size_t i) const {
 
 // What others hide of it, or show beside it, matters only where it can't be followed without, or could not last time.
 Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& light, std::size_t i, WorkBudget& budget) {
-  const Memory& memory = *memory_[i];
+  const InstrumentMemory& memory = *memory_[i];
   const auto follow_it = [&](bool among_others) {
     Scene scene = scene_of(image, i);
     scene.among_others = among_others;
-    Found found = follow(scene, light, memory.expected_pose(), memory.blur, memory.expected_processing(), budget);
+    Found found = follow(scene, light, memory.expected_pose(now_s_), memory.blur, memory.expected_processing(), budget);
     scene.among_others = false;
     found.among_others = among_others && found.fit && (!others_.empty() || validate(scene, *found.fit) != Status::ok);
     return found;
@@ -211,10 +177,12 @@ void SurfaceTracker::find(const ImageView& image, const LightImage& light, WorkB
   while (more && (single_ || !frame_budget_)) more = look_for_lost(image, light, blobs, budget, true);
 }
 
-const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) {
+const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr, std::optional<double> time_s) {
   const ImageView image(image_bgr);
   const LightImage light(image, light_, channels_);
   if (single_) forget();
+  now_s_ = clock_.next(time_s);
+  for (PrintRecord& print : prints_) print.begin_frame(now_s_);
   WorkBudget budget(single_ ? std::nullopt : frame_budget_);
   find(image, light, budget);
   for (std::size_t i = 0; i < rig_.instruments.size(); ++i) {
@@ -224,15 +192,16 @@ const std::vector<Observation>& SurfaceTracker::track(const cv::Mat& image_bgr) 
     observations_[i].status = found.status;
     if (found.refused) observations_[i] = refused_observation(found.status, *found.refused);
     if (!found.fit) continue;
-    // The fit was judged without: a turn that is off by a twelfth of itself at most is no reason to refuse it.
-    const Eigen::Index psi = found.fit->unknowns.size() - 1;
-    found.fit->covariance(psi, psi) += variance_of_uneven_turn(found.fit->turn, turn_change_rad(i, *found.fit));
-    remember(i, found);
-    if (!rig_.instruments[i].marker.bands_are_measured() && prints_[i].is_off()) {
-      observations_[i] = refused_observation(Status::marker_mismatch, found.fit->unknowns.pose());
-      continue;
-    }
-    observations_[i] = observation_of(scene_of(image, i), *found.fit, rig_.instruments[i].camera_from_rcm);
+    FineFit& fit = *found.fit;
+    const Eigen::Index psi = fit.unknowns.size() - 1;
+    const auto change_rad = memory_[i] ? memory_[i]->turn_change_rad(fit.unknowns, now_s_) : std::nullopt;
+    fit.covariance(psi, psi) += variance_of_uneven_turn(fit.turn, change_rad);
+    memory_[i] = remembered(memory_[i], fit, found.among_others, now_s_);
+    const bool is_off = !rig_.instruments[i].marker.bands_are_measured() && prints_[i].is_off();
+    if (is_off || !tells_psi(fit))
+      observations_[i] = refused_observation(is_off ? Status::marker_mismatch : Status::uncertain, fit.unknowns.pose());
+    else
+      observations_[i] = observation_of(scene_of(image, i), fit, rig_.instruments[i].camera_from_rcm);
   }
   return observations_;
 }

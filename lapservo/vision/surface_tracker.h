@@ -8,7 +8,8 @@
 
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/colour/color_classes.h"
-#include "lapservo/vision/memory/look_schedule.h"
+#include "lapservo/vision/memory/frame_clock.h"
+#include "lapservo/vision/memory/instrument_memory.h"
 #include "lapservo/vision/memory/print_record.h"
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/observation.h"
@@ -26,8 +27,8 @@ class SurfaceTracker {
   /// `single`: every frame on its own. `frame_budget`: TrackerOptions::frame_budget.
   SurfaceTracker(const Rig& rig, bool single, std::optional<double> frame_budget = std::nullopt);
 
-  /// `image_bgr` is 8-bit BGR of the rig's size. One observation per instrument.
-  const std::vector<Observation>& track(const cv::Mat& image_bgr);
+  /// `image_bgr` is 8-bit BGR of the rig's size, `time_s` as Tracker::track has it. One observation per instrument.
+  const std::vector<Observation>& track(const cv::Mat& image_bgr, std::optional<double> time_s = std::nullopt);
   /// Forgets where an instrument was in the frames before.
   void forget(std::size_t instrument);
   /// Forgets all of the frames before, what they showed of the prints as well.
@@ -35,18 +36,6 @@ class SurfaceTracker {
   void set_frame_budget(std::optional<double> units) { frame_budget_ = units; }
 
  private:
-  struct Memory {
-    PoseUnknowns last;
-    UnknownVector velocity;  // per frame
-    EdgeBlur blur;
-    LookSchedule looks;
-    std::array<double, 4> bias_px{};
-    CameraDeparture departure;
-    bool among_others = false;  // Found::among_others
-    bool followed = false;      // from a frame before: the velocity is one
-    ExpectedProcessing expected_processing() const;
-    PoseUnknowns expected_pose() const { return last.changed_by(velocity); }
-  };
   void find(const ImageView& image, const LightImage& light, WorkBudget& budget);
   Found follow_known(const ImageView& image, const LightImage& light, std::size_t instrument, WorkBudget& budget);
   bool look_for_lost(const ImageView& image, const LightImage& light, const std::vector<Blob>& blobs,
@@ -57,8 +46,6 @@ class SurfaceTracker {
   void cover_found(std::size_t instrument, const std::vector<Blob>& blobs, WorkBudget& budget);
   bool may_touch_another_lost(std::size_t instrument) const;
   void cover(std::size_t instrument, const ShaftPose& pose, WorkBudget& budget);
-  std::optional<double> turn_change_rad(std::size_t instrument, const FineFit& fit) const;
-  void remember(std::size_t instrument, const Found& found);
   void learn_print(std::size_t instrument);
   Scene scene_of(const ImageView& image, std::size_t instrument) const;
 
@@ -68,7 +55,9 @@ class SurfaceTracker {
   ColorClasses classes_;
   std::array<float, 256> light_;
   ChannelGeometry channels_;
-  std::vector<std::optional<Memory>> memory_;
+  FrameClock clock_;
+  double now_s_ = 0;  // of this frame
+  std::vector<std::optional<InstrumentMemory>> memory_;
   std::vector<PrintRecord> prints_;
   std::vector<MarkerSearch> searches_;
   bool followed_twice_ = false, followed_in_vain_ = false;  // in this frame, one of them

@@ -416,7 +416,8 @@ class TurningInstrument {
     Renderer renderer(rig_.camera, {shaft}, make_tissue(rig_.camera.width_px, rig_.camera.height_px, 5));
     int found = 0;
     for (int i = 0; i < frames; ++i, q_.psi_rad += step_rad) {
-      seen_ = tracker_.track(renderer.render({placement_of(rig_.instruments[0], q_)}, random_.bits()))[0];
+      time_s_ += 0.04;
+      seen_ = tracker_.track(renderer.render({placement_of(rig_.instruments[0], q_)}, random_.bits()), time_s_)[0];
       if (seen_.status != Status::ok) continue;
       ++found;
       expect_right(seen_, q_);
@@ -428,6 +429,7 @@ class TurningInstrument {
     shaft.blotches = blood_over(shaft.marker, fraction, random_);
     return shaft;
   }
+  void is_away(double duration_s) { time_s_ += duration_s; }
   void is_damaged() { tracker_.refuse(Status::damaged); }
   void is_reset() { tracker_.reset(); }
   Status status() const { return seen_.status; }
@@ -437,15 +439,17 @@ class TurningInstrument {
   Tracker tracker_;
   Random random_;
   JointVector q_;
+  double time_s_ = 0;
   Observation seen_;
 };
 
-// Where blood hides an inner boundary, a print that is off would look like a turn: not one that was seen before.
+// Where blood hides an inner boundary, a print that is off would look like a turn: not one that was seen before, unless
+// the instrument may have been exchanged since.
 TEST(SurfaceTracker, APrintThatWasSeenIsTrustedUnderBlood) {
   constexpr int markers = 8, frames = 4;
   constexpr double step_rad = 0.1, blood = 0.5;
   const Rig rig = scenes::usual_rig();
-  int found = 0, found_after = 0;
+  int found = 0, found_after = 0, found_exchanged = 0;
   for (std::uint64_t seed = 1; seed <= markers; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     TurningInstrument unseen(rig, seed), seen(rig, seed);
@@ -453,7 +457,13 @@ TEST(SurfaceTracker, APrintThatWasSeenIsTrustedUnderBlood) {
     const ShaftModel bloody = seen.bloody(blood);
     EXPECT_EQ(seen.found(shaft_of(rig.instruments[0]), frames, step_rad), frames);
     found_after += seen.found(bloody, frames, step_rad);
+    TurningInstrument exchanged(rig, seed);
+    const ShaftModel as_bloody = exchanged.bloody(blood);
+    EXPECT_EQ(exchanged.found(shaft_of(rig.instruments[0]), frames, step_rad), frames);
+    exchanged.is_away(3);
+    found_exchanged += exchanged.found(as_bloody, frames, step_rad);
   }
+  EXPECT_LT(found_exchanged, 0.7 * markers * frames);
   EXPECT_GE(found_after, 0.9 * markers * frames);
   EXPECT_LT(found, 0.7 * markers * frames) << "the test's own power";
 }
@@ -616,21 +626,38 @@ TEST(SurfaceTracker, ATurnWithinTheExposureGivesPsiOfItsMiddle) {
   EXPECT_LT(std::sqrt(from_rest_squares), 1.5);
 }
 
-// One that turns on evenly has no more sigma than one that stands still; one that was at rest has.
+// One that turns on evenly has no more sigma than one that stands still, whatever frames were dropped; one that was at
+// rest has.
 TEST(SurfaceTracker, TellsAnEvenTurnFromAStartByTheFramesBefore) {
-  constexpr double turn_rad = 0.1;
+  constexpr double turn_rad = 0.1, period_s = 0.04;
   const Shot& shot = usual_shot(2);
-  const auto sigma_of_third_frame = [&](bool even) {
+  const auto sigma_of_third_frame = [&](bool even, int dropped) {
     Tracker tracker(shot.rig);
     for (int before = 2; before > 0; --before) {
+      const int periods = before + dropped;
       JointVector q = shot.q;
-      q.psi_rad -= even ? turn_rad * before : turn_rad / 4;  // of which it has come so far in the middle
-      tracker.track(render_turning(shot.rig, q, even ? turn_rad : 0, true));
+      q.psi_rad -= even ? turn_rad * periods : turn_rad / 4;  // of which it has come so far in the middle
+      tracker.track(render_turning(shot.rig, q, even ? turn_rad : 0, true), -periods * period_s);
     }
-    return std::sqrt(tracker.track(render_turning(shot.rig, shot.q, turn_rad, even))[0].rcm.value().covariance(3, 3));
+    const cv::Mat third = render_turning(shot.rig, shot.q, turn_rad, even);
+    return std::sqrt(tracker.track(third, 0)[0].rcm.value().covariance(3, 3));
   };
-  EXPECT_LT(sigma_of_third_frame(true), 0.003);
-  EXPECT_GT(sigma_of_third_frame(false), 0.005);
+  for (const int dropped : {0, 1, 2}) EXPECT_LT(sigma_of_third_frame(true, dropped), 0.003) << dropped;
+  EXPECT_GT(sigma_of_third_frame(false, 0), 0.005);
+}
+
+// A start from rest adds to sigma after the fit was validated.
+TEST(SurfaceTracker, SigmaKeepsItsLimitWhateverAddsToIt) {
+  int uncertain = 0;
+  for (std::uint64_t seed = 1; seed <= 3; ++seed)
+    for (const double turn_rad : {0.6, -0.8}) {
+      const Shot& shot = usual_shot(seed);
+      const Observation o = Tracker(shot.rig).track(render_turning(shot.rig, shot.q, turn_rad, false))[0];
+      uncertain += o.status == Status::uncertain;
+      if (o.status == Status::ok)
+        EXPECT_LT(std::sqrt(o.rcm.value().covariance(3, 3)), 0.04) << seed << ", " << turn_rad;
+    }
+  EXPECT_GT(uncertain, 0);
 }
 
 // One marker before the other, or beside it: one blob of colours.

@@ -66,9 +66,9 @@ struct Tracker::State {
         surface(rig, options.single, options.frame_budget),
         centerline(rig) {}
 
-  void observe(const cv::Mat& image_bgr) {
+  void observe(const cv::Mat& image_bgr, std::optional<double> time_s) {
     if (method == Method::surface)
-      observations = surface.track(image_bgr);
+      observations = surface.track(image_bgr, time_s);
     else
       observations = centerline.observe(image_bgr);
   }
@@ -99,12 +99,12 @@ Tracker::~Tracker() = default;
 Tracker::Tracker(Tracker&&) noexcept = default;
 Tracker& Tracker::operator=(Tracker&&) noexcept = default;
 
-const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr) & {
+const std::vector<Observation>& Tracker::track(const cv::Mat& image_bgr, std::optional<double> time_s) & {
   check_image(image_bgr, state_->rig.camera);
   if (state_->deinterlace) {
-    state_->observe(state_->even_field.of(image_bgr));
+    state_->observe(state_->even_field.of(image_bgr), time_s);
   } else {
-    state_->observe(image_bgr);
+    state_->observe(image_bgr, time_s);
     state_->refuse_combed(image_bgr);
   }
   state_->name_observations();

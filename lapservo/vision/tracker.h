@@ -35,7 +35,8 @@ struct TrackerOptions {
 };
 
 /// Finds all instruments of a rig in the frames of one camera. Holds what it learnt from the frames before: where they
-/// were, what the camera does to its pictures, and whether each print is the rig's.
+/// were, what the camera does to its pictures, and whether each print is the rig's; the latter until the marker was out
+/// of sight for 2 s, in which the instrument may have been exchanged.
 class Tracker {
  public:
   explicit Tracker(const Rig& rig, TrackerOptions options = {});
@@ -44,8 +45,9 @@ class Tracker {
   Tracker& operator=(Tracker&&) noexcept;
 
   /// `image_bgr`: 8-bit, 3 channels, of the rig's size, else InputError. One observation per instrument of the rig, in
-  /// its order.
-  const std::vector<Observation>& track(const cv::Mat& image_bgr) &;
+  /// its order. `time_s`: when the frame was taken, by any clock. Frames without it, and those whose times do not go
+  /// on, count as taken 1/32 s after the one before.
+  const std::vector<Observation>& track(const cv::Mat& image_bgr, std::optional<double> time_s = std::nullopt) &;
   /// Of a tracker that is gone after the expression, as in `Tracker(rig).track(image)`: by value. There is no frame to
   /// come, so this one is searched whole.
   std::vector<Observation> track(const cv::Mat& image_bgr) &&;

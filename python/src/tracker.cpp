@@ -234,12 +234,12 @@ class SafeTracker {
     const cv::Mat bgr = view_of(image);
     const py::gil_scoped_release others_run;
     const std::lock_guard lock(mutex_);
-    return observed(tracker_.track(bgr), rig_, stamp_s);
+    return observed(tracker_.track(bgr, stamp_s), rig_, stamp_s);
   }
   std::vector<Observed> track_frame(const Frame& frame) {
     const py::gil_scoped_release others_run;
     const std::lock_guard lock(mutex_);
-    return observed(frame.flaw ? tracker_.refuse(*frame.flaw) : tracker_.track(frame.bgr), rig_, frame.time_s);
+    return observed(frame.flaw ? tracker_.refuse(*frame.flaw) : tracker_.track(frame.bgr, frame.time_s), rig_, frame.time_s);
   }
   void reset() {
     const py::gil_scoped_release others_run;

@@ -246,7 +246,7 @@ class TrackRun {
       const double came_s = clock_.now_s() - (live_ ? live_->age_s() : 0);
       Tracker& tracker = rigs_.tracker_for(*frame);
       try {
-        const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr);
+        const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
         tally_.add(observations);
         if (registration_.add(observations)) say_moved(options_, *frame);
         diagnosis().add(frame->bgr, observations);

@@ -17,6 +17,10 @@ namespace {
 
 constexpr const ValidationLimits& limits = validation_limits;
 
+double squared(double x) {
+  return x * x;
+}
+
 // Of the marker; at least a pixel.
 double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azimuth_rad) {
   const auto px = [&](double along_m) {
@@ -125,17 +129,14 @@ double max_sigma_suspected_rad(const FineFit& fit) {
 
 // Sigma of psi, and whom to blame when it is too large: the print or the picture.
 Status validate_sigma(const Scene& scene, const FineFit& fit, const ColorAgreement& agreement) {
-  const auto squared = [](double x) { return x * x; };
   const bool off = fit.print_off_probability > limits.certainly_off;
   const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
-  const double told_times = fit.psi_variance_suspected > 0 ? print_limits.suspected_told : 1;
-  const double told_limit = squared(told_times * limits.max_sigma_told_rad);
   const double by_tolerance = fit.psi_variance_by_tolerance;
-  const double variance = fit.psi_variance, told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
+  const double variance = fit.psi_variance;
   if (by_tolerance < limit && misses_a_boundary(scene, fit, agreement)) return Status::marker_mismatch;
   const double slack = limits.tolerance_slack * by_tolerance;
   const bool well_seen = is_well_seen(fit);
-  if (!(variance < limit + slack && told < told_limit + slack))
+  if (!(variance < limit + slack && tells_psi(fit)))
     return well_seen && fit.psi_variance_by_print > variance / 2 ? Status::marker_mismatch : Status::uncertain;
   const double suspected = variance - fit.psi_variance_by_print + fit.psi_variance_suspected;
   // Without the RCM it is in sigma only: there a picture tells less of the print, and no psi.
@@ -149,6 +150,13 @@ Status validate_sigma(const Scene& scene, const FineFit& fit, const ColorAgreeme
 
 bool is_well_seen(const FineFit& fit) {
   return fit.located_fraction() > limits.well_seen_fraction;
+}
+
+bool tells_psi(const FineFit& fit) {
+  const double told_times = fit.psi_variance_suspected > 0 ? print_limits.suspected_told : 1;
+  const double told = fit.covariance(fit.covariance.rows() - 1, fit.covariance.cols() - 1);
+  return told <
+         squared(told_times * limits.max_sigma_told_rad) + limits.tolerance_slack * fit.psi_variance_by_tolerance;
 }
 
 ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {

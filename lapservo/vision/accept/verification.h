@@ -109,6 +109,9 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose);
 /// Enough of the boundary points are located to blame the print or the registration.
 bool is_well_seen(const FineFit& fit);
 
+/// Whether sigma of psi, as it is told, is small enough to be of use.
+bool tells_psi(const FineFit& fit);
+
 /// Whether a fit is good enough to move a robot by: Status::ok, or why not.
 Status validate(const Scene& scene, const FineFit& fit);
 

@@ -25,7 +25,13 @@ bool shows_the_rigs_print(const FineFit& fit) {
          fit.inner_off_m < limits.most_inner_off_m;
 }
 
+void PrintRecord::begin_frame(double time_s) {
+  if (time_s - seen_s_ > limits.exchange_s) *this = PrintRecord();
+  now_s_ = time_s;
+}
+
 void PrintRecord::add(double tau_rad, View view) {
+  seen_s_ = now_s_;
   View& known = views_[side_of(tau_rad, sides)];
   if (!(view == View::possible && known == View::the_rigs)) known = view;
 }

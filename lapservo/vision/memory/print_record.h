@@ -15,6 +15,7 @@ struct PrintRecordLimits {
   double wholly_located = 0.8, most_far_off = 0.005, most_inner_off_m = 0.03e-3;
   /// From one side that is so near, and two that show much of the same (a camera sees 1 rad to either side).
   double near_rad = 0.6, in_view_rad = 1.2;
+  double exchange_s = 2;  ///< out of sight for so long it may have been exchanged for another instrument
   int least_off_sides = 3, off_for_others = 2;  ///< and so many times those from which it may be the rig's
 };
 inline constexpr PrintRecordLimits print_record_limits;
@@ -30,6 +31,9 @@ class PrintRecord {
   /// `possible`: nothing speaks against the rig's print, but the picture could not tell.
   enum class View : std::uint8_t { unseen, possible, the_rigs, off };
 
+  /// Before each frame; times are FrameClock's. Forgets a print of which nothing was added for so long that it may be
+  /// another one.
+  void begin_frame(double time_s);
   /// The latest from there counts, but what is possible is no news of what was the rig's. `tau_rad`: of the generatrix
   /// that faces the camera, any angle.
   void add(double tau_rad, View view);
@@ -41,6 +45,7 @@ class PrintRecord {
  private:
   static constexpr std::size_t sides = 24;
   std::array<View, sides> views_{};
+  double now_s_ = 0, seen_s_ = 0;
 };
 
 }  // namespace lapservo::internal

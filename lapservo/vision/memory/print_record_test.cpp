@@ -34,6 +34,19 @@ TEST(PrintRecord, IsTheRigsWhereItWasSeenToBe) {
   EXPECT_TRUE(record.is_the_rigs(1.3)) << "the latest counts";
 }
 
+TEST(PrintRecord, IsForgottenWhenTheInstrumentMayHaveBeenExchanged) {
+  PrintRecord record;
+  record.begin_frame(100);
+  for (const double tau_rad : {0.5, 1.0}) record.add(tau_rad, View::the_rigs);
+  record.begin_frame(101);
+  EXPECT_TRUE(record.is_the_rigs(0.7));
+  record.add(3, View::possible);
+  record.begin_frame(102.5);
+  EXPECT_TRUE(record.is_the_rigs(0.7)) << "it was in sight";
+  record.begin_frame(104);
+  EXPECT_FALSE(record.is_the_rigs(0.7));
+}
+
 TEST(PrintRecord, TheSeamIsNoBorder) {
   PrintRecord record;
   record.add(-0.2, View::the_rigs), record.add(0.2, View::the_rigs);

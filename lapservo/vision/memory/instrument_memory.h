@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "lapservo/vision/camera/camera_departure.h"
+#include "lapservo/vision/edges/edge_blur.h"
+#include "lapservo/vision/memory/look_schedule.h"
+#include "lapservo/vision/model/fine_fit.h"
+#include "lapservo/vision/shaft/shaft_pose.h"
+
+namespace lapservo::internal {
+
+/// What is remembered of an instrument that was found in the frame before. Times are FrameClock's.
+struct InstrumentMemory {
+  double time_s;
+  PoseUnknowns last;
+  UnknownVector step;  ///< of the unknowns, from the frame before
+  double step_s = 0;   ///< which took so long; 0 where none was found before
+  EdgeBlur blur;
+  LookSchedule looks;
+  std::array<double, 4> bias_px{};
+  CameraDeparture departure;
+  bool among_others = false;  ///< Found::among_others
+
+  ExpectedProcessing expected_processing() const { return {looks.is_due(), bias_px, departure}; }
+  /// Where it is when it moves on as it did, for some steps at most.
+  PoseUnknowns expected_pose(double at_s) const;
+  /// By how much psi differs from there. Nullopt where no step is known, or without q.
+  std::optional<double> turn_change_rad(const PoseUnknowns& unknowns, double at_s) const;
+
+ private:
+  UnknownVector expected_step(double at_s) const;
+};
+
+/// After a frame in which it was found.
+InstrumentMemory remembered(const std::optional<InstrumentMemory>& before, const FineFit& fit, bool among_others,
+                            double time_s);
+
+}  // namespace lapservo::internal
