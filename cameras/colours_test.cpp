@@ -75,5 +75,48 @@ TEST(Colours, AreThoseOfTheCapsColorimetry) {
   }
 }
 
+// A slope of blue along columns or rows, sampled where chroma lies: `right` of and `below` the first pixel.
+struct Slope {
+  const char* format;
+  const char* site;
+  double right, below;
+};
+
+TEST(Colours, ChromaLiesWhereTheCapsPutIt) {
+  constexpr int side = 32, per_pixel = 3, middle = 128, light = 120;
+  const testing::TemporaryFolder folder;
+  for (const Slope& slope : {Slope{"i420", ",chroma-site=mpeg2", 0, 0.5},
+                             {"i420", ",chroma-site=jpeg", 0.5, 0.5},
+                             {"nv12", ",chroma-site=mpeg2", 0, 0.5},
+                             {"yuy2", ",chroma-site=jpeg", 0, 0},
+                             {"yuy2", "", 0, 0}}) {
+    for (const bool along_rows : {false, true}) {
+      const bool packed = std::string(slope.format) == "yuy2", interleaved = std::string(slope.format) == "nv12";
+      const auto chroma = [&](double column, double row) {
+        return static_cast<char>(std::lround(middle + per_pixel * ((along_rows ? row : column) - side / 2)));
+      };
+      std::string y, u, v;
+      for (int row = 0; row < side; ++row)
+        for (int column = 0; column < side; column += 2) {
+          const char blue = chroma(column + slope.right, row + slope.below);
+          y += packed ? std::string{light, blue, light, static_cast<char>(middle)} : std::string(2, light);
+          if (!packed && row % 2 == 0) u += blue, v += static_cast<char>(middle);
+          if (interleaved && row % 2 == 0) u += static_cast<char>(middle);
+        }
+      testing::write_file(folder / "slope", y + u + (interleaved ? "" : v));
+      const std::string pipeline = fmt::format(
+          "filesrc location={} ! rawvideoparse format={} width={} height={} ! "
+          "capssetter caps=video/x-raw,colorimetry=bt601{}",
+          (folder / "slope").string(), slope.format, side, side, slope.site);
+      const auto image = open_camera_or_file("gst:" + pipeline, 30)->next();
+      ASSERT_TRUE(image) << pipeline;
+      for (int i = 4; i < side - 4; ++i) {
+        const auto bgr = along_rows ? image->bgr.at<cv::Vec3b>(i, side / 2) : image->bgr.at<cv::Vec3b>(side / 2, i);
+        EXPECT_NEAR(bgr[0], 1.164 * (light - 16) + 2.017 * per_pixel * (i - side / 2), 2) << pipeline << ", at " << i;
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lapservo::internal

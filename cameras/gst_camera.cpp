@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <gst/app/gstappsink.h>
@@ -15,6 +17,7 @@
 
 #include "cameras/camera.h"
 #include "lapservo/core/error.h"
+#include "lapservo/io/video/yuv_picture.h"
 
 namespace lapservo::internal {
 namespace {
@@ -59,20 +62,68 @@ std::string end_of(GstMessage* message) {
          (line == std::string::npos ? "" : ", " + one_line(all.substr(line + 1)));
 }
 
-// By the caps' colorimetry. GStreamer's own 8-bit conversion to RGB is off by up to 5.
-cv::Matx34d bgr_from_yuv(const GstVideoInfo& info) {
-  double red = 0, blue = 0;  // of the light
-  if (!gst_video_color_matrix_get_Kr_Kb(info.colorimetry.matrix, &red, &blue))
-    gst_video_color_matrix_get_Kr_Kb(GST_VIDEO_COLOR_MATRIX_BT601, &red, &blue);
-  const double green = 1 - red - blue, from_u = 2 * (1 - blue), from_v = 2 * (1 - red);
-  cv::Matx33d matrix(1, from_u, 0, 1, -blue * from_u / green, -red * from_v / green, 1, 0, from_v);
-  int offset[GST_VIDEO_MAX_COMPONENTS] = {}, scale[GST_VIDEO_MAX_COMPONENTS] = {};
-  gst_video_color_range_offsets(info.colorimetry.range, info.finfo, offset, scale);
-  for (int i = 0; i < 3; ++i)
-    for (int row = 0; row < 3; ++row) matrix(row, i) *= 255.0 / scale[i];
-  cv::Matx34d affine;
-  cv::hconcat(matrix, matrix * cv::Vec3d(-offset[0], -offset[1], -offset[2]), affine);
-  return affine;
+// By the caps. GStreamer's elements name a site by the height of the image alone where they know none: amid the pixels
+// up to 576 rows, else the left. Packed 4:2:2 has chroma on the left nevertheless, and JPEG amid the pixels.
+ChromaSite site_of(const GstVideoInfo& info, bool is_jpeg) {
+  const GstVideoFormat format = GST_VIDEO_INFO_FORMAT(&info);
+  const bool packed = format == GST_VIDEO_FORMAT_YUY2 || format == GST_VIDEO_FORMAT_UYVY;
+  const bool is_top = (info.chroma_site & GST_VIDEO_CHROMA_SITE_V_COSITED) != 0;
+  if (is_jpeg) return ChromaSite::centre;
+  if ((info.chroma_site & GST_VIDEO_CHROMA_SITE_H_COSITED) != 0)
+    return is_top ? ChromaSite::top_left : ChromaSite::left;
+  if (is_top) return ChromaSite::top;
+  return packed || info.chroma_site == GST_VIDEO_CHROMA_SITE_UNKNOWN ? ChromaSite::left : ChromaSite::centre;
+}
+
+YuvColors colors_of(const GstVideoInfo& info) {
+  YuvColors colors;
+  colors.full_range = info.colorimetry.range == GST_VIDEO_COLOR_RANGE_0_255;
+  const bool is_601 = info.colorimetry.matrix == GST_VIDEO_COLOR_MATRIX_BT601;
+  switch (info.colorimetry.matrix) {
+    case GST_VIDEO_COLOR_MATRIX_FCC:
+      colors.matrix = YuvMatrix::fcc;
+      break;
+    case GST_VIDEO_COLOR_MATRIX_BT709:
+      colors.matrix = YuvMatrix::bt709;
+      break;
+    case GST_VIDEO_COLOR_MATRIX_SMPTE240M:
+      colors.matrix = YuvMatrix::smpte240m;
+      break;
+    case GST_VIDEO_COLOR_MATRIX_BT2020:
+      colors.matrix = YuvMatrix::bt2020;
+      break;
+    default:
+      break;
+  }
+  colors.chroma = site_of(info, is_601 && colors.full_range);
+  return colors;
+}
+
+struct Layout {
+  GstVideoFormat format;
+  YuvPicture::Layout layout;
+};
+constexpr std::array layouts{Layout{GST_VIDEO_FORMAT_I420, YuvPicture::Layout::planar_420},
+                             Layout{GST_VIDEO_FORMAT_Y42B, YuvPicture::Layout::planar_422},
+                             Layout{GST_VIDEO_FORMAT_Y444, YuvPicture::Layout::planar_444},
+                             Layout{GST_VIDEO_FORMAT_NV12, YuvPicture::Layout::nv12},
+                             Layout{GST_VIDEO_FORMAT_YUY2, YuvPicture::Layout::yuyv},
+                             Layout{GST_VIDEO_FORMAT_UYVY, YuvPicture::Layout::uyvy}};
+constexpr const char* formats = "{BGR,I420,Y42B,Y444,NV12,YUY2,UYVY}";
+
+// GStreamer's own conversion to RGB is off by up to 5, and repeats chroma of some formats.
+bool convert(const GstVideoFrame& frame, const cv::Size& size, cv::Mat& bgr) {
+  const GstVideoInfo& info = frame.info;
+  const auto found = std::find_if(layouts.begin(), layouts.end(),
+                                  [&](const Layout& known) { return known.format == GST_VIDEO_INFO_FORMAT(&info); });
+  if (found == layouts.end()) return false;
+  YuvPicture picture{found->layout, size};
+  for (guint i = 0; i < GST_VIDEO_FRAME_N_PLANES(&frame); ++i) {
+    picture.planes[i] = static_cast<const std::uint8_t*>(GST_VIDEO_FRAME_PLANE_DATA(&frame, i));
+    picture.steps[i] = GST_VIDEO_FRAME_PLANE_STRIDE(&frame, i);
+  }
+  picture.by_field = GST_VIDEO_FRAME_IS_INTERLACED(&frame);
+  return convert_to_bgr(picture, colors_of(info), bgr);
 }
 
 void require_gstreamer() {
@@ -129,9 +180,8 @@ class GstCamera : public LiveCamera {
 
   void parse() {
     GError* error = nullptr;
-    const std::string whole =
-        camera_pipeline(camera_, size_) +
-        " ! videoconvert ! video/x-raw,format={BGR,v308} ! appsink name=lapservo_sink max-buffers=2";
+    const std::string whole = camera_pipeline(camera_, size_) + " ! videoconvert ! video/x-raw,format=" + formats +
+                              " ! appsink name=lapservo_sink max-buffers=2";
     pipeline_.reset(gst_parse_launch_full(whole.c_str(), nullptr, GST_PARSE_FLAG_FATAL_ERRORS, &error));
     if (error && g_error_matches(error, GST_PARSE_ERROR, GST_PARSE_ERROR_NO_SUCH_ELEMENT))
       refuse(text_of(error), "one of installed plugins, as gstreamer1.0-plugins-base and gstreamer1.0-plugins-good");
@@ -195,16 +245,17 @@ class GstCamera : public LiveCamera {
                          "bgr8",
                          false,
                          std::vector<std::uint8_t>(std::size_t{step} * height)};
-    const cv::Mat pixels(height, width, CV_8UC3, GST_VIDEO_FRAME_PLANE_DATA(&frame, 0),
-                         static_cast<std::size_t>(GST_VIDEO_FRAME_PLANE_STRIDE(&frame, 0)));
-    const cv::Mat bgr(height, width, CV_8UC3, message.data.data());
+    cv::Mat bgr(height, width, CV_8UC3, message.data.data());
+    bool converted = true;
     if (GST_VIDEO_INFO_IS_RGB(&info)) {
-      pixels.copyTo(bgr);
+      cv::Mat(height, width, CV_8UC3, GST_VIDEO_FRAME_PLANE_DATA(&frame, 0),
+              static_cast<std::size_t>(GST_VIDEO_FRAME_PLANE_STRIDE(&frame, 0)))
+          .copyTo(bgr);
     } else {
-      cv::transform(pixels, bgr, bgr_from_yuv(info));
+      converted = convert(frame, bgr.size(), bgr);
     }
     gst_video_frame_unmap(&frame);
-    return message;
+    return converted ? std::optional(std::move(message)) : std::nullopt;
   }
   double stamp_of(GstSample& sample) const {
     const GstSegment* const segment = gst_sample_get_segment(&sample);

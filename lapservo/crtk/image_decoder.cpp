@@ -10,6 +10,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
+#include "lapservo/io/video/yuv_picture.h"
 
 namespace lapservo::internal {
 namespace {
@@ -17,8 +18,9 @@ namespace {
 constexpr std::uint32_t max_px = 16384;
 constexpr std::size_t max_compressed = std::size_t{64} << 20;
 
-// How pixels lie, and what makes BGR of them; keep: they are BGR.
-constexpr int keep = -1;
+// How pixels lie, and what makes BGR of them: one of OpenCV's conversions; keep: they are BGR; uyvy, yuyv: they are
+// that.
+constexpr int keep = -1, uyvy = -2, yuyv = -3;
 struct Encoding {
   std::string_view name;
   int channels, bytes;  // of a channel
@@ -33,10 +35,10 @@ constexpr std::array encodings{
     Encoding{"rgba8", 4, 1, cv::COLOR_RGBA2BGR},
     Encoding{"bgr16", 3, 2, keep},
     Encoding{"rgb16", 3, 2, cv::COLOR_RGB2BGR},
-    Encoding{"yuv422", 2, 1, cv::COLOR_YUV2BGR_UYVY},
-    Encoding{"uyvy", 2, 1, cv::COLOR_YUV2BGR_UYVY},
-    Encoding{"yuv422_yuy2", 2, 1, cv::COLOR_YUV2BGR_YUY2},
-    Encoding{"yuyv", 2, 1, cv::COLOR_YUV2BGR_YUY2},
+    Encoding{"yuv422", 2, 1, uyvy},
+    Encoding{"uyvy", 2, 1, uyvy},
+    Encoding{"yuv422_yuy2", 2, 1, yuyv},
+    Encoding{"yuyv", 2, 1, yuyv},
     Encoding{"bayer_rggb8", 1, 1, cv::COLOR_BayerBG2BGR},
     Encoding{"bayer_bggr8", 1, 1, cv::COLOR_BayerRG2BGR},
     Encoding{"bayer_gbrg8", 1, 1, cv::COLOR_BayerGR2BGR},
@@ -59,6 +61,14 @@ BadImage bad_encoding(const std::string& encoding) {
   if (encoding == "mono8" || encoding == "mono16")
     return {encoding + " has no colours, by which the marker is found: publish bgr8, rgb8, yuv422 or bayer_*"};
   return {"encoding " + shown(encoding) + ", expected bgr8, rgb8, bgra8, rgba8, bgr16, rgb16, yuv422 or bayer_*"};
+}
+
+// Chroma lies on the left of each two pixels, as cameras send it.
+DecodedImage bgr_of(const cv::Mat& pixels, YuvPicture::Layout layout) {
+  const YuvPicture picture{layout, pixels.size(), {pixels.data}, {static_cast<int>(pixels.step)}};
+  cv::Mat bgr;
+  if (!convert_to_bgr(picture, {}, bgr)) return BadImage{fmt::format("size {}x{}", pixels.cols, pixels.rows)};
+  return bgr;
 }
 
 // The upper byte of each 16-bit value.
@@ -85,8 +95,17 @@ DecodedImage decode(const ImageMessage& message) {
                       const_cast<std::uint8_t*>(message.data.data()), step);
   cv::Mat pixels = found->bytes == 2 ? upper_bytes(bytes, message.is_bigendian) : bytes;
   pixels = pixels.reshape(found->channels);
+  switch (found->conversion) {
+    case keep:
+      return pixels.clone();
+    case uyvy:
+      return bgr_of(pixels, YuvPicture::Layout::uyvy);
+    case yuyv:
+      return bgr_of(pixels, YuvPicture::Layout::yuyv);
+    default:
+      break;
+  }
   cv::Mat bgr;
-  if (found->conversion == keep) return pixels.clone();
   cv::cvtColor(pixels, bgr, found->conversion);
   return bgr;
 }

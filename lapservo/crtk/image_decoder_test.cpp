@@ -64,6 +64,25 @@ TEST(ImageDecoder, Yuv422) {
     for (int i = 0; i < 3; ++i) EXPECT_NEAR(bgr_at(decode(message), 1, 2)[i], expected[i], 2) << message.encoding;
 }
 
+// Chroma is a slope, and its samples lie on the even columns.
+TEST(ImageDecoder, ChromaOfYuv422IsInterpolatedFromTheLeftOfEachTwoPixels) {
+  constexpr int columns = 24, slope = 4, middle = 128;
+  for (const bool chroma_first : {true, false}) {
+    ImageMessage message;
+    message.width = columns, message.height = 2, message.step = 2 * columns;
+    message.encoding = chroma_first ? "uyvy" : "yuyv";
+    for (int i = 0; i < columns * 2; ++i) {
+      const int u = middle + slope * (i % columns / 2 * 2 - columns / 2);
+      const auto chroma = static_cast<std::uint8_t>(i % 2 == 0 ? u : middle), light = std::uint8_t{120};
+      message.data.push_back(chroma_first ? chroma : light);
+      message.data.push_back(chroma_first ? light : chroma);
+    }
+    for (int column = 4; column < columns - 4; ++column)
+      EXPECT_NEAR(bgr_at(decode(message), 1, column)[0], 1.164 * (120 - 16) + 2.017 * slope * (column - columns / 2), 2)
+          << message.encoding << ", column " << column;
+  }
+}
+
 // An evenly coloured scene through each pattern: the first row's first two letters are its first two pixels.
 TEST(ImageDecoder, BayerPatternsByTheirLetters) {
   const cv::Vec3b color(40, 120, 220);

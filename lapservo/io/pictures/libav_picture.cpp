@@ -11,6 +11,7 @@ extern "C" {
 }
 #include <opencv2/imgproc.hpp>
 
+#include "lapservo/io/video/bgr_converter.h"
 #include "lapservo/io/video/libav.h"
 
 namespace lapservo::internal {
@@ -92,11 +93,21 @@ Layout layout_of(AVPixelFormat format) {
   return deep ? Layout{AV_PIX_FMT_BGR48, CV_16UC3} : Layout{AV_PIX_FMT_BGR24, CV_8UC3};
 }
 
+// Of lossy WebP, which has JPEG's place of chroma; empty for all others.
+cv::Mat pixels_of_yuv(const AVFrame& frame) {
+  const AVPixFmtDescriptor& format = *av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame.format));
+  cv::Mat bgr;
+  const bool is_yuv = (format.flags & (AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL)) == 0 && format.nb_components >= 3;
+  if (is_yuv) BgrConverter().convert(frame, {.chroma = ChromaSite::centre}, false, bgr);
+  return bgr;
+}
+
 cv::Mat pixels_of(const libav::Frame& decoded) {
   if (!decoded) return {};
   const AVFrame& frame = *decoded;
   const auto format = static_cast<AVPixelFormat>(frame.format);
   const Layout layout = layout_of(format);
+  if (const cv::Mat bgr = pixels_of_yuv(frame); !bgr.empty()) return bgr;
   const libav::Scaler scaler(sws_getContext(frame.width, frame.height, format, frame.width, frame.height, layout.format,
                                             SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP,
                                             nullptr, nullptr, nullptr));

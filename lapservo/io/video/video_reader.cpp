@@ -6,11 +6,9 @@
 #include <cstdint>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 extern "C" {
 #include <libavutil/display.h>
-#include <libavutil/opt.h>
 #include <libavutil/pixdesc.h>
 }
 
@@ -18,6 +16,7 @@ extern "C" {
 
 #include "lapservo/core/error.h"
 #include "lapservo/io/pictures/jpeg_picture.h"
+#include "lapservo/io/video/bgr_converter.h"
 #include "lapservo/io/video/libav.h"
 #include "lapservo/io/video/yuv_colors.h"
 
@@ -130,12 +129,25 @@ class VideoReader::State {
     if (kind_ == Kind::stream) deadline_ = Clock::now() + patience_;
     while (av_read_frame(format_.get(), packet_.get()) >= 0) {
       const bool ours = packet_->stream_index == stream_->index;
+      if (ours && packets_++ == 0) of_software_ = names_software();
       if (ours && ((packet_->flags & AV_PKT_FLAG_CORRUPT) != 0 || is_damaged_jpeg(*packet_))) tainted_ = true;
       const int sent = ours ? avcodec_send_packet(decoder_.get(), packet_.get()) : 0;
       av_packet_unref(packet_.get());
       if (ours) return sent >= 0 || sent == AVERROR(EAGAIN);
     }
     return avcodec_send_packet(decoder_.get(), nullptr) >= 0;
+  }
+
+  // By the first packet, what precedes it or the container.
+  bool names_software() const {
+    const auto names = [](const std::uint8_t* data, int size) {
+      constexpr int most = 4096;
+      return data && size > 0 && names_software_encoder({data, static_cast<std::size_t>(std::min(most, size))});
+    };
+    const AVDictionaryEntry* const encoder = av_dict_get(stream_->metadata, "encoder", nullptr, 0);
+    return names(packet_->data, packet_->size) ||
+           names(stream_->codecpar->extradata, stream_->codecpar->extradata_size) ||
+           (encoder && std::string_view(encoder->value).starts_with("Lavc"));
   }
 
   // FFmpeg's decoder of motion JPEG says nothing where the data go on after the last row: rows are shifted then.
@@ -189,67 +201,15 @@ class VideoReader::State {
     return std::nullopt;
   }
 
-  // The scaler that reads such frames, by each frame's own tags: a stream's may change.
-  void update_scaler() {
-    const AVPixelFormat format = pixel_format_of(*frame_);
-    const AVPixFmtDescriptor* const description = av_pix_fmt_desc_get(format);
-    const bool is_rgb = description && (description->flags & AV_PIX_FMT_FLAG_RGB) != 0;
-    const auto colors = is_rgb ? YuvColors() : yuv_colors_of(*frame_);
+  // By each frame's own tags: a stream's may change.
+  void convert() {
+    const auto colors = yuv_colors_of(*frame_, stream_->codecpar->codec_id, of_software_);
     if (!colors)
       throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
                        "bt709, smpte170m, bt470bg, bt2020nc, fcc or smpte240m (convert it: ffmpeg -i IN -vf "
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
-    const bool by_field = fields_ && description && description->log2_chroma_h == 1 && frame_->height % 4 == 0;
-    const Scaled scaled{frame_->width, frame_->height, format, *colors, by_field};
-    if (!scalers_.empty() && scaled == scaled_) return;
-    scalers_.clear();
-    // Where a field's chroma lies between two of its rows, in 1/256 of a row: of the even rows, of the odd ones.
-    for (const int row : by_field ? std::vector{64, 192} : std::vector{default_row}) {
-      libav::Scaler scaler = scaler_of(scaled, row);
-      if (!scaler) throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
-      if (!is_rgb) set_colors(*scaler, *colors);
-      scalers_.push_back(std::move(scaler));
-    }
-    scaled_ = scaled;
-  }
-
-  // The whole frame by one scaler, or each of its fields by one.
-  void convert() {
-    update_scaler();
-    last_.create(frame_->height, frame_->width, CV_8UC3);
-    const int fields = static_cast<int>(scalers_.size());
-    for (int field = 0; field < fields; ++field) {
-      const std::uint8_t* from[4];
-      int from_steps[4];
-      for (int plane = 0; plane < 4; ++plane) {
-        from[plane] = frame_->data[plane] ? frame_->data[plane] + field * frame_->linesize[plane] : nullptr;
-        from_steps[plane] = fields * frame_->linesize[plane];
-      }
-      std::uint8_t* const rows[4] = {last_.ptr(field)};
-      const int steps[4] = {fields * static_cast<int>(last_.step)};
-      sws_scale(scalers_[field].get(), from, from_steps, 0, frame_->height / fields, rows, steps);
-    }
-  }
-
-  struct Scaled {
-    int width_px = 0, height_px = 0;
-    AVPixelFormat format = AV_PIX_FMT_NONE;
-    YuvColors colors;
-    bool by_field = false;
-    bool operator==(const Scaled&) const = default;
-  };
-  static constexpr int default_row = -513;  // swscale's
-
-  // `chroma_row`: where chroma lies between two rows of luma.
-  static libav::Scaler scaler_of(const Scaled& scaled, int chroma_row) {
-    libav::Scaler scaler(sws_alloc_context());
-    if (!scaler) return nullptr;
-    const int height_px = scaled.by_field ? scaled.height_px / 2 : scaled.height_px;
-    const auto set = [&](const char* name, int value) { av_opt_set_int(scaler.get(), name, value, 0); };
-    set("srcw", scaled.width_px), set("srch", height_px), set("src_format", scaled.format);
-    set("dstw", scaled.width_px), set("dsth", height_px), set("dst_format", AV_PIX_FMT_BGR24);
-    set("sws_flags", SWS_BICUBIC), set("src_v_chr_pos", chroma_row);
-    return sws_init_context(scaler.get(), nullptr, nullptr) < 0 ? nullptr : std::move(scaler);
+    if (!converter_.convert(*frame_, *colors, fields_, last_))
+      throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
   }
 
   std::string source_;
@@ -261,15 +221,15 @@ class VideoReader::State {
   libav::Packet packet_{av_packet_alloc()};
   libav::Frame frame_{av_frame_alloc()};
   bool fields_;
-  std::vector<libav::Scaler> scalers_;  // of the whole frame, or of its two fields
-  Scaled scaled_;                       // what they read
+  bool of_software_ = false;  // a software encoder wrote the stream
+  BgrConverter converter_;
   AVStream* stream_ = nullptr;
   cv::Mat last_;
   std::optional<double> time_s_;  // of the last frame, since the first
   double end_s_ = 0;              // of the last frame
   double first_s_ = 0;            // the first frame's stamp
   bool stamped_ = false;          // a frame had a stamp
-  int frames_ = 0, damaged_ = 0;
+  int packets_ = 0, frames_ = 0, damaged_ = 0;
   bool tainted_ = false;  // a packet since the last frame was damaged on its way
   bool spoiled_ = false;  // the last frame is damaged
 };

@@ -1,27 +1,22 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <span>
 
 #include "lapservo/io/video/libav.h"
+#include "lapservo/io/video/yuv_picture.h"
 
 namespace lapservo::internal {
 
-/// How a decoded frame's luma and chroma become red, green and blue.
-struct YuvColors {
-  int matrix = SWS_CS_ITU601;  ///< SWS_CS_...
-  bool full_range = false;     ///< 0 to 255 and not 16 to 235
-  bool operator==(const YuvColors&) const = default;
-};
+/// Whether the first bytes of a stream name x264, x265 or an encoder of libavcodec.
+bool names_software_encoder(std::span<const std::uint8_t> bytes);
 
-/// By the frame's tags (AVFrame::colorspace, color_range), which decoders take from the stream. Without a tag Rec.
-/// 601's matrix in the limited range, which is what FFmpeg makes of RGB unless told otherwise. Nullopt for a matrix
-/// that swscale does not know.
-std::optional<YuvColors> yuv_colors_of(const AVFrame& frame);
-
-/// AVFrame::format without the deprecated formats that say full range (yuvj420p ...): yuv_colors_of() has it.
-AVPixelFormat pixel_format_of(const AVFrame& frame);
-
-/// Makes `scaler`, which converts such frames to RGB, read them by `colors`. Not for frames that hold RGB.
-void set_colors(SwsContext& scaler, const YuvColors& colors);
+/// By the frame's tags (AVFrame::colorspace, color_range, chroma_location), which decoders take from the stream.
+/// Without a matrix Rec. 601's, without a range the limited one. Without a place of chroma the format's: amid the
+/// pixels (JPEG, MPEG-1, H.263 and their kin), top left (Rec. 2020), else left. `from_rgb`: a software encoder wrote
+/// the stream; where that names no matrix either, swscale made it of RGB, as for OpenCV and `ffmpeg` without options,
+/// and put chroma amid the pixels. Nullopt for a matrix that swscale does not know.
+std::optional<YuvColors> yuv_colors_of(const AVFrame& frame, AVCodecID codec, bool from_rgb);
 
 }  // namespace lapservo::internal

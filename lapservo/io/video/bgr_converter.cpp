@@ -1,0 +1,162 @@
+#include "lapservo/io/video/bgr_converter.h"
+
+#include <utility>
+
+extern "C" {
+#include <libavutil/opt.h>
+#include <libavutil/pixdesc.h>
+}
+
+namespace lapservo::internal {
+namespace {
+
+// Where chroma's first sample lies beside luma's, in 1/256 of a pixel of luma.
+struct Place {
+  int column = 0, row = 0;
+};
+
+Place place_of(ChromaSite site) {
+  switch (site) {
+    case ChromaSite::left:
+      return {0, 128};
+    case ChromaSite::centre:
+      return {128, 128};
+    case ChromaSite::top_left:
+      return {0, 0};
+    case ChromaSite::top:
+      return {128, 0};
+    case ChromaSite::bottom_left:
+      return {0, 256};
+    case ChromaSite::bottom:
+      return {128, 256};
+  }
+  return {};
+}
+
+int coefficients_of(YuvMatrix matrix) {
+  switch (matrix) {
+    case YuvMatrix::bt601:
+      return SWS_CS_ITU601;
+    case YuvMatrix::bt709:
+      return SWS_CS_ITU709;
+    case YuvMatrix::bt2020:
+      return SWS_CS_BT2020;
+    case YuvMatrix::fcc:
+      return SWS_CS_FCC;
+    case YuvMatrix::smpte240m:
+      return SWS_CS_SMPTE240M;
+  }
+  return SWS_CS_ITU601;
+}
+
+bool is_rgb(const AVPixFmtDescriptor& format) {
+  return (format.flags & (AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL)) != 0;
+}
+bool has_chroma(const AVPixFmtDescriptor& format) {
+  return !is_rgb(format) && format.nb_components >= 3;
+}
+
+// Within a whole frame, or within the even (0) or the odd (1) rows. Between columns 4:1:1 has four of luma.
+Place place_in(ChromaSite site, const AVPixFmtDescriptor& format, bool by_field, int field) {
+  Place place = place_of(site);
+  constexpr int quarter = 64;
+  if (by_field && place.row == 128) place.row = field == 0 ? quarter : 3 * quarter;
+  if (format.log2_chroma_h == 0) place.row = 0;
+  if (place.column > 0) place.column = (128 << format.log2_chroma_w) - 128;
+  return place;
+}
+
+libav::Scaler scaler_of(const cv::Size& size, AVPixelFormat format, const Place& chroma, bool to_planes) {
+  libav::Scaler scaler(sws_alloc_context());
+  if (!scaler) return nullptr;
+  const auto set = [&](const char* name, int value) { av_opt_set_int(scaler.get(), name, value, 0); };
+  set("srcw", size.width), set("srch", size.height), set("src_format", format);
+  set("dstw", size.width), set("dsth", size.height);
+  set("dst_format", to_planes ? AV_PIX_FMT_GBRP : AV_PIX_FMT_BGR24);
+  // Without SWS_ACCURATE_RND chroma is repeated. SWS_BICUBIC overshoots where an encoder's filter does already
+  // (docs/notes/cameras.md).
+  set("sws_flags", SWS_BILINEAR | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP);
+  set("src_h_chr_pos", chroma.column), set("src_v_chr_pos", chroma.row);
+  return sws_init_context(scaler.get(), nullptr, nullptr) < 0 ? nullptr : std::move(scaler);
+}
+
+void set_colors(SwsContext& scaler, const YuvColors& colors) {
+  constexpr int unity = 1 << 16;
+  sws_setColorspaceDetails(&scaler, sws_getCoefficients(coefficients_of(colors.matrix)), colors.full_range ? 1 : 0,
+                           sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, unity, unity);
+}
+
+// With room for what swscale writes beyond the ends of rows.
+cv::Mat plane_of(const cv::Size& size) {
+  constexpr int step = 64;
+  return cv::Mat(size.height, (size.width / step + 2) * step, CV_8UC1).colRange(0, size.width);
+}
+
+}  // namespace
+
+AVPixelFormat pixel_format_of(const AVFrame& frame) {
+  switch (frame.format) {
+    case AV_PIX_FMT_YUVJ420P:
+      return AV_PIX_FMT_YUV420P;
+    case AV_PIX_FMT_YUVJ422P:
+      return AV_PIX_FMT_YUV422P;
+    case AV_PIX_FMT_YUVJ444P:
+      return AV_PIX_FMT_YUV444P;
+    case AV_PIX_FMT_YUVJ440P:
+      return AV_PIX_FMT_YUV440P;
+    case AV_PIX_FMT_YUVJ411P:
+      return AV_PIX_FMT_YUV411P;
+    default:
+      return static_cast<AVPixelFormat>(frame.format);
+  }
+}
+
+// To planes where there is chroma: three times as fast as to BGR, where swscale takes chroma from the wrong rows
+// besides.
+bool BgrConverter::set_up(const Source& source) {
+  source_.reset();
+  scalers_.clear();
+  const AVPixFmtDescriptor& format = *av_pix_fmt_desc_get(source.format);
+  const int fields = source.by_field ? 2 : 1;
+  const cv::Size size(source.width_px, source.height_px), scaled(size.width, size.height / fields);
+  for (int field = 0; field < fields; ++field) {
+    const Place chroma = place_in(source.colors.chroma, format, source.by_field, field);
+    libav::Scaler scaler = scaler_of(scaled, source.format, chroma, has_chroma(format));
+    if (!scaler) return false;
+    if (!is_rgb(format)) set_colors(*scaler, source.colors);
+    scalers_.push_back(std::move(scaler));
+  }
+  for (cv::Mat& plane : planes_) plane = has_chroma(format) ? plane_of(size) : cv::Mat();
+  source_ = source;
+  return true;
+}
+
+bool BgrConverter::convert(const AVFrame& frame, const YuvColors& colors, bool by_field, cv::Mat& bgr) {
+  const AVPixelFormat format = pixel_format_of(frame);
+  const AVPixFmtDescriptor* const description = av_pix_fmt_desc_get(format);
+  if (!description) return false;
+  const bool split = by_field && has_chroma(*description) && description->log2_chroma_h == 1 && frame.height % 4 == 0;
+  const Source source{frame.width, frame.height, format, colors, split};
+  if (source != source_ && !set_up(source)) return false;
+  bgr.create(frame.height, frame.width, CV_8UC3);
+  const bool to_planes = !planes_[0].empty();
+  const int fields = static_cast<int>(scalers_.size());
+  for (int field = 0; field < fields; ++field) {
+    std::array<const std::uint8_t*, 4> from{};
+    std::array<std::uint8_t*, 4> to{to_planes ? nullptr : bgr.ptr(field)};
+    std::array<int, 4> from_steps{}, to_steps{fields * static_cast<int>(bgr.step)};
+    for (std::size_t i = 0; i < 4; ++i) {
+      from[i] = frame.data[i] ? frame.data[i] + field * frame.linesize[i] : nullptr;
+      from_steps[i] = fields * frame.linesize[i];
+      if (!to_planes || i == 3) continue;
+      to[i] = planes_[i].ptr(field);
+      to_steps[i] = fields * static_cast<int>(planes_[i].step);
+    }
+    sws_scale(scalers_[static_cast<std::size_t>(field)].get(), from.data(), from_steps.data(), 0, frame.height / fields,
+              to.data(), to_steps.data());
+  }
+  if (to_planes) cv::merge(std::array{planes_[1], planes_[0], planes_[2]}, bgr);
+  return true;
+}
+
+}  // namespace lapservo::internal

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include <opencv2/core.hpp>
+
+namespace lapservo::internal {
+
+enum class YuvMatrix { bt601, bt709, bt2020, fcc, smpte240m };
+
+/// Where the first sample of chroma lies, as seen from the first pixel of luma: on its column (left) or half a pixel
+/// to the right of it, on its row (top), half a pixel below it or a pixel below it (bottom). Concerns only directions
+/// in which chroma has fewer samples than luma.
+enum class ChromaSite { left, centre, top_left, top, bottom_left, bottom };
+
+/// How luma and chroma become red, green and blue.
+struct YuvColors {
+  YuvMatrix matrix = YuvMatrix::bt601;
+  bool full_range = false;  ///< 0 to 255 and not 16 to 235
+  ChromaSite chroma = ChromaSite::left;
+  bool operator==(const YuvColors&) const = default;
+};
+
+/// Luma and chroma in memory, 8 bits each, without tags.
+struct YuvPicture {
+  enum class Layout { yuyv, uyvy, nv12, planar_420, planar_422, planar_444 };
+  Layout layout;
+  cv::Size size;
+  std::array<const std::uint8_t*, 4> planes{};
+  std::array<int, 4> steps{};  ///< bytes a row
+  bool by_field = false;       ///< the rows are two fields', each with its own chroma
+};
+
+/// 8-bit BGR of it; in the memory of `bgr` where that is of its size and type. False where it has no size that can be
+/// converted.
+bool convert_to_bgr(const YuvPicture& picture, const YuvColors& colors, cv::Mat& bgr);
+
+}  // namespace lapservo::internal
