@@ -438,7 +438,7 @@ TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {
   video.release();
   const std::string whole = read_file("in/a.mkv");
   const std::string half = in("half.mkv", whole.substr(0, whole.size() / 2));
-  EXPECT_EQ(run("track " + half + " --rig configs/example.yaml --out out/obs.csv"), 1);
+  EXPECT_EQ(run("track " + half + " --rig configs/example.yaml --colour-matrix bt601 --out out/obs.csv"), 1);
   expect_in(errors(), "half.mkv: ends early");
   const std::string said = errors();
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;

@@ -45,6 +45,7 @@ std::unique_ptr<LiveCamera> open_camera(const std::string& camera, const cv::Siz
 /// The frames of a camera, which end with it, when none comes for 15 s, or when `stop` returns true; of what names no
 /// camera open_frame_source(). Throws as that and open_camera().
 std::unique_ptr<FrameSource> open_camera_or_file(const std::string& input, double folder_fps, const cv::Size& size = {},
-                                                 std::function<bool()> stop = nullptr, bool deinterlaced = false);
+                                                 std::function<bool()> stop = nullptr,
+                                                 const VideoReading& reading = {});
 
 }  // namespace lapservo::internal

@@ -54,8 +54,8 @@ class CameraFrames : public FrameSource {
 }  // namespace
 
 std::unique_ptr<FrameSource> open_camera_or_file(const std::string& input, double folder_fps, const cv::Size& size,
-                                                 std::function<bool()> stop, bool deinterlaced) {
-  if (!names_camera(input)) return open_frame_source(input, folder_fps, deinterlaced);
+                                                 std::function<bool()> stop, const VideoReading& reading) {
+  if (!names_camera(input)) return open_frame_source(input, folder_fps, reading);
   return std::make_unique<CameraFrames>(open_camera(input, size), std::move(stop));
 }
 

@@ -63,11 +63,12 @@ BadImage bad_encoding(const std::string& encoding) {
   return {"encoding " + shown(encoding) + ", expected bgr8, rgb8, bgra8, rgba8, bgr16, rgb16, yuv422 or bayer_*"};
 }
 
-// Chroma lies on the left of each two pixels, as cameras send it.
+// By the matrix of its height; chroma lies on the left of each two pixels, as cameras send it.
 DecodedImage bgr_of(const cv::Mat& pixels, YuvPicture::Layout layout) {
   const YuvPicture picture{layout, pixels.size(), {pixels.data}, {static_cast<int>(pixels.step)}};
   cv::Mat bgr;
-  if (!convert_to_bgr(picture, {}, bgr)) return BadImage{fmt::format("size {}x{}", pixels.cols, pixels.rows)};
+  if (!convert_to_bgr(picture, {usual_matrix(pixels.rows)}, bgr))
+    return BadImage{fmt::format("size {}x{}", pixels.cols, pixels.rows)};
   return bgr;
 }
 

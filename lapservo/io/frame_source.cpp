@@ -41,8 +41,8 @@ class PictureSource : public FrameSource {
 
 class VideoSource : public FrameSource {
  public:
-  VideoSource(const std::string& path, bool deinterlaced)
-      : video_(path, std::chrono::seconds(5), VideoReader::Kind::file, deinterlaced), first_(video_.next()) {
+  VideoSource(const std::string& path, const VideoReading& reading)
+      : video_(path, std::chrono::seconds(5), VideoReader::Kind::file, reading), first_(video_.next()) {
     if (!first_) throw InputError(path, "has no frames, expected a video");
   }
 
@@ -60,6 +60,7 @@ class VideoSource : public FrameSource {
   Kind kind() const override { return Kind::video; }
   std::optional<int> frame_count() const override { return video_.frame_count(); }
   double frames_per_second() const override { return video_.frames_per_second(); }
+  std::string remark() const override { return video_.remark(); }
   std::string complaint() const override { return video_.complaint(); }
 
  private:
@@ -71,8 +72,8 @@ class VideoSource : public FrameSource {
 // Frames have the times at which they were asked for.
 class StreamSource : public FrameSource {
  public:
-  explicit StreamSource(const std::string& name)
-      : stream_(name, std::chrono::seconds(30), VideoReader::Kind::stream), first_(stream_.next()) {
+  StreamSource(const std::string& name, const VideoReading& reading)
+      : stream_(name, std::chrono::seconds(30), VideoReader::Kind::stream, reading), first_(stream_.next()) {
     if (!first_) throw InputError(name, "gives no frames, expected a stream");
   }
 
@@ -88,6 +89,7 @@ class StreamSource : public FrameSource {
   Kind kind() const override { return Kind::live; }
   std::optional<int> frame_count() const override { return std::nullopt; }
   double frames_per_second() const override { return stream_.frames_per_second(); }
+  std::string remark() const override { return stream_.remark(); }
 
  private:
   VideoReader stream_;
@@ -116,9 +118,10 @@ std::vector<fs::path> pictures_in(const fs::path& folder) {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps, bool deinterlaced) {
+std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps,
+                                               const VideoReading& reading) {
   using Kind = FrameSource::Kind;
-  if (input.find("://") != std::string::npos) return std::make_unique<StreamSource>(input);
+  if (input.find("://") != std::string::npos) return std::make_unique<StreamSource>(input, reading);
   std::error_code error;  // of a name that no file can have, or a folder that may not be looked into
   if (!fs::exists(input, error))
     throw InputError(input, "does not exist, expected a picture, a folder of pictures or a video");
@@ -128,7 +131,7 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (has_image_extension(input))
     return std::make_unique<PictureSource>(Kind::image, std::vector<fs::path>{input}, folder_fps);
   if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected a picture, a folder or a video");
-  return std::make_unique<VideoSource>(input, deinterlaced);
+  return std::make_unique<VideoSource>(input, reading);
 }
 
 }  // namespace lapservo

@@ -34,14 +34,23 @@ class FrameSource {
   virtual double frames_per_second() const = 0;
   /// What `time_s` counts from, by the clock that a recording's other messages are stamped with, where there are such.
   virtual std::optional<double> first_stamp_s() const { return std::nullopt; }
+  /// How it is read where the file does not say, in words, and the option that decides; empty where it says.
+  virtual std::string remark() const { return {}; }
   /// After the end: what is wrong with the file as a whole, for example that it ends early; empty when nothing is.
   virtual std::string complaint() const { return {}; }
 };
 
-/// All but cameras. `folder_fps` gives the pictures of a folder their times. `deinterlaced`: one field of each frame is
-/// to be tracked, so that the chroma of a 4:2:0 video is read for each field by itself. Throws InputError when there is
-/// nothing to read: a missing or empty file, a folder without pictures, a video without frames, a stream that doesn't
-/// answer.
-std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps, bool deinterlaced = false);
+/// How videos and streams are read.
+struct VideoReading {
+  bool deinterlaced = false;      ///< one field of each frame is tracked: chroma of 4:2:0 is read for each by itself
+  std::string colour_matrix{};    ///< bt601, bt709 or bt2020, whatever the video names; empty: by the video
+  std::string chroma_location{};  ///< left, centre or top-left, whatever the video names; empty: by the video
+};
+
+/// All but cameras. `folder_fps` gives the pictures of a folder their times. Throws InputError when there is nothing to
+/// read: a missing or empty file, a folder without pictures, a video without frames, a stream that doesn't answer; and
+/// for words in `reading` that have no meaning.
+std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps,
+                                               const VideoReading& reading = {});
 
 }  // namespace lapservo

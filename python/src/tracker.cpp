@@ -266,6 +266,8 @@ void bind_frames(py::module_& m) {
   py::class_<FrameSource>(m, "FrameSource", "Frames of pictures, a video or a camera, to be iterated over once.")
       .def_property_readonly("frame_count", &FrameSource::frame_count, "where it is known beforehand")
       .def_property_readonly("frames_per_second", &FrameSource::frames_per_second)
+      .def_property_readonly("remark", &FrameSource::remark,
+                             "how it is read where the file does not say, and the option that decides, or ''")
       .def_property_readonly("complaint", &FrameSource::complaint,
                              "after the end: what is wrong with the file as a whole, or ''")
       .def("__iter__", [](FrameSource& source) -> FrameSource& { return source; })
@@ -276,12 +278,16 @@ void bind_frames(py::module_& m) {
       });
   m.def(
       "open_frames",
-      [](const std::filesystem::path& input, double fps, bool deinterlaced) {
-        return internal::open_camera_or_file(input.string(), fps, {}, nullptr, deinterlaced);
+      [](const std::filesystem::path& input, double fps, bool deinterlaced, const std::string& colour_matrix,
+         const std::string& chroma_location) {
+        return internal::open_camera_or_file(input.string(), fps, {}, nullptr,
+                                             {deinterlaced, colour_matrix, chroma_location});
       },
-      py::arg("input"), py::arg("fps") = 30.0, py::arg("deinterlaced") = false,
+      py::arg("input"), py::arg("fps") = 30.0, py::arg("deinterlaced") = false, py::arg("colour_matrix") = "",
+      py::arg("chroma_location") = "",
       "A picture, a folder of pictures (with `fps`), a video, 'rtsp://...', '/dev/video0' or 'gst:PIPELINE': a "
-      "FrameSource. `deinterlaced`: one field of each frame is tracked.");
+      "FrameSource. `deinterlaced`: one field of each frame is tracked. `colour_matrix` ('bt601', 'bt709', "
+      "'bt2020') and `chroma_location` ('left', 'centre', 'top-left') of a video, in place of what it names.");
   m.def(
       "_png",
       [](const Image& image) {

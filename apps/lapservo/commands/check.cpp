@@ -83,7 +83,7 @@ int check(const CalibrateOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  const auto source = open_frames(options.input, options.fps, options.image_topic, &rig.camera, options.deinterlace);
+  const auto source = open_frames(options.input, options, &rig.camera);
   const auto joints = find_joint_input(options, instrument, source.get());
   if (joints) instrument.joints = joints->joints;
   watch_for_interrupts();

@@ -36,13 +36,12 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-struct TrackOptions {
-  std::string input, rig, out = "obs.csv", overlay, image_topic;
+struct TrackOptions : FrameOptions {
+  std::string input, rig, out = "obs.csv", overlay;
   std::string method = "surface";
-  bool single = false, deinterlace = false, view = false;
+  bool single = false, view = false;
   WebOptions web;
   bool page_only = false;  ///< `lapservo view`: at the input's own pace, and without --out
-  double fps = 30;
   int frames = 0;
 };
 
@@ -203,9 +202,7 @@ class TrackRun {
       : options_(options),
         rigs_(options),
         live_(open_topic(options, rigs_)),
-        file_(live_
-                  ? nullptr
-                  : open_frames(options.input, options.fps, options.image_topic, rigs_.camera(), options.deinterlace)),
+        file_(live_ ? nullptr : open_frames(options.input, options, rigs_.camera())),
         source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
     if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
       rigs_.expect_pictures();
@@ -338,6 +335,7 @@ void add_input_options(Command command, TrackOptions& options) {
           "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
       .required();
   add_image_topic_option(command, options.image_topic);
+  add_video_options(command, options);
   command.add_option("--rig", options.rig,
                      "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
   command.add_option("--method", options.method, "surface: all visible lines; centerline: the paper's Algorithm 1")

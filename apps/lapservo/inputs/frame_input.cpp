@@ -1,5 +1,6 @@
 #include "apps/lapservo/inputs/frame_input.h"
 
+#include <cstdio>
 #include <utility>
 
 #include "apps/lapservo/cli/interrupt.h"
@@ -12,13 +13,15 @@
 namespace lapservo::app {
 using namespace internal;
 
-std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic,
-                                         const Camera* camera, bool deinterlace) {
-  if (is_bag(input)) return read_ahead(std::make_unique<BagFrames>(open_bag(input), image_topic));
-  refuse_topic_outside_bags("--image-topic", image_topic, input);
+std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
+  if (is_bag(input)) return read_ahead(std::make_unique<BagFrames>(open_bag(input), options.image_topic));
+  refuse_topic_outside_bags("--image-topic", options.image_topic, input);
   const cv::Size size = camera ? cv::Size(camera->width_px, camera->height_px) : cv::Size();
-  const bool deinterlaced = deinterlace || (camera && camera->deinterlace);
-  auto source = open_camera_or_file(input, folder_fps, size, interrupted, deinterlaced);
+  const VideoReading reading{options.deinterlace || (camera && camera->deinterlace), options.colour_matrix,
+                             options.chroma_location};
+  auto source = open_camera_or_file(input, options.fps, size, interrupted, reading);
+  if (const std::string remark = source->remark(); !remark.empty())
+    std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
 }
 
@@ -28,6 +31,15 @@ void refuse_topic_outside_bags(const std::string& option, const std::string& top
 
 void add_image_topic_option(Command command, std::string& image_topic) {
   command.add_option("--image-topic", image_topic, "Of a bag with several: the topic whose images are meant");
+}
+
+void add_video_options(Command command, FrameOptions& options) {
+  command.add_option("--colour-matrix", options.colour_matrix, "Of a video, whatever it names; else as it names")
+      .one_of({"bt601", "bt709", "bt2020"});
+  command
+      .add_option("--chroma-location", options.chroma_location,
+                  "Place of the samples of chroma of a video, whatever it names; else as it names")
+      .one_of({"left", "centre", "top-left"});
 }
 
 }  // namespace lapservo::app

@@ -9,15 +9,24 @@
 
 namespace lapservo::app {
 
-/// internal::open_camera_or_file() until Ctrl-C, and the images of bags; `image_topic`: see internal::image_topic_of().
-/// `camera`: the rig's, whose size a camera's images shall have; null where none is known. `deinterlace`: one field of
-/// each frame is tracked; also where the rig's camera says so.
-std::unique_ptr<FrameSource> open_frames(const std::string& input, double folder_fps, const std::string& image_topic,
-                                         const Camera* camera, bool deinterlace = false);
+/// How a command reads its frames.
+struct FrameOptions {
+  std::string image_topic;   ///< of a bag: see internal::image_topic_of()
+  double fps = 30;           ///< of a folder of pictures
+  bool deinterlace = false;  ///< one field of each frame is tracked; also where the rig's camera says so
+  std::string colour_matrix, chroma_location;  ///< see VideoReading
+};
+
+/// internal::open_camera_or_file() until Ctrl-C, and the images of bags. Says the source's remark on stderr. `camera`:
+/// the rig's, whose size a camera's images shall have; null where none is known.
+std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera);
 
 /// Throws InputError naming `option` where it names a topic although `input` is no bag.
 void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input);
 
 void add_image_topic_option(Command command, std::string& image_topic);
+
+/// --colour-matrix and --chroma-location.
+void add_video_options(Command command, FrameOptions& options);
 
 }  // namespace lapservo::app

@@ -18,7 +18,8 @@ class ReadAhead : public FrameSource {
         kind_(source_->kind()),
         frame_count_(source_->frame_count()),
         frames_per_second_(source_->frames_per_second()),
-        first_stamp_s_(source_->first_stamp_s()) {}
+        first_stamp_s_(source_->first_stamp_s()),
+        remark_(source_->remark()) {}
   ~ReadAhead() override { stop(); }
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
@@ -33,6 +34,7 @@ class ReadAhead : public FrameSource {
   std::optional<int> frame_count() const override { return frame_count_; }
   double frames_per_second() const override { return frames_per_second_; }
   std::optional<double> first_stamp_s() const override { return first_stamp_s_; }
+  std::string remark() const override { return remark_; }
   /// Of what was read: after it, nothing more is.
   std::string complaint() const override {
     stop();
@@ -60,6 +62,7 @@ class ReadAhead : public FrameSource {
   std::optional<int> frame_count_;
   double frames_per_second_;
   std::optional<double> first_stamp_s_;
+  std::string remark_;
   mutable BoundedQueue<Frame> frames_{most_ahead};
   std::exception_ptr failure_;  // the thread's, until frames_ is closed
   mutable bool stopped_ = false;

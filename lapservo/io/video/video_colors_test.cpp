@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/io/frame_source.h"
+#include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo {
@@ -28,14 +29,29 @@ struct Coding {
   const char* ending;
 };
 
-class VideoColors : public ::testing::TestWithParam<std::tuple<Colors, Coding>> {};
-
-// Four patches side by side. False where FFmpeg or the encoder is missing.
-bool write_patches(const std::filesystem::path& path, const Colors& colors, const Coding& coding,
-                   const std::filesystem::path& scratch) {
-  cv::Mat picture(patch_px, 4 * patch_px, CV_8UC3);
+// Four patches side by side.
+cv::Mat patches_of(int height_px) {
+  cv::Mat picture(height_px, 4 * patch_px, CV_8UC3);
   for (int i = 0; i < 4; ++i)
     picture.colRange(i * patch_px, (i + 1) * patch_px).setTo(patches[static_cast<std::size_t>(i)]);
+  return picture;
+}
+
+void expect_patches(const cv::Mat& bgr, int tolerance) {
+  for (int i = 0; i < 4; ++i) {
+    const cv::Vec3b seen = bgr.at<cv::Vec3b>(bgr.rows / 2, i * patch_px + patch_px / 2);
+    for (int channel = 0; channel < 3; ++channel)
+      EXPECT_NEAR(seen[channel], patches[static_cast<std::size_t>(i)][channel], tolerance)
+          << "patch " << i << ", " << channel;
+  }
+}
+
+class VideoColors : public ::testing::TestWithParam<std::tuple<Colors, Coding>> {};
+
+// False where FFmpeg or the encoder is missing.
+bool write_patches(const std::filesystem::path& path, const Colors& colors, const Coding& coding,
+                   const std::filesystem::path& scratch) {
+  const cv::Mat picture = patches_of(patch_px);
   testing::write_file(scratch, std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
   const std::string command =
       "ffmpeg -v quiet -y -stream_loop 2 -f rawvideo -pix_fmt bgr24 -s 256x64 -r 25 -i '" + scratch.string() +
@@ -55,14 +71,49 @@ TEST_P(VideoColors, ReadAsTheirTagsSay) {
   int frames = 0;
   while (const auto frame = source->next()) {
     ++frames;
-    for (int i = 0; i < 4; ++i) {
-      const cv::Vec3b seen = frame->bgr.at<cv::Vec3b>(patch_px / 2, i * patch_px + patch_px / 2);
-      for (int channel = 0; channel < 3; ++channel)
-        EXPECT_NEAR(seen[channel], patches[static_cast<std::size_t>(i)][channel], 2)
-            << "patch " << i << ", " << channel;
-    }
+    expect_patches(frame->bgr, 2);
   }
   EXPECT_EQ(frames, 3);
+}
+
+// A recorder's MPEG-2 names no encoder; x264 does.
+TEST(VideoWithoutTags, IsReadByItsHeightOrItsWriterOrAsGiven) {
+  const testing::TemporaryFolder folder;
+  struct Video {
+    const char* matrix;
+    int height_px;
+    const char* name;
+    VideoReading reading;
+    std::string remark;
+  };
+  for (const Video& video :
+       {Video{"bt709", 720, "a.mpg", {}, "read as Rec. 709, as it is 720 rows high"},
+        Video{"bt601", 480, "a.mpg", {}, ""}, Video{"bt601", 720, "a.mpg", {.colour_matrix = "bt601"}, ""},
+        Video{"bt601", 720, "a.mp4", {}, "read as Rec. 601 with chroma amid the pixels"},
+        Video{"bt601", 480, "a.mp4", {}, ""}, Video{"bt709", 720, "a.mp4", {.colour_matrix = "bt709"}, ""}}) {
+    const cv::Mat picture = patches_of(video.height_px);
+    testing::write_file(folder / "raw", std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
+    const std::string path = (folder / video.name).string();
+    const std::string command = "ffmpeg -v quiet -y -f rawvideo -pix_fmt bgr24 -s 256x" +
+                                std::to_string(video.height_px) + " -r 25 -i '" + (folder / "raw").string() +
+                                "' -vf scale=out_range=tv:flags=accurate_rnd:out_color_matrix=" + video.matrix +
+                                ",setparams=colorspace=unknown " +
+                                (path.ends_with("mpg") ? "-c:v mpeg2video -q:v 1 -dc 10" : "-c:v libx264 -crf 2") +
+                                " -pix_fmt yuv420p '" + path + "'";
+    if (std::system(command.c_str()) != 0) GTEST_SKIP() << "FFmpeg here can't write " << video.name;
+    SCOPED_TRACE(path + ", " + std::to_string(video.height_px) + " rows, " + video.reading.colour_matrix);
+    const auto source = open_frame_source(path, 25, video.reading);
+    EXPECT_NE(source->remark().find(video.remark), std::string::npos) << source->remark();
+    EXPECT_EQ(source->remark().empty(), video.remark.empty()) << source->remark();
+    const auto frame = source->next();
+    ASSERT_TRUE(frame);
+    expect_patches(frame->bgr, 3);
+  }
+  EXPECT_EQ(testing::input_error([&] { open_frame_source((folder / "a.mp4").string(), 25, {.colour_matrix = "709"}); }),
+            "colour matrix: is 709, expected bt601, bt709 or bt2020");
+  EXPECT_EQ(
+      testing::input_error([&] { open_frame_source((folder / "a.mp4").string(), 25, {.chroma_location = "mid"}); }),
+      "chroma location: is mid, expected left, centre or top-left");
 }
 
 // Red in the rows of one field, blue in those of the other.
@@ -78,7 +129,7 @@ TEST(VideoFields, HaveTheirOwnChroma) {
                               "-c:v ffv1 -pix_fmt yuv420p -colorspace bt709 -color_range tv '" +
                               path.string() + "'";
   if (std::system(command.c_str()) != 0) GTEST_SKIP() << "no ffmpeg";
-  const auto frame = open_frame_source(path.string(), 25, true)->next();
+  const auto frame = open_frame_source(path.string(), 25, {.deinterlaced = true})->next();
   ASSERT_TRUE(frame);
   for (const int row : {30, 31, 32, 33})
     for (int channel = 0; channel < 3; ++channel)

@@ -39,8 +39,12 @@ bool turned(const AVStream& stream) {
 
 class VideoReader::State {
  public:
-  State(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind, bool fields)
-      : source_(path.string()), kind_(kind), patience_(patience), fields_(fields) {
+  State(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind, const VideoReading& reading)
+      : source_(path.string()),
+        kind_(kind),
+        patience_(patience),
+        fields_(reading.deinterlaced),
+        given_(given_colors(reading.colour_matrix, reading.chroma_location)) {
     av_log_set_level(AV_LOG_QUIET);
     open();
     stream_ = format_->streams[choose_stream()];
@@ -72,6 +76,8 @@ class VideoReader::State {
     const double fps = av_q2d(av_guess_frame_rate(format_.get(), stream_, nullptr));
     return fps > 0 && fps < 10000 ? fps : 30;
   }
+
+  const std::string& remark() const { return remark_; }
 
   std::string complaint() const {
     constexpr double slack = 0.01;  // durations are rounded, and sound may last longer
@@ -203,13 +209,14 @@ class VideoReader::State {
 
   // By each frame's own tags: a stream's may change.
   void convert() {
-    const auto colors = yuv_colors_of(*frame_, stream_->codecpar->codec_id, of_software_);
+    const auto colors = yuv_colors_of(*frame_, stream_->codecpar->codec_id, of_software_, given_);
     if (!colors)
       throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
                        "bt709, smpte170m, bt470bg, bt2020nc, fcc or smpte240m (convert it: ffmpeg -i IN -vf "
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
     if (!converter_.convert(*frame_, *colors, fields_, last_))
       throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
+    if (frames_ == 0 && !given_.matrix) remark_ = remark_on_matrix(*frame_, of_software_);
   }
 
   std::string source_;
@@ -221,6 +228,8 @@ class VideoReader::State {
   libav::Packet packet_{av_packet_alloc()};
   libav::Frame frame_{av_frame_alloc()};
   bool fields_;
+  GivenColors given_;
+  std::string remark_;
   bool of_software_ = false;  // a software encoder wrote the stream
   BgrConverter converter_;
   AVStream* stream_ = nullptr;
@@ -234,8 +243,9 @@ class VideoReader::State {
   bool spoiled_ = false;  // the last frame is damaged
 };
 
-VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind, bool fields)
-    : state_(std::make_unique<State>(path, patience, kind, fields)) {}
+VideoReader::VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience, Kind kind,
+                         const VideoReading& reading)
+    : state_(std::make_unique<State>(path, patience, kind, reading)) {}
 VideoReader::~VideoReader() = default;
 
 std::optional<VideoReader::Image> VideoReader::next() {
@@ -246,6 +256,9 @@ std::optional<int> VideoReader::frame_count() const {
 }
 double VideoReader::frames_per_second() const {
   return state_->frames_per_second();
+}
+std::string VideoReader::remark() const {
+  return state_->remark();
 }
 std::string VideoReader::complaint() const {
   return state_->complaint();

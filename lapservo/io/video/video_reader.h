@@ -8,6 +8,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "lapservo/io/frame_source.h"
+
 namespace lapservo::internal {
 
 /// The frames of a video file, by FFmpeg's libraries: OpenCV hides what their decoders complain of.
@@ -24,10 +26,9 @@ class VideoReader {
 
   /// Throws InputError when it holds no video that can be decoded, or one that is to be turned for display: a
   /// calibration belongs to the pixels in one orientation and nobody can tell to which.
-  /// Opening may take no longer than `patience`; reading may. `fields`: frames are of two fields, and chroma that has
-  /// fewer rows than luma (4:2:0) belongs to each field by itself.
+  /// Opening may take no longer than `patience`; reading may.
   explicit VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience = std::chrono::seconds(5),
-                       Kind kind = Kind::file, bool fields = false);
+                       Kind kind = Kind::file, const VideoReading& reading = {});
   ~VideoReader();
 
   /// nullopt at the end.
@@ -35,6 +36,8 @@ class VideoReader {
   /// As the file announces it; nullopt when it doesn't.
   std::optional<int> frame_count() const;
   double frames_per_second() const;
+  /// After the first frame: FrameSource::remark().
+  std::string remark() const;
   /// After the end: that the frames end before the duration that the container announces or within a frame, else empty.
   std::string complaint() const;
 

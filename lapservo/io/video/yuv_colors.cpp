@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <string_view>
 
 extern "C" {
 #include <libavutil/pixdesc.h>
 }
 
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
 #include "lapservo/io/video/bgr_converter.h"
 
 namespace lapservo::internal {
@@ -15,9 +19,6 @@ namespace {
 
 std::optional<YuvMatrix> matrix_of(AVColorSpace tag) {
   switch (tag) {
-    case AVCOL_SPC_UNSPECIFIED:
-    case AVCOL_SPC_RESERVED:
-    case AVCOL_SPC_RGB:  // some cameras' streams say so of YUV
     case AVCOL_SPC_BT470BG:
     case AVCOL_SPC_SMPTE170M:
       return YuvMatrix::bt601;
@@ -32,6 +33,17 @@ std::optional<YuvMatrix> matrix_of(AVColorSpace tag) {
     default:
       return std::nullopt;
   }
+}
+
+// Some cameras' streams say RGB of YUV.
+bool names_no_matrix(const AVFrame& frame) {
+  return frame.colorspace == AVCOL_SPC_UNSPECIFIED || frame.colorspace == AVCOL_SPC_RESERVED ||
+         frame.colorspace == AVCOL_SPC_RGB;
+}
+
+bool is_rgb(const AVFrame& frame) {
+  const AVPixFmtDescriptor* const format = av_pix_fmt_desc_get(pixel_format_of(frame));
+  return format && (format->flags & AV_PIX_FMT_FLAG_RGB) != 0;
 }
 
 ChromaSite usual_site(AVCodecID codec, AVColorSpace matrix) {
@@ -86,14 +98,51 @@ bool names_software_encoder(std::span<const std::uint8_t> bytes) {
                      [&](std::string_view name) { return text.find(name) != std::string_view::npos; });
 }
 
-std::optional<YuvColors> yuv_colors_of(const AVFrame& frame, AVCodecID codec, bool from_rgb) {
-  const AVPixelFormat format = pixel_format_of(frame);
-  const AVPixFmtDescriptor* const description = av_pix_fmt_desc_get(format);
-  if (description && (description->flags & AV_PIX_FMT_FLAG_RGB) != 0) return YuvColors();
-  const auto matrix = matrix_of(frame.colorspace);
-  if (!matrix) return std::nullopt;
-  const bool full_range = format != frame.format || frame.color_range == AVCOL_RANGE_JPEG;
-  return YuvColors{*matrix, full_range, site_of(frame, codec, from_rgb && frame.colorspace == AVCOL_SPC_UNSPECIFIED)};
+GivenColors given_colors(const std::string& colour_matrix, const std::string& chroma_location) {
+  static const std::map<std::string, YuvMatrix> matrices{
+      {"bt601", YuvMatrix::bt601}, {"bt709", YuvMatrix::bt709}, {"bt2020", YuvMatrix::bt2020}};
+  static const std::map<std::string, ChromaSite> sites{
+      {"left", ChromaSite::left}, {"centre", ChromaSite::centre}, {"top-left", ChromaSite::top_left}};
+  GivenColors given;
+  if (const auto found = matrices.find(colour_matrix); found != matrices.end()) given.matrix = found->second;
+  if (const auto found = sites.find(chroma_location); found != sites.end()) given.chroma = found->second;
+  if (!colour_matrix.empty() && !given.matrix)
+    throw InputError("colour matrix", "is " + colour_matrix + ", expected bt601, bt709 or bt2020");
+  if (!chroma_location.empty() && !given.chroma)
+    throw InputError("chroma location", "is " + chroma_location + ", expected left, centre or top-left");
+  return given;
+}
+
+std::optional<YuvColors> yuv_colors_of(const AVFrame& frame, AVCodecID codec, bool of_software,
+                                       const GivenColors& given) {
+  if (is_rgb(frame)) return YuvColors();
+  const bool from_rgb = of_software && names_no_matrix(frame);
+  YuvColors colors;
+  if (given.matrix) {
+    colors.matrix = *given.matrix;
+  } else if (names_no_matrix(frame)) {
+    colors.matrix = from_rgb ? YuvMatrix::bt601 : usual_matrix(frame.height);
+  } else if (const auto matrix = matrix_of(frame.colorspace)) {
+    colors.matrix = *matrix;
+  } else {
+    return std::nullopt;
+  }
+  colors.full_range = pixel_format_of(frame) != frame.format || frame.color_range == AVCOL_RANGE_JPEG;
+  colors.chroma = given.chroma.value_or(site_of(frame, codec, from_rgb));
+  return colors;
+}
+
+std::string remark_on_matrix(const AVFrame& frame, bool of_software) {
+  const AVPixFmtDescriptor* const format = av_pix_fmt_desc_get(pixel_format_of(frame));
+  const bool has_chroma = format && !is_rgb(frame) && format->nb_components >= 3;
+  if (!has_chroma || !names_no_matrix(frame) || usual_matrix(frame.height) == YuvMatrix::bt601) return "";
+  if (of_software)
+    return "names no colour matrix: read as Rec. 601 with chroma amid the pixels, as OpenCV and ffmpeg write RGB; if "
+           "ffmpeg wrote a camera's video anew: --colour-matrix bt709 --chroma-location left";
+  return fmt::format(
+      "names no colour matrix: read as Rec. 709, as it is {} rows high; if OpenCV or ffmpeg wrote it from RGB: "
+      "--colour-matrix bt601 --chroma-location centre",
+      frame.height);
 }
 
 }  // namespace lapservo::internal

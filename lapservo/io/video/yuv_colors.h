@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "lapservo/io/video/libav.h"
 #include "lapservo/io/video/yuv_picture.h"
@@ -12,11 +13,26 @@ namespace lapservo::internal {
 /// Whether the first bytes of a stream name x264, x265 or an encoder of libavcodec.
 bool names_software_encoder(std::span<const std::uint8_t> bytes);
 
-/// By the frame's tags (AVFrame::colorspace, color_range, chroma_location), which decoders take from the stream.
-/// Without a matrix Rec. 601's, without a range the limited one. Without a place of chroma the format's: amid the
-/// pixels (JPEG, MPEG-1, H.263 and their kin), top left (Rec. 2020), else left. `from_rgb`: a software encoder wrote
-/// the stream; where that names no matrix either, swscale made it of RGB, as for OpenCV and `ffmpeg` without options,
-/// and put chroma amid the pixels. Nullopt for a matrix that swscale does not know.
-std::optional<YuvColors> yuv_colors_of(const AVFrame& frame, AVCodecID codec, bool from_rgb);
+/// In place of what a stream names.
+struct GivenColors {
+  std::optional<YuvMatrix> matrix;
+  std::optional<ChromaSite> chroma;
+};
+
+/// By the words of VideoReading, of which each may be empty. Throws InputError for others.
+GivenColors given_colors(const std::string& colour_matrix, const std::string& chroma_location);
+
+/// By `given`, else by the frame's tags (AVFrame::colorspace, color_range, chroma_location), which decoders take from
+/// the stream. Without a matrix usual_matrix(), without a range the limited one. Without a place of chroma the
+/// format's: amid the pixels (JPEG, MPEG-1, H.263 and their kin), top left (Rec. 2020), else left. `of_software`: a
+/// software encoder wrote the stream; where that names no matrix either, swscale made it of RGB, as for OpenCV and
+/// `ffmpeg` without options, by Rec. 601's matrix and with chroma amid the pixels, whatever the height. Nullopt for a
+/// matrix that swscale does not know.
+std::optional<YuvColors> yuv_colors_of(const AVFrame& frame, AVCodecID codec, bool of_software,
+                                       const GivenColors& given);
+
+/// How a frame without a matrix is read, in words, where players would read it otherwise than OpenCV or FFmpeg may have
+/// written it; else empty.
+std::string remark_on_matrix(const AVFrame& frame, bool of_software);
 
 }  // namespace lapservo::internal

@@ -22,7 +22,12 @@ struct YuvColors {
   bool operator==(const YuvColors&) const = default;
 };
 
-/// Luma and chroma in memory, 8 bits each, without tags.
+/// Of images that name none: as players and GStreamer have it, Rec. 709's from 720 rows on, else Rec. 601's.
+inline YuvMatrix usual_matrix(int height_px) {
+  return height_px >= 720 ? YuvMatrix::bt709 : YuvMatrix::bt601;
+}
+
+/// Luma and chroma in memory, 8 bits each.
 struct YuvPicture {
   enum class Layout { yuyv, uyvy, nv12, planar_420, planar_422, planar_444 };
   Layout layout;

@@ -26,11 +26,11 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
-struct AllOptions {
+struct AllOptions : FrameOptions {
   std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, report, instrument, redo;
   std::string camera, robot, joint_limits;  // of a live system
-  double square_mm = 0, fps = 30;
-  bool deinterlace = false, no_questions = false, enable_motion = false;
+  double square_mm = 0;
+  bool no_questions = false, enable_motion = false;
 };
 
 // One step: what the user is to record for it, the command that measures it, and what that does.
@@ -142,6 +142,7 @@ class Guide {
 
   int run_camera(const CalibrateOptions& options) const {
     CalibrateCameraOptions camera;
+    static_cast<FrameOptions&>(camera) = options_;
     camera.inputs = {options.input}, camera.rig = options.rig;
     camera.board = options_.board, camera.square_mm = options_.square_mm, camera.dictionary = options_.aruco;
     return calibrate_camera(camera);
@@ -156,6 +157,8 @@ class Guide {
     if (!check && !camera) all.insert(all.end(), {"--out", options_.rig});
     if (!step.joints.empty()) all.insert(all.end(), {"--joints", step.joints});
     all.insert(all.end(), step.arguments.begin(), step.arguments.end());
+    if (!options_.colour_matrix.empty()) all.insert(all.end(), {"--colour-matrix", options_.colour_matrix});
+    if (!options_.chroma_location.empty()) all.insert(all.end(), {"--chroma-location", options_.chroma_location});
     if (camera) return all;
     if (!options_.instrument.empty()) all.insert(all.end(), {"--instrument", options_.instrument});
     if (options_.deinterlace) all.push_back("--deinterlace");
@@ -165,9 +168,10 @@ class Guide {
 
   CalibrateOptions options_of(const Step& step) const {
     CalibrateOptions options;
+    static_cast<FrameOptions&>(options) = options_;
     options.input = *step.input, options.rig = options_.rig, options.joints = step.joints;
     if (step.name != "check") options.out = options_.rig;
-    options.instrument = options_.instrument, options.fps = options_.fps, options.deinterlace = options_.deinterlace;
+    options.instrument = options_.instrument;
     if (step.name == "check") options.report = options_.report;
     return options;
   }
@@ -308,6 +312,7 @@ void add_calibrate_all(Command parent, Run& run_later) {
   command.add_option("--joint-limits", options->joint_limits, "For --enable-motion: YAML of the arm's joints");
   command.add_option("--report", options->report, "The check's HTML page with figures");
   command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
+  add_video_options(command, *options);
   command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
   command.add_option("--fps", options->fps, "Frames per second of folders of pictures")
       .shows_default()

@@ -55,9 +55,8 @@ void check_files(const CalibrateCameraOptions& options, const std::optional<Rig>
   files.refuse_as_output(options.camera_info);
 }
 
-void look_at(const std::string& input, const std::string& image_topic, const Camera* camera,
-             BoardRecordings& recordings) {
-  const auto source = open_frames(input, 30, image_topic, camera);
+void look_at(const std::string& input, const FrameOptions& options, const Camera* camera, BoardRecordings& recordings) {
+  const auto source = open_frames(input, options, camera);
   recordings.look_at(*source, input, watched_job(),
                      [](const std::string& wanted) { std::fprintf(stderr, "lapservo: %s\n", wanted.c_str()); });
   if (!recordings.read().stopped) say_complaint(input, recordings.read().complaint);
@@ -113,7 +112,7 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   const Camera before = rig ? rig->camera : Camera{};
   BoardRecordings recordings(board, options.views, rig);
   for (const std::string& input : options.inputs) {
-    look_at(input, options.image_topic, rig ? &rig->camera : nullptr, recordings);
+    look_at(input, options, rig ? &rig->camera : nullptr, recordings);
     if (recordings.read().stopped) break;
   }
   const auto without_board = recordings.without_board();
@@ -139,6 +138,7 @@ void add_calibrate_camera(Command parent, Run& run_later) {
                   "Pictures of the board from different sides: pictures, folders, a video, a bag, a camera or a stream")
       .required();
   add_image_topic_option(command, options->image_topic);
+  add_video_options(command, *options);
   command.add_option("--board", options->board, "Inner corners of the board, COLUMNSxROWS, for example 9x6").required();
   command.add_option("--square-mm", options->square_mm, "Width of a square").required().number_between(0.1, 1000.0);
   command.add_option("--aruco", options->dictionary, "For a ChArUco board: its markers' dictionary, as DICT_4X4_50");

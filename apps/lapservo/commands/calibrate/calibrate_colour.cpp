@@ -57,7 +57,7 @@ int calibrate_colour(const CalibrateColourOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  const auto source = open_frames(options.input, options.fps, options.image_topic, &rig.camera, options.deinterlace);
+  const auto source = open_frames(options.input, options, &rig.camera);
   std::optional<LiveView> view;
   if (options.view) view.emplace("calibrate colour", "`lapservo check --out` writes a page with the segmentation");
   AtomicFile out(options.out);

@@ -3,16 +3,15 @@
 #include <string>
 
 #include "apps/lapservo/cli/subcommands.h"
+#include "apps/lapservo/inputs/frame_input.h"
 #include "lapservo/calibration/recording/frame_recording.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::app {
 
 /// What the subcommands that measure one instrument of a rig from frames are told.
-struct CalibrateOptions {
-  std::string input, rig, out, instrument, joints, report, image_topic, joint_topic;
-  double fps = 30;
-  bool deinterlace = false;
+struct CalibrateOptions : FrameOptions {
+  std::string input, rig, out, instrument, joints, report, joint_topic;
 };
 
 /// All but the input and the joints, which each subcommand describes itself.

@@ -42,7 +42,7 @@ int calibrate_marker(const CalibrateOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  const auto source = open_frames(options.input, options.fps, options.image_topic, &rig.camera, options.deinterlace);
+  const auto source = open_frames(options.input, options, &rig.camera);
   const auto joints = joints_of_turn(options, instrument, *source);
   AtomicFile out(options.out);
   watch_for_interrupts();

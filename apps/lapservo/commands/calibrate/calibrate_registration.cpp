@@ -61,9 +61,7 @@ int calibrate_registration(const CalibrateOptions& options) {
   const std::size_t index = instrument_meant(rig, options);
   Instrument instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
-  const auto frames = is_table(options.input) ? nullptr
-                                              : open_frames(options.input, options.fps, options.image_topic,
-                                                            &rig.camera, options.deinterlace);
+  const auto frames = is_table(options.input) ? nullptr : open_frames(options.input, options, &rig.camera);
   const auto joints = find_joint_input(options, instrument, frames.get());
   if (joints) instrument.joints = joints->joints;
   AtomicFile out(options.out);

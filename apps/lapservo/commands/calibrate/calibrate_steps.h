@@ -9,9 +9,9 @@
 
 namespace lapservo::app {
 
-struct CalibrateCameraOptions {
+struct CalibrateCameraOptions : FrameOptions {
   std::vector<std::string> inputs;
-  std::string rig, out, camera_info, board, dictionary, image_topic;
+  std::string rig, out, camera_info, board, dictionary;
   double square_mm = 0;
   std::optional<double> marker_mm;
   std::size_t views = 30;
