@@ -10,6 +10,7 @@
 
 #include "lapservo/crtk/messages.h"
 #include "lapservo/io/frame_source.h"
+#include "lapservo/stream/image_stream.h"
 
 namespace lapservo::internal {
 
@@ -28,7 +29,8 @@ class LiveCamera {
   /// Nothing while images may come. Then why none does any more, in one line; empty when that is how it should end.
   virtual std::optional<std::string> ended() const = 0;
   /// The next image, where the camera was opened without a sink; nothing when none comes within that time.
-  virtual std::optional<ImageMessage> take(std::chrono::milliseconds patience) = 0;
+  /// Its time is the stamp of open_camera()'s images.
+  virtual std::optional<StampedImage> take(std::chrono::milliseconds patience) = 0;
   /// As the camera announces it, else 30.
   virtual double frames_per_second() const = 0;
 };

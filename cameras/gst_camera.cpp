@@ -2,6 +2,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <gst/app/gstappsink.h>
 #include <gst/gst.h>
 #include <gst/video/video.h>
@@ -112,12 +113,18 @@ constexpr std::array layouts{Layout{GST_VIDEO_FORMAT_I420, YuvPicture::Layout::p
 constexpr const char* formats = "{BGR,I420,Y42B,Y444,NV12,YUY2,UYVY}";
 
 // GStreamer's own conversion to RGB is off by up to 5, and repeats chroma of some formats.
-bool convert(const GstVideoFrame& frame, const cv::Size& size, cv::Mat& bgr) {
+bool convert(const GstVideoFrame& frame, cv::Mat& bgr) {
   const GstVideoInfo& info = frame.info;
+  if (GST_VIDEO_INFO_IS_RGB(&info)) {
+    cv::Mat(bgr.size(), CV_8UC3, GST_VIDEO_FRAME_PLANE_DATA(&frame, 0),
+            static_cast<std::size_t>(GST_VIDEO_FRAME_PLANE_STRIDE(&frame, 0)))
+        .copyTo(bgr);
+    return true;
+  }
   const auto found = std::find_if(layouts.begin(), layouts.end(),
                                   [&](const Layout& known) { return known.format == GST_VIDEO_INFO_FORMAT(&info); });
   if (found == layouts.end()) return false;
-  YuvPicture picture{found->layout, size};
+  YuvPicture picture{found->layout, bgr.size()};
   for (guint i = 0; i < GST_VIDEO_FRAME_N_PLANES(&frame); ++i) {
     picture.planes[i] = static_cast<const std::uint8_t*>(GST_VIDEO_FRAME_PLANE_DATA(&frame, i));
     picture.steps[i] = GST_VIDEO_FRAME_PLANE_STRIDE(&frame, i);
@@ -160,9 +167,13 @@ class GstCamera : public LiveCamera {
     return ended_;
   }
 
-  std::optional<ImageMessage> take(std::chrono::milliseconds patience) override {
-    const Sample sample(gst_app_sink_try_pull_sample(app_sink(), std::chrono::nanoseconds(patience).count()));
-    return sample ? image_of(*sample) : std::nullopt;
+  std::optional<StampedImage> take(std::chrono::milliseconds patience) override {
+    StampedImage image;
+    const bool came = take(patience, image.time_s, [&](const cv::Size& size) {
+      image.bgr.create(size, CV_8UC3);
+      return image.bgr;
+    });
+    return came ? std::optional(std::move(image)) : std::nullopt;
   }
 
   double frames_per_second() const override {
@@ -192,7 +203,16 @@ class GstCamera : public LiveCamera {
     GstAppSinkCallbacks callbacks{};
     callbacks.new_sample = [](GstAppSink*, gpointer camera) {
       auto& self = *static_cast<GstCamera*>(camera);
-      if (auto image = self.take({})) self.sink_(std::move(*image));
+      ImageMessage message;
+      message.encoding = "bgr8";
+      const bool came = self.take(std::chrono::milliseconds(0), message.stamp_s, [&](const cv::Size& size) {
+        message.width = static_cast<std::uint32_t>(size.width);
+        message.height = static_cast<std::uint32_t>(size.height);
+        message.step = 3 * message.width;
+        message.data.resize(std::size_t{message.step} * message.height);
+        return cv::Mat(size, CV_8UC3, message.data.data());
+      });
+      if (came) self.sink_(std::move(message));
       return GST_FLOW_OK;
     };
     gst_app_sink_set_callbacks(app_sink(), &callbacks, this, nullptr);
@@ -230,32 +250,20 @@ class GstCamera : public LiveCamera {
     throw InputError(camera_, "gives no images (" + why + "), expected " + expected);
   }
 
-  std::optional<ImageMessage> image_of(GstSample& sample) const {
+  // The next image, in 8-bit BGR into what `place` returns for its size; false when none comes.
+  bool take(std::chrono::milliseconds patience, double& stamp_s,
+            const std::function<cv::Mat(const cv::Size&)>& place) const {
+    const Sample sample(gst_app_sink_try_pull_sample(app_sink(), std::chrono::nanoseconds(patience).count()));
     GstVideoInfo info;
     GstVideoFrame frame;
-    if (!gst_video_info_from_caps(&info, gst_sample_get_caps(&sample)) ||
-        !gst_video_frame_map(&frame, &info, gst_sample_get_buffer(&sample), GST_MAP_READ))
-      return std::nullopt;
-    const int width = GST_VIDEO_FRAME_WIDTH(&frame), height = GST_VIDEO_FRAME_HEIGHT(&frame);
-    const auto step = static_cast<std::uint32_t>(3 * width);
-    ImageMessage message{stamp_of(sample),
-                         static_cast<std::uint32_t>(width),
-                         static_cast<std::uint32_t>(height),
-                         step,
-                         "bgr8",
-                         false,
-                         std::vector<std::uint8_t>(std::size_t{step} * height)};
-    cv::Mat bgr(height, width, CV_8UC3, message.data.data());
-    bool converted = true;
-    if (GST_VIDEO_INFO_IS_RGB(&info)) {
-      cv::Mat(height, width, CV_8UC3, GST_VIDEO_FRAME_PLANE_DATA(&frame, 0),
-              static_cast<std::size_t>(GST_VIDEO_FRAME_PLANE_STRIDE(&frame, 0)))
-          .copyTo(bgr);
-    } else {
-      converted = convert(frame, bgr.size(), bgr);
-    }
+    if (!sample || !gst_video_info_from_caps(&info, gst_sample_get_caps(sample.get())) ||
+        !gst_video_frame_map(&frame, &info, gst_sample_get_buffer(sample.get()), GST_MAP_READ))
+      return false;
+    stamp_s = stamp_of(*sample);
+    cv::Mat bgr = place({GST_VIDEO_FRAME_WIDTH(&frame), GST_VIDEO_FRAME_HEIGHT(&frame)});
+    const bool converted = convert(frame, bgr);
     gst_video_frame_unmap(&frame);
-    return converted ? std::optional(std::move(message)) : std::nullopt;
+    return converted;
   }
   double stamp_of(GstSample& sample) const {
     const GstSegment* const segment = gst_sample_get_segment(&sample);
