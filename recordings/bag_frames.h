@@ -21,6 +21,7 @@ class BagFrames : public FrameSource {
   std::optional<int> frame_count() const override;
   double frames_per_second() const override;
   std::string complaint() const override;
+  const std::string& topic() const { return topic_.name; }
   std::optional<double> first_stamp_s() const override { return first_->stamp_s; }
 
  private:

@@ -119,6 +119,15 @@ TEST(BagJoints, OfAnotherArmOnTheSameTopicArePassedOver) {
   EXPECT_EQ(recording.of_other_arms, 2);
 }
 
+TEST(BagJoints, OfAnotherClockThanTheImagesAreRefused) {
+  constexpr double since_1970_s = 1.7e9;
+  const std::vector<std::string> names{"a", "b", "c", "d"};
+  const std::string error = input_error([&] {
+    BagOfJoints({{since_1970_s, names, {1, 2, 3, 0.4}}, {since_1970_s + 1, names, {1, 2, 3, 0.4}}}).read();
+  });
+  EXPECT_NE(error.find("the images are stamped by the time since a computer's start"), std::string::npos) << error;
+}
+
 TEST(BagJoints, ThatAreNotThereAreMissed) {
   const std::string error = input_error([] { BagOfJoints({{100, {"a", "b", "c"}, {1, 2, 3}}}).read(); });
   EXPECT_NE(error.find("/PSM1/measured_js: has no positions of the rig's joints b, a, d, c: it names a, b, c"),

@@ -26,6 +26,19 @@ std::optional<std::array<double, 4>> chosen(const JointMessage& message, const J
   return values;
 }
 
+// Drivers that stamp by the time since the computer's start give small numbers.
+void check_clock(const JointRecording& recording, double begin_s, const std::string& source) {
+  constexpr double least_since_1970_s = 1e9;
+  const double joints_s = recording.time_s.front() + begin_s;
+  const bool images_by_start = begin_s < least_since_1970_s;
+  if (images_by_start == (joints_s < least_since_1970_s)) return;
+  throw InputError(source,
+                   fmt::format("is stamped from {:.0f} s on, but the images from {:.0f} s: the {} are stamped by "
+                               "the time since a computer's start, expected both since 1970 (let the driver stamp "
+                               "by ROS's clock, and record again)",
+                               joints_s, begin_s, images_by_start ? "images" : "joints"));
+}
+
 }  // namespace
 
 std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topic) {
@@ -63,6 +76,7 @@ JointRecording joints_in_bag(const Bag& bag, const BagTopic& topic, const Joints
   if (recording.time_s.size() < 2)
     throw InputError(source, fmt::format("has {} readings that are numbers with a stamp, expected two or more",
                                          recording.time_s.size()));
+  check_clock(recording, begin_s, source);
   check_units(recording, joints, source);
   return recording;
 }

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/io/video/video_reader.h"
@@ -15,10 +17,15 @@ using namespace internal;
 namespace {
 namespace fs = std::filesystem;
 
+struct Pictures {
+  std::vector<fs::path> files;
+  int unread = 0;  ///< beside them, of formats that are not read
+};
+
 class PictureSource : public FrameSource {
  public:
-  PictureSource(Kind kind, std::vector<fs::path> files, double fps)
-      : kind_(kind), files_(std::move(files)), fps_(fps) {}
+  PictureSource(Kind kind, Pictures pictures, double fps)
+      : kind_(kind), files_(std::move(pictures.files)), unread_(pictures.unread), fps_(fps) {}
 
   std::optional<Frame> next() override {
     if (next_ == files_.size()) return std::nullopt;
@@ -26,7 +33,16 @@ class PictureSource : public FrameSource {
     Picture picture = read_picture(file);
     Frame frame{std::move(picture.bgr), static_cast<int>(next_), static_cast<double>(next_) / fps_, file, picture.flaw};
     ++next_;
+    low_bits_ += picture.low_bits;
     return frame;
+  }
+  std::string remark() const override {
+    return unread_ == 0 ? "" : fmt::format("{} pictures in HEIC or AVIF are left out: convert them to PNG", unread_);
+  }
+  std::string complaint() const override {
+    if (low_bits_ == 0 || low_bits_ < next_) return "";
+    return "has 16 bits a channel of which at most the lower 12 are used: multiply the values by 16 where the camera "
+           "has 12 bits, by 256 where it has 8";
   }
   Kind kind() const override { return kind_; }
   std::optional<int> frame_count() const override { return static_cast<int>(files_.size()); }
@@ -35,8 +51,9 @@ class PictureSource : public FrameSource {
  private:
   Kind kind_;
   std::vector<fs::path> files_;
+  int unread_;
   double fps_;
-  std::size_t next_ = 0;
+  std::size_t next_ = 0, low_bits_ = 0;
 };
 
 class VideoSource : public FrameSource {
@@ -98,22 +115,26 @@ class StreamSource : public FrameSource {
   std::chrono::steady_clock::time_point start_;
 };
 
-std::vector<fs::path> pictures_in(const fs::path& folder) {
+Pictures pictures_in(const fs::path& folder) {
   std::vector<fs::path> files;
+  int unread = 0;
   std::error_code error;
   const fs::directory_iterator entries(folder, error);
   if (error)
     throw InputError(folder.string(), "can't be read (" + error.message() + "), expected a folder of pictures");
   for (const auto& entry : entries) {
     const bool hidden = entry.path().filename().string().starts_with(".");
-    if (!hidden && entry.is_regular_file(error) && has_image_extension(entry.path())) files.push_back(entry.path());
+    if (hidden || !entry.is_regular_file(error)) continue;
+    if (has_image_extension(entry.path())) files.push_back(entry.path());
+    unread += has_unread_extension(entry.path());
   }
   // frame9.png comes before frame10.png.
   std::sort(files.begin(), files.end(),
             [](const fs::path& a, const fs::path& b) { return strverscmp(a.c_str(), b.c_str()) < 0; });
   if (files.empty())
-    throw InputError(folder.string(), "has no pictures, expected some (png, jpg, bmp, tif, webp, ppm)");
-  return files;
+    throw InputError(folder.string(), std::string("has no pictures") + (unread > 0 ? " but in HEIC or AVIF" : "") +
+                                          ", expected some (png, jpg, bmp, tif, webp, ppm)");
+  return {std::move(files), unread};
 }
 
 }  // namespace
@@ -128,8 +149,8 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (fs::is_directory(input)) return std::make_unique<PictureSource>(Kind::folder, pictures_in(input), folder_fps);
   if (fs::is_regular_file(input) && fs::file_size(input) == 0)
     throw InputError(input, "is empty, expected a picture or a video");
-  if (has_image_extension(input))
-    return std::make_unique<PictureSource>(Kind::image, std::vector<fs::path>{input}, folder_fps);
+  if (has_image_extension(input) || has_unread_extension(input))
+    return std::make_unique<PictureSource>(Kind::image, Pictures{{input}}, folder_fps);
   if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected a picture, a folder or a video");
   return std::make_unique<VideoSource>(input, reading);
 }

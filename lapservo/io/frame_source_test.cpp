@@ -75,6 +75,37 @@ TEST(FolderSource, OrdersNumbersInNamesByValue) {
   EXPECT_EQ(order, (std::vector<int>{0, 1, 9, 10, 100}));
 }
 
+TEST(FolderSource, SaysWhatItLeavesOut) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "b.HEIC", "");
+  EXPECT_NE(testing::input_error([&] { open_frame_source(folder.path().string(), 30); }).find("but in HEIC"),
+            std::string::npos);
+  write_image(folder / "a.png", cv::Mat(16, 16, CV_8UC3, cv::Scalar(20, 120, 220)));
+  const auto source = open_frame_source(folder.path().string(), 30);
+  EXPECT_EQ(source->frame_count(), 1);
+  EXPECT_EQ(source->remark(), "1 pictures in HEIC or AVIF are left out: convert them to PNG");
+}
+
+// Of 12 bits as cameras' drivers leave them, and of 16.
+TEST(FolderSource, SaysThatTheUpperBitsAreEmpty) {
+  for (const double scale : {1.0, 16.0}) {
+    const cv::Mat picture(16, 16, CV_16UC3, cv::Scalar(300, 2000, 4095) * scale);
+    std::string ppm = "P6\n16 16\n65535\n";  // the upper byte first
+    for (std::size_t i = 0; i < picture.total() * 3; ++i)
+      for (const int shift : {8, 0}) ppm += static_cast<char>(picture.ptr<std::uint16_t>()[i] >> shift);
+    for (const char* name : {"a.png", "a.ppm"}) {
+      const testing::TemporaryFolder folder;
+      if (std::string(name) == "a.png")
+        write_image(folder / name, picture);
+      else
+        testing::write_file(folder / name, ppm);
+      const auto source = open_frame_source(folder.path().string(), 30);
+      ASSERT_TRUE(source->next());
+      EXPECT_EQ(source->complaint().find("multiply the values by 16") != std::string::npos, scale == 1) << name;
+    }
+  }
+}
+
 TEST(VideoSource, SaysThatAVideoEndsEarly) {
   const testing::TemporaryFolder folder;
   for (const char* name : {"a.mkv", "a.avi", "a.ts"}) {

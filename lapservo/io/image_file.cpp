@@ -46,8 +46,13 @@ PictureSize png_size(std::span<const std::uint8_t> bytes) {
   return {static_cast<std::uint32_t>(numbers.of(16, 4)), static_cast<std::uint32_t>(numbers.of(20, 4))};
 }
 
+struct JpegHeader {
+  PictureSize size;
+  int channels = 0;
+};
+
 // Of the first frame header (SOF); zero without one. Steps over garbage between segments as decoders do.
-PictureSize jpeg_size(std::span<const std::uint8_t> bytes) {
+JpegHeader jpeg_header(std::span<const std::uint8_t> bytes) {
   const auto two_at = [&](std::size_t at) { return std::uint32_t{bytes[at]} << 8 | std::uint32_t{bytes[at + 1]}; };
   std::size_t at = 2;
   while (at + 9 <= bytes.size()) {
@@ -58,7 +63,7 @@ PictureSize jpeg_size(std::span<const std::uint8_t> bytes) {
     } else if (stands_alone) {
       at += 2;
     } else if (marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc) {
-      return {two_at(at + 7), two_at(at + 5)};
+      return {{two_at(at + 7), two_at(at + 5)}, at + 9 < bytes.size() ? bytes[at + 9] : 0};
     } else {
       at += 2 + std::max<std::size_t>(two_at(at + 2), 2);
     }
@@ -100,15 +105,29 @@ void check_whole(std::span<const std::uint8_t> bytes, const std::string& source)
   if (is_jpeg(bytes)) {
     if (text.rfind("\xff\xd9"sv) == std::string_view::npos)
       throw InputError(source, "is a truncated JPEG, expected a whole picture");
-    check_size(jpeg_size(bytes), source);
+    check_size(jpeg_header(bytes).size, source);
   }
   if (const std::string format = libav_format(bytes); bytes.size() < least_bytes(bytes, format))
     throw InputError(source, "is a truncated " + format + ", expected a whole picture");
   if (!tiff_has_its_rows(bytes)) throw InputError(source, "is a truncated TIFF, expected a whole picture");
 }
 
+// "HEIC" or "AVIF" by the brand that follows the box of the file's type; else empty.
+std::string unread_format(std::span<const std::uint8_t> bytes) {
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), std::min<std::size_t>(bytes.size(), 12));
+  if (text.size() < 12 || text.substr(4, 4) != "ftyp") return "";
+  const std::string_view brand = text.substr(8);
+  if (brand == "avif" || brand == "avis") return "AVIF";
+  constexpr std::array<std::string_view, 8> heic{"heic", "heix", "heim", "heis", "hevc", "hevx", "mif1", "msf1"};
+  return std::find(heic.begin(), heic.end(), brand) != heic.end() ? "HEIC" : "";
+}
+
 // FFmpeg takes all samples for unsigned, and YCbCr for a video's.
 void refuse_misread(std::span<const std::uint8_t> bytes, const std::string& source) {
+  if (const std::string format = unread_format(bytes); !format.empty())
+    throw InputError(source, "is in " + format + ", which is not read: convert it to PNG");
+  if (is_jpeg(bytes) && jpeg_header(bytes).channels == 4)
+    throw InputError(source, "is a JPEG in CMYK, which is not read: convert it to PNG in RGB");
   constexpr std::size_t photometric = 262, sample_format = 339, ycbcr = 6, is_unsigned = 1;
   if (tiff_value(bytes, sample_format).value_or(is_unsigned) != is_unsigned) refuse_pixel_type(source);
   if (tiff_value(bytes, photometric) == ycbcr)
@@ -128,6 +147,11 @@ bool has_image_extension(const fs::path& path) {
                                                          ".tiff", ".webp", ".ppm",  ".pgm"};
   const std::string extension = lower_case(path.extension().string());
   return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+bool has_unread_extension(const fs::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  return extension == ".heic" || extension == ".heif" || extension == ".avif";
 }
 
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
@@ -182,6 +206,10 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
     throw InputError(source, "can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM picture");
   check_size({static_cast<std::uint32_t>(decoded.bgr.cols), static_cast<std::uint32_t>(decoded.bgr.rows)}, source);
   Picture picture{bgr8_from(decoded.bgr, source), std::nullopt};
+  constexpr std::size_t png_depth = 24;
+  const bool is_deep = is_png(bytes) ? bytes[png_depth] == 16 : decoded.bgr.depth() == CV_16U;
+  constexpr double most_of_12_bits = 16;  // of 255
+  picture.low_bits = is_deep && cv::norm(picture.bgr, cv::NORM_INF) <= most_of_12_bits;
   if (!decoded.complaint.empty()) {
     picture.flaw = Status::damaged;
   } else if (has_few_colors(picture.bgr)) {

@@ -15,17 +15,21 @@ namespace lapservo {
 /// Whether the name ends like a picture's (png, jpg, jpeg, bmp, tif, tiff, webp, ppm, pgm).
 bool has_image_extension(const std::filesystem::path& path);
 
+/// Whether the name ends like that of a picture in HEIC or AVIF, which are not read.
+bool has_unread_extension(const std::filesystem::path& path);
+
 /// A picture in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained, `few_colors`
 /// when it has no more colours than a palette.
 struct Picture {
   cv::Mat bgr;
   std::optional<Status> flaw;
+  bool low_bits = false;  ///< 16 bits a channel, of which the values use no more than the lower 12
 };
 
 /// Decodes a picture. Grey is repeated over the channels, alpha dropped, 16-bit rounded to 8. Throws InputError for
 /// anything that isn't a whole picture of the camera's pixels: empty, larger than 256 MiB, truncated (PNG without its
-/// end chunk, JPEG without its end marker), not decodable, other pixel types, or to be turned by EXIF, as a calibration
-/// belongs to the pixels in one orientation and nobody can tell to which.
+/// end chunk, JPEG without its end marker), not decodable, HEIC, CMYK, other pixel types, or to be turned by EXIF, as a
+/// calibration belongs to the pixels in one orientation and nobody can tell to which.
 Picture read_picture(const std::filesystem::path& path);
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source);
 

@@ -231,6 +231,17 @@ TEST(Image, IsRefusedWhenItIsSomethingElse) {
             "p: channels: is 2, expected 1 (grey), 3 or 4 (alpha)");
 }
 
+TEST(Image, OfAFormatThatIsNotReadIsNamed) {
+  const std::string heic = std::string("\0\0\0\x18", 4) + "ftypheic" + std::string(40, '\0');
+  EXPECT_EQ(refusal(Bytes(heic.begin(), heic.end())), "p: is in HEIC, which is not read: convert it to PNG");
+  Bytes jpeg = encoded(cv::Mat(16, 16, CV_8UC3, cv::Scalar(20, 120, 220)), ".jpg");
+  const Bytes frame_header{0xff, 0xc0};
+  const auto at = std::search(jpeg.begin(), jpeg.end(), frame_header.begin(), frame_header.end());
+  ASSERT_NE(at, jpeg.end());
+  at[9] = 4;
+  EXPECT_EQ(refusal(jpeg), "p: is a JPEG in CMYK, which is not read: convert it to PNG in RGB");
+}
+
 // A TIFF of one strip, whose directory follows a text: a tag among those of ours is one that says what samples are.
 TEST(Image, OfFloatingPointOrInTilesIsRefused) {
   const cv::Mat image(4, 4, CV_8UC3, cv::Scalar(20, 120, 220));

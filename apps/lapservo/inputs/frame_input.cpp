@@ -14,7 +14,11 @@ namespace lapservo::app {
 using namespace internal;
 
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera) {
-  if (is_bag(input)) return read_ahead(std::make_unique<BagFrames>(open_bag(input), options.image_topic));
+  if (is_bag(input)) {
+    auto frames = std::make_unique<BagFrames>(open_bag(input), options.image_topic);
+    say_if_undistorted(frames->topic(), camera);
+    return read_ahead(std::move(frames));
+  }
   refuse_topic_outside_bags("--image-topic", options.image_topic, input);
   const cv::Size size = camera ? cv::Size(camera->width_px, camera->height_px) : cv::Size();
   const VideoReading reading{options.deinterlace || (camera && camera->deinterlace), options.colour_matrix,
@@ -23,6 +27,15 @@ std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOp
   if (const std::string remark = source->remark(); !remark.empty())
     std::fprintf(stderr, "lapservo: %s: %s\n", input.c_str(), remark.c_str());
   return source->kind() == FrameSource::Kind::live ? std::move(source) : read_ahead(std::move(source));
+}
+
+void say_if_undistorted(const std::string& topic, const Camera* camera) {
+  if (!camera || !camera->distorted() || topic.find("image_rect") == std::string::npos) return;
+  std::fprintf(
+      stderr,
+      "lapservo: %s: its images are undistorted by its name, but the rig's camera has distortion_coefficients: "
+      "take the raw topic (image_raw), or a rig of the undistorted camera\n",
+      topic.c_str());
 }
 
 void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input) {

@@ -21,6 +21,10 @@ struct FrameOptions {
 /// the rig's, whose size a camera's images shall have; null where none is known.
 std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOptions& options, const Camera* camera);
 
+/// Says on stderr when a topic's name (image_rect, image_rect_color) is that of undistorted images, which do not go
+/// with a camera that distorts. `camera`: the rig's, or null.
+void say_if_undistorted(const std::string& topic, const Camera* camera);
+
 /// Throws InputError naming `option` where it names a topic although `input` is no bag.
 void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input);
 

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/core/error.h"
 
@@ -42,7 +43,9 @@ LiveImages::LiveImages(const std::string& text, const std::string& option, const
                        Transports& transports)
     : clock_(clock),
       receiver_(camera.width_px, camera.height_px, names_topic(text) ? StampsBy::sender : StampsBy::loop),
-      input_(open_images(text, option, {camera.width_px, camera.height_px}, transports, sink())) {}
+      input_(open_images(text, option, {camera.width_px, camera.height_px}, transports, sink())) {
+  if (names_topic(text)) say_if_undistorted(text, &camera);
+}
 
 ImageSink LiveImages::sink() {
   return {[this](ImageMessage&& message) { receiver_.receive(std::move(message), clock_.now_s()); },
