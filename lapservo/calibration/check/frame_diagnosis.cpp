@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
+#include "lapservo/calibration/check/other_bands.h"
 #include "lapservo/calibration/registration/timed_pose.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/vision/tracker.h"
@@ -133,7 +134,7 @@ std::string FrameDiagnosis::cause_in_frames() const {
   for (const Reading& reading : readings())
     if (2 * found_in(kept_, rig_, deinterlaced_, reading.read) > static_cast<int>(kept_.size()))
       return reading.cause_and_remedy;
-  return "";
+  return seen_other_bands(kept_, rig_, deinterlaced_);
 }
 
 std::string FrameDiagnosis::text_of_missed_rcm() const {

@@ -70,6 +70,15 @@ TEST_F(FrameDiagnosisTest, PointsAtTheHuesWhereTheMarkerIsAnother) {
   expect_names(text(other, [](cv::Mat&) {}), "hues_deg");
 }
 
+TEST_F(FrameDiagnosisTest, NamesTheBandsWhereThePrintIsAnother) {
+  Rig other = rig;
+  Marker& marker = other.instruments[0].marker;
+  const double length_m = marker.length_m();
+  marker.bands_upper_m = {0.1 * length_m, 0.3 * length_m, 0.6 * length_m};
+  marker.bands_lower_m = {0.2 * length_m, 0.6 * length_m, 0.2 * length_m};
+  expect_names(text(other, [](cv::Mat&) {}), "its bands do not fit");
+}
+
 TEST_F(FrameDiagnosisTest, NamesDeinterlacing) {
   FrameDiagnosis diagnosis(rig);
   Observation interlaced;

@@ -1,0 +1,16 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "lapservo/rig/rig.h"
+
+namespace lapservo::internal {
+
+/// Where most of these frames, 8-bit BGR, show an instrument's colours in their order but with bands that its marker
+/// has at no azimuth: one line with the lengths that are seen. Else empty.
+std::string seen_other_bands(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlaced);
+
+}  // namespace lapservo::internal
