@@ -22,7 +22,7 @@
 
 #include "acceptance/tool_test.h"
 #include "lapservo/core/csv.h"
-#include "lapservo/testing/boards.h"
+#include "lapservo/sim/boards.h"
 #ifdef LAPSERVO_TEST_BAGS
 #include <fmt/format.h>
 
@@ -694,8 +694,8 @@ TEST_F(CommandLine, CalibratesACamera) {
   camera.response = {Response::Kind::rec709};
   fs::create_directories("in/boards");
   int number = 0;
-  for (const Rigid3& pose : boards::different_poses({}, camera, 5, 3))
-    cv::imwrite("in/boards/" + std::to_string(number++) + ".png", boards::render({}, camera, pose, 7));
+  for (const Rigid3& pose : board_poses({}, camera, 5, 3))
+    cv::imwrite("in/boards/" + std::to_string(number++) + ".png", render_board({}, camera, pose, 7));
   cv::imwrite("in/boards/9.png", cv::Mat(480, 640, CV_8UC3, cv::Scalar(90, 90, 90)));
   const std::string rig = in("rig.yaml", R"(camera:
   image_width: 640
@@ -737,6 +737,27 @@ TEST_F(CommandLine, CalibrateAllRefusesARigThatCanNotBeReplaced) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   expect_refused("calibrate all --no-questions --rig " + pipe,
                  {"pipe: is a pipe or a device", "each step replaces it"});
+}
+
+// Without a recording there is nothing to do, and a rig that somebody edits is another.
+TEST_F(CommandLine, CalibrateAllSaysWhatItDidNot) {
+  const std::string start =
+      "calibrate all --no-questions --rig " + in("mine.yaml", read_file("configs/example.yaml"));
+  expect_done(start);
+  expect_in(output(), "camera: left out; --boards names");
+  EXPECT_FALSE(fs::exists("in/mine.calibration.yaml"));
+  in("mine.calibration.yaml", "rig: another\nsteps:\n  - {name: camera, command: a, inputs: b, when: 2026}\n");
+  expect_done(start);
+  expect_in(output(), "mine.yaml is not as the last step left it");
+  write_grey("in/grey.png");
+  expect_refused(start + " --boards in/grey.png", {"needs --board and --square-mm"});
+  expect_refused(start + " --redo marker", {"--redo: marker needs --turn"});
+  expect_refused(start + " --turn /dev/video0", {"expected a folder with files"});
+}
+
+TEST_F(CommandLine, SamplesGoIntoAnEmptyFolder) {
+  in("kept", "");
+  expect_refused("sample in", {"in: is not empty, expected a new or an empty folder"});
 }
 
 TEST_F(CommandLine, CalibrateCameraRefusesBadInput) {

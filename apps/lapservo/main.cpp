@@ -81,6 +81,7 @@ int parse_and_run(int argc, char** argv) {
   lapservo::app::add_record(program, run);
 #endif
   lapservo::app::add_render(program, run);
+  lapservo::app::add_sample(program, run);
   lapservo::app::add_servo(program, run);
   lapservo::app::add_sim_robot(program, run);
   lapservo::app::add_marker(program, run);

@@ -1,21 +1,17 @@
 #!/bin/sh
-# Makes the pictures of docs/tutorial.md with the tools themselves, from the recordings of their test.
-# Usage: docs/tutorial/pictures.sh [BUILD]     needs chromium for the page
+# Makes the pictures of docs/tutorial.md by the commands of the page.
+# Usage: docs/tutorial/pictures.sh [BUILD]     needs chromium and ffmpeg
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 build=$(cd "${1:-build}" && pwd)
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Everything that the page's commands make; what the test says of pictures that are missing does not count here.
-LAPSERVO_TUTORIAL_FOLDER=$work "$build/acceptance/tutorial_test" --gtest_filter='*EveryCommand*' || true
-
-cp "$work/marker.png" "$here/marker.png"
-# A frame as JPEG, so that the overlay is one.
-sed -n '1p;30p' "$work/swing_poses.csv" >"$work/one.csv"
-"$build/lapservo" render --rig "$work/truth.yaml" --poses "$work/one.csv" --format jpg --out "$work/one"
-"$build/lapservo" track "$work/one" --rig "$work/rig.yaml" --out "$work/one.obs.csv" --overlay "$work/one.overlay"
-cp "$work/one.overlay/0000.jpg" "$here/overlay.jpg"
+export PATH="$build:$PATH"
+AUTOPKGTEST_TMP=$work "$here/../../debian/tests/pages" "$here/../tutorial.md"
+cd "$work/tutorial/morning"
+cp marker.png "$here/marker.png"
+ffmpeg -loglevel error -y -ss 1 -i overlay.mp4 -frames:v 1 -q:v 4 "$here/overlay.jpg"
 chromium --headless --no-sandbox --disable-gpu --force-device-scale-factor=0.6 --window-size=1150,1500 \
-  --screenshot="$here/check.png" "file://$work/check.html"
+  --screenshot="$here/check.png" "file://$PWD/check.html"
 ls -l "$here"

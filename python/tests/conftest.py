@@ -1,4 +1,6 @@
+import os
 import pathlib
+import subprocess
 
 import hypothesis
 import numpy as np
@@ -15,6 +17,14 @@ Q = np.array([0.05, 1.57, 0.064, 1.2])
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "wire: loops through a robot's wire in real time")
+
+
+@pytest.fixture(scope="session")
+def sample(tmp_path_factory):
+    """The tutorial's recordings."""
+    folder = tmp_path_factory.mktemp("recorded") / "sample"
+    subprocess.run([os.environ["LAPSERVO_TOOL"], "sample", folder], check=True, capture_output=True)
+    return folder
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from recordings import DELAY_S, FPS, TOOL, Recordings, board_pictures, scaled_rig, swinging, turning
+from recordings import DELAY_S, FPS, TOOL, Recordings, swinging, turning
 
 import lapservo
 
@@ -100,22 +100,20 @@ def test_a_print_is_the_command_lines(recordings):
     assert result.seam_may_lag is False
 
 
-def test_a_camera_is_the_command_lines(recordings, tmp_path):
-    camera = scaled_rig(0.5).camera
-    folder = tmp_path / "boards"
-    folder.mkdir()
-    pictures = board_pictures(camera)
-    for i, picture in enumerate(pictures):
-        (folder / f"{i}.png").write_bytes(lapservo.Picture(picture)._repr_png_())
-    small = scaled_rig(0.5)
-    (tmp_path / "rig.yaml").write_text(small.to_yaml())
-    subprocess.run([TOOL, "calibrate", "camera", folder, "--board", "9x6", "--square-mm", "5", "--rig", tmp_path / "rig.yaml",
-                    "--out", tmp_path / "commanded.yaml"], check=True, capture_output=True)
-    result = lapservo.calibrate_camera(pictures, "9x6", 0.005, rig=tmp_path / "rig.yaml")
+@pytest.fixture(scope="module")
+def boards(sample):
+    return [lapservo.read_image(path) for path in sorted((sample / "boards").iterdir())]
+
+
+def test_a_camera_is_the_command_lines(sample, boards, tmp_path):
+    rig = lapservo.Rig.load(sample / "truth.yaml")
+    subprocess.run([TOOL, "calibrate", "camera", sample / "boards", "--board", "9x6", "--square-mm", "5", "--rig",
+                    sample / "truth.yaml", "--out", tmp_path / "commanded.yaml"], check=True, capture_output=True)
+    result = lapservo.calibrate_camera(boards, "9x6", 0.005, rig=sample / "truth.yaml")
     result.save(tmp_path / "saved.yaml")
     assert (tmp_path / "saved.yaml").read_bytes() == (tmp_path / "commanded.yaml").read_bytes()
-    expect_whole(result, small)
-    assert result.camera.matrix[0, 0] == pytest.approx(camera.matrix[0, 0], rel=5e-3) and len(result.views) == 6
+    expect_whole(result, rig)
+    assert result.camera.matrix[0, 0] == pytest.approx(rig.camera.matrix[0, 0], rel=1e-3) and len(result.views) == 12
     assert np.array_equal(pickle.loads(pickle.dumps(result)).camera.matrix, result.camera.matrix)
 
 
@@ -148,13 +146,12 @@ def test_a_cameras_own_file_is_named_from_anywhere_and_never_written_over(record
     assert lens.read_bytes() == before
 
 
-def test_a_fit_asks_for_signals():
-    pictures = board_pictures(scaled_rig(0.5).camera)
+def test_a_fit_asks_for_signals(boards):
     asked = []
     before = signal.signal(signal.SIGALRM, lambda *_: asked.append(True))
     signal.setitimer(signal.ITIMER_REAL, 1e-3, 1e-3)
     try:
-        lapservo.calibrate_camera(pictures, "9x6", 0.005)
+        lapservo.calibrate_camera(boards[:6], "9x6", 0.005)
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)

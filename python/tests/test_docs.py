@@ -1,7 +1,6 @@
 """Every block of commands and code in README.md, CONTRIBUTING.md and docs/ is run, in its page's order.
 
-A page has a folder with what it takes for granted. Recordings are folders of pictures, whatever their names end in: what
-compression does to a calibration is measured elsewhere. What is not run, or not to its end, stands in lists with the reason: here,
+A page has a folder with what it takes for granted: the recordings of `lapservo sample`. What is not run, or not to its end, stands in lists with the reason: here,
 and in doc_shell.py. A block that is in no list and does not run fails.
 """
 
@@ -9,18 +8,19 @@ import re
 import shutil
 import subprocess
 import sys
+import textwrap
 
+import numpy as np
 import pytest
 from conftest import SOURCE
 from doc_blocks import BLOCKS, PAGES
 from doc_shell import BUILD, Shell
-from recordings import Recordings, board_pictures, swinging
 
 import lapservo
 
 #: Pages that a test of their own runs from the first block to the last, and the languages that it knows.
-ELSEWHERE = {"tutorial.md": ("acceptance/tutorial_test.cpp", ["yaml", "sh", "sh", "sh", "sh", "sh", "sh"]),
-             "quickstart.md": ("debian/tests/quickstart", ["text", "sh", "python", "cpp", "sh", "sh"])}
+ELSEWHERE = {"tutorial.md": ("debian/tests/pages", ["sh", "sh", "yaml", "sh", "sh", "sh", "sh", "sh", "sh"]),
+             "quickstart.md": ("debian/tests/pages", ["text", "sh", "python", "cpp", "sh", "sh"])}
 
 #: Blocks that are no code, by page and first line.
 TEXT = {("README.md", "lapservo/core geometry marker kinematics rcm rig   values: no images, no control"): "the folders",
@@ -48,7 +48,6 @@ SHOWN_FILE = re.compile(r"^\[.*\]\(\.\./((?:examples|transports)/.*\.[a-z]+)\)$"
 
 RUN = ("sh", "python", "cpp", "yaml")
 WIRE = re.compile(r"ros[12]:|sim-robot")  # in real time
-FRAMES, FPS = 72, 30  # as the calibration's tests have: of 50 the registration is known just to its limit
 
 
 def reason_not_run(command):
@@ -92,30 +91,19 @@ def test_the_lists_name_what_there_is():
         assert [block.language for block in BLOCKS if block.page.name == page] == languages
 
 
-@pytest.fixture(scope="session")
-def recorded(tmp_path_factory):
-    recordings = Recordings(tmp_path_factory.mktemp("recorded"))
-    recordings.record("swing", swinging, FRAMES, as_if_fps=FPS)
-    boards = recordings.folder / "boards"
-    boards.mkdir()
-    for i, picture in enumerate(board_pictures(recordings.rig.camera)):
-        (boards / f"{i}.png").write_bytes(lapservo.Picture(picture)._repr_png_())
-    return recordings
-
-
-def furnish(folder, recorded):
+def furnish(folder, sample):
     (folder / "configs").symlink_to(SOURCE / "configs")
     (folder / "build").symlink_to(BUILD)
     (folder / "arm.yaml").symlink_to(SOURCE / "configs" / "paper.yaml")
     for name in ("boards", "boards.mp4"):
-        (folder / name).symlink_to(recorded.folder / "boards")
-    for name in ("swing.mp4", "motion.mp4", "turn.mp4", "turn"):
-        shutil.copytree(recorded.folder / "swing", folder / name, ignore=shutil.ignore_patterns("rig.yaml", "truth.csv"))
+        (folder / name).symlink_to(sample / "boards")
+    for name in ("swing.mp4", "motion.mp4", "turn.mp4"):
+        (folder / name).symlink_to(sample / "video.mp4")
     for name in ("joints.csv", "turn_joints.csv"):
-        shutil.copy(recorded.folder / "swing_joints.csv", folder / name)
+        (folder / name).symlink_to(sample / "swing_joints.csv")
     (folder / "swing.bag").symlink_to("swing")
     for name in ("rig.yaml", "my_rig.yaml", "designed.yaml"):
-        shutil.copy(recorded.folder / "rig.yaml", folder / name)
+        shutil.copy(sample / "truth.yaml", folder / name)
 
 
 def run_cpp(block, folder):
@@ -139,7 +127,7 @@ def run_python(block, folder, environment):
 @pytest.mark.parametrize("blocks", [page_parameter(page) for page in PAGES if page.name not in ELSEWHERE])
 def test_every_block_runs(blocks, request, tmp_path):
     if blocks:
-        furnish(tmp_path, request.getfixturevalue("recorded"))
+        furnish(tmp_path, request.getfixturevalue("sample"))
     shell = Shell(tmp_path)
     for block in blocks:
         print(block.where, flush=True)
@@ -152,3 +140,56 @@ def test_every_block_runs(blocks, request, tmp_path):
         else:
             shell.run_all(run_lines([block]))
     shutil.rmtree(tmp_path / "swing", ignore_errors=True)  # half a gigabyte of images
+
+
+@pytest.fixture(scope="module")
+def tutorial(tmp_path_factory):
+    """The folder of the tutorial's end, what its commands printed, and a shell."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    shell = Shell(folder)
+    done = subprocess.run([SOURCE / "debian" / "tests" / "pages", SOURCE / "docs" / "tutorial.md"], text=True, capture_output=True,
+                          env=shell.environment | {"AUTOPKGTEST_TMP": str(folder)})
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "tutorial" / "morning", done.stdout, shell
+
+
+@pytest.mark.wire
+def test_the_tutorials_rig_is_the_true_one(tutorial):
+    folder, said, _ = tutorial
+    found, true = (lapservo.Rig.load(folder / name) for name in ("rig.yaml", "truth.yaml"))
+    assert found.camera.matrix[0, 0] == pytest.approx(true.camera.matrix[0, 0], abs=1)
+    found, true = found.instruments[0], true.instruments[0]
+    assert np.allclose(found.marker.hues_deg, true.marker.hues_deg, atol=4)
+    assert np.allclose(found.marker.bands_upper_m, true.marker.bands_upper_m, atol=5e-5)
+    assert np.linalg.norm((found.camera_from_rcm - true.camera_from_rcm)[:3, 3]) < 0.6e-3
+    assert list(found.joints.sign) == list(true.joints.sign)
+    assert found.image_delay_s == pytest.approx(true.image_delay_s, abs=5e-3)
+    designed = re.search(r"^marker:\n((?:  .*\n)+)", said, re.MULTILINE)[1]
+    first_rig = next(block.text for block in BLOCKS if block.page.name == "tutorial.md" and block.language == "yaml")
+    assert textwrap.indent(designed, "    ") in first_rig
+
+
+@pytest.mark.wire
+def test_calibrate_all_goes_on_where_it_stopped(tutorial):
+    folder, _, shell = tutorial
+    whole = next(line for block in BLOCKS if block.page.name == "tutorial.md" for line in block.commands()
+                 if line.startswith("lapservo calibrate all "))
+
+    def run(arguments=""):
+        done = subprocess.run(whole + arguments, shell=True, cwd=folder, env=shell.environment, text=True, capture_output=True)
+        return done.returncode, done.stdout
+
+    def done_before(said):
+        return re.findall(r"^(\w+): done on 2", said, re.MULTILINE)
+
+    rig = (folder / "rig.yaml").read_bytes()
+    code, said = run()
+    assert code == 0 and done_before(said) == ["camera", "colour", "marker", "registration", "check"], said
+    assert (folder / "rig.yaml").read_bytes() == rig
+    (folder / "swing_joints.csv").rename(folder / "elsewhere.csv")
+    code, said = run(" --redo marker")
+    record = (folder / "rig.calibration.yaml").read_text()
+    assert code == 2 and "name: marker" in record and "name: registration" not in record, said
+    (folder / "elsewhere.csv").rename(folder / "swing_joints.csv")
+    code, said = run()
+    assert code == 0 and done_before(said) == ["camera", "colour", "marker"] and "\ngood enough\n" in said, said

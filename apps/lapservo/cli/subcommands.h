@@ -17,6 +17,7 @@ void add_experiment(Command app, Run& run);
 void add_marker(Command app, Run& run);
 void add_record(Command app, Run& run);
 void add_render(Command app, Run& run);
+void add_sample(Command app, Run& run);
 void add_servo(Command app, Run& run);
 void add_sim_robot(Command app, Run& run);
 void add_track(Command app, Run& run);

@@ -13,13 +13,11 @@
 
 #include "lapservo/calibration/camera/camera_measurement.h"
 #include "lapservo/core/random.h"
-#include "lapservo/testing/boards.h"
+#include "lapservo/sim/boards.h"
 #include "lapservo/testing/environment.h"
 
 namespace lapservo::internal {
 namespace {
-
-using boards::BoardScene;
 
 Camera small_camera() {
   Camera camera;
@@ -60,9 +58,9 @@ const Board board{9, 6, 0.005};
 
 std::vector<BoardView> views_of(const BoardScene& scene, const Camera& camera, int count, std::uint64_t seed) {
   BoardViews views(board, 50);
-  for (const Rigid3& pose : boards::different_poses(scene, camera, count, seed)) {
+  for (const Rigid3& pose : board_poses(scene, camera, count, seed)) {
     const std::string name = "view " + std::to_string(seed);
-    EXPECT_TRUE(views.add(name, boards::render(scene, camera, pose, ++seed), true)) << name;
+    EXPECT_TRUE(views.add(name, render_board(scene, camera, pose, ++seed), true)) << name;
   }
   return views.take();
 }
@@ -168,7 +166,7 @@ TEST(CalibrateCamera, RefusesViewsThatAreTooFewOrAlike) {
   BoardViews same(board, 50);
   for (int i = 0; i < 6; ++i) {
     flat.translation.x() += 1e-4;
-    same.add("", boards::render(scene, camera, flat, 150 + static_cast<std::uint64_t>(i)), true);
+    same.add("", render_board(scene, camera, flat, 150 + static_cast<std::uint64_t>(i)), true);
   }
   const std::string refusal = calibrate_camera(board, same.views(), {}).refusal;
   EXPECT_NE(refusal.find("too alike"), std::string::npos) << refusal;
@@ -178,9 +176,9 @@ TEST(CalibrateCamera, RefusesViewsThatAreTooFewOrAlike) {
 
 TEST(CalibrateCamera, ChoosesViewsThatDiffer) {
   const Camera camera = small_camera();
-  const auto poses = boards::different_poses({}, camera, 2, 170);
-  const cv::Mat one = boards::render({}, camera, poses[0], 1), again = boards::render({}, camera, poses[0], 2);
-  const cv::Mat other = boards::render({}, camera, poses[1], 3);
+  const auto poses = board_poses({}, camera, 2, 170);
+  const cv::Mat one = render_board({}, camera, poses[0], 1), again = render_board({}, camera, poses[0], 2);
+  const cv::Mat other = render_board({}, camera, poses[1], 3);
   BoardViews views(board, 50);
   for (const cv::Mat& frame : {one, again, other}) EXPECT_TRUE(views.add("", frame, false));
   EXPECT_EQ(views.views().size(), 2U);
@@ -207,7 +205,7 @@ TEST(CalibrateCamera, ReadsCharucoBoards) {
   BoardScene scene;
   scene.columns = 7, scene.rows = 5;
   BoardViews views(charuco, 50);
-  for (const Rigid3& pose : boards::different_poses(scene, camera, 6, 190)) {
+  for (const Rigid3& pose : board_poses(scene, camera, 6, 190)) {
     // Pixel of the pattern to twice the picture's.
     const Eigen::Matrix3d r = pose.rotation.toRotationMatrix();
     Eigen::Matrix3d from_board, camera_matrix, board_from_pattern, twice;

@@ -8,7 +8,7 @@
 #include "lapservo/geometry/camera.h"
 #include "lapservo/geometry/rigid3.h"
 
-namespace lapservo::boards {
+namespace lapservo::internal {
 
 /// A chessboard on white paper before a camera under a lamp: what the light is, what the camera makes of it.
 struct BoardScene {
@@ -22,9 +22,10 @@ struct BoardScene {
 };
 
 /// 8-bit BGR. The camera's response, distortion and chromatic aberration count.
-cv::Mat render(const BoardScene& scene, const Camera& camera, const Rigid3& camera_from_board, std::uint64_t seed);
+cv::Mat render_board(const BoardScene& scene, const Camera& camera, const Rigid3& camera_from_board,
+                     std::uint64_t seed);
 
 /// Poses that fill the image, tilted by 15 to 35 degrees.
-std::vector<Rigid3> different_poses(const BoardScene& scene, const Camera& camera, int count, std::uint64_t seed);
+std::vector<Rigid3> board_poses(const BoardScene& scene, const Camera& camera, int count, std::uint64_t seed);
 
-}  // namespace lapservo::boards
+}  // namespace lapservo::internal

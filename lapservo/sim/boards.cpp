@@ -1,4 +1,4 @@
-#include "lapservo/testing/boards.h"
+#include "lapservo/sim/boards.h"
 
 #include <algorithm>
 #include <array>
@@ -11,10 +11,8 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 
-namespace lapservo::boards {
+namespace lapservo::internal {
 namespace {
-
-using namespace internal;
 
 constexpr int step_px = 4;  // between places that are computed; a lens bends little in between
 
@@ -86,7 +84,8 @@ cv::Mat sharpened(const BoardScene& scene, const cv::Mat& values) {
 
 }  // namespace
 
-cv::Mat render(const BoardScene& scene, const Camera& camera, const Rigid3& camera_from_board, std::uint64_t seed) {
+cv::Mat render_board(const BoardScene& scene, const Camera& camera, const Rigid3& camera_from_board,
+                     std::uint64_t seed) {
   Random random(seed);
   const double lamp_u = random.uniform(0.3, 0.7) * camera.width_px,
                lamp_v = random.uniform(0.3, 0.7) * camera.height_px;
@@ -112,7 +111,7 @@ cv::Mat render(const BoardScene& scene, const Camera& camera, const Rigid3& came
   return bgr;
 }
 
-std::vector<Rigid3> different_poses(const BoardScene& scene, const Camera& camera, int count, std::uint64_t seed) {
+std::vector<Rigid3> board_poses(const BoardScene& scene, const Camera& camera, int count, std::uint64_t seed) {
   Random random(seed);
   const Eigen::Vector3d middle_m(0.5 * scene.square_m * (scene.columns - 1), 0.5 * scene.square_m * (scene.rows - 1),
                                  0);
@@ -138,4 +137,4 @@ std::vector<Rigid3> different_poses(const BoardScene& scene, const Camera& camer
   return poses;
 }
 
-}  // namespace lapservo::boards
+}  // namespace lapservo::internal
