@@ -143,6 +143,18 @@ TEST_F(CommandLine, RenderThenTrack) {
   }
 }
 
+TEST_F(CommandLine, TrackNamesTheRigThatItFound) {
+  for (const char* name : {"a.png", "b.png", "c.png"}) write_grey(std::string("in/") + name);
+  in("rig.yaml", read_file("configs/example.yaml"));
+  EXPECT_EQ(run("track in --out out/obs.csv"), 1);
+  expect_in(output(), "\nrig: in/rig.yaml\n");
+  fs::copy_file("in/rig.yaml", "in/a.rig.yaml");
+  EXPECT_EQ(run("track in --out out/obs.csv"), 1);
+  expect_in(output(), "\nrig: in/a.rig.yaml and 1 more beside their images\n");
+  EXPECT_EQ(run("track in --rig in/rig.yaml --out out/obs.csv"), 1);
+  EXPECT_EQ(output().find("rig: "), std::string::npos) << output();
+}
+
 // Such a print gives no numbers, only the remedy.
 TEST_F(CommandLine, SaysWhatToDoAboutAPrintThatIsOff) {
   std::string printed = read_file("configs/example.yaml");
@@ -196,7 +208,7 @@ TEST_F(CommandLine, GStreamersPipelinesAreTracked) {
 
 TEST_F(CommandLine, DevicesThatAreNoCamera) {
   for (const char* command :
-       {"track --out {} --rig ", "view --port 0 --rig ", "record --out {} --camera /dev/video-none --rig ",
+       {"track --out {} --rig ", "view --web 0 --rig ", "record --out {} --camera /dev/video-none --rig ",
         "servo --robot ros2:PSM1 --camera /dev/video-none --rig ", "calibrate colour --out {} --rig ",
         "calibrate camera --board 9x6 --square-mm 5 --out {} --rig "}) {
     std::string line = command + std::string("configs/paper.yaml");
@@ -240,7 +252,10 @@ TEST_F(CommandLine, PagesThatCanNotBeServed) {
   expect_refused("servo --robot sim --rig configs/example.yaml --listen 0.0.0.0", {"--listen", "expected --web"});
   expect_refused(track + "--web 65536", {"--web", "65536"});
   expect_refused(track + "--web 0 --listen robot.example", {"--listen", "robot.example", "an address"});
-  expect_refused("view " + picture + "--port 0 --listen 192.0.2.1", {"--port", "192.0.2.1"});  // nobody's
+  for (const std::string option : {"--web", "--port"})
+    expect_refused("view " + picture + option + " 0 --listen 192.0.2.1", {"--web", "192.0.2.1"});  // nobody's
+  expect_done("view --help");
+  EXPECT_EQ(output().find("--port"), std::string::npos) << output();
 }
 #endif
 
@@ -741,8 +756,7 @@ TEST_F(CommandLine, CalibrateAllRefusesARigThatCanNotBeReplaced) {
 
 // Without a recording there is nothing to do, and a rig that somebody edits is another.
 TEST_F(CommandLine, CalibrateAllSaysWhatItDidNot) {
-  const std::string start =
-      "calibrate all --no-questions --rig " + in("mine.yaml", read_file("configs/example.yaml"));
+  const std::string start = "calibrate all --no-questions --rig " + in("mine.yaml", read_file("configs/example.yaml"));
   expect_done(start);
   expect_in(output(), "camera: left out; --boards names");
   EXPECT_FALSE(fs::exists("in/mine.calibration.yaml"));

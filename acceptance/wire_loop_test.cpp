@@ -526,6 +526,27 @@ TEST_P(FirstWireLoop, ThePageEndsTheWaitForAnArm) {
   EXPECT_NE(said("servo.txt").find("end: asked for on the page"), std::string::npos) << said("servo.txt");
 }
 
+TEST_P(WireLoop, ATopicThatNobodyPublishesEndsWithTheTopicsThatAreThere) {
+  const auto room = arm();
+  const std::vector<std::string> inputs{
+      "--camera", GetParam() + ":/endoscope/image", "--robot", GetParam() + ":PSM1", "--rig", file("rig.yaml"),
+      "--out"};
+  std::vector<std::unique_ptr<Process>> commands;
+  for (const std::string command : {"record", "servo"}) {
+    std::vector<std::string> words{command};
+    words.insert(words.end(), inputs.begin(), inputs.end());
+    words.push_back(file(command));
+    commands.push_back(std::make_unique<Process>(words, file(command + ".txt")));
+  }
+  const std::string types = GetParam() == "ros2" ? "sensor_msgs/msg/" : "sensor_msgs/";
+  for (const auto& command : commands) EXPECT_EQ(command->wait(), 1);
+  for (const char* output : {"record.txt", "servo.txt"})
+    for (const std::string& words :
+         {std::string("nobody publishes /endoscope/image; topics that are there: /PSM1/"),
+          "/PSM1/measured_js (" + types + "JointState)", "/endoscope/image_raw (" + types + "Image)"})
+      EXPECT_NE(said(output).find(words), std::string::npos) << words << " in: " << said(output);
+}
+
 TEST_P(FirstWireLoop, ThePageStartsNothingWithoutEnableMotion) {
   Arm room(GetParam(), rig_);
   const auto ears = named_transport(GetParam(), "ears");

@@ -17,7 +17,8 @@ std::optional<Frame> LiveSource::next() {
       return std::nullopt;
     }
     if (clock_.now_s() > begin_s + patience_s) {
-      complaint_ = "no image came within 15 s" + (why_dropped().empty() ? "" : " (" + why_dropped() + ")");
+      const std::string why = why_none();
+      complaint_ = "no image came within 15 s" + (why.empty() ? "" : " (" + why + ")");
       return std::nullopt;
     }
   }

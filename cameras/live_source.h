@@ -26,8 +26,8 @@ class LiveSource : public FrameSource {
   virtual std::optional<StampedImage> take() = 0;
   /// See LiveCamera.
   virtual std::optional<std::string> ended() const = 0;
-  /// Why images were dropped, in words; empty when none were.
-  virtual std::string why_dropped() const { return {}; }
+  /// Why no image came, in words; empty where that is unknown.
+  virtual std::string why_none() { return {}; }
 
   SteadyClock clock_;
 

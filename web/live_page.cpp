@@ -69,7 +69,7 @@ LivePage::LivePage(const PageConfig& config)
       token_(is_loopback(config.address, "--listen") ? "" : random_token()),
       access_(token_.empty(), token_) {
   server_ =
-      std::make_unique<HttpServer>(config.address, config.port, config.option, config.limits,
+      std::make_unique<HttpServer>(config.address, config.port, "--web", config.limits,
                                    [this](const HttpRequest& request, bool last) { return answer(request, last); });
   thread_ = std::thread([this] { draw(); });
 }

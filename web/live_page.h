@@ -25,7 +25,6 @@ struct PageConfig {
   std::string title;                  ///< what runs, in a few words
   std::string address = "127.0.0.1";  ///< to listen at; beyond this computer's own a token is asked for
   int port = 8080;                    ///< 0: any that is free
-  std::string option = "--web";       ///< in complaints of the port
   bool live = true;                   ///< what is old is no longer so; else a file's
   bool has_loop = false;              ///< a loop that can be held and started
   bool may_start = false;

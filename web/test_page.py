@@ -210,7 +210,7 @@ def see_the_loop(browser, tool, rig, folder):
 
 
 def see_a_picture(browser, tool, rig, picture, folder):
-    lapservo, url = start(tool, "view", picture, "--rig", rig, "--port", "0")
+    lapservo, url = start(tool, "view", picture, "--rig", rig, "--web", "0")
     try:
         browser.complaints.clear()
         browser.call("Page.navigate", url=url)

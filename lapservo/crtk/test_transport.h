@@ -54,6 +54,7 @@ class TestTransport : public Transport {
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override {
     return add(compressed_handlers_[topic], std::move(handler));
   }
+  std::map<std::string, std::string> published() const override { return {}; }
   double stamp_now_s() const override { return stamp_s; }
 
   void say(const std::string& topic, const JointMessage& message) { tell(joint_handlers_[topic], message); }

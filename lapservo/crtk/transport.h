@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -42,6 +43,10 @@ class Transport {
   virtual Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) = 0;
   virtual Subscription subscribe_compressed_images(const std::string& topic,
                                                    Handler<CompressedImageMessage> handler) = 0;
+
+  /// Topics that others publish now, by their types: {"/endoscope/image_raw", "sensor_msgs/msg/Image"}, in ROS 1
+  /// "sensor_msgs/Image". Empty where the middleware does not answer.
+  virtual std::map<std::string, std::string> published() const = 0;
 
   /// The time that stamps of messages to be sent carry: seconds since 1970.
   virtual double stamp_now_s() const = 0;

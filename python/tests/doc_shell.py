@@ -32,7 +32,7 @@ ENOUGH = {
 CAMERA, NO_CAMERA = "/dev/video0", "/dev/video-none"
 #: What the tests have in its place: a recording for the first camera, no screen, any port that is free.
 INSTEAD = {r"lapservo (track|view) 0 ": r"lapservo \1 swing.mp4 ", r"--view\b": "", r"--web\b": "--web 0",
-           r"lapservo view\b": "lapservo view --port 0", CAMERA: NO_CAMERA}
+           r"lapservo view\b": "lapservo view --web 0", CAMERA: NO_CAMERA}
 #: Exit code 1: what was found is not good enough, or the arm is not yet where it shall be.
 MAY_BE_1 = re.compile(r"\S*lapservo (check|servo (?!--replay run/)|calibrate all) ")
 #: Of what was interrupted: ended by itself, said so, or as shells have it.

@@ -1,5 +1,6 @@
 #include "transports/ros1/ros1_transport.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <stdexcept>
 #include <utility>
@@ -54,6 +55,17 @@ std::optional<std::string> other_type_on(const std::string& topic, const std::st
 Ros1Transport::Ros1Transport(const std::string& node_name) : node_(Ros1Node::get(node_name)) {}
 
 Ros1Transport::~Ros1Transport() = default;
+
+std::map<std::string, std::string> Ros1Transport::published() const {
+  ros::master::V_TopicInfo topics;
+  if (!std::static_pointer_cast<Ros1Node>(node_)->answers() || !ros::master::getTopics(topics)) return {};
+  ros::V_string own;
+  ros::this_node::getAdvertisedTopics(own);
+  std::map<std::string, std::string> published;
+  for (const auto& topic : topics)
+    if (std::find(own.begin(), own.end(), topic.name) == own.end()) published[topic.name] = topic.datatype;
+  return published;
+}
 
 double Ros1Transport::stamp_now_s() const {
   return since_1970_s();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
 
@@ -35,6 +36,7 @@ class Ros1Transport : public Transport {
   Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) override;
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override;
 
+  std::map<std::string, std::string> published() const override;
   double stamp_now_s() const override;
 
  private:

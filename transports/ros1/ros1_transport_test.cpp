@@ -59,6 +59,13 @@ TEST_F(Ros1Wire, CarriesEveryKindOfMessageThereAndBack) {
   expect_carries_each_kind(*transport_, "/in/", *transport_, "/out/");
 }
 
+TEST_F(Ros1Wire, ListsWhatOthersPublish) {
+  const auto say = transport_->joint_publisher("in/joints");
+  wait_for([&] { return transport_->published().contains("/out/state"); });
+  EXPECT_EQ(transport_->published().at("/out/state"), "crtk_msgs/OperatingState");
+  EXPECT_FALSE(transport_->published().contains("/in/joints")) << "its own";
+}
+
 TEST_F(Ros1Wire, HearsOthersOnItsOwnTopicButNotItself) {
   TestInbox<JointMessage> heard;
   const auto subscription = transport_->subscribe_joints("/out/joints", heard.handler());

@@ -1,6 +1,7 @@
 #include "transports/ros2/dds_node.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -188,6 +189,27 @@ void DdsNode::remove(dds_entity_t entity) {
   for (auto* list : {&readers_, &writers_}) list->erase(std::remove(list->begin(), list->end(), entity), list->end());
   announce();
   dds_delete(entity);
+}
+
+std::map<std::string, std::string> DdsNode::published() const {
+  dds_guid_t own{};
+  dds_get_guid(participant_, &own);
+  const dds_entity_t reader =
+      checked(dds_create_reader(participant_, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr), "reader");
+  std::map<std::string, std::string> published;
+  constexpr int at_once = 64;
+  std::array<void*, at_once> samples{};
+  std::array<dds_sample_info_t, at_once> infos;
+  for (int count; (count = dds_take(reader, samples.data(), infos.data(), at_once, at_once)) > 0;) {
+    for (int i = 0; i < count; ++i) {
+      const auto& writer = *static_cast<const dds_builtintopic_endpoint_t*>(samples[i]);
+      if (!infos[i].valid_data || std::memcmp(writer.participant_key.v, own.v, sizeof own.v) == 0) continue;
+      if (const auto topic = ros2_topic_name(writer.topic_name)) published[*topic] = ros2_type_name(writer.type_name);
+    }
+    dds_return_loan(reader, samples.data(), count);
+  }
+  dds_delete(reader);
+  return published;
 }
 
 void DdsNode::announce() {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <dds/dds.h>
+#include <map>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -30,6 +31,9 @@ class DdsNode {
   dds_entity_t create_reader(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery);
   /// Of a reader or writer.
   void remove(dds_entity_t entity);
+
+  /// Topics that other participants write, by their types; both as in ROS.
+  std::map<std::string, std::string> published() const;
 
   dds_entity_t participant() const { return participant_; }
 

@@ -1,6 +1,7 @@
 #include "transports/ros2/ros2_names.h"
 
 #include <charconv>
+#include <utility>
 
 #include "lapservo/core/error.h"
 
@@ -33,6 +34,20 @@ std::string dds_topic_name(const std::string& topic) {
   if (!is_topic(name))
     throw InputError("topic", "is " + topic + ", expected names of letters, digits and _ between slashes");
   return "rt" + name;
+}
+
+std::optional<std::string> ros2_topic_name(std::string_view dds_topic) {
+  if (!dds_topic.starts_with("rt/")) return std::nullopt;
+  return std::string(dds_topic.substr(2));
+}
+
+std::string ros2_type_name(std::string_view dds_type) {
+  std::string name(dds_type);
+  if (name.ends_with('_')) name.pop_back();
+  for (const auto& [before, after] : {std::pair("::dds_::", "/"), std::pair("::", "/")})
+    for (std::size_t at; (at = name.find(before)) != std::string::npos;)
+      name.replace(at, std::string_view(before).size(), after);
+  return name;
 }
 
 std::uint32_t domain_id(const std::string& text) {

@@ -14,6 +14,14 @@ TEST(Ros2Names, TopicsAreMangledAsRos2Does) {
     EXPECT_NE(testing::input_error([&] { dds_topic_name(wrong); }), "") << wrong;
 }
 
+TEST(Ros2Names, TopicsAndTypesOfOthersAreRos2s) {
+  EXPECT_EQ(ros2_topic_name("rt/PSM1/measured_js"), "/PSM1/measured_js");
+  for (const char* other : {"rq/add/_request", "ros_discovery_info", "DCPSTopic", ""})
+    EXPECT_EQ(ros2_topic_name(other), std::nullopt) << other;
+  EXPECT_EQ(ros2_type_name("sensor_msgs::msg::dds_::JointState_"), "sensor_msgs/msg/JointState");
+  EXPECT_EQ(ros2_type_name("a::Type"), "a/Type");
+}
+
 TEST(Ros2Names, Domains) {
   EXPECT_EQ(domain_id(""), 0u);
   EXPECT_EQ(domain_id("42"), 42u);

@@ -94,6 +94,8 @@ class Ros2Transport::Implementation {
   explicit Implementation(const std::string& node_name)
       : node_(std::make_shared<DdsNode>(node_name, domain_of_environment())) {}
 
+  std::map<std::string, std::string> published() const { return node_->published(); }
+
   template <typename Message>
   Publisher<Message> publisher(const std::string& topic, Delivery delivery) {
     const dds_entity_t writer = node_->create_writer(topic, Wire<Message>::descriptor(), delivery);
@@ -118,6 +120,10 @@ Ros2Transport::Ros2Transport(const std::string& node_name)
     : implementation_(std::make_shared<Implementation>(node_name)) {}
 
 Ros2Transport::~Ros2Transport() = default;
+
+std::map<std::string, std::string> Ros2Transport::published() const {
+  return implementation_->published();
+}
 
 double Ros2Transport::stamp_now_s() const {
   return since_1970_s();

@@ -13,6 +13,7 @@
 
 #include "lapservo/crtk/test_inbox.h"
 #include "lapservo/crtk/test_messages.h"
+#include "lapservo/testing/wait_for.h"
 #include "transports/ros2/dds_node.h"
 #include "transports/ros2/ros2_names.h"
 #include "transports/ros2/wire.h"
@@ -32,6 +33,16 @@ TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   const auto subscription = to.subscribe_operating_state("/PSM1/operating_state", states.handler());
   expect_same(states.get([] {}), sample_state);
   expect_carries_each_kind(from, "/PSM1/", to, "/PSM1/");
+}
+
+TEST(Ros2Transport, ListsWhatOthersPublish) {
+  Ros2Transport one("one"), other("other");
+  const auto joints = one.joint_publisher("/PSM1/measured_js");
+  const auto images = other.image_publisher("endoscope/image_raw");
+  testing::wait_for([&] { return one.published().contains("/endoscope/image_raw"); });
+  const auto published = one.published();
+  EXPECT_EQ(published.at("/endoscope/image_raw"), "sensor_msgs/msg/Image");
+  EXPECT_FALSE(published.contains("/PSM1/measured_js")) << "its own";
 }
 
 TEST(Ros2Transport, DoesNotHearItself) {

@@ -41,6 +41,11 @@ Option& Option::shows_default() {
   return *this;
 }
 
+Option& Option::hidden() {
+  option_->group("");
+  return *this;
+}
+
 Option& Option::expected(int count) {
   option_->expected(count);
   return *this;

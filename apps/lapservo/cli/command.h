@@ -25,6 +25,8 @@ class Option {
   Option& required();
   /// --help shows what it is without being given.
   Option& shows_default();
+  /// --help leaves it out: another name of an option.
+  Option& hidden();
   /// Takes so many values.
   Option& expected(int count);
   Option& delimiter(char between_values);

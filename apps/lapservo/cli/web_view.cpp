@@ -37,8 +37,12 @@ void add_web_options(Command command, WebOptions& options) {
 
 void add_page_options(Command command, WebOptions& options) {
   options.port = 8080;
-  command.add_option("--port", options.port, "Where the page is served, else 8080; 0: any port that is free")
-      .whole_number_between(0, highest_port);
+  const auto add = [&](const char* name) {
+    return command.add_option(name, options.port, "The port of the page, else 8080; 0: any port that is free")
+        .whole_number_between(0, highest_port);
+  };
+  add("--web");
+  add("--port").hidden();
   add_listen_option(command, options);
 }
 
@@ -68,8 +72,8 @@ PageWishes WebView::wishes() {
 
 #else
 
-WebView::WebView(const WebOptions&, PageConfig config) {
-  throw InputError(config.option,
+WebView::WebView(const WebOptions&, PageConfig) {
+  throw InputError("--web",
                    "asks for a page, which this build lacks: it was built without libmicrohttpd-dev and "
                    "nlohmann-json3-dev");
 }

@@ -19,7 +19,7 @@ struct WebOptions {
 };
 /// --web and --listen.
 void add_web_options(Command command, WebOptions& options);
-/// --port and --listen, where the page is what the command is for.
+/// The same, where the page is what the command is for.
 void add_page_options(Command command, WebOptions& options);
 
 /// The page of --web and `lapservo view`, whose address is printed.

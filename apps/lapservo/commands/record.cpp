@@ -206,8 +206,14 @@ std::string told(const RecordedCounts& counts) {
   return text;
 }
 
+// `unpublished`: see Transports.
+std::string missing(const std::string& what, const std::string& unpublished) {
+  return fmt::format("no {} came within {:.0f} s{}{}", what, patience_s, unpublished.empty() ? "" : ": ", unpublished);
+}
+
 // Why the recording ends; empty: as it should.
-std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recording& recording, MovingArm* arm) {
+std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recording& recording, MovingArm* arm,
+                         Transports& transports) {
   Progress progress(std::nullopt);
   std::optional<double> first_s;
   const double begin_s = clock.now_s();
@@ -221,7 +227,11 @@ std::string wait_for_end(const RecordOptions& options, const Clock& clock, Recor
       last_image_s = now_s;  // a slow disk is no silent camera
     if (!first_s && counts.arrived > 0) first_s = now_s;
     progress.show(static_cast<int>(counts.images), fmt::format(" images, {} joint readings", counts.joints));
-    if (!first_s && now_s > begin_s + patience_s) return fmt::format("no image came within {:.0f} s", patience_s);
+    if (!first_s && now_s > begin_s + patience_s)
+      return missing("image",
+                     names_topic(options.camera) ? transports.unpublished(options.camera, "--camera") : std::string());
+    if (!options.robot.empty() && counts.joints == 0 && now_s > begin_s + patience_s)
+      return missing("measured_js", transports.unpublished(options.robot, "--robot", "measured_js"));
     if (const auto ended = recording.ended()) return *ended;
     if (first_s && arm && now_s > last_image_s + max_silence_s) return "its images have stopped";
     if (first_s && arm) {
@@ -246,12 +256,12 @@ int record(const RecordOptions& options) {
     arm.emplace(options, rig->instruments[named_instrument(*rig, options.instrument, options.rig)], transports, clock);
   Recording recording(options, rig, transports, clock);
   watch_for_interrupts();
-  const std::string why = wait_for_end(options, clock, recording, arm ? &*arm : nullptr);
+  const std::string why = wait_for_end(options, clock, recording, arm ? &*arm : nullptr, transports);
   recording.finish();
   const RecordedCounts counts = recording.counts();
   std::printf("%s: %s\n", options.out.c_str(), told(counts).c_str());
   if (!why.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", options.out.c_str(), why.c_str());
-  if (!options.robot.empty() && counts.joints == 0)
+  if (why.empty() && !options.robot.empty() && counts.joints == 0)
     std::fprintf(stderr, "lapservo: %s: no measured_js came\n", options.robot.c_str());
   return why.empty() && counts.images > 0 && (options.robot.empty() || counts.joints > 0) ? 0 : 1;
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -97,7 +98,12 @@ class RigByFrame {
   /// What comes are pictures that may have nothing to do with one another: each is searched whole.
   void expect_pictures() { tracking_.frame_budget.reset(); }
   const std::shared_ptr<const Rig>& rig() const { return rig_; }
-  const fs::path& path() const { return path_; }
+  /// Those that were found beside the input, in words; empty where --rig names one.
+  std::string found() const {
+    if (!options_.rig.empty() || found_.empty()) return {};
+    const std::string first = found_.begin()->string();
+    return found_.size() == 1 ? first : fmt::format("{} and {} more beside their images", first, found_.size() - 1);
+  }
   /// Null while no rig is known.
   const Camera* camera() const { return rig_ ? &rig_->camera : nullptr; }
 
@@ -113,12 +119,14 @@ class RigByFrame {
     inputs.add_rig(path, *rig_);
     refuse_outputs(options_, inputs);
     path_ = path;
+    found_.insert(path);
     tracker_.reset();
   }
 
   const TrackOptions& options_;
   TrackerOptions tracking_;
   fs::path path_;
+  std::set<fs::path> found_;
   std::shared_ptr<const Rig> rig_;
   std::optional<Tracker> tracker_;
   bool warned_ = false;
@@ -183,7 +191,6 @@ std::unique_ptr<LiveFrames> open_topic(const TrackOptions& options, const RigByF
 PageConfig page_config_of(const TrackOptions& options, const FrameSource& source) {
   PageConfig config;
   config.title = (options.page_only ? "view " : "track ") + options.input;
-  if (options.page_only) config.option = "--port";
   config.live = source.kind() == FrameSource::Kind::live;
   return config;
 }
@@ -272,6 +279,7 @@ class TrackRun {
 
   void tell_results() const {
     std::printf("%s%d frames%s\n", stopped_ ? "stopped after " : "", tally_.frames, tally_.text().c_str());
+    if (!rigs_.found().empty()) std::printf("rig: %s\n", rigs_.found().c_str());
     if (csv_) std::printf("observations: %s\n", options_.out.c_str());
     if (overlay_) std::printf("overlay: %s\n", options_.overlay.c_str());
     if (overlay_ && overlay_->is_video() && !video_remark().empty())

@@ -8,13 +8,17 @@
 namespace lapservo::app {
 
 LiveFrames::LiveFrames(const std::string& text, const Camera& camera)
-    : LiveSource(interrupted), transports_("lapservo_track"), images_(text, "input", camera, clock_, transports_) {}
+    : LiveSource(interrupted), text_(text), transports_("lapservo_track"), images_(text, "input", camera, clock_, transports_) {}
 
 std::optional<StampedImage> LiveFrames::take() {
   auto image = images_.newest();
   if (image) last_s_ = image->time_s;
   if (!image) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   return image;
+}
+
+std::string LiveFrames::why_none() {
+  return dropped().empty() ? transports_.unpublished(text_, "input") : images_.complaint();
 }
 
 }  // namespace lapservo::app

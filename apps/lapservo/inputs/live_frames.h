@@ -22,9 +22,10 @@ class LiveFrames : public internal::LiveSource {
  protected:
   std::optional<StampedImage> take() override;
   std::optional<std::string> ended() const override { return images_.ended(); }
-  std::string why_dropped() const override { return dropped().empty() ? "" : images_.complaint(); }
+  std::string why_none() override;
 
  private:
+  std::string text_;
   Transports transports_;
   LiveImages images_;
   double last_s_ = 0;

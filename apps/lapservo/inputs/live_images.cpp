@@ -5,6 +5,7 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/transports.h"
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/crtk_robot.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -21,6 +22,18 @@ Transport& Transports::get(const std::string& transport, const std::string& opti
   auto& made = transports_[transport];
   if (!made) made = make_transport(transport, node_name_, option);
   return *made;
+}
+
+std::string Transports::unpublished(const std::string& text, const std::string& option, const std::string& of_arm) {
+  const Address address = address_of(text, option);
+  const std::string name = address.name.starts_with('/') ? address.name : "/" + address.name;
+  const std::string topic = of_arm.empty() ? name : topic_of(name, of_arm);
+  const auto published = get(address.transport, option).published();
+  if (published.contains(topic)) return {};
+  std::string others;
+  for (const auto& [other, type] : published) others += (others.empty() ? "" : ", ") + other + " (" + type + ")";
+  return "nobody publishes " + topic + "; " +
+         (others.empty() ? "there are no topics" : "topics that are there: " + others);
 }
 
 bool names_topic(const std::string& text) {

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -204,14 +205,28 @@ int end_by_page() {
   return 1;
 }
 
-// Where the arm is, once it says so; nullopt when it does not, or somebody ends the run.
-std::optional<JointVector> wait_for(CrtkRobot& robot, ServoPage* page) {
+// Whether it holds in time, before somebody ends the run.
+bool wait_until(const std::function<bool()>& holds, CrtkRobot& robot, ServoPage* page) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
   while (!interrupted() && !obey(page, robot) && std::chrono::steady_clock::now() < end) {
-    if (robot.counts().joint_states > 0 && robot.blocked() != Blocked::no_joint_states) return robot.state().q;
+    if (holds()) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  return std::nullopt;
+  return false;
+}
+
+// Why the loop can't begin; empty where the arm is heard and somebody publishes the camera's topic.
+std::string wait_for_topics(const ServoOptions& options, Transports& transports, CrtkRobot& robot, ServoPage* page) {
+  const auto heard = [&] { return robot.counts().joint_states > 0 && robot.blocked() != Blocked::no_joint_states; };
+  if (!wait_until(heard, robot, page)) {
+    const std::string why = transports.unpublished(options.robot, "--robot", "measured_js");
+    return fmt::format("{}: no measured_js with the rig's joints within {:.0f} s{}", options.robot, wait_s,
+                       why.empty() ? "" : ": " + why);
+  }
+  if (!names_topic(options.camera)) return {};
+  std::string why;
+  wait_until([&] { return (why = transports.unpublished(options.camera, "--camera")).empty(); }, robot, page);
+  return why.empty() ? "" : fmt::format("{}: no images within {:.0f} s: {}", options.camera, wait_s, why);
 }
 
 InterlockConfig interlock_of(const ServoOptions& options, const RunConfig& config) {
@@ -252,15 +267,15 @@ int steer_arm(const ServoOptions& options) {
   CrtkRobot robot(transport, arm.name, interlock, clock);
   watch_for_interrupts();
   ServoPage* const its_page = page ? &*page : nullptr;
-  const auto start = wait_for(robot, its_page);
-  if (!start && obey(its_page, robot)) return end_by_page();
-  if (!start) {
-    std::fprintf(stderr, "lapservo: %s: no measured_js with the rig's joints within %.0f s\n", options.robot.c_str(),
-                 wait_s);
+  const std::string missing = wait_for_topics(options, transports, robot, its_page);
+  if (obey(its_page, robot)) return end_by_page();
+  if (!missing.empty()) {
+    std::fprintf(stderr, "lapservo: %s\n", missing.c_str());
     return 1;
   }
+  const JointVector start = robot.state().q;
   if (config.rig.instruments.front().camera_from_rcm)
-    refuse_infeasible(trajectory, duration_s(options), feature_model(config.rig), config.controller, *start,
+    refuse_infeasible(trajectory, duration_s(options), feature_model(config.rig), config.controller, start,
                       trajectory_name(options));
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
