@@ -180,7 +180,9 @@ HttpResponse LivePage::state() {
   nlohmann::ordered_json state{{"title", config_.title},
                                {"has_loop", config_.has_loop},
                                {"may_start", config_.may_start},
-                               {"live", config_.live}};
+                               {"live", config_.live},
+                               {"ended", over_.load()}};
+  watched_ = true;
   const auto now = std::chrono::steady_clock::now();
   state["now_s"] = seconds(now.time_since_epoch());
   std::vector<Observation> observations;

@@ -70,6 +70,10 @@ class LivePage {
   void show(PageImage image);
   /// `state`: the loop's, in words.
   void tell(const PageLoop& loop, const std::string& state);
+  /// Nothing more comes: the page shows the last, without buttons.
+  void end() { over_ = true; }
+  /// Whether a browser has shown the page.
+  bool was_watched() const { return watched_; }
   /// What was asked for since the last call. A start that nobody took within a second is none: who asked for it no
   /// longer expects that the arm moves.
   PageWishes take_wishes();
@@ -117,7 +121,7 @@ class LivePage {
 
   Mailbox<Shown> images_;
   Mailbox<Told> loops_;
-  std::atomic<bool> hold_ = false, stop_ = false;
+  std::atomic<bool> hold_ = false, stop_ = false, over_ = false, watched_ = false;
   std::atomic<double> start_s_ = never;  ///< when it was asked for
 
   // The page's threads' only.

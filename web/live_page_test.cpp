@@ -97,6 +97,16 @@ TEST(LivePage, ServesItsFilesAndNothingElse) {
   EXPECT_EQ(http_status(http(port, "DELETE", "/state")), 405);
 }
 
+TEST(LivePage, KnowsItsViewersAndTellsThemTheEnd) {
+  LivePage page(config_of_test());
+  const int port = port_of(page);
+  EXPECT_FALSE(page.was_watched());
+  EXPECT_NE(http(port, "GET", "/state").find("\"ended\":false"), std::string::npos);
+  EXPECT_TRUE(page.was_watched());
+  page.end();
+  EXPECT_NE(http(port, "GET", "/state").find("\"ended\":true"), std::string::npos);
+}
+
 TEST(LivePage, TellsWhatTheLoopDoes) {
   const Rig rig = testing::small_test_rig();
   LivePage page(config_of_test());

@@ -128,7 +128,7 @@ def look(browser, folder, name):
         browser.resize(width, height)
         time.sleep(0.3)
         assert browser.value("document.documentElement.scrollWidth") <= width, f"{name} is wider than {width} px"
-        small = browser.value("[...document.querySelectorAll('button')].filter(b => !b.hidden && b.offsetHeight < 44).length")
+        small = browser.value("[...document.querySelectorAll('button')].filter(b => b.offsetHeight && b.offsetHeight < 44).length")
         assert small == 0, "a button is too small for a finger"
         if folder:
             browser.screenshot(os.path.join(folder, f"{name}_{width}.png"))
@@ -200,13 +200,30 @@ def see_the_loop(browser, tool, rig, folder):
         assert not browser.complaints, browser.complaints
         browser.value("document.getElementById('stop').click()")
         assert lapservo.wait(PATIENCE_S) in (0, 1)
+        said = lapservo.stdout.read()
+        assert re.search("held for [0-9]+ of [0-9]+ ticks: held\n", said) and "arm_not_enabled" not in said, said
         state(browser, "not connected")
         assert browser.value("document.getElementById('picture').classList.contains('old')"), "an old picture looks new"
         assert browser.value("!document.getElementById('alert').hidden")
+        see_the_end(browser)
         look(browser, folder, "ended")
     finally:
         lapservo.kill()
         lapservo.wait()
+
+
+def see_the_end(browser):
+    assert browser.value("document.getElementById('buttons').hidden"), "a button has nothing to act on"
+    assert browser.value("document.getElementById('state').className") != "track", "what has ended looks alive"
+
+
+def see_units(browser):
+    """Of a picture: angles are in rad as in files, and nothing is minus zero."""
+    rows = browser.value("[...document.querySelectorAll('#instruments th')].map(th => th.textContent).join()")
+    assert "psi [rad]" in rows and "mrad" not in rows, rows
+    shown = [browser.value(f"shown({json.dumps(name)}, {value})") for name, value in
+             (("psi_rad", -1.23456), ("psi_rad", -0.00004), ("rho_m", -1e-6), ("r_px", -0.04), ("r_px", -10.04))]
+    assert shown == ["-1.2346", "0.0000", "0.00", "0.0", "-10.0"], shown
 
 
 def see_a_picture(browser, tool, rig, picture, folder):
@@ -215,7 +232,9 @@ def see_a_picture(browser, tool, rig, picture, folder):
         browser.complaints.clear()
         browser.call("Page.navigate", url=url)
         browser.wait_for("document.getElementById('picture').naturalWidth > 0")
-        state(browser, "seen")
+        state(browser, "ended: 1 of 1 seen")
+        see_the_end(browser)
+        see_units(browser)
         assert browser.value("document.getElementById('start').hidden"), "nothing here can be started"
         assert not browser.complaints, browser.complaints
         look(browser, folder, "view")

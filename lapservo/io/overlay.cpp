@@ -1,6 +1,7 @@
 #include "lapservo/io/overlay.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -62,13 +63,18 @@ class Pen {
     polyline({to - 12 * scale_ * along + 6 * scale_ * across, to, to - 12 * scale_ * along - 6 * scale_ * across},
              color, 2);
   }
-  // Keeps the label inside the picture.
+  // Of a label's text, without what backs it.
+  cv::Size text_size(const std::string& text) const {
+    int baseline = 0;
+    return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, font_scale(), thickness(1), &baseline);
+  }
+  // Keeps the label inside the picture. `near`: where the text begins, on its baseline.
   void label(const std::string& text, const Eigen::Vector2d& near) {
-    const double font_scale = 0.55 * scale_;
+    const double font_scale = this->font_scale();
     const int weight = thickness(1);
     int baseline = 0;
     const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, font_scale, weight, &baseline);
-    const int pad = static_cast<int>(5 * scale_);
+    const int pad = this->pad();
     const int right = std::max(pad, canvas_.cols - size.width - pad), top = size.height + pad;
     const int x = static_cast<int>(std::clamp<double>(near.x(), pad, right));
     const int y = static_cast<int>(std::clamp<double>(near.y(), top, std::max(top, canvas_.rows - baseline - pad)));
@@ -80,8 +86,11 @@ class Pen {
     cv::putText(canvas_, text, {x, y}, cv::FONT_HERSHEY_SIMPLEX, font_scale, white, weight, cv::LINE_AA);
   }
   double scale() const { return scale_; }
+  int pad() const { return static_cast<int>(5 * scale_); }  // around a label's text
+  cv::Size size() const { return canvas_.size(); }
 
  private:
+  double font_scale() const { return 0.55 * scale_; }
   static constexpr int bits = 4, max_parts = 2000;
   cv::Point at(const Eigen::Vector2d& p) const {
     const auto fixed = [](double x) { return static_cast<int>(std::lround(std::clamp(x, -2e4, 2e4) * (1 << bits))); };
@@ -161,15 +170,48 @@ void draw_rcm(Pen& pen, const Camera& camera, const Instrument& instrument, cons
   pen.label("RCM", px + Eigen::Vector2d(12, -8) * pen.scale());
 }
 
+// So many decimals, and no minus zero.
+std::string decimals(double value, int digits) {
+  const std::string text = fmt::format("{:.{}f}", value, digits);
+  return text.starts_with('-') && text.find_first_not_of("-0.") == std::string::npos ? text.substr(1) : text;
+}
+
+// Units as in files.
 std::string rotation_text(const Observation& o) {
-  return o.rcm ? fmt::format("psi {:+.1f} deg  +-{:.2f}", deg_from_rad(o.rcm->q.psi_rad),
-                             deg_from_rad(std::sqrt(o.rcm->covariance(3, 3))))
-               : fmt::format("tau {:.1f} deg  +-{:.2f}", deg_from_rad(o.tau_rad), deg_from_rad(o.sigma_tau_rad));
+  return o.rcm ? fmt::format("psi {} +-{} rad", decimals(o.rcm->q.psi_rad, 4),
+                             decimals(std::sqrt(o.rcm->covariance(3, 3)), 4))
+               : fmt::format("tau {} +-{} rad", decimals(o.tau_rad, 4), decimals(o.sigma_tau_rad, 4));
 }
 
 std::string features_text(const Features& f) {
-  const std::string r = f.r_px ? fmt::format("{:.1f}", *f.r_px) : "-";
-  return fmt::format("s {:.1f} deg  r {}  l {:.1f}  d {:.1f} px", deg_from_rad(f.s_rad), r, f.l_px, f.d_px);
+  const std::string r = f.r_px ? decimals(*f.r_px, 1) : "-";
+  return fmt::format("s {} rad  r {}  l {}  d {} px", decimals(f.s_rad, 4), r, decimals(f.l_px, 1),
+                     decimals(f.d_px, 1));
+}
+
+// Where two lines of text stand beside a shaft, inside the picture where there is such a place: as near to the marker's
+// middle as it goes, on either side. `along`: the axis, a unit vector; `half_px`: half the shaft's width.
+Eigen::Vector2d place_beside(const Pen& pen, const std::array<std::string, 2>& lines, const Eigen::Vector2d& middle,
+                             const Eigen::Vector2d& along, double half_px) {
+  const cv::Size first = pen.text_size(lines[0]), second = pen.text_size(lines[1]);
+  const double pad = pen.pad(), line_px = line_height * pen.scale();
+  const Eigen::Vector2d half(std::max(first.width, second.width) / 2.0 + pad,
+                             (first.height + line_px + second.height / 2.0) / 2 + pad);  // the last: below the baseline
+  const Eigen::Vector2d across(-along.y(), along.x());
+  const double clear_px = half_px + 8 * pen.scale() + across.cwiseAbs().dot(half);
+  const Eigen::Vector2d corner(pen.size().width, pen.size().height);
+  const auto is_inside = [&](const Eigen::Vector2d& centre) {
+    return ((centre - half).array() >= 0).all() && ((centre + half).array() <= corner.array()).all();
+  };
+  Eigen::Vector2d best = middle + clear_px * across;
+  const double step_px = 10 * pen.scale(), longest_px = corner.norm();
+  for (double slid_px = 0; slid_px < longest_px && !is_inside(best); slid_px += step_px)
+    for (const double side : {1.0, -1.0})
+      for (const double way : {1.0, -1.0})
+        if (const Eigen::Vector2d centre = middle + side * clear_px * across + way * slid_px * along;
+            !is_inside(best) && is_inside(centre))
+          best = centre;
+  return best - half + Eigen::Vector2d(pad, pad + first.height);
 }
 
 void draw_found(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation& o) {
@@ -182,13 +224,13 @@ void draw_found(Pen& pen, const Camera& camera, const Instrument& instrument, co
   pen.arrow(proximal, distal + 0.25 * (distal - proximal), axis_color);
   for (const Eigen::Vector2d& edge : o.edges_raw_px) pen.dot(edge, boundary_color);
 
-  const Eigen::Vector2d along = (distal - proximal).normalized();
-  const double width_px = (marker.at(1, 0) - proximal).norm();
-  const Eigen::Vector2d beside(std::abs(along.y()) * (width_px + 14 * pen.scale()),
-                               std::abs(along.x()) * (width_px + 22 * pen.scale()));
-  const Eigen::Vector2d place = (proximal + distal) / 2 + beside;
-  pen.label(instrument.name + "  " + rotation_text(o), place);
-  pen.label(features_text(o.features), place + Eigen::Vector2d(0, line_height * pen.scale()));
+  double half_px = 0;
+  for (const double end_m : {0.0, instrument.marker.length_m()})
+    half_px = std::max(half_px, (marker.at(1, end_m) - marker.at(-1, end_m)).norm() / 2);
+  const std::array<std::string, 2> lines{instrument.name + "  " + rotation_text(o), features_text(o.features)};
+  const Eigen::Vector2d place =
+      place_beside(pen, lines, (proximal + distal) / 2, (distal - proximal).normalized(), half_px);
+  for (int i = 0; i < 2; ++i) pen.label(lines[i], place + Eigen::Vector2d(0, i * line_height * pen.scale()));
 }
 
 // What was taken for the marker, in another style.

@@ -55,6 +55,32 @@ TEST(Overlay, MarksTheRcmWhenItLiesInThePicture) {
   EXPECT_GT(drawn_near(frame, overlay, halfway, 15), 10) << "r leads there";
 }
 
+// A label's backing makes grey of 90 about 32; nothing else of a marker far from its lines has that.
+TEST(Overlay, LabelsStandBesideTheMarker) {
+  for (const double direction_rad : {0.1, 0.8, 1.5, 2.4, 3.0, 4.0, 5.5}) {
+    Rig rig = testing::paper_test_rig();
+    Rigid3& camera_from_rcm = *rig.instruments[0].camera_from_rcm;
+    const double half_m = rig.instruments[0].marker.length_m() / 2;
+    const Eigen::Vector3d middle = camera_from_rcm * rcm_from_unrolled(q) * Eigen::Vector3d(0, 0, half_m);
+    const Eigen::Matrix3d turned = Eigen::AngleAxisd(direction_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const Eigen::Vector3d in_view(0.004, -0.006, middle.z());
+    camera_from_rcm.translation = in_view + turned * (camera_from_rcm.translation - middle);
+    camera_from_rcm.rotation = Eigen::Quaterniond(turned) * camera_from_rcm.rotation;
+    const Observation seen = seen_at(rig);
+    const cv::Mat overlay = draw_overlay(grey_frame(rig), rig, {seen});
+    int over = 0;
+    for (const double place : {0.15, 0.5, 0.85}) {
+      const Eigen::Vector2d px = seen.edges_raw_px[0] + place * (seen.edges_raw_px[3] - seen.edges_raw_px[0]);
+      const cv::Rect around(static_cast<int>(px.x()) - 20, static_cast<int>(px.y()) - 20, 41, 41);
+      cv::Mat backed;
+      cv::inRange(overlay(around & cv::Rect(0, 0, overlay.cols, overlay.rows)), cv::Scalar::all(30),
+                  cv::Scalar::all(34), backed);
+      over += cv::countNonZero(backed);
+    }
+    EXPECT_LT(over, 60) << direction_rad;
+  }
+}
+
 // With the reason, and in another style than what is believed.
 TEST(Overlay, DrawsWhatWasRefused) {
   const Rig rig = testing::paper_test_rig();

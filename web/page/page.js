@@ -5,7 +5,7 @@ const oldS = 1;            // a picture or a loop that is older is said to be ol
 const patienceMs = 3000;   // for an answer
 
 let clock = null;  // how far lapservo's is ahead of this page's, by the quickest answer of late
-let number = 0, pictureCameMs = null, heardMs = null, last = null;
+let number = 0, pictureCameMs = null, heardMs = null, last = null, failed = 0;
 
 const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const text = (element, value) => { if (element.textContent !== value) element.textContent = value; };
@@ -14,18 +14,20 @@ async function ask(path, options = {}) {
   return fetch(path, { ...options, cache: "no-store", signal: AbortSignal.timeout(patienceMs) });
 }
 
-// Numbers: in milliradians, millimetres and pixels.
+// By the end of a number's name: its unit here, how many of them, and decimals. Angles are in rad as in files.
+const units = { rad: ["rad", 1, 4], m: ["mm", 1000, 2], px: ["px", 1, 1] };
+const unit = (name) => units[name.slice(name.lastIndexOf("_") + 1)];
+
 function shown(name, value) {
   if (value === null || value === undefined) return "–";
-  if (name.endsWith("_px")) return value.toFixed(1);
-  return (1000 * value).toFixed(name.endsWith("_m") ? 2 : 1);
+  const [, factor, digits] = unit(name);
+  return (factor * value).toFixed(digits).replace(/^-(0\.0*)$/, "$1");
 }
 function sigmaShown(name, sigma) {
-  return Number((name.endsWith("_px") ? sigma : 1000 * sigma).toPrecision(2)).toString();
+  return Number((unit(name)[1] * sigma).toPrecision(2)).toString();
 }
 function label(name) {
-  const cut = name.lastIndexOf("_");
-  return name.slice(0, cut) + " [" + { rad: "mrad", m: "mm", px: "px" }[name.slice(cut + 1)] + "]";
+  return `${name.slice(0, name.lastIndexOf("_"))} [${unit(name)[0]}]`;
 }
 
 function row(cells) {
@@ -85,7 +87,8 @@ function compareClocks(nowS, beginMs) {
 function showAges() {
   const now = performance.now();
   const silentS = heardMs === null ? null : (now - heardMs) / 1000;
-  const lost = silentS === null || silentS > 2;
+  const lost = silentS === null || silentS > 2 || failed > 2;
+  at("buttons").hidden = lost || last.ended;
   at("alert").hidden = !lost || heardMs === null;
   if (!at("alert").hidden) text(at("alert"), `No answer for ${Math.round(silentS)} s: lapservo has ended, or the network is gone. What you see is old.`);
   const ageS = pictureCameMs === null ? null : (now - pictureCameMs) / 1000;
@@ -101,8 +104,8 @@ function showAges() {
     state.className = "";
   } else if (!last.loop) {
     const found = last.instruments.filter((one) => one.status === "ok").length;
-    text(state, last.images ? `${found} of ${last.instruments.length} seen` : "no picture yet");
-    state.className = found && found === last.instruments.length ? "track" : "";
+    text(state, (last.ended ? "ended: " : "") + (last.images ? `${found} of ${last.instruments.length} seen` : "no picture yet"));
+    state.className = !last.ended && found && found === last.instruments.length ? "track" : "";
   } else {
     const current = last.events.length ? last.events[0].state : "";
     const asleep = last.loop_age_s > oldS;
@@ -143,10 +146,13 @@ async function states() {
       if (answer.ok) {
         const state = await answer.json();
         heardMs = performance.now();
+        failed = 0;
         compareClocks(state.now_s, begin);
         showState(state);
       }
-    } catch { /* showAges() says it */ }
+    } catch {
+      ++failed;  // showAges() says it
+    }
     await wait(150);
   }
 }

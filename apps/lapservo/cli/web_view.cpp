@@ -66,6 +66,14 @@ void WebView::tell(const PageLoop& loop, const std::string& state) {
   page_->tell(loop, state);
 }
 
+void WebView::end() {
+  page_->end();
+}
+
+bool WebView::was_watched() const {
+  return page_->was_watched();
+}
+
 PageWishes WebView::wishes() {
   return page_->take_wishes();
 }
@@ -80,6 +88,10 @@ WebView::WebView(const WebOptions&, PageConfig) {
 
 void WebView::show(PageImage) {}
 void WebView::tell(const PageLoop&, const std::string&) {}
+void WebView::end() {}
+bool WebView::was_watched() const {
+  return false;
+}
 PageWishes WebView::wishes() {
   return {};
 }

@@ -32,6 +32,8 @@ class WebView {
   // See internal::LivePage.
   void show(internal::PageImage image);
   void tell(const internal::PageLoop& loop, const std::string& state);
+  void end();
+  bool was_watched() const;
   internal::PageWishes wishes();
 
  private:

@@ -1,8 +1,8 @@
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -196,10 +196,9 @@ PageConfig page_config_of(const TrackOptions& options, const FrameSource& source
 }
 
 // Until then, or until somebody wants the end.
-void wait_on_page(WebView& web, std::optional<double> until_s) {
+void wait_on_page(WebView& web, const std::function<bool()>& done) {
   SteadyClock clock;
-  while (!interrupted() && !web.wishes().stop && !(until_s && clock.now_s() >= *until_s))
-    clock.sleep_until(std::min(until_s.value_or(INFINITY), clock.now_s() + 0.05));
+  while (!interrupted() && !web.wishes().stop && !done()) clock.sleep_until(clock.now_s() + 0.005);
 }
 
 // One run of either command: where frames come from, and where what was seen in them goes.
@@ -222,11 +221,13 @@ class TrackRun {
   /// The command's exit code.
   int run() {
     watch_for_interrupts();
+    if (plays_a_file()) wait_on_page(*web_, [this] { return web_->was_watched(); });
     begin_s_ = clock_.now_s();
     track_all();
     if (plays_a_file() && !stopped_) {
       std::fprintf(stderr, "lapservo: %s has ended; the page stays until Ctrl-C\n", options_.input.c_str());
-      wait_on_page(*web_, std::nullopt);
+      web_->end();
+      wait_on_page(*web_, [] { return false; });
     }
     if (csv_) csv_->commit();
     if (overlay_) overlay_->commit();
@@ -259,7 +260,8 @@ class TrackRun {
         rethrow_with_frame(error, options_, *frame);
       }
       progress.show(tally_.frames, tally_.text());
-      if (plays_a_file()) wait_on_page(*web_, begin_s_ + frame->time_s + 1 / source_.frames_per_second());
+      const double next_s = begin_s_ + frame->time_s + 1 / source_.frames_per_second();
+      if (plays_a_file()) wait_on_page(*web_, [this, next_s] { return clock_.now_s() >= next_s; });
     }
   }
 
@@ -391,7 +393,8 @@ void add_view(Command app, Run& run_later) {
   add_input_options(command, *options);
   add_page_options(command, options->web);
   command.footer(
-      "Files are shown at their own pace, once. A browser on another computer reaches the page by\n"
+      "Files are shown at their own pace, once, when a browser shows the page. A browser on another computer reaches "
+      "the page by\n"
       "ssh -L 8080:localhost:8080 THIS_COMPUTER, or with --listen by the address that is printed.\n"
       "Example:\n"
       "  lapservo view ros2:/endoscope/image_raw --rig rig.yaml");

@@ -76,12 +76,13 @@ class Watcher : public RunObserver {
 
   bool on_tick(const ControlTick& tick) override {
     const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
-    summary_.add(tick, truth);
+    const std::string block = robot_.held() ? "held" : "", state = state_text(tick.decision.control, block);
+    summary_.add(tick, truth, block);
     if (folder_) folder_->log().add(tick.input, tick.decision, truth);
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
     if (strict_ && summary_.registration_contradicted()) return false;
-    if (page_ && !obey_page(tick)) return false;
-    return !interrupted() && (!view_ || show(*view_, tick, rig_));
+    if (page_ && !obey_page(tick, state)) return false;
+    return !interrupted() && (!view_ || show(*view_, tick, rig_, state));
   }
   const Summary& finish() {
     progress_.reset();
@@ -90,8 +91,8 @@ class Watcher : public RunObserver {
 
  private:
   // False when it ends the run.
-  bool obey_page(const ControlTick& tick) {
-    page_->tell(tick, tick.input.time_s, robot_.held() ? "hold: held" : state_text(tick.decision.control));
+  bool obey_page(const ControlTick& tick, const std::string& state) {
+    page_->tell(tick, tick.input.time_s, state);
     const PageWishes wishes = page_->wishes();
     if (wishes.hold) robot_.hold(*wishes.hold);
     return !wishes.stop;

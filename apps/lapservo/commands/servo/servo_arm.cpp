@@ -69,13 +69,13 @@ class ArmWatcher : public RunObserver {
   bool on_tick(const ControlTick& tick) override {
     if (!start_s_) start_s_ = tick.input.time_s;
     const double time_s = tick.input.time_s - *start_s_;
-    summary_.add(tick, std::nullopt);
+    const Blocked blocked = robot_.blocked();
+    summary_.add(tick, std::nullopt, block_of(blocked));
     if (const auto& motions = summary_.endoscope_motions(); motions.size() > said_motions_) {
       say(time_s, motions.back());
       said_motions_ = motions.size();
     }
     if (folder_) folder_->log().add(tick.input, tick.decision, std::nullopt);
-    const Blocked blocked = robot_.blocked();
     say_state(time_s, tick.decision.control, blocked);
     say_images(time_s);
     topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
@@ -85,7 +85,7 @@ class ArmWatcher : public RunObserver {
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
     if (blocked == Blocked::foreign_command || stopped) return false;
     if (options_.strict && summary_.registration_contradicted()) return false;
-    return !interrupted() && (!view_ || show(*view_, tick, run_.rig));
+    return !interrupted() && (!view_ || show(*view_, tick, run_.rig, state_));
   }
   const Summary& summary() const { return summary_; }
 
@@ -100,10 +100,11 @@ class ArmWatcher : public RunObserver {
   }
   std::string state_of(const ControlStep& control, Blocked blocked) const {
     if (blocked == Blocked::foreign_command) return "end: somebody else sends set-points to the arm (foreign_command)";
-    // However the operator keeps the arm meanwhile.
-    if (blocked == Blocked::none || !operators_part(control.reason).empty()) return state_text(control);
-    if (blocked == Blocked::not_enabled) return "hold: the arm is " + robot_.operating_state();
-    return "hold: " + std::string(to_string(blocked));
+    return state_text(control, block_of(blocked));
+  }
+  std::string block_of(Blocked blocked) const {
+    if (blocked == Blocked::none) return {};
+    return blocked == Blocked::not_enabled ? "the arm is " + robot_.operating_state() : std::string(to_string(blocked));
   }
   void say_state(double time_s, const ControlStep& control, Blocked blocked) {
     const std::string state = state_of(control, blocked);

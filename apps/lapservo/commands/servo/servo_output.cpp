@@ -52,7 +52,8 @@ std::string_view operators_part(HoldReason reason) {
   return "";
 }
 
-std::string state_text(const ControlStep& control) {
+std::string state_text(const ControlStep& control, const std::string& block) {
+  if (!block.empty() && operators_part(control.reason).empty()) return "hold: " + block;
   const std::string action(to_string(control.action));
   return control.reason == HoldReason::none ? action : action + ": " + reason_text(control.reason);
 }
@@ -86,15 +87,16 @@ void Summary::follow_registration(const ControlTick& tick) {
   if (now) camera_from_rcm_ = now;
 }
 
-void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {
+void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth, const std::string& block) {
   const ControlStep& control = tick.decision.control;
   if (!start_s_) start_s_ = tick.input.time_s;
   ++ticks_;
   follow_registration(tick);
   contradicted_ += tick.decision.registration_contradicted;
   const bool holds = control.action == ControlAction::hold;
-  if (holds) ++held_[std::string(to_string(control.reason))];
-  held_at_end_ = holds ? std::optional(control.reason) : std::nullopt;
+  const bool blocked = control.reason == HoldReason::arm_not_enabled && !block.empty();
+  if (holds) ++held_[blocked ? block : std::string(to_string(control.reason))];
+  held_at_end_ = holds ? std::optional(blocked ? block : reason_text(control.reason)) : std::nullopt;
   Eigen::Vector4d error = control.error;
   if (truth && truth->features) {
     error = feature_error(*truth->features, tick.input.desired.features);
@@ -118,7 +120,7 @@ std::string Summary::holds_text() const {
   std::string text;
   for (const auto& [reason, count] : held_) text += fmt::format("\nheld for {} of {} ticks: {}", count, ticks_, reason);
   for (const std::string& motion : endoscope_motions_) text += "\n" + motion;
-  if (held_at_end_) text += "\nended in a hold: " + reason_text(*held_at_end_);
+  if (held_at_end_) text += "\nended in a hold: " + *held_at_end_;
   if (contradicted_ > 0)
     text += fmt::format(
         "\nregistration_contradicted in {} of {} ticks: the images fit neither camera_from_rcm nor lens "
@@ -127,12 +129,12 @@ std::string Summary::holds_text() const {
   return text;
 }
 
-bool show(LiveView& view, const ControlTick& tick, const Rig& rig) {
+bool show(LiveView& view, const ControlTick& tick, const Rig& rig, const std::string& state) {
   if (!tick.seen) return true;
   Rig now = rig;
   now.instruments.front().camera_from_rcm = tick.decision.camera_from_rcm;
   cv::Mat picture = draw_overlay(tick.seen->image.bgr, now, tick.seen->observations);
-  const std::string label = fmt::format("{:.2f} s  {}", tick.input.time_s, state_text(tick.decision.control));
+  const std::string label = fmt::format("{:.2f} s  {}", tick.input.time_s, state);
   cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
   return view.show(picture);
 }

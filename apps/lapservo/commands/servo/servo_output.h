@@ -18,8 +18,9 @@ namespace lapservo::app {
 void say(double time_s, const std::string& what);
 /// What a hold for that reason waits for the operator to do; empty where it goes on by itself.
 std::string_view operators_part(HoldReason reason);
-/// "track", "hold: marker_lost", "hold: endoscope_measured (...)" with the operator's part.
-std::string state_text(const ControlStep& control);
+/// "track", "hold: marker_lost", "hold: endoscope_measured (...)" with the operator's part: the words of page, terminal
+/// and window. `block`: why the arm is kept at rest, where not by the loop.
+std::string state_text(const ControlStep& control, const std::string& block = {});
 
 /// A run's log.csv, rig.yaml and controller.yaml.
 class RunFolder {
@@ -37,8 +38,8 @@ class RunFolder {
 /// What the run came to, for the last lines.
 class Summary {
  public:
-  /// By the truth, where it is known, else by the estimate.
-  void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
+  /// By the truth, where it is known, else by the estimate. `block`: see state_text().
+  void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth, const std::string& block = {});
   bool converged() const { return convergence_.reached_s().has_value(); }
   /// Converged and not in a hold at the end; when `strict`, with a registration that no image contradicted.
   bool succeeded(bool strict) const { return converged() && !held_at_end_ && !(strict && registration_contradicted()); }
@@ -59,11 +60,11 @@ class Summary {
   long contradicted_ = 0;
   long ticks_ = 0;
   std::map<std::string, long> held_;
-  std::optional<HoldReason> held_at_end_;  // by the last tick
+  std::optional<std::string> held_at_end_;  // by the last tick, and why
   Convergence convergence_;
 };
 
-/// The image of a tick, if it has one, with what was seen and decided. False when the window was closed.
-bool show(LiveView& view, const ControlTick& tick, const Rig& rig);
+/// The image of a tick, if it has one, with what was seen and its state. False when the window was closed.
+bool show(LiveView& view, const ControlTick& tick, const Rig& rig, const std::string& state);
 
 }  // namespace lapservo::app

@@ -104,7 +104,7 @@ class RecordingWatcher : public RunObserver {
     }
     progress_.show(images_.count(), "");
     if (strict_ && summary_.registration_contradicted()) return false;
-    return !images_.ended() && !interrupted() && (!view_ || show(*view_, tick, rig_));
+    return !images_.ended() && !interrupted() && (!view_ || show(*view_, tick, rig_, state_));
   }
   const Summary& summary() const { return summary_; }
   bool acted() const { return acted_; }
