@@ -341,6 +341,7 @@ TEST_F(CommandLine, Markers) {
     EXPECT_GT(fs::file_size(name), 1000U);
   }
   expect_done("marker show --rig configs/example.yaml --out out/marker.png");
+  expect_in(output(), "by all visible lines");
   expect_in(output(), "222");
   empty_out();
   expect_refused("marker design --bands-upper-mm 5,5,10 --bands-lower-mm 10,5,5", {"not decodable"});

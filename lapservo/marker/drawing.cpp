@@ -17,7 +17,7 @@ namespace {
 using Anchor = Canvas::Anchor;
 const PrintColor black{0, 0, 0}, grey{0.55, 0.55, 0.55}, pale{0.93, 0.93, 0.93};
 
-constexpr double tab_mm = 4, gap_mm = 12;
+constexpr double tab_mm = 4, gap_mm = 12, edge_mm = 10;  // the last: nearer to the paper's edge printers cut off
 
 double width_mm(const Marker& marker) {
   return 1e3 * pi * marker.diameter_m;
@@ -96,9 +96,8 @@ Page page_of(Paper paper) {
 }
 
 void draw_curve(Canvas& canvas, PointMm corner, double width, double height, const std::vector<double>& values,
-                const std::string& title, const std::string& label, const std::string& format) {
-  const double low = *std::min_element(values.begin(), values.end()),
-               high = *std::max_element(values.begin(), values.end());
+                const std::string& title, const std::string& label, const std::string& format, double low) {
+  const double high = *std::max_element(values.begin(), values.end());
   const double room = std::max(0.08 * (high - low), 1e-9 + 1e-3 * std::abs(high)), bottom = low - room,
                top = high + room;
   canvas.line({corner, {corner.x, corner.y + height}, {corner.x + width, corner.y + height}}, black, 0.2);
@@ -133,26 +132,28 @@ void write_print_sheet(const std::filesystem::path& path, const std::string& ins
                        Paper paper, int copies) {
   const Page page = page_of(paper);
   const double length = length_mm(marker), width = width_mm(marker);
-  const double left = 25, top = 78;
-  const int columns = static_cast<int>((page.width - left - 15 + gap_mm) / (length + gap_mm));
+  const double left = 25, top = 78, room = page.width - left - edge_mm;
+  const int columns = static_cast<int>((room - 5 + gap_mm) / (length + gap_mm));
   const int rows = static_cast<int>((page.height - top - 15 + gap_mm) / (width + tab_mm + gap_mm));
   if (columns < 1 || rows < 1)
     throw InputError(path.string(),
                      fmt::format("the marker of {:.0f} x {:.0f} mm does not fit on the paper", length, width));
   Canvas canvas(path, page.width, page.height);
-  canvas.text(fmt::format("lapservo marker for {}", instrument), {left, 18}, 4.5);
-  canvas.text(
+  fitting_text(canvas, fmt::format("lapservo marker for {}", instrument), {left, 18}, 4.5, room);
+  fitting_text(
+      canvas,
       fmt::format(
           "outer diameter {:.2f} mm, circumference {:.2f} mm, length {:.2f} mm; hues {:.0f}, {:.0f}, {:.0f} degrees",
           1e3 * marker.diameter_m, width, length, marker.hues_deg[0], marker.hues_deg[1], marker.hues_deg[2]),
-      {left, 24}, 2.4);
+      {left, 24}, 2.4, room);
   const char* const steps[] = {
       "1. Print at 100 % on matte paper or film. Measure both rulers: they must show 100 mm and 50 mm.",
       "2. Cut along the dashed line. Wrap it around the shaft, print outside, arrow towards the tip.",
       "3. Glue the upper edge onto the tab, edge on edge. Measure the outer diameter; put it into the rig."};
-  for (std::size_t i = 0; i < 3; ++i) canvas.text(steps[i], {left, 31 + 5 * static_cast<double>(i)}, 2.4);
+  for (std::size_t i = 0; i < 3; ++i)
+    fitting_text(canvas, steps[i], {left, 31 + 5 * static_cast<double>(i)}, 2.4, room);
   draw_ruler(canvas, {left, 57}, 100, false);
-  draw_ruler(canvas, {15, top}, 50, true);
+  draw_ruler(canvas, {left - 5, top}, 50, true);
   canvas.arrow({left, 66}, {left + 25, 66});
   canvas.text("towards the tip", {left + 27, 67}, 2.4);
   canvas.arrow({left + 75, 61}, {left + 75, 71});
@@ -185,14 +186,14 @@ void write_marker_picture(const std::filesystem::path& path, const std::string& 
   for (int i = 0; i <= 180; ++i) {
     const double tau_rad = two_pi * std::min(i / 180.0, 0.99999);
     ratio.push_back(cross_ratio_at(marker, tau_rad));
-    sigma.push_back(1e3 * predicted_sigma_centre_line_rad(marker, tau_rad, viewing));
+    sigma.push_back(1e3 * predicted_sigma_surface_rad(marker, tau_rad, viewing));
   }
   draw_curve(canvas, {left, 108}, plot_width, plot_height - 8, ratio, "cross-ratio over tau (eq. 17)", "cross-ratio",
-             "{:.3f}");
+             "{:.3f}", *std::min_element(ratio.begin(), ratio.end()));
   draw_curve(canvas, {left, 156}, plot_width, plot_height - 8, sigma,
-             fmt::format("predicted sigma of tau, centre line alone: {:.2f} px a boundary, f {:.0f} px, {:.0f} mm away",
+             fmt::format("predicted sigma of psi, all visible lines: {:.2f} px a boundary, f {:.0f} px, {:.0f} mm away",
                          viewing.sigma_edge_px, viewing.focal_px, 1e3 * viewing.distance_m),
-             "sigma [mrad]", "{:.1f}");
+             "sigma [mrad]", "{:.2f}", 0);
   canvas.finish();
 }
 

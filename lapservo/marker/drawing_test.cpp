@@ -278,6 +278,25 @@ std::vector<Vector2d> letters(const std::string& svg) {
   return found;
 }
 
+TEST(PrintSheet, KeepsAwayFromThePapersEdges) {
+  const TemporaryFolder folder;
+  for (const Paper paper : {Paper::a4, Paper::letter})
+    for (const std::string& name : {std::string("PSM1"), std::string(120, 'W')}) {
+      write_print_sheet(folder / "sheet.svg", name, example, paper, 1000);
+      const Page page = read_svg(folder / "sheet.svg");
+      const std::string text = testing::read_file(folder / "sheet.svg");
+      std::vector<Vector2d> points = letters(text);
+      for (const auto& match : matches(text, std::regex(R"re(d="M ([\d.]+) ([\d.]+) L ([\d.]+) ([\d.]+) ?")re")))
+        for (const int i : {1, 3}) points.emplace_back(number(match[i]), number(match[i + 1]));
+      for (const Polygon& polygon : page.polygons)
+        if (polygon.color != Vector3d::Ones())  // else the page itself
+          points.insert(points.end(), polygon.points_mm.begin(), polygon.points_mm.end());
+      for (const Vector2d& p : points)
+        EXPECT_TRUE(p.x() > 10 && p.y() > 10 && p.x() < page.width_mm - 10 && p.y() < page.height_mm - 10)
+            << p.transpose();
+    }
+}
+
 // Each copy, once cut out, has its name and its direction; the bands stay clean.
 TEST(PrintSheet, EveryCopysTabHasTheNameAndAnArrowToTheTip) {
   const TemporaryFolder folder;

@@ -121,10 +121,10 @@ std::string shape_path(int color, double x, double y, double size) {
 }
 
 bool has_line(Draw draw) {
-  return draw != Draw::points && draw != Draw::boxes;
+  return draw != Draw::points && draw != Draw::rings && draw != Draw::boxes;
 }
 bool has_points(Draw draw) {
-  return draw == Draw::points || draw == Draw::line_and_points;
+  return draw == Draw::points || draw == Draw::rings || draw == Draw::line_and_points;
 }
 
 bool drawable(const Layout& layout, const Series& series, std::size_t i) {
@@ -150,14 +150,19 @@ std::string hover_text(const Plot& plot, const Series& series, std::size_t i) {
   return escaped(text + part(plot.x, series.x[i]) + ", " + part(plot.y, series.y[i]));
 }
 
+const char* point_class(Draw draw) {
+  return draw == Draw::rings ? "ring s-" : "point f-";
+}
+
 std::string points_of(const Plot& plot, const Layout& layout, const Series& series) {
-  const double size = series.x.size() > 300 ? 2 : series.x.size() > 100 ? 2.6 : 3.6;
+  const double point = series.x.size() > 300 ? 2 : series.x.size() > 100 ? 2.6 : 3.6;
+  const double size = series.draw == Draw::rings ? 1.8 * point : point;
   std::string text;
   for (std::size_t i = 0; i < series.x.size(); ++i) {
     if (!drawable(layout, series, i)) continue;
-    text += fmt::format("<path class=\"point f-{}\" d=\"{}\"><title>{}</title></path>\n", color_class(series.color),
-                        shape_path(series.color, layout.x(series.x[i]), layout.y(series.y[i]), size),
-                        hover_text(plot, series, i));
+    text += fmt::format(
+        "<path class=\"{}{}\" d=\"{}\"><title>{}</title></path>\n", point_class(series.draw), color_class(series.color),
+        shape_path(series.color, layout.x(series.x[i]), layout.y(series.y[i]), size), hover_text(plot, series, i));
   }
   return text;
 }
@@ -250,11 +255,11 @@ std::string drawn(const LegendEntry& entry) {
   std::string text;
   const double middle = entry.y_px - 4.5;
   const int color = entry.series ? entry.series->color : -1;
-  if (!entry.series || entry.series->draw != Draw::points)
+  if (!entry.series || has_line(entry.series->draw) || !has_points(entry.series->draw))
     text += fmt::format("<path class=\"line s-{}{}\" d=\"M{:.1f} {:.1f}h22\"/>", color_class(color),
                         !entry.series || entry.series->draw == Draw::dashed ? " dashed" : "", entry.x_px, middle);
   if (entry.series && has_points(entry.series->draw))
-    text += fmt::format("<path class=\"point f-{}\" d=\"{}\"/>", color_class(color),
+    text += fmt::format("<path class=\"{}{}\" d=\"{}\"/>", point_class(entry.series->draw), color_class(color),
                         shape_path(color, entry.x_px + 11, middle, 4));
   return text +
          fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", entry.x_px + 28, entry.y_px, escaped(entry.name));
@@ -509,6 +514,7 @@ std::string plot_css() {
       ".plot .line{fill:none;stroke-width:1.8;stroke-linejoin:round}.plot .dashed{stroke-dasharray:6 4}\n"
       ".plot .box{fill-opacity:.25;stroke-width:1.4}.plot "
       ".bar{stroke-width:1.4;opacity:.6}.plot .hover{fill:transparent}\n"
+      ".plot .ring{fill:none;stroke-width:1.4}\n"
       ".plot .point{fill-opacity:.8}.plot .point:hover,.plot .hover:hover{stroke:var(--ink);stroke-width:1.5}\n";
   for (const char* name : {"c0", "c1", "c2", "c3", "c4", "grey"})
     css += fmt::format(".s-{0}{{stroke:var(--{0})}}.f-{0}{{fill:var(--{0})}}\n", name);

@@ -6,10 +6,11 @@
 
 namespace lapservo::internal {
 
-/// How a series is drawn. Its colour and the shape of its points follow from `Series::color`. `boxes`: the points of
+/// How a series is drawn. Its colour and the shape of its points follow from `Series::color`. `rings`: points as larger
+/// outlines, which show around points of another series at the same places. `boxes`: the points of
 /// equal x as one box from quartile to quartile with its median; whiskers to the farthest point within 1.5 times the
 /// box's height, the points beyond as points.
-enum class Draw { line, dashed, points, line_and_points, boxes };
+enum class Draw { line, dashed, points, rings, line_and_points, boxes };
 
 /// A run of points, in the units of the axes. Points that are not finite leave a gap.
 struct Series {

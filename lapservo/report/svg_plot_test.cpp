@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <set>
 
@@ -119,7 +120,7 @@ Plot hostile_plot() {
   const std::string name = "<script>&\"'</title>";
   Plot plot{name, {name, name, {}, {}}, {name, name, {}, {}}, {}, {{name, 3}}, false};
   int color = -1;
-  for (const Draw draw : {Draw::line, Draw::dashed, Draw::points, Draw::line_and_points})
+  for (const Draw draw : {Draw::line, Draw::dashed, Draw::points, Draw::rings, Draw::line_and_points})
     plot.series.push_back({name, {0, 1, nan, 3, 4, -infinity}, {1, infinity, 2, nan, 5, 0}, draw, color++});
   return plot;
 }
@@ -154,6 +155,21 @@ TEST(Svg, DrawsEachPointOnceAndTellsItsNumbers) {
   const std::string svg = svg_from(plot);
   EXPECT_EQ(count_of(svg, "class=\"point f-c0\" d="), 3U + 1U) << "and one in the legend";
   EXPECT_NE(svg.find("<title>psi: time 1 s, error 20.5 mrad</title>"), std::string::npos);
+}
+
+TEST(Svg, RingsShowAroundPointsAtTheSamePlaces) {
+  Plot plot{"both", {"time", "s", {}, {}}, {"error", "px", {}, {}}, {}, {}, false};
+  plot.series.push_back({"before", {0, 1}, {1, 2}, Draw::rings, 0});
+  plot.series.push_back({"after", {0, 1}, {1, 2}, Draw::points, 0});
+  const std::string svg = svg_from(plot);
+  const auto radius_of = [&](const std::string& kind) {
+    double x = 0, y = 0, radius = 0;
+    EXPECT_EQ(count_of(svg, kind), 2U + 1U) << "and one in the legend";
+    const std::string path = kind + "\" d=\"M";
+    std::sscanf(svg.c_str() + svg.rfind(path) + path.size(), "%lf %lfa%lf", &x, &y, &radius);
+    return radius;
+  };
+  EXPECT_GT(radius_of("class=\"ring s-c0"), 1.5 * radius_of("class=\"point f-c0"));
 }
 
 // On the image plane a square is a square, and v grows downwards.

@@ -26,8 +26,9 @@ using Point = std::optional<std::pair<double, double>>;
 
 // A point for each item that has one.
 template <typename Items, typename PointOf>
-void add_points(Plot& plot, const std::string& name, int color, const Items& items, PointOf point_of) {
-  Series series{name, {}, {}, Draw::points, color};
+void add_points(Plot& plot, const std::string& name, int color, const Items& items, PointOf point_of,
+                Draw draw = Draw::points) {
+  Series series{name, {}, {}, draw, color};
   for (const auto& item : items)
     if (const Point point = point_of(item)) series.x.push_back(point->first), series.y.push_back(point->second);
   if (!series.x.empty()) plot.series.push_back(std::move(series));
@@ -37,7 +38,7 @@ Plot arm_plot(const ArmCheck& arm, const std::string& title, const std::string& 
               double ArmResidual::*what) {
   Plot plot = over_time(title, "off by", unit);
   const auto point = [&](const ArmResidual& r) { return Point({r.time_s, factor * (r.*what)}); };
-  add_points(plot, "as the rig has it", 1, arm.by_rig, point);
+  add_points(plot, "as the rig has it", 1, arm.by_rig, point, Draw::rings);
   add_points(plot, "after a calibration", 0, arm.at_best, point);
   return plot;
 }
@@ -104,6 +105,15 @@ cv::Scalar color_of(double sigma_rad) {
   return small + part * (large - small);
 }
 
+// Where there is no sigma: "not found", "not in view".
+void name_cell(cv::Mat& canvas, const cv::Rect& cell, const char* what, const cv::Scalar& ink) {
+  int y = 42;
+  for (const char* word : {"not", what}) {
+    cv::putText(canvas, word, cell.tl() + cv::Point(14, y), cv::FONT_HERSHEY_SIMPLEX, 0.55, ink, 1, cv::LINE_AA);
+    y += 22;
+  }
+}
+
 Picture map_picture(const SigmaMap& map) {
   constexpr int cell_px = 92;
   cv::Mat canvas(cell_px * SigmaMap::rows, cell_px * SigmaMap::columns, CV_8UC3, cv::Scalar(255, 255, 255));
@@ -115,10 +125,13 @@ Picture map_picture(const SigmaMap& map) {
       if (map.lost[at]) cv::rectangle(canvas, cell, cv::Scalar(60, 60, 60), cv::FILLED);
       if (sigma_rad) cv::rectangle(canvas, cell, color_of(*sigma_rad), cv::FILLED);
       cv::rectangle(canvas, cell, cv::Scalar(200, 200, 200));
-      const std::string text = sigma_rad ? fmt::format("{:.2g}", 1e3 * *sigma_rad) : map.lost[at] ? "lost" : "-";
       const bool beyond = map.lost[at] || (sigma_rad && *sigma_rad > 1.4 * rig_limits.sigma_rad);
-      cv::putText(canvas, text, cell.tl() + cv::Point(24, 54), cv::FONT_HERSHEY_SIMPLEX, 0.8,
-                  beyond ? cv::Scalar(255, 255, 255) : cv::Scalar(50, 50, 50), 2, cv::LINE_AA);
+      const cv::Scalar ink = beyond ? cv::Scalar(255, 255, 255) : cv::Scalar(50, 50, 50);
+      if (sigma_rad)
+        cv::putText(canvas, fmt::format("{:.2g}", 1e3 * *sigma_rad), cell.tl() + cv::Point(24, 54),
+                    cv::FONT_HERSHEY_SIMPLEX, 0.8, ink, 2, cv::LINE_AA);
+      else
+        name_cell(canvas, cell, map.lost[at] ? "found" : "in view", ink);
     }
   return {fmt::format("Sigma of psi [mrad] at {:.0f} mm", 1e3 * map.depth_m), canvas};
 }
@@ -184,7 +197,7 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
   for (const SigmaMap& map : checked.maps)
     figures.push_back({map_picture(map),
                        fmt::format("Sigma of psi [mrad] to expect with the marker in each part of the picture, {:.0f} "
-                                   "mm away; -: it is not wholly in view; lost: it is, and is not found.",
+                                   "mm away. Dark: it is wholly in view, and not found.",
                                    1e3 * map.depth_m)});
   figures.push_back({light_plot(checked.frames), "Median over the marker. Near 255 boundaries are lost."});
   if (f.print && f.print->refusal.empty())

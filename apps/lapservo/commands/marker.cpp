@@ -185,15 +185,20 @@ int run_show(const RigOptions& options) {
   std::printf("%s: %.2f mm outer diameter, %.2f mm long\n", instrument.name.c_str(), 1e3 * instrument.marker.diameter_m,
               1e3 * instrument.marker.length_m());
   show_in_terminal(instrument.marker);
-  double worst_rad = 0;
-  for (int i = 0; i < 16; ++i)
-    worst_rad =
-        std::max(worst_rad, predicted_print_error_rad(instrument.marker, two_pi * (i + 0.5) / 16, usual_print_error_m));
+  const Viewing viewing = options.viewing.viewing();
+  double surface_rad = 0, print_rad = 0;
+  for (int i = 0; i < 16; ++i) {
+    const double tau_rad = two_pi * (i + 0.5) / 16;
+    surface_rad = std::max(surface_rad, predicted_sigma_surface_rad(instrument.marker, tau_rad, viewing));
+    print_rad = std::max(print_rad, predicted_print_error_rad(instrument.marker, tau_rad, usual_print_error_m));
+  }
   std::printf(
-      "worst sigma of tau on the centre line: %.1f mrad by noise (%.2f px a boundary), %.0f mrad by a print that "
-      "is off by %.1f mm\n",
-      1e3 * worst_sigma_centre_line_rad(instrument.marker, options.viewing.viewing()), options.viewing.sigma_px,
-      1e3 * worst_rad, 1e3 * usual_print_error_m);
+      "worst sigma of psi by noise (%.2f px a boundary): %.2f mrad, as lapservo measures it, by all visible lines; "
+      "%.1f mrad by the centre line alone\n"
+      "worst error of psi by boundaries that are printed %.1f mm off: %.0f mrad until `lapservo calibrate marker` has "
+      "measured them\n",
+      viewing.sigma_edge_px, 1e3 * surface_rad, 1e3 * worst_sigma_centre_line_rad(instrument.marker, viewing),
+      1e3 * usual_print_error_m, 1e3 * print_rad);
   if (options.out.empty()) return 0;
   write_marker_picture(options.out, instrument.name, instrument.marker, options.viewing.viewing());
   std::printf("picture: %s\n", options.out.c_str());
