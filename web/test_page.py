@@ -62,7 +62,8 @@ class Browser:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']}")
                 return answer["result"]
-            if answer.get("method") in ("Runtime.exceptionThrown", "Log.entryAdded"):
+            failed = answer.get("method") == "Runtime.consoleAPICalled" and answer["params"]["type"] == "error"
+            if failed or answer.get("method") in ("Runtime.exceptionThrown", "Log.entryAdded"):
                 self.complaints.append(json.dumps(answer["params"]))
 
     def value(self, expression):

@@ -1,4 +1,4 @@
-"""Sphinx's settings for docs/*.md, which stay readable without it: sphinx-build -c docs/site docs OUT (docs/site/build.sh)."""
+"""Sphinx's settings for docs/*.md, which stay readable without it (docs/site/build.sh)."""
 
 import os
 import pathlib
@@ -8,16 +8,16 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 
 import public_api  # noqa: E402
+import python_api  # noqa: E402
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 
 project = "lapservo"
 copyright = "the lapservo authors, BSD-3-Clause"  # noqa: A001, Sphinx's name for it
 version = release = re.search(r"project\(lapservo VERSION ([0-9.]+)", (SOURCE / "CMakeLists.txt").read_text())[1]
-extensions = ["myst_parser", "breathe"]
+extensions = ["myst_parser", "breathe", "sphinx_copybutton"]
 myst_enable_extensions = ["deflist"]
 myst_heading_anchors = 3
-exclude_patterns = ["site"]
 smartquotes = False  # makes another sign of the two dashes of an option
 highlight_language = "text"
 
@@ -30,6 +30,7 @@ html_theme = "furo"
 html_title = "lapservo"
 html_static_path = ["static"]
 html_css_files = ["lapservo.css"]
+html_favicon = "static/icon.svg"
 html_copy_source = False
 html_show_sphinx = False
 html_last_updated_fmt = None
@@ -45,14 +46,14 @@ def menu(index):
 
 
 def add_generated(_app, page, text):
-    """Pages are plain Markdown; here they get the menu, the commands, the headers and the files that they link to."""
+    """Pages are plain Markdown; here they get the menu, the commands, Python's names and the files that they link to."""
     if page == "index":
         text[0] += "\n" + "\n".join(menu(text[0]))
     if page == "cli":
         commands = (SOURCE / "build" / "reference" / "cli.md").read_text()
         text[0] = re.sub(r"<!--.*?-->", lambda _: re.sub(r"^(#.*)", r"#\1", commands, flags=re.MULTILINE), text[0], flags=re.DOTALL)
-    if page == "cpp":
-        text[0] = re.sub(r"<!--.*?-->", lambda _: public_api.page(SOURCE, os.environ["LAPSERVO_DOXYGEN_XML"]), text[0], flags=re.DOTALL)
+    if page == "python_api":
+        text[0] = re.sub(r"<!--.*?-->", lambda _: python_api.page(), text[0], flags=re.DOTALL)
     text[0] = re.sub(r"^\[.*\]\(\.\./((?:examples|transports)/.*\.([a-z]+))\)$", show_file, text[0], flags=re.MULTILINE)
 
 
@@ -70,6 +71,16 @@ def leave_out_links(_app, page, text):
         text[0] = "---\norphan: true\n---\n\n" + text[0]
 
 
+def add_headers(app):
+    """The pages of the C++ headers, and their menu on the page cpp."""
+    folder = pathlib.Path(app.srcdir)
+    names = public_api.write_pages(SOURCE, os.environ["LAPSERVO_DOXYGEN_XML"], folder)
+    cpp = folder / "cpp.md"
+    menu_of_headers = "```{toctree}\n:maxdepth: 2\n\n" + "\n".join(names) + "\n```"
+    cpp.write_text(re.sub(r"<!--.*?-->", menu_of_headers, cpp.read_text(), flags=re.DOTALL))
+
+
 def setup(app):
+    app.connect("builder-inited", add_headers)
     app.connect("source-read", add_generated)
     app.connect("source-read", leave_out_links)

@@ -1,4 +1,4 @@
-"""The page of the public headers: lapservo.h's comments are its sections, what Doxygen found in each header its entries."""
+"""The pages of the public headers: lapservo.h's comments are their titles, what Doxygen found in each header their entries."""
 
 import pathlib
 import re
@@ -30,16 +30,25 @@ def entries_of(header, xml, members):
     return "\n".join(entries)
 
 
-def page(checkout, xml_folder):
-    """Markdown for what lapservo.h includes."""
-    files = [ElementTree.parse(path).getroot().find("compounddef") for path in sorted(pathlib.Path(xml_folder).glob("*_8h.xml"))]
-    namespace = ElementTree.parse(pathlib.Path(xml_folder) / "namespacelapservo.xml")
-    members = list(namespace.iter("memberdef"))
-    sections = []
+def sections(checkout):
+    """Title, text and headers of each part of lapservo.h."""
+    found = []
     for line in (checkout / "lapservo" / "lapservo.h").read_text().splitlines():
         if title := re.match(r"// (.*)", line):
             head, colon, _ = title[1].partition(":")
-            sections.append(f"## {head.rstrip('.')}\n\n{title[1] if colon else ''}\n")
+            found.append((head.rstrip("."), title[1] if colon else "", []))
         elif header := re.match(r'#include "(lapservo/.*)"', line):
-            sections.append(f"### {header[1]}\n\n```{{eval-rst}}\n{entries_of(header[1], files, members)}```\n")
-    return "\n".join(sections)
+            found[-1][2].append(header[1])
+    return found
+
+
+def write_pages(checkout, xml_folder, folder):
+    """One page for each part of lapservo.h, cpp_FOLDER.md by its last header's; the names without endings."""
+    files = [ElementTree.parse(path).getroot().find("compounddef") for path in sorted(pathlib.Path(xml_folder).glob("*_8h.xml"))]
+    members = list(ElementTree.parse(pathlib.Path(xml_folder) / "namespacelapservo.xml").iter("memberdef"))
+    names = []
+    for title, text, headers in sections(checkout):
+        entries = "".join(f"## {header}\n\n```{{eval-rst}}\n{entries_of(header, files, members)}```\n\n" for header in headers)
+        names.append("cpp_" + headers[-1].split("/")[1])
+        (folder / f"{names[-1]}.md").write_text(f"# {title}\n\n{text}\n\n{entries}")
+    return names
