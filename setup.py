@@ -17,9 +17,8 @@ class CMakeBuild(build_ext):
     def build_extension(self, ext):
         build = pathlib.Path(os.environ.get("LAPSERVO_BUILD", SOURCE / "build" / "pip"))
         if "LAPSERVO_BUILD" not in os.environ:
-            settings = ["-DCMAKE_BUILD_TYPE=Release", "-DLAPSERVO_BUILD_TESTS=OFF", "-DLAPSERVO_BUILD_BENCH=OFF"]
-            subprocess.run(["cmake", "-G", "Ninja", "-S", SOURCE, "-B", build, f"-DPython_EXECUTABLE={sys.executable}",
-                            *settings], check=True)
+            subprocess.run(["cmake", "-S", SOURCE, "-B", build, "--preset", "package", f"-DPython_EXECUTABLE={sys.executable}"],
+                           check=True)
             subprocess.run(["cmake", "--build", build, "--target", "lapservo_python"], check=True)
         built = list((build / "python" / "lapservo").glob("_lapservo.*.so"))
         if len(built) != 1:

@@ -15,9 +15,10 @@ if [ -z "$tree" ]; then
   cp "$archive" "$out/lapservo_$version.orig.tar.xz"
   tar -C "$out" -xf "$archive"
   (cd "$source" && dpkg-buildpackage --unsigned-source --unsigned-changes)
+  rm -rf "$source"  # gigabytes of objects
 else
   mkdir "$source"
   cp -r --parents CMakeLists.txt LICENSE README.md debian docs examples "$source"
-  (cd "$source" && LAPSERVO_BUILD_TREE=$tree DEB_BUILD_OPTIONS="noautodbgsym nocheck" dpkg-buildpackage --no-check-builddeps --unsigned-changes --build=binary)
+  (cd "$source" && LAPSERVO_BUILD_TREE=$tree DEB_BUILD_OPTIONS=nocheck dpkg-buildpackage --no-check-builddeps --unsigned-changes --build=binary)
 fi
 lintian --allow-root --fail-on error --tag-display-limit 0 "$out"/lapservo_*.changes
