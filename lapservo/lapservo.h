@@ -34,13 +34,16 @@
 #include "lapservo/rcm/line_observation.h"
 #include "lapservo/rcm/projected_rcm.h"
 
-// The ports, to be implemented for an arm and a camera: Robot, ImageStream, Clock.
+// The ports, to be implemented for an arm and a camera: Robot, ImageStream, Clock; Supervisor before every arm.
+#include "lapservo/robot/blocked.h"
 #include "lapservo/robot/clock.h"
 #include "lapservo/robot/joint_path.h"
 #include "lapservo/robot/operating_state.h"
 #include "lapservo/robot/reading_buffer.h"
 #include "lapservo/robot/robot.h"
 #include "lapservo/robot/steady_clock.h"
+#include "lapservo/robot/supervisor.h"
+#include "lapservo/robot/supervisor_state.h"
 #include "lapservo/stream/image_stream.h"
 
 // Control: run() follows a Trajectory with a ControllerConfig and passes each ControlTick to a RunObserver.

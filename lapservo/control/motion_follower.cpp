@@ -7,14 +7,19 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr double follow_s = 0.5, retreat_s = 0.1, retreats_for_s = 0.5, max_waiting_s = 3;
+constexpr double follow_s = 0.5, retreat_s = 0.1, retreats_for_s = 0.5;
 constexpr int far_after = 5;  // one wild reading is none
 
 }  // namespace
 
 MotionFollower::MotionFollower(JointMotion motion, const JointLimits& limits, const Eigen::Vector4d& max_lead,
                                double now_s)
-    : motion_(std::move(motion)), limits_(limits), max_lead_(max_lead), path_(limits.acceleration), started_s_(now_s) {
+    : motion_(std::move(motion)),
+      limits_(limits),
+      max_lead_(max_lead),
+      path_(limits.acceleration),
+      started_s_(now_s),
+      last_s_(now_s) {
   path_.reset(now_s, motion_.at(0));
 }
 
@@ -30,32 +35,26 @@ MotionFollower::Step MotionFollower::send(double now_s, const Eigen::Vector4d& w
   return {Progress::moving, path_};
 }
 
-MotionFollower::Step MotionFollower::wait(double now_s) {
-  if (!waiting_s_) waiting_s_ = now_s;
-  far_ = 0;
-  return {now_s > *waiting_s_ + max_waiting_s ? Progress::blocked : Progress::waiting};
-}
-
 MotionFollower::Step MotionFollower::retreat(double now_s) {
   if (now_s > retreat_->until_s) return {Progress::does_not_follow};
   return send(now_s, (retreat_->to - path_.at(now_s).position) / retreat_s);
 }
 
-MotionFollower::Step MotionFollower::step(double now_s, const JointState& measured) {
-  const Eigen::Vector4d q = measured.q.vector();
-  if (measured.operating_state != OperatingState::enabled || !q.allFinite()) return wait(now_s);
-  if (waiting_s_) {
-    const double waited_s = now_s - *std::exchange(waiting_s_, std::nullopt);
-    if (is_far(q, motion_.at(now_s - waited_s - started_s_))) return {Progress::moved_meanwhile};
-    started_s_ += waited_s;
-    path_.reset(now_s, q);
-  }
+void MotionFollower::resume(double now_s, const JointVector& measured) {
+  started_s_ += now_s - std::exchange(last_s_, now_s);
+  path_.reset(now_s, measured.vector());
+  far_ = 0;
+}
+
+MotionFollower::Step MotionFollower::step(double now_s, const JointVector& measured) {
+  last_s_ = now_s;
+  const Eigen::Vector4d q = measured.vector();
   if (retreat_) return retreat(now_s);
   const double t = now_s - started_s_;
   if (t > motion_.duration_s + period_s) return {Progress::done};
   const Eigen::Vector4d on_path = path_.at(now_s).position;
   far_ = is_far(q, on_path) ? far_ + 1 : 0;
-  if (far_ >= far_after) {
+  if (far_ >= far_after && q.allFinite()) {
     retreat_ = Retreat{q, now_s + retreats_for_s};
     return retreat(now_s);
   }

@@ -3,21 +3,18 @@
 #include <optional>
 
 #include "lapservo/control/calibration_motion.h"
+#include "lapservo/core/joint_vector.h"
 #include "lapservo/robot/joint_path.h"
-#include "lapservo/robot/robot.h"
 
 namespace lapservo::internal {
 
-/// Leads an arm along a motion, within the rate, acceleration and position limits. While the arm is not enabled the
-/// motion waits, and goes on from rest. Where it ends nothing more is to be sent: the last path brakes by itself.
+/// Leads an arm along a motion, within the rate, acceleration and position limits. Where it ends nothing more is to be
+/// sent: the last path brakes by itself.
 class MotionFollower {
  public:
   enum class Progress {
     moving,
-    waiting,          ///< the arm is not enabled
     done,             ///< from here on the motion has ended
-    blocked,          ///< the arm was not enabled for 3 s
-    moved_meanwhile,  ///< while it was not, it went farther from the motion than max_lead
     does_not_follow,  ///< its joints stayed farther than max_lead from the setpoints, which have returned to them
   };
 
@@ -29,12 +26,13 @@ class MotionFollower {
     Progress progress = Progress::moving;
     std::optional<JointPath> path{};
   };
-  Step step(double now_s, const JointState& measured);
+  Step step(double now_s, const JointVector& measured);
+  /// Goes on at rest from there, with what is left of the motion: nothing could be sent since the last step.
+  void resume(double now_s, const JointVector& measured);
 
   static constexpr double period_s = 0.01;
 
  private:
-  Step wait(double now_s);
   Step retreat(double now_s);
   bool is_far(const Eigen::Vector4d& a, const Eigen::Vector4d& b) const;
   Step send(double now_s, const Eigen::Vector4d& wanted_velocity);
@@ -44,8 +42,8 @@ class MotionFollower {
   Eigen::Vector4d max_lead_;
   JointPath path_;
   double started_s_;  // what was waited for left out
-  int far_ = 0;       // readings at a stretch
-  std::optional<double> waiting_s_;
+  double last_s_;
+  int far_ = 0;  // readings at a stretch
   struct Retreat {
     Eigen::Vector4d to;
     double until_s;

@@ -14,7 +14,7 @@ using Progress = MotionFollower::Progress;
 constexpr double tick_s = 0.002;
 const Eigen::Vector4d start(0, 1.5, 0.1, 0), max_lead(0.05, 0.05, 0.005, 0.2);
 
-// An arm that follows its setpoints with a lag, and drops its path when it is not enabled, as an interlock does.
+// An arm that follows its setpoints with a lag.
 struct SimulatedRun {
   double now_s = 0;
   Eigen::Vector4d q = start, set_point = start, velocity = Eigen::Vector4d::Zero();
@@ -35,29 +35,25 @@ struct SimulatedRun {
   }
 };
 
-// Runs to the end; the loop receives `state`.
+// Runs to the end; `misread` changes the measured joints.
 Progress follow(MotionFollower& follower, SimulatedRun& run, const std::function<void(SimulatedRun&)>& disturb,
-                const std::function<void(const SimulatedRun&, JointState&)>& state) {
+                const std::function<void(const SimulatedRun&, JointVector&)>& misread) {
   for (int i = 0; i < 100000; ++i) {
     for (int k = 0; k < 5; ++k) run.tick(disturb);
-    JointState measured{run.now_s, JointVector::from_vector(run.q), OperatingState::enabled};
-    state(run, measured);
-    if (measured.operating_state != OperatingState::enabled) {
-      run.path.reset();
-      run.velocity.setZero();
-    }
+    JointVector measured = JointVector::from_vector(run.q);
+    misread(run, measured);
     const auto step = follower.step(run.now_s, measured);
     if (step.path) run.path = step.path;
-    if (step.progress != Progress::moving && step.progress != Progress::waiting) {
+    if (step.progress != Progress::moving) {
       for (int k = 0; k < 500; ++k) run.tick(disturb);  // it brakes
       return step.progress;
     }
   }
   ADD_FAILURE() << "it never ends";
-  return Progress::waiting;
+  return Progress::moving;
 }
 const auto undisturbed = [](SimulatedRun&) {};
-const auto as_it_is = [](const SimulatedRun&, JointState&) {};
+const auto as_it_is = [](const SimulatedRun&, JointVector&) {};
 
 void expect_within(const SimulatedRun& run, const JointLimits& limits) {
   EXPECT_TRUE((run.max_rate <= 1.001 * limits.rate.array()).all()) << run.max_rate.transpose();
@@ -77,41 +73,22 @@ TEST(MotionFollower, LeadsAnArmToTheEnd) {
   expect_within(run, limits);
 }
 
-TEST(MotionFollower, WaitsWhileTheArmIsNotEnabledAndGoesOnFromRest) {
+TEST(MotionFollower, GoesOnFromRestAfterAPause) {
   const JointLimits limits;
   for (const double begin_s : {1.0, 2.2, 3.7, 5.1}) {
     MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
     SimulatedRun run;
-    const auto paused = [&](const SimulatedRun& r, JointState& state) {
-      if (r.now_s > begin_s && r.now_s < begin_s + 1) state.operating_state = OperatingState::paused;
-    };
-    EXPECT_EQ(follow(follower, run, undisturbed, paused), Progress::done) << begin_s;
+    while (run.now_s < begin_s) {
+      run.path = follower.step(run.now_s, JointVector::from_vector(run.q)).path;
+      for (int k = 0; k < 5; ++k) run.tick(undisturbed);
+    }
+    for (int k = 0; k < 500; ++k) run.tick(undisturbed);  // it brakes
+    run.set_point = run.q;
+    follower.resume(run.now_s, JointVector::from_vector(run.q));
+    EXPECT_EQ(follow(follower, run, undisturbed, as_it_is), Progress::done) << begin_s;
     EXPECT_GT(run.now_s, 11);
     EXPECT_TRUE((run.max_rate <= 1.001 * limits.rate.array()).all()) << run.max_rate.transpose();
   }
-}
-
-TEST(MotionFollower, GivesUpWhenTheArmIsNotEnabledForLong) {
-  const JointLimits limits;
-  MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
-  SimulatedRun run;
-  const auto faulted = [](const SimulatedRun& r, JointState& state) {
-    if (r.now_s > 2) state.operating_state = OperatingState::fault;
-  };
-  EXPECT_EQ(follow(follower, run, undisturbed, faulted), Progress::blocked);
-}
-
-TEST(MotionFollower, EndsWhenSomebodyMovedTheArmMeanwhile) {
-  const JointLimits limits;
-  MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
-  SimulatedRun run;
-  const auto paused = [](const SimulatedRun& r, JointState& state) {
-    if (r.now_s > 2 && r.now_s < 3) state.operating_state = OperatingState::paused;
-  };
-  const auto pushed = [](SimulatedRun& r) {
-    if (r.now_s > 2.4 && r.now_s < 2.6) r.q[0] += 0.3 * tick_s / 0.2, r.set_point = r.q;
-  };
-  EXPECT_EQ(follow(follower, run, pushed, paused), Progress::moved_meanwhile);
 }
 
 TEST(MotionFollower, LetsGoOfWhatItRunsAgainst) {
@@ -135,9 +112,9 @@ TEST(MotionFollower, OneWildReadingMovesNothing) {
       undisturbed_follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
   SimulatedRun run, other;
   bool was_wild = false;
-  const auto wild = [&](const SimulatedRun& r, JointState& state) {
+  const auto wild = [&](const SimulatedRun& r, JointVector& q) {
     if (r.now_s < 2 || was_wild) return;
-    state.q.theta_rad += 0.5, was_wild = true;
+    q.theta_rad += 0.5, was_wild = true;
   };
   EXPECT_EQ(follow(follower, run, undisturbed, wild), Progress::done);
   EXPECT_EQ(follow(undisturbed_follower, other, undisturbed, as_it_is), Progress::done);

@@ -47,7 +47,6 @@ void VisualController::reset(double time_s, const Eigen::Vector4d& q_joint) {
   arm_response_.restart();
   following_error_limit_.restart();
   now_s_ = time_s;
-  usable_s_ = time_s;
   started_ = true;
 }
 
@@ -58,7 +57,6 @@ void VisualController::start_over(double time_s, const Eigen::Vector4d& q_joint)
   path_.reset(time_s, position.cwiseMax(lower).cwiseMin(upper));
   following_error_limit_ = FollowingErrorLimit(config_.limits);
   now_s_ = time_s;
-  usable_s_ = time_s;
 }
 
 void VisualController::resume(const FeatureModel& model) {
@@ -79,6 +77,7 @@ ControlStep VisualController::step(double time_s, const Eigen::Vector4d& q_joint
     if (suspended_ == HoldReason::none) step.estimate = estimator_->at(time_s, q_joint);
   }
   if (step.reason == HoldReason::none) step.reason = image_reason_;
+  if (step.reason == HoldReason::none && !(image_s_ >= needed_since_s_)) step.reason = HoldReason::stale_image;
 
   const Law law = decide(step.reason, step.estimate, desired);
   step.reason = law.reason;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -39,6 +40,9 @@ class VisualController {
 
   /// The same after a hold, of an arm that was enabled all the while: under its load it keeps the place that it has.
   void start_over(double time_s, const Eigen::Vector4d& q_joint);
+
+  /// Images of before that time move nothing: the arm may be elsewhere since.
+  void need_image_since(double time_s) { needed_since_s_ = time_s; }
 
   /// From the next step on the model does not count: nothing is estimated, and the arm holds for that reason.
   void suspend(HoldReason reason) { suspended_ = reason; }
@@ -107,6 +111,7 @@ class VisualController {
   HoldReason image_reason_ = HoldReason::no_image_yet;  ///< of the latest image
   std::optional<double> image_s_;                       ///< stamp of the latest image
   double usable_s_ = 0;                                 ///< when the last usable one arrived
+  double needed_since_s_ = -std::numeric_limits<double>::infinity();
 };
 
 }  // namespace lapservo::internal

@@ -36,12 +36,14 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
   joints("setpoint_js", &Interlock::on_setpoint);
   subscriptions_.push_back(
       transport.subscribe_operating_state(topic_of(arm, "operating_state"), [this](OperatingStateMessage&& message) {
+        const double arrival_s = clock_.now_s();
         const std::lock_guard lock(mutex_);
-        interlock_.on_operating_state(message);
+        interlock_.on_operating_state(message, arrival_s);
       }));
   subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, "servo_jp"), [this](JointMessage&&) {
+    const double arrival_s = clock_.now_s();
     const std::lock_guard lock(mutex_);
-    interlock_.on_foreign_command();
+    interlock_.on_foreign_command(arrival_s);
   }));
   thread_ = std::thread([this] { command(); });
 }
@@ -72,24 +74,9 @@ void CrtkRobot::release() {
   interlock_.release();
 }
 
-void CrtkRobot::hold(bool on) {
-  const std::lock_guard lock(mutex_);
-  interlock_.hold(on);
-}
-
-Blocked CrtkRobot::blocked() const {
-  const std::lock_guard lock(mutex_);
-  return interlock_.blocked(clock_.now_s());
-}
-
 InterlockCounts CrtkRobot::counts() const {
   const std::lock_guard lock(mutex_);
   return interlock_.counts();
-}
-
-std::string CrtkRobot::operating_state() const {
-  const std::lock_guard lock(mutex_);
-  return interlock_.operating_state();
 }
 
 std::optional<Eigen::Vector4d> CrtkRobot::set_point() const {

@@ -30,12 +30,7 @@ class CrtkRobot : public Robot {
   void send(const JointPath& path) override;
   void release() override;
 
-  /// See Interlock::hold().
-  void hold(bool on);
-
-  Blocked blocked() const;
   InterlockCounts counts() const;
-  std::string operating_state() const;
   std::optional<Eigen::Vector4d> set_point() const;
 
  private:

@@ -36,8 +36,9 @@ void say_all(TestTransport& transport, double stamp_s) {
 
 void send_a_path(TestTransport& transport, StandingClock& clock, CrtkRobot& robot) {
   say_all(transport, 1000);
-  EXPECT_NE(robot.state().operating_state, OperatingState::enabled);  // once, so that the loop starts anew
+  EXPECT_NE(robot.state().blocked, Blocked::none);  // before
   const JointState state = robot.state();
+  EXPECT_EQ(state.blocked, Blocked::none);
   EXPECT_EQ(state.operating_state, OperatingState::enabled);
   EXPECT_EQ(state.q.psi_rad, 0.2);
   JointPath path(JointLimits().acceleration);
@@ -58,7 +59,7 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
   EXPECT_EQ(sent.positions, (std::vector<double>{0.1, 1.5, 0.1, 0.2, 0.7}));
   clock.now = 10.2;  // nothing came since
   ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
-  EXPECT_EQ(robot.blocked(), Blocked::old_joint_states);
+  EXPECT_EQ(robot.state().blocked, Blocked::old_joint_states);
 }
 
 TEST(CrtkRobot, ANoticedCommandOfSomebodyElseStopsIt) {
@@ -68,7 +69,7 @@ TEST(CrtkRobot, ANoticedCommandOfSomebodyElseStopsIt) {
   send_a_path(transport, clock, robot);
   transport.say("/PSM1/servo_jp", JointMessage{});
   ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
-  EXPECT_EQ(robot.blocked(), Blocked::foreign_command);
+  EXPECT_EQ(robot.state().blocked, Blocked::foreign_command);
 }
 
 TEST(CrtkRobot, ObservingItSendsNothing) {

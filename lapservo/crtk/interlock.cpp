@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "lapservo/core/words.h"
 #include "lapservo/crtk/joint_map.h"
 
 namespace lapservo::internal {
@@ -16,30 +15,11 @@ constexpr double memory_s = 0.25;  // by which a set-point that was sent is the 
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
 constexpr double same_other = 4e-3;
 
-constexpr Words<Blocked, 13> blocked_words{{{Blocked::none, "none"},
-                                            {Blocked::no_joint_states, "no_joint_states"},
-                                            {Blocked::old_joint_states, "old_joint_states"},
-                                            {Blocked::non_finite_joints, "non_finite_joints"},
-                                            {Blocked::no_setpoint, "no_setpoint"},
-                                            {Blocked::no_operating_state, "no_operating_state"},
-                                            {Blocked::not_enabled, "not_enabled"},
-                                            {Blocked::not_homed, "not_homed"},
-                                            {Blocked::busy, "busy"},
-                                            {Blocked::far_from_setpoint, "far_from_setpoint"},
-                                            {Blocked::held, "held"},
-                                            {Blocked::foreign_command, "foreign_command"},
-                                            {Blocked::stopped, "stopped"}}};
-static_assert(names_all(blocked_words, Blocked::stopped));
-
 bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
 }  // namespace
-
-std::string_view to_string(Blocked blocked) {
-  return word_of(blocked_words, blocked);
-}
 
 Interlock::Interlock(const InterlockConfig& config)
     : config_(config), measured_clock_(config.max_age_s), setpoint_clock_(config.max_age_s) {}
@@ -101,18 +81,20 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
     names_ = message.names;
     places_ = *places;
   } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_))) {
-    on_foreign_command();
+    on_foreign_command(arrival_s);
   }
   watch(arrival_s);
 }
 
-void Interlock::on_operating_state(const OperatingStateMessage& message) {
+void Interlock::on_operating_state(const OperatingStateMessage& message, double arrival_s) {
   operating_state_ = message;
-  operating_state_known_ = true;
+  watch(arrival_s);
 }
 
-void Interlock::on_foreign_command() {
-  if (config_.motion_enabled && !released_) foreign_ = true;
+void Interlock::on_foreign_command(double arrival_s) {
+  if (!config_.motion_enabled) return;
+  foreign_s_ = arrival_s;
+  watch(arrival_s);
 }
 
 // Between those that were sent of late: the arm may interpolate, and what comes back is from a moment ago.
@@ -133,48 +115,36 @@ bool Interlock::is_ours(const Reading& setpoint) const {
 }
 
 void Interlock::follow(const JointPath& path) {
-  if (must_start_anew_ || held_) return;
+  if (untold_ != Blocked::none) return;
   path_ = path;
   released_ = false;
 }
 
-void Interlock::hold(bool on) {
-  if (held_ && !on) forget_path();
-  held_ = on;
-  started_ = !on;
-}
-
-void Interlock::stop() {
-  stopped_ = true;
-}
-
 Blocked Interlock::blocked(double now_s) const {
-  if (stopped_) return Blocked::stopped;
-  if (foreign_) return Blocked::foreign_command;
+  if (foreign_s_ && now_s - *foreign_s_ <= config_.max_age_s) return Blocked::foreign_command;
   if (!finite_) return Blocked::non_finite_joints;
+  if (operating_state_) {
+    if (operating_state_->state != to_string(OperatingState::enabled)) return Blocked::not_enabled;
+    if (!operating_state_->is_homed) return Blocked::not_homed;
+    if (operating_state_->is_busy) return Blocked::busy;
+  }
   if (!measured_) return Blocked::no_joint_states;
   if (now_s - measured_->time_s > config_.max_age_s) return Blocked::old_joint_states;
-  if (!operating_state_known_) return Blocked::no_operating_state;
-  if (operating_state_.state != to_string(OperatingState::enabled)) return Blocked::not_enabled;
-  if (!operating_state_.is_homed) return Blocked::not_homed;
-  if (operating_state_.is_busy) return Blocked::busy;
+  if (!operating_state_) return Blocked::no_operating_state;
   if (!setpoint_ || now_s - setpoint_->time_s > config_.max_age_s) return Blocked::no_setpoint;
   const Eigen::Array4d distance = (setpoint_->q - measured_->q).array().abs();
-  if (!moving_ && (distance > config_.max_distance.array()).any()) return Blocked::far_from_setpoint;
-  return held_ ? Blocked::held : Blocked::none;
+  return !moving_ && (distance > config_.max_distance.array()).any() ? Blocked::far_from_setpoint : Blocked::none;
 }
 
-// From the moment on that something is amiss until the loop knows of it, nothing moves.
 void Interlock::watch(double now_s) {
   const Blocked why = blocked(now_s);
-  if (why == Blocked::none || why == Blocked::held) return;
+  if (why == Blocked::none) return;
+  if (untold_ == Blocked::none || is_silence(untold_)) untold_ = why;
   blocked_s_ = now_s;
   forget_path();
 }
 
 void Interlock::forget_path() {
-  if (!must_start_anew_) told_ = false;
-  must_start_anew_ = true;
   moving_ = false;
   path_.reset();
   sent_.clear();
@@ -184,19 +154,10 @@ JointState Interlock::state(double now_s) {
   watch(now_s);
   JointState state;
   state.follows = config_.motion_enabled;
-  state.started = std::exchange(started_, false);
+  state.blocked = std::exchange(untold_, Blocked::none);
   if (measured_) state.time_s = measured_->time_s, state.q = JointVector::from_vector(measured_->q);
-  const bool well = blocked(now_s) == Blocked::none;
-  if (well && told_) must_start_anew_ = false;
-  if (must_start_anew_) told_ = true;
-  if (held_) {
-    state.operating_state = OperatingState::paused;
-  } else if (!must_start_anew_) {
-    state.operating_state = OperatingState::enabled;
-  } else if (const auto said = operating_state_from_string(operating_state_.state);
-             said && *said != OperatingState::enabled) {
-    state.operating_state = *said;
-  }
+  if (operating_state_)
+    state.operating_state = operating_state_from_string(operating_state_->state).value_or(OperatingState::disabled);
   return state;
 }
 
@@ -218,32 +179,29 @@ std::vector<double> Interlock::all_joints() const {
   return positions;
 }
 
+// Where it is to be this period, as far as the limits allow; true when it is there.
+bool Interlock::approach(const Eigen::Vector4d& wanted) {
+  const Eigen::Vector4d step = config_.limits.rate * config_.period_s, away = within_limits(wanted) - last_;
+  const Eigen::Vector4d taken = away.cwiseMax(-step).cwiseMin(step);
+  last_ += taken;
+  return taken == away;
+}
+
 std::optional<std::vector<double>> Interlock::tick(double now_s) {
   watch(now_s);
-  if (released_ && path_ && path_->at(now_s).velocity.isZero()) forget_path();
+  if (path_ && !path_->at(now_s).position.allFinite()) forget_path();
   if (!path_) return std::nullopt;
   // While the arm could not be moved by us it may have been by others.
   if (!moving_ && !(setpoint_->arrival_s > blocked_s_)) return std::nullopt;
-  if (!moving_) {
-    start(now_s);
-  } else {
-    const Eigen::Vector4d step = config_.limits.rate * config_.period_s;
-    const Eigen::Vector4d away = within_limits(path_->at(now_s).position + shift_) - last_;
-    last_ += away.cwiseMax(-step).cwiseMin(step);
-  }
-  if (!last_.allFinite()) {
-    stop();
-    watch(now_s);
-    return std::nullopt;
-  }
-  if (!config_.motion_enabled) {
-    ++counts_.withheld;
-    return std::nullopt;
-  }
+  if (!moving_) start(now_s);
+  const MotionState motion = path_->at(now_s);
+  const bool there = approach(motion.position + shift_);
   sent_.push_back({now_s, last_});
   while (now_s - sent_.front().time_s > memory_s + config_.max_age_s) sent_.pop_front();
-  ++counts_.set_points;
-  return all_joints();
+  const std::vector<double> positions = all_joints();
+  if (released_ && there && motion.velocity.isZero()) forget_path();
+  ++(config_.motion_enabled ? counts_.set_points : counts_.withheld);
+  return config_.motion_enabled ? std::optional(positions) : std::nullopt;
 }
 
 }  // namespace lapservo::internal

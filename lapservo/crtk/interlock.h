@@ -5,7 +5,6 @@
 #include <deque>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -15,29 +14,11 @@
 #include "lapservo/crtk/messages.h"
 #include "lapservo/crtk/stamp_clock.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/robot/blocked.h"
 #include "lapservo/robot/reading_buffer.h"
 #include "lapservo/robot/robot.h"
 
 namespace lapservo::internal {
-
-/// Why an arm is not moved.
-enum class Blocked {
-  none,
-  no_joint_states,    ///< none has come yet
-  old_joint_states,   ///< none with a new stamp for too long
-  non_finite_joints,  ///< the latest holds a NaN or an infinity
-  no_setpoint,        ///< where the arm wants to be is not known, or not any more
-  no_operating_state,
-  not_enabled,
-  not_homed,
-  busy,
-  far_from_setpoint,  ///< the arm is not where its own set-point is
-  held,               ///< a person wants it to stand still
-  foreign_command,    ///< somebody else moves the arm; stays until the end
-  stopped,            ///< stays until the end
-};
-/// The enumerator's name.
-std::string_view to_string(Blocked blocked);
 
 struct InterlockConfig {
   Joints joints;
@@ -57,13 +38,13 @@ struct InterlockCounts {
   long withheld = 0;  ///< set-points that would have been sent, but for motion_enabled
 };
 
-/// Decides whether and where a CRTK arm is moved. It goes by what it is told and by the times that it is given: no
-/// clock, no thread, no transport. An arm moves only while its joint states come, finite and freshly stamped, and it is
-/// ENABLED, homed and not busy. Motion starts at the arm's own set-point, which a path's start is moved to; each
-/// set-point differs from the one before by a period's rate limit at most and lies within the limits (or nearer to them
-/// than before). Joints beyond the four stay at their set-point of the start. When anything is amiss the path is
-/// forgotten, nothing is sent, and state() tells of an arm that is not enabled at least once, so that the loop starts
-/// anew from where the arm is.
+/// Turns a path into the set-points of a CRTK arm, and says when the arm is not ready for them. It goes by what it is
+/// told and by the times that it is given: no clock, no thread, no transport. An arm is ready while its joint states
+/// come, finite and freshly stamped, it is ENABLED, homed and not busy, and nobody else commands it. Motion starts at
+/// the arm's own set-point, which a path's start is moved to; each set-point differs from the one before by a period's
+/// rate limit at most and lies within the limits (or nearer to them than before). Joints beyond the four stay at their
+/// set-point of the start. From the moment on that the arm is not ready the path is forgotten and nothing is sent;
+/// state() tells of it, however short it was, and until then no new path is followed.
 class Interlock {
  public:
   explicit Interlock(const InterlockConfig& config);
@@ -71,29 +52,21 @@ class Interlock {
   // What came, with its time of arrival on the loop's clock.
   void on_measured(const JointMessage& message, double arrival_s);
   void on_setpoint(const JointMessage& message, double arrival_s);
-  void on_operating_state(const OperatingStateMessage& message);
+  void on_operating_state(const OperatingStateMessage& message, double arrival_s);
   /// Somebody else sends set-points to this arm.
-  void on_foreign_command();
+  void on_foreign_command(double arrival_s);
 
-  /// The loop's wishes: Robot::send, and the end.
+  /// Robot::send.
   void follow(const JointPath& path);
-  void stop();
-  /// A person's wish: while it holds, new paths are not followed, so that the last one brakes to rest; false is a
-  /// start.
-  void hold(bool on);
-  /// Robot::release: until follow() others may command the arm.
+  /// Robot::release.
   void release() { released_ = true; }
-
-  /// Robot::state. An arm that must not be moved now is not enabled, whatever it says itself.
+  /// Robot::state.
   JointState state(double now_s);
   /// Robot::readings.
   std::vector<JointReading> take_readings() { return readings_.take(); }
   /// To be called every period: the set-point of all the arm's joints to be sent now, if any.
   std::optional<std::vector<double>> tick(double now_s);
 
-  Blocked blocked(double now_s) const;
-  /// What the arm said of itself last; empty before it did.
-  const std::string& operating_state() const { return operating_state_.state; }
   /// Names of the arm's joints, as in its set-points.
   const std::vector<std::string>& names() const { return names_; }
   /// The set-point of theta, phi, rho, psi that was sent last, or withheld; nullopt while none is wanted.
@@ -115,11 +88,13 @@ class Interlock {
   std::optional<Places> places_in(const JointMessage& message);
   std::optional<double> stamped(StampClock& clock, const JointMessage& message, double arrival_s);
   Eigen::Vector4d q_of(const JointMessage& message, const Places& places) const;
+  Blocked blocked(double now_s) const;
   void watch(double now_s);
   void forget_path();
   void start(double now_s);
   bool is_ours(const Reading& setpoint) const;
   Eigen::Vector4d within_limits(const Eigen::Vector4d& wanted) const;
+  bool approach(const Eigen::Vector4d& wanted);
   std::vector<double> all_joints() const;
 
   InterlockConfig config_;
@@ -128,15 +103,14 @@ class Interlock {
   std::optional<Reading> measured_, setpoint_;
   ReadingBuffer readings_;
   bool finite_ = true;
-  OperatingStateMessage operating_state_;
-  bool operating_state_known_ = false, held_ = false, foreign_ = false, stopped_ = false;
-  bool released_ = false, started_ = false;
+  std::optional<OperatingStateMessage> operating_state_;
+  std::optional<double> foreign_s_;  // when somebody else commanded the arm last
+  Blocked untold_ = Blocked::none;   // what was amiss first since state(); other things count more than silence
   std::vector<std::string> names_;
   Places places_{};
 
   std::optional<JointPath> path_;
-  bool must_start_anew_ = true, told_ = false;  // the loop was told that the arm is not enabled
-  bool moving_ = false;
+  bool released_ = false, moving_ = false;
   double blocked_s_ = 0;  // when something was amiss last
   Eigen::Vector4d shift_ = Eigen::Vector4d::Zero(), last_ = Eigen::Vector4d::Zero();
   std::vector<double> others_;  // all joints' set-points at the start

@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <functional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -30,7 +33,7 @@ class Bench {
   explicit Bench(const InterlockConfig& config = config_of()) : interlock(config), config_(config) { enable(); }
 
   void enable(const std::string& state = "ENABLED", bool homed = true, bool busy = false) {
-    interlock.on_operating_state({epoch_s + now_s, state, homed, busy});
+    interlock.on_operating_state({epoch_s + now_s, state, homed, busy}, now_s);
   }
   JointMessage message(const Eigen::Vector4d& of_q) const {
     const Eigen::Vector4d joints = joints_from_q(psm(), of_q);
@@ -62,12 +65,13 @@ class Bench {
       ++sent_count;
     }
   }
-  // As the loop does once a period: starts anew where the arm is when it is told that it is not enabled.
+  // As the loop does once a period: starts anew where the arm is when it is told that it is not ready.
   void control(double duration_s, const Eigen::Vector4d& velocity) {
     constexpr double period_s = 1.0 / 60;
     for (const double end_s = now_s + duration_s; now_s < end_s - 1e-9;) {
       const JointState state = interlock.state(now_s);
-      if (state.operating_state != OperatingState::enabled) {
+      blocked = state.blocked;
+      if (blocked != Blocked::none) {
         path.reset(now_s, state.q.vector());
       } else {
         path.ramp_to(now_s, velocity, period_s);
@@ -82,6 +86,7 @@ class Bench {
   Eigen::Vector4d setpoint{0.1, 1.5, 0.08, 0.5}, sag{0.004, -0.003, 0.001, 0.02};
   double now_s = 10, wrist = 0.3, last_sent_s = 0;
   int sent_count = 0;
+  Blocked blocked = Blocked::none;
   bool talking = true;
   std::function<void(JointMessage&)> alter;
 
@@ -122,7 +127,7 @@ TEST(Interlock, FollowsFromTheArmsOwnSetPointOn) {
   bench.control(1, slow);
   EXPECT_GT(bench.sent_count, 450);
   EXPECT_TRUE((bench.setpoint - start).isApprox(slow, 0.1));
-  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+  EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
 }
 
 TEST(Interlock, NoStepExceedsTheRateLimitWhateverThePathDoes) {
@@ -191,13 +196,12 @@ TEST(Interlock, HoldsAtEveryFaultAndGoesOnAfterwards) {
     SCOPED_TRACE(fault.name);
     Bench bench;
     bench.control(0.3, slow);
-    EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+    EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
     const double fault_s = bench.now_s;
     fault.begin(bench);
     bench.control(1, slow);
-    EXPECT_EQ(bench.interlock.blocked(bench.now_s), fault.blocked) << to_string(bench.interlock.blocked(bench.now_s));
+    EXPECT_EQ(bench.blocked, fault.blocked) << to_string(bench.blocked);
     EXPECT_LE(bench.last_sent_s, fault_s + fault.within_s + 2 * tick_s);
-    EXPECT_NE(bench.interlock.state(bench.now_s).operating_state, OperatingState::enabled);
     const int sent = bench.sent_count;
     fault.end(bench);
     bench.setpoint += Eigen::Vector4d(0.02, 0, 0, 0.1);  // moved meanwhile: the steps from there on count
@@ -206,40 +210,49 @@ TEST(Interlock, HoldsAtEveryFaultAndGoesOnAfterwards) {
   }
 }
 
-// A fault so short that the loop never saw it: its path is not taken up as if nothing had happened.
-TEST(Interlock, AShortFaultMakesTheLoopStartAnew) {
-  Bench bench;
-  bench.control(0.3, slow);
-  bench.enable("PAUSED");
-  bench.pass(tick_s);
-  bench.enable();
-  const int sent = bench.sent_count;
-  bench.interlock.follow(bench.path);
-  bench.pass(0.01);
-  EXPECT_EQ(bench.sent_count, sent);
-  EXPECT_NE(bench.interlock.state(bench.now_s).operating_state, OperatingState::enabled);
-  EXPECT_EQ(bench.interlock.state(bench.now_s).operating_state, OperatingState::enabled);
-}
-
-TEST(Interlock, SomebodyElsesSetPointEndsIt) {
-  for (const bool of_wrist : {false, true}) {
+// A fault of no time at all, between two ticks: what was sent before is not taken up as if nothing had happened.
+TEST(Interlock, TellsOfAFaultHoweverShort) {
+  const std::vector<std::pair<Blocked, std::function<void(Bench&)>>> faults{
+      {Blocked::not_enabled, [](Bench& b) { b.enable("PAUSED"); }},
+      {Blocked::not_homed, [](Bench& b) { b.enable("ENABLED", false); }},
+      {Blocked::busy, [](Bench& b) { b.enable("ENABLED", true, true); }}};
+  for (const auto& [blocked, begin] : faults) {
     Bench bench;
     bench.control(0.3, slow);
-    JointMessage foreign = bench.message(bench.setpoint);
-    foreign.stamp_s += 1e-4;
-    foreign.positions[of_wrist ? 2 : 0] += 0.02;
-    bench.interlock.on_setpoint(foreign, bench.now_s);
+    begin(bench);
+    bench.enable();
     const int sent = bench.sent_count;
-    bench.control(1, slow);
-    EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::foreign_command);
+    bench.interlock.follow(bench.path);
+    bench.pass(0.01);
     EXPECT_EQ(bench.sent_count, sent);
+    EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, blocked);
+    EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
   }
-  Bench bench;
-  bench.control(0.3, slow);
-  bench.interlock.on_foreign_command();
-  const int sent = bench.sent_count;
-  bench.control(1, slow);
-  EXPECT_EQ(bench.sent_count, sent);
+}
+
+TEST(Interlock, NothingIsSentWhileSomebodyElseCommandsTheArm) {
+  const std::vector<std::function<void(Bench&)>> commands{[](Bench& b) { b.interlock.on_foreign_command(b.now_s); },
+                                                          [](Bench& b) {
+                                                            JointMessage foreign = b.message(b.setpoint);
+                                                            foreign.stamp_s += 1e-4, foreign.positions[0] += 0.02;
+                                                            b.interlock.on_setpoint(foreign, b.now_s);
+                                                          },
+                                                          [](Bench& b) {
+                                                            JointMessage foreign = b.message(b.setpoint);
+                                                            foreign.stamp_s += 1e-4, foreign.positions[2] += 0.02;
+                                                            b.interlock.on_setpoint(foreign, b.now_s);
+                                                          }};
+  for (const auto& command : commands) {
+    Bench bench;
+    bench.control(0.3, slow);
+    command(bench);
+    const int sent = bench.sent_count;
+    EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::foreign_command);
+    bench.control(max_s / 2, slow);
+    EXPECT_EQ(bench.sent_count, sent);
+    bench.control(0.2, slow);
+    EXPECT_EQ(bench.blocked, Blocked::none);
+  }
 }
 
 TEST(Interlock, TheArmsOwnSetPointMayComeBackLate) {
@@ -250,7 +263,7 @@ TEST(Interlock, TheArmsOwnSetPointMayComeBackLate) {
   JointMessage late = old;
   late.stamp_s = epoch_s + bench.now_s - 1e-4;
   bench.interlock.on_setpoint(late, bench.now_s);
-  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+  EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
 }
 
 // A quarter of a second to the arm, and its answer was on its way for nearly as long as answers count.
@@ -264,7 +277,7 @@ TEST(Interlock, TheWayBackCountsByTheStamp) {
   bench.pass(max_s - 2 * tick_s);
   late.stamp_s = epoch_s + stamped_s;
   bench.interlock.on_setpoint(late, bench.now_s);
-  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+  EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
 }
 
 TEST(Interlock, DoesNotStartWhereTheArmIsFarFromItsSetPoint) {
@@ -272,7 +285,7 @@ TEST(Interlock, DoesNotStartWhereTheArmIsFarFromItsSetPoint) {
   bench.sag[1] = 0.06;
   bench.control(0.5, slow);
   EXPECT_EQ(bench.sent_count, 0);
-  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::far_from_setpoint);
+  EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::far_from_setpoint);
 }
 
 TEST(Interlock, ObservesOnlyUntilMotionIsEnabled) {
@@ -283,21 +296,12 @@ TEST(Interlock, ObservesOnlyUntilMotionIsEnabled) {
   EXPECT_GT(bench.interlock.counts().withheld, 450);
   ASSERT_TRUE(bench.interlock.set_point());
   EXPECT_TRUE((*bench.interlock.set_point() - bench.setpoint).isApprox(slow, 0.1));
-  bench.interlock.on_foreign_command();  // others may move what is only observed
-  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::none);
+  bench.interlock.on_foreign_command(bench.now_s);  // others may move what is only observed
+  EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
   EXPECT_FALSE(bench.interlock.state(bench.now_s).follows);
   Bench led(config_of(true));
   led.control(1, slow);
   EXPECT_TRUE(led.interlock.state(led.now_s).follows);
-}
-
-TEST(Interlock, NothingIsSentOnceStopped) {
-  Bench bench;
-  bench.control(0.3, slow);
-  bench.interlock.stop();
-  const int sent = bench.sent_count;
-  bench.control(0.3, slow);
-  EXPECT_EQ(bench.sent_count, sent);
 }
 
 // The loop is gone: what it sent last brakes to rest.
@@ -310,37 +314,18 @@ TEST(Interlock, BrakesWhenTheLoopIsGone) {
   EXPECT_TRUE(bench.setpoint.isApprox(rest, 1e-12));
 }
 
-TEST(Interlock, HeldItBrakesToRestAndGoesOnWhenReleased) {
+TEST(Interlock, ReleasedItBrakesToRestAndIsSilent) {
   Bench bench;
   bench.control(0.5, slow);
-  bench.interlock.hold(true);
-  const int sent = bench.sent_count;
-  bench.control(0.5, slow);
-  EXPECT_GT(bench.sent_count, sent + 200);  // at rest, but held where it is
-  const Eigen::Vector4d rest = bench.setpoint;
-  bench.control(0.5, slow);
-  EXPECT_TRUE(bench.setpoint.isApprox(rest, 1e-12));
-  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::held);
-  bench.interlock.hold(false);
-  EXPECT_TRUE(bench.interlock.state(bench.now_s).started);
-  EXPECT_FALSE(bench.interlock.state(bench.now_s).started);
-  bench.control(0.5, slow);
-  EXPECT_GT((bench.setpoint - rest).norm(), 0.01);
-}
-
-TEST(Interlock, ReleasedItIsSilentOnceAtRestAndOthersMayCommandTheArm) {
-  Bench bench;
-  bench.control(0.5, slow);
+  const Eigen::Vector4d shift = bench.setpoint - bench.path.at(bench.now_s - tick_s).position;
   bench.interlock.release();
   bench.pass(0.5);
   const int sent = bench.sent_count;
-  bench.interlock.on_foreign_command();
+  EXPECT_LT((bench.setpoint - shift - bench.path.at(bench.now_s).position).norm(), 1e-12);
   bench.pass(0.5);
   EXPECT_EQ(bench.sent_count, sent);
   bench.control(0.5, slow);
   EXPECT_GT(bench.sent_count, sent + 200);
-  bench.interlock.on_foreign_command();
-  EXPECT_EQ(bench.interlock.blocked(bench.now_s), Blocked::foreign_command);
 }
 
 TEST(Interlock, CountsWhatItDrops) {

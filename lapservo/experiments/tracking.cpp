@@ -204,7 +204,10 @@ std::optional<TrackingRun> run_scenario(const TrackingScenario& scenario, const 
     stopped = !setup.keep_going(++done, total);
     return !stopped;
   });
-  lapservo::run(simulator, simulator, simulator, config, trajectory, scenario.duration_s, recorder);
+  SupervisorConfig supervision;
+  supervision.max_loop_hold_s = scenario.duration_s;  // nobody is there to say start
+  Supervisor arm(simulator, simulator, supervision);
+  lapservo::run(arm, simulator, simulator, config, trajectory, scenario.duration_s, recorder);
   if (stopped) return std::nullopt;
   sum_up(run);
   return run;

@@ -11,6 +11,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
+#include "lapservo/robot/steady_clock.h"
 
 namespace lapservo::internal {
 namespace {
@@ -185,10 +186,11 @@ void LoopTopics::publish_state(const ControlTick& tick, const std::string& state
 
 void LoopTopics::hear(const StringMessage& command) {
   const std::lock_guard lock(mutex_);
-  if (command.text == "start") {
-    wishes_.hold = false;
+  const bool force = command.text == "start force";
+  if (force || command.text == "start") {
+    wishes_.start = LoopWishes::Start{SteadyClock().now_s(), force};
   } else if (command.text == "stop") {
-    wishes_.hold = true;
+    wishes_.stop = true;
   } else {
     ++malformed_;
   }

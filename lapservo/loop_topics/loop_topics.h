@@ -18,7 +18,12 @@ namespace lapservo::internal {
 
 /// Commands of other programs to the loop.
 struct LoopWishes {
-  std::optional<bool> hold;                  ///< true: stop; false: start
+  struct Start {
+    double said_s = 0;   ///< when it came, on SteadyClock
+    bool force = false;  ///< whoever holds
+  };
+  bool stop = false;
+  std::optional<Start> start;                ///< the last one
   std::optional<Eigen::Vector4d> set_point;  ///< s_rad, r_px, l_px, d_px
   std::optional<Trajectory> trajectory;      ///< of time since it is begun; of this and set_point the last
 };
@@ -28,8 +33,8 @@ struct LoopWishes {
 /// camera_from_rcm is known) of every image; /lapservo/NAME/desired and /lapservo/NAME/error (JointState: s_rad, r_px,
 /// l_px, d_px) every tick; /diagnostics (DiagnosticArray) once a second and when something changes;
 /// /lapservo/NAME/overlay/compressed, drawn in a thread of its own, at most ten a second. It hears
-/// /lapservo/NAME/command (StringStamped: start, stop), /lapservo/NAME/set_point (JointState: s_rad, r_px, l_px, d_px)
-/// and /lapservo/NAME/trajectory (JointTrajectory of these).
+/// /lapservo/NAME/command (StringStamped: start, start force, stop), /lapservo/NAME/set_point (JointState: s_rad, r_px,
+/// l_px, d_px) and /lapservo/NAME/trajectory (JointTrajectory of these).
 class LoopTopics {
  public:
   LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame);

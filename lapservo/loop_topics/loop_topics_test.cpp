@@ -7,6 +7,7 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/crtk/test_transport.h"
+#include "lapservo/robot/steady_clock.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/wait_for.h"
 
@@ -112,12 +113,15 @@ TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
   const Rig rig = testing::small_test_rig();
   TestTransport transport;
   LoopTopics topics(transport, rig, "endoscope");
-  EXPECT_FALSE(topics.wishes().hold);
-  transport.say("/lapservo/PSM1/command", StringMessage{0, "stop"});
-  EXPECT_EQ(topics.wishes().hold, true);
-  transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
-  EXPECT_EQ(topics.wishes().hold, false);
-  EXPECT_FALSE(topics.wishes().hold);
+  const double begin_s = SteadyClock().now_s();
+  for (const char* text : {"start", "stop"}) transport.say("/lapservo/PSM1/command", StringMessage{0, text});
+  const LoopWishes both = topics.wishes();
+  ASSERT_TRUE(both.stop && both.start);
+  EXPECT_GE(both.start->said_s, begin_s);
+  EXPECT_FALSE(both.start->force);
+  transport.say("/lapservo/PSM1/command", StringMessage{0, "start force"});
+  EXPECT_TRUE(topics.wishes().start.value().force);
+  EXPECT_FALSE(topics.wishes().stop || topics.wishes().start);
   transport.say("/lapservo/PSM1/command", StringMessage{0, "explode"});
   const std::vector<std::string> names{"s_rad", "r_px", "l_px", "d_px"};
   transport.say("/lapservo/PSM1/set_point", JointMessage{0, names, {0.9, 400, 180, 100}});

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "lapservo/core/joint_vector.h"
+#include "lapservo/robot/blocked.h"
 #include "lapservo/robot/joint_path.h"
 #include "lapservo/robot/operating_state.h"
 
@@ -20,6 +21,9 @@ struct JointState {
   bool follows = true;
   /// The operator has said start since the last call of Robot::state(): what waits for that goes on.
   bool started = false;
+  /// The first thing since the last call of Robot::state() for which the arm must not be moved, however short it was.
+  /// What follows from the other fields may be left to the Supervisor.
+  Blocked blocked = Blocked::none;
 };
 
 /// The joints at one time, on the loop's clock.
@@ -49,6 +53,9 @@ class Robot {
   /// The arm is the operator's until the next send(): once the last path has come to rest, an implementation that goes
   /// on sending set-points stops that, so that hands or teleoperation may move the arm.
   virtual void release() {}
+  /// True for an arm that exists in this program only: nobody can stand beside it. Starts count at once, and no limits
+  /// have to be named.
+  virtual bool is_simulated() const { return false; }
 };
 
 }  // namespace lapservo

@@ -22,27 +22,61 @@ void withhold_contradicted(ControlTick& tick) {
   tick.seen->measurement.found = false;
 }
 
+void tell(Supervisor& arm, const ControlStep& control) {
+  arm.tell_loop(control.action == ControlAction::hold ? to_string(control.reason) : "",
+                control.reason == HoldReason::not_following);
+}
+
+// However the loop ends, the arm comes to rest before those who drive it are gone.
+class BrakesAtTheEnd {
+ public:
+  BrakesAtTheEnd(Supervisor& arm, Clock& clock, const ControllerConfig& config)
+      : arm_(arm), clock_(clock), lasts_s_(stopping_time_s(config.limits) + config.period_s) {}
+  ~BrakesAtTheEnd() {
+    try {
+      arm_.end();
+      clock_.sleep_until(clock_.now_s() + lasts_s_);
+    } catch (...) {  // of a port that is gone: the path brakes by itself
+    }
+  }
+  BrakesAtTheEnd(const BrakesAtTheEnd&) = delete;
+  BrakesAtTheEnd& operator=(const BrakesAtTheEnd&) = delete;
+
+ private:
+  Supervisor& arm_;
+  Clock& clock_;
+  double lasts_s_;
+};
+
 }  // namespace
 
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
+         double duration_s, RunObserver& observer) {
+  Supervisor arm(robot, clock);
+  run(arm, images, clock, config, trajectory, duration_s, observer);
+}
+
+void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer) {
   Servo servo(config.controller, config.rig);
   const auto vision = track_images(images, config.rig, config.tracker, config.rcm_px, config.tracking_thread);
   const double period_s = config.controller.period_s, start_s = clock.now_s();
   const auto ticks = std::lround(duration_s / period_s);
+  const BrakesAtTheEnd brakes(arm, clock, config.controller);
   bool go_on = true;
   int registration = 0;
   for (long k = 0; k < ticks && go_on;) {
     ControlTick tick;
     tick.seen = vision->newest();
     tick.input.time_s = clock.now_s();
-    tick.input.readings = robot.readings();
-    tick.input.joints = robot.state();
+    tick.input.readings = arm.readings();
+    tick.input.joints = arm.state();
     tick.input.desired = trajectory.at(tick.input.time_s - start_s);
     if (tick.seen) tick.input.image = tick.seen->measurement;
     tick.decision = servo.step(tick.input);
-    if (tick.decision.send) robot.send(servo.path());
-    if (tick.decision.release) robot.release();
+    if (tick.decision.send) arm.send(servo.path());
+    if (tick.decision.release) arm.release();
+    tell(arm, tick.decision.control);
     if (tick.decision.registration != registration) {
       registration = tick.decision.registration;
       vision->use(registration, tick.decision.camera_from_rcm);
@@ -53,8 +87,6 @@ void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& confi
     k = std::max(k + 1, std::lround((clock.now_s() - start_s) / period_s));
     clock.sleep_until(start_s + static_cast<double>(k) * period_s);
   }
-  // No more velocities: the path brakes by itself.
-  clock.sleep_until(clock.now_s() + stopping_time_s(config.controller.limits) + period_s);
 }
 
 }  // namespace lapservo

@@ -9,6 +9,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/clock.h"
 #include "lapservo/robot/robot.h"
+#include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/servo_decision.h"
 #include "lapservo/servo/tracked_image.h"
 #include "lapservo/stream/image_stream.h"
@@ -41,11 +42,16 @@ class RunObserver {
 };
 
 /// The servo loop: reads the joints, sees, decides, sends, then tells the observer, once every
-/// ControllerConfig::period_s for `duration_s`; then lets the arm brake to rest. A missing or stale image, a lost
-/// marker, an outlier, a number that is not finite or an arm that is not enabled make it hold within the tick; it goes
-/// on by itself when all is well again. A late tick shifts none of those after it. Where the endoscope moves it
-/// releases the arm, measures camera_from_rcm anew from motion that the operator makes, and goes on after
-/// JointState::started.
+/// ControllerConfig::period_s for `duration_s`; then, and whenever an exception ends it, lets the arm brake to rest. A
+/// missing or stale image, a lost marker, an outlier or a number that is not finite make it hold within the tick; it
+/// goes on by itself when all is well again within SupervisorConfig::max_loop_hold_s. After anything else it holds
+/// until a start (see SupervisorState), and then until an image shows where the instrument is. A late tick shifts none
+/// of those after it. Where the endoscope moves it releases the arm, measures camera_from_rcm anew from motion that the
+/// operator makes, and goes on after a start.
+void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
+         double duration_s, RunObserver& observer);
+
+/// With a Supervisor of its own: this call is the first start, JointState::started every other.
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "lapservo/servo/image_features.h"
 
@@ -45,6 +46,8 @@ ServoDecision Servo::decide(const ServoInput& input) {
   ServoDecision decision;
   decision.camera_from_rcm = camera_from_rcm_;
   controller_.expect_following(input.joints.follows);
+  const bool enabled = input.joints.operating_state == OperatingState::enabled;
+  if (!std::exchange(enabled_, enabled) && enabled) controller_.need_image_since(input.time_s);
   decision.control = controller_.step(input.time_s, q, input.image, input.desired, input.readings);
   if (recovery_) recovery_->doubt(decision.control.reason, controller_);
   watch_registration(input);
@@ -52,7 +55,7 @@ ServoDecision Servo::decide(const ServoInput& input) {
   decision.send = orderly(decision.control);
   start_anew_when_at_rest(input, decision.control.reason);
   decision.release = recovery_ && recovery_->moved();
-  if (input.joints.operating_state == OperatingState::enabled && !decision.release) return decision;
+  if (enabled && !decision.release) return decision;
   decision.control.action = ControlAction::hold;
   if (!decision.release) decision.control.reason = HoldReason::arm_not_enabled;
   decision.send = false;

@@ -32,6 +32,7 @@ class Servo {
   VisualController controller_;
   std::optional<Rigid3> camera_from_rcm_;  ///< the rig's
   std::optional<EndoscopeRecovery> recovery_;
+  bool enabled_ = false;          ///< in the step before
   bool registered_;               ///< the rig says where the RCM is
   int images_contradicting_ = 0;  ///< in a row
   std::optional<double> not_following_since_s_;

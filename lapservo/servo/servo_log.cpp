@@ -45,7 +45,7 @@ std::string covariance_column(int row, int column) {
 }
 
 std::vector<std::string> make_input_columns() {
-  std::vector<std::string> columns{"time_s", "arm_state", "arm_follows", "arm_started"};
+  std::vector<std::string> columns{"time_s", "arm_state", "arm_blocked", "arm_follows", "arm_started"};
   name(columns, "joint_", joints);
   columns.emplace_back("readings");
   columns.insert(columns.end(), {"image", "image_time_s", "image_registration", "image_repetition"});
@@ -117,6 +117,7 @@ std::vector<std::string> input_fields(const ServoInput& input) {
   std::vector<std::string> fields;
   write(fields, input.time_s);
   fields.emplace_back(to_string(input.joints.operating_state));
+  fields.emplace_back(to_string(input.joints.blocked));
   fields.emplace_back(input.joints.follows ? "1" : "0");
   fields.emplace_back(input.joints.started ? "1" : "0");
   write(fields, input.joints.q.vector());
@@ -215,6 +216,9 @@ ServoInput read_input(const Row& row) {
   const auto state = operating_state_from_string(row.text("arm_state"));
   if (!state) row.complain("arm_state", "DISABLED, ENABLED, PAUSED or FAULT");
   input.joints.operating_state = *state;
+  const auto blocked = blocked_from_string(row.text("arm_blocked"));
+  if (!blocked) row.complain("arm_blocked", "none or why the arm was not moved, see docs/statuses.md");
+  input.joints.blocked = *blocked;
   input.joints.follows = row.flag("arm_follows");
   input.joints.started = row.flag("arm_started");
   input.readings = read_readings(row);

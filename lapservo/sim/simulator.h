@@ -73,6 +73,7 @@ class Simulator : public Robot, public ImageStream, public Clock {
   /// As often as the arm samples its path.
   std::vector<JointReading> readings() override { return readings_.take(); }
   void send(const JointPath& path) override;
+  bool is_simulated() const override { return true; }
   std::optional<StampedImage> newest() override;
   double now_s() const override { return time_s_; }
   /// Lets time pass; the arm samples the path at SimulatorConfig::arm_rate_hz.

@@ -27,7 +27,8 @@ class Room {
     subscriptions.push_back(transport.subscribe_joints(
         "/PSM1/setpoint_js", [this](JointMessage&& message) { interlock->on_setpoint(message, now_s); }));
     subscriptions.push_back(transport.subscribe_operating_state(
-        "/PSM1/operating_state", [this](OperatingStateMessage&& message) { interlock->on_operating_state(message); }));
+        "/PSM1/operating_state",
+        [this](OperatingStateMessage&& message) { interlock->on_operating_state(message, now_s); }));
     subscriptions.push_back(transport.subscribe_images(
         "/endoscope/image_raw", [this](ImageMessage&& message) { images.receive(std::move(message), now_s); }));
   }
@@ -43,7 +44,7 @@ class Room {
       robot->advance(now_s);
       transport.deliver();
       const JointState state = interlock->state(now_s);
-      if (state.operating_state != OperatingState::enabled) {
+      if (state.blocked != Blocked::none) {
         path.reset(now_s, state.q.vector());
       } else {
         path.ramp_to(now_s, velocity, 0.01);

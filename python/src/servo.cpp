@@ -23,6 +23,11 @@
 namespace lapservo::python {
 namespace {
 
+Blocked blocked_of(const std::string& word) {
+  if (const auto blocked = blocked_from_string(word)) return *blocked;
+  throw InputError("JointState", "blocked", word, "none or a reason of docs/statuses.md, for example busy");
+}
+
 OperatingState operating_state_of(const std::string& word) {
   if (const auto state = operating_state_from_string(word)) return *state;
   throw InputError("JointState", "operating_state", word, "DISABLED, ENABLED, PAUSED or FAULT");
@@ -43,6 +48,7 @@ class PythonRobot : public Robot {
   }
   void send(const JointPath& path) override { PYBIND11_OVERRIDE_PURE(void, Robot, send, path); }
   void release() override { PYBIND11_OVERRIDE(void, Robot, release); }
+  bool is_simulated() const override { PYBIND11_OVERRIDE(bool, Robot, is_simulated); }
 };
 
 class PythonClock : public Clock {
@@ -70,24 +76,25 @@ class PythonImageStream : public ImageStream {
 void bind_ports(py::module_& m) {
   py::class_<JointState>(m, "JointState", "What an arm says of itself.")
       .def(py::init([](double time_s, const Eigen::Vector4d& q, const std::string& operating_state, bool follows,
-                       bool started) {
-             return JointState{time_s, JointVector::from_vector(q), operating_state_of(operating_state), follows,
-                               started};
+                       bool started, const std::string& blocked) {
+             return JointState{time_s,  JointVector::from_vector(q), operating_state_of(operating_state), follows,
+                               started, blocked_of(blocked)};
            }),
            py::arg("time_s"), py::arg("q"), py::arg("operating_state") = "ENABLED", py::arg("follows") = true,
-           py::arg("started") = false,
+           py::arg("started") = false, py::arg("blocked") = "none",
            "time_s: when the joints were read, on the loop's clock; q: float[4], theta, phi [rad], rho [m], psi [rad]; "
            "operating_state: CRTK's word; follows: False where nothing that is sent moves the arm, and the loop only "
            "says "
-           "what it would do; started: the operator has said start since the last state, which a loop waits for after "
-           "the endoscope moved.")
+           "what it would do; started: the operator has said start since the last state, which a held loop waits for; "
+           "blocked: why else the arm must not be moved, for example 'busy' or 'not_homed'.")
       .def_readonly("time_s", &JointState::time_s)
       .def_property_readonly(
           "q", [](const JointState& self) { return self.q.vector(); }, "float[4]")
       .def_property_readonly("operating_state",
                              [](const JointState& self) { return std::string(to_string(self.operating_state)); })
       .def_readonly("follows", &JointState::follows)
-      .def_readonly("started", &JointState::started);
+      .def_readonly("started", &JointState::started)
+      .def_property_readonly("blocked", [](const JointState& self) { return std::string(to_string(self.blocked)); });
 
   py::class_<JointPath>(m, "JointPath",
                         R"(Set-points over time. Where no newer path comes it brakes to rest by itself.)")
@@ -123,7 +130,9 @@ own rate, and forgets it as soon as it is not enabled.)")
       .def("send", &Robot::send, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
            "Follow this JointPath from now on; it is yours.")
       .def("release", &Robot::release, py::call_guard<py::gil_scoped_release>(),
-           "Until the next send() hands or teleoperation may move the arm: the endoscope moved. May be left out.");
+           "Until the next send() hands or teleoperation may move the arm: it is held. May be left out.")
+      .def("is_simulated", &Robot::is_simulated, py::call_guard<py::gil_scoped_release>(),
+           "True for an arm that exists in this program only: starts count at once. May be left out.");
   py::class_<ImageStream, PythonImageStream>(m, "ImageStream", "The port to a camera: subclass it.")
       .def(py::init<>())
       .def(
@@ -335,10 +344,11 @@ void bind_servo(py::module_& m) {
         py::arg("own_thread") = false, py::arg("on_tick") = py::none(),
         R"(The servo loop: reads the joints, sees, decides, sends, then tells on_tick, once every period.
 
-It holds by itself, within the tick, on a missing or stale image, a lost marker, an outlier, numbers that are not finite
-or an arm that is not enabled, and goes on when all is well again. own_thread: vision in a thread of its own, so that
-setpoints never wait for it (for real arms). on_tick(ControlTick) may return False, which ends the run. At the end the
-arm brakes to rest. With camera_from_rcm a trajectory that can't be followed from the arm's joints, by reach, limits or
+It holds by itself, within the tick, on a missing or stale image, a lost marker, an outlier or numbers that are not
+finite, and goes on when all is well again within 2 s. After anything else, above all an arm that was not enabled, it
+holds until JointState.started; this call is the first start, and counts when the arm has been ready for 0.5 s.
+own_thread: vision in a thread of its own, so that setpoints never wait for it (for real arms). on_tick(ControlTick) may
+return False, which ends the run. However it ends, the arm brakes to rest. With camera_from_rcm a trajectory that can't be followed from the arm's joints, by reach, limits or
 the image's window, raises InputError before anything moves.)");
 }
 

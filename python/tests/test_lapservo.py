@@ -227,6 +227,9 @@ class Arm(lapservo.Robot):
         self.sent += 1
         self.simulator.send(path)
 
+    def is_simulated(self):
+        return True
+
 
 class Eye(lapservo.ImageStream):
     def __init__(self, simulator):

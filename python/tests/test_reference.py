@@ -27,7 +27,7 @@ def enumerators(header, name):
 @pytest.mark.parametrize(("header", "name", "title"), [
     ("lapservo/vision/status.h", "Status", "Status of an observation"),
     ("lapservo/control/hold_reason.h", "HoldReason", "Hold reasons of the loop"),
-    ("lapservo/crtk/interlock.h", "Blocked", "Reasons of the interlock"),
+    ("lapservo/robot/blocked.h", "Blocked", "Reasons of the supervisor"),
 ])
 def test_every_reason_has_a_row(header, name, title):
     words = enumerators(header, name)

@@ -30,13 +30,14 @@
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/steady_clock.h"
+#include "lapservo/robot/supervisor.h"
 #include "recordings/bag_recorder.h"
 
 namespace lapservo::app {
 using namespace internal;
 namespace {
 
-constexpr double patience_s = 15;    // for the first image, the arm's first joint states
+constexpr double patience_s = 15;    // for the first image
 constexpr double max_silence_s = 1;  // of the camera while the arm moves
 
 // Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
@@ -100,12 +101,15 @@ class Recording {
 class MovingArm {
  public:
   MovingArm(const RecordOptions& options, const Instrument& instrument, Transports& transports, const Clock& clock)
-      : options_(options), clock_(clock), config_(config_of(options, instrument)) {
-    const Address arm = address_of(options.robot, "--robot");
-    robot_ = std::make_unique<CrtkRobot>(transports.get(arm.transport, "--robot"), arm.name, config_, clock);
-  }
-  // However it ends: without new velocities the path brakes by itself.
+      : options_(options),
+        clock_(clock),
+        config_(config_of(options, instrument)),
+        address_(address_of(options.robot, "--robot")),
+        robot_(transports.get(address_.transport, "--robot"), address_.name, config_, clock),
+        arm_(robot_, clock) {}
+  // However it ends, the arm comes to rest.
   ~MovingArm() {
+    arm_.end();
     std::this_thread::sleep_for(
         std::chrono::duration<double>(stopping_time_s(config_.limits) + MotionFollower::period_s));
   }
@@ -114,15 +118,17 @@ class MovingArm {
 
   // Nothing while it is on its way or about to begin, then why it has ended: empty when the motion is done.
   std::optional<std::string> advance() {
+    const JointState measured = arm_.state();
+    if (arm_.held()) return arm_.text();
+    const bool moved = std::exchange(moves_, arm_.armed());
+    if (!moves_) return std::nullopt;
     const double now_s = clock_.now_s();
-    const JointState measured = robot_->state();
-    const Blocked blocked = robot_->blocked();
-    if (blocked == Blocked::foreign_command) return std::string("somebody else sends set-points to the arm");
-    if (!follower_) return begin(now_s, measured, blocked);
-    const MotionFollower::Step step = follower_->step(now_s, measured);
-    if (step.path) robot_->send(*step.path);
-    if (blocked != Blocked::none) last_blocked_ = blocked;
-    return end_of(step.progress);
+    if (follower_ && !moved) follower_->resume(now_s, measured.q);
+    if (!follower_) follower_.emplace(motion_from(measured.q.vector()), config_.limits, config_.max_distance, now_s);
+    const MotionFollower::Step step = follower_->step(now_s, measured.q);
+    if (step.path) arm_.send(*step.path);
+    if (step.progress == MotionFollower::Progress::does_not_follow) return "the arm does not follow";
+    return step.progress == MotionFollower::Progress::done ? std::optional(std::string()) : std::nullopt;
   }
 
  private:
@@ -142,43 +148,19 @@ class MovingArm {
   static std::string limits_source(const RecordOptions& options) {
     return options.joint_limits.empty() ? "--joint-limits" : options.joint_limits;
   }
-  std::optional<std::string> begin(double now_s, const JointState& measured, Blocked blocked) {
-    if (!asked_s_) asked_s_ = now_s;
-    if (blocked != Blocked::none || measured.operating_state != OperatingState::enabled) {
-      if (now_s < *asked_s_ + patience_s) return std::nullopt;
-      return std::string(to_string(blocked)) + ": the arm can't be moved";
-    }
-    const Eigen::Vector4d start = measured.q.vector();
-    follower_.emplace(options_.move == "turn"
-                          ? turn_motion(start, config_.limits, limits_source(options_))
-                          : swing_motion(start, config_.limits, options_.scale, options_.duration_s),
-                      config_.limits, config_.max_distance, now_s);
-    return std::nullopt;
-  }
-  std::optional<std::string> end_of(MotionFollower::Progress progress) const {
-    switch (progress) {
-      case MotionFollower::Progress::moving:
-      case MotionFollower::Progress::waiting:
-        return std::nullopt;
-      case MotionFollower::Progress::done:
-        return "";
-      case MotionFollower::Progress::blocked:
-        return std::string(to_string(last_blocked_)) + " (the arm is " + robot_->operating_state() + ")";
-      case MotionFollower::Progress::moved_meanwhile:
-        return "the arm was moved while it was not enabled";
-      case MotionFollower::Progress::does_not_follow:
-        break;
-    }
-    return "the arm does not follow";
+  JointMotion motion_from(const Eigen::Vector4d& start) const {
+    return options_.move == "turn" ? turn_motion(start, config_.limits, limits_source(options_))
+                                   : swing_motion(start, config_.limits, options_.scale, options_.duration_s);
   }
 
   const RecordOptions& options_;
   const Clock& clock_;
   InterlockConfig config_;
-  std::unique_ptr<CrtkRobot> robot_;
+  Address address_;
+  CrtkRobot robot_;
+  Supervisor arm_;
   std::optional<MotionFollower> follower_;
-  std::optional<double> asked_s_;
-  Blocked last_blocked_ = Blocked::none;
+  bool moves_ = false;
 };
 
 // Before anything is opened or made.
@@ -301,8 +283,8 @@ void add_record(Command app, Run& run_later) {
                      "For --move: YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
   command.add_flag("--enable-motion", options->enable_motion, "For --move: do move the arm");
   command.footer(
-      "An arm that is moved starts from rest and ends at rest; whatever is amiss with it ends the motion, and it stays "
-      "where it is.\n"
+      "An arm that is moved starts from rest, when it has been ready for half a second, and ends at rest; whatever is "
+      "amiss with it ends the motion, and it stays where it is.\n"
       "Example:\n  lapservo record --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --out swing\n"
       "  lapservo calibrate registration swing --rig rig.yaml --out rig.yaml");
   command.runs(run_later, [options] { return record(*options); });

@@ -12,7 +12,6 @@
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/cli/subcommands.h"
-#include "apps/lapservo/commands/servo/holdable_robot.h"
 #include "apps/lapservo/commands/servo/servo_arm.h"
 #include "apps/lapservo/commands/servo/servo_options.h"
 #include "apps/lapservo/commands/servo/servo_output.h"
@@ -25,6 +24,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/rig/single_instrument.h"
+#include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/controller_file.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/replay.h"
@@ -63,7 +63,7 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
 class Watcher : public RunObserver {
  public:
   Watcher(const Rig& rig, FeatureModel true_model, const Simulator& simulator, RunFolder* folder, LiveView* view,
-          int ticks, bool strict, ServoPage* page, HoldableRobot& robot)
+          int ticks, bool strict, ServoPage* page, Supervisor& arm)
       : rig_(rig),
         true_model_(std::move(true_model)),
         simulator_(simulator),
@@ -72,12 +72,12 @@ class Watcher : public RunObserver {
         progress_(std::make_unique<Progress>(ticks)),
         strict_(strict),
         page_(page),
-        robot_(robot) {}
+        arm_(arm) {}
 
   bool on_tick(const ControlTick& tick) override {
     const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
-    const std::string block = robot_.held() ? "held" : "", state = state_text(tick.decision.control, block);
-    summary_.add(tick, truth, block);
+    const std::string state = state_text(tick.decision.control, arm_);
+    summary_.add(tick, truth, block_of(arm_));
     if (folder_) folder_->log().add(tick.input, tick.decision, truth);
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
     if (strict_ && summary_.registration_contradicted()) return false;
@@ -93,9 +93,7 @@ class Watcher : public RunObserver {
   // False when it ends the run.
   bool obey_page(const ControlTick& tick, const std::string& state) {
     page_->tell(tick, tick.input.time_s, state);
-    const PageWishes wishes = page_->wishes();
-    if (wishes.hold) robot_.hold(*wishes.hold);
-    return !wishes.stop;
+    return !page_->command(arm_, tick.input.time_s);
   }
 
   Rig rig_;
@@ -106,7 +104,7 @@ class Watcher : public RunObserver {
   std::unique_ptr<Progress> progress_;
   bool strict_;
   ServoPage* page_;
-  HoldableRobot& robot_;
+  Supervisor& arm_;
   Summary summary_;
   int done_ = 0;
 };
@@ -128,15 +126,15 @@ int simulate(const ServoOptions& options) {
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<ServoPage> page;
   if (options.web.port) page.emplace(options.web, config.rig, "servo, simulated", true);
-  HoldableRobot robot(simulator);
+  Supervisor arm(simulator, simulator);
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
   watch_for_interrupts();
 
   Watcher watcher(config.rig, true_model, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
                   static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict,
-                  page ? &*page : nullptr, robot);
-  lapservo::run(robot, simulator, simulator, config, trajectory, duration_s(options), watcher);
+                  page ? &*page : nullptr, arm);
+  lapservo::run(arm, simulator, simulator, config, trajectory, duration_s(options), watcher);
   const Summary& summary = watcher.finish();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
@@ -296,7 +294,7 @@ void add_servo(Command app, Run& run_later) {
       "is read per control period (gains_per_s = K times --fps) and omega per second.\n"
       "Examples:\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
-      "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,5 --view\n"
+      "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,4 --view\n"
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
       "  lapservo servo --replay run/log.csv\n"
       "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");

@@ -23,6 +23,7 @@
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/loop_topics/loop_topics.h"
 #include "lapservo/robot/steady_clock.h"
+#include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/image_features.h"
 
 namespace lapservo::app {
@@ -51,13 +52,15 @@ class Goal {
   std::shared_ptr<Trajectory> trajectory_;
 };
 
-// What changes is said once, in one line; what somebody else does to the arm ends the run.
+// What changes is said once, in one line.
 class ArmWatcher : public RunObserver {
  public:
-  ArmWatcher(const ServoOptions& options, const RunConfig& run, CrtkRobot& robot, const LiveImages& images,
-             LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view, ServoPage* page)
+  ArmWatcher(const ServoOptions& options, const RunConfig& run, Supervisor& arm, const CrtkRobot& robot,
+             const LiveImages& images, LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view,
+             ServoPage* page)
       : options_(options),
         run_(run),
+        arm_(arm),
         robot_(robot),
         images_(images),
         topics_(topics),
@@ -69,51 +72,39 @@ class ArmWatcher : public RunObserver {
   bool on_tick(const ControlTick& tick) override {
     if (!start_s_) start_s_ = tick.input.time_s;
     const double time_s = tick.input.time_s - *start_s_;
-    const Blocked blocked = robot_.blocked();
-    summary_.add(tick, std::nullopt, block_of(blocked));
+    summary_.add(tick, std::nullopt, block_of(arm_));
     if (const auto& motions = summary_.endoscope_motions(); motions.size() > said_motions_) {
       say(time_s, motions.back());
       said_motions_ = motions.size();
     }
     if (folder_) folder_->log().add(tick.input, tick.decision, std::nullopt);
-    say_state(time_s, tick.decision.control, blocked);
+    say_state(time_s, state_text(tick.decision.control, arm_));
     say_images(time_s);
     topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
-    LoopWishes wishes = topics_.wishes();
-    const bool stopped = page_ && add_page_wishes(wishes, tick, time_s);
-    grant(wishes, tick, time_s);
+    obey(topics_.wishes(), tick, time_s);
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
-    if (blocked == Blocked::foreign_command || stopped) return false;
+    if (page_ && obey_page(tick, time_s)) return false;
     if (options_.strict && summary_.registration_contradicted()) return false;
     return !interrupted() && (!view_ || show(*view_, tick, run_.rig, state_));
   }
   const Summary& summary() const { return summary_; }
 
  private:
-  // Of two who want different things in a tick, the one that holds. True when the page ends the run.
-  bool add_page_wishes(LoopWishes& wishes, const ControlTick& tick, double time_s) {
+  // True when it ends the run.
+  bool obey_page(const ControlTick& tick, double time_s) {
     page_->tell(tick, time_s, state_);
-    const PageWishes of_page = page_->wishes();
-    if (of_page.hold) wishes.hold = wishes.hold.value_or(false) || *of_page.hold;
-    if (of_page.stop) say(time_s, "end: asked for on the page");
-    return of_page.stop;
+    const bool ends = page_->command(arm_, tick.input.time_s);
+    if (ends) say(time_s, "end: asked for on the page");
+    return ends;
   }
-  std::string state_of(const ControlStep& control, Blocked blocked) const {
-    if (blocked == Blocked::foreign_command) return "end: somebody else sends set-points to the arm (foreign_command)";
-    return state_text(control, block_of(blocked));
-  }
-  std::string block_of(Blocked blocked) const {
-    if (blocked == Blocked::none) return {};
-    return blocked == Blocked::not_enabled ? "the arm is " + robot_.operating_state() : std::string(to_string(blocked));
-  }
-  void say_state(double time_s, const ControlStep& control, Blocked blocked) {
-    const std::string state = state_of(control, blocked);
+  void say_state(double time_s, const std::string& state) {
     if (state == state_) return;
     state_ = state;
     say(time_s, state);
   }
-  void grant(const LoopWishes& wishes, const ControlTick& tick, double time_s) {
-    if (wishes.hold) robot_.hold(*wishes.hold);
+  void obey(const LoopWishes& wishes, const ControlTick& tick, double time_s) {
+    if (wishes.stop) arm_.stop(Commander::topic);
+    if (wishes.start) arm_.start(Commander::topic, wishes.start->said_s, wishes.start->force);
     if (wishes.set_point) wanted_ = Wanted{"set_point", 1, set_point(*wishes.set_point)};
     if (wishes.trajectory) wanted_ = Wanted{"trajectory", wishes.trajectory->duration_s, *wishes.trajectory};
     const ServoDecision& decision = tick.decision;
@@ -168,7 +159,8 @@ class ArmWatcher : public RunObserver {
 
   const ServoOptions& options_;
   const RunConfig& run_;
-  CrtkRobot& robot_;
+  Supervisor& arm_;
+  const CrtkRobot& robot_;
   const LiveImages& images_;
   LoopTopics& topics_;
   Goal& goal_;
@@ -193,40 +185,32 @@ class ArmWatcher : public RunObserver {
       refusal_;  // of what was asked about, empty when it can be followed; last: it uses the others
 };
 
-// What the page asks for before the loop runs. True when it ends the run.
-bool obey(ServoPage* page, CrtkRobot& robot) {
-  if (!page) return false;
-  const PageWishes wishes = page->wishes();
-  if (wishes.hold) robot.hold(*wishes.hold);
-  return wishes.stop;
-}
-
 int end_by_page() {
   std::printf("end: asked for on the page\n");
   return 1;
 }
 
-// Whether it holds in time, before somebody ends the run.
-bool wait_until(const std::function<bool()>& holds, CrtkRobot& robot, ServoPage* page) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
-  while (!interrupted() && !obey(page, robot) && std::chrono::steady_clock::now() < end) {
+// Whether `holds` becomes true in time, before the user ends the run.
+bool wait_until(const std::function<bool()>& holds, Supervisor& arm, ServoPage* page, const Clock& clock) {
+  const double end_s = clock.now_s() + wait_s;
+  while (!interrupted() && clock.now_s() < end_s && !(page && page->command(arm, clock.now_s()))) {
     if (holds()) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   return false;
 }
 
-// Why the loop can't begin; empty where the arm is heard and somebody publishes the camera's topic.
-std::string wait_for_topics(const ServoOptions& options, Transports& transports, CrtkRobot& robot, ServoPage* page) {
-  const auto heard = [&] { return robot.counts().joint_states > 0 && robot.blocked() != Blocked::no_joint_states; };
-  if (!wait_until(heard, robot, page)) {
+// Why the loop can't begin; empty where the arm's joints arrive and the camera's topic has a publisher.
+std::string wait_for_topics(const ServoOptions& options, Transports& transports, Supervisor& arm, ServoPage* page,
+                            const Clock& clock) {
+  if (!wait_until([&] { return arm.state().time_s > 0; }, arm, page, clock)) {
     const std::string why = transports.unpublished(options.robot, "--robot", "measured_js");
     return fmt::format("{}: no measured_js with the rig's joints within {:.0f} s{}", options.robot, wait_s,
                        why.empty() ? "" : ": " + why);
   }
   if (!names_topic(options.camera)) return {};
   std::string why;
-  wait_until([&] { return (why = transports.unpublished(options.camera, "--camera")).empty(); }, robot, page);
+  wait_until([&] { return (why = transports.unpublished(options.camera, "--camera")).empty(); }, arm, page, clock);
   return why.empty() ? "" : fmt::format("{}: no images within {:.0f} s: {}", options.camera, wait_s, why);
 }
 
@@ -248,7 +232,7 @@ void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
 }  // namespace
 
 int steer_arm(const ServoOptions& options) {
-  const Address arm = address_of(options.robot, "--robot");
+  const Address address = address_of(options.robot, "--robot");
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
   const InterlockConfig interlock = interlock_of(options, config);
@@ -264,17 +248,18 @@ int steer_arm(const ServoOptions& options) {
   Transports transports("lapservo");
   SteadyClock clock;
   LiveImages images(options.camera, "--camera", rig.camera, clock, transports);
-  Transport& transport = transports.get(arm.transport, "--robot");
-  CrtkRobot robot(transport, arm.name, interlock, clock);
+  Transport& transport = transports.get(address.transport, "--robot");
+  CrtkRobot robot(transport, address.name, interlock, clock);
+  Supervisor arm(robot, clock);
   watch_for_interrupts();
   ServoPage* const its_page = page ? &*page : nullptr;
-  const std::string missing = wait_for_topics(options, transports, robot, its_page);
-  if (obey(its_page, robot)) return end_by_page();
+  const std::string missing = wait_for_topics(options, transports, arm, its_page, clock);
+  if (page && page->command(arm, clock.now_s())) return end_by_page();
   if (!missing.empty()) {
     std::fprintf(stderr, "lapservo: %s\n", missing.c_str());
     return 1;
   }
-  const JointVector start = robot.state().q;
+  const JointVector start = arm.state().q;
   if (config.rig.instruments.front().camera_from_rcm)
     refuse_infeasible(trajectory, duration_s(options), feature_model(config.rig), config.controller, start,
                       trajectory_name(options));
@@ -283,15 +268,14 @@ int steer_arm(const ServoOptions& options) {
 
   LoopTopics topics(transport, rig, "endoscope");
   Goal goal(trajectory);
-  ArmWatcher watcher(options, config, robot, images, topics, goal, folder ? &*folder : nullptr, view ? &*view : nullptr,
-                     its_page);
-  if (obey(its_page, robot)) return end_by_page();
-  lapservo::run(robot, images, clock, config, goal.trajectory(), duration_s(options), watcher);
+  ArmWatcher watcher(options, config, arm, robot, images, topics, goal, folder ? &*folder : nullptr,
+                     view ? &*view : nullptr, its_page);
+  if (page && page->command(arm, clock.now_s())) return end_by_page();
+  lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
   if (folder) folder->commit();
-  const bool ended_early = robot.blocked() == Blocked::foreign_command;
-  return watcher.summary().succeeded(options.strict) && !ended_early ? 0 : 1;
+  return watcher.summary().succeeded(options.strict) ? 0 : 1;
 }
 
 }  // namespace lapservo::app

@@ -52,10 +52,18 @@ std::string_view operators_part(HoldReason reason) {
   return "";
 }
 
-std::string state_text(const ControlStep& control, const std::string& block) {
-  if (!block.empty() && operators_part(control.reason).empty()) return "hold: " + block;
+std::string block_of(const Supervisor& arm) {
+  return arm.armed() ? "" : std::string(to_string(arm.blocked()));
+}
+
+std::string state_text(const ControlStep& control) {
   const std::string action(to_string(control.action));
   return control.reason == HoldReason::none ? action : action + ": " + reason_text(control.reason);
+}
+
+std::string state_text(const ControlStep& control, const Supervisor& arm) {
+  // Whatever else holds the arm meanwhile, the endoscope is the operator's part.
+  return arm.armed() || !operators_part(control.reason).empty() ? state_text(control) : arm.text();
 }
 
 RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller)

@@ -9,6 +9,7 @@
 #include "apps/lapservo/cli/live_view.h"
 #include "apps/lapservo/cli/output_folder.h"
 #include "apps/lapservo/commands/servo/servo_options.h"
+#include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/convergence.h"
 #include "lapservo/servo/servo_log.h"
 
@@ -19,8 +20,12 @@ void say(double time_s, const std::string& what);
 /// What a hold for that reason waits for the operator to do; empty where it goes on by itself.
 std::string_view operators_part(HoldReason reason);
 /// "track", "hold: marker_lost", "hold: endoscope_measured (...)" with the operator's part: the words of page, terminal
-/// and window. `block`: why the arm is kept at rest, where not by the loop.
-std::string state_text(const ControlStep& control, const std::string& block = {});
+/// and window.
+std::string state_text(const ControlStep& control);
+/// The same, or why the arm is not moved.
+std::string state_text(const ControlStep& control, const Supervisor& arm);
+/// The word of Blocked for which the arm is not moved; empty while it is armed.
+std::string block_of(const Supervisor& arm);
 
 /// A run's log.csv, rig.yaml and controller.yaml.
 class RunFolder {
@@ -38,7 +43,7 @@ class RunFolder {
 /// What the run came to, for the last lines.
 class Summary {
  public:
-  /// By the truth, where it is known, else by the estimate. `block`: see state_text().
+  /// By the truth, where it is known, else by the estimate. `block`: see block_of().
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth, const std::string& block = {});
   bool converged() const { return convergence_.reached_s().has_value(); }
   /// Converged and not in a hold at the end; when `strict`, with a registration that no image contradicted.

@@ -45,4 +45,10 @@ void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& 
   web_.tell(loop_of(tick, time_s), state);
 }
 
+bool ServoPage::command(Supervisor& arm, double now_s) {
+  const PageWishes wishes = web_.wishes();
+  if (wishes.hold) *wishes.hold ? arm.stop(Commander::page) : arm.start(Commander::page, now_s);
+  return wishes.stop;
+}
+
 }  // namespace lapservo::app

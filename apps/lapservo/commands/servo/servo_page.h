@@ -5,6 +5,7 @@
 
 #include "apps/lapservo/cli/web_view.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/run.h"
 
 namespace lapservo::app {
@@ -17,7 +18,8 @@ class ServoPage {
 
   /// `state`: in words.
   void tell(const ControlTick& tick, double time_s, const std::string& state);
-  internal::PageWishes wishes() { return web_.wishes(); }
+  /// Passes on what was asked for on it; true when that ends the run.
+  bool command(Supervisor& arm, double now_s);
 
  private:
   WebView web_;

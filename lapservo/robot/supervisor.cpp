@@ -1,0 +1,130 @@
+#include "lapservo/robot/supervisor.h"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace lapservo {
+namespace {
+
+Blocked arm_of(const JointState& state, double now_s, double max_age_s) {
+  if (state.blocked != Blocked::none) return state.blocked;
+  if (!state.q.vector().allFinite()) return Blocked::non_finite_joints;
+  if (state.operating_state != OperatingState::enabled) return Blocked::not_enabled;
+  return now_s - state.time_s <= max_age_s ? Blocked::none : Blocked::old_joint_states;
+}
+
+std::string names_of(const Commanders& holders) {
+  constexpr const char* names[]{"the program", "the page", "the topic"};
+  std::string text;
+  for (std::size_t who = 0; who < holders.size(); ++who)
+    if (holders[who]) text += (text.empty() ? "" : " and ") + std::string(names[who]);
+  return text;
+}
+
+}  // namespace
+
+Supervisor::Supervisor(Robot& robot, const Clock& clock, const SupervisorConfig& config)
+    : robot_(robot), clock_(clock), config_(config) {
+  if (robot.is_simulated()) config_.settle_s = 0;
+}
+
+JointState Supervisor::state() {
+  JointState state = robot_.state();
+  operating_state_ = state.operating_state;
+  input_.time_s = clock_.now_s();
+  input_.arm = arm_of(state, input_.time_s, config_.max_reading_age_s);
+  input_.follows = state.follows;
+  // In the step before, too: the loop begins where the joints were then.
+  input_.at_rest = !path_ || path_->at(state_.time_s).velocity.isZero();
+  input_.operator_present = !is_present_ || is_present_();
+  if (state.started) start(Commander::program, input_.time_s);
+  const bool was_armed = armed();
+  state_ = next(state_, input_, config_);
+  input_.stops.reset();
+  input_.starts = {};
+  if (was_armed && !armed()) robot_.release();
+  if (!armed() && state.operating_state == OperatingState::enabled) state.operating_state = OperatingState::paused;
+  state.started = state_.started;
+  state.blocked = blocked();
+  return state;
+}
+
+void Supervisor::send(const JointPath& path) {
+  if (!armed()) return;
+  path_ = path;
+  robot_.send(path);
+}
+
+void Supervisor::start(Commander who, double said_s, bool force) {
+  input_.starts[static_cast<std::size_t>(who)] = SupervisorInput::Start{said_s, force};
+}
+
+void Supervisor::tell_loop(std::string_view hold_reason, bool displaced) {
+  input_.loop_holds = !hold_reason.empty();
+  input_.displaced = displaced;
+  if (armed()) loop_reason_ = hold_reason;
+}
+
+void Supervisor::end() {
+  input_.ended = true;
+  state_.phase = SupervisorState::Phase::held;
+  state_.obstacle = Blocked::ended;
+  robot_.release();
+}
+
+Blocked Supervisor::blocked() const {
+  if (armed()) return Blocked::none;
+  if (state_.obstacle != Blocked::none) return state_.obstacle;
+  return state_.phase == SupervisorState::Phase::held ? state_.reason : Blocked::arming;
+}
+
+std::string Supervisor::remedy() const {
+  switch (state_.obstacle) {
+    case Blocked::no_joint_states:
+      return "check the arm's namespace and the names of its joints";
+    case Blocked::old_joint_states:
+      return "the arm is silent: restore its joint states";
+    case Blocked::non_finite_joints:
+      return "check the arm";
+    case Blocked::no_setpoint:
+      return "enable and home the arm";
+    case Blocked::no_operating_state:
+      return "let the arm repeat its operating_state";
+    case Blocked::not_enabled:
+      return fmt::format("the arm is {}: enable it", to_string(operating_state_));
+    case Blocked::not_homed:
+      return "home the arm";
+    case Blocked::busy:
+      return "wait until the arm's own motion has ended";
+    case Blocked::far_from_setpoint:
+      return "let the arm settle at its own setpoint";
+    case Blocked::foreign_command:
+      return "another program commands the arm: end that";
+    case Blocked::operator_absent:
+      return "press what says that the operator is present";
+    default:
+      return "";
+  }
+}
+
+std::string Supervisor::text() const {
+  using Phase = SupervisorState::Phase;
+  if (armed()) return "";
+  std::string part;
+  if (blocked() == Blocked::ended) return "hold: ended";
+  if (blocked() == Blocked::held) {
+    part = fmt::format("by {}: start there", names_of(state_.held_by));
+  } else if (blocked() == Blocked::arming) {
+    part = fmt::format("the arm has to be ready for {} s", config_.settle_s);
+  } else if (state_.obstacle != Blocked::none) {
+    part = remedy() + (state_.phase == Phase::held ? ", then start" : "");
+  } else {
+    part = state_.reason == Blocked::loop_held
+               ? fmt::format("{} for more than {} s: start goes on", loop_reason_, config_.max_loop_hold_s)
+               : "start goes on";
+  }
+  return fmt::format("hold: {} ({})", to_string(blocked()), part);
+}
+
+}  // namespace lapservo

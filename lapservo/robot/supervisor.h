@@ -1,0 +1,65 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "lapservo/robot/clock.h"
+#include "lapservo/robot/robot.h"
+#include "lapservo/robot/supervisor_state.h"
+
+namespace lapservo {
+
+/// Stands between a loop and its arm and decides whether the arm moves: see SupervisorState for the states and their
+/// transitions. Whoever makes one wants the arm to move: that is the first start. While it holds, the arm tells the
+/// loop that it is not enabled; no path reaches it, the last one brakes to rest, and then the arm is released. All
+/// calls come from the loop's thread.
+class Supervisor : public Robot {
+ public:
+  /// Both must outlive it.
+  Supervisor(Robot& robot, const Clock& clock, const SupervisorConfig& config = {});
+
+  /// Goes one step on.
+  JointState state() override;
+  std::vector<JointReading> readings() override { return robot_.readings(); }
+  void send(const JointPath& path) override;
+  void release() override { robot_.release(); }
+  bool is_simulated() const override { return robot_.is_simulated(); }
+
+  // These count in the next step.
+  void stop(Commander who) { input_.stops.set(static_cast<std::size_t>(who)); }
+  /// `said_s`: on the clock; `force`: whoever holds.
+  void start(Commander who, double said_s, bool force = false);
+  /// What the loop has decided: empty where the arm is to move, else why it holds; `displaced`: since the arm is not
+  /// where it was sent.
+  void tell_loop(std::string_view hold_reason, bool displaced);
+  /// Whether the operator presses what has to be pressed, now.
+  void watch_operator(std::function<bool()> is_present) { is_present_ = std::move(is_present); }
+  /// The arm comes to rest and stays held, whatever is said.
+  void end();
+
+  bool armed() const { return state_.phase == SupervisorState::Phase::armed; }
+  /// Held until a start; else the arm moves, or will as soon as it is ready.
+  bool held() const { return state_.phase == SupervisorState::Phase::held; }
+  /// Why the arm is not moved: none while armed.
+  Blocked blocked() const;
+  /// Why and what is to be done, in one line: "hold: not_homed (home the arm, then start)"; empty while armed.
+  std::string text() const;
+
+ private:
+  std::string remedy() const;
+
+  Robot& robot_;
+  const Clock& clock_;
+  SupervisorConfig config_;
+  SupervisorInput input_;
+  SupervisorState state_;
+  std::optional<JointPath> path_;  ///< the last one sent
+  OperatingState operating_state_ = OperatingState::disabled;
+  std::string loop_reason_;
+  std::function<bool()> is_present_;
+};
+
+}  // namespace lapservo
