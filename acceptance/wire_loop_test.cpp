@@ -47,7 +47,7 @@ using testing::wait_for;
 
 constexpr double allowed_s = 0.1;  // from a fault to the last set-point
 constexpr double tick_s = 1.0 / 500;
-const JointLimits limits;  // the controller's, which the command line was not told otherwise
+const JointLimits limits;  // those of the file, but for rounded positions
 const double rest_s = (limits.rate.cwiseQuotient(limits.acceleration)).maxCoeff();
 
 // Those that this build has.
@@ -184,6 +184,9 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
 #endif
     rig_ = testing::small_test_rig();
     testing::write_file(folder_ / "rig.yaml", rig_yaml(rig_));
+    testing::write_file(folder_ / "limits.yaml",
+                        "lower: [-1, -0.92, 0.045, -4]\nupper: [1, 0.97, 0.21, 4]\n"
+                        "rate: [0.4, 0.4, 0.04, 1.5]\nacceleration: [2, 2, 0.2, 7.5]\n");
     Sinusoids f = paper_sinusoids();
     f.offset.tail<3>() /= 2;
     f.amplitude.tail<3>() /= 2;
@@ -222,7 +225,7 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
                                        "30",
                                        "--duration",
                                        fmt::format("{}", duration_s)};
-    if (motion) arguments.push_back("--enable-motion");
+    if (motion) arguments.insert(arguments.end(), {"--enable-motion", "--joint-limits", file("limits.yaml")});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return std::make_unique<Process>(arguments, file(output));
   }
@@ -444,6 +447,10 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   EXPECT_NE(said("refused.txt").find("--enable-motion"), std::string::npos) << said("refused.txt");
   auto moving = recording;
   moving.push_back("--enable-motion");
+  Process unlimited(moving, file("unlimited.txt"));
+  EXPECT_EQ(unlimited.wait(), 2);
+  EXPECT_NE(said("unlimited.txt").find("--joint-limits"), std::string::npos) << said("unlimited.txt");
+  moving.insert(moving.end(), {"--joint-limits", file("limits.yaml")});
   const auto ears = named_transport(GetParam(), "ears");
   Spy spy(*ears);
   Process record(moving, file("record.txt"));

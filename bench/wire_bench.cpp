@@ -203,6 +203,7 @@ void measure(const Options& options, const Rig& rig, pid_t arm, int from) {
   config.rig = rig;
   config.controller = controller_of(rig, options.ticks_per_s);
   config.tracking_thread = TrackingThread::own;
+  config.arm_limits = config.controller.limits;
   Watcher watcher(*transport, images);
   run(robot, images, loop_clock, config, sinusoids(paper_sinusoids()), options.duration_s, watcher);
   std::ifstream load("/proc/loadavg");

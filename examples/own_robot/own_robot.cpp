@@ -77,6 +77,10 @@ int main(int argc, char** argv) {
   RunConfig config;
   config.rig = rig;
   config.controller.window = image_window(rig.camera, 20);
+  config.arm_limits = JointLimits{.lower = {-1, 0.6, 0.03, -4},
+                                  .upper = {1, 2.5, 0.2, 4},
+                                  .rate = {0.4, 0.4, 0.04, 1.5},
+                                  .acceleration = {2, 2, 0.2, 7.5}};
   LastSecond watch;
   run(arm, camera, clock, config, sinusoids(paper_sinusoids()), 10, watch);
   const Eigen::Vector4d& e = watch.largest_;

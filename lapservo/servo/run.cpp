@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "lapservo/control/motion_limits.h"
+#include "lapservo/core/error.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/servo.h"
 #include "lapservo/servo/track_images.h"
@@ -52,8 +53,12 @@ class BrakesAtTheEnd {
 
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer) {
+  if (!config.arm_limits && !robot.is_simulated())
+    throw InputError("RunConfig", "arm_limits", "missing", "the limits of the arm's joints");
+  RunConfig limited = config;
+  if (config.arm_limits) limited.controller.limits = *config.arm_limits;
   Supervisor arm(robot, clock);
-  run(arm, images, clock, config, trajectory, duration_s, observer);
+  run(arm, images, clock, limited, trajectory, duration_s, observer);
 }
 
 void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,

@@ -23,6 +23,8 @@ struct RunConfig {
   std::optional<Eigen::Vector2d> rcm_px;  ///< for r, where the rig has no camera_from_rcm; ideal pixels
   TrackerOptions tracker;
   TrackingThread tracking_thread = TrackingThread::callers;
+  /// Of the arm's q, in the place of controller.limits: what run() needs with an arm that is not simulated.
+  std::optional<JointLimits> arm_limits{};
 };
 
 /// One control tick: what the loop went by, what it decided, and the image that came, if one did.
@@ -51,7 +53,8 @@ class RunObserver {
 void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 
-/// With a Supervisor of its own: this call is the first start, JointState::started every other.
+/// With a Supervisor of its own: this call is the first start, JointState::started every other. Throws InputError
+/// without RunConfig::arm_limits where the arm is not simulated.
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 

@@ -780,6 +780,25 @@ TEST(Run, WhatVisionThrowsInItsOwnThreadEndsTheRun) {
   EXPECT_EQ(said, "image: size: is 20x10, expected 640x360 as in the rig");
 }
 
+TEST(Run, NeedsTheLimitsOfAnArmThatIsNotSimulated) {
+  class Real : public OperatedArm {
+   public:
+    using OperatedArm::OperatedArm;
+    bool is_simulated() const override { return false; }
+  };
+  const Rig rig = testing::small_test_rig();
+  Simulator simulator(rig, {}, {0.05, 1.57, 0.064, 1.2});
+  Real arm(simulator);
+  Watcher watcher({}, rig, simulator);
+  RunConfig config = config_of(rig, {});
+  const auto complaint = [&] {
+    return testing::input_error([&] { run(arm, simulator, simulator, config, small_trajectory(), 0.1, watcher); });
+  };
+  EXPECT_EQ(complaint(), "RunConfig: arm_limits: is missing, expected the limits of the arm's joints");
+  config.arm_limits.emplace();
+  EXPECT_EQ(complaint(), "");
+}
+
 TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
   const Rig rig = testing::paper_test_rig();
   ControllerConfig controller;

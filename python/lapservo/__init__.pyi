@@ -434,6 +434,7 @@ def run(
     *,
     controller: Optional[Controller] = ...,
     rcm_px: Optional[ArrayLike] = ...,
+    joint_limits: Optional[Sequence[ArrayLike]] = ...,
     own_thread: bool = ...,
     on_tick: Optional[Callable[[ControlTick], Optional[bool]]] = ...,
 ) -> None: ...

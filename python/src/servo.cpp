@@ -1,3 +1,4 @@
+#include <array>
 #include <functional>
 #include <memory>
 #include <pybind11/functional.h>
@@ -307,12 +308,15 @@ void bind_tick(py::module_& m) {
 
 void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared_ptr<Rig>& rig,
               const Trajectory& trajectory, double duration_s, const std::optional<ControllerConfig>& controller,
-              const std::optional<Eigen::Vector2d>& rcm_px, bool own_thread, py::object on_tick) {
+              const std::optional<Eigen::Vector2d>& rcm_px, const std::optional<std::array<Eigen::Vector4d, 4>>& limits,
+              bool own_thread, py::object on_tick) {
   RunConfig config;
   config.rig = *rig;
   config.controller =
       controller ? *controller : make_controller(*rig, "fused", {}, ControllerConfig{}.period_s, {}, {}, 20);
   config.rcm_px = rcm_px;
+  if (limits) config.arm_limits = JointLimits{(*limits)[0], (*limits)[1], (*limits)[2], (*limits)[3]};
+  if (limits) config.controller.limits = *config.arm_limits;
   config.tracking_thread = own_thread ? TrackingThread::own : TrackingThread::callers;
   if (config.controller.mode == ControlMode::paper) config.tracker.method = Method::centerline;
   const JointVector start = robot.state().q;
@@ -341,12 +345,13 @@ void bind_servo(py::module_& m) {
   bind_tick(m);
   m.def("run", &run_loop, py::arg("robot"), py::arg("images"), py::arg("clock"), py::arg("rig"), py::arg("trajectory"),
         py::arg("duration_s"), py::kw_only(), py::arg("controller") = py::none(), py::arg("rcm_px") = py::none(),
-        py::arg("own_thread") = false, py::arg("on_tick") = py::none(),
+        py::arg("joint_limits") = py::none(), py::arg("own_thread") = false, py::arg("on_tick") = py::none(),
         R"(The servo loop: reads the joints, sees, decides, sends, then tells on_tick, once every period.
 
 It holds by itself, within the tick, on a missing or stale image, a lost marker, an outlier or numbers that are not
 finite, and goes on when all is well again within 2 s. After anything else, above all an arm that was not enabled, it
 holds until JointState.started; this call is the first start, and counts when the arm has been ready for 0.5 s.
+joint_limits: lower, upper, rate and acceleration of q, float[4] each, needed where Robot.is_simulated() is False.
 own_thread: vision in a thread of its own, so that setpoints never wait for it (for real arms). on_tick(ControlTick) may
 return False, which ends the run. However it ends, the arm brakes to rest. With camera_from_rcm a trajectory that can't be followed from the arm's joints, by reach, limits or
 the image's window, raises InputError before anything moves.)");

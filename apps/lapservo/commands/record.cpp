@@ -139,17 +139,13 @@ class MovingArm {
     InterlockConfig config;
     config.joints = *instrument.joints;
     config.motion_enabled = options.enable_motion;
-    if (!options.joint_limits.empty())
-      config.limits = limits_of_q(config.joints, load_arm_limits(options.joint_limits));
+    config.limits = limits_of_q(config.joints, load_arm_limits(options.joint_limits));
     // Refused now where there is no room for it, wherever the arm is.
-    if (options.move == "turn") turn_motion(Eigen::Vector4d::Zero(), config.limits, limits_source(options));
+    if (options.move == "turn") turn_motion(Eigen::Vector4d::Zero(), config.limits, options.joint_limits);
     return config;
   }
-  static std::string limits_source(const RecordOptions& options) {
-    return options.joint_limits.empty() ? "--joint-limits" : options.joint_limits;
-  }
   JointMotion motion_from(const Eigen::Vector4d& start) const {
-    return options_.move == "turn" ? turn_motion(start, config_.limits, limits_source(options_))
+    return options_.move == "turn" ? turn_motion(start, config_.limits, options_.joint_limits)
                                    : swing_motion(start, config_.limits, options_.scale, options_.duration_s);
   }
 
@@ -170,6 +166,10 @@ void expect_possible(const RecordOptions& options) {
   if (options.rig.empty()) throw InputError("--move", "needs --rig, whose joints entry names the arm's joints");
   if (!options.enable_motion)
     throw InputError("--move", "moves the arm: give --enable-motion too, once nothing is in its way");
+  if (options.joint_limits.empty())
+    throw InputError("--move",
+                     "needs --joint-limits, the limits of the arm's joints, for example "
+                     "configs/joint_limits/psm-classic.yaml");
 }
 
 bool line_was_entered() {

@@ -328,7 +328,8 @@ void add_calibrate_all(Command parent, Run& run_later) {
       "changed.\n"
       "Example:\n  lapservo calibrate all --rig rig.yaml --boards boards/ --board 9x6 --square-mm 5 --turn turn.mp4 "
       "--swing swing.mp4 --joints joints.csv --report check.html\n"
-      "  lapservo calibrate all --rig rig.yaml --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --enable-motion");
+      "  lapservo calibrate all --rig rig.yaml --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --enable-motion "
+      "--joint-limits configs/joint_limits/psm-classic.yaml");
   command.runs(run_later, [options] { return run_all(*options); });
 }
 

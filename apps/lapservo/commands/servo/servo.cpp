@@ -191,8 +191,10 @@ void add_arm_options(Command command, ServoOptions& options) {
       "/dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
   command.add_flag("--enable-motion", options.enable_motion,
                    "Move a real arm; without it nothing is sent, and what would be is said");
-  command.add_option("--joint-limits", options.joint_limits,
-                     "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
+  command.add_option(
+      "--joint-limits", options.joint_limits,
+      "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml; with --enable-motion "
+      "needed");
 }
 
 void add_trajectory_options(Command command, ServoOptions& options) {

@@ -57,6 +57,7 @@ class RecordedArm : public Robot {
     return {latest.time_s, latest.q, known ? OperatingState::enabled : OperatingState::disabled, false};
   }
   void send(const JointPath&) override {}
+  bool is_simulated() const override { return true; }  // nothing moves
 
  private:
   const Clock& clock_;
