@@ -4,15 +4,24 @@
 #include <chrono>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
 #include <utility>
 
 namespace lapservo::internal {
 namespace {
 
-// What computes elsewhere then delays set-points less. Who may not have it does without.
-void ask_for_real_time() {
+// What computes or swaps elsewhere then delays set-points less. Who may not have it does without: empty, or what was
+// not granted. Later allocations fail where the memory that may be locked has a limit: then none is.
+std::string ask_for_real_time() {
   const sched_param priority{.sched_priority = 20};
-  pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
+  const bool first = pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority) == 0;
+  rlimit limit{};
+  const bool unlimited = getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
+  const bool locked = unlimited && mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0;
+  if (first && locked) return {};
+  return std::string(first ? "" : "real-time priority") + (first || locked ? "" : " and ") +
+         (locked ? "" : "locked memory");
 }
 
 }  // namespace
@@ -79,13 +88,22 @@ InterlockCounts CrtkRobot::counts() const {
   return interlock_.counts();
 }
 
+std::string CrtkRobot::not_granted() const {
+  const std::lock_guard lock(mutex_);
+  return not_granted_;
+}
+
 std::optional<Eigen::Vector4d> CrtkRobot::set_point() const {
   const std::lock_guard lock(mutex_);
   return interlock_.set_point();
 }
 
 void CrtkRobot::command() {
-  ask_for_real_time();
+  {
+    std::string refused = ask_for_real_time();
+    const std::lock_guard lock(mutex_);
+    not_granted_ = std::move(refused);
+  }
   const auto period =
       std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(period_s_));
   auto next = std::chrono::steady_clock::now();

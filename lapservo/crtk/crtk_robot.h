@@ -32,6 +32,8 @@ class CrtkRobot : public Robot {
 
   InterlockCounts counts() const;
   std::optional<Eigen::Vector4d> set_point() const;
+  /// "real-time priority and locked memory", or what of them the system did not grant for set-points.
+  std::string not_granted() const;
 
  private:
   void command();
@@ -42,6 +44,7 @@ class CrtkRobot : public Robot {
   Transport& transport_;
   mutable std::mutex mutex_;
   Interlock interlock_;
+  std::string not_granted_;
   Transport::Publisher<JointMessage> servo_jp_;
   std::vector<Transport::Subscription> subscriptions_;
   std::atomic<bool> ended_ = false;

@@ -78,7 +78,7 @@ class Watcher : public RunObserver {
     const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
     const std::string state = state_text(tick.decision.control, arm_);
     summary_.add(tick, truth, block_of(arm_));
-    if (folder_) folder_->log().add(tick.input, tick.decision, truth);
+    if (folder_) folder_->add(tick, truth);
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
     if (strict_ && summary_.registration_contradicted()) return false;
     if (page_ && !obey_page(tick, state)) return false;
@@ -139,11 +139,9 @@ int simulate(const ServoOptions& options) {
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
               summary.text().c_str());
-  if (folder) {
-    folder->commit();
-    std::printf("log, rig and controller: %s\n", options.out.c_str());
-  }
-  return summary.succeeded(options.strict) ? 0 : 1;
+  const bool logged = !folder || folder->commit();
+  if (folder && logged) std::printf("log, rig and controller: %s\n", options.out.c_str());
+  return summary.succeeded(options.strict) && logged ? 0 : 1;
 }
 
 int replay_log(const ServoOptions& options) {

@@ -77,7 +77,7 @@ class ArmWatcher : public RunObserver {
       say(time_s, motions.back());
       said_motions_ = motions.size();
     }
-    if (folder_) folder_->log().add(tick.input, tick.decision, std::nullopt);
+    if (folder_) folder_->add(tick, std::nullopt);
     say_state(time_s, state_text(tick.decision.control, arm_));
     say_images(time_s);
     topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
@@ -267,6 +267,8 @@ int steer_arm(const ServoOptions& options) {
   if (config.rig.instruments.front().camera_from_rcm)
     refuse_infeasible(trajectory, duration_s(options), feature_model(config.rig), config.controller, start,
                       trajectory_name(options));
+  if (const std::string missing = robot.not_granted(); options.enable_motion && !missing.empty())
+    std::printf("set-points leave without %s, see docs/ros.md\n", missing.c_str());
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
 
@@ -278,8 +280,8 @@ int steer_arm(const ServoOptions& options) {
   lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
-  if (folder) folder->commit();
-  return watcher.summary().succeeded(options.strict) ? 0 : 1;
+  const bool logged = !folder || folder->commit();
+  return watcher.summary().succeeded(options.strict) && logged ? 0 : 1;
 }
 
 }  // namespace lapservo::app

@@ -10,6 +10,7 @@
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
+#include "lapservo/core/error.h"
 #include "lapservo/io/overlay.h"
 #include "lapservo/servo/controller_file.h"
 
@@ -72,9 +73,21 @@ RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& 
   write_file(folder_ / "controller.yaml", controller_yaml(controller));
 }
 
-void RunFolder::commit() {
+void RunFolder::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {
+  if (failed_) return;
+  try {
+    log_.add(tick.input, tick.decision, truth);
+  } catch (const InputError& error) {
+    failed_ = true;
+    std::fprintf(stderr, "lapservo: %s: the run goes on without a log\n", error.what());
+  }
+}
+
+bool RunFolder::commit() {
+  if (failed_) return false;
   log_.commit();
   folder_.commit();
+  return true;
 }
 
 void Summary::follow_registration(const ControlTick& tick) {

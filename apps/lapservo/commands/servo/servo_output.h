@@ -32,12 +32,15 @@ class RunFolder {
  public:
   /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
   RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller);
-  ServoLog& log() { return log_; }
-  void commit();
+  /// What can't be written is said once, and never ends the run.
+  void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
+  /// False where something could not be written.
+  bool commit();
 
  private:
   OutputFolder folder_;
   ServoLog log_;
+  bool failed_ = false;
 };
 
 /// What the run came to, for the last lines.

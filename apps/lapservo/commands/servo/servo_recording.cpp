@@ -96,7 +96,7 @@ class RecordingWatcher : public RunObserver {
     if (!start_s_) start_s_ = tick.input.time_s;
     duration_s_ = tick.input.time_s - *start_s_;
     summary_.add(tick, std::nullopt);
-    if (folder_) folder_->log().add(tick.input, tick.decision, std::nullopt);
+    if (folder_) folder_->add(tick, std::nullopt);
     acted_ |= tick.decision.control.action != ControlAction::hold;
     if (const std::string state = state_text(tick.decision.control); state != state_) {
       state_ = state;
@@ -165,11 +165,9 @@ int decide_on_recording(const ServoOptions& options) {
               images.count(), watcher.summary().holds_text().c_str());
   if (const std::string complaint = frames.complaint(); !complaint.empty())
     std::fprintf(stderr, "lapservo: %s: %s\n", bag->path().c_str(), complaint.c_str());
-  if (folder) {
-    folder->commit();
-    std::printf("log, rig and controller: %s\n", options.out.c_str());
-  }
-  return watcher.acted() && !(options.strict && watcher.summary().registration_contradicted()) ? 0 : 1;
+  const bool logged = !folder || folder->commit();
+  if (folder && logged) std::printf("log, rig and controller: %s\n", options.out.c_str());
+  return logged && watcher.acted() && !(options.strict && watcher.summary().registration_contradicted()) ? 0 : 1;
 }
 
 }  // namespace lapservo::app
