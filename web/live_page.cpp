@@ -158,7 +158,7 @@ HttpResponse LivePage::command(const HttpRequest& request) {
     return plain(202, "the run ends");
   }
   if (path != "/hold" && path != "/start") return plain(404, "there is no such command");
-  if (!config_.has_loop) return plain(403, "nothing here moves");
+  if (!config_.has_loop) return plain(403, "nothing that moves is commanded here");
   if (path == "/start") return start(request);
   hold_ = true;
   return plain(202, "asked for");

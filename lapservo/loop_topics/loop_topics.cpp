@@ -82,7 +82,7 @@ PoseMessage pose_message(const Instrument& instrument, const Observation::Rcm& s
   return message;
 }
 
-LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame)
+LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame, bool hears)
     : transport_(transport),
       rig_(rig),
       frame_(camera_frame),
@@ -92,13 +92,14 @@ LoopTopics::LoopTopics(Transport& transport, const Rig& rig, const std::string& 
       error_(transport.joint_publisher(topic(rig, "error"))),
       diagnostics_(transport.diagnostic_publisher("/diagnostics")),
       overlay_(transport.compressed_image_publisher(topic(rig, "overlay/compressed"))) {
+  thread_ = std::thread([this] { draw(); });
+  if (!hears) return;
   subscriptions_.push_back(
       transport.subscribe_strings(topic(rig, "command"), [this](StringMessage&& command) { hear(command); }));
   subscriptions_.push_back(
       transport.subscribe_joints(topic(rig, "set_point"), [this](JointMessage&& set_point) { hear(set_point); }));
   subscriptions_.push_back(transport.subscribe_trajectories(
       topic(rig, "trajectory"), [this](TrajectoryMessage&& trajectory) { hear(trajectory); }));
-  thread_ = std::thread([this] { draw(); });
 }
 
 LoopTopics::~LoopTopics() {

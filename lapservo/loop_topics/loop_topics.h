@@ -37,7 +37,8 @@ struct LoopWishes {
 /// l_px, d_px) and /lapservo/NAME/trajectory (JointTrajectory of these).
 class LoopTopics {
  public:
-  LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame);
+  /// `hears`: whether it hears anything; else it only publishes.
+  LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame, bool hears = true);
   ~LoopTopics();
   LoopTopics(const LoopTopics&) = delete;
   LoopTopics& operator=(const LoopTopics&) = delete;

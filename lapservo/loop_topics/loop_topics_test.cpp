@@ -134,6 +134,13 @@ TEST(LoopTopics, HearsCommandsAndDropsWhatMakesNoSense) {
   EXPECT_EQ(topics.malformed(), 4);
 }
 
+TEST(LoopTopics, HearsNothingWhereNobodyMayCommand) {
+  TestTransport transport;
+  LoopTopics topics(transport, testing::small_test_rig(), "endoscope", false);
+  transport.say("/lapservo/PSM1/command", StringMessage{0, "start"});
+  EXPECT_FALSE(topics.wishes().start);
+}
+
 TEST(LoopTopics, HearsTrajectories) {
   const Rig rig = testing::small_test_rig();
   TestTransport transport;

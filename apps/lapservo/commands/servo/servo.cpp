@@ -125,7 +125,7 @@ int simulate(const ServoOptions& options) {
   Simulator simulator(true_rig, simulated, start);
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<ServoPage> page;
-  if (options.web.port) page.emplace(options.web, config.rig, "servo, simulated", true);
+  if (options.web.port) page.emplace(options.web, config.rig, "servo, simulated", may_command(options, "page"), true);
   Supervisor arm(simulator, simulator);
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
@@ -187,6 +187,12 @@ void add_arm_options(Command command, ServoOptions& options) {
       "--camera", options.camera,
       "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
       "/dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
+  command
+      .add_option("--control", options.control,
+                  "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "
+                  "network may publish, both, or nobody but Ctrl-C")
+      .shows_default()
+      .one_of({"none", "page", "topics", "page,topics"});
   command.add_flag("--enable-motion", options.enable_motion,
                    "Move a real arm; without it nothing is sent, and what would be is said");
   command.add_option(

@@ -247,7 +247,8 @@ int steer_arm(const ServoOptions& options) {
   if (options.view) view.emplace("servo", "use --out to write a log instead");
 
   std::optional<ServoPage> page;
-  if (options.web.port) page.emplace(options.web, rig, "servo " + options.robot, options.enable_motion);
+  if (options.web.port)
+    page.emplace(options.web, rig, "servo " + options.robot, may_command(options, "page"), options.enable_motion);
 
   Transports transports("lapservo");
   SteadyClock clock;
@@ -272,7 +273,7 @@ int steer_arm(const ServoOptions& options) {
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
 
-  LoopTopics topics(transport, rig, "endoscope");
+  LoopTopics topics(transport, rig, "endoscope", may_command(options, "topics"));
   Goal goal(trajectory);
   ArmWatcher watcher(options, config, arm, robot, images, topics, goal, folder ? &*folder : nullptr,
                      view ? &*view : nullptr, its_page);

@@ -62,6 +62,10 @@ std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
 
 }  // namespace
 
+bool may_command(const ServoOptions& options, std::string_view who) {
+  return options.control.find(who) != std::string::npos;
+}
+
 double periods_per_s(const ServoOptions& options) {
   return options.fps.value_or(options.robot == "sim" ? 60 : 120);
 }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,7 +17,8 @@ namespace lapservo::app {
 /// What `lapservo servo` was asked for.
 struct ServoOptions {
   std::string rig, robot, camera, joint_limits, trajectory = "paper", method = "default", tracker, controller,
-                                                delay = "estimate", out, replay, image_topic, joint_topic;
+                                                delay = "estimate", out, replay, image_topic, joint_topic,
+                                                control = "page,topics";
   std::vector<double> set_point, via, start, rcm_px, hide;
   std::vector<double> registration_error;  // 3 x mm
   double latency_ms = 80;
@@ -35,6 +37,9 @@ RunConfig run_config_of(const ServoOptions& options);
 void forget_registration(RunConfig& run, const ServoOptions& options);
 /// The rig's `joints` entry. Throws InputError when there is none.
 const Joints& joints_of(const ServoOptions& options, const Rig& rig);
+
+/// Whether "page" or "topics" may say stop and start, and set goals.
+bool may_command(const ServoOptions& options, std::string_view who);
 
 /// What is asked for, else 60 in the simulation and 120 with an arm, where an image waits for the next period.
 double periods_per_s(const ServoOptions& options);

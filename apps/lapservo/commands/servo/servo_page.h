@@ -13,8 +13,8 @@ namespace lapservo::app {
 /// The page of a loop.
 class ServoPage {
  public:
-  /// `may_start`: whether whoever sees the page may let the arm move.
-  ServoPage(const WebOptions& options, const Rig& rig, const std::string& title, bool may_start);
+  /// Whether whoever sees the page may hold and start the loop, and whether a start moves an arm.
+  ServoPage(const WebOptions& options, const Rig& rig, const std::string& title, bool may_command, bool may_start);
 
   /// `state`: in words.
   void tell(const ControlTick& tick, double time_s, const std::string& state);
