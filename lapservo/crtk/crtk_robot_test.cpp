@@ -1,10 +1,13 @@
 #include "lapservo/crtk/crtk_robot.h"
 
 #include <atomic>
+#include <cstdint>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/crtk/operator_presence.h"
 #include "lapservo/crtk/test_transport.h"
 #include "lapservo/testing/wait_for.h"
 
@@ -70,6 +73,28 @@ TEST(CrtkRobot, ANoticedCommandOfSomebodyElseStopsIt) {
   transport.say("/PSM1/servo_jp", JointMessage{});
   ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
   EXPECT_EQ(robot.state().blocked, Blocked::foreign_command);
+}
+
+TEST(OperatorPresence, IsAButtonThatIsPressedThroughoutAndSaysSo) {
+  TestTransport transport;
+  StandingClock clock;
+  OperatorPresence presence(transport, "/pedal", clock);
+  const auto say = [&](const std::vector<std::int32_t>& buttons) { transport.say("/pedal", JoyMessage{0, buttons}); };
+  EXPECT_FALSE(presence.was_present());
+  say({1});
+  EXPECT_TRUE(presence.was_present());
+  clock.now = 10.19;
+  EXPECT_TRUE(presence.was_present());
+  clock.now = 10.21;
+  EXPECT_FALSE(presence.was_present());
+  say({1, 0});
+  EXPECT_TRUE(presence.was_present());
+  for (const std::vector<std::int32_t>& buttons : std::vector<std::vector<std::int32_t>>{{0}, {}, {2}, {0, 1}}) {
+    say(buttons);
+    say({1});  // pressed again before anybody asked
+    EXPECT_FALSE(presence.was_present());
+    EXPECT_TRUE(presence.was_present());
+  }
 }
 
 TEST(CrtkRobot, ObservingItSendsNothing) {

@@ -41,6 +41,12 @@ struct StringMessage {
   std::string text;
 };
 
+/// sensor_msgs/Joy: foot pedals. Axes are not used.
+struct JoyMessage {
+  double stamp_s = 0;
+  std::vector<std::int32_t> buttons;  ///< 1 where pressed
+};
+
 /// sensor_msgs/Image.
 struct ImageMessage {
   double stamp_s = 0;

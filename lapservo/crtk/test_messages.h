@@ -28,6 +28,10 @@ inline void expect_same(const StringMessage& heard, const StringMessage& sent) {
   EXPECT_NEAR(heard.stamp_s, sent.stamp_s, 1e-6);
   EXPECT_EQ(heard.text, sent.text);
 }
+inline void expect_same(const JoyMessage& heard, const JoyMessage& sent) {
+  EXPECT_NEAR(heard.stamp_s, sent.stamp_s, 1e-6);
+  EXPECT_EQ(heard.buttons, sent.buttons);
+}
 inline void expect_same(const TrajectoryMessage& heard, const TrajectoryMessage& sent) {
   EXPECT_NEAR(heard.stamp_s, sent.stamp_s, 1e-6);
   EXPECT_EQ(heard.names, sent.names);
@@ -56,6 +60,7 @@ constexpr double sample_stamp_s = 1700000000.123456;
 const JointMessage sample_joints{sample_stamp_s, {"yaw", "", "pitch"}, {0.25, 0, -1.5}};
 const OperatingStateMessage sample_state{sample_stamp_s, "ENABLED", true, false};
 const StringMessage sample_string{sample_stamp_s, "enable"};
+const JoyMessage sample_joy{sample_stamp_s, {1, 0, -3}};
 const TrajectoryMessage sample_trajectory{sample_stamp_s, {"s_rad"}, {{0, {1}}, {2.25, {3, 4}}}};
 const ImageMessage sample_image{sample_stamp_s, 2, 1, 6, "bgr8", true, {1, 2, 3, 4, 5, 6}};
 const CompressedImageMessage sample_jpeg{sample_stamp_s, "jpeg", {7, 8}};
@@ -71,6 +76,7 @@ inline void expect_carries_each_kind(Transport& from, const std::string& in, Tra
   };
   carry("joints", &Transport::joint_publisher, &Transport::subscribe_joints, sample_joints);
   carry("text", &Transport::string_publisher, &Transport::subscribe_strings, sample_string);
+  carry("joy", &Transport::joy_publisher, &Transport::subscribe_joys, sample_joy);
   carry("trajectory", &Transport::trajectory_publisher, &Transport::subscribe_trajectories, sample_trajectory);
   carry("compressed", &Transport::compressed_image_publisher, &Transport::subscribe_compressed_images, sample_jpeg);
   ImageMessage large{sample_stamp_s, 640, 360, 1920, "bgr8", true, {}};

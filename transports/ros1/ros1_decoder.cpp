@@ -83,6 +83,11 @@ void read_fields(Bytes& from, TrajectoryMessage& message) {
   }
 }
 
+void read_fields(Bytes& from, JoyMessage& message) {
+  from.numbers<float>();  // axes
+  message.buttons = from.numbers<std::int32_t>();
+}
+
 void read_fields(Bytes& from, OperatingStateMessage& message) {
   message.state = from.text();
   message.is_homed = from.number<std::uint8_t>() != 0;
@@ -107,6 +112,7 @@ std::optional<Message> decode_ros1(std::span<const std::uint8_t> bytes) {
 template std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<TrajectoryMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<OperatingStateMessage> decode_ros1(std::span<const std::uint8_t>);
+template std::optional<JoyMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<StringMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<ImageMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<CompressedImageMessage> decode_ros1(std::span<const std::uint8_t>);

@@ -30,6 +30,12 @@ ros1::JointState ros1_message(const JointMessage& message) {
   return wire;
 }
 
+ros1::Joy ros1_message(const JoyMessage& message) {
+  auto wire = with_stamp<ros1::Joy>(message.stamp_s);
+  wire.buttons.assign(message.buttons.begin(), message.buttons.end());
+  return wire;
+}
+
 ros1::JointTrajectory ros1_message(const TrajectoryMessage& message) {
   auto wire = with_stamp<ros1::JointTrajectory>(message.stamp_s);
   wire.joint_names.assign(message.names.begin(), message.names.end());

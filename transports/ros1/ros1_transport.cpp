@@ -83,6 +83,10 @@ Transport::Publisher<StringMessage> Ros1Transport::string_publisher(const std::s
   return publisher<StringMessage>(node_, topic, few);
 }
 
+Transport::Publisher<JoyMessage> Ros1Transport::joy_publisher(const std::string& topic) {
+  return publisher<JoyMessage>(node_, topic, few);
+}
+
 Transport::Publisher<TrajectoryMessage> Ros1Transport::trajectory_publisher(const std::string& topic) {
   return publisher<TrajectoryMessage>(node_, topic, few);
 }
@@ -122,6 +126,10 @@ Transport::Subscription Ros1Transport::subscribe_operating_state(const std::stri
 
 Transport::Subscription Ros1Transport::subscribe_strings(const std::string& topic, Handler<StringMessage> handler) {
   return subscription<StringMessage>(node_, topic, few, handler);
+}
+
+Transport::Subscription Ros1Transport::subscribe_joys(const std::string& topic, Handler<JoyMessage> handler) {
+  return subscription<JoyMessage>(node_, topic, few, handler);
 }
 
 Transport::Subscription Ros1Transport::subscribe_trajectories(const std::string& topic,

@@ -66,6 +66,8 @@ int main() {
   state({1700000000, "DISABLED", false, false});  // before anybody listens: it is latched
   subscriptions.push_back(
       transport.subscribe_operating_state("/in/state", [&](OperatingStateMessage&& m) { state(m); }));
+  const auto joy = transport.joy_publisher("/out/joy");
+  subscriptions.push_back(transport.subscribe_joys("/in/joy", [&](JoyMessage&& m) { joy(m); }));
   const auto trajectory = transport.trajectory_publisher("/out/trajectory");
   subscriptions.push_back(
       transport.subscribe_trajectories("/in/trajectory", [&](TrajectoryMessage&& m) { trajectory(m); }));

@@ -9,6 +9,7 @@ set(idl_of_char octet)
 set(idl_of_uint8 octet)
 set(idl_of_int32 long)
 set(idl_of_uint32 "unsigned long")
+set(idl_of_float32 float)
 set(idl_of_float64 double)
 set(idl_of_string string)
 

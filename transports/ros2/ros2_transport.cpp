@@ -141,6 +141,10 @@ Transport::Publisher<StringMessage> Ros2Transport::string_publisher(const std::s
   return implementation_->publisher<StringMessage>(topic, Delivery::reliable);
 }
 
+Transport::Publisher<JoyMessage> Ros2Transport::joy_publisher(const std::string& topic) {
+  return implementation_->publisher<JoyMessage>(topic, Delivery::reliable);
+}
+
 Transport::Publisher<TrajectoryMessage> Ros2Transport::trajectory_publisher(const std::string& topic) {
   return implementation_->publisher<TrajectoryMessage>(topic, Delivery::reliable);
 }
@@ -181,6 +185,10 @@ Transport::Subscription Ros2Transport::subscribe_operating_state(const std::stri
 
 Transport::Subscription Ros2Transport::subscribe_strings(const std::string& topic, Handler<StringMessage> handler) {
   return implementation_->subscribe<StringMessage>(topic, {Delivery::reliable, Delivery::best_effort}, handler);
+}
+
+Transport::Subscription Ros2Transport::subscribe_joys(const std::string& topic, Handler<JoyMessage> handler) {
+  return implementation_->subscribe<JoyMessage>(topic, {Delivery::best_effort}, handler);
 }
 
 Transport::Subscription Ros2Transport::subscribe_trajectories(const std::string& topic,

@@ -9,7 +9,7 @@ import re
 import sys
 
 NESTED, BOUNDED_STRING, ARRAY, SEQUENCE = 1, 21, 48, 144
-IDS = {"uint8": 3, "char": 3, "int32": 6, "uint32": 7, "float64": 11, "bool": 15, "byte": 16, "string": 17}
+IDS = {"uint8": 3, "char": 3, "int32": 6, "uint32": 7, "float32": 10, "float64": 11, "bool": 15, "byte": 16, "string": 17}
 
 
 def field(line, package):

@@ -126,6 +126,16 @@ StringMessage Wire<StringMessage>::read(const Type& wire) {
   return {stamp_of(wire.header_), text_of(wire.string_)};
 }
 
+void Wire<JoyMessage>::write(dds_entity_t writer, const JoyMessage& message) {
+  auto wire = with_header<Type>(message.stamp_s);
+  point(wire.buttons_, message.buttons);
+  dds_write(writer, &wire);
+}
+
+JoyMessage Wire<JoyMessage>::read(const Type& wire) {
+  return {stamp_of(wire.header_), vector_of(wire.buttons_)};
+}
+
 void Wire<ImageMessage>::write(dds_entity_t writer, const ImageMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
   wire.height_ = message.height;

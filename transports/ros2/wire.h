@@ -44,6 +44,14 @@ struct Wire<StringMessage> {
 };
 
 template <>
+struct Wire<JoyMessage> {
+  using Type = sensor_msgs_msg_dds__Joy_;
+  static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__Joy__desc; }
+  static void write(dds_entity_t writer, const JoyMessage& message);
+  static JoyMessage read(const Type& wire);
+};
+
+template <>
 struct Wire<ImageMessage> {
   using Type = sensor_msgs_msg_dds__Image_;
   static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__Image__desc; }

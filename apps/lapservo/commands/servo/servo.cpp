@@ -193,6 +193,9 @@ void add_arm_options(Command command, ServoOptions& options) {
                   "network may publish, both, or nobody but Ctrl-C")
       .shows_default()
       .one_of({"none", "page", "topics", "page,topics"});
+  command.add_option("--operator-present", options.operator_present,
+                     "Move the arm only while the first button of this sensor_msgs/Joy topic, for example "
+                     "/footpedals/coag, is pressed, and said to be every 0.2 s");
   command.add_flag("--enable-motion", options.enable_motion,
                    "Move a real arm; without it nothing is sent, and what would be is said");
   command.add_option(

@@ -21,6 +21,7 @@
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/crtk/operator_presence.h"
 #include "lapservo/loop_topics/loop_topics.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/robot/supervisor.h"
@@ -256,6 +257,11 @@ int steer_arm(const ServoOptions& options) {
   Transport& transport = transports.get(address.transport, "--robot");
   CrtkRobot robot(transport, address.name, interlock, clock);
   Supervisor arm(robot, clock);
+  std::optional<OperatorPresence> operator_presence;
+  if (!options.operator_present.empty()) {
+    operator_presence.emplace(transport, options.operator_present, clock);
+    arm.watch_operator([&] { return operator_presence->was_present(); });
+  }
   watch_for_interrupts();
   ServoPage* const its_page = page ? &*page : nullptr;
   const std::string missing = wait_for_topics(options, transports, arm, its_page, clock);
