@@ -33,7 +33,7 @@ std::string topic_of(const std::string& arm, const std::string& name) {
 CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const InterlockConfig& config, const Clock& clock)
     : clock_(clock), period_s_(config.period_s), arm_(arm), transport_(transport), interlock_(config) {
   // Who only observes is no publisher either: others may watch for those.
-  if (config.motion_enabled) servo_jp_ = transport.joint_publisher(topic_of(arm, "servo_jp"));
+  if (config.motion_enabled) servo_jp_ = transport.set_point_publisher(topic_of(arm, "servo_jp"));
   const auto joints = [&](const char* topic, void (Interlock::*tell)(const JointMessage&, double)) {
     subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, topic), [this, tell](JointMessage&& message) {
       const double arrival_s = clock_.now_s();

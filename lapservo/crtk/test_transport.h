@@ -15,6 +15,7 @@ namespace lapservo::internal {
 class TestTransport : public Transport {
  public:
   Publisher<JointMessage> joint_publisher(const std::string& topic) override { return keep(topic, joints_); }
+  Publisher<JointMessage> set_point_publisher(const std::string& topic) override { return keep(topic, joints_); }
   Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) override {
     return keep(topic, states_);
   }

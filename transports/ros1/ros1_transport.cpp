@@ -75,6 +75,10 @@ Transport::Publisher<JointMessage> Ros1Transport::joint_publisher(const std::str
   return publisher<JointMessage>(node_, topic, few);
 }
 
+Transport::Publisher<JointMessage> Ros1Transport::set_point_publisher(const std::string& topic) {
+  return publisher<JointMessage>(node_, topic, 1);
+}
+
 Transport::Publisher<OperatingStateMessage> Ros1Transport::operating_state_publisher(const std::string& topic) {
   return publisher<OperatingStateMessage>(node_, topic, few, true);
 }

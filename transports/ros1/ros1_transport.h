@@ -19,6 +19,7 @@ class Ros1Transport : public Transport {
   ~Ros1Transport() override;
 
   Publisher<JointMessage> joint_publisher(const std::string& topic) override;
+  Publisher<JointMessage> set_point_publisher(const std::string& topic) override;
   Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) override;
   Publisher<StringMessage> string_publisher(const std::string& topic) override;
   Publisher<JoyMessage> joy_publisher(const std::string& topic) override;

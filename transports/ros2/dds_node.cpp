@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -10,6 +11,7 @@
 #include <stdexcept>
 
 #include "ros2_messages.h"
+#include "transports/ros2/discovery.h"
 #include "transports/ros2/ros2_names.h"
 
 namespace lapservo::internal {
@@ -31,36 +33,69 @@ Qos qos_of(Delivery delivery) {
   dds_qset_reliability(qos.get(), reliable ? DDS_RELIABILITY_RELIABLE : DDS_RELIABILITY_BEST_EFFORT, DDS_MSECS(100));
   dds_qset_durability(qos.get(),
                       delivery == Delivery::latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
-  const int depth = delivery == Delivery::latched ? 1 : delivery == Delivery::reliable ? 10 : 5;
+  const int depth = delivery == Delivery::reliable ? 10 : delivery == Delivery::best_effort ? 5 : 1;
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, depth);
+  // Without it what a dead arm has not acknowledged goes to the one that is started in its place.
+  if (delivery == Delivery::set_point) dds_qset_lifespan(qos.get(), DDS_MSECS(50));
   const dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
   dds_qset_data_representation(qos.get(), 1, &xcdr1);
   return qos;
 }
 
-// Whole pictures in few packets and a receive buffer for some of them (as far as net.core.rmem_max goes), unless
-// CYCLONEDDS_URI says otherwise; what it says comes last and counts. Loopback often has no multicast: those on it are
-// asked one by one.
-std::string configuration() {
-  std::string general = "<MaxMessageSize>65500B</MaxMessageSize>", discovery;
-  const char* const localhost = std::getenv("ROS_LOCALHOST_ONLY");
-  if (localhost && std::string(localhost) == "1") {
-    general += "<Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces>";
-    discovery =
-        "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
-        "<Peers><Peer address=\"127.0.0.1\"/></Peers>";
-  }
-  const std::string text =
-      "<CycloneDDS><Domain id=\"any\"><General>" + general + "</General><Discovery>" + discovery +
-      "</Discovery><Internal><SocketReceiveBufferSize min=\"default\" max=\"16MB\"/></Internal></Domain></CycloneDDS>";
-  const char* const own = std::getenv("CYCLONEDDS_URI");
-  return own && *own ? text + "," + own : text;
+std::string environment(const char* name) {
+  const char* const value = std::getenv(name);
+  return value ? value : "";
 }
 
-// Errors only: it warns of every loopback without multicast.
+const char* text_of(std::uint32_t policy) {
+  switch (policy) {
+    case DDS_RELIABILITY_QOS_POLICY_ID:
+      return "reliability";
+    case DDS_DURABILITY_QOS_POLICY_ID:
+      return "durability";
+    case DDS_DATA_REPRESENTATION_QOS_POLICY_ID:
+      return "data representation";
+    default:
+      return "quality of service";
+  }
+}
+
+// Called by DDS with the topic's name; once a topic.
+void say_offered(dds_entity_t, dds_offered_incompatible_qos_status_t status, void* topic) {
+  if (status.total_count > 1) return;
+  std::fprintf(stderr, "DDS: %s: a subscriber asks for another %s than is offered, and gets nothing%s\n",
+               static_cast<const std::string*>(topic)->c_str(), text_of(status.last_policy_id),
+               status.last_policy_id == DDS_RELIABILITY_QOS_POLICY_ID ? ": let it read best effort" : "");
+}
+
+void say_requested(dds_entity_t, dds_requested_incompatible_qos_status_t status, void* topic) {
+  if (status.total_count > 1) return;
+  std::fprintf(stderr, "DDS: %s: a publisher offers another %s than can be read, and is not heard\n",
+               static_cast<const std::string*>(topic)->c_str(), text_of(status.last_policy_id));
+}
+
+struct DeleteListener {
+  void operator()(dds_listener_t* listener) const { dds_delete_listener(listener); }
+};
+using Listener = std::unique_ptr<dds_listener_t, DeleteListener>;
+
+// What CYCLONEDDS_URI says comes last and counts.
+std::string configuration() {
+  const Discovery discovery = discovery_of(
+      environment("ROS_LOCALHOST_ONLY"), environment("ROS_AUTOMATIC_DISCOVERY_RANGE"), environment("ROS_STATIC_PEERS"));
+  const std::string own = environment("CYCLONEDDS_URI");
+  return cyclone_configuration(discovery, has_network()) + (own.empty() ? "" : "," + own);
+}
+
+// Errors, and warnings that have a remedy, which are given once.
 void log_sink(void*, const dds_log_data_t* data) {
-  if (data->priority & (DDS_LC_ERROR | DDS_LC_FATAL))
-    std::fprintf(stderr, "DDS: %.*s\n", static_cast<int>(data->size), data->message);
+  const std::string text(data->message, data->size);
+  static std::atomic<bool> remedied = false;
+  if (data->priority & (DDS_LC_ERROR | DDS_LC_FATAL)) {
+    std::fprintf(stderr, "DDS: %s\n", text.c_str());
+  } else if (const auto remedy = remedy_of_warning(text); remedy && !remedied.exchange(true)) {
+    std::fprintf(stderr, "DDS: %s: %s\n", text.c_str(), remedy->c_str());
+  }
 }
 
 // One a process and number, configured before its first participant.
@@ -92,8 +127,7 @@ dds_entity_t create_participant(std::uint32_t domain) {
 
 // Up to Humble a Gid had 24 bytes.
 bool has_wide_gids() {
-  const char* const distro = std::getenv("ROS_DISTRO");
-  const std::string name = distro ? distro : "";
+  const std::string name = environment("ROS_DISTRO");
   return name == "humble" || name == "galactic" || name == "foxy";
 }
 
@@ -164,9 +198,12 @@ dds_entity_t DdsNode::create_topic(const std::string& dds_name, const dds_topic_
 
 dds_entity_t DdsNode::create_writer(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery) {
   const dds_entity_t on = create_topic(dds_topic_name(topic), type);
-  const dds_entity_t writer = checked(dds_create_writer(participant_, on, qos_of(delivery).get(), nullptr), "writer");
-  dds_delete(on);  // the writer keeps it
   const std::lock_guard lock(mutex_);
+  const Listener listener(dds_create_listener(&topics_.emplace_back(topic)));
+  dds_lset_offered_incompatible_qos(listener.get(), say_offered);
+  const dds_entity_t writer =
+      checked(dds_create_writer(participant_, on, qos_of(delivery).get(), listener.get()), "writer");
+  dds_delete(on);  // the writer keeps it
   writers_.push_back(writer);
   announce();
   return writer;
@@ -176,9 +213,12 @@ dds_entity_t DdsNode::create_reader(const std::string& topic, const dds_topic_de
   const Qos qos = qos_of(delivery);
   dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
   const dds_entity_t on = create_topic(dds_topic_name(topic), type);
-  const dds_entity_t reader = checked(dds_create_reader(participant_, on, qos.get(), nullptr), "reader");
-  dds_delete(on);
   const std::lock_guard lock(mutex_);
+  const Listener listener(dds_create_listener(&topics_.emplace_back(topic)));
+  // Every topic has a best-effort reader, which matches all that can be read.
+  if (delivery == Delivery::best_effort) dds_lset_requested_incompatible_qos(listener.get(), say_requested);
+  const dds_entity_t reader = checked(dds_create_reader(participant_, on, qos.get(), listener.get()), "reader");
+  dds_delete(on);
   readers_.push_back(reader);
   announce();
   return reader;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <dds/dds.h>
+#include <deque>
 #include <map>
 #include <mutex>
 #include <string>
@@ -14,10 +15,12 @@ enum class Delivery {
   reliable,     ///< the default: reliable, volatile, the last 10
   best_effort,  ///< sensor data: best effort, volatile, the last 5
   latched,      ///< reliable, transient local, the last 1
+  set_point,    ///< reliable, volatile, the last 1, void after 50 ms
 };
 
 /// A DDS participant that ROS 2's tools list as a node: each reader and writer is announced on ros_discovery_info.
-/// Errors of the middleware are std::runtime_error.
+/// Errors of the middleware are std::runtime_error. Peers whose QoS or types don't fit are said on stderr, once a
+/// topic.
 class DdsNode {
  public:
   DdsNode(const std::string& node_name, std::uint32_t domain);
@@ -46,6 +49,7 @@ class DdsNode {
   bool wide_gids_ = false;
   std::mutex mutex_;
   std::vector<dds_entity_t> readers_, writers_;
+  std::deque<std::string> topics_;  // as their listeners name them
 };
 
 }  // namespace lapservo::internal

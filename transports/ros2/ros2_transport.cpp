@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdlib>
+#include <deque>
 #include <functional>
 #include <map>
 #include <thread>
@@ -21,19 +22,22 @@ std::uint32_t domain_of_environment() {
   return domain_id(id ? id : "");
 }
 
-// What one writer wrote reaches readers of different QoS each on its own way: the first counts.
+// What one writer wrote reaches readers of different QoS each on its own way: the first counts. Its stamp names it, and
+// says nothing of the order: a writer's clock may be set.
 class Sieve {
  public:
-  bool is_new(const dds_sample_info_t& info) {
-    const auto [last, first] = last_.try_emplace(info.publication_handle, info.source_timestamp);
-    if (first) return true;
-    if (info.source_timestamp <= last->second) return false;
-    last->second = info.source_timestamp;
+  bool is_new(const dds_sample_info_t& info, dds_entity_t reader) {
+    constexpr std::size_t remembered = 64;  // more than all readers hold
+    auto& last = last_[info.publication_handle];
+    for (const auto& [stamp, by] : last)
+      if (stamp == info.source_timestamp && by != reader) return false;
+    last.emplace_back(info.source_timestamp, reader);
+    if (last.size() > remembered) last.pop_front();
     return true;
   }
 
  private:
-  std::map<dds_instance_handle_t, dds_time_t> last_;
+  std::map<dds_instance_handle_t, std::deque<std::pair<dds_time_t, dds_entity_t>>> last_;
 };
 
 // Readers of a topic with the thread that takes from them.
@@ -75,7 +79,7 @@ class Reading {
     const int count = dds_take(reader, samples.data(), infos.data(), at_once, at_once);
     if (count <= 0) return;
     for (int i = 0; i < count; ++i)
-      if (infos[i].valid_data && sieve_.is_new(infos[i])) taken_(samples[i]);
+      if (infos[i].valid_data && sieve_.is_new(infos[i], reader)) taken_(samples[i]);
     dds_return_loan(reader, samples.data(), count);
   }
 
@@ -131,6 +135,10 @@ double Ros2Transport::stamp_now_s() const {
 
 Transport::Publisher<JointMessage> Ros2Transport::joint_publisher(const std::string& topic) {
   return implementation_->publisher<JointMessage>(topic, Delivery::reliable);
+}
+
+Transport::Publisher<JointMessage> Ros2Transport::set_point_publisher(const std::string& topic) {
+  return implementation_->publisher<JointMessage>(topic, Delivery::set_point);
 }
 
 Transport::Publisher<OperatingStateMessage> Ros2Transport::operating_state_publisher(const std::string& topic) {

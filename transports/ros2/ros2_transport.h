@@ -17,6 +17,7 @@ class Ros2Transport : public Transport {
   ~Ros2Transport() override;
 
   Publisher<JointMessage> joint_publisher(const std::string& topic) override;
+  Publisher<JointMessage> set_point_publisher(const std::string& topic) override;
   Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) override;
   Publisher<StringMessage> string_publisher(const std::string& topic) override;
   Publisher<JoyMessage> joy_publisher(const std::string& topic) override;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -55,12 +56,85 @@ TEST(Ros2Transport, DoesNotHearItself) {
   EXPECT_TRUE(own.empty());
 }
 
+std::uint32_t test_domain() {
+  const char* const domain = std::getenv("ROS_DOMAIN_ID");
+  return domain_id(domain ? domain : "");
+}
+
+// A node as in another process: what passes between it and this process's others goes through sockets.
+std::unique_ptr<DdsNode> node_elsewhere() {
+  constexpr std::uint32_t handle = 300;  // of Cyclone DDS, for a second domain of the same number
+  const std::string number = std::to_string(test_domain());
+  const std::string outside = "<CycloneDDS><Domain><Discovery><ExternalDomainId>" + number +
+                              "</ExternalDomainId></Discovery></Domain></CycloneDDS>";
+  ::setenv("CYCLONEDDS_URI", outside.c_str(), 1);
+  auto node = std::make_unique<DdsNode>("elsewhere", handle);
+  ::unsetenv("CYCLONEDDS_URI");
+  return node;
+}
+
+std::vector<double> take_positions(dds_entity_t reader) {
+  std::vector<double> taken;
+  void* sample = nullptr;
+  dds_sample_info_t info;
+  while (dds_take(reader, &sample, &info, 1, 1) > 0) {
+    if (info.valid_data)
+      taken.push_back(Wire<JointMessage>::read(*static_cast<Wire<JointMessage>::Type*>(sample)).positions.at(0));
+    dds_return_loan(reader, &sample, 1);
+    sample = nullptr;
+  }
+  return taken;
+}
+
+// An arm that hears nothing for a while, as one that was killed, gets none of what was sent meanwhile.
+TEST(Ros2Transport, NoSetPointIsDeliveredWhenItIsOld) {
+  Ros2Transport from("from");
+  const auto arm = node_elsewhere();
+  const dds_entity_t reader =
+      arm->create_reader("/PSM1/servo_jp", Wire<JointMessage>::descriptor(), Delivery::reliable);
+  const auto say = from.set_point_publisher("/PSM1/servo_jp");
+  const auto hears = [&](double position) {
+    bool heard = false;
+    return testing::wait_for([&] {
+      say({stamp_s, {}, {position}});
+      const auto taken = take_positions(reader);
+      return heard = heard || (!taken.empty() && taken.back() == position);
+    });
+  };
+  ASSERT_TRUE(hears(0));
+  dds_domain_set_deafmute(arm->participant(), true, false, DDS_INFINITY);
+  for (int k = 1; k <= 20; ++k) {
+    say({stamp_s, {}, {static_cast<double>(k)}});
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  take_positions(reader);
+  dds_domain_set_deafmute(arm->participant(), false, false, DDS_INFINITY);
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  EXPECT_EQ(take_positions(reader), std::vector<double>());
+  EXPECT_TRUE(hears(99));
+}
+
+TEST(Ros2Transport, PeersWhoseQualityOfServiceDoesNotFitAreSaid) {
+  ::testing::internal::CaptureStderr();
+  Ros2Transport own("own");
+  const auto images = own.image_publisher("/endoscope/image_raw");
+  const auto joints = own.subscribe_joints("/PSM1/measured_js", [](JointMessage&&) {});
+  DdsNode other("other", test_domain());
+  for (int k = 0; k < 2; ++k)
+    other.create_reader("/endoscope/image_raw", Wire<ImageMessage>::descriptor(), Delivery::reliable);
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  EXPECT_EQ(
+      ::testing::internal::GetCapturedStderr(),
+      "DDS: /endoscope/image_raw: a subscriber asks for another reliability than is offered, and gets nothing: let "
+      "it read best effort\n");
+}
+
 // Each reliability and durability that a publisher may offer is heard, once.
 TEST(Ros2Transport, EveryPublisherOfOperatingStatesMatches) {
   for (const Delivery delivery : {Delivery::reliable, Delivery::best_effort, Delivery::latched}) {
     Ros2Transport to("to");
-    const char* const domain = std::getenv("ROS_DOMAIN_ID");
-    DdsNode from("from", domain_id(domain ? domain : ""));
+    DdsNode from("from", test_domain());
     TestInbox<OperatingStateMessage> states;
     const auto subscription = to.subscribe_operating_state("/PSM1/operating_state", states.handler());
     const dds_entity_t writer =
@@ -72,12 +146,37 @@ TEST(Ros2Transport, EveryPublisherOfOperatingStatesMatches) {
   }
 }
 
+// Each once, and a stop at once, whatever the sender's clock does between two.
+TEST(Ros2Transport, CommandsAreHeardWhateverTheSendersClockSays) {
+  Ros2Transport to("to");
+  DdsNode from("from", test_domain());
+  TestInbox<StringMessage> commands;
+  const auto subscription = to.subscribe_strings("/lapservo/PSM1/command", commands.handler());
+  const dds_entity_t writer =
+      from.create_writer("/lapservo/PSM1/command", Wire<StringMessage>::descriptor(), Delivery::reliable);
+  static char text[] = "stop";
+  static char no_frame[] = "";
+  crtk_msgs_msg_dds__StringStamped_ stop{};
+  stop.header_.frame_id_ = no_frame;
+  stop.string_ = text;
+  dds_time_t now = dds_time();
+  const auto say = [&] { dds_write_ts(writer, &stop, now); };
+  commands.get(say);
+  for (const std::int64_t step_s : {0, -1, 3600, -7200, 0}) {
+    now += DDS_SECS(step_s);
+    const std::size_t before = commands.count();
+    for (int k = 0; k < 3; ++k) say(), ++now;
+    EXPECT_TRUE(testing::wait_for([&] { return commands.count() >= before + 3; })) << step_s;
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    EXPECT_EQ(commands.count(), before + 3) << step_s;
+  }
+}
+
 // The first message of a topic as its type lies in memory, said again until it is there.
 template <typename Message>
 void expect_heard(const std::function<void()>& say, const std::string& topic,
                   const std::function<void(const typename Wire<Message>::Type&)>& look) {
-  const char* const domain = std::getenv("ROS_DOMAIN_ID");
-  DdsNode to("to", domain_id(domain ? domain : ""));
+  DdsNode to("to", test_domain());
   const dds_entity_t reader = to.create_reader(topic, Wire<Message>::descriptor(), Delivery::reliable);
   void* sample = nullptr;
   dds_sample_info_t info;
