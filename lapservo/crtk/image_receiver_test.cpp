@@ -74,7 +74,7 @@ TEST(ImageReceiver, DropsAndCountsWhatCanNotBeUsed) {
   EXPECT_FALSE(offer(image(0)));
   EXPECT_FALSE(offer(image(epoch_s + now_s + 3600)));
   EXPECT_TRUE(offer(image(epoch_s + now_s + 3600)));
-  EXPECT_FALSE(offer(image(epoch_s + now_s + 3600 - 2)));
+  EXPECT_FALSE(offer(image(epoch_s + now_s + 3600 - 2)));  // repeated
   CompressedImageMessage compressed;
   compressed.stamp_s = epoch_s + now_s + 3600;
   receiver.receive(std::move(compressed), now_s + period_s);
@@ -82,9 +82,10 @@ TEST(ImageReceiver, DropsAndCountsWhatCanNotBeUsed) {
   const ImageCounts counts = receiver.counts();
   EXPECT_EQ(counts.taken, 2);
   EXPECT_EQ(counts.resized, 1);
-  EXPECT_EQ(counts.unreadable, 1);
+  EXPECT_EQ(counts.unreadable, 2);
   EXPECT_EQ(counts.unstamped, 2);
-  EXPECT_EQ(counts.jumped, 3);
+  EXPECT_EQ(counts.repeated, 1);
+  EXPECT_EQ(counts.jumped, 1);
 }
 
 TEST(ImageReceiver, CountsLateAndMissingFrames) {

@@ -2,14 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "lapservo/core/words.h"
 
 namespace lapservo::internal {
 namespace {
 
-constexpr double jump_s = 0.25;         // no network reorders messages by so much
+constexpr double jump_s = 0.25;         // a fastest message is not faster than all before by so much
 constexpr double drift_s_per_s = 1e-3;  // twice what adjtime slews by
+constexpr double disorder_s = 1e-3;     // by which a sender's threads stamp out of order
+constexpr double way_s = 0.05;          // by which two messages' ways differ
+constexpr double patience_s = 1;        // with late messages only
 
 constexpr Words<StampVerdict, 5> verdict_words{{{StampVerdict::fresh, "fresh"},
                                                 {StampVerdict::repeated, "repeated"},
@@ -24,27 +28,51 @@ std::string_view to_string(StampVerdict verdict) {
   return word_of(verdict_words, verdict);
 }
 
-void StampClock::start_anew(double stamp_s, double arrival_s) {
-  last_stamp_s_ = stamp_s;
-  last_arrival_s_ = arrival_s;
-  offset_s_ = arrival_s - stamp_s;
+void StampClock::start_anew(const Stamped& message) {
+  last_ = message;
+  older_.reset();
+  late_since_s_.reset();
+  offset_s_ = message.arrival_s - message.stamp_s;
+}
+
+// One message that is older than the last was said again. Two in a row, stamped as far apart as they came, go by a
+// clock that was set.
+bool StampClock::was_set_back(const Stamped& message) {
+  if (message.stamp_s > last_->stamp_s - disorder_s) {
+    older_.reset();
+    return false;
+  }
+  const auto before = std::exchange(older_, message);
+  if (!before) return false;
+  const double advance_s = message.stamp_s - before->stamp_s;
+  return advance_s > 0 && std::abs(advance_s - (message.arrival_s - before->arrival_s)) < way_s;
+}
+
+bool StampClock::stays_late(const Stamped& message) {
+  if (!late_since_s_) late_since_s_ = message.arrival_s;
+  return message.arrival_s - *late_since_s_ > patience_s;
 }
 
 StampClock::Reading StampClock::read(double stamp_s, double arrival_s) {
   if (!std::isfinite(stamp_s) || !(stamp_s > 0)) return {StampVerdict::unusable, 0};
-  const bool first = !last_stamp_s_;
-  if (first) start_anew(stamp_s, arrival_s);
-  const double advance_s = stamp_s - *last_stamp_s_;
+  const Stamped message{stamp_s, arrival_s};
   const double difference_s = arrival_s - stamp_s;
-  if (advance_s < -jump_s || difference_s < offset_s_ - jump_s) {
-    start_anew(stamp_s, arrival_s);
+  if (!last_) {
+    start_anew(message);
+  } else if (difference_s < offset_s_ - jump_s || was_set_back(message)) {
+    start_anew(message);
+    return {StampVerdict::jumped, 0};
+  } else if (stamp_s <= last_->stamp_s) {
+    return {StampVerdict::repeated, 0};
+  }
+  offset_s_ = std::min(difference_s, offset_s_ + drift_s_per_s * (arrival_s - last_->arrival_s));
+  last_ = message;
+  if (difference_s - offset_s_ > late_s_) {
+    if (!stays_late(message)) return {StampVerdict::late, 0};
+    start_anew(message);
     return {StampVerdict::jumped, 0};
   }
-  if (!first && advance_s <= 0) return {StampVerdict::repeated, 0};
-  offset_s_ = std::min(difference_s, offset_s_ + drift_s_per_s * (arrival_s - last_arrival_s_));
-  last_stamp_s_ = stamp_s;
-  last_arrival_s_ = arrival_s;
-  if (difference_s - offset_s_ > late_s_) return {StampVerdict::late, 0};
+  late_since_s_.reset();
   last_time_s_ = std::max(last_time_s_, stamp_s + offset_s_);
   return {StampVerdict::fresh, last_time_s_};
 }

@@ -8,9 +8,9 @@ namespace lapservo::internal {
 /// What the stamp of a message tells of it.
 enum class StampVerdict {
   fresh,
-  repeated,  ///< not newer than the one before: the same message again, or out of order
+  repeated,  ///< not newer than the one before: the same message again, an old one, or out of order
   late,      ///< it was on its way for much longer than others
-  jumped,    ///< the sender's clock was set; the next message counts again
+  jumped,    ///< the sender's clock was set, forwards or back; the next message counts again
   unusable,  ///< no stamp: zero or not finite
 };
 /// The enumerator's name.
@@ -18,7 +18,8 @@ std::string_view to_string(StampVerdict verdict);
 
 /// Puts a sender's stamps on the loop's clock without asking that both computers agree on the time: the smallest
 /// difference between arrival and stamp is taken for that of the clocks. So a time is as if the message had travelled
-/// as fast as the fastest one. The difference may drift by 1 ms a second.
+/// as fast as the fastest one. The difference may drift by 1 ms a second. A clock that is set costs two messages; where
+/// that looks like a way that has become longer, a second.
 class StampClock {
  public:
   /// `late_s`: so much longer on its way than the fastest is late.
@@ -32,11 +33,17 @@ class StampClock {
   Reading read(double stamp_s, double arrival_s);
 
  private:
-  void start_anew(double stamp_s, double arrival_s);
+  struct Stamped {
+    double stamp_s = 0, arrival_s = 0;
+  };
+  void start_anew(const Stamped& message);
+  bool was_set_back(const Stamped& message);
+  bool stays_late(const Stamped& message);
 
   double late_s_;
-  std::optional<double> last_stamp_s_;
-  double last_arrival_s_ = 0, offset_s_ = 0, last_time_s_ = 0;
+  std::optional<Stamped> last_, older_;  // older_: the message before, when its stamp lay behind that of last_
+  std::optional<double> late_since_s_;
+  double offset_s_ = 0, last_time_s_ = 0;
 };
 
 }  // namespace lapservo::internal

@@ -43,17 +43,57 @@ TEST(StampClock, RepeatedReorderedLateAndMissingStampsAreTold) {
     EXPECT_EQ(other.read(none, 1.3).verdict, StampVerdict::unusable);
 }
 
-TEST(StampClock, AClockThatWasSetCostsOneMessage) {
-  for (const double jump_s : {3600.0, -3600.0, 1.0, -1.0}) {
-    SCOPED_TRACE(jump_s);
-    StampClock clock(0.05);
-    for (int k = 0; k < 10; ++k)
-      EXPECT_EQ(clock.read(epoch_s + k * period_s, 1 + k * period_s).verdict, StampVerdict::fresh);
-    EXPECT_EQ(clock.read(epoch_s + jump_s + 10 * period_s, 1 + 10 * period_s).verdict, StampVerdict::jumped);
-    const auto measured = clock.read(epoch_s + jump_s + 11 * period_s, 1 + 11 * period_s);
-    EXPECT_EQ(measured.verdict, StampVerdict::fresh);
-    EXPECT_NEAR(measured.time_s, 1 + 11 * period_s, 1e-6);
+// By any step, either way: a short hold, and from then on times as good as before. What is within disorder and lateness
+// needs no hold.
+TEST(StampClock, AClockThatWasSetCostsTwoMessages) {
+  for (const double size_s : {1e-4, 0.005, 0.03, 0.07, 0.1, 0.2, 0.24, 0.3, 1.0, 3600.0, 1e8})
+    for (const double step_s : {size_s, -size_s}) {
+      SCOPED_TRACE(step_s);
+      StampClock clock(0.05);
+      for (int k = 0; k < 10; ++k)
+        ASSERT_EQ(clock.read(epoch_s + k * period_s, 1 + k * period_s).verdict, StampVerdict::fresh);
+      int dropped = 0, jumped = 0;
+      for (int k = 10; k < 300; ++k) {
+        const double now_s = 1 + k * period_s;
+        const auto measured = clock.read(epoch_s + step_s + k * period_s, now_s);
+        dropped += measured.verdict != StampVerdict::fresh;
+        jumped += measured.verdict == StampVerdict::jumped;
+        if (measured.verdict != StampVerdict::fresh) continue;
+        EXPECT_LE(measured.time_s, now_s + 1e-6);
+        EXPECT_GE(measured.time_s, now_s - 0.05);
+      }
+      EXPECT_LE(dropped, 2);
+      EXPECT_EQ(jumped, step_s > 0.25 || step_s < -0.02 ? 1 : 0);
+    }
+}
+
+// As the dVRK's: the same stamp twice, back by 0.03 ms, and an old message now and then.
+TEST(StampClock, OldMessagesAndDisorderAreNoJump) {
+  StampClock clock(0.05);
+  for (int k = 0; k < 1000; ++k) {
+    const double now_s = 1 + k * period_s;
+    ASSERT_EQ(clock.read(epoch_s + now_s, now_s).verdict, StampVerdict::fresh) << k;
+    EXPECT_EQ(clock.read(epoch_s + now_s - (k % 2 ? 0 : 3e-5), now_s + 1e-3).verdict, StampVerdict::repeated);
+    if (k % 10 == 0) {
+      EXPECT_EQ(clock.read(epoch_s + now_s - 5, now_s + 2e-3).verdict, StampVerdict::repeated);
+    }
   }
+}
+
+// Set back while nothing came, which is seen as a longer way: held for a second, not for minutes.
+TEST(StampClock, AWayThatStaysLongerCountsAfterASecond) {
+  StampClock clock(0.05);
+  ASSERT_EQ(clock.read(epoch_s, 1).verdict, StampVerdict::fresh);
+  int late = 0;
+  for (int k = 0; k < 300; ++k) {
+    const double now_s = 3 + k * period_s;
+    const auto verdict = clock.read(epoch_s + now_s - 1 - 0.2, now_s).verdict;
+    late += verdict == StampVerdict::late;
+    if (k > 102) {
+      EXPECT_EQ(verdict, StampVerdict::fresh) << k;
+    }
+  }
+  EXPECT_NEAR(late, 100, 2);
 }
 
 // A pause of the network: what was stored on the way is late, what was sent after it is fresh.
