@@ -230,9 +230,10 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
     return std::make_unique<Process>(arguments, file(output));
   }
   std::unique_ptr<Process> arm() const {
-    return std::make_unique<Process>(std::vector<std::string>{"sim-robot", "--rig", file("rig.yaml"), "--start",
-                                                              "0.05,1.57,0.064,1.2", "--transport", GetParam()},
-                                     file("arm.txt"));
+    return std::make_unique<Process>(
+        std::vector<std::string>{"sim-robot", "--rig", file("rig.yaml"), "--start", "0.05,1.57,0.064,1.2",
+                                 "--transport", GetParam(), "--arm", "PSM1"},
+        file("arm.txt"));
   }
   // Where servo says that its page is; 0 when it does not say it.
   int page_port(const std::string& output = "servo.txt") const {
@@ -336,6 +337,22 @@ class Arm {
   std::atomic<bool> ended_ = false;
   std::thread thread_;
 };
+
+TEST_P(WireLoop, ASimulatedArmHasANameOfItsOwnAndRefusesOneThatIsTaken) {
+  const std::vector<std::string> command{"sim-robot",           "--rig",      file("rig.yaml"),
+                                         "--transport",         GetParam(),   "--start",
+                                         "0.05,1.57,0.064,1.2", "--duration", "1"};
+  Process own(command, file("own.txt"));
+  EXPECT_EQ(own.wait(), 0);
+  EXPECT_EQ(said("own.txt").find("arm SIM_PSM1, "), 0u) << said("own.txt");
+  Arm room(GetParam(), rig_);
+  auto taken = command;
+  taken.insert(taken.end(), {"--arm", "PSM1"});
+  Process second(taken, file("second.txt"));
+  EXPECT_EQ(second.wait(), 2);
+  EXPECT_NE(said("second.txt").find("--arm: is PSM1, where an arm is already"), std::string::npos)
+      << said("second.txt");
+}
 
 TEST_P(WireLoop, TwoProcessesConverge) {
   const auto room = arm();
@@ -495,6 +512,19 @@ TEST_P(WireLoop, GoesOnWithoutAJumpWhenTheArmsClockIsSet) {
   loop->wait();
   spy.expect_no_jump();
   EXPECT_NE(said("servo.txt").find("2 after a jump of the clock"), std::string::npos) << said("servo.txt");
+}
+
+TEST_P(FirstWireLoop, IsHeldWhileASecondArmSaysThatItIsThisOne) {
+  Arm room(GetParam(), rig_);
+  const auto ears = named_transport(GetParam(), "ears");
+  const auto loop = servo(600);
+  Spy spy(*ears);
+  ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+  const Arm second(GetParam(), rig_);
+  expect_soon_said("second_source");
+  const std::size_t held = spy.count();
+  sleep(0.5);
+  EXPECT_EQ(spy.count(), held);
 }
 
 TEST_P(WireLoop, ASecondPublisherIsNoticedWithin100MillisecondsAndHoldsUntilAStart) {

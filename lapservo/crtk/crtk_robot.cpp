@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -39,6 +40,7 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
       const double arrival_s = clock_.now_s();
       const std::lock_guard lock(mutex_);
       (interlock_.*tell)(message, arrival_s);
+      say_complaint();
     }));
   };
   joints("measured_js", &Interlock::on_measured);
@@ -49,11 +51,12 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
         const std::lock_guard lock(mutex_);
         interlock_.on_operating_state(message, arrival_s);
       }));
-  subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, "servo_jp"), [this](JointMessage&&) {
-    const double arrival_s = clock_.now_s();
-    const std::lock_guard lock(mutex_);
-    interlock_.on_foreign_command(arrival_s);
-  }));
+  if (config.motion_enabled)
+    subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, "servo_jp"), [this](JointMessage&&) {
+      const double arrival_s = clock_.now_s();
+      const std::lock_guard lock(mutex_);
+      interlock_.on_foreign_command(arrival_s);
+    }));
   thread_ = std::thread([this] { command(); });
 }
 
@@ -98,6 +101,14 @@ std::optional<Eigen::Vector4d> CrtkRobot::set_point() const {
   return interlock_.set_point();
 }
 
+// At once, and again when it changes.
+void CrtkRobot::say_complaint() {
+  const std::string& complaint = interlock_.complaint();
+  if (complaint == said_) return;
+  said_ = complaint;
+  if (!said_.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", arm_.c_str(), said_.c_str());
+}
+
 void CrtkRobot::command() {
   {
     std::string refused = ask_for_real_time();
@@ -114,6 +125,7 @@ void CrtkRobot::command() {
       if (auto positions = interlock_.tick(clock_.now_s())) {
         message.names = interlock_.names();
         message.positions = std::move(*positions);
+        message.velocities = interlock_.velocities();
       }
     }
     if (!message.positions.empty()) {

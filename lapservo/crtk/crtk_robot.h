@@ -15,8 +15,8 @@
 namespace lapservo::internal {
 
 /// A CRTK arm behind a transport: measured_js, setpoint_js and operating_state come in, servo_jp goes out in a thread
-/// of its own, with real-time priority where the system grants it, as the interlock allows. Destroyed, it sends nothing
-/// any more: the arm stays at its last set-point.
+/// of its own, with real-time priority where the system grants it, as the interlock allows. Joints that are not the
+/// rig's are said on stderr. Destroyed, it sends nothing any more: the arm stays at its last set-point.
 class CrtkRobot : public Robot {
  public:
   /// `arm`: the arm's namespace, for example PSM1 or /dvrk/PSM1. The transport and the clock must outlive it.
@@ -37,10 +37,11 @@ class CrtkRobot : public Robot {
 
  private:
   void command();
+  void say_complaint();
 
   const Clock& clock_;
   double period_s_;
-  std::string arm_;
+  std::string arm_, said_;
   Transport& transport_;
   mutable std::mutex mutex_;
   Interlock interlock_;

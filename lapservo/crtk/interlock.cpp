@@ -10,6 +10,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t max_joints = 64;
+constexpr double silence_s = 0.5;  // from a sender's last message on another one may be the arm
 constexpr double memory_s = 0.25;  // by which a set-point that was sent is the arm's
 // What an arm may make of a set-point (units, coupling, rounding) before it is somebody else's.
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
@@ -28,8 +29,20 @@ Interlock::Interlock(const InterlockConfig& config)
 std::optional<Interlock::Places> Interlock::places_in(const JointMessage& message) {
   const bool sized = message.names.size() <= max_joints && message.names.size() == message.positions.size();
   const auto places = sized ? find_joints(config_.joints, message.names) : std::nullopt;
+  complaint_ = sized && !places ? unfit_joints(config_.joints, message.names) : "";
   if (!places) ++counts_.malformed;
   return places;
+}
+
+// Whether a message is of the topic's first sender or, when nothing has come for a while, of the one after it.
+bool Interlock::is_of(Source& source, std::uint64_t sender, const std::optional<double>& heard_s, double arrival_s) {
+  if (source.value_or(sender) != sender && heard_s && arrival_s - *heard_s <= silence_s) {
+    second_s_ = arrival_s;
+    watch(arrival_s);
+    return false;
+  }
+  source = sender;
+  return true;
 }
 
 std::optional<double> Interlock::stamped(StampClock& clock, const JointMessage& message, double arrival_s) {
@@ -60,6 +73,10 @@ Eigen::Vector4d Interlock::q_of(const JointMessage& message, const Places& place
 }
 
 void Interlock::on_measured(const JointMessage& message, double arrival_s) {
+  const Source before = measured_source_;
+  if (!is_of(measured_source_, message.source, measured_s_, arrival_s)) return;
+  if (before.value_or(message.source) != message.source) state_source_.reset();  // an arm that was restarted
+  measured_s_ = arrival_s;
   const auto places = places_in(message);
   if (!places) return;
   const auto time_s = stamped(measured_clock_, message, arrival_s);
@@ -72,6 +89,8 @@ void Interlock::on_measured(const JointMessage& message, double arrival_s) {
 }
 
 void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
+  if (!is_of(setpoint_source_, message.source, setpoint_s_, arrival_s)) return;
+  setpoint_s_ = arrival_s;
   const auto places = places_in(message);
   if (!places || !all_finite(message.positions)) return;
   const auto time_s = stamped(setpoint_clock_, message, arrival_s);
@@ -87,6 +106,7 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
 }
 
 void Interlock::on_operating_state(const OperatingStateMessage& message, double arrival_s) {
+  if (!is_of(state_source_, message.source, measured_s_, arrival_s)) return;  // said seldom: the arm's joints tell
   operating_state_ = message;
   watch(arrival_s);
 }
@@ -122,6 +142,7 @@ void Interlock::follow(const JointPath& path) {
 
 Blocked Interlock::blocked(double now_s) const {
   if (foreign_s_ && now_s - *foreign_s_ <= config_.max_age_s) return Blocked::foreign_command;
+  if (second_s_ && now_s - *second_s_ <= silence_s) return Blocked::second_source;
   if (!finite_) return Blocked::non_finite_joints;
   if (operating_state_) {
     if (operating_state_->state != to_string(OperatingState::enabled)) return Blocked::not_enabled;
@@ -179,11 +200,20 @@ std::vector<double> Interlock::all_joints() const {
   return positions;
 }
 
+std::vector<double> Interlock::velocities() const {
+  std::vector<double> velocities(others_.size(), 0.0);
+  const Eigen::Vector4d at_rest = Eigen::Vector4d::Zero();
+  const Eigen::Vector4d joints = joints_from_q(config_.joints, velocity_) - joints_from_q(config_.joints, at_rest);
+  for (int i = 0; i < 4; ++i) velocities[places_[i]] = joints[i];
+  return velocities;
+}
+
 // Where it is to be this period, as far as the limits allow; true when it is there.
 bool Interlock::approach(const Eigen::Vector4d& wanted) {
   const Eigen::Vector4d step = config_.limits.rate * config_.period_s, away = within_limits(wanted) - last_;
   const Eigen::Vector4d taken = away.cwiseMax(-step).cwiseMin(step);
   last_ += taken;
+  velocity_ = taken / config_.period_s;
   return taken == away;
 }
 
@@ -196,6 +226,13 @@ std::optional<std::vector<double>> Interlock::tick(double now_s) {
   if (!moving_) start(now_s);
   const MotionState motion = path_->at(now_s);
   const bool there = approach(motion.position + shift_);
+  if (there && motion.velocity.isZero()) velocity_.setZero();
+  if (!last_.allFinite()) {
+    untold_ = Blocked::non_finite_joints;
+    blocked_s_ = now_s;
+    forget_path();
+    return std::nullopt;
+  }
   sent_.push_back({now_s, last_});
   while (now_s - sent_.front().time_s > memory_s + config_.max_age_s) sent_.pop_front();
   const std::vector<double> positions = all_joints();

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <optional>
 #include <string>
@@ -43,7 +44,8 @@ struct InterlockCounts {
 /// come, finite and freshly stamped, it is ENABLED, homed and not busy, and nobody else commands it. Motion starts at
 /// the arm's own set-point, which a path's start is moved to; each set-point differs from the one before by a period's
 /// rate limit at most and lies within the limits (or nearer to them than before). Joints beyond the four stay at their
-/// set-point of the start. From the moment on that the arm is not ready the path is forgotten and nothing is sent;
+/// set-point of the start. A topic is its first sender's: another one's messages are not used before the arm has fallen
+/// silent. From the moment on that the arm is not ready the path is forgotten and nothing is sent;
 /// state() tells of it, however short it was, and until then no new path is followed.
 class Interlock {
  public:
@@ -67,6 +69,10 @@ class Interlock {
   /// To be called every period: the set-point of all the arm's joints to be sent now, if any.
   std::optional<std::vector<double>> tick(double now_s);
 
+  /// Joint velocities to the positions that tick() returned last: from those before, a period earlier; zero at rest.
+  std::vector<double> velocities() const;
+  /// Why the last joint state's joints are not the rig's; empty when they are.
+  const std::string& complaint() const { return complaint_; }
   /// Names of the arm's joints, as in its set-points.
   const std::vector<std::string>& names() const { return names_; }
   /// The set-point of theta, phi, rho, psi that was sent last, or withheld; nullopt while none is wanted.
@@ -85,6 +91,8 @@ class Interlock {
   };
 
   using Places = std::array<std::size_t, 4>;
+  using Source = std::optional<std::uint64_t>;
+  bool is_of(Source& source, std::uint64_t sender, const std::optional<double>& heard_s, double arrival_s);
   std::optional<Places> places_in(const JointMessage& message);
   std::optional<double> stamped(StampClock& clock, const JointMessage& message, double arrival_s);
   Eigen::Vector4d q_of(const JointMessage& message, const Places& places) const;
@@ -100,6 +108,9 @@ class Interlock {
   InterlockConfig config_;
   InterlockCounts counts_;
   StampClock measured_clock_, setpoint_clock_;
+  Source measured_source_, setpoint_source_, state_source_;
+  std::optional<double> measured_s_, setpoint_s_, second_s_;  // when these, and somebody else as the arm, came last
+  std::string complaint_;
   std::optional<Reading> measured_, setpoint_;
   ReadingBuffer readings_;
   bool finite_ = true;
@@ -112,7 +123,8 @@ class Interlock {
   std::optional<JointPath> path_;
   bool released_ = false, moving_ = false;
   double blocked_s_ = 0;  // when something was amiss last
-  Eigen::Vector4d shift_ = Eigen::Vector4d::Zero(), last_ = Eigen::Vector4d::Zero();
+  Eigen::Vector4d shift_ = Eigen::Vector4d::Zero(), last_ = Eigen::Vector4d::Zero(),
+                  velocity_ = Eigen::Vector4d::Zero();
   std::vector<double> others_;  // all joints' set-points at the start
   std::deque<Sent> sent_;
 };

@@ -60,6 +60,7 @@ class Bench {
       const Eigen::Vector4d q = q_from_joints(psm(), {sent->at(0), sent->at(1), sent->at(3), sent->at(4)});
       const Eigen::Array4d step = (q - setpoint).array().abs();
       EXPECT_TRUE((step <= config_.limits.rate.array() * tick_s + 1e-12).all()) << step.transpose();
+      expect_velocities(q - setpoint);
       setpoint = q;
       last_sent_s = now_s;
       ++sent_count;
@@ -91,6 +92,16 @@ class Bench {
   std::function<void(JointMessage&)> alter;
 
  private:
+  // Of all joints, those of the step, or none at the end of a motion.
+  void expect_velocities(const Eigen::Vector4d& step) const {
+    const auto sent = interlock.velocities();
+    ASSERT_EQ(sent.size(), 5u);
+    EXPECT_EQ(sent[2], 0);
+    const Eigen::Vector4d rate =
+        q_from_joints(psm(), {sent[0], sent[1], sent[3], sent[4]}) - q_from_joints(psm(), Eigen::Vector4d::Zero());
+    EXPECT_TRUE(rate.isApprox(step / tick_s, 1e-6) || (rate.isZero() && step.cwiseAbs().maxCoeff() < 1e-4)) << rate;
+  }
+
   InterlockConfig config_;
   double next_joints_s_ = 0;
 };
@@ -326,6 +337,74 @@ TEST(Interlock, ReleasedItBrakesToRestAndIsSilent) {
   EXPECT_EQ(bench.sent_count, sent);
   bench.control(0.5, slow);
   EXPECT_GT(bench.sent_count, sent + 200);
+}
+
+// One topic after the other: not one of a second arm's messages is used, and none is sent while there is one.
+TEST(Interlock, OfTwoArmsOfANameNeitherIsMoved) {
+  const std::vector<std::function<void(Bench&)>> others{
+      [](Bench& b) {
+        JointMessage other = b.message(b.setpoint + slow);
+        other.source = 7;
+        b.interlock.on_measured(other, b.now_s);
+      },
+      [](Bench& b) {
+        JointMessage other = b.message(b.setpoint + slow);
+        other.source = 7;
+        b.interlock.on_setpoint(other, b.now_s);
+      },
+      [](Bench& b) {
+        b.interlock.on_operating_state({epoch_s, "ENABLED", true, false, 7}, b.now_s);
+      }};
+  for (const auto& says : others) {
+    Bench bench;
+    bench.control(0.3, slow);
+    const int sent = bench.sent_count;
+    for (int k = 0; k < 10; ++k) {
+      says(bench);
+      EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::second_source);
+      bench.control(0.05, slow);
+    }
+    EXPECT_EQ(bench.sent_count, sent);
+    bench.control(0.6, Eigen::Vector4d::Zero());
+    EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
+  }
+}
+
+// Whichever of its topics comes first.
+TEST(Interlock, AnArmThatWasRestartedIsTheArm) {
+  for (int first = 0; first < 3; ++first) {
+    SCOPED_TRACE(first);
+    Bench bench;
+    bench.control(0.3, slow);
+    bench.talking = false;
+    bench.control(0.6, slow);
+    JointMessage message = bench.message(bench.setpoint);
+    message.source = 7;
+    for (int k = 0; k < 3; ++k) {
+      const int topic = (first + k) % 3;
+      if (topic == 0) bench.interlock.on_operating_state({epoch_s, "ENABLED", true, false, 7}, bench.now_s);
+      if (topic == 1) bench.interlock.on_setpoint(message, bench.now_s);
+      if (topic == 2) bench.interlock.on_measured(message, bench.now_s);
+    }
+    bench.interlock.state(bench.now_s);  // takes the reason of before
+    EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
+    message.source = 0;
+    bench.interlock.on_measured(message, bench.now_s);
+    EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::second_source);
+  }
+}
+
+TEST(Interlock, SaysWhichJointsDoNotFit) {
+  Bench bench;
+  bench.pass(0.1);
+  EXPECT_EQ(bench.interlock.complaint(), "");
+  JointMessage message = bench.message(bench.setpoint);
+  message.names[0] = "disc_1";
+  bench.interlock.on_measured(message, bench.now_s);
+  EXPECT_NE(bench.interlock.complaint().find("joints are disc_1, pitch, wrist, insertion, roll"), std::string::npos);
+  EXPECT_NE(bench.interlock.complaint().find("set_tool_type"), std::string::npos);
+  bench.pass(0.1);
+  EXPECT_EQ(bench.interlock.complaint(), "");
 }
 
 TEST(Interlock, CountsWhatItDrops) {

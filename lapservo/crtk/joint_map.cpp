@@ -2,7 +2,35 @@
 
 #include <algorithm>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 namespace lapservo::internal {
+namespace {
+
+using Names = decltype(Joints::names);
+
+// A dVRK PSM's, from 2.3 on and before.
+const std::array<Names, 2> dvrk_names{
+    {{"yaw", "pitch", "insertion", "roll"}, {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"}}};
+
+std::optional<Names> other_names(const Joints& joints) {
+  for (std::size_t i = 0; i < dvrk_names.size(); ++i)
+    if (joints.names == dvrk_names[i]) return dvrk_names[1 - i];
+  return std::nullopt;
+}
+
+std::optional<std::array<std::size_t, 4>> find_names(const Names& wanted, const std::vector<std::string>& names) {
+  std::array<std::size_t, 4> places{};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto found = std::find(names.begin(), names.end(), wanted[i]);
+    if (found == names.end() || std::find(found + 1, names.end(), wanted[i]) != names.end()) return std::nullopt;
+    places[i] = static_cast<std::size_t>(found - names.begin());
+  }
+  return places;
+}
+
+}  // namespace
 
 JointLimits limits_of_q(const Joints& joints, const JointLimits& limits) {
   const Eigen::Vector4d a = q_from_joints(joints, limits.lower), b = q_from_joints(joints, limits.upper);
@@ -13,13 +41,18 @@ JointLimits limits_of_q(const Joints& joints, const JointLimits& limits) {
 }
 
 std::optional<std::array<std::size_t, 4>> find_joints(const Joints& joints, const std::vector<std::string>& names) {
-  std::array<std::size_t, 4> places{};
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const auto found = std::find(names.begin(), names.end(), joints.names[i]);
-    if (found == names.end() || std::find(found + 1, names.end(), joints.names[i]) != names.end()) return std::nullopt;
-    places[i] = static_cast<std::size_t>(found - names.begin());
-  }
-  return places;
+  if (const auto places = find_names(joints.names, names)) return places;
+  const auto other = other_names(joints);
+  return other ? find_names(*other, names) : std::nullopt;
+}
+
+std::string unfit_joints(const Joints& joints, const std::vector<std::string>& names) {
+  const auto other = other_names(joints);
+  const bool no_tool = std::any_of(names.begin(), names.end(),
+                                   [](const std::string& name) { return name.rfind("disc", 0) == 0 || name == "jaw"; });
+  return fmt::format("joints are {}, expected {}{}{}", fmt::join(names, ", "), fmt::join(joints.names, ", "),
+                     other ? fmt::format(" or {}", fmt::join(*other, ", ")) : "",
+                     no_tool ? ". The arm knows no instrument: name it on set_tool_type" : "");
 }
 
 }  // namespace lapservo::internal

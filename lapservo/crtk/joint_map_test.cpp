@@ -88,5 +88,21 @@ TEST(JointMap, FindsTheFourAmongOthersAndRefusesMissingAndRepeatedOnes) {
   EXPECT_FALSE(find_joints(psm(), {}));
 }
 
+TEST(JointMap, KnowsADvrksNamesOfBothTimes) {
+  const std::vector<std::string> since{"yaw", "pitch", "insertion", "roll", "wrist_pitch", "wrist_yaw"};
+  Joints joints = psm();
+  EXPECT_EQ(find_joints(joints, since), (std::array<std::size_t, 4>{0, 1, 2, 3}));
+  joints.names = {"yaw", "pitch", "insertion", "roll"};
+  EXPECT_TRUE(find_joints(joints, {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"}));
+  EXPECT_FALSE(find_joints(joints, {"outer_yaw", "pitch", "insertion", "roll"}));
+  joints.names = {"q1", "q2", "q3", "q4"};  // somebody else's arm
+  EXPECT_FALSE(find_joints(joints, since));
+  EXPECT_EQ(unfit_joints(joints, since),
+            "joints are yaw, pitch, insertion, roll, wrist_pitch, wrist_yaw, expected q1, q2, q3, q4");
+  EXPECT_EQ(unfit_joints(psm(), {"yaw", "pitch", "insertion", "disc_1"}),
+            "joints are yaw, pitch, insertion, disc_1, expected outer_yaw, outer_pitch, outer_insertion, outer_roll or "
+            "yaw, pitch, insertion, roll. The arm knows no instrument: name it on set_tool_type");
+}
+
 }  // namespace joint_map_test
 }  // namespace lapservo::internal

@@ -10,11 +10,13 @@ namespace lapservo::internal {
 
 // What a CRTK site says, whatever carries it. Times are the sender's stamps in seconds; NaN where a stamp is none.
 
-/// sensor_msgs/JointState: measured_js, setpoint_js, servo_jp. Velocities and efforts are not used.
+/// sensor_msgs/JointState: measured_js, setpoint_js, servo_jp. Efforts are not used.
 struct JointMessage {
   double stamp_s = 0;
   std::vector<std::string> names;
-  std::vector<double> positions;  ///< rad, m
+  std::vector<double> positions;     ///< rad, m
+  std::vector<double> velocities{};  ///< rad/s, m/s; written, not read
+  std::uint64_t source = 0;          ///< whoever sent it: of what came, a number for each sender
 };
 
 /// trajectory_msgs/JointTrajectory. Velocities, accelerations and efforts are not used.
@@ -33,6 +35,7 @@ struct OperatingStateMessage {
   double stamp_s = 0;
   std::string state;
   bool is_homed = false, is_busy = false;
+  std::uint64_t source = 0;  ///< as in JointMessage
 };
 
 /// crtk_msgs/StringStamped: state_command.

@@ -6,7 +6,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<Blocked, 17> blocked_words{{{Blocked::none, "none"},
+constexpr Words<Blocked, 18> blocked_words{{{Blocked::none, "none"},
                                             {Blocked::no_joint_states, "no_joint_states"},
                                             {Blocked::old_joint_states, "old_joint_states"},
                                             {Blocked::non_finite_joints, "non_finite_joints"},
@@ -17,6 +17,7 @@ constexpr Words<Blocked, 17> blocked_words{{{Blocked::none, "none"},
                                             {Blocked::busy, "busy"},
                                             {Blocked::far_from_setpoint, "far_from_setpoint"},
                                             {Blocked::foreign_command, "foreign_command"},
+                                            {Blocked::second_source, "second_source"},
                                             {Blocked::displaced, "displaced"},
                                             {Blocked::held, "held"},
                                             {Blocked::operator_absent, "operator_absent"},

@@ -101,6 +101,8 @@ std::string Supervisor::remedy() const {
       return "let the arm settle at its own setpoint";
     case Blocked::foreign_command:
       return "another program commands the arm: end that";
+    case Blocked::second_source:
+      return "two programs publish the arm's states: end one of them";
     case Blocked::operator_absent:
       return "press what says that the operator is present";
     default:

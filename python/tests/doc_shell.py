@@ -136,4 +136,4 @@ class Shell:
         if "ros2:" not in command:
             return []
         shutil.copy(self.folder / "arm.yaml", self.folder / "rig.yaml")
-        return ["lapservo sim-robot --rig arm.yaml --fps 6"]
+        return ["lapservo sim-robot --rig arm.yaml --fps 6 --arm PSM1"]

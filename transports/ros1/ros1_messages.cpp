@@ -27,6 +27,7 @@ ros1::JointState ros1_message(const JointMessage& message) {
   auto wire = with_stamp<ros1::JointState>(message.stamp_s);
   wire.name.assign(message.names.begin(), message.names.end());
   wire.position.assign(message.positions.begin(), message.positions.end());
+  wire.velocity.assign(message.velocities.begin(), message.velocities.end());
   return wire;
 }
 

@@ -75,8 +75,9 @@ class Ros1Subscription {
     connected_ = true;
     if (!event.getConnectionHeaderPtr() || event.getPublisherName() == ros::this_node::getName()) return;
     const auto received = event.getMessage();
-    if (received->message) {
-      handler_(std::move(*received->message));
+    if (auto& message = received->message) {
+      if constexpr (requires { message->source; }) message->source = std::hash<std::string>()(event.getPublisherName());
+      handler_(std::move(*message));
     } else if (unreadable_++ == 0) {
       std::fprintf(stderr, "ROS: %s: dropping messages of %s that can't be read as %s\n", topic_.c_str(),
                    event.getPublisherName().c_str(), ros::message_traits::datatype<Ros1Type<Message>>());

@@ -1,6 +1,8 @@
 #include "transports/ros2/ros2_transport.h"
 
+#include <algorithm>
 #include <array>
+#include <cstdio>
 #include <cstdlib>
 #include <deque>
 #include <functional>
@@ -40,13 +42,31 @@ class Sieve {
   std::map<dds_instance_handle_t, std::deque<std::pair<dds_time_t, dds_entity_t>>> last_;
 };
 
+// Whether the reader has a publisher that keeps nothing for those who come later.
+bool has_volatile_publisher(dds_entity_t reader) {
+  std::array<dds_instance_handle_t, 16> writers{};
+  const int count = dds_get_matched_publications(reader, writers.data(), writers.size());
+  return std::any_of(writers.begin(), writers.begin() + std::clamp<int>(count, 0, writers.size()), [&](auto writer) {
+    dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_publication_data(reader, writer);
+    if (!endpoint) return false;
+    dds_durability_kind_t kind = DDS_DURABILITY_TRANSIENT_LOCAL;
+    dds_qget_durability(endpoint->qos, &kind);
+    dds_builtintopic_free_endpoint(endpoint);
+    return kind == DDS_DURABILITY_VOLATILE;
+  });
+}
+
 // Readers of a topic with the thread that takes from them.
 class Reading {
  public:
-  using Taken = std::function<void(const void*)>;
+  using Taken = std::function<void(const void*, dds_instance_handle_t writer)>;
   Reading(std::shared_ptr<DdsNode> node, const std::string& topic, const dds_topic_descriptor_t& type,
           const std::vector<Delivery>& deliveries, Taken taken)
-      : node_(std::move(node)), taken_(std::move(taken)), waitset_(dds_create_waitset(node_->participant())) {
+      : node_(std::move(node)),
+        topic_(topic),
+        taken_(std::move(taken)),
+        awaited_(deliveries.front() == Delivery::latched),
+        waitset_(dds_create_waitset(node_->participant())) {
     dds_waitset_attach(waitset_, waitset_, 0);
     for (const Delivery delivery : deliveries) {
       readers_.push_back(node_->create_reader(topic, type, delivery));
@@ -67,10 +87,20 @@ class Reading {
  private:
   void work() {
     while (true) {
-      dds_waitset_wait(waitset_, nullptr, 0, DDS_INFINITY);
+      const bool silent = dds_waitset_wait(waitset_, nullptr, 0, awaited_ ? patience : DDS_INFINITY) == 0;
       if (dds_triggered(waitset_) > 0) return;
+      if (silent) look_for_silent_publisher();
       for (const dds_entity_t reader : readers_) take(reader);
     }
+  }
+  // What is said once should be there for those who come later.
+  void look_for_silent_publisher() {
+    if (!has_volatile_publisher(readers_.back()) || ++silences_ < 2) return;  // the first may have just come
+    awaited_ = false;
+    std::fprintf(stderr,
+                 "DDS: %s: its publisher is volatile and has said nothing since: let it say it again, or latch it "
+                 "(transient local)\n",
+                 topic_.c_str());
   }
   void take(dds_entity_t reader) {
     constexpr int at_once = 16;
@@ -78,13 +108,19 @@ class Reading {
     std::array<dds_sample_info_t, at_once> infos;
     const int count = dds_take(reader, samples.data(), infos.data(), at_once, at_once);
     if (count <= 0) return;
+    awaited_ = false;
     for (int i = 0; i < count; ++i)
-      if (infos[i].valid_data && sieve_.is_new(infos[i], reader)) taken_(samples[i]);
+      if (infos[i].valid_data && sieve_.is_new(infos[i], reader)) taken_(samples[i], infos[i].publication_handle);
     dds_return_loan(reader, samples.data(), count);
   }
 
+  static constexpr dds_duration_t patience = DDS_SECS(1);
+
   std::shared_ptr<DdsNode> node_;
+  std::string topic_;
   Taken taken_;
+  bool awaited_;  // until the first message of a topic that is latched
+  int silences_ = 0;
   dds_entity_t waitset_;
   std::vector<dds_entity_t> readers_;
   Sieve sieve_;
@@ -110,10 +146,13 @@ class Ros2Transport::Implementation {
   template <typename Message>
   Subscription subscribe(const std::string& topic, const std::vector<Delivery>& deliveries,
                          const Handler<Message>& handler) {
-    return std::make_shared<Reading>(
-        node_, topic, Wire<Message>::descriptor(), deliveries, [handler](const void* wire) {
-          handler(Wire<Message>::read(*static_cast<const typename Wire<Message>::Type*>(wire)));
-        });
+    using Type = typename Wire<Message>::Type;
+    const auto taken = [handler](const void* wire, dds_instance_handle_t writer) {
+      Message message = Wire<Message>::read(*static_cast<const Type*>(wire));
+      if constexpr (requires { message.source; }) message.source = writer;
+      handler(std::move(message));
+    };
+    return std::make_shared<Reading>(node_, topic, Wire<Message>::descriptor(), deliveries, taken);
   }
 
  private:

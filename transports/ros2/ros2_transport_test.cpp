@@ -146,6 +146,28 @@ TEST(Ros2Transport, EveryPublisherOfOperatingStatesMatches) {
   }
 }
 
+TEST(Ros2Transport, AStateThatWasSaidOnceByAVolatilePublisherIsMissed) {
+  ::testing::internal::CaptureStderr();
+  Ros2Transport to("to");
+  DdsNode from("from", test_domain());
+  for (const auto& [topic, delivery] : {std::pair("/PSM1/operating_state", Delivery::reliable),
+                                        std::pair("/PSM2/operating_state", Delivery::latched)}) {
+    const dds_entity_t writer = from.create_writer(topic, Wire<OperatingStateMessage>::descriptor(), delivery);
+    Wire<OperatingStateMessage>::write(writer, {stamp_s, "ENABLED", true, false});
+  }
+  TestInbox<OperatingStateMessage> lost, kept;
+  const auto volatile_one = to.subscribe_operating_state("/PSM1/operating_state", lost.handler());
+  const auto latched_one = to.subscribe_operating_state("/PSM2/operating_state", kept.handler());
+  std::this_thread::sleep_for(std::chrono::seconds(3));
+  const std::string said = ::testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(lost.empty());
+  EXPECT_EQ(kept.count(), 1u);
+  EXPECT_NE(said.find("DDS: /PSM1/operating_state: its publisher is volatile and has said nothing since"),
+            std::string::npos)
+      << said;
+  EXPECT_EQ(said.find("PSM2"), std::string::npos) << said;
+}
+
 // Each once, and a stop at once, whatever the sender's clock does between two.
 TEST(Ros2Transport, CommandsAreHeardWhateverTheSendersClockSays) {
   Ros2Transport to("to");

@@ -74,6 +74,7 @@ void Wire<JointMessage>::write(dds_entity_t writer, const JointMessage& message)
   for (const std::string& name : message.names) names.push_back(pointer(name));
   point(wire.name_, names);
   point(wire.position_, message.positions);
+  point(wire.velocity_, message.velocities);
   dds_write(writer, &wire);
 }
 

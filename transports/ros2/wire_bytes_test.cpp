@@ -135,7 +135,7 @@ const Fields stamp{{"header.stamp.sec", "1700000000"}, {"header.stamp.nanosec", 
 
 TEST(WireBytes, OfWhatSteersAnArm) {
   const Fields joints =
-      sent_as("sensor_msgs/JointState", JointMessage{stamp_s, {"yaw", "", "pitch"}, {0.25, -1.5, 1e-300}});
+      sent_as("sensor_msgs/JointState", JointMessage{stamp_s, {"yaw", "", "pitch"}, {0.25, -1.5, 1e-300}, {4, 5, 6}});
   expect_fields(joints, stamp);
   expect_fields(joints, {{"header.frame_id", ""},
                          {"name", "3 of them"},
@@ -146,7 +146,8 @@ TEST(WireBytes, OfWhatSteersAnArm) {
                          {"position[0]", "0.25"},
                          {"position[1]", "-1.5"},
                          {"position[2]", "1e-300"},
-                         {"velocity", "0 of them"},
+                         {"velocity", "3 of them"},
+                         {"velocity[2]", "6"},
                          {"effort", "0 of them"}});
   const TrajectoryMessage trajectory{stamp_s, {"s_rad", "r_px"}, {{0, {1, 2}}, {2.25, {3, 4}}}};
   expect_fields(sent_as("trajectory_msgs/JointTrajectory", trajectory),

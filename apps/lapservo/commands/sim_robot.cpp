@@ -1,5 +1,6 @@
 #include "lapservo/sim_robot/sim_robot.h"
 
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <memory>
@@ -14,6 +15,7 @@
 #include "lapservo/control/random_start.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
+#include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/rig/single_instrument.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/image_features.h"
@@ -24,7 +26,7 @@ using namespace internal;
 namespace {
 
 struct SimRobotOptions {
-  std::string rig, transport = "ros2", arm = "PSM1", camera = "/endoscope";
+  std::string rig, transport = "ros2", arm = "SIM_PSM1", camera = "/endoscope";
   std::vector<double> start;
   double latency_ms = 80, fps = 30, duration_s = 0;
   std::uint64_t seed = 1;
@@ -41,6 +43,20 @@ JointVector start_of(const SimRobotOptions& options, const Rig& rig, const ArmCo
                       random, "the paper's trajectory, which --start replaces");
 }
 
+// Whoever steers an arm of that name would steer both.
+void refuse_taken_name(Transport& transport, const SimRobotConfig& config, const std::string& arm) {
+  constexpr double listen_s = 2;  // until whoever is there has been found
+  std::atomic<bool> heard = false;
+  const auto joints =
+      transport.subscribe_joints(topic_of(config.arm, "measured_js"), [&](JointMessage&&) { heard = true; });
+  const auto states = transport.subscribe_operating_state(topic_of(config.arm, "operating_state"),
+                                                          [&](OperatingStateMessage&&) { heard = true; });
+  SteadyClock clock;
+  for (const double end_s = clock.now_s() + listen_s; !heard && !interrupted() && clock.now_s() < end_s;)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  if (heard) throw InputError("--arm", "is " + arm + ", where an arm is already, expected a name of its own");
+}
+
 int run(const SimRobotOptions& options) {
   if (options.rig.empty())
     throw InputError("--rig", "is missing, expected a rig's YAML, for example configs/paper.yaml");
@@ -55,8 +71,9 @@ int run(const SimRobotOptions& options) {
   SimRobotConfig config;
   config.arm = resolved_name({options.transport, options.arm}, "--arm");
   config.camera = resolved_name({options.transport, options.camera}, "--camera");
-  SimRobot robot(*transport, rig, simulator, config);
   watch_for_interrupts();
+  refuse_taken_name(*transport, config, options.arm);
+  SimRobot robot(*transport, rig, simulator, config);
   std::printf("arm %s, camera %s/image_raw; lapservo servo --rig %s --robot %s:%s --camera %s:%s/image_raw ",
               options.arm.c_str(), options.camera.c_str(), options.rig.c_str(), options.transport.c_str(),
               options.arm.c_str(), options.transport.c_str(), options.camera.c_str());
@@ -82,7 +99,7 @@ void add_sim_robot(Command app, Run& run_later) {
       app.add_subcommand("sim-robot", "Be an arm and its camera, simulated, for another process to steer.");
   command.add_option("--rig", options->rig, "What stands before the camera");
   command.add_option("--transport", options->transport, "ros2 or ros1").shows_default();
-  command.add_option("--arm", options->arm, "Namespace of its CRTK topics").shows_default();
+  command.add_option("--arm", options->arm, "Namespace of its CRTK topics, where no other arm is").shows_default();
   command.add_option("--camera", options->camera, "Namespace of image_raw and camera_info").shows_default();
   command.add_option("--start", options->start, "Measured joints to start from, theta,phi,rho,psi; else random")
       .finite_number()
@@ -99,7 +116,8 @@ void add_sim_robot(Command app, Run& run_later) {
   command.footer(
       "Example, in two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
       "  lapservo sim-robot --rig configs/paper.yaml\n"
-      "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera ros2:/endoscope/image_raw --enable-motion");
+      "  lapservo servo --rig configs/paper.yaml --robot ros2:SIM_PSM1 --camera ros2:/endoscope/image_raw "
+      "--enable-motion");
   command.runs(run_later, [options] { return run(*options); });
 }
 
