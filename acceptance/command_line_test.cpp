@@ -602,7 +602,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   // The same swing tests both rigs: the first has no calibration yet.
   const std::string check = "check in/swing --fps 8 --joints in/joints.csv --rig ";
   expect_done(check + "out/rig.yaml --out out/check.html");
-  expect_in(output(), "\ngood enough\n");
+  expect_in(output(), "\ngood enough\n  checked where yaw -0.");
   for (const char* figure : {"Rotation against encoder", "alt=\"Colours\""})
     expect_in(read_file("out/check.html"), figure);
   EXPECT_EQ(run(check + unregistered), 1);
@@ -623,6 +623,20 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   EXPECT_EQ(run("calibrate registration out/bound.csv --rig out/rig.yaml --out out/no.yaml"), 1);
   expect_in(errors(), "camera_from_rcm");
   EXPECT_FALSE(fs::exists("out/no.yaml"));
+
+  // A joint that stood still: no rig, whatever the other numbers are.
+  std::string still = joints;
+  for (std::size_t line = still.find('\n') + 1; line < still.size(); line = still.find('\n', line) + 1) {
+    const std::size_t from = still.find(',', still.find(',', line) + 1) + 1;
+    still.replace(from, still.find(',', from) - from, "0.25");
+  }
+  EXPECT_EQ(run("calibrate registration out/free.csv --rig " + unregistered + " --out out/no.yaml --joints " +
+                in("still.csv", still)),
+            1);
+  expect_in(errors(), "pitch moved by 0.00 rad only, at least 0.10 rad show its sign and offset");
+  EXPECT_FALSE(fs::exists("out/no.yaml"));
+  EXPECT_EQ(run("check in/swing --fps 8 --joints in/still.csv --rig out/rig.yaml"), 1);
+  expect_in(output(), "pitch moved by 0.00 rad only");
 
   EXPECT_EQ(run(calibrate + " --joints " + in("other.csv", "time_s,a,b,c,d\n0,1,2,3,4\n1,1,2,3,4\n")), 2);
   expect_in(errors(), "yaw");

@@ -13,6 +13,9 @@ namespace {
 
 constexpr int psi = 3;
 
+// The share of a swing's duration for fading in, and out; the shares of the rate limit for fading and for the swings.
+constexpr double ease_of_swing = 0.25, share_of_easing = 0.25, share_of_swinging = 0.55;
+
 // From 0 to 1, at rest at both ends; per duration, and its square, at most so fast.
 constexpr double eased_rate = 1.875, eased_acceleration = 5.774;
 double eased(double part) {
@@ -30,17 +33,19 @@ double travelled(double time_s, double distance, double rate, double ramp_s) {
 
 }  // namespace
 
-JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s) {
-  // Shares of the rate limit: fading in and out, and the swings.
-  constexpr double share_of_easing = 0.25, share_of_swinging = 0.55;
-  const double ease_s = duration_s / 4;
+Eigen::Vector4d swing_reach(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s) {
+  const double ease_s = ease_of_swing * duration_s;
   const Eigen::Array4d wanted = scale * Eigen::Array4d(0.25, 0.2, 0.01, 1);
   const Eigen::Array4d room = (limits.upper - start).cwiseMin(start - limits.lower).cwiseMax(0);
+  return wanted.min(room)
+      .min(share_of_easing * ease_s / eased_rate * limits.rate.array())
+      .min(0.15 * ease_s * ease_s / eased_acceleration * limits.acceleration.array());
+}
+
+JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s) {
+  const double ease_s = ease_of_swing * duration_s;
   const Eigen::Array4d rate = limits.rate, acceleration = limits.acceleration;
-  const Eigen::Array4d amplitude = wanted.min(room)
-                                       .min(share_of_easing * ease_s / eased_rate * rate)
-                                       .min(0.15 * ease_s * ease_s / eased_acceleration * acceleration)
-                                       .max(1e-9);
+  const Eigen::Array4d amplitude = swing_reach(start, limits, scale, duration_s).array().max(1e-9);
   // Shares of the acceleration limit: 0.3 for the swings, 0.15 for easing, and at most 0.33 for both together.
   const Eigen::Array4d fastest = (share_of_swinging * rate / amplitude).min((0.3 * acceleration / amplitude).sqrt());
   const Eigen::Array4d omega = fastest.min(two_pi / duration_s * Eigen::Array4d(3, 4, 5, 2));

@@ -16,6 +16,9 @@ struct JointMotion {
   std::function<Eigen::Vector4d(double)> at;
 };
 
+/// By how much each joint swings to either side of `start` in a swing_motion().
+Eigen::Vector4d swing_reach(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s);
+
 /// For `calibrate registration`: all joints at once, each with a period of its own, up to 0.25 rad, 0.2 rad, 10 mm and
 /// 1 rad to either side of `start`, times `scale`, as far as limits and rates go. Ends where it starts.
 JointMotion swing_motion(const Eigen::Vector4d& start, const JointLimits& limits, double scale, double duration_s);

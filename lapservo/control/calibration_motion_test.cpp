@@ -52,6 +52,19 @@ TEST(CalibrationMotion, SwingsAllJointsAndReturns) {
   EXPECT_TRUE((reach.array() > 0.8 * Eigen::Array4d(0.25, 0.2, 0.01, 1)).all()) << reach.transpose();
 }
 
+TEST(CalibrationMotion, SwingsAsFarAsItsReach) {
+  JointLimits limits;
+  const Eigen::Vector4d start(0, 2.47, 0.03, 0);  // phi 0.03 rad from its limit, rho at it
+  const Eigen::Vector4d reach = swing_reach(start, limits, 1, 20);
+  EXPECT_NEAR(reach[0], 0.25, 1e-12);
+  EXPECT_NEAR(reach[1], 0.03, 1e-12);
+  EXPECT_EQ(reach[2], 0);
+  const JointMotion motion = swing_motion(start, limits, 1, 20);
+  Eigen::Vector4d most = Eigen::Vector4d::Zero();
+  for (double t = 0; t < 20; t += step_s) most = most.cwiseMax((motion.at(t) - start).cwiseAbs());
+  EXPECT_TRUE((most.array() < reach.array() + 1e-8).all() && (most.array() > 0.8 * reach.array() - 1e-8).all());
+}
+
 TEST(CalibrationMotion, TurnsOnceAndALittleMore) {
   const JointLimits limits;
   const JointMotion motion = turn_motion({0, 1.5, 0.1, 3.5}, limits, "limits");

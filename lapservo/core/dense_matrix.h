@@ -18,6 +18,9 @@ Eigen::MatrixXd inverse_of_symmetric(const Eigen::MatrixXd& matrix);
 /// The upper triangular W with W^T W = covariance^-1, which makes errors of unit size of such errors.
 Eigen::MatrixXd whitening_of(const Eigen::MatrixXd& covariance);
 
+/// The covariance, made as large as another, positive definite one in the directions in which it is smaller.
+Eigen::MatrixXd covariance_at_least(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& least);
+
 /// In rising order.
 Eigen::VectorXd eigenvalues_of_symmetric(const Eigen::MatrixXd& matrix);
 

@@ -27,6 +27,16 @@ TEST(DenseMatrix, ASolutionSolvesAndWhiteningMakesUnits) {
   }
 }
 
+TEST(DenseMatrix, ACovarianceGrowsWhereItIsTooSmallOnly) {
+  const Eigen::MatrixXd covariance{{4, 0}, {0, 0.01}}, least{{1, 0}, {0, 1}};
+  EXPECT_TRUE(covariance_at_least(covariance, least).isApprox(Eigen::MatrixXd{{4, 0}, {0, 1}}, 1e-12));
+  Random random(4);
+  const Eigen::MatrixXd root = random_matrix(5, 8, random);
+  const Eigen::MatrixXd large = product(root, root.transpose());
+  EXPECT_TRUE(covariance_at_least(large, 0.5 * large).isApprox(large, 1e-9));
+  EXPECT_TRUE(covariance_at_least(0.5 * large, large).isApprox(large, 1e-9));
+}
+
 TEST(DenseMatrix, WhatHasNoInverseGetsNone) {
   const Eigen::MatrixXd regular{{2, 1}, {1, 3}}, singular{{2, 0, 0}, {0, 0, 0}, {0, 0, 3}}, indefinite{{1, 0}, {0, -1}};
   EXPECT_TRUE(product(regular, inverse_of_symmetric(regular)).isIdentity(1e-12));

@@ -69,7 +69,7 @@ void look_over_work_space(const Rig& rig, std::size_t index, const RigEvidence& 
 
 void print(const CheckedRig& checked) {
   for (const CheckLine& line : check_lines(checked)) std::printf("  %-26s %s\n", line.name.c_str(), line.found.c_str());
-  std::printf("\n%s\n", verdict_of(checked).c_str());
+  std::printf("\n%s\n  %s\n", verdict_of(checked).c_str(), region_of(checked).c_str());
   int rank = 0;
   for (const Advice& advice : checked.advice)
     std::printf("  %d. %s%s\n     do: %s\n     gains: %s\n", ++rank, advice.needed ? "" : "(may be) ",

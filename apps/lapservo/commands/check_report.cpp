@@ -261,10 +261,17 @@ std::string verdict_of(const CheckedRig& checked) {
   return "not good enough: " + checked.advice.front().what;
 }
 
+std::string region_of(const CheckedRig& checked) {
+  const auto& arm = checked.findings.arm;
+  if (arm && arm->refusal.empty()) return "checked where " + arm->region + "; beyond that, repeat with a wider swing";
+  return "checked by images alone: not the joints, nor where they put the marker";
+}
+
 void write_check_report(const std::filesystem::path& path, const std::string& instrument, const CheckedRig& checked) {
   ReportSection section;
   section.id = "check";
   section.title = instrument + ": " + verdict_of(checked);
+  section.text.push_back(region_of(checked));
   int rank = 0;
   for (const Advice& advice : checked.advice)
     section.text.push_back(fmt::format("{}. {}{}. Do: {}. Gains: {}.", ++rank,

@@ -33,6 +33,9 @@ std::vector<CheckLine> check_lines(const CheckedRig& checked);
 /// "good enough", or "not good enough: " and what to do first.
 std::string verdict_of(const CheckedRig& checked);
 
+/// Where that holds.
+std::string region_of(const CheckedRig& checked);
+
 /// One HTML page. Throws InputError when it can't be written.
 void write_check_report(const std::filesystem::path& path, const std::string& instrument, const CheckedRig& checked);
 

@@ -1,5 +1,6 @@
 #include "apps/lapservo/commands/record.h"
 
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -11,8 +12,10 @@
 #include <thread>
 #include <unistd.h>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
@@ -28,6 +31,8 @@
 #include "lapservo/crtk/arm_limits.h"
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/rig/joint_conversion.h"
+#include "lapservo/rig/joint_travel.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/robot/supervisor.h"
@@ -39,6 +44,7 @@ namespace {
 
 constexpr double patience_s = 15;    // for the first image
 constexpr double max_silence_s = 1;  // of the camera while the arm moves
+constexpr double least_swing = 1.2;  // of least_joint_travel: what growing and fading leave of a swing's ends
 
 // Stamps of this computer's cameras are on the monotonic clock, or missing; joints' are on that of 1970.
 double stamp_since_1970_s(double stamp_s, const Clock& clock) {
@@ -116,6 +122,9 @@ class MovingArm {
   MovingArm(const MovingArm&) = delete;
   MovingArm& operator=(const MovingArm&) = delete;
 
+  // How far each joint moved; empty before it began.
+  std::string travels() const { return readings_.empty() ? "" : travels_text(config_.joints, ranges_of(readings_)); }
+
   // Nothing while it is on its way or about to begin, then why it has ended: empty when the motion is done.
   std::optional<std::string> advance() {
     const JointState measured = arm_.state();
@@ -124,7 +133,13 @@ class MovingArm {
     if (!moves_) return std::nullopt;
     const double now_s = clock_.now_s();
     if (follower_ && !moved) follower_->resume(now_s, measured.q);
-    if (!follower_) follower_.emplace(motion_from(measured.q.vector()), config_.limits, config_.max_distance, now_s);
+    if (!follower_) {
+      const Eigen::Vector4d start = measured.q.vector();
+      if (std::string still = options_.move == "swing" ? still_in_swing(start) : ""; !still.empty()) return still;
+      follower_.emplace(motion_from(start), config_.limits, config_.max_distance, now_s);
+    }
+    const Eigen::Vector4d at = joints_from_q(config_.joints, measured.q.vector());
+    if (at.allFinite()) readings_.push_back({at[0], at[1], at[2], at[3]});
     const MotionFollower::Step step = follower_->step(now_s, measured.q);
     if (step.path) arm_.send(*step.path);
     if (step.progress == MotionFollower::Progress::does_not_follow) return "the arm does not follow";
@@ -148,6 +163,25 @@ class MovingArm {
     return options_.move == "turn" ? turn_motion(start, config_.limits, options_.joint_limits)
                                    : swing_motion(start, config_.limits, options_.scale, options_.duration_s);
   }
+  // Which joints would move too little for `calibrate registration`, and why; empty when there is none.
+  std::string still_in_swing(const Eigen::Vector4d& start) const {
+    const Eigen::Vector4d reach = swing_reach(start, config_.limits, options_.scale, options_.duration_s);
+    const Eigen::Vector4d at = joints_from_q(config_.joints, start);
+    const Eigen::Vector4d room = (config_.limits.upper - start).cwiseMin(start - config_.limits.lower);
+    std::vector<std::string> still;
+    for (Eigen::Index i = 0; i < 4; ++i) {
+      const auto j = static_cast<std::size_t>(i);
+      if (2 * reach[i] >= least_swing * least_joint_travel[j]) continue;
+      const std::string why = room[i] <= reach[i]
+                                  ? fmt::format("it stands at {}, {} from its limit of {}: move it away from there",
+                                                joint_text(j, at[i]), joint_text(j, room[i]), options_.joint_limits)
+                                  : std::string("a longer --duration or a larger --scale moves it more");
+      still.push_back(fmt::format("{} would move by {}, registration needs {}: {}", config_.joints.names[j],
+                                  joint_text(j, 2 * reach[i]), joint_text(j, least_swing * least_joint_travel[j]),
+                                  why));
+    }
+    return still.empty() ? "" : fmt::format("the arm was not moved: {}", fmt::join(still, "; "));
+  }
 
   const RecordOptions& options_;
   const Clock& clock_;
@@ -157,6 +191,7 @@ class MovingArm {
   Supervisor arm_;
   std::optional<MotionFollower> follower_;
   bool moves_ = false;
+  std::vector<std::array<double, 4>> readings_;  // while it moved
 };
 
 // Before anything is opened or made.
@@ -242,6 +277,7 @@ int record(const RecordOptions& options) {
   recording.finish();
   const RecordedCounts counts = recording.counts();
   std::printf("%s: %s\n", options.out.c_str(), told(counts).c_str());
+  if (const std::string travels = arm ? arm->travels() : ""; !travels.empty()) std::printf("%s\n", travels.c_str());
   if (!why.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", options.out.c_str(), why.c_str());
   if (why.empty() && !options.robot.empty() && counts.joints == 0)
     std::fprintf(stderr, "lapservo: %s: no measured_js came\n", options.robot.c_str());
@@ -280,11 +316,14 @@ void add_record(Command app, Run& run_later) {
       .shows_default()
       .number_between(0.05, 4);
   command.add_option("--joint-limits", options->joint_limits,
-                     "For --move: YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
+                     "For --move: YAML of the arm's joints, between which they stay, for example "
+                     "configs/joint_limits/psm-classic.yaml");
   command.add_flag("--enable-motion", options->enable_motion, "For --move: do move the arm");
   command.footer(
       "An arm that is moved starts from rest, when it has been ready for half a second, and ends at rest; whatever is "
       "amiss with it ends the motion, and it stays where it is.\n"
+      "A swing is centred on where the arm is. It does not begin where a joint has too little room within "
+      "--joint-limits.\n"
       "Example:\n  lapservo record --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --out swing\n"
       "  lapservo calibrate registration swing --rig rig.yaml --out rig.yaml");
   command.runs(run_later, [options] { return record(*options); });

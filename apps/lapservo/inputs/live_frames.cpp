@@ -8,7 +8,10 @@
 namespace lapservo::app {
 
 LiveFrames::LiveFrames(const std::string& text, const Camera& camera)
-    : LiveSource(interrupted), text_(text), transports_("lapservo_track"), images_(text, "input", camera, clock_, transports_) {}
+    : LiveSource(interrupted),
+      text_(text),
+      transports_("lapservo_track"),
+      images_(text, "input", camera, clock_, transports_) {}
 
 std::optional<StampedImage> LiveFrames::take() {
   auto image = images_.newest();

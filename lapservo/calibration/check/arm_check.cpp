@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -23,6 +24,7 @@ constexpr double least_focal = 2e-3, least_drift_m = 0.5e-3, least_drift_rad = 2
 struct Fitted {
   ArmModel model;
   FrameFit fit;
+  Eigen::MatrixXd covariance;
 };
 
 std::optional<Fitted> fitted(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
@@ -31,12 +33,13 @@ std::optional<Fitted> fitted(const Instrument& instrument, const ArmStart& start
   auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
                         2 * poses_per_second(start.poses));
   if (!fit) return std::nullopt;
-  return Fitted{std::move(model), std::move(*fit)};
+  Eigen::MatrixXd covariance = arm_covariance(*fit);
+  return Fitted{std::move(model), std::move(*fit), std::move(covariance)};
 }
 
 Told focal_of(const Fitted& f) {
   const Block& focal = f.model.blocks().focal;
-  return {focal.of(f.fit.x).norm(), unmodelled_sigmas * std::sqrt(focal.of(f.fit.covariance).trace())};
+  return {focal.of(f.fit.x).norm(), std::sqrt(focal.of(f.covariance).trace())};
 }
 
 // By how much the marker in the middle of its work moves in the camera over the recording.
@@ -49,14 +52,13 @@ Told drift_of_place(const Fitted& f) {
   Eigen::Matrix<double, 3, 6> by_drift = Eigen::Matrix<double, 3, 6>::Identity();
   for (Eigen::Index k = 0; k < 3; ++k)
     by_drift.col(3 + k) = camera_from_rcm.rotation * Eigen::Vector3d::Unit(k).cross(arm);
-  const Eigen::Matrix3d covariance = by_drift * drift.of(f.fit.covariance) * by_drift.transpose();
-  return {(by_drift * drift.of(f.fit.x)).norm(), unmodelled_sigmas * std::sqrt(std::max(0.0, covariance.trace()))};
+  const Eigen::Matrix3d covariance = by_drift * drift.of(f.covariance) * by_drift.transpose();
+  return {(by_drift * drift.of(f.fit.x)).norm(), std::sqrt(std::max(0.0, covariance.trace()))};
 }
 
 Told drift_of_directions(const Fitted& f) {
   const Block& drift = f.model.blocks().drift;
-  return {drift.of(f.fit.x).tail<3>().norm(),
-          unmodelled_sigmas * std::sqrt(drift.of(f.fit.covariance).bottomRightCorner<3, 3>().trace())};
+  return {drift.of(f.fit.x).tail<3>().norm(), std::sqrt(drift.of(f.covariance).bottomRightCorner<3, 3>().trace())};
 }
 
 Rigid3 marker_at(const Instrument& instrument, const Rigid3& camera_from_rcm, const Joints& joints,
@@ -93,7 +95,7 @@ std::vector<ArmResidual> residuals(const Instrument& instrument, const Camera& c
 
 // By how much the fit's registration may be off at the markers: place, direction and turn.
 Eigen::Vector3d registration_sigmas(const Fitted& f) {
-  const Eigen::MatrixXd& c = f.fit.covariance;
+  const Eigen::MatrixXd& c = f.covariance;
   const ArmModel::Blocks& blocks = f.model.blocks();
   const double turn_rad = std::sqrt(blocks.rotation.of(c).trace());
   double rho_m = 0;
@@ -102,7 +104,7 @@ Eigen::Vector3d registration_sigmas(const Fitted& f) {
     rho_m += (pose.origin() - rcm).norm() / static_cast<double>(f.model.poses().size());
   // The joint offsets' share goes with the rotation's and the translation's: their sum is known better than each.
   const double place_m = std::hypot(std::sqrt(blocks.translation.of(c).trace()), 0.2 * turn_rad * rho_m);
-  return unmodelled_sigmas * Eigen::Vector3d(place_m, turn_rad, std::sqrt(blocks.offsets.of(c)(2, 2)) + turn_rad);
+  return Eigen::Vector3d(place_m, turn_rad, std::sqrt(blocks.offsets.of(c)(2, 2)) + turn_rad);
 }
 
 }  // namespace
@@ -112,6 +114,7 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
   ArmCheck check;
   const ArmStart start = start_arm(instrument, poses, recording, source);
   if (!start.refusal.empty()) return check.refusal = start.refusal, check;
+  check.region = ranges_text(*instrument.joints, start.ranges);
   const auto full = fitted(instrument, start, recording, {true, true});
   if (!full) return check.refusal = std::string("the motion leaves the registration open: ") + swing_more, check;
   check.focal = focal_of(*full);
@@ -129,7 +132,7 @@ ArmCheck check_arm(const Instrument& instrument, const Camera& camera, const std
   check.at_best = residuals(instrument, camera, start, recording, camera_from_rcm, joints, check.measured_delay_s);
   if (instrument.image_delay_s)
     check.delay_s = Told{std::abs(*instrument.image_delay_s - check.measured_delay_s),
-                         unmodelled_sigmas * std::sqrt(delay.of(best->fit.covariance).trace())};
+                         std::sqrt(delay.of(best->covariance).trace())};
   if (!instrument.camera_from_rcm) return check;
   const double delay_s = instrument.image_delay_s.value_or(check.measured_delay_s);
   check.by_rig =

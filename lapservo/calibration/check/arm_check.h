@@ -34,6 +34,7 @@ struct TrackedPsi {
 struct ArmCheck {
   /// Why it is not told, and what to do about it: then nothing else counts. Empty when it is.
   std::string refusal;
+  std::string region;                        ///< between which readings each joint moved: all of this holds there
   std::vector<ArmResidual> by_rig, at_best;  ///< as the rig has it, and as it would after a calibration
   std::vector<TrackedPsi> beyond_encoder;    ///< psi as it is tracked less what the joints say, in [-pi, pi)
   Told focal;                                ///< relative error of the focal length

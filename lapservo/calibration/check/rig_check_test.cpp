@@ -20,8 +20,10 @@ namespace {
 constexpr double fps = 6, delay_s = 0.1;
 constexpr int frames = 108;
 
-JointVector q_at(double t) {
-  return {0.22 * std::sin(0.9 * t), 1.57 + 0.18 * std::sin(1.3 * t + 1), 0.089 + 0.008 * std::sin(0.7 * t),
+constexpr double phi_swing_rad = 0.18;
+
+JointVector q_at(double t, double phi_rad = phi_swing_rad) {
+  return {0.22 * std::sin(0.9 * t), 1.57 + phi_rad * std::sin(1.3 * t + 1), 0.089 + 0.008 * std::sin(0.7 * t),
           3.3 * std::sin(0.5 * t + 2)};
 }
 
@@ -36,22 +38,22 @@ const Rig& true_rig() {
   return rig;
 }
 
-std::vector<cv::Mat> rendered(int count, const RenderOptions& options) {
+std::vector<cv::Mat> rendered(int count, const RenderOptions& options, double phi_rad = phi_swing_rad) {
   const Rig& rig = true_rig();
   Renderer renderer(rig.camera, shafts_of(rig), make_tissue(rig.camera.width_px, rig.camera.height_px, 5), options);
   std::vector<cv::Mat> pictures;
   for (int i = 0; i < count; ++i)
     pictures.push_back(
-        renderer.render({placement_of(rig.instruments[0], q_at(i / fps))}, static_cast<std::uint64_t>(i)));
+        renderer.render({placement_of(rig.instruments[0], q_at(i / fps, phi_rad))}, static_cast<std::uint64_t>(i)));
   return pictures;
 }
 
 // `slip_rad`: by how much theta's joint lags more at the end than at the beginning.
-JointRecording joints_meanwhile(double slip_rad = 0) {
+JointRecording joints_meanwhile(double slip_rad = 0, double phi_rad = phi_swing_rad) {
   const Joints& joints = *true_rig().instruments[0].joints;
   JointRecording recording;
   for (double t = -0.6; t < frames / fps + 0.6; t += 0.02) {
-    const Eigen::Vector4d q = q_at(t).vector();
+    const Eigen::Vector4d q = q_at(t, phi_rad).vector();
     std::array<double, 4> at;
     for (std::size_t j = 0; j < 4; ++j) at[j] = (q[static_cast<Eigen::Index>(j)] - joints.offset[j]) / joints.sign[j];
     at[0] += slip_rad * t * fps / frames;
@@ -157,6 +159,7 @@ TEST_F(CheckRig, AGoodRigIsGoodEnough) {
   EXPECT_EQ(needed(findings), std::vector<std::string>{});
   ASSERT_TRUE(findings.arm);
   EXPECT_EQ(findings.arm->refusal, "");
+  EXPECT_EQ(findings.arm->region.find("yaw -0.22 to 0.22 rad, pitch"), 0U) << findings.arm->region;
   EXPECT_EQ(findings.print->refusal, "");
   EXPECT_EQ(findings.found, frames);
   EXPECT_NEAR(findings.arm->measured_delay_s, delay_s, 2e-3);
@@ -180,6 +183,13 @@ TEST_F(CheckRig, NamesAWrongRegistrationFirst) {
   const RigFindings findings = found_out(rig, pictures(), joints);
   expect_first(findings, "registration");
   EXPECT_NEAR(findings.arm->place_m->value, 9.85e-3, 0.3e-3);
+}
+
+// A sign of pitch that is wrong shows nowhere in these pictures.
+TEST_F(CheckRig, CallsNoRigGoodWhereAJointStoodStill) {
+  instrument.joints->sign[1] *= -1;
+  const RigFindings findings = found_out(rig, rendered(60, {}, 0.01), joints_meanwhile(0, 0.01));
+  expect_first(findings, "pitch moved by 0.02 rad only, at least 0.10 rad");
 }
 
 TEST_F(CheckRig, NamesAWrongDelayFirst) {

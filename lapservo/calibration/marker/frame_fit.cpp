@@ -130,9 +130,13 @@ Eigen::VectorXd robust_scales(const Eigen::MatrixXd& residuals) {
   return scales;
 }
 
-// (sum J'J)^-1 S (sum J'J)^-1 with S that of the frames' gradients and of their neighbours'.
-std::optional<Eigen::MatrixXd> covariance(const Linearisation& at, const Eigen::VectorXd& weights,
-                                          std::size_t alike_frames) {
+struct Covariances {
+  Eigen::MatrixXd scattered, independent;
+};
+
+// (sum J'J)^-1 S (sum J'J)^-1 with S that of the frames' gradients and of their neighbours', and (sum J'J)^-1.
+std::optional<Covariances> covariances(const Linearisation& at, const Eigen::VectorXd& weights,
+                                       std::size_t alike_frames) {
   const Eigen::Index numbers = static_cast<Eigen::Index>(at.slopes.size()), frames = at.residuals.cols();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(numbers, numbers), gradients(numbers, frames);
   const double scale = loss_scale(weights.size());
@@ -161,7 +165,7 @@ std::optional<Eigen::MatrixXd> covariance(const Linearisation& at, const Eigen::
   const double taken = static_cast<double>(numbers) + static_cast<double>(alike_frames);
   const double freedom = static_cast<double>(frames) / std::max(1.0, static_cast<double>(frames) - taken);
   const Eigen::MatrixXd inverse = units.asDiagonal() * inverse_of_symmetric(normed) * units.asDiagonal();
-  return freedom * product(product(inverse, scatter), inverse);
+  return Covariances{freedom * product(product(inverse, scatter), inverse), inverse};
 }
 
 }  // namespace
@@ -188,9 +192,9 @@ std::optional<FrameFit> fit_frames(const FrameResiduals& residuals, const std::v
     scales = next;
     if (settled) break;
   }
-  const auto sigma = covariance(at, scales.cwiseInverse(), alike_frames);
-  if (!sigma || !sigma->allFinite()) return std::nullopt;
-  return FrameFit{x, *sigma, at.residuals, scales};
+  const auto sigma = covariances(at, scales.cwiseInverse(), alike_frames);
+  if (!sigma || !sigma->scattered.allFinite() || !sigma->independent.allFinite()) return std::nullopt;
+  return FrameFit{x, sigma->scattered, sigma->independent, at.residuals, scales};
 }
 
 }  // namespace lapservo::internal

@@ -17,9 +17,10 @@ using FrameResiduals = std::function<Eigen::MatrixXd(const Eigen::VectorXd& x)>;
 
 struct FrameFit {
   Eigen::VectorXd x;
-  Eigen::MatrixXd covariance;  ///< of x
-  Eigen::MatrixXd residuals;   ///< at x
-  Eigen::VectorXd scales;      ///< of each channel: its residuals' robust standard deviation
+  Eigen::MatrixXd covariance;   ///< of x, as the residuals scatter
+  Eigen::MatrixXd independent;  ///< of x, if no residual went with another: the inverse of the information
+  Eigen::MatrixXd residuals;    ///< at x
+  Eigen::VectorXd scales;       ///< of each channel: its residuals' robust standard deviation
 };
 
 /// One number of x before the fit.

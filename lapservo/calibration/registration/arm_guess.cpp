@@ -1,8 +1,10 @@
 #include "lapservo/calibration/registration/arm_guess.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
@@ -31,6 +33,9 @@ Turned best_rotation(const std::vector<Eigen::Vector3d>& from, const std::vector
           2 - 2 * svd.singularValues().dot(signs) / static_cast<double>(from.size())};
 }
 
+// By how many times the other sign of a joint has to explain the motion worse, as a mean square.
+constexpr double telling_misfit = 9;
+
 // Offset of phi and rotation for one sign of phi.
 struct Swing {
   double sign, offset;
@@ -38,29 +43,27 @@ struct Swing {
 };
 
 Swing best_swing(const std::vector<TimedPose>& poses, const std::vector<std::array<double, 4>>& joints,
-                 const Joints& given) {
+                 const Joints& given, double sign) {
   std::vector<Eigen::Vector3d> axes, shafts(poses.size());
   for (const TimedPose& pose : poses) axes.push_back(pose.axis());
   double mean = 0;
   for (const auto& at : joints) mean += at[1] / static_cast<double>(joints.size());
-  const auto turned_at = [&](double sign, double offset) {
+  const auto turned_at = [&](double offset) {
     for (std::size_t i = 0; i < joints.size(); ++i) {
       const double theta_rad = given.sign[0] * joints[i][0] + given.offset[0], phi_rad = sign * joints[i][1] + offset;
       shafts[i] = shaft_axis_in_rcm({theta_rad, phi_rad, 0, 0});
     }
     return best_rotation(shafts, axes);
   };
-  Swing best{1, 0, {Eigen::Matrix3d::Identity(), 1e300}};
-  const auto consider = [&](double sign, double offset) {
-    if (const Turned turned = turned_at(sign, offset); turned.misfit < best.turned.misfit)
-      best = {sign, offset, turned};
+  Swing best{sign, 0, {Eigen::Matrix3d::Identity(), 1e300}};
+  const auto consider = [&](double offset) {
+    if (const Turned turned = turned_at(offset); turned.misfit < best.turned.misfit) best = {sign, offset, turned};
   };
   // phi and -phi (with theta turned by pi) are the same axis: of both, phi lies between 0 and pi in the mean.
   constexpr int parts = 60;
-  for (const double sign : {1.0, -1.0})
-    for (int i = 1; i < parts; ++i) consider(sign, pi * i / parts - sign * mean);
+  for (int i = 1; i < parts; ++i) consider(pi * i / parts - sign * mean);
   for (double step = pi / parts / 2; step > 1e-4; step /= 2)
-    for (const double offset : {best.offset - step, best.offset + step}) consider(best.sign, offset);
+    for (const double offset : {best.offset - step, best.offset + step}) consider(offset);
   return best;
 }
 
@@ -96,7 +99,10 @@ ArmGuess guess_arm(const Instrument& instrument, const std::vector<TimedPose>& p
                    double rho_per_joint) {
   ArmGuess guess;
   guess.joints = instrument.joints.value();
-  const Swing swing = best_swing(poses, joints, guess.joints);
+  std::array swings{best_swing(poses, joints, guess.joints, 1), best_swing(poses, joints, guess.joints, -1)};
+  if (swings[1].turned.misfit < swings[0].turned.misfit) std::swap(swings[0], swings[1]);
+  const Swing& swing = swings[0];
+  if (swings[1].turned.misfit < telling_misfit * swing.turned.misfit) guess.open_sign = 1;
   guess.misfit_rad = std::sqrt(std::max(0.0, swing.turned.misfit));
   guess.camera_from_rcm = {Eigen::Quaterniond(swing.turned.rotation).normalized(), rcm_m};
   guess.joints.sign[1] = swing.sign, guess.joints.offset[1] = swing.offset;
@@ -108,20 +114,19 @@ ArmGuess guess_arm(const Instrument& instrument, const std::vector<TimedPose>& p
       guess = over;
   }
 
-  double low = joints[0][2], high = low;
-  for (const auto& at : joints) low = std::min(low, at[2]), high = std::max(high, at[2]);
-  constexpr double least_travel_m = 0.003;
-  if (high - low > least_travel_m) guess.joints.sign[2] = rho_per_joint < 0 ? -1 : 1;
+  constexpr double least_slope = 0.5;
+  guess.joints.sign[2] = rho_per_joint < 0 ? -1 : 1;
+  if (std::abs(rho_per_joint) < least_slope) guess.open_sign = 2;
   std::vector<double> offsets_m;
   for (std::size_t i = 0; i < poses.size(); ++i)
     offsets_m.push_back((poses[i].origin() - rcm_m).dot(poses[i].axis()) - guess.joints.sign[2] * joints[i][2]);
   guess.joints.offset[2] = median(offsets_m);
 
-  const double given = guess.joints.sign[3];
-  auto turn = mean_turn(poses, joints, instrument.marker, guess, given);
-  if (const auto other = mean_turn(poses, joints, instrument.marker, guess, -given);
-      std::abs(other) > std::abs(turn) + 0.02)
-    turn = other, guess.joints.sign[3] = -given;
+  auto turn = mean_turn(poses, joints, instrument.marker, guess, 1);
+  auto other = mean_turn(poses, joints, instrument.marker, guess, -1);
+  guess.joints.sign[3] = std::abs(turn) > std::abs(other) ? 1 : -1;
+  if (guess.joints.sign[3] < 0) std::swap(turn, other);
+  if (1 - std::abs(other) < telling_misfit * (1 - std::abs(turn))) guess.open_sign = 3;
   const double offset = instrument.joints->offset[3];
   guess.joints.offset[3] = offset + wrap_pi(std::arg(turn) - offset);
   return guess;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "lapservo/calibration/recording/joint_recording.h"
@@ -12,7 +15,8 @@ namespace lapservo::internal {
 struct ArmGuess {
   Rigid3 camera_from_rcm;
   Joints joints;
-  double misfit_rad = 0;  ///< rms of the axes about it
+  double misfit_rad = 0;                 ///< rms of the axes about it
+  std::optional<std::size_t> open_sign;  ///< a joint whose other sign explains the motion about as well
 };
 
 /// Signs, offsets and rotation by the axes and turns of poses whose joints are known; `rcm_m`: where the axes meet.

@@ -5,12 +5,17 @@
 
 #include <Eigen/Geometry>
 
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/joint_conversion.h"
 #include "lapservo/robot/backlash.h"
 
 namespace lapservo::internal {
+
+Eigen::MatrixXd arm_covariance(const FrameFit& fit) {
+  return covariance_at_least(unmodelled_sigmas * unmodelled_sigmas * fit.covariance, fit.independent);
+}
 
 ArmModel::ArmModel(const Instrument& instrument, const ArmStart& start, const JointRecording& recording,
                    const ArmFaults& faults)

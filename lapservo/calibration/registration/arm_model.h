@@ -15,6 +15,9 @@ namespace lapservo::internal {
 /// Times sigma: what goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor
 /// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/notes/calibration.md).
 inline constexpr double unmodelled_sigmas = 2;
+/// Of an arm's numbers: as the residuals scatter, times this, but nowhere smaller than by the information alone: in
+/// directions that the motion leaves open, residuals scatter little.
+Eigen::MatrixXd arm_covariance(const FrameFit& fit);
 
 /// Which faults an arm's model may have beside a wrong registration.
 struct ArmFaults {

@@ -47,6 +47,9 @@ ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& p
   if (poses.size() < min_registration_poses) return start.refusal = too_few_poses(poses.size()), start;
   const double about_s = instrument.image_delay_s.value_or(0);
   refuse_apart(poses, recording, about_s, source);
+  const Joints& joints = instrument.joints.value();
+  if (const std::string still = still_joints(joints, ranges_of(recording.joints)); !still.empty())
+    return start.refusal = still + ": " + swing_more, start;
   const auto meeting = axes_meeting_point(poses);
   if (!meeting)
     return start.refusal = std::string("the shaft's axes are too alike to tell where they meet: ") + swing_more, start;
@@ -69,9 +72,16 @@ ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& p
     return start.refusal = fmt::format("{} frames lie within the recording of the joints, at least {} are needed",
                                        start.poses.size(), min_registration_poses),
            start;
+  start.ranges = ranges_of(start.joints);
+  if (const std::string still = still_joints(joints, start.ranges); !still.empty())
+    return start.refusal = "while the marker is seen, " + still + ": " + swing_more, start;
   start.guess = guess_arm(instrument, start.poses, start.joints, meeting->point_m, search.rho_per_joint);
   if (start.guess.misfit_rad > max_misfit_rad)
     return foreign(fmt::format("axes miss by {:.2f} rad", start.guess.misfit_rad));
+  if (const auto open = start.guess.open_sign)
+    return start.refusal = fmt::format("both signs of {} explain the motion ({}): move it independently of the others",
+                                       joints.names[*open], travels_text(joints, start.ranges)),
+           start;
   return start;
 }
 

@@ -8,6 +8,7 @@
 #include "lapservo/calibration/recording/joint_recording.h"
 #include "lapservo/calibration/registration/arm_guess.h"
 #include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/rig/joint_travel.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
@@ -25,11 +26,13 @@ struct ArmStart {
   /// Those that the recording covers whichever way the fit moves the delay, and the joints there.
   std::vector<TimedPose> poses;
   std::vector<std::array<double, 4>> joints;
+  JointRanges ranges;  ///< of these
   ArmGuess guess;
   double delay_s = 0;
 };
 
-/// Delay, signs and a first registration, whatever of them the instrument knows. Throws InputError when the recording
+/// Delay, signs and a first registration, whatever of them the instrument knows: refused where a joint stood still, or
+/// where its sign does not show. Throws InputError when the recording
 /// and the frames have no time in common, naming `source`.
 ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& poses, const JointRecording& recording,
                    const std::string& source);

@@ -12,6 +12,9 @@
 #include "lapservo/calibration/registration/arm_start.h"
 #include "lapservo/calibration/registration/axes_meeting_point.h"
 #include "lapservo/core/statistics.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/joint_conversion.h"
 
 namespace lapservo::internal {
 namespace {
@@ -30,14 +33,6 @@ Eigen::Vector4d quaternion_sigma(const Eigen::Quaterniond& q, const Eigen::Matri
     slopes.col(i) = (q * turn).coeffs();
   }
   return (slopes * turn_covariance * slopes.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
-}
-
-std::string travel_of(const std::vector<std::array<double, 4>>& joints) {
-  std::array<double, 4> low = joints.front(), high = low;
-  for (const auto& at : joints)
-    for (std::size_t j = 0; j < 4; ++j) low[j] = std::min(low[j], at[j]), high[j] = std::max(high[j], at[j]);
-  return fmt::format("theta's joint moved by {:.2f} rad, phi's by {:.2f} rad, rho's by {:.1f} mm, psi's by {:.2f} rad",
-                     high[0] - low[0], high[1] - low[1], 1e3 * (high[2] - low[2]), high[3] - low[3]);
 }
 
 // Where the axes meet when all of them are wrong alike: in distance, and tilted along the view.
@@ -76,7 +71,7 @@ double common_turn_rad(const std::vector<TimedPose>& poses) {
 
 void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result) {
   result.camera_from_rcm = model.camera_from_rcm(fit.x);
-  const Eigen::MatrixXd covariance = unmodelled * fit.covariance;
+  const Eigen::MatrixXd covariance = arm_covariance(fit);
   const Eigen::VectorXd sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const ArmModel::Blocks& blocks = model.blocks();
   const Eigen::Matrix3d turn = blocks.rotation.of(covariance);
@@ -86,7 +81,9 @@ void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result
   Registration::Arm arm;
   arm.joints = model.joints(fit.x);
   for (Eigen::Index i = 0; i < 3; ++i) arm.sigma_offset[static_cast<std::size_t>(i) + 1] = blocks.offsets.of(sigma)[i];
-  arm.sigma_offset[3] = std::hypot(arm.sigma_offset[3], common_turn_rad(model.poses()));
+  arm.covariance = covariance.topLeftCorner<9, 9>();  // of rotation, translation, offsets, as they stand there
+  arm.covariance(8, 8) += std::pow(common_turn_rad(model.poses()), 2);
+  arm.sigma_offset[3] = std::sqrt(arm.covariance(8, 8));
   arm.image_delay_s = blocks.delay.of(fit.x)[0], arm.sigma_image_delay_s = blocks.delay.of(sigma)[0];
   arm.backlash = model.backlash_of(fit.x);
   result.arm = arm;
@@ -100,7 +97,49 @@ void report_arm(const ArmModel& model, const FrameFit& fit, Registration& result
   }
 }
 
+Rigid3 placed(const Marker& marker, const Registration& registration, const std::array<double, 4>& readings,
+              const Eigen::Matrix<double, 9, 1>& off) {
+  Joints joints = registration.arm->joints;
+  for (Eigen::Index i = 0; i < 3; ++i) joints.offset[static_cast<std::size_t>(i) + 1] += off[6 + i];
+  Rigid3 camera_from_rcm = registration.camera_from_rcm;
+  camera_from_rcm.rotation = camera_from_rcm.rotation * rotation_by(off.head<3>());
+  camera_from_rcm.translation += off.segment<3>(3);
+  const auto q = JointVector::from_vector(q_from_joints(joints, Eigen::Vector4d(readings.data())));
+  return camera_from_marker(marker, camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
+}
+
 }  // namespace
+
+MarkerPlacementSigma placement_sigma(const Marker& marker, const Registration& registration,
+                                     const std::array<double, 4>& readings) {
+  constexpr double step = 1e-6;  // rad, m
+  const Rigid3 is = placed(marker, registration, readings, Eigen::Matrix<double, 9, 1>::Zero());
+  Eigen::Matrix<double, 6, 9> slopes;
+  for (Eigen::Index i = 0; i < 9; ++i) {
+    const Rigid3 off = placed(marker, registration, readings, step * Eigen::Matrix<double, 9, 1>::Unit(i));
+    slopes.col(i) << (off.translation - is.translation) / step,
+        rotation_vector_of(is.rotation.conjugate() * off.rotation) / step;
+  }
+  const Eigen::Matrix<double, 6, 1> variances =
+      (slopes * registration.arm.value().covariance * slopes.transpose()).diagonal().cwiseMax(0);
+  return {std::sqrt(variances.head<3>().sum()), std::sqrt(variances[3] + variances[4]), std::sqrt(variances[5])};
+}
+
+MarkerPlacementSigma placement_sigma_beyond(const Marker& marker, const Registration& registration, double beyond_rad,
+                                            double beyond_m) {
+  const JointRanges& ranges = registration.arm.value().ranges;
+  const std::array<double, 4> beyond{beyond_rad, beyond_rad, beyond_m, beyond_rad};
+  MarkerPlacementSigma most;
+  for (unsigned corner = 0; corner < 16; ++corner) {
+    std::array<double, 4> readings;
+    for (std::size_t j = 0; j < 4; ++j)
+      readings[j] = corner >> j & 1U ? ranges.high[j] + beyond[j] : ranges.low[j] - beyond[j];
+    const MarkerPlacementSigma sigma = placement_sigma(marker, registration, readings);
+    most = {std::max(most.place_m, sigma.place_m), std::max(most.axis_rad, sigma.axis_rad),
+            std::max(most.roll_rad, sigma.roll_rad)};
+  }
+  return most;
+}
 
 Registration register_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses,
                           const AtIteration& at_iteration) {
@@ -118,9 +157,9 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
   const bool known = instrument.camera_from_rcm.has_value();
   result.camera_from_rcm = {known ? instrument.camera_from_rcm->rotation : usual_rotation(poses), meeting->point_m};
   result.sigma_translation_m = sigma_m;
-  result.unknown.push_back(known ? "camera_from_rcm's rotation is the rig's: it takes --joints to measure it"
-                                 : "camera_from_rcm's rotation is a convention (x along the mean shaft, z up in the "
-                                   "image), not the arm's: theta, phi and psi differ from the joints' by constants");
+  result.unknown.emplace_back(known ? "camera_from_rcm's rotation is the rig's: it takes --joints to measure it"
+                                    : "camera_from_rcm's rotation is a convention (x along the mean shaft, z up in the "
+                                      "image), not the arm's: theta, phi and psi differ from the joints' by constants");
   result.unknown.emplace_back("joints and image_delay_s stay as the rig has them: they take --joints");
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Eigen::Vector3d arm_m = poses[i].origin() - meeting->point_m;
@@ -139,13 +178,18 @@ Registration register_arm(const Instrument& instrument, const std::vector<TimedP
   const auto fit = fit_frames([&](const Eigen::VectorXd& x) { return model.residuals(x); }, model.unknowns(),
                               2 * poses_per_second(start.poses), at_iteration);
   if (!fit)
-    return result.refusal = "the motion leaves the registration open: " + travel_of(start.joints) + ": " + swing_more,
+    return result.refusal =
+               "the motion leaves the registration open: " + travels_text(start.guess.joints, start.ranges) + ": " +
+               swing_more,
            result;
   report_arm(model, *fit, result);
-  if (result.sigma_translation_m.norm() > max_sigma_m || result.sigma_rotation_rad > max_sigma_rad)
-    result.refusal = fmt::format("it would be known to {:.1f} mm and {:.2f} degrees only; {}: {}",
-                                 1e3 * result.sigma_translation_m.norm(), 57.3 * result.sigma_rotation_rad,
-                                 travel_of(start.joints), swing_more);
+  result.arm->ranges = start.ranges;
+  const auto& sigma_offset = result.arm->sigma_offset;
+  const double sigma_m = std::max(result.sigma_translation_m.norm(), sigma_offset[2]);
+  const double sigma_rad = std::max({result.sigma_rotation_rad, sigma_offset[1], sigma_offset[3]});
+  if (sigma_m > max_sigma_m || sigma_rad > max_sigma_rad)
+    result.refusal = fmt::format("it would be known to {:.1f} mm and {:.2f} degrees only; {}: {}", 1e3 * sigma_m,
+                                 57.3 * sigma_rad, travels_text(start.guess.joints, start.ranges), swing_more);
   result.unknown.emplace_back("theta's offset is the rig's: camera_from_rcm turns with it");
   return result;
 }

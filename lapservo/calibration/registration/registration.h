@@ -9,6 +9,7 @@
 #include "lapservo/calibration/fit/at_iteration.h"
 #include "lapservo/calibration/recording/joint_recording.h"
 #include "lapservo/calibration/registration/timed_pose.h"
+#include "lapservo/rig/joint_travel.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
@@ -34,7 +35,10 @@ struct Registration {
     Joints joints;
     std::array<double, 4> sigma_offset{};  ///< 0: the rig's own, which camera_from_rcm absorbs
     double image_delay_s = 0, sigma_image_delay_s = 0;
-    std::array<double, 4> backlash{};  ///< between joint readings and instrument, rad and m; 0 where it did not move
+    std::array<double, 4> backlash{};  ///< between joint readings and instrument, rad and m
+    JointRanges ranges{};              ///< of the joints' readings
+    /// Of a turn of camera_from_rcm about its own axes (3), of its translation (3), of the offsets of phi, rho, psi.
+    Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
   };
   std::optional<Arm> arm;
 
@@ -42,16 +46,27 @@ struct Registration {
   std::vector<RegistrationResidual> residuals;
 };
 
+/// By how much a registration may put the marker off, one sigma: its place, its axis' direction, its turn about that.
+struct MarkerPlacementSigma {
+  double place_m = 0, axis_rad = 0, roll_rad = 0;
+};
+/// At readings of the joints, within what they moved by or beyond. Needs Registration::arm.
+MarkerPlacementSigma placement_sigma(const Marker& marker, const Registration& registration,
+                                     const std::array<double, 4>& readings);
+/// The largest over the corners of what the joints moved by, widened to all sides by so much.
+MarkerPlacementSigma placement_sigma_beyond(const Marker& marker, const Registration& registration, double beyond_rad,
+                                            double beyond_m);
+
 /// From the poses alone: where the RCM is. The rotation stays the rig's; where it has none, x points along the mean
 /// shaft and z up in the image, so that phi is near a right angle.
 Registration register_rcm(const Instrument& instrument, const std::vector<TimedPose>& poses,
                           const AtIteration& at_iteration = {});
 
 /// camera_from_rcm, joints.sign, joints.offset and image_delay_s, with the backlash between readings and instrument,
-/// whatever of them the instrument knows; its `joints` names the columns. theta's offset stays the rig's, and of the
-/// two ways to turn the RCM frame (z up or down, with the signs of theta and phi) that nearer to the rig's
-/// camera_from_rcm, else that of its theta's sign. Throws InputError when the recording and the frames have no time in
-/// common, naming `source`.
+/// whatever of them the instrument knows; its `joints` names the columns. Refused where a joint stood still. theta's
+/// offset stays the rig's, and of the two ways to turn the RCM frame (z up or down, with the signs of theta and phi)
+/// that nearer to the rig's camera_from_rcm, else that of its theta's sign. Throws InputError when the recording and
+/// the frames have no time in common, naming `source`.
 Registration register_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
                           const JointRecording& recording, const std::string& source,
                           const AtIteration& at_iteration = {});

@@ -1,5 +1,7 @@
 #include "lapservo/calibration/registration/registration.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -11,7 +13,9 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/rig/joint_conversion.h"
 #include "lapservo/robot/backlash.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/rigs.h"
@@ -23,7 +27,9 @@ namespace {
 // An arm in smooth motion, its joints read at 100 Hz, its marker seen 30 times a second with the noise that its sigmas
 // say.
 struct Motion {
-  double seconds = 20, delay_s = 0.08, swing = 1;
+  double seconds = 20, delay_s = 0.08;
+  std::array<double, 4> swing{1, 1, 1, 1};  // of each joint's usual one
+  double common_turn_rad = 0;               // of all frames: the film's and the print's
   std::array<double, 4> sign{1, -1, 1, -1}, offset{0.2, 1.5, -0.02, 0.7}, backlash{};
   std::uint64_t seed = 1;
 };
@@ -34,10 +40,10 @@ struct Recorded {
   JointRecording recording;
 };
 
-JointVector motion_at(double t, double swing, std::uint64_t seed) {
+JointVector motion_at(double t, const std::array<double, 4>& swing, std::uint64_t seed) {
   const double p = 0.3 * static_cast<double>(seed);
-  return {0.2 + swing * 0.35 * std::sin(0.9 * t + p), 1.45 + swing * 0.25 * std::sin(1.3 * t + 2 * p),
-          0.11 + swing * 0.02 * std::sin(0.7 * t + 3 * p), swing * 1.2 * std::sin(0.8 * t + p)};
+  return {0.2 + swing[0] * 0.35 * std::sin(0.9 * t + p), 1.45 + swing[1] * 0.25 * std::sin(1.3 * t + 2 * p),
+          0.11 + swing[2] * 0.02 * std::sin(0.7 * t + 3 * p), swing[3] * 1.2 * std::sin(0.8 * t + p)};
 }
 
 Recorded recorded(const Motion& motion) {
@@ -75,11 +81,17 @@ Recorded recorded(const Motion& motion) {
     const auto n = [&] { return random.normal(); };
     seen.camera_from_marker.translation =
         exact.translation + 1e-4 * n() * ray + 1e-5 * (n() * side + n() * ray.cross(side));
-    const Eigen::Vector3d turn(7e-4 * n(), 7e-4 * n(), 1e-3 * n());
+    const Eigen::Vector3d turn(7e-4 * n(), 7e-4 * n(), 1e-3 * n() + motion.common_turn_rad);
     seen.camera_from_marker.rotation = exact.rotation * Eigen::AngleAxisd(turn.norm(), turn.normalized());
     result.poses.push_back(pose);
   }
   return result;
+}
+
+// Where an arm as the instrument has it puts the marker.
+Rigid3 marker_at(const Instrument& instrument, const std::array<double, 4>& readings) {
+  const auto q = JointVector::from_vector(q_from_joints(*instrument.joints, Eigen::Vector4d(readings.data())));
+  return camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
 }
 
 // What a user has: names only.
@@ -166,9 +178,89 @@ TEST(RegisterArm, ErrorsAreAsTheirSigmasSayBacklashOrNot) {
   EXPECT_LT(z, 1.5);
 }
 
+// Within the swing, and 30 degrees and 20 mm beside it.
+TEST(RegisterArm, PlacesMarkersAsTheirSigmasSayBesideTheSwing) {
+  for (const double beside : {0.0, 1.0}) {
+    Eigen::Array3d squares = Eigen::Array3d::Zero();
+    int count = 0;
+    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+      Motion motion;
+      motion.seed = seed, motion.seconds = 10;
+      if (seed % 2) motion.backlash = {0.01, 0.01, 1e-3, 0.03};
+      motion.common_turn_rad = 0.5e-3 * Random(100 + seed).normal();  // half of a frame's sigma
+      const Recorded data = recorded(motion);
+      const auto found = register_arm(with_names_only(data.truth), data.poses, data.recording, "joints.csv");
+      ASSERT_EQ(found.refusal, "");
+      Instrument registered = data.truth;
+      registered.camera_from_rcm = found.camera_from_rcm, registered.joints = found.arm->joints;
+      const JointRanges& ranges = found.arm->ranges;
+      for (const double theta : {0.0, 1.0})
+        for (const double phi : {0.0, 1.0}) {
+          std::array<double, 4> at = ranges.low;
+          for (std::size_t j = 0; j < 3; ++j) {
+            const double part = j == 0 ? theta : j == 1 ? phi : 1;
+            at[j] += part * ranges.travel(j) + (2 * part - 1) * beside * (j == 2 ? 0.02 : 0.5236);
+          }
+          const Rigid3 is = marker_at(data.truth, at), placed = marker_at(registered, at);
+          const Eigen::Vector3d turn = rotation_vector_of(is.rotation.conjugate() * placed.rotation);
+          const auto sigma = placement_sigma(data.truth.marker, found, at);
+          squares += Eigen::Array3d((placed.translation - is.translation).norm() / sigma.place_m,
+                                    turn.head<2>().norm() / sigma.axis_rad, turn.z() / sigma.roll_rad)
+                         .square();
+          ++count;
+        }
+    }
+    const Eigen::Array3d z = (squares / count).sqrt();
+    EXPECT_TRUE((z > 0.5).all() && (z < 1.5).all()) << beside << ": " << z.transpose();
+  }
+}
+
+// Whatever signs the rig has, and without offsets.
+TEST(RegisterArm, RefusesWhereJointsStoodStillAndNamesThem) {
+  for (unsigned still = 1; still < 15; ++still) {
+    Motion motion;
+    for (std::size_t j = 0; j < 4; ++j)
+      if (still >> j & 1U) motion.swing[j] = 1e-3;
+    const Recorded data = recorded(motion);
+    for (std::size_t wrong = 0; wrong < 4; ++wrong) {
+      Instrument rig = data.truth;
+      rig.joints->offset = {}, rig.joints->sign[wrong] *= -1;
+      const auto found = register_arm(rig, data.poses, data.recording, "joints.csv");
+      for (std::size_t j = 0; j < 4; ++j)
+        EXPECT_EQ(found.refusal.find(data.truth.joints->names[j] + " moved by 0.0") != std::string::npos,
+                  (still >> j & 1U) != 0)
+            << still << ": " << found.refusal;
+    }
+  }
+}
+
+// theta and phi in step: seen from a turned frame, that is either sign of phi.
+TEST(RegisterArm, RefusesASignThatDoesNotShow) {
+  Motion motion;
+  motion.swing = {0.2, 0.28, 1, 1};
+  for (const bool in_step : {true, false}) {
+    Recorded swung = recorded(motion);
+    const Instrument& truth = swung.truth;
+    if (in_step) {  // the same arm with phi's joint led by theta's
+      JointRecording led = swung.recording;
+      const auto first = led.joints.front();
+      for (auto& at : led.joints) at[1] = first[1] + at[0] - first[0];
+      for (TimedPose& pose : swung.poses) {
+        const double time_s = std::clamp(pose.time_s - motion.delay_s, 0.0, 19.9);
+        const Rigid3 noise = marker_at(truth, *swung.recording.at(time_s)).inverse() * pose.marker.camera_from_marker;
+        pose.marker.camera_from_marker = marker_at(truth, *led.at(time_s)) * noise;
+      }
+      swung.recording = led;
+    }
+    const std::string refusal =
+        register_arm(with_names_only(truth), swung.poses, swung.recording, "joints.csv").refusal;
+    EXPECT_EQ(refusal.find("both signs of pitch explain the motion") != std::string::npos, in_step) << refusal;
+  }
+}
+
 TEST(RegisterArm, RefusesWhatCanNotTell) {
   Motion still;
-  still.swing = 0.01;
+  still.swing.fill(0.01);
   const Recorded little = recorded(still);
   EXPECT_NE(register_arm(with_names_only(little.truth), little.poses, little.recording, "j").refusal.find("swing"),
             std::string::npos);
@@ -249,7 +341,7 @@ TEST(RegisterRcm, PutsItWhereTheAxesMeet) {
   EXPECT_GT(std::sqrt(squares / count), 0.05) << "sigma counts what frames have in common; these have nothing";
   EXPECT_LT(std::sqrt(squares / count), 1);
   Motion still;
-  still.swing = 0.05;
+  still.swing.fill(0.05);
   EXPECT_NE(register_rcm(recorded(still).truth, recorded(still).poses).refusal.find("too alike"), std::string::npos);
 }
 

@@ -34,7 +34,8 @@ void print_numbers(const Instrument& before, const Registration& registration) {
     std::printf("  %-22s   %10s   %10.4f   %8.4f\n", n.name.c_str(),
                 std::isfinite(n.before) ? fmt::format("{:.4f}", n.before).c_str() : "-", n.after, n.sigma);
   if (!registration.arm) return;
-  const auto& [joints, sigma, delay_s, sigma_delay_s, backlash] = *registration.arm;
+  const Joints& joints = registration.arm->joints;
+  const auto& backlash = registration.arm->backlash;
   std::printf("  joints.sign: %+.0f %+.0f %+.0f %+.0f\n", joints.sign[0], joints.sign[1], joints.sign[2],
               joints.sign[3]);
   std::printf("  backlash behind the readings (not written): theta %.1f, phi %.1f mrad, rho %.2f mm, psi %.1f mrad\n",
@@ -52,6 +53,20 @@ void print_residuals(const Registration& registration) {
       "%zu frames\n",
       position_mm, 1e3 * rms(registration.residuals, &RegistrationResidual::axis_rad),
       1e3 * rms(registration.residuals, &RegistrationResidual::roll_rad), registration.residuals.size());
+}
+
+// Where it holds, and what it is worth beside that.
+void print_reach(const Marker& marker, const Registration& registration) {
+  if (!registration.arm) return;
+  constexpr double beyond_rad = 0.52, beyond_m = 0.02;
+  const auto within = placement_sigma_beyond(marker, registration, 0, 0);
+  const auto beyond = placement_sigma_beyond(marker, registration, beyond_rad, beyond_m);
+  std::printf(
+      "it places the marker to %.2f mm and %.1f mrad (one sigma) where %s, to %.2f mm and %.1f mrad 30 degrees "
+      "and 20 mm beyond\n",
+      1e3 * within.place_m, 1e3 * within.axis_rad,
+      ranges_text(registration.arm->joints, registration.arm->ranges).c_str(), 1e3 * beyond.place_m,
+      1e3 * beyond.axis_rad);
 }
 
 }  // namespace
@@ -78,6 +93,7 @@ int calibrate_registration(const CalibrateOptions& options) {
   if (!registration.refusal.empty()) return refuse_calibration(options, registration.refusal);
   print_numbers(instrument, registration);
   print_residuals(registration);
+  print_reach(instrument.marker, registration);
   for (const std::string& what : registration.unknown) std::printf("%s\n", what.c_str());
   rig.instruments[index] = registered(rig.instruments[index], registration);
   out.stream() << rig_yaml(rig, options.out);
