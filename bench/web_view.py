@@ -82,7 +82,8 @@ def run(tool, rig, duration_s, web, crowded):
         arm = subprocess.Popen([tool, "sim-robot", "--rig", rig, "--fps", "30"], env=environment, stdout=subprocess.DEVNULL)
         try:
             loop = subprocess.Popen(
-                [tool, "servo", "--rig", rig, "--robot", "ros2:SIM_PSM1", "--camera", "ros2:/endoscope/image_raw", "--enable-motion", "--duration",
+                [tool, "servo", "--rig", rig, "--robot", "ros2:SIM_PSM1", "--camera", "ros2:/endoscope/image_raw", "--enable-motion",
+                 "--joint-limits", "configs/joint_limits/psm-classic.yaml", "--duration",
                  str(duration_s), "--fps", str(PERIODS_PER_S), "--out", folder + "/run", *(["--web", "0"] if web else [])],
                 env=environment, stdout=subprocess.PIPE, text=True)
             viewer = crowd = None

@@ -59,6 +59,13 @@ instruments:
       offset: [0, 0, 0, 0]
 )";
 
+// Of the simulated arm, in the order of the rig's joints.
+constexpr const char* joint_limits = R"(lower: [-1.5, -1.5, 0.01, -7]
+upper: [1.5, 1.5, 0.24, 7]
+rate: [0.4, 0.4, 0.04, 1.5]
+acceleration: [2, 2, 0.2, 7.5]
+)";
+
 // The same as made and mounted: another lens, other inks, a print cut by hand, an arm with encoders of its own.
 Rig mounted(Rig rig) {
   rig.camera.fx_px = rig.camera.fy_px = 825;
@@ -97,6 +104,7 @@ class Sample {
   void make() {
     write_file(folder_ / "rig.yaml", designed_rig);
     write_file(folder_ / "truth.yaml", rig_yaml(truth_));
+    write_file(folder_ / "joint_limits.yaml", joint_limits);
     show_boards();
     record("turn", turn_images, turning);
     record("swing", swing_images, swinging);
@@ -184,6 +192,7 @@ void add_sample(Command app, Run& run_later) {
       "swing/       the instrument swung in all four joints, the same; swing_joints.csv has its joints\n"
       "video.mp4    the swing as a camera films it: H.264, 30 images a second\n"
       "truth.yaml   the rig that calibration should find\n"
+      "joint_limits.yaml  limits of the simulated arm's joints, for servo --joint-limits\n"
       "Example:\n  lapservo sample morning");
   command.runs(run_later, [folder] { return run(*folder); });
 }
