@@ -281,13 +281,13 @@ TEST_F(CommandLine, PicturesThatAreNone) {
   expect_refused(track("in/missing.png"), {"missing.png", "does not exist"});
   expect_refused(track(in("half.png", png.substr(0, png.size() / 2))), {"half.png", "truncated"});
   expect_refused(track(in("half.jpg", jpg.substr(0, jpg.size() / 2))), {"half.jpg", "truncated"});
-  expect_refused(track(in("text.png", "this is no picture")), {"text.png", "expected a PNG"});
+  expect_refused(track(in("text.png", "this is no image")), {"text.png", "expected a PNG"});
   expect_refused(track(in("film.mp4", "this is no film")), {"film.mp4", "expected"});
   expect_refused(track("in/small.png"), {"small.png", "960x540", "1280x720"});
   in("empty.png", "");
   expect_refused(track("in/empty.png"), {"empty.png", "is empty"});
   fs::create_directories("in/folder");
-  expect_refused(track("in/folder"), {"folder", "no pictures"});
+  expect_refused(track("in/folder"), {"folder", "no images"});
 }
 
 TEST_F(CommandLine, GreyDeepAndTransparentPicturesAreAccepted) {
@@ -420,7 +420,7 @@ TEST_F(CommandLine, NumbersThatAreNone) {
     for (const char* name : names)
       for (const char* value : {"nan", "-1", "1x"})
         expect_refused(command + " --" + name + " " + value, {name, "expected"});
-  for (const char* list : {"start 0,1.5,nan,0", "start 0,1.5,0.1,1e999", "set-point nan,795,365,212", "via 1,2,x,4",
+  for (const char* list : {"start 0,1.5,nan,0", "start 0,1.5,0.1,1e999", "setpoint nan,795,365,212", "via 1,2,x,4",
                            "rcm-px nan,1", "hide 1,inf"})
     expect_refused(servo + " --" + list,
                    {std::string(list).substr(0, std::string(list).find(' ')).c_str(), "expected"});
@@ -743,7 +743,7 @@ instruments:
   EXPECT_EQ(run("calibrate camera in/boards/0.png" + board + " --rig " + rig), 1);
   expect_in(errors(), "3 more views");
   EXPECT_EQ(run("calibrate camera in/boards/9.png" + board + " --rig " + rig), 1);
-  expect_in(errors(), "in none of 1 pictures");
+  expect_in(errors(), "in none of 1 images");
   EXPECT_EQ(read_file(rig), before);
 
   expect_done("calibrate camera in/boards" + board + " --rig " + rig + " --camera-info out/camera.yaml");

@@ -1,6 +1,6 @@
 // The closed loop through ROS 2's wire and ROS 1's: `lapservo servo` as a process of its own steers an arm in another
-// process or in this one, over loopback. What is asserted goes by the stamps that messages carry and by counts, not by
-// how fast this computer is; waits end early.
+// process or in this one, over loopback. Assertions use the stamps of messages and counts, not the speed of this
+// computer; waits end early.
 
 #include <algorithm>
 #include <array>
@@ -45,7 +45,7 @@ namespace lapservo::internal {
 namespace {
 using testing::wait_for;
 
-constexpr double allowed_s = 0.1;  // from a fault to the last set-point
+constexpr double allowed_s = 0.1;  // from a fault to the last setpoint
 constexpr double tick_s = 1.0 / 500;
 const JointLimits limits;  // those of the file, but for rounded positions
 const double rest_s = (limits.rate.cwiseQuotient(limits.acceleration)).maxCoeff();
@@ -108,7 +108,7 @@ class Process {
   std::optional<int> exit_code_;
 };
 
-// What everybody on the arm's topics can hear of servo_jp.
+// The setpoints that any listener on the arm's topics receives.
 class Spy {
  public:
   explicit Spy(Transport& transport)
@@ -157,7 +157,7 @@ class Spy {
     const Eigen::Array4d step = (last.q - before.q).cwiseAbs();
     EXPECT_TRUE((step <= limits.acceleration.array() * passed_s * passed_s).all()) << step.transpose();
   }
-  // Of messages of one sender: no step is farther than the rate limit over the time between the two, or over a tick.
+  // Among messages of one sender: no step is farther than the rate limit over the time between the two, or over a tick.
   void expect_no_jump() {
     const auto all = heard();
     for (std::size_t i = 1; i < all.size(); ++i) {
@@ -263,7 +263,7 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
   std::unique_ptr<TestRosMaster> master_;
 #endif
 };
-// What goes through the same code whatever the wire is seen on the first one only: it is in real time.
+// Code that all wires share is tested on the first one only: it is in real time.
 class FirstWireLoop : public WireLoop {};
 INSTANTIATE_TEST_SUITE_P(Over, WireLoop, ::testing::ValuesIn(transports()),
                          [](const auto& wire) { return wire.param; });
@@ -390,7 +390,7 @@ struct Fault {
   const char* name;
   std::function<void(Arm&)> begin, end;
   const char* said;
-  bool silent;  // no set-point is sent any more; else they come to rest
+  bool silent;  // no setpoint is sent any more; else they come to rest
 };
 
 TEST_P(FirstWireLoop, HoldsAtAFaultWithin100MillisecondsAndGoesOnAfterAStartWithoutAJump) {
@@ -402,8 +402,8 @@ TEST_P(FirstWireLoop, HoldsAtAFaultWithin100MillisecondsAndGoesOnAfterAStartWith
        [](Arm& a) { a.robot().set_state(OperatingState::enabled); }, "the arm is FAULT", true},
       {"silence", [](Arm& a) { a.silent = true; }, [](Arm& a) { a.silent = false; }, "old_joint_states", true},
       {"repeated stamps", [](Arm& a) { a.frozen = true; }, [](Arm& a) { a.frozen = false; }, "stale_image", false},
-      {"the same picture", [](Arm& a) { a.stuck = true; }, [](Arm& a) { a.stuck = false; }, "frozen_image", false},
-      {"no picture", [](Arm& a) { a.blind = true; }, [](Arm& a) { a.blind = false; }, "stale_image", false},
+      {"the same image", [](Arm& a) { a.stuck = true; }, [](Arm& a) { a.stuck = false; }, "frozen_image", false},
+      {"no image", [](Arm& a) { a.blind = true; }, [](Arm& a) { a.blind = false; }, "stale_image", false},
   };
   Arm room(GetParam(), rig_);
   const auto ears = named_transport(GetParam(), "ears");
@@ -621,7 +621,7 @@ TEST_P(FirstWireLoop, ThePageHoldsStartsAndEnds) {
   ASSERT_TRUE(wait_for([&] { return spy.moves_after(rested_s); })) << said("servo.txt");
   EXPECT_EQ(testing::http_status(testing::http_post(port, "/stop")), 202);
   loop->wait();
-  EXPECT_NE(said("servo.txt").find("end: asked for on the page"), std::string::npos) << said("servo.txt");
+  EXPECT_NE(said("servo.txt").find("end: requested on the page"), std::string::npos) << said("servo.txt");
 }
 
 TEST_P(FirstWireLoop, ThePageEndsTheWaitForAnArm) {
@@ -632,7 +632,7 @@ TEST_P(FirstWireLoop, ThePageEndsTheWaitForAnArm) {
   EXPECT_EQ(testing::http_status(testing::http_post(port, "/stop")), 202);
   EXPECT_EQ(loop->wait(), 1);
   EXPECT_LT(now_s(), asked_s + 10);
-  EXPECT_NE(said("servo.txt").find("end: asked for on the page"), std::string::npos) << said("servo.txt");
+  EXPECT_NE(said("servo.txt").find("end: requested on the page"), std::string::npos) << said("servo.txt");
 }
 
 TEST_P(WireLoop, ATopicThatNobodyPublishesEndsWithTheTopicsThatAreThere) {
@@ -691,7 +691,7 @@ TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {
   wish({now_s(), names, {there[0], 1e6, 200, 100}});
   expect_soon_said("refused: set_point");
   wish({now_s(), names, {there[0], there[1] / 2, there[2] / 2, there[3] / 2}});
-  expect_soon_said("a set-point came");
+  expect_soon_said("a setpoint came");
   sleep(2);
   const Eigen::Vector4d here = {there[0], there[1] / 2, there[2] / 2, there[3] / 2};
   const std::vector<double> begin(here.data(), here.data() + 4), end{here[0], here[1] + 10, here[2], here[3]};
@@ -746,7 +746,7 @@ TEST_P(FirstWireLoop, InterruptedItBringsTheArmToRestAndSaysWhatItCameTo) {
   loop->wait();
   spy.expect_braked();
   spy.expect_no_jump();
-  EXPECT_NE(said("servo.txt").find("set-points: "), std::string::npos);
+  EXPECT_NE(said("servo.txt").find("setpoints: "), std::string::npos);
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 
 namespace lapservo::internal {
 
-// What follows the header in messages that have the same fields in ROS 1 and 2, in their order. `From` gives numbers,
-// texts and sequences as either writes them.
+// The fields after the header of messages that are the same in ROS 1 and 2, in their order. `From` gives numbers, texts
+// and sequences as either writes them.
 
 template <typename From>
 void read_fields(From& from, JointMessage& message) {

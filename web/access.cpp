@@ -111,11 +111,12 @@ std::optional<HttpResponse> Access::refuse(const HttpRequest& request) const {
   const auto host = request.header("host");
   if (!host || !is_own_host(*host)) return refusal(403, "the host is to be an address or localhost");
   const auto count = request.headers.count("origin");
-  if (count > 0 && request.header("origin") != "http://" + *host) return refusal(403, "a page of another site asks");
+  if (count > 0 && request.header("origin") != "http://" + *host)
+    return refusal(403, "a page of another site sends this");
   if (request.method == "POST" && count == 0) return refusal(403, "a POST is to have its Origin");
   const auto site = request.header("sec-fetch-site");
   if (site && *site != "same-origin" && *site != "none" && !follows_a_link(request))
-    return refusal(403, "a page of another site asks");
+    return refusal(403, "a page of another site sends this");
   return ask_for_token(request);
 }
 

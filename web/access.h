@@ -25,8 +25,8 @@ class Access {
   /// `token`: empty for a server that only this computer reaches.
   Access(bool loopback, std::string token) : loopback_(loopback), token_(std::move(token)) {}
 
-  /// What to answer instead; nullopt: it may be answered. Whoever asks for / with ?token=... gets it as a
-  /// cookie, and a page that goes on to / by welcome.js.
+  /// The refusal of a request; nullopt: it may be answered. A request of / with ?token=... gets the token as a cookie,
+  /// and a page that continues to / by welcome.js.
   std::optional<HttpResponse> refuse(const HttpRequest& request) const;
 
  private:

@@ -15,7 +15,7 @@ struct HttpRequest {
   std::map<std::string, std::string> query;         ///< ?name=value
   std::map<std::string, std::string> cookies{};
 
-  /// Of a header that is there once; nullopt else.
+  /// Value of a header that is there once; nullopt otherwise.
   std::optional<std::string> header(const std::string& name) const {
     return headers.count(name) == 1 ? std::optional(headers.find(name)->second) : std::nullopt;
   }

@@ -18,7 +18,7 @@
 namespace lapservo::internal {
 namespace {
 
-// What no page needs is forbidden to it, and nothing is kept by anybody between.
+// Forbids everything that no page needs, and all caching.
 constexpr std::pair<const char*, const char*> always[] = {{"Content-Security-Policy",
                                                            "default-src 'none'; script-src 'self'; style-src 'self'; "
                                                            "img-src 'self' blob: data:; connect-src 'self'; base-uri "

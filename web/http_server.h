@@ -18,21 +18,21 @@ struct MHD_Daemon;
 
 namespace lapservo::internal {
 
-/// What others can cost at most.
+/// Limits on the cost of other programs' requests.
 struct HttpLimits {
   unsigned connections = 48, connections_per_address = 24;
   std::size_t request_bytes = 16384;  ///< request line and headers; a body is refused
   double first_s = 1;                 ///< for a connection's first request to come: who is silent keeps others out
   double head_s = 5;                  ///< for the next one's head, from the answer before on
   double answer_s = 20;               ///< for an answer to be fetched
-  double patience_s = 1;              ///< a request that waits is asked again for the last time
+  double patience_s = 1;              ///< a waiting request is answered at the latest after this time
 };
 
 /// HTTP/1.1 by libmicrohttpd, in one thread at low priority, and another that watches the time.
 class HttpServer {
  public:
-  /// The answer, or nullopt: not yet, which is asked again at the next wake(), and once with `last` when its patience
-  /// has ended. Called in the server's thread.
+  /// The answer, or nullopt: not yet; called again at the next wake(), and once with `last` when its patience has
+  /// ended. Called in the server's thread.
   using Handler = std::function<std::optional<HttpResponse>(const HttpRequest&, bool last)>;
 
   /// At an address of this computer; port 0: any that is free. Throws InputError, naming `option`, where it can't.
@@ -43,7 +43,7 @@ class HttpServer {
   HttpServer& operator=(const HttpServer&) = delete;
 
   int port() const { return port_; }
-  /// Asks for those that wait again. From any thread.
+  /// Calls the handler again for waiting requests. From any thread.
   void wake();
 
  private:

@@ -32,7 +32,7 @@ double now_s() {
   return seconds(std::chrono::steady_clock::now().time_since_epoch());
 }
 
-// Of a clock that is off too: what is not of now can't be trusted to be wanted now.
+// Includes a wrong clock: an old command may be unwanted by now.
 bool is_recent_start(double asked_s) {
   return std::abs(now_s() - asked_s) <= start_lasts_s;
 }
@@ -129,7 +129,7 @@ std::optional<HttpResponse> LivePage::answer(const HttpRequest& request, bool la
   return plain(404, "there is no such page");
 }
 
-// Whoever has one asks for the next: none waits in a socket where the way is slow.
+// The page requests the next image when it has one: none waits in a socket on a slow connection.
 std::optional<HttpResponse> LivePage::picture(const HttpRequest& request, bool last) {
   const long after = after_of(request);
   std::unique_lock lock(mutex_);
@@ -161,7 +161,7 @@ HttpResponse LivePage::command(const HttpRequest& request) {
   if (!config_.has_loop) return plain(403, "nothing that moves is commanded here");
   if (path == "/start") return start(request);
   hold_ = true;
-  return plain(202, "asked for");
+  return plain(202, "accepted");
 }
 
 // The page says when its button was pressed, by this clock: what the network or a stopped process kept back starts
@@ -170,10 +170,10 @@ HttpResponse LivePage::start(const HttpRequest& request) {
   if (!config_.may_start) return plain(403, "lapservo runs without --enable-motion");
   const auto at = request.query.find("at");
   const auto asked_s = at == request.query.end() ? std::nullopt : parse_finite(at->second);
-  if (!asked_s) return plain(400, "a start is to say when it was asked for, ?at= now_s of /state");
+  if (!asked_s) return plain(400, "a start needs its time: ?at= now_s of /state");
   if (!is_recent_start(*asked_s)) return plain(409, "it came too late, nothing was started");
   start_s_ = *asked_s;
-  return plain(202, "asked for");
+  return plain(202, "accepted");
 }
 
 HttpResponse LivePage::state() {
@@ -227,7 +227,7 @@ void LivePage::draw() {
       continue;
     }
     if (newest_.number == 0 || (drawn_ && drawn_->number == newest_.number)) {
-      changed_.wait_for(lock, between_looks);  // so that the loop need not tell
+      changed_.wait_for(lock, between_looks);  // so that the loop need not wake it
       continue;
     }
     watched_until_ = {};

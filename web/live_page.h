@@ -23,9 +23,9 @@ namespace lapservo::internal {
 
 struct PageConfig {
   std::string title;                  ///< what runs, in a few words
-  std::string address = "127.0.0.1";  ///< to listen at; beyond this computer's own a token is asked for
+  std::string address = "127.0.0.1";  ///< to listen at; beyond this computer's own a token is required
   int port = 8080;                    ///< 0: any that is free
-  bool live = true;                   ///< what is old is no longer so; else a file's
+  bool live = true;                   ///< images get old; a file's do not
   bool has_loop = false;              ///< a loop that can be held and started
   bool may_start = false;
   HttpLimits limits{};
@@ -39,7 +39,7 @@ struct PageImage {
   double age_s = 0;  ///< since the image came
 };
 
-/// What the loop does: s_rad, r_px, l_px, d_px.
+/// The loop's state: s_rad, r_px, l_px, d_px.
 struct PageLoop {
   double time_s = 0;  ///< since it began
   std::optional<Eigen::Vector4d> desired, features, error;
@@ -47,14 +47,14 @@ struct PageLoop {
   bool limited = false;
 };
 
-/// What those before the page want.
+/// The commands of the page's users.
 struct PageWishes {
   std::optional<bool> hold;  ///< true: hold; false: start; the last one
   bool stop = false;         ///< end the run
 };
 
-/// The page for those without a screen on this computer. Those who tell it something never wait: of images it keeps the
-/// newest, and draws and encodes it in a thread of its own at low priority, while somebody watches.
+/// The page for users without a screen on this computer. Its inputs never wait: it keeps the newest image only, and
+/// draws and encodes it in a thread of its own at low priority, while somebody watches.
 class LivePage {
  public:
   /// Throws InputError when it can't listen there.
@@ -74,8 +74,8 @@ class LivePage {
   void end() { over_ = true; }
   /// Whether a browser has shown the page.
   bool was_watched() const { return watched_; }
-  /// What was asked for since the last call. A start that nobody took within a second is none: who asked for it no
-  /// longer expects that the arm moves.
+  /// The commands since the last call. A start that is not taken within a second is void: its sender does not expect
+  /// motion any more.
   PageWishes take_wishes();
 
  private:
@@ -122,7 +122,7 @@ class LivePage {
   Mailbox<Shown> images_;
   Mailbox<Told> loops_;
   std::atomic<bool> hold_ = false, stop_ = false, over_ = false, watched_ = false;
-  std::atomic<double> start_s_ = never;  ///< when it was asked for
+  std::atomic<double> start_s_ = never;  ///< when it was requested
 
   // The page's threads' only.
   std::mutex mutex_;

@@ -51,7 +51,7 @@ PageImage image_of(const Rig& rig, double brightness) {
   return {bgr, std::make_shared<const Rig>(rig), {seen}, 0.01};
 }
 
-// As the page does: asks again where none came in time.
+// Like the page: requests again after a timeout.
 std::string newer_picture(int port, int after) {
   std::string answer;
   for (int i = 0; i < 100 && http_status(answer) != 200; ++i)
@@ -71,7 +71,7 @@ TEST(LivePage, ShowsTheNewestImageToWhoeverWaits) {
   EXPECT_NE(answer.find("X-Number: 3\r\n"), std::string::npos) << answer.substr(0, 600);
   const std::string jpeg = body_of(answer);
   const cv::Mat shown =
-      decode_image({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()}, "the page's picture");
+      decode_image({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()}, "the page's image");
   ASSERT_EQ(shown.size(), cv::Size(rig.camera.width_px, rig.camera.height_px));
   EXPECT_NEAR(shown.at<cv::Vec3b>(shown.rows / 2, shown.cols / 2)[1], 200, 3);
   EXPECT_EQ(http_status(http(port, "GET", "/picture?after=3")), 204);
@@ -157,7 +157,7 @@ TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
   EXPECT_EQ(http_status(http_post(port_of(page), "/hold")), 403);
 }
 
-// The network or a stopped process may keep it back: who asked for it has turned to something else by then.
+// The network or a stopped process may delay it: its sender does not expect it any more.
 TEST(LivePage, StartsNothingLate) {
   PageConfig config = config_of_test();
   config.may_start = true;
@@ -173,7 +173,7 @@ TEST(LivePage, StartsNothingLate) {
   std::this_thread::sleep_for(std::chrono::milliseconds(520));
   EXPECT_NE(http(port, "GET", "/state").find(R"("asked":"")"), std::string::npos);
   EXPECT_FALSE(page.take_wishes().hold);
-  // What holds comes late too.
+  // A hold counts late too.
   EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_EQ(http_status(http_post(port, start_path(1.1))), 409);
@@ -275,7 +275,7 @@ TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
   }
   ASSERT_GT(crowd.size(), 100u);
   EXPECT_LT(longest, std::chrono::milliseconds(500));
-  EXPECT_EQ(crowd.front()->hear(), "");  // ended: it asked for nothing in time
+  EXPECT_EQ(crowd.front()->hear(), "");  // ended: no request in time
   crowd.clear();
   // Once they have gone.
   int status = 0;

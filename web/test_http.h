@@ -56,7 +56,7 @@ inline std::string http_post(int port, const std::string& path, const std::strin
   return http(port, "POST", path, headers + fmt::format("Origin: http://127.0.0.1:{}\r\nContent-Length: 0\r\n", port));
 }
 
-/// To be asked for with http_post(); `ago_s`: when the button was pressed.
+/// A request for http_post(); `ago_s`: since the button was pressed.
 inline std::string start_path(double ago_s = 0) {
   const std::chrono::duration<double> now = std::chrono::steady_clock::now().time_since_epoch();
   return fmt::format("/start?at={:.4f}", now.count() - ago_s);

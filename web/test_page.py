@@ -1,4 +1,4 @@
-"""The page as a person meets it, in headless Chromium: test_page.py LAPSERVO RIG PICTURE ITS_RIG [FOLDER for screenshots].
+"""The page as a person meets it, in headless Chromium: test_page.py LAPSERVO RIG IMAGE ITS_RIG [FOLDER for screenshots].
 
 Ends with 77 and the reason where Chromium is not installed.
 """
@@ -182,7 +182,7 @@ def see_the_loop(browser, tool, rig, folder):
     try:
         browser.call("Page.navigate", url=url.replace("0.0.0.0", "127.0.0.1").split("?")[0])
         browser.wait_for("document.body.innerText.includes('token')")  # refused
-        browser.call("Page.navigate", url="about:blank")  # what it still asks for is refused, too
+        browser.call("Page.navigate", url="about:blank")  # its further requests is refused, too
         time.sleep(1)
         browser.value("1")
         browser.complaints.clear()
@@ -204,7 +204,7 @@ def see_the_loop(browser, tool, rig, folder):
         said = lapservo.stdout.read()
         assert re.search("held for [0-9]+ of [0-9]+ ticks: held\n", said) and "arm_not_enabled" not in said, said
         state(browser, "not connected")
-        assert browser.value("document.getElementById('picture').classList.contains('old')"), "an old picture looks new"
+        assert browser.value("document.getElementById('picture').classList.contains('old')"), "an old image looks new"
         assert browser.value("!document.getElementById('alert').hidden")
         see_the_end(browser)
         look(browser, folder, "ended")
@@ -219,7 +219,7 @@ def see_the_end(browser):
 
 
 def see_units(browser):
-    """Of a picture: angles are in rad as in files, and nothing is minus zero."""
+    """A page of an image: angles are in rad as in files, and nothing is minus zero."""
     rows = browser.value("[...document.querySelectorAll('#instruments th')].map(th => th.textContent).join()")
     assert "psi [rad]" in rows and "mrad" not in rows, rows
     shown = [browser.value(f"shown({json.dumps(name)}, {value})") for name, value in
@@ -240,7 +240,7 @@ def see_a_picture(browser, tool, rig, picture, folder):
         assert not browser.complaints, browser.complaints
         look(browser, folder, "view")
         time.sleep(1)
-        assert not browser.value("document.getElementById('picture').classList.contains('old')"), "a file's picture does not get old"
+        assert not browser.value("document.getElementById('picture').classList.contains('old')"), "a file's image gets old"
     finally:
         lapservo.terminate()
         assert lapservo.wait(PATIENCE_S) in (0, 1)

@@ -34,7 +34,7 @@ void prepare_standard_streams() {
   std::signal(SIGXFSZ, SIG_IGN);
 }
 
-// What was printed may be what was wanted.
+// The printed part may be the wanted one.
 int flushed(int exit_code) {
   if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return exit_code;
   std::fprintf(stderr, "lapservo: standard output: could not be written to its end\n");

@@ -10,7 +10,7 @@ import tokenize
 from pathlib import Path
 
 WORDS = re.compile(
-    r"\b(tells?|told|asks|asked|believes?|believed|doubts?|doubted|judges?|judged|suspicious|leash|pictures?|set-points?|inks? aside"
+    r"\b(tells?|told|asks|asked|believes?|believed|doubts?|doubted|judges?|judged|suspicious|leash|pictures?|(?<!-)set-points?|inks? aside"
     r"|prints? (that|which) (is|are) off|nothing was chosen|even light|gloss|no longer|honest\w*)\b", re.I)
 # Of sentences, cells and headings.
 BEGINNINGS = re.compile(r"(^|[.!?] |\| |#+ |\*\*|^ *- )(What|Of) ")
@@ -37,7 +37,7 @@ def comments_of_c(text: str) -> list[tuple[int, str]]:
             continue
         for match in token.finditer(line):
             if match[1] is None:
-                if " " in match[0].strip('" '):
+                if " " in match[0].strip('" ') and not re.search(r"/picture|\('picture'\)", match[0]):  # a path of the page's
                     found.append((number, match[0].strip('"')))
             elif last == number - 1 and not line[: match.start()].strip():
                 found[-1] = (found[-1][0], found[-1][1] + " " + match[1].strip())

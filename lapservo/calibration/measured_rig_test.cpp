@@ -1,4 +1,4 @@
-// What a calibration measured goes into the rig, and all else stays.
+// The results of a calibration go into the rig, and all other keys stay.
 #include <array>
 #include <optional>
 

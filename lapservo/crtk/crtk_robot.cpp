@@ -12,8 +12,9 @@
 namespace lapservo::internal {
 namespace {
 
-// What computes or swaps elsewhere then delays set-points less. Who may not have it does without: empty, or what was
-// not granted. Later allocations fail where the memory that may be locked has a limit: then none is.
+// Computing or swapping of other programs then delays setpoints less. A process without the right runs without it:
+// empty, or the parts that were not granted. Later allocations fail where lockable memory has a limit: then nothing is
+// locked.
 std::string ask_for_real_time() {
   const sched_param priority{.sched_priority = 20};
   const bool first = pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority) == 0;
@@ -132,7 +133,7 @@ void CrtkRobot::command() {
       message.stamp_s = transport_.stamp_now_s();
       servo_jp_(message);
     }
-    // What was missed is not made up for: set-points in a burst would pass the rate limit.
+    // Missed setpoints are dropped: a burst of setpoints would pass the rate limit.
     next = std::max(next + period, std::chrono::steady_clock::now());
     std::this_thread::sleep_until(next);
   }

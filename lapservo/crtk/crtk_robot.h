@@ -16,7 +16,7 @@ namespace lapservo::internal {
 
 /// A CRTK arm behind a transport: measured_js, setpoint_js and operating_state come in, servo_jp goes out in a thread
 /// of its own, with real-time priority where the system grants it, as the interlock allows. Joints that are not the
-/// rig's are said on stderr. Destroyed, it sends nothing any more: the arm stays at its last set-point.
+/// rig's are said on stderr. Destroyed, it sends nothing any more: the arm stays at its last setpoint.
 class CrtkRobot : public Robot {
  public:
   /// `arm`: the arm's namespace, for example PSM1 or /dvrk/PSM1. The transport and the clock must outlive it.
@@ -32,7 +32,7 @@ class CrtkRobot : public Robot {
 
   InterlockCounts counts() const;
   std::optional<Eigen::Vector4d> set_point() const;
-  /// "real-time priority and locked memory", or what of them the system did not grant for set-points.
+  /// "real-time priority and locked memory", or the part of them that the system did not grant for setpoints.
   std::string not_granted() const;
 
  private:

@@ -61,7 +61,7 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
   EXPECT_EQ(sent.names, (std::vector<std::string>{"yaw", "pitch", "insertion", "roll", "wrist"}));
   EXPECT_EQ(sent.positions, (std::vector<double>{0.1, 1.5, 0.1, 0.2, 0.7}));
   EXPECT_EQ(sent.velocities, std::vector<double>(5, 0.0));  // at rest
-  clock.now = 10.2;  // nothing came since
+  clock.now = 10.2;                                         // nothing came since
   ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
   EXPECT_EQ(robot.state().blocked, Blocked::old_joint_states);
 }
@@ -92,7 +92,7 @@ TEST(OperatorPresence, IsAButtonThatIsPressedThroughoutAndSaysSo) {
   EXPECT_TRUE(presence.was_present());
   for (const std::vector<std::int32_t>& buttons : std::vector<std::vector<std::int32_t>>{{0}, {}, {2}, {0, 1}}) {
     say(buttons);
-    say({1});  // pressed again before anybody asked
+    say({1});  // pressed again before the next query
     EXPECT_FALSE(presence.was_present());
     EXPECT_TRUE(presence.was_present());
   }

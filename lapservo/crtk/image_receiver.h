@@ -11,10 +11,10 @@
 
 namespace lapservo::internal {
 
-/// What became of a camera's images.
+/// Counts of a camera's images.
 struct ImageCounts {
   long taken = 0;    ///< by newest()
-  long skipped = 0;  ///< a newer one came before they were asked for
+  long skipped = 0;  ///< replaced by a newer one before it was taken
   long missing = 0;  ///< gaps of more than one and a half times the usual distance of stamps, in frames
   long repeated = 0, late = 0, jumped = 0, unstamped = 0;
   long resized = 0;     ///< of another size than the rig's camera
@@ -26,13 +26,13 @@ struct ImageCounts {
 /// Whose clock stamps are of: one that agrees with nobody's, or the loop's own.
 enum class StampsBy { sender, loop };
 
-/// A camera's image messages as an ImageStream: the newest, once, decoded by whoever asks for it. Only images with a
-/// stamp that is newer than the last count, so a camera that repeats itself soon gives stale images; time_s is as of
-/// the fastest image (StampClock), or the stamp where it is by the loop's clock. What can't be used is dropped,
-/// counted, and its reason kept.
+/// A camera's image messages as an ImageStream: the newest, once, decoded by the caller. Only images with a stamp that
+/// is newer than the last count, so a camera that repeats itself soon gives stale images; time_s is that of the fastest
+/// image (StampClock), or the stamp where it is by the loop's clock. Unusable images are dropped, counted, and the
+/// reason is kept.
 class ImageReceiver : public ImageStream {
  public:
-  /// Of the rig's camera.
+  /// `camera`: the rig's.
   ImageReceiver(int width_px, int height_px, StampsBy stamps_by = StampsBy::sender)
       : size_(width_px, height_px), stamps_by_(stamps_by) {}
 

@@ -11,8 +11,9 @@ namespace {
 
 constexpr std::size_t max_joints = 64;
 constexpr double silence_s = 0.5;  // from a sender's last message on another one may be the arm
-constexpr double memory_s = 0.25;  // by which a set-point that was sent is the arm's
-// What an arm may make of a set-point (units, coupling, rounding) before it is somebody else's.
+constexpr double memory_s = 0.25;  // by which a setpoint that was sent is the arm's
+// Tolerance for the arm's changes of a setpoint (units, coupling, rounding); beyond it the setpoint is another
+// program's.
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
 constexpr double same_other = 4e-3;
 
@@ -25,7 +26,7 @@ bool all_finite(const std::vector<double>& values) {
 Interlock::Interlock(const InterlockConfig& config)
     : config_(config), measured_clock_(config.max_age_s), setpoint_clock_(config.max_age_s) {}
 
-// Of the four joints; nullopt, and counted, when the message is none to go by.
+// Places of the four joints; nullopt, and counted, for an unusable message.
 std::optional<Interlock::Places> Interlock::places_in(const JointMessage& message) {
   const bool sized = message.names.size() <= max_joints && message.names.size() == message.positions.size();
   const auto places = sized ? find_joints(config_.joints, message.names) : std::nullopt;
@@ -106,7 +107,8 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
 }
 
 void Interlock::on_operating_state(const OperatingStateMessage& message, double arrival_s) {
-  if (!is_of(state_source_, message.source, measured_s_, arrival_s)) return;  // said seldom: the arm's joints tell
+  if (!is_of(state_source_, message.source, measured_s_, arrival_s))
+    return;  // a rare message: the arm's joints show its presence
   operating_state_ = message;
   watch(arrival_s);
 }

@@ -23,39 +23,39 @@ namespace lapservo::internal {
 
 struct InterlockConfig {
   Joints joints;
-  JointLimits limits;           ///< of q: positions and rates that no set-point exceeds
-  double period_s = 1.0 / 500;  ///< between set-points
-  double max_age_s = 0.07;      ///< of joint states and set-points
-  bool motion_enabled = false;  ///< else it observes only: no set-point leaves, whatever is asked for
-  /// Farther than this from its set-point an arm is not started: theta, phi [rad], rho [m], psi [rad].
+  JointLimits limits;           ///< of q: positions and rates that no setpoint exceeds
+  double period_s = 1.0 / 500;  ///< between setpoints
+  double max_age_s = 0.07;      ///< of joint states and setpoints
+  bool motion_enabled = false;  ///< else it observes only: no setpoint leaves
+  /// Farther than this from its setpoint an arm is not started: theta, phi [rad], rho [m], psi [rad].
   Eigen::Vector4d max_distance{0.05, 0.05, 0.005, 0.2};
 };
 
-/// What was dropped or withheld so far.
+/// Counts of dropped and withheld messages.
 struct InterlockCounts {
   long joint_states = 0, set_points = 0;  ///< taken in; sent
   long malformed = 0;                     ///< wrong length, missing names, absurd sizes
   long repeated = 0, late = 0, jumped = 0, unstamped = 0;
-  long withheld = 0;  ///< set-points that would have been sent, but for motion_enabled
+  long withheld = 0;  ///< setpoints that would have been sent, but for motion_enabled
 };
 
-/// Turns a path into the set-points of a CRTK arm, and says when the arm is not ready for them. It goes by what it is
-/// told and by the times that it is given: no clock, no thread, no transport. An arm is ready while its joint states
-/// come, finite and freshly stamped, it is ENABLED, homed and not busy, and nobody else commands it. Motion starts at
-/// the arm's own set-point, which a path's start is moved to; each set-point differs from the one before by a period's
-/// rate limit at most and lies within the limits (or nearer to them than before). Joints beyond the four stay at their
-/// set-point of the start. A topic is its first sender's: another one's messages are not used before the arm has fallen
-/// silent. From the moment on that the arm is not ready the path is forgotten and nothing is sent;
-/// state() tells of it, however short it was, and until then no new path is followed.
+/// Turns a path into the setpoints of a CRTK arm, and reports when the arm is not ready for them. It uses only messages
+/// and times that it receives: no clock, no thread, no transport. An arm is ready while its joint states arrive, finite
+/// and freshly stamped, it is ENABLED, homed and not busy, and no other program commands it. Motion starts at the arm's
+/// own setpoint, to which a path's start is moved; each setpoint differs from the previous one by a period's rate limit
+/// at most and lies within the limits (or nearer to them than before). Joints beyond the four stay at their setpoint of
+/// the start. A topic belongs to its first sender: messages of another one are not used before the arm has fallen
+/// silent. As soon as the arm is not ready the path is dropped and nothing is sent; state() reports it, however short
+/// it was, and no new path is followed before.
 class Interlock {
  public:
   explicit Interlock(const InterlockConfig& config);
 
-  // What came, with its time of arrival on the loop's clock.
+  // Received messages, with their time of arrival on the loop's clock.
   void on_measured(const JointMessage& message, double arrival_s);
   void on_setpoint(const JointMessage& message, double arrival_s);
   void on_operating_state(const OperatingStateMessage& message, double arrival_s);
-  /// Somebody else sends set-points to this arm.
+  /// Another program sends setpoints to this arm.
   void on_foreign_command(double arrival_s);
 
   /// Robot::send.
@@ -66,16 +66,16 @@ class Interlock {
   JointState state(double now_s);
   /// Robot::readings.
   std::vector<JointReading> take_readings() { return readings_.take(); }
-  /// To be called every period: the set-point of all the arm's joints to be sent now, if any.
+  /// Call it every period: the setpoint of all the arm's joints to send now, if any.
   std::optional<std::vector<double>> tick(double now_s);
 
   /// Joint velocities to the positions that tick() returned last: from those before, a period earlier; zero at rest.
   std::vector<double> velocities() const;
   /// Why the last joint state's joints are not the rig's; empty when they are.
   const std::string& complaint() const { return complaint_; }
-  /// Names of the arm's joints, as in its set-points.
+  /// Names of the arm's joints, as in its setpoints.
   const std::vector<std::string>& names() const { return names_; }
-  /// The set-point of theta, phi, rho, psi that was sent last, or withheld; nullopt while none is wanted.
+  /// The setpoint of theta, phi, rho, psi that was sent last, or withheld; nullopt while none is wanted.
   std::optional<Eigen::Vector4d> set_point() const { return moving_ ? std::optional(last_) : std::nullopt; }
   const InterlockCounts& counts() const { return counts_; }
 
@@ -125,7 +125,7 @@ class Interlock {
   double blocked_s_ = 0;  // when something was amiss last
   Eigen::Vector4d shift_ = Eigen::Vector4d::Zero(), last_ = Eigen::Vector4d::Zero(),
                   velocity_ = Eigen::Vector4d::Zero();
-  std::vector<double> others_;  // all joints' set-points at the start
+  std::vector<double> others_;  // all joints' setpoints at the start
   std::deque<Sent> sent_;
 };
 

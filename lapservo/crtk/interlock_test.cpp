@@ -27,7 +27,7 @@ InterlockConfig config_of(bool motion_enabled = true) {
   return config;
 }
 
-// An arm that obeys at once, whose set-point lies beside its joints (gravity), on a clock that only this test moves.
+// An arm that obeys at once, whose setpoint lies beside its joints (gravity), on a clock that only this test moves.
 class Bench {
  public:
   explicit Bench(const InterlockConfig& config = config_of()) : interlock(config), config_(config) { enable(); }
@@ -66,7 +66,7 @@ class Bench {
       ++sent_count;
     }
   }
-  // As the loop does once a period: starts anew where the arm is when it is told that it is not ready.
+  // Like the loop once a period: restarts where the arm is after a report that it is not ready.
   void control(double duration_s, const Eigen::Vector4d& velocity) {
     constexpr double period_s = 1.0 / 60;
     for (const double end_s = now_s + duration_s; now_s < end_s - 1e-9;) {
@@ -92,7 +92,7 @@ class Bench {
   std::function<void(JointMessage&)> alter;
 
  private:
-  // Of all joints, those of the step, or none at the end of a motion.
+  // Compares the velocities of all joints with the step, or with zero at the end of a motion.
   void expect_velocities(const Eigen::Vector4d& step) const {
     const auto sent = interlock.velocities();
     ASSERT_EQ(sent.size(), 5u);
@@ -173,7 +173,7 @@ struct Fault {
   std::function<void(Bench&)> begin, end;
 };
 
-// Each: no set-point leaves later than `within_s` after it, and motion goes on afterwards without a jump.
+// Each: no setpoint leaves later than `within_s` after it, and motion goes on afterwards without a jump.
 TEST(Interlock, HoldsAtEveryFaultAndGoesOnAfterwards) {
   const auto alter = [](std::function<void(JointMessage&)> how) { return [how](Bench& bench) { bench.alter = how; }; };
   const auto well = [](Bench& bench) { bench.alter = nullptr, bench.talking = true, bench.enable(); };

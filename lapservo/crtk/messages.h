@@ -8,7 +8,8 @@
 
 namespace lapservo::internal {
 
-// What a CRTK site says, whatever carries it. Times are the sender's stamps in seconds; NaN where a stamp is none.
+// Messages of a CRTK site, independent of the transport. Times are the sender's stamps in seconds; NaN for an invalid
+// stamp.
 
 /// sensor_msgs/JointState: measured_js, setpoint_js, servo_jp. Efforts are not used.
 struct JointMessage {

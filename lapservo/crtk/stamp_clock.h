@@ -5,7 +5,7 @@
 
 namespace lapservo::internal {
 
-/// What the stamp of a message tells of it.
+/// Verdict on the stamp of a message.
 enum class StampVerdict {
   fresh,
   repeated,  ///< not newer than the one before: the same message again, an old one, or out of order

@@ -43,8 +43,8 @@ TEST(StampClock, RepeatedReorderedLateAndMissingStampsAreTold) {
     EXPECT_EQ(other.read(none, 1.3).verdict, StampVerdict::unusable);
 }
 
-// By any step, either way: a short hold, and from then on times as good as before. What is within disorder and lateness
-// needs no hold.
+// Steps of any size, either way: a short hold, then times as accurate as before. Steps within disorder and lateness
+// need no hold.
 TEST(StampClock, AClockThatWasSetCostsTwoMessages) {
   for (const double size_s : {1e-4, 0.005, 0.03, 0.07, 0.1, 0.2, 0.24, 0.3, 1.0, 3600.0, 1e8})
     for (const double step_s : {size_s, -size_s}) {

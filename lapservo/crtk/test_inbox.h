@@ -13,7 +13,7 @@
 
 namespace lapservo::internal {
 
-/// What arrived, for whoever waits for it.
+/// Messages that arrived, for a waiting test.
 template <typename Message>
 class TestInbox {
  public:

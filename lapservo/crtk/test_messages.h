@@ -65,7 +65,8 @@ const TrajectoryMessage sample_trajectory{sample_stamp_s, {"s_rad"}, {{0, {1}}, 
 const ImageMessage sample_image{sample_stamp_s, 2, 1, 6, "bgr8", true, {1, 2, 3, 4, 5, 6}};
 const CompressedImageMessage sample_jpeg{sample_stamp_s, "jpeg", {7, 8}};
 
-/// What `from` says on the topic `in` + KIND, `to` hears on `out` + KIND, of each kind but the operating state.
+/// Messages that `from` sends on the topic `in` + KIND arrive at `to` on `out` + KIND, for each kind but the operating
+/// state.
 inline void expect_carries_each_kind(Transport& from, const std::string& in, Transport& to, const std::string& out) {
   const auto carry = [&]<typename Message>(const std::string& kind, auto publisher, auto subscribe,
                                            const Message& sent) {

@@ -25,7 +25,7 @@ class Transport {
 
   /// Publishers may be called from every thread; a copy that lives keeps the topic alive.
   virtual Publisher<JointMessage> joint_publisher(const std::string& topic) = 0;
-  /// For servo_jp: only the newest set-point is kept, for 50 ms, and none reaches a subscriber that came after it.
+  /// For servo_jp: only the newest setpoint is kept, for 50 ms, and none reaches a subscriber that came after it.
   virtual Publisher<JointMessage> set_point_publisher(const std::string& topic) = 0;
   virtual Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) = 0;
   virtual Publisher<StringMessage> string_publisher(const std::string& topic) = 0;

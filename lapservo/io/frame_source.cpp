@@ -37,7 +37,7 @@ class PictureSource : public FrameSource {
     return frame;
   }
   std::string remark() const override {
-    return unread_ == 0 ? "" : fmt::format("{} pictures in HEIC or AVIF are left out: convert them to PNG", unread_);
+    return unread_ == 0 ? "" : fmt::format("{} images in HEIC or AVIF are left out: convert them to PNG", unread_);
   }
   std::string complaint() const override {
     if (low_bits_ == 0 || low_bits_ < next_) return "";
@@ -86,7 +86,7 @@ class VideoSource : public FrameSource {
   int index_ = 0;
 };
 
-// Frames have the times at which they were asked for.
+// Frames have the times at which they were requested.
 class StreamSource : public FrameSource {
  public:
   StreamSource(const std::string& name, const VideoReading& reading)
@@ -120,8 +120,7 @@ Pictures pictures_in(const fs::path& folder) {
   int unread = 0;
   std::error_code error;
   const fs::directory_iterator entries(folder, error);
-  if (error)
-    throw InputError(folder.string(), "can't be read (" + error.message() + "), expected a folder of pictures");
+  if (error) throw InputError(folder.string(), "can't be read (" + error.message() + "), expected a folder of images");
   for (const auto& entry : entries) {
     const bool hidden = entry.path().filename().string().starts_with(".");
     if (hidden || !entry.is_regular_file(error)) continue;
@@ -132,7 +131,7 @@ Pictures pictures_in(const fs::path& folder) {
   std::sort(files.begin(), files.end(),
             [](const fs::path& a, const fs::path& b) { return strverscmp(a.c_str(), b.c_str()) < 0; });
   if (files.empty())
-    throw InputError(folder.string(), std::string("has no pictures") + (unread > 0 ? " but in HEIC or AVIF" : "") +
+    throw InputError(folder.string(), std::string("has no images") + (unread > 0 ? " but in HEIC or AVIF" : "") +
                                           ", expected some (png, jpg, bmp, tif, webp, ppm)");
   return {std::move(files), unread};
 }
@@ -145,13 +144,13 @@ std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double 
   if (input.find("://") != std::string::npos) return std::make_unique<StreamSource>(input, reading);
   std::error_code error;  // of a name that no file can have, or a folder that may not be looked into
   if (!fs::exists(input, error))
-    throw InputError(input, "does not exist, expected a picture, a folder of pictures or a video");
+    throw InputError(input, "does not exist, expected an image, a folder of images or a video");
   if (fs::is_directory(input)) return std::make_unique<PictureSource>(Kind::folder, pictures_in(input), folder_fps);
   if (fs::is_regular_file(input) && fs::file_size(input) == 0)
-    throw InputError(input, "is empty, expected a picture or a video");
+    throw InputError(input, "is empty, expected an image or a video");
   if (has_image_extension(input) || has_unread_extension(input))
     return std::make_unique<PictureSource>(Kind::image, Pictures{{input}}, folder_fps);
-  if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected a picture, a folder or a video");
+  if (!fs::is_regular_file(input)) throw InputError(input, "is no file, expected an image, a folder or a video");
   return std::make_unique<VideoSource>(input, reading);
 }
 

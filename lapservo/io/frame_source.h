@@ -15,24 +15,24 @@ struct Frame {
   cv::Mat bgr;                 ///< 8-bit
   int index = 0;               ///< from 0
   double time_s = 0;           ///< since the first frame
-  std::filesystem::path file;  ///< the picture's path; empty for videos and cameras
+  std::filesystem::path file;  ///< the image's path; empty for videos and cameras
   std::optional<Status> flaw;  ///< why nothing is to be measured in it
 };
 
-/// Frames of a picture, a folder of pictures (sorted by name, numbers in names by value), a video file, a stream
+/// Frames of an image, a folder of images (sorted by name, numbers in names by value), a video file, a stream
 /// ("rtsp://...") or a camera.
 class FrameSource {
  public:
   enum class Kind { image, folder, video, live };
 
   virtual ~FrameSource() = default;
-  /// nullopt at the end. Throws InputError for a picture that can't be read.
+  /// nullopt at the end. Throws InputError for an image that can't be read.
   virtual std::optional<Frame> next() = 0;
   virtual Kind kind() const = 0;
   /// Where it is known beforehand.
   virtual std::optional<int> frame_count() const = 0;
   virtual double frames_per_second() const = 0;
-  /// What `time_s` counts from, by the clock that a recording's other messages are stamped with, where there are such.
+  /// The origin of `time_s` on the clock that stamps a recording's other messages, where there are such.
   virtual std::optional<double> first_stamp_s() const { return std::nullopt; }
   /// How it is read where the file does not say, in words, and the option that decides; empty where it says.
   virtual std::string remark() const { return {}; }
@@ -47,8 +47,8 @@ struct VideoReading {
   std::string chroma_location{};  ///< left, centre or top-left, whatever the video names; empty: by the video
 };
 
-/// All but cameras. `folder_fps` gives the pictures of a folder their times. Throws InputError when there is nothing to
-/// read: a missing or empty file, a folder without pictures, a video without frames, a stream that doesn't answer; and
+/// All but cameras. `folder_fps` gives the images of a folder their times. Throws InputError when there is nothing to
+/// read: a missing or empty file, a folder without images, a video without frames, a stream that doesn't answer; and
 /// for words in `reading` that have no meaning.
 std::unique_ptr<FrameSource> open_frame_source(const std::string& input, double folder_fps,
                                                const VideoReading& reading = {});

@@ -83,10 +83,10 @@ TEST(FolderSource, SaysWhatItLeavesOut) {
   write_image(folder / "a.png", cv::Mat(16, 16, CV_8UC3, cv::Scalar(20, 120, 220)));
   const auto source = open_frame_source(folder.path().string(), 30);
   EXPECT_EQ(source->frame_count(), 1);
-  EXPECT_EQ(source->remark(), "1 pictures in HEIC or AVIF are left out: convert them to PNG");
+  EXPECT_EQ(source->remark(), "1 images in HEIC or AVIF are left out: convert them to PNG");
 }
 
-// Of 12 bits as cameras' drivers leave them, and of 16.
+// 12 bits as cameras' drivers leave them, and 16.
 TEST(FolderSource, SaysThatTheUpperBitsAreEmpty) {
   for (const double scale : {1.0, 16.0}) {
     const cv::Mat picture(16, 16, CV_16UC3, cv::Scalar(300, 2000, 4095) * scale);
@@ -118,7 +118,7 @@ TEST(VideoSource, SaysThatAVideoEndsEarly) {
   }
 }
 
-// Of damage within its data the decoder learns most of the time; then the frame says so and the video as a whole.
+// The decoder notices damage within its data most of the time; then the frame and the video as a whole report it.
 TEST(VideoSource, MarksDamagedFrames) {
   const testing::TemporaryFolder folder;
   for (const char* name : {"a.mp4", "a.avi"}) {
@@ -131,13 +131,13 @@ TEST(VideoSource, MarksDamagedFrames) {
   }
 }
 
-// By libx264 with several slices a picture, as endoscopes' recorders may write it; nothing but its packets.
+// By libx264 with several slices an image, as endoscopes' recorders may write it; nothing but its packets.
 void write_sliced_video(const fs::path& path) {
   libav::Codec codec(avcodec_alloc_context3(avcodec_find_encoder_by_name("libx264")));
   codec->width = 320, codec->height = 240;
   codec->pix_fmt = AV_PIX_FMT_YUV420P;
   codec->time_base = {1, 25};
-  ASSERT_EQ(av_opt_set(codec->priv_data, "preset", "ultrafast", 0), 0);  // arithmetic coding tells less of damage
+  ASSERT_EQ(av_opt_set(codec->priv_data, "preset", "ultrafast", 0), 0);  // arithmetic coding shows less of damage
   ASSERT_EQ(av_opt_set(codec->priv_data, "x264-params", "slices=4", 0), 0);
   ASSERT_EQ(avcodec_open2(codec.get(), codec->codec, nullptr), 0);
   const libav::Frame frame(av_frame_alloc());
@@ -160,7 +160,7 @@ void write_sliced_video(const fs::path& path) {
   testing::write_file(path, video);
 }
 
-// FFmpeg's decoder forgets what it complained of where it decodes a picture's slices in parallel.
+// FFmpeg's decoder forgets what it complained of where it decodes an image's slices in parallel.
 TEST(VideoSource, MarksDamagedFramesOfSeveralSlices) {
   if (!avcodec_find_encoder_by_name("libx264")) GTEST_SKIP() << "FFmpeg here lacks libx264";
   const testing::TemporaryFolder folder;
@@ -176,8 +176,8 @@ TEST(VideoSource, MarksDamagedFramesOfSeveralSlices) {
   EXPECT_EQ(told, tries);
 }
 
-// A flipped bit may let a picture of motion JPEG end before its data do, with shifted rows or other colours: FFmpeg's
-// decoder says nothing of that, libjpeg does.
+// A flipped bit may let an image of motion JPEG end before its data do, with shifted rows or other colours: FFmpeg's
+// decoder reports nothing, libjpeg does.
 TEST(VideoSource, MarksFramesOfMotionJpegWhoseDataGoOn) {
   const testing::TemporaryFolder folder;
   std::string video;
@@ -203,8 +203,8 @@ TEST(OpenFrameSource, NamesWhatCanNotBeRead) {
   };
   testing::write_file(folder / "text.mp4", "this is no film");
   EXPECT_EQ(said((folder / "text.mp4").string()),
-            (folder / "text.mp4").string() + ": can't be read, expected a picture or a video");
-  EXPECT_EQ(said("/dev/zero"), "/dev/zero: is no file, expected a picture, a folder or a video");
+            (folder / "text.mp4").string() + ": can't be read, expected an image or a video");
+  EXPECT_EQ(said("/dev/zero"), "/dev/zero: is no file, expected an image, a folder or a video");
   EXPECT_NE(said(std::string(300, 'a')).find("does not exist"), std::string::npos);
 }
 

@@ -51,7 +51,7 @@ struct JpegHeader {
   int channels = 0;
 };
 
-// Of the first frame header (SOF); zero without one. Steps over garbage between segments as decoders do.
+// Pixels by the first frame header (SOF); zero without one. Steps over garbage between segments as decoders do.
 JpegHeader jpeg_header(std::span<const std::uint8_t> bytes) {
   const auto two_at = [&](std::size_t at) { return std::uint32_t{bytes[at]} << 8 | std::uint32_t{bytes[at + 1]}; };
   std::size_t at = 2;
@@ -93,23 +93,23 @@ std::size_t least_bytes(std::span<const std::uint8_t> bytes, const std::string& 
   return format == "BMP" ? numbers.of(2, 4) : 0;
 }
 
-// Decoders return half a picture for half a file, and fill gigabytes for a few bytes: ask for end and size beforehand.
+// Decoders return half an image for half a file, and fill gigabytes for a few bytes: ask for end and size beforehand.
 void check_whole(std::span<const std::uint8_t> bytes, const std::string& source) {
   using namespace std::string_view_literals;
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (is_png(bytes)) {
     if (bytes.size() < 33 || text.rfind("IEND"sv) == std::string_view::npos)
-      throw InputError(source, "is a truncated PNG, expected a whole picture");
+      throw InputError(source, "is a truncated PNG, expected a whole image");
     check_size(png_size(bytes), source);
   }
   if (is_jpeg(bytes)) {
     if (text.rfind("\xff\xd9"sv) == std::string_view::npos)
-      throw InputError(source, "is a truncated JPEG, expected a whole picture");
+      throw InputError(source, "is a truncated JPEG, expected a whole image");
     check_size(jpeg_header(bytes).size, source);
   }
   if (const std::string format = libav_format(bytes); bytes.size() < least_bytes(bytes, format))
-    throw InputError(source, "is a truncated " + format + ", expected a whole picture");
-  if (!tiff_has_its_rows(bytes)) throw InputError(source, "is a truncated TIFF, expected a whole picture");
+    throw InputError(source, "is a truncated " + format + ", expected a whole image");
+  if (!tiff_has_its_rows(bytes)) throw InputError(source, "is a truncated TIFF, expected a whole image");
 }
 
 // "HEIC" or "AVIF" by the brand that follows the box of the file's type; else empty.
@@ -194,7 +194,7 @@ bool has_few_colors(const cv::Mat& bgr) {
 }
 
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
-  if (bytes.empty()) throw InputError(source, "is empty, expected a picture");
+  if (bytes.empty()) throw InputError(source, "is empty, expected an image");
   check_whole(bytes, source);
   refuse_misread(bytes, source);
   // 0 and numbers above 8 have no meaning in EXIF; they are shown upright everywhere.
@@ -203,7 +203,7 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
                      "1: the pixels as the calibrated camera has them, not to be turned");
   DecodedPicture decoded = decode(bytes);
   if (decoded.bgr.empty())
-    throw InputError(source, "can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM picture");
+    throw InputError(source, "can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM image");
   check_size({static_cast<std::uint32_t>(decoded.bgr.cols), static_cast<std::uint32_t>(decoded.bgr.rows)}, source);
   Picture picture{bgr8_from(decoded.bgr, source), std::nullopt};
   constexpr std::size_t png_depth = 24;
@@ -220,17 +220,17 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
 
 cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source) {
   const Picture picture = decode_picture(bytes, source);
-  if (picture.flaw == Status::damaged) throw InputError(source, "is damaged, expected a whole picture");
+  if (picture.flaw == Status::damaged) throw InputError(source, "is damaged, expected a whole image");
   return picture.bgr;
 }
 
 Picture read_picture(const fs::path& path) {
-  const std::string bytes = read_input(path, max_bytes, "a picture");
+  const std::string bytes = read_input(path, max_bytes, "an image");
   return decode_picture({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, path.string());
 }
 
 cv::Mat read_image(const fs::path& path) {
-  const std::string bytes = read_input(path, max_bytes, "a picture");
+  const std::string bytes = read_input(path, max_bytes, "an image");
   return decode_image({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}, path.string());
 }
 

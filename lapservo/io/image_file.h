@@ -12,13 +12,13 @@
 
 namespace lapservo {
 
-/// Whether the name ends like a picture's (png, jpg, jpeg, bmp, tif, tiff, webp, ppm, pgm).
+/// Whether the name ends like an image's (png, jpg, jpeg, bmp, tif, tiff, webp, ppm, pgm).
 bool has_image_extension(const std::filesystem::path& path);
 
-/// Whether the name ends like that of a picture in HEIC or AVIF, which are not read.
+/// Whether the name ends like that of an image in HEIC or AVIF, which are not read.
 bool has_unread_extension(const std::filesystem::path& path);
 
-/// A picture in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained, `few_colors`
+/// An image in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained, `few_colors`
 /// when it has no more colours than a palette.
 struct Picture {
   cv::Mat bgr;
@@ -26,18 +26,18 @@ struct Picture {
   bool low_bits = false;  ///< 16 bits a channel, of which the values use no more than the lower 12
 };
 
-/// Decodes a picture. Grey is repeated over the channels, alpha dropped, 16-bit rounded to 8. Throws InputError for
-/// anything that isn't a whole picture of the camera's pixels: empty, larger than 256 MiB, truncated (PNG without its
+/// Decodes an image. Grey is repeated over the channels, alpha dropped, 16-bit rounded to 8. Throws InputError for
+/// anything that isn't a whole image of the camera's pixels: empty, larger than 256 MiB, truncated (PNG without its
 /// end chunk, JPEG without its end marker), not decodable, HEIC, CMYK, other pixel types, or to be turned by EXIF, as a
-/// calibration belongs to the pixels in one orientation and nobody can tell to which.
+/// calibration belongs to the pixels in one orientation and it is unknown to which.
 Picture read_picture(const std::filesystem::path& path);
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source);
 
-/// The same for pictures that must be without flaw: else InputError.
+/// The same for images that must be without flaw: else InputError.
 cv::Mat read_image(const std::filesystem::path& path);
 cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& source);
 
-/// Whether an 8-bit BGR picture has colours, but no more than a palette (256): each then stands for many, and the edges
+/// Whether an 8-bit BGR image has colours, but no more than a palette (256): each then stands for many, and the edges
 /// between them are not where the light's were.
 bool has_few_colors(const cv::Mat& bgr);
 

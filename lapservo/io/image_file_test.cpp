@@ -25,7 +25,7 @@ using testing::input_error;
 using testing::TemporaryFolder;
 
 constexpr std::uint64_t seed = 61;
-constexpr auto not_decoded = "p: can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM picture";
+constexpr auto not_decoded = "p: can't be decoded, expected a PNG, JPEG, BMP, TIFF, WebP, PPM or PGM image";
 
 template <typename Value>
 cv::Mat random_image(int rows, int columns, int type, Random& random) {
@@ -91,7 +91,7 @@ TEST(Image, SixteenBitsAreRoundedToEight) {
         EXPECT_NEAR(bgr.at<cv::Vec3b>(v, u)[c], deep.at<cv::Vec3w>(v, u)[c] / 257.0, 0.5001) << "seed " << seed;
 }
 
-// Which of the two orientations the camera was calibrated in, nobody can tell.
+// The camera's calibration may be in either orientation.
 TEST(Image, ThatExifWouldTurnIsRefused) {
   const cv::Mat wide(16, 48, CV_8UC3, cv::Scalar(20, 120, 220));
   const Bytes plain = encoded(wide, ".jpg");
@@ -109,7 +109,7 @@ TEST(Image, ThatExifWouldTurnIsRefused) {
   }
 }
 
-// A picture with smooth shades, as cameras see, so that a flipped bit matters.
+// An image with smooth shades, as cameras see, so that a flipped bit matters.
 cv::Mat shades() {
   cv::Mat image(120, 160, CV_8UC3);
   for (int v = 0; v < image.rows; ++v)
@@ -126,7 +126,7 @@ TEST(Image, ThatItsDecoderComplainsOfIsDamaged) {
   Bytes shortened = jpeg;  // the last quarter of the scan is gone, but the end marker is there
   shortened.erase(shortened.end() - static_cast<std::ptrdiff_t>(jpeg.size() / 4), shortened.end() - 2);
   EXPECT_EQ(decode_picture(shortened, "p").flaw, Status::damaged);
-  EXPECT_EQ(refusal(shortened), "p: is damaged, expected a whole picture");
+  EXPECT_EQ(refusal(shortened), "p: is damaged, expected a whole image");
 }
 
 // JPEG has no checksum. Zeros are read as the shortest codes, and what was not in them is missing from the colours of
@@ -193,7 +193,7 @@ TEST(Image, OfNoMoreColoursThanAPaletteIsFlagged) {
 TEST(Image, IsRefusedWhereverTheFileIsCut) {
   Random random(seed);
   const cv::Mat image = random_image<std::uint8_t>(12, 12, CV_8UC3, random);
-  // What tells the format; and the checksum after a PNG's last chunk, without which the picture is whole.
+  // The signature of the format; and the checksum after a PNG's last chunk, without which the image is whole.
   struct Format {
     std::string extension, name;
     std::size_t signature, dispensable;
@@ -202,14 +202,13 @@ TEST(Image, IsRefusedWhereverTheFileIsCut) {
     const Bytes whole = encoded(image, format.extension);
     EXPECT_EQ(refusal(whole), "");
     for (std::size_t size = 1; size < whole.size() - format.dispensable; ++size)
-      EXPECT_EQ(
-          refusal(std::span(whole).first(size)),
-          size < format.signature ? not_decoded : "p: is a truncated " + format.name + ", expected a whole picture")
+      EXPECT_EQ(refusal(std::span(whole).first(size)),
+                size < format.signature ? not_decoded : "p: is a truncated " + format.name + ", expected a whole image")
           << size << " of " << whole.size() << " bytes";
   }
 }
 
-// Where the rarer formats are cut they are refused too, or nothing of the picture was lost.
+// Where the rarer formats are cut they are refused too, or nothing of the image was lost.
 TEST(Image, OfARareFormatIsRefusedWhereverTheFileIsCut) {
   Random random(seed);
   const cv::Mat image = random_image<std::uint8_t>(12, 13, CV_8UC3, random);
@@ -226,7 +225,7 @@ TEST(Image, OfARareFormatIsRefusedWhereverTheFileIsCut) {
 TEST(Image, IsRefusedWhenItIsSomethingElse) {
   const std::string text = "frame,time_s\n0,0\n";
   EXPECT_EQ(refusal(Bytes(text.begin(), text.end())), not_decoded);
-  EXPECT_EQ(refusal({}), "p: is empty, expected a picture");
+  EXPECT_EQ(refusal({}), "p: is empty, expected an image");
   EXPECT_EQ(input_error([] { bgr8_from(cv::Mat(4, 4, CV_8UC2, cv::Scalar(1, 2)), "p"); }),
             "p: channels: is 2, expected 1 (grey), 3 or 4 (alpha)");
 }
@@ -248,7 +247,7 @@ TEST(Image, OfFloatingPointOrInTilesIsRefused) {
   const Bytes tiff = encoded(image, ".tif");
   const auto with_tag = [&](std::uint8_t low_byte) {
     Bytes changed = tiff;
-    const Bytes resolution_unit{0x28, 0x01, 3, 0, 1, 0, 0, 0};  // a tag that tells nothing about pixels
+    const Bytes resolution_unit{0x28, 0x01, 3, 0, 1, 0, 0, 0};  // a tag that has no effect on pixels
     const auto at = std::search(changed.begin(), changed.end(), resolution_unit.begin(), resolution_unit.end());
     EXPECT_NE(at, changed.end());
     at[0] = low_byte, at[8] = 3;
@@ -271,7 +270,7 @@ TEST(Image, IsRefusedWhenItClaimsToBeEnormous) {
   Bytes jpeg = encoded(cv::Mat(4, 4, CV_8UC3, cv::Scalar::all(7)), ".jpg");
   const Bytes application{0xff, 0xe5, 0, 11, 0xff, 0xc0, 0, 8, 8, 255, 255, 255, 255, 0x12, 0x34};
   jpeg.insert(jpeg.begin() + 2, application.begin(), application.end());
-  EXPECT_EQ(refusal(jpeg), "p: is damaged, expected a whole picture");
+  EXPECT_EQ(refusal(jpeg), "p: is damaged, expected a whole image");
   for (const std::uint8_t frame : {0xc0, 0xc1, 0xc2}) {
     Bytes huge = jpeg;
     const Bytes baseline{0xff, 0xc0, 0, 17};
@@ -286,9 +285,9 @@ TEST(Image, TheFileThatCanNotBeReadIsNamed) {
   const TemporaryFolder folder;
   const auto said = [&](const std::filesystem::path& path) { return input_error([&] { read_image(path); }); };
   testing::write_file(folder / "empty.png", "");
-  EXPECT_EQ(said(folder / "empty.png"), (folder / "empty.png").string() + ": is empty, expected a picture");
-  EXPECT_EQ(said(folder / "none.png"), (folder / "none.png").string() + ": can't be opened, expected a picture");
-  EXPECT_EQ(said(folder.path()), folder.path().string() + ": is a folder, expected a picture");
+  EXPECT_EQ(said(folder / "empty.png"), (folder / "empty.png").string() + ": is empty, expected an image");
+  EXPECT_EQ(said(folder / "none.png"), (folder / "none.png").string() + ": can't be opened, expected an image");
+  EXPECT_EQ(said(folder.path()), folder.path().string() + ": is a folder, expected an image");
 }
 
 TEST(Image, ThatCanNotBeWrittenIsNamedAndLeavesNothing) {
@@ -298,7 +297,7 @@ TEST(Image, ThatCanNotBeWrittenIsNamedAndLeavesNothing) {
   const auto said = [&](const char* name) { return input_error([&] { write_image(folder / name, image); }); };
   const std::string place = folder.path().string() + "/";
   for (const std::string name : {"a.xyz", "a"})
-    EXPECT_EQ(said(name.c_str()), place + name + ": can't be written as a picture");
+    EXPECT_EQ(said(name.c_str()), place + name + ": can't be written as an image");
   EXPECT_EQ(said("none/a.png"), place + "none/a.png: can't be written: No such file or directory");
   EXPECT_EQ(said("taken.png"), place + "taken.png: is a folder, expected a file to write");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the folder";

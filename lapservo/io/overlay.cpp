@@ -63,12 +63,12 @@ class Pen {
     polyline({to - 12 * scale_ * along + 6 * scale_ * across, to, to - 12 * scale_ * along - 6 * scale_ * across},
              color, 2);
   }
-  // Of a label's text, without what backs it.
+  // The size of a label's text, without its background.
   cv::Size text_size(const std::string& text) const {
     int baseline = 0;
     return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, font_scale(), thickness(1), &baseline);
   }
-  // Keeps the label inside the picture. `near`: where the text begins, on its baseline.
+  // Keeps the label inside the image. `near`: where the text begins, on its baseline.
   void label(const std::string& text, const Eigen::Vector2d& near) {
     const double font_scale = this->font_scale();
     const int weight = thickness(1);
@@ -158,7 +158,7 @@ class DrawnMarker {
   std::optional<CylinderView> view_;
 };
 
-// The RCM's image and r, when it lies in the picture.
+// The RCM's image and r, when it lies in the image.
 void draw_rcm(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation& o) {
   if (!instrument.camera_from_rcm || !(instrument.camera_from_rcm->translation.z() > 0)) return;
   const auto ideal_px = projected_rcm_px(camera, *instrument.camera_from_rcm);
@@ -189,7 +189,7 @@ std::string features_text(const Features& f) {
                      decimals(f.d_px, 1));
 }
 
-// Where two lines of text stand beside a shaft, inside the picture where there is such a place: as near to the marker's
+// Where two lines of text stand beside a shaft, inside the image where there is such a place: as near to the marker's
 // middle as it goes, on either side. `along`: the axis, a unit vector; `half_px`: half the shaft's width.
 Eigen::Vector2d place_beside(const Pen& pen, const std::array<std::string, 2>& lines, const Eigen::Vector2d& middle,
                              const Eigen::Vector2d& along, double half_px) {
@@ -233,7 +233,7 @@ void draw_found(Pen& pen, const Camera& camera, const Instrument& instrument, co
   for (int i = 0; i < 2; ++i) pen.label(lines[i], place + Eigen::Vector2d(0, i * line_height * pen.scale()));
 }
 
-// What was taken for the marker, in another style.
+// The rejected detection, in another style.
 void draw_refused(Pen& pen, const Camera& camera, const Instrument& instrument, const Observation::Refused& refused) {
   using What = Observation::Refused::What;
   if (refused.what == What::pose) {

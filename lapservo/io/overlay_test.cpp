@@ -81,7 +81,7 @@ TEST(Overlay, LabelsStandBesideTheMarker) {
   }
 }
 
-// With the reason, and in another style than what is believed.
+// With the status, and in another style than an accepted measurement.
 TEST(Overlay, DrawsWhatWasRefused) {
   const Rig rig = testing::paper_test_rig();
   const cv::Mat frame = grey_frame(rig);

@@ -20,7 +20,7 @@ struct JointRanges {
   double travel(std::size_t joint) const { return high[joint] - low[joint]; }
 };
 
-/// Of at least one row of readings, without the hundredth at either end, where wild ones are.
+/// Ranges of at least one row of readings, without the hundredth at either end, which may hold outliers.
 JointRanges ranges_of(const std::vector<std::array<double, 4>>& readings);
 
 /// A joint's length or angle with its unit: "0.12 rad", "5.0 mm".

@@ -10,7 +10,7 @@ struct MotionState {
   Eigen::Vector4d velocity = Eigen::Vector4d::Zero();
 };
 
-/// The joints' set-points over time, made of the controller's velocities for an arm that takes positions. Over each
+/// The joints' setpoints over time, made of the controller's velocities for an arm that takes positions. Over each
 /// period the velocity ramps linearly from where it is to the new one, so the path is continuously differentiable, its
 /// rate never exceeds the larger of both velocities and its acceleration is their difference over the period. When no
 /// new velocity comes in time the path brakes to rest, all joints in step, within the acceleration limits: a controller

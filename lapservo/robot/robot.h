@@ -9,20 +9,20 @@
 
 namespace lapservo {
 
-/// What an arm says of itself (CRTK measured_js and operating_state).
+/// State of an arm (CRTK measured_js and operating_state).
 struct JointState {
   /// When the joints were read, on the loop's clock: not when the reading arrived. The loop takes the joints that it
   /// gets in a tick for those of the tick; a reading that is older by some time adds this to the images' delay.
   double time_s = 0;
   JointVector q;
   OperatingState operating_state = OperatingState::disabled;
-  /// False where nothing that is sent moves the arm: somebody else leads it, and the loop only says what it would do.
-  /// Its set-points start from the joints in each tick then, and it does not hold because the arm does not follow.
+  /// False where setpoints do not move the arm: another program leads it, and the loop only reports what it would do.
+  /// Its setpoints then start from the joints in each tick, and it does not hold because the arm does not follow.
   bool follows = true;
   /// The operator has said start since the last call of Robot::state(): what waits for that goes on.
   bool started = false;
-  /// The first thing since the last call of Robot::state() for which the arm must not be moved, however short it was.
-  /// What follows from the other fields may be left to the Supervisor.
+  /// The first reason since the last call of Robot::state() for which the arm must not be moved, however short it was.
+  /// Reasons that follow from the other fields may be left to the Supervisor.
   Blocked blocked = Blocked::none;
 };
 
@@ -51,7 +51,7 @@ class Robot {
   /// Follow this path from now on; it replaces the one before and goes on from it without a jump. To be copied.
   virtual void send(const JointPath& path) = 0;
   /// The arm is the operator's until the next send(): once the last path has come to rest, an implementation that goes
-  /// on sending set-points stops that, so that hands or teleoperation may move the arm.
+  /// on sending setpoints stops that, so that hands or teleoperation may move the arm.
   virtual void release() {}
   /// True for an arm that exists in this program only: nobody can stand beside it. Starts count at once, and no limits
   /// have to be named.

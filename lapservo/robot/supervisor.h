@@ -13,9 +13,9 @@
 namespace lapservo {
 
 /// Stands between a loop and its arm and decides whether the arm moves: see SupervisorState for the states and their
-/// transitions. Whoever makes one wants the arm to move: that is the first start. While it holds, the arm tells the
-/// loop that it is not enabled; no path reaches it, the last one brakes to rest, and then the arm is released. All
-/// calls come from the loop's thread.
+/// transitions. Its construction is the first start. While it holds, the arm reports to the loop that it is not
+/// enabled; no path reaches it, the last one brakes to rest, and then the arm is released. All calls come from the
+/// loop's thread.
 class Supervisor : public Robot {
  public:
   /// Both must outlive it.
@@ -32,8 +32,8 @@ class Supervisor : public Robot {
   void stop(Commander who) { input_.stops.set(static_cast<std::size_t>(who)); }
   /// `said_s`: on the clock; `force`: whoever holds.
   void start(Commander who, double said_s, bool force = false);
-  /// What the loop has decided: empty where the arm is to move, else why it holds; `displaced`: since the arm is not
-  /// where it was sent.
+  /// The loop's decision: empty where the arm is to move, else the reason of the hold; `displaced`: because the arm is
+  /// not where it was sent.
   void tell_loop(std::string_view hold_reason, bool displaced);
   /// Whether the operator presses what has to be pressed, now.
   void watch_operator(std::function<bool()> is_present) { is_present_ = std::move(is_present); }

@@ -13,7 +13,7 @@ bool may_come_yet(Blocked obstacle) {
          obstacle == Blocked::operator_absent;
 }
 
-// Whether somebody said start in time and nobody stop; whoever did no longer holds.
+// Whether a start was given in time and no stop; its commander then does not hold any more.
 bool take_starts(SupervisorState& state, const SupervisorInput& input, const SupervisorConfig& config) {
   if (input.stops.any()) return false;
   bool said = false;

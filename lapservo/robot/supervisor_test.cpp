@@ -291,7 +291,7 @@ TEST(Supervisor, AnArmThatDoesNotFollowNeedsNoStart) {
   }
 }
 
-// What the table allows, by all that happened and not by a state.
+// The motion that the table allows, by all past events and not by a state.
 class Model {
  public:
   bool may_move(const SupervisorInput& input, const SupervisorConfig& config) {

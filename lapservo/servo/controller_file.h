@@ -13,8 +13,8 @@ namespace lapservo {
 /// and expectation.
 ControllerConfig load_controller(const std::filesystem::path& path, const ControllerConfig& base);
 
-/// Text of these keys, from which load_controller reads their values back to the same bits. What a file cannot set
-/// (scales, observer but for its delay, Jacobian, probing, damping, when to hold) is not in it.
+/// Text of these keys, from which load_controller reads their values back to the same bits. It omits values that a file
+/// cannot set (scales, observer except for its delay, Jacobian, probing, damping, conditions of holds).
 std::string controller_yaml(const ControllerConfig& config);
 
 }  // namespace lapservo

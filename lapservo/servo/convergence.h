@@ -22,7 +22,7 @@ class Convergence {
 
   /// Start of the first such second.
   std::optional<double> reached_s() const { return reached_ ? std::optional(since_s_) : std::nullopt; }
-  /// Of all errors from then on; zero before.
+  /// RMS of all errors from then on; zero before.
   Eigen::Vector4d rms_since() const {
     return reached_ ? Eigen::Vector4d((squares_ / static_cast<double>(count_)).cwiseSqrt()) : Eigen::Vector4d::Zero();
   }

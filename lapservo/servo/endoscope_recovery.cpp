@@ -12,7 +12,7 @@ namespace {
 
 constexpr int agreed_after = 10, moved_after = 2;
 
-// Of theta, phi (rad), rho (m) against the joints, from one image to the next: more than these tell.
+// Largest believable motion of theta, phi (rad), rho (m) against the joints, from one image to the next.
 const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
 
 // Offsets from so long ago are those of before the endoscope began to move.
@@ -68,7 +68,7 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
   const auto& image = input.image;
   if (!image) return;
   if (!image->found && !image->marker) return drop_suspicion(controller);
-  // A picture that repeats is no moved endoscope: that would show another one.
+  // An image that repeats is no moved endoscope: that would show another one.
   if (!follow_joints(*image, controller) || !image->found || image->repetition != Repetition::none) return;
   if (auto* watching = std::get_if<Watching>(&state_)) watch(*watching, *image, controller);
 }

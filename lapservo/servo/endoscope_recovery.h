@@ -16,7 +16,7 @@
 
 namespace lapservo::internal {
 
-/// What EndoscopeRecovery does, and all that it knows for that alone.
+/// State of EndoscopeRecovery and the data of that state.
 namespace endoscope {
 
 /// The measured joints at an image.
@@ -49,7 +49,7 @@ struct WaitingForStart {
 
 /// Notices that the endoscope moved, and measures camera_from_rcm anew. Noticed is that images which showed q, in
 /// agreement with the joints, show the marker as well as before but nowhere where its shaft passes the RCM, or where
-/// the joints are not: not what hides a marker, freezes a picture, sets an encoder or blocks a joint does. From then on
+/// the joints are not: not what hides a marker, freezes an image, sets an encoder or blocks a joint does. From then on
 /// the arm is the operator's. Images and measured joints of the motion that the operator makes give camera_from_rcm;
 /// the loop goes by it after JointState::started, unless the newest image contradicts it.
 class EndoscopeRecovery {
@@ -64,7 +64,7 @@ class EndoscopeRecovery {
 
   /// Before a step: its input. Suspends the controller, and resumes it.
   void see(const ServoInput& input, VisualController& controller);
-  /// In it, with the controller's own reason: a picture that repeats and joints that jump are no moved endoscope,
+  /// In it, with the controller's own reason: an image that repeats and joints that jump are no moved endoscope,
   /// nor anything to measure one by.
   void doubt(HoldReason reason, VisualController& controller);
   /// After it.

@@ -7,7 +7,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-// What the fit's covariance does not know: the lens, the print, the registration; s_rad, r_px, l_px, d_px.
+// Errors outside the fit's covariance: the lens, the print, the registration; s_rad, r_px, l_px, d_px.
 const Eigen::Vector4d min_sigma(5e-5, 0.02, 0.02, 0.02);
 
 Eigen::Vector4d both_ends(const Eigen::Vector2d& first, const Eigen::Vector2d& last) {

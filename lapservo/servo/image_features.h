@@ -18,8 +18,8 @@ FeatureModel feature_model(const Rig& rig);
 /// The same, were its camera_from_rcm that one.
 FeatureModel feature_model(const Rig& rig, const Rigid3& camera_from_rcm);
 
-/// What an observation tells the controller. Found only when all four features are known, r from `rcm_px`, the RCM's
-/// image in ideal pixels. The covariance is that of the points that were fitted, carried to the features.
+/// The controller's measurement from an observation. Valid only when all four features are known, r from `rcm_px`, the
+/// RCM's image in ideal pixels. The covariance is that of the fitted points, propagated to the features.
 ImageMeasurement measurement_of(const Observation& observation, double stamp_s,
                                 const std::optional<Eigen::Vector2d>& rcm_px);
 

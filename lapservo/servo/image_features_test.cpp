@@ -95,7 +95,7 @@ TEST(ImageFeatures, WhatIsNotOkIsNotFound) {
   }
 }
 
-// Every ideal point of the window lies in the picture, also through a distorting lens.
+// Every ideal point of the window lies in the image, also through a distorting lens.
 TEST(ImageFeatures, TheWindowLiesInThePicture) {
   Camera camera = testing::paper_test_rig().camera;
   for (const double k1 : {0.0, -0.25, 0.15}) {

@@ -9,14 +9,14 @@ namespace {
 
 constexpr double memory_s = 0.1;
 
-// Less tells nothing: theta, phi (rad), rho (m), of which this is also the scale.
+// Smaller steps are insignificant: theta, phi (rad), rho (m), of which this is also the scale.
 const Eigen::Array3d min_step(7.5e-4, 7.5e-4, 1.5e-4);
-// Of the path that the joints have gone: a registration or lens that is off, and the whole of rho's where its play is.
-// Once suspected, what goes with the path is no moved endoscope.
+// Fractions of the path of the joints: a wrong registration or lens, and for rho all of its play. A step that is
+// proportional to the path is no moved endoscope.
 const Eigen::Array3d of_path(0.1, 0.1, 0.5), of_path_suspected(0.5, 0.5, 0.5);
 constexpr double unusual = 6, weight = 0.05;
 
-// What changes by and by is learnt so much later.
+// A gradual change is learnt so much later.
 constexpr double learnt_after_s = 0.5;
 
 // One joint's own is what the others show less of than this part of it, beside their path and what is usual.
@@ -33,7 +33,7 @@ bool OffsetSteps::add(const SeenOffset& offset, bool delay_is_known) {
   Seen now{offset};
   if (!seen_.empty()) now.path = seen_.back().path + (offset.measured - seen_.back().at.measured).cwiseAbs();
   while (!seen_.empty() && !(offset.stamp_s - seen_.front().at.stamp_s < memory_s)) seen_.pop_front();
-  // An earlier stamp, or none, tells nothing.
+  // A stamp that is missing or not newer carries no information.
   if (!seen_.empty() && !(offset.stamp_s > seen_.back().at.stamp_s)) return false;
   if (!latest_.empty() && !(offset.stamp_s > latest_.back().stamp_s)) latest_.clear();
   const bool usual_before = latest(false) != nullptr;
@@ -92,8 +92,8 @@ const OffsetSteps::Seen* OffsetSteps::oldest(bool unusual_ones) const {
   return found == seen_.end() ? nullptr : &*found;
 }
 
-// A late image shows the joints at another time: all of them off along their motion; so does a delay that is off, where
-// the motion changed. What the two explain at best is taken off, by turns, each within its bounds.
+// A late image shows the joints at another time: all of them off along their motion; a wrong delay does the same where
+// the motion changed. The best explanation by the two is subtracted, by turns, each within its bounds.
 OffsetSteps::Change OffsetSteps::change(const Seen& before, const Seen& now, const Usual& usual,
                                         bool delay_is_known) const {
   const Eigen::Array3d step = (now.at.offset - before.at.offset).array() / min_step;

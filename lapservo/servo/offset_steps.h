@@ -6,25 +6,25 @@
 
 namespace lapservo::internal {
 
-/// What one image says of the joints, theta, phi (rad) and rho (m): where they were measured when it was exposed, how
-/// fast they moved since the image before, and how far from there the image shows the instrument.
+/// The joints at one image, theta, phi (rad) and rho (m): their measurement at its exposure, their speed since the
+/// previous image, and the distance from there at which the image shows the instrument.
 struct SeenOffset {
   double stamp_s = 0;
   Eigen::Vector3d measured = Eigen::Vector3d::Zero(), rate_per_s = Eigen::Vector3d::Zero();
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
 };
 
-/// Tells when the offset of what images show from the joints changes faster than it usually does: what moves with the
-/// endoscope slowly jumps nowhere, but goes away from where it was a moment ago. What an image that came late, a delay
-/// that is off, motion and play make of it is taken off first. How fast it changes usually is learnt half a second
-/// later, so that what begins to move is not taken for usual while it gains speed. What one joint alone shows is that
-/// joint's own, play, a slip or a drift, and learnt at once.
+/// Detects that the offset between images and joints changes faster than usual: an endoscope that moves slowly makes no
+/// jump, but leaves its place of a moment ago. The effects of a late image, a wrong delay, motion and play are
+/// subtracted first. The usual rate of change is learnt half a second later, so that the start of a motion does not
+/// count as usual while it gains speed. A change in one joint alone is that joint's own play, slip or drift, and is
+/// learnt at once.
 class OffsetSteps {
  public:
   /// Whether it lies elsewhere than a moment ago. Images that do are compared with those before them until these are
   /// 0.1 s old; then it has to go on moving.
   bool add(const SeenOffset& now, bool delay_is_known);
-  /// What comes next has nothing to do with what came before.
+  /// The next image is unrelated to the previous ones.
   void interrupt() { seen_.clear(); }
   /// Nor is what came in the last half second anything to learn from.
   void drop_latest() { interrupt(), latest_.clear(); }
@@ -35,7 +35,7 @@ class OffsetSteps {
     bool unusual = false;
     Eigen::Vector3d path = Eigen::Vector3d::Zero();  ///< that the joints have gone since the beginning, without sign
   };
-  /// Of one distance in time.
+  /// Statistics of one distance in time.
   struct Usual {
     Eigen::Array3d step_squared = Eigen::Array3d::Zero();
     double late_s2 = 0;

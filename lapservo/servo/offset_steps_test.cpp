@@ -63,7 +63,7 @@ TEST(OffsetSteps, TellsAnOffsetThatMovesOnAndOn) {
   }
 }
 
-// By how much the offset has moved from rest, on a smooth way that takes `duration_s`, when the first image is told.
+// The motion of the offset from rest, on a smooth way that takes `duration_s`, when the first image is reported.
 double told_after_mrad(OffsetSteps& steps, Swing& swing, double duration_s) {
   const Eigen::Vector3d way(0.3, -0.2, 0.015);
   for (int i = 0; i * period_s < duration_s; ++i) {
@@ -95,7 +95,7 @@ TEST(OffsetSteps, LearnsNothingFromWhatMovedBeforeItIsTold) {
   EXPECT_LT(told_after_mrad(steps, swing, 2), 1.5 * first_mrad);
 }
 
-// What an encoder or a belt does; the same in two joints is told.
+// A step as of an encoder or a belt; the same step in two joints is reported.
 TEST(OffsetSteps, TakesAJointThatSlipsForThatJoints) {
   const auto told = [](const Eigen::Vector3d& per_s) {
     Swing swing(9);
@@ -141,8 +141,8 @@ TEST(OffsetSteps, LearnsHowLateImagesCome) {
     EXPECT_FALSE(steps.add(swing.next(Eigen::Vector3d::Zero(), i % 7 == 0 ? 0.012 : 0), true)) << i;
 }
 
-// Joints at rest, then theta at 1.5 rad/s, and what images show of it: of phi so much of theta's path, all as if by a
-// delay that is off by `delay_off_s`. How many of the images while it moves are told.
+// Joints at rest, then theta at 1.5 rad/s, and the images' measurement: in phi a fraction of theta's path, all as by a
+// delay that is wrong by `delay_off_s`. Returns the number of images during the motion that are reported.
 int told_of_a_start(double phi_of_path, double delay_off_s, bool delay_is_known) {
   constexpr double per_s = 1.5;
   Random random(7);

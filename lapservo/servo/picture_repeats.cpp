@@ -7,8 +7,8 @@
 namespace lapservo::internal {
 namespace {
 
-// A picture in so many parts each way. A shaft in motion does not change three quarters of them, nor does the black
-// around a round picture take a quarter.
+// An image in so many parts each way. A shaft in motion does not change three quarters of them, nor does the black
+// around a round image take a quarter.
 constexpr int parts = 4, most_parts = 12;
 constexpr int noisy_after = 10, noiseless_after = 3;
 

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int width = 320, height = 180;
 
-// A bar that moves from picture to picture before what stands still.
+// A bar that moves from image to image before what stands still.
 cv::Mat scene(int k) {
   cv::Mat picture(height, width, CV_8UC3, cv::Scalar(60, 70, 160));
   cv::rectangle(picture, {k % 40, 0, 60, height}, cv::Scalar(20, 180, 40), cv::FILLED);
@@ -30,7 +30,7 @@ TEST(PictureRepeats, NoiseThatRepeatsIsTold) {
   EXPECT_EQ(repeats.add(noisy(scene(0), 12)), Repetition::none);
 }
 
-// Nothing is known of a camera after its first pictures, nor when its first one is shown on and on.
+// Nothing is known of a camera after its first images, nor when its first one is shown on and on.
 TEST(PictureRepeats, OfACameraThatIsNotKnownRepetitionMayBeRest) {
   PictureRepeats repeats;
   EXPECT_EQ(repeats.add(noisy(scene(0), 1)), Repetition::none);

@@ -135,7 +135,7 @@ std::optional<Sums> sum(const Model& model, const std::vector<MarkerSighting>& s
   return sums;
 }
 
-// What all images have in common (film, lens, print) is no smaller for being seen often: so many count as one.
+// Errors that all images share (film, lens, print) do not average out: so many images count as one.
 constexpr double alike_images = 20;
 
 Numbers weights_of(const RegistrationPrior& prior) {

@@ -25,7 +25,7 @@ struct GapPath {
   std::vector<Eigen::Vector2d> joints;
 };
 
-/// What is not known of q, one standard deviation; theta's offset is camera_from_rcm's.
+/// Unknown parts of q, one standard deviation; theta's offset is camera_from_rcm's.
 struct RegistrationPrior {
   double phi_rad = 3e-3, rho_m = 3e-4, psi_rad = 0.02;
   double delay_s = 0.01;
@@ -43,9 +43,9 @@ struct RegistrationFit {
 /// Where the sighting alone puts the RCM frame.
 Rigid3 camera_from_rcm_by(const Marker& marker, const MarkerSighting& sighting);
 
-/// Least squares over the edges' images, with a Cauchy loss, from `start`: camera_from_rcm and, about what they are
-/// believed to be, offsets of phi, rho, psi, the delay, and the backlash of rho and psi. Nullopt where the marker
-/// leaves the view or the sightings leave a number open.
+/// Least squares over the edges' images, with a Cauchy loss, from `start`: camera_from_rcm and, with priors, offsets of
+/// phi, rho, psi, the delay, and the backlash of rho and psi. Nullopt where the marker leaves the view or the sightings
+/// do not determine a number.
 std::optional<RegistrationFit> fit_registration(const Camera& camera, const Marker& marker,
                                                 const std::vector<MarkerSighting>& sightings, const GapPath& path,
                                                 const Rigid3& start, const RegistrationPrior& prior = {});

@@ -10,8 +10,8 @@
 
 namespace lapservo::internal {
 
-/// Notices in images alone that the endoscope moved: shafts that passed the RCM miss it from some frame on, those of
-/// all instruments that are seen. What it can't tell is a turn about the RCM, or one seen as a motion of the
+/// Detects in images alone that the endoscope moved: shafts that passed the RCM miss it from some frame on, those of
+/// all visible instruments. It can't detect a rotation about the RCM, or a motion that looks like one of the
 /// instrument.
 class RegistrationWatch {
  public:
@@ -23,7 +23,7 @@ class RegistrationWatch {
     if (moved) seen_.clear();
     return moved;
   }
-  static constexpr int frames = 5;  ///< that tell
+  static constexpr int frames = 5;  ///< informative frames
 
  private:
   struct Seen {

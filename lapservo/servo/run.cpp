@@ -13,7 +13,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-// An image alone can't tell an endoscope that moved from an instrument that did; the joints do.
+// An image alone can't distinguish a moved endoscope from a moved instrument; the joints do.
 void withhold_contradicted(ControlTick& tick) {
   const HoldReason reason = tick.decision.control.reason;
   const bool contradicted = reason == HoldReason::outlier || reason == HoldReason::endoscope_moved;

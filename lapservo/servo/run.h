@@ -18,12 +18,12 @@
 namespace lapservo {
 
 struct RunConfig {
-  Rig rig;  ///< as the loop believes it to be; its first instrument is steered
+  Rig rig;  ///< the loop's rig; its first instrument is steered
   ControllerConfig controller;
   std::optional<Eigen::Vector2d> rcm_px;  ///< for r, where the rig has no camera_from_rcm; ideal pixels
   TrackerOptions tracker;
   TrackingThread tracking_thread = TrackingThread::callers;
-  /// Of the arm's q, in the place of controller.limits: what run() needs with an arm that is not simulated.
+  /// Limits of the arm's q, in the place of controller.limits: run() needs them with an arm that is not simulated.
   std::optional<JointLimits> arm_limits{};
 };
 
@@ -34,8 +34,8 @@ struct ControlTick {
   std::optional<TrackedImage> seen;  ///< without q and r where the joints contradict them
 };
 
-/// Told of every tick after its set-points were sent, in the loop's thread: what takes long here makes the next tick
-/// late, nothing worse.
+/// Receives every tick after its setpoints were sent, in the loop's thread: a long computation here only delays the
+/// next tick.
 class RunObserver {
  public:
   virtual ~RunObserver() = default;
@@ -43,13 +43,13 @@ class RunObserver {
   virtual bool on_tick(const ControlTick& tick) = 0;
 };
 
-/// The servo loop: reads the joints, sees, decides, sends, then tells the observer, once every
+/// The servo loop: reads the joints, measures, decides, sends, then calls the observer, once every
 /// ControllerConfig::period_s for `duration_s`; then, and whenever an exception ends it, lets the arm brake to rest. A
 /// missing or stale image, a lost marker, an outlier or a number that is not finite make it hold within the tick; it
-/// goes on by itself when all is well again within SupervisorConfig::max_loop_hold_s. After anything else it holds
-/// until a start (see SupervisorState), and then until an image shows where the instrument is. A late tick shifts none
-/// of those after it. Where the endoscope moves it releases the arm, measures camera_from_rcm anew from motion that the
-/// operator makes, and goes on after a start.
+/// continues by itself when the cause ends within SupervisorConfig::max_loop_hold_s. After anything else it holds until
+/// a start (see SupervisorState), and then until an image shows the instrument. A late tick shifts none of those after
+/// it. Where the endoscope moves it releases the arm, measures camera_from_rcm anew from motion that the operator
+/// makes, and continues after a start.
 void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 

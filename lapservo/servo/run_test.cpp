@@ -49,7 +49,7 @@ struct Case {
   std::optional<Interval> hidden, faulted;
   ControlMode mode = ControlMode::fused;
   TrackingThread thread = TrackingThread::callers;
-  std::optional<Interval> frozen{};  ///< the picture from its beginning arrives again and again
+  std::optional<Interval> frozen{};  ///< the image from its beginning arrives again and again
   bool new_stamps = true;            ///< then, as if it were new
   std::optional<EndoscopeMotion> endoscope{};
   bool operated = true;  ///< then somebody moves the released arm, and says start
@@ -184,7 +184,7 @@ class InStep : public Robot, public ImageStream, public Clock {
   std::optional<StampedImage> newest() override {
     const std::lock_guard lock(mutex_);
     auto image = simulator_.newest();
-    vision_is_idle_ = !image;  // whoever asks for the next image has told of the one before
+    vision_is_idle_ = !image;  // requesting the next image means that the previous one was reported
     changed_.notify_all();
     return image;
   }
@@ -206,7 +206,7 @@ class InStep : public Robot, public ImageStream, public Clock {
   bool vision_is_idle_ = false;
 };
 
-// A camera that shows one picture for a while.
+// A camera that shows one image for a while.
 class FreezingImages : public ImageStream {
  public:
   FreezingImages(Simulator& simulator, const Interval& when, bool new_stamps)
@@ -325,8 +325,8 @@ TEST(Run, HoldsWhileTheMarkerIsHiddenAndGoesOnWithoutAJump) {
   EXPECT_EQ(done.records.back().decision.registration, 0);
 }
 
-// What is believed of the room is wrong: said where r is wrong with it, or nothing is moved. A turn about the RCM is no
-// more than an offset of the joints.
+// A wrong rig: reported where r is wrong with it, or nothing is moved. A rotation about the RCM equals an offset of the
+// joints.
 TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
   const Rig rig = testing::small_test_rig();
   const auto last_of = [&](const Rig& believed) {
@@ -354,7 +354,7 @@ TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
   }
 }
 
-// Held within 100 ms of the first picture that repeats, and no farther away then than braking takes it; then on again.
+// Held within 100 ms of the first image that repeats, and no farther away then than braking takes it; then on again.
 TEST(Run, HoldsWhenThePictureFreezesWhateverItsStamps) {
   for (const bool new_stamps : {true, false}) {
     SCOPED_TRACE(new_stamps ? "new stamps" : "the same stamp");
@@ -409,7 +409,7 @@ EndoscopeMotion random_motion(const Rig& rig, double duration_s, Random& random)
   }
 }
 
-// No image told a configuration that is not the instrument's when it was exposed.
+// No image gave a configuration that is not the instrument's at its exposure.
 void expect_right_where_ok(const PastRun& done, double latency_s, double period_s) {
   const Eigen::Array4d right(0.03, 0.03, 0.002, 0.1);
   const auto late = static_cast<std::size_t>(std::lround(latency_s / period_s));
@@ -422,7 +422,7 @@ void expect_right_where_ok(const PastRun& done, double latency_s, double period_
   }
 }
 
-// Pictures with motion in them: dark for a while; and blurred, veiled, stained and dark at once.
+// Images with motion in them: dark for a while; and blurred, veiled, stained and dark at once.
 TEST(Run, IsNeverWrongByPicturesThatAreHardToRead) {
   Case darkened;
   darkened.dark = Interval{2, 2.6};
@@ -538,17 +538,17 @@ double beside_m(const Rig& rig, const InstrumentTruth& truth, const Rigid3& came
   return (camera_from_first_camera * first - first).norm();
 }
 
-// Of a run in which the endoscope moved; times since it began to.
+// Results of a run in which the endoscope moved; times since it began to.
 struct HeldMotion {
   std::optional<double> plain_s;  ///< the marker lies 0.5 mm beside where it would in the camera's frame
   std::optional<double> held_s;
   Eigen::Vector4d made_error = Eigen::Vector4d::Zero();  ///< by the endoscope alone, when it is held
   int held_before = 0;                                   ///< ticks, at rest
-  int believed_wrong = 0;  ///< images that tell a q more than five sigma off while the arm follows it
+  int believed_wrong = 0;  ///< images that give a q more than five sigma off while the arm follows it
   Eigen::Vector4d worst_believed = Eigen::Vector4d::Zero();  ///< of their q
 };
 
-// By how much the q that an image told is off, where that is more than its sigma lets expect.
+// The error of an image's q, where it exceeds its sigma's expectation.
 std::optional<Eigen::Vector4d> told_wrong(const PastRun& done, std::size_t i, std::size_t late) {
   const auto& seen = done.records[i].observation;
   if (!seen || seen->status != Status::ok || !seen->rcm) return std::nullopt;
@@ -589,7 +589,7 @@ void print(const HeldMotion& motion, const EndoscopeMotion& endoscope) {
   const Eigen::Vector4d &made = motion.made_error, &believed = motion.worst_believed;
   std::printf(
       "%s ramp %.1f s: held %.3f s after the beginning, %+.3f s after it is plain, when it makes %.1f mrad %.1f %.1f "
-      "%.1f px; believed wrongly %d (%.1f %.1f mrad %.2f mm %.1f mrad); held before %d\n",
+      "%.1f px; wrong while followed %d (%.1f %.1f mrad %.2f mm %.1f mrad); held before %d\n",
       endoscope.profile == MotionProfile::smooth ? "smooth" : "even", endoscope.duration_s, motion.held_s.value_or(-1),
       motion.held_s.value_or(99) - motion.plain_s.value_or(0), 1e3 * made[0], made[1], made[2], made[3],
       motion.believed_wrong, 1e3 * believed[0], 1e3 * believed[1], 1e3 * believed[2], 1e3 * believed[3],

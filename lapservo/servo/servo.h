@@ -14,8 +14,8 @@ class Servo {
  public:
   /// Throws InputError for a configuration that can't work.
   Servo(const ControllerConfig& config, FeatureModel model);
-  /// Of the rig's first instrument. With ControlMode::fused and where the rig has camera_from_rcm, the arm is held when
-  /// the endoscope moved (EndoscopeRecovery).
+  /// The servo of the rig's first instrument. With ControlMode::fused and where the rig has camera_from_rcm, the arm is
+  /// held when the endoscope moved (EndoscopeRecovery).
   Servo(const ControllerConfig& config, const Rig& rig);
 
   ServoDecision step(const ServoInput& input);

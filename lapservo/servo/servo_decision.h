@@ -20,11 +20,11 @@ struct ServoInput {
   std::vector<JointReading> readings{};   ///< since the step before: Robot::readings()
 };
 
-/// What one step decides.
+/// The decision of one step.
 struct ServoDecision {
   ControlStep control;
   /// Images show the marker well, but for some time nowhere where camera_from_rcm, lens and RCM agree on a
-  /// configuration: one of them is wrong, r with it, and nothing in the image tells by how much.
+  /// configuration: one of them is wrong, r with it, by an unknown amount.
   bool registration_contradicted = false;
   /// Which camera_from_rcm the loop goes by: 0 the rig's, then one more whenever the endoscope moved and when the
   /// operator has started it with one that was measured anew. Images that were tracked with another one do not count.

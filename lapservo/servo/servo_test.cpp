@@ -20,7 +20,7 @@ namespace servo_test {
 constexpr double period_s = 1.0 / 60;
 const Eigen::Vector4d start(0.05, 1.57, 0.064, 1.2);
 
-// A loop whose arm goes where it is told at once and whose camera sees at once.
+// A loop whose arm reaches each setpoint at once and whose camera measures at once.
 class PerfectWorld {
  public:
   PerfectWorld() : model_(feature_model(testing::paper_test_rig())), servo_(config(), model_) {
@@ -172,7 +172,7 @@ TEST(Servo, AnArmThatDoesNotFollowIsLeftAloneUntilItRests) {
   world.steps(3);
   world.push({0.3, 0, 0, 0});
   world.stuck = true;
-  EXPECT_EQ(world.steps(2).control.reason, HoldReason::wild_joints);  // so far at once: believed once it stays there
+  EXPECT_EQ(world.steps(2).control.reason, HoldReason::wild_joints);  // so far at once: accepted once it stays there
   EXPECT_EQ(world.step().control.reason, HoldReason::not_following);
   world.stuck = false;
   EXPECT_LT(world.steps(400).control.error.norm(), 0.05);
@@ -499,7 +499,7 @@ TEST(MovedEndoscope, IsNoPictureThatRepeats) {
   EXPECT_EQ(world.steps(10).registration, 0);
 }
 
-// What was seen before may be of another place than what is seen afterwards.
+// Observations before may be of another place than those afterwards.
 TEST(MovedEndoscope, IsNotMeasuredByAPictureThatFreezesMeanwhile) {
   MovedEndoscope world;
   world.steps(60);

@@ -81,7 +81,7 @@ class OwnThreadTracking : public TrackedImageStream {
           continue;
         }
         const std::lock_guard lock(mutex_);
-        // The loop is not told of the picture that it repeats.
+        // The loop does not get the repeated image.
         if (latest_ && latest_->measurement.repetition == Repetition::none)
           tracked->measurement.repetition = Repetition::none;
         latest_ = std::move(tracked);

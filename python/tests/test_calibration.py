@@ -155,7 +155,7 @@ def test_a_fit_asks_for_signals(boards):
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
-    assert len(asked) > 20  # six pictures alone would ask some ten times
+    assert len(asked) > 20  # six images alone would be looked at some ten times
 
 
 def refused(call, *arguments, **keywords):
@@ -170,7 +170,7 @@ def test_what_does_not_tell_is_refused(recordings, rig):
     assert error.source == "frames" and error.problem.startswith("PSM1 is in none of 2 frames")
     assert "PSM1 is in none" in refused(lapservo.calibrate_registration, [grey], rig).problem
     assert "at least" in refused(lapservo.calibrate_colour, [grey], rig).problem
-    assert "the board is in none of 1 pictures" in refused(lapservo.calibrate_camera, [grey], "9x6", 0.005).problem
+    assert "the board is in none of 1 images" in refused(lapservo.calibrate_camera, [grey], "9x6", 0.005).problem
     # As the command line has it, with its own words for the options.
     assert refused(lapservo.calibrate_camera, [grey], "9", 0.005).field == "corners"
     assert refused(lapservo.calibrate_marker, [grey], rig, instrument="PSM9").value == "PSM9"
@@ -196,7 +196,7 @@ def test_times_that_are_none_or_do_not_rise_are_refused(rig, times):
 
 def test_pictures_of_a_board_have_no_order():
     grey = np.full((90, 160, 3), 90, np.uint8)
-    assert "none of 2 pictures" in refused(lapservo.calibrate_camera, [(1.0, grey), (0.5, grey)], "9x6", 0.005).problem
+    assert "none of 2 images" in refused(lapservo.calibrate_camera, [(1.0, grey), (0.5, grey)], "9x6", 0.005).problem
 
 
 def test_what_frames_raise_leaves_the_calibration(rig):

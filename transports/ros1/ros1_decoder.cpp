@@ -42,7 +42,7 @@ class Bytes {
     for (auto count = number<std::uint32_t>(); count > 0 && whole_; --count) values.push_back(text());
     return values;
   }
-  /// Of a std_msgs/Header.
+  /// The stamp of a std_msgs/Header.
   double stamp_s() {
     number<std::uint32_t>();  // seq
     const auto sec = number<std::uint32_t>(), nsec = number<std::uint32_t>();

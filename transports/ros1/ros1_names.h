@@ -9,8 +9,8 @@ struct MasterAddress {
   std::string host;
   int port = 0;
 };
-/// Of a text as in ROS_MASTER_URI: "http://host:11311", a slash behind it or none; localhost:11311 for an empty one.
-/// Throws InputError.
+/// Host and port of a text as in ROS_MASTER_URI: "http://host:11311", with or without a final slash; localhost:11311
+/// for an empty one. Throws InputError.
 MasterAddress master_address(const std::string& text);
 /// "http://host:port".
 std::string to_string(const MasterAddress& address);

@@ -10,15 +10,15 @@
 
 namespace lapservo::internal {
 
-/// This process as a node of ROS 1: one at a time, which all transports share. SIGINT stays as it is. What roscpp has
-/// to say is said on stderr, a line each, from warnings on.
+/// This process as a node of ROS 1: one at a time, which all transports share. SIGINT stays as it is. roscpp's messages
+/// go to stderr, a line each, from warnings on.
 class Ros1Node {
  public:
   /// The node that is there or, where none is, a new one of that name. Throws InputError when no master answers within
   /// 2 s or a variable of the environment can't be used.
   static std::shared_ptr<Ros1Node> get(const std::string& name);
   ~Ros1Node();
-  /// Whether its master does, asked for 1.5 s at most.
+  /// Whether its master answers within 1.5 s.
   bool answers() const;
   /// Unregisters what the master knows. Where the master neither answers nor refuses, for which roscpp would wait
   /// without end, it is kept for good instead.
@@ -33,7 +33,7 @@ class Ros1Node {
 
   MasterAddress master_;
   std::mutex mutex_;
-  std::optional<bool> hangs_;  // once asked, which is at the end
+  std::optional<bool> hangs_;  // once checked, which is at the end
 };
 
 }  // namespace lapservo::internal

@@ -26,8 +26,8 @@ namespace lapservo::internal {
 template <typename Message>
 using Ros1Type = decltype(ros1_message(std::declval<const Message&>()));
 
-/// What came of the type that carries Message: nothing when it can't be read. roscpp's own deserialiser would
-/// reserve what a message claims to hold.
+/// The content of the type that carries Message: empty when it can't be read. roscpp's own deserialiser would reserve
+/// the size that a message claims.
 template <typename Message>
 struct Ros1Received {
   std::optional<Message> message;
@@ -99,7 +99,7 @@ class Ros1Subscription {
   std::shared_ptr<ros::CallbackQueue> queue_ = std::make_shared<ros::CallbackQueue>();
   ros::Subscriber subscriber_;
   std::atomic<bool> ended_ = false;
-  bool connected_ = false;  // or told of why not
+  bool connected_ = false;  // or the reason was reported
   long unreadable_ = 0, refused_ = 0;
   std::thread thread_;
 };

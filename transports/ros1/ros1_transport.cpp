@@ -14,7 +14,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::uint32_t few = 10;    // as ROS 2 keeps by default
-constexpr std::uint32_t newest = 2;  // of pictures
+constexpr std::uint32_t newest = 2;  // of images
 
 std::string full_name(const std::string& topic) {
   return resolved_ros1_name(topic, ros1_namespace(), "topic");

@@ -10,9 +10,9 @@ namespace lapservo::internal {
 
 /// ROS 1 by roscpp: topics and types as ROS 1's nodes have them, at the master of ROS_MASTER_URI; ROS_NAMESPACE, ROS_IP
 /// and ROS_HOSTNAME as everywhere in ROS 1. All transports of a process are one node, of the first one's name, and none
-/// hears what another one of the same process says. Each subscription has its own thread. A topic of another type, and
-/// messages that can't be read, which are dropped, are told of on stderr, once a topic. Throws InputError for a topic
-/// that is none or when no master answers, std::runtime_error when roscpp fails.
+/// receives another one's messages of the same process. Each subscription has its own thread. A topic of another type,
+/// and unreadable messages, which are dropped, are reported on stderr, once a topic. Throws InputError for an invalid
+/// topic or when no master answers, std::runtime_error when roscpp fails.
 class Ros1Transport : public Transport {
  public:
   explicit Ros1Transport(const std::string& node_name);

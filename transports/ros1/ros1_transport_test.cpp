@@ -111,7 +111,7 @@ TEST_F(Ros1Wire, StrangersMessagesAreDroppedAndTold) {
   for (int i = 0; i < 4; ++i) {
     echo.clear();
     echo.get([&] { ask({stamp_s, "pretend"}); });
-    std::this_thread::sleep_for(std::chrono::seconds(1));  // the master is asked after 1 s and 3 s
+    std::this_thread::sleep_for(std::chrono::seconds(1));  // roscpp queries the master after 1 s and 3 s
   }
   const std::string said = ::testing::internal::GetCapturedStderr();
   EXPECT_TRUE(odd.empty());
@@ -124,7 +124,7 @@ TEST_F(Ros1Wire, StrangersMessagesAreDroppedAndTold) {
   EXPECT_EQ(said.find(unreadable), said.rfind(unreadable)) << said;
 }
 
-// What runs goes on when the master dies; a publisher that dies falls silent, and is heard when it is back.
+// Connections survive the master's death; a publisher that dies falls silent, and is heard when it is back.
 TEST_F(Ros1Wire, OutlivesMasterAndPeer) {
   TestInbox<JointMessage> joints;
   const auto subscription = transport_->subscribe_joints("/out/joints", joints.handler());
@@ -149,7 +149,7 @@ TEST_F(Ros1Wire, EndsThoughItsMasterHangs) {
   joints.get([&] { say({stamp_s, {}, {1}}); });
   auto lonely = transport_->subscribe_joints("/nobody", joints.handler());
   master_.stop();
-  std::this_thread::sleep_for(std::chrono::milliseconds(1200));  // it asks the master for such a topic
+  std::this_thread::sleep_for(std::chrono::milliseconds(1200));  // roscpp queries the master for such a topic
   const auto begin = std::chrono::steady_clock::now();
   lonely = subscription = nullptr;
   say = nullptr;

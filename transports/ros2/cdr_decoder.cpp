@@ -51,7 +51,7 @@ class CdrBytes {
     for (auto count = number<std::uint32_t>(); count > 0 && whole_; --count) values.push_back(text());
     return values;
   }
-  /// Of a std_msgs/Header.
+  /// The stamp of a std_msgs/Header.
   double stamp_s() {
     const auto sec = number<std::int32_t>();
     const auto nanosec = number<std::uint32_t>();

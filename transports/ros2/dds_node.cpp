@@ -63,7 +63,7 @@ const char* text_of(std::uint32_t policy) {
 // Called by DDS with the topic's name; once a topic.
 void say_offered(dds_entity_t, dds_offered_incompatible_qos_status_t status, void* topic) {
   if (status.total_count > 1) return;
-  std::fprintf(stderr, "DDS: %s: a subscriber asks for another %s than is offered, and gets nothing%s\n",
+  std::fprintf(stderr, "DDS: %s: a subscriber requires another %s than is offered, and gets nothing%s\n",
                static_cast<const std::string*>(topic)->c_str(), text_of(status.last_policy_id),
                status.last_policy_id == DDS_RELIABILITY_QOS_POLICY_ID ? ": let it read best effort" : "");
 }
@@ -79,7 +79,7 @@ struct DeleteListener {
 };
 using Listener = std::unique_ptr<dds_listener_t, DeleteListener>;
 
-// What CYCLONEDDS_URI says comes last and counts.
+// CYCLONEDDS_URI comes last and overrides the rest.
 std::string configuration() {
   const Discovery discovery = discovery_of(
       environment("ROS_LOCALHOST_ONLY"), environment("ROS_AUTOMATIC_DISCOVERY_RANGE"), environment("ROS_STATIC_PEERS"));

@@ -32,7 +32,7 @@ class DdsNode {
   dds_entity_t create_writer(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery);
   /// Without what this node's own writers send.
   dds_entity_t create_reader(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery);
-  /// Of a reader or writer.
+  /// Statistics of a reader or writer.
   void remove(dds_entity_t entity);
 
   /// Topics that other participants write, by their types; both as in ROS.

@@ -47,7 +47,7 @@ std::string peers_of(const std::vector<std::string>& hosts) {
   return text + "</Peers>";
 }
 
-// Ports that others can guess: without multicast, participants are asked one by one.
+// Well-known ports: without multicast, participants are queried one by one.
 constexpr const char* known_ports =
     "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>";
 
@@ -72,7 +72,7 @@ Discovery discovery_of(const std::string& localhost_only, const std::string& ran
 
 std::string cyclone_configuration(const Discovery& discovery, bool has_network) {
   std::vector<std::string> peers = discovery.peers;
-  // Whole pictures in few packets.
+  // Whole images in few packets.
   std::string general = "<MaxMessageSize>65500B</MaxMessageSize>", found = "<SPDPInterval>1s</SPDPInterval>";
   switch (discovery.range) {
     case DiscoveryRange::localhost:

@@ -41,7 +41,7 @@ class Arm {
   Arm(const Arm&) = delete;
   Arm& operator=(const Arm&) = delete;
 
-  // The positions of the set-points that came.
+  // The positions of the setpoints that came.
   std::vector<double> heard() const {
     std::vector<double> all;
     std::istringstream lines(testing::read_file(output_));
@@ -49,7 +49,7 @@ class Arm {
       if (double position = 0; std::istringstream(line) >> position) all.push_back(position);
     return all;
   }
-  // How many writers of set-points it knows.
+  // How many writers of setpoints it knows.
   bool says(const std::string& words) const { return testing::read_file(output_).find(words) != std::string::npos; }
 
  private:

@@ -24,8 +24,8 @@ std::uint32_t domain_of_environment() {
   return domain_id(id ? id : "");
 }
 
-// What one writer wrote reaches readers of different QoS each on its own way: the first counts. Its stamp names it, and
-// says nothing of the order: a writer's clock may be set.
+// A writer's sample reaches readers of different QoS on separate ways: the first one counts. Its stamp identifies it,
+// but not its order: a writer's clock may be set.
 class Sieve {
  public:
   bool is_new(const dds_sample_info_t& info, dds_entity_t reader) {
@@ -93,7 +93,7 @@ class Reading {
       for (const dds_entity_t reader : readers_) take(reader);
     }
   }
-  // What is said once should be there for those who come later.
+  // A message that is sent once should reach later subscribers.
   void look_for_silent_publisher() {
     if (!has_volatile_publisher(readers_.back()) || ++silences_ < 2) return;  // the first may have just come
     awaited_ = false;

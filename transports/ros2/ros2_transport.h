@@ -9,7 +9,7 @@
 namespace lapservo::internal {
 
 /// The ROS 2 wire: topics, types and QoS as ROS 2's nodes have them, in the domain of ROS_DOMAIN_ID. Joint states,
-/// set-points and images are read best effort and operating states and strings by whatever is offered, so that every
+/// setpoints and images are read best effort and operating states and strings by whatever is offered, so that every
 /// publisher matches. Throws InputError for a topic or a domain that is none, std::runtime_error when DDS fails.
 class Ros2Transport : public Transport {
  public:

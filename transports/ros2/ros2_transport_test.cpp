@@ -126,7 +126,7 @@ TEST(Ros2Transport, PeersWhoseQualityOfServiceDoesNotFitAreSaid) {
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   EXPECT_EQ(
       ::testing::internal::GetCapturedStderr(),
-      "DDS: /endoscope/image_raw: a subscriber asks for another reliability than is offered, and gets nothing: let "
+      "DDS: /endoscope/image_raw: a subscriber requires another reliability than is offered, and gets nothing: let "
       "it read best effort\n");
 }
 

@@ -1,5 +1,5 @@
 // An arm's ears on Fast DDS, which ROS 2 uses by default: a reader of /PSM1/servo_jp as rmw_fastrtps makes one in the
-// range LOCALHOST. Writes "writers N" as they come and go, and the first position of each set-point, until it is
+// range LOCALHOST. Writes "writers N" as they come and go, and the first position of each setpoint, until it is
 // killed.
 
 #include <cstdint>

@@ -9,7 +9,7 @@
 namespace lapservo::internal {
 namespace {
 
-// What is written points into the message: dds_write() copies, and takes nothing away.
+// The written fields point into the message: dds_write() copies, and takes nothing away.
 char* pointer(const std::string& text) {
   return const_cast<char*>(text.c_str());
 }

@@ -1,4 +1,4 @@
-// What is on the wire, read by eProsima's Fast CDR, which ROS 2's nodes use by default, along the .msg files: every
+// The bytes on the wire, read by eProsima's Fast CDR, which ROS 2's nodes use by default, along the .msg files: every
 // field has its number, in its place, and nothing is left over.
 
 #include <cstdlib>
@@ -231,7 +231,7 @@ TEST(WireBytes, OfWhatTheLoopTells) {
                                                              {"error[3]", "11"}});
 }
 
-// What bags hold are these bytes.
+// Bags hold these bytes.
 TEST(WireBytes, AreReadAsBagsAre) {
   const JointMessage joints{stamp_s, {"yaw", "", "pitch"}, {0.25, -1.5, 3}};
   const auto bytes = sent(joints);

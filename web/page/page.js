@@ -1,7 +1,7 @@
 "use strict";
 
 const at = (id) => document.getElementById(id);
-const oldS = 1;            // a picture or a loop that is older is said to be old
+const oldS = 1;            // an image or a loop that is older is said to be old
 const patienceMs = 3000;   // for an answer
 
 let clock = null;  // how far lapservo's is ahead of this page's, by the quickest answer of late
@@ -83,7 +83,7 @@ function compareClocks(nowS, beginMs) {
     clock = { tookMs, aheadMs: 1000 * nowS - (beginMs + tookMs / 2), untilMs: performance.now() + 10000 };
 }
 
-// What is shown goes by this page's clock too: nothing old looks new where the connection is lost.
+// The display uses this page's clock too: nothing old looks new where the connection is lost.
 function showAges() {
   const now = performance.now();
   const silentS = heardMs === null ? null : (now - heardMs) / 1000;
@@ -94,7 +94,7 @@ function showAges() {
   const ageS = pictureCameMs === null ? null : (now - pictureCameMs) / 1000;
   const old = ageS !== null && ageS > oldS && last && last.live;
   at("picture").classList.toggle("old", lost || ageS === null || old);
-  const parts = [ageS === null ? "no picture yet" : last && !last.live ? "a recording" : `picture ${old ? "OLD: " + ageS.toFixed(1) + " s" : (1000 * ageS).toFixed(0) + " ms"}`];
+  const parts = [ageS === null ? "no image yet" : last && !last.live ? "a recording" : `image ${old ? "OLD: " + ageS.toFixed(1) + " s" : (1000 * ageS).toFixed(0) + " ms"}`];
   if (last && last.loop) parts.push(`loop's delay ${(1000 * last.loop.delay_s).toFixed(0)} ms`);
   if (last && last.loop && last.loop.limited) parts.push("at a limit");
   text(at("ages"), parts.join(" · "));
@@ -104,12 +104,12 @@ function showAges() {
     state.className = "";
   } else if (!last.loop) {
     const found = last.instruments.filter((one) => one.status === "ok").length;
-    text(state, (last.ended ? "ended: " : "") + (last.images ? `${found} of ${last.instruments.length} seen` : "no picture yet"));
+    text(state, (last.ended ? "ended: " : "") + (last.images ? `${found} of ${last.instruments.length} seen` : "no image yet"));
     state.className = !last.ended && found && found === last.instruments.length ? "track" : "";
   } else {
     const current = last.events.length ? last.events[0].state : "";
     const asleep = last.loop_age_s > oldS;
-    text(state, asleep ? `the loop is silent for ${last.loop_age_s.toFixed(0)} s` : current + (last.asked ? ` (${last.asked} asked)` : ""));
+    text(state, asleep ? `the loop is silent for ${last.loop_age_s.toFixed(0)} s` : current + (last.asked ? ` (${last.asked} requested)` : ""));
     state.className = asleep || current.startsWith("hold") || current.startsWith("end") ? "hold" : current === "track" ? "track" : "";
   }
 }

@@ -11,8 +11,8 @@ class Option;
 
 namespace lapservo::app {
 
-/// What a parsed command line asks for; returns the exit code: 0, or 1 when nothing was found or nothing converged.
-/// Throws InputError for bad input, which main() prints in one line and ends with 2.
+/// The job of a parsed command line; returns the exit code: 0, or 1 when nothing was found or nothing converged. Throws
+/// InputError for bad input, which main() prints in one line and ends with 2.
 using Run = std::function<int()>;
 
 // CLI11 reads the command line; its headers, which take seconds to compile, stay in command.cpp and main.cpp.
@@ -58,7 +58,7 @@ class Command {
   template <typename Value>
   Option add_option(const std::string& names, Value& value, const std::string& help);
   void add_flag(const std::string& names, bool& value, const std::string& help);
-  /// What --help ends with: an example.
+  /// The end of --help: an example.
   void footer(const std::string& text);
   /// Sets `run_later` when the command line names this subcommand.
   void runs(Run& run_later, Run run);

@@ -26,7 +26,7 @@ class OutputFolder {
 
   /// Where to write a result of this name for now.
   std::filesystem::path operator/(const std::string& name) const { return unfinished_.path / name; }
-  /// What every run's help says about existing folders.
+  /// The help on existing folders, common to every run.
   static constexpr auto help =
       "; it must be new or empty, or hold a run that --force replaces; until all is done, and if the run is killed, "
       "what there is stands in its subfolder unfinished";

@@ -6,7 +6,7 @@
 
 namespace lapservo::app {
 
-/// One line on stderr that tells how far a long job is, only on a terminal and only once it takes longer than a second.
+/// One line on stderr with the progress of a long job, only on a terminal and only once it takes longer than a second.
 class Progress {
  public:
   explicit Progress(std::optional<int> total);

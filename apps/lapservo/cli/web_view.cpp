@@ -15,7 +15,7 @@ void add_listen_option(Command command, WebOptions& options) {
   command
       .add_option("--listen", options.listen,
                   "The page for others too, at this address of this computer (0.0.0.0: all); a token, printed once "
-                  "with the page's address, is asked for then")
+                  "with the page's address, is required then")
       .shows_default();
 }
 
@@ -82,7 +82,7 @@ PageWishes WebView::wishes() {
 
 WebView::WebView(const WebOptions&, PageConfig) {
   throw InputError("--web",
-                   "asks for a page, which this build lacks: it was built without libmicrohttpd-dev and "
+                   "needs a page, which this build lacks: it was built without libmicrohttpd-dev and "
                    "nlohmann-json3-dev");
 }
 

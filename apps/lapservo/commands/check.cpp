@@ -139,10 +139,10 @@ int check(const CalibrateOptions& options) {
 
 void add_check(Command app, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
-  Command command = app.add_subcommand("check", "Tell whether a rig is good enough, and what to improve first.");
+  Command command = app.add_subcommand("check", "Check whether a rig is good enough, and what to improve first.");
   command.add_option("input", options->input, "A short recording of the marker in motion: a folder, a video or a bag")
       .required();
-  command.add_option("--rig", options->rig, "The rig that is judged").required();
+  command.add_option("--rig", options->rig, "The rig to check").required();
   add_joint_options(
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "

@@ -68,7 +68,7 @@ Plot light_plot(const std::vector<FrameEvidence>& frames) {
   return plot;
 }
 
-// Of one boundary, by parts of the turn: of thousands of points a page that opens.
+// Points of one boundary, by parts of the roll: a page with thousands of points would not open.
 Series residual_means(const std::vector<PrintResidual>& residuals, std::size_t boundary) {
   constexpr std::size_t parts = 60;
   constexpr int least = 3;
@@ -98,7 +98,7 @@ Plot print_plot(const std::vector<PrintResidual>& residuals) {
   return plot;
 }
 
-// Light where sigma is small, orange at the limit, dark beyond it; told apart by lightness alone, too.
+// Light where sigma is small, orange at the limit, dark beyond it; the lightness alone distinguishes them, too.
 cv::Scalar color_of(double sigma_rad) {
   const double part = std::min(1.0, sigma_rad / (2 * rig_limits.sigma_rad));
   const cv::Scalar small(250, 240, 225), large(20, 70, 190);
@@ -163,7 +163,7 @@ std::vector<CheckLine> arm_lines(const ArmCheck& arm) {
 }
 
 std::vector<CheckLine> rcm_lines(const RcmCheck& rcm) {
-  if (!rcm.refusal.empty()) return {{"RCM", "can't be told: " + rcm.refusal}};
+  if (!rcm.refusal.empty()) return {{"RCM", "unknown: " + rcm.refusal}};
   std::vector<CheckLine> lines;
   lines.push_back(
       {"RCM", fmt::format("axes miss where they meet by {:.2f} mm rms",
@@ -183,7 +183,7 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
         {encoder_plot(*f.arm),
          "psi as the rig tracks it, less what the joints say. Steps that come with reversals are backlash."});
     figures.push_back({arm_plot(*f.arm, "The marker's place", "mm", 1e3, &ArmResidual::position_m),
-                       "The same in space. What grows with time is drift, what goes with speed is delay."});
+                       "The same in space. Growth with time is drift, dependence on speed is delay."});
   }
   if (f.rcm && f.rcm->refusal.empty()) {
     Plot plot = over_time("Axes and the RCM", "miss", "mm");
@@ -193,10 +193,10 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
     figures.push_back({std::move(plot), "By how much each frame's axis misses the point where they meet."});
   }
   figures.push_back(
-      {sigma_plot(checked.frames), "Of the rotation, as the tracker states it, in each frame where it is ok."});
+      {sigma_plot(checked.frames), "Sigma of the rotation, as the tracker states it, in each frame where it is ok."});
   for (const SigmaMap& map : checked.maps)
     figures.push_back({map_picture(map),
-                       fmt::format("Sigma of psi [mrad] to expect with the marker in each part of the picture, {:.0f} "
+                       fmt::format("Sigma of psi [mrad] to expect with the marker in each part of the image, {:.0f} "
                                    "mm away. Dark: it is wholly in view, and not found.",
                                    1e3 * map.depth_m)});
   figures.push_back({light_plot(checked.frames), "Median over the marker. Near 255 boundaries are lost."});
@@ -235,8 +235,8 @@ std::vector<CheckLine> check_lines(const CheckedRig& checked) {
                                    f.response->before_px, f.response->after_px)});
     lines.push_back({"size", fmt::format("the shaft is {:.0f} px wide", f.width_px)});
   } else {
-    lines.push_back({"light", fmt::format("the picture's values reach {:.0f} of 255, {:.0f} % saturated",
-                                          f.picture.value, 100 * f.picture.clipped)});
+    lines.push_back({"light", fmt::format("the image's values reach {:.0f} of 255, {:.0f} % saturated", f.picture.value,
+                                          100 * f.picture.clipped)});
   }
   if (f.print)
     lines.push_back({"print", f.print->refusal.empty()
@@ -244,7 +244,7 @@ std::vector<CheckLine> check_lines(const CheckedRig& checked) {
                                                 "that fits best; psi off by ",
                                                 f.print->before_px, f.print->after_px) +
                                         told(f.print->psi_rad, 1e3, "mrad")
-                                  : "can't be told: " + f.print->refusal});
+                                  : "unknown: " + f.print->refusal});
   const auto more = f.arm ? arm_lines(*f.arm) : f.rcm ? rcm_lines(*f.rcm) : std::vector<CheckLine>{};
   lines.insert(lines.end(), more.begin(), more.end());
   if (f.work_space)
@@ -278,7 +278,7 @@ void write_check_report(const std::filesystem::path& path, const std::string& in
                                        advice.needed ? "" : "Good enough without, but: ", advice.what, advice.command,
                                        advice.gain));
   section.figures = figures_of(checked);
-  Table table{"What was found", {"", ""}, {}, true};
+  Table table{"Results", {"", ""}, {}, true};
   for (const CheckLine& line : check_lines(checked)) table.rows.push_back({line.name, line.found});
   section.tables = {table};
   section.notes = {

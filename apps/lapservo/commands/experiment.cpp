@@ -35,7 +35,7 @@ struct ExperimentOptions {
   bool force = false;
 };
 
-// Measures, leaves the data in the folder, and tells of it.
+// Measures, leaves the data in the folder, and reports.
 using Experiment = std::function<ReportSection(const ExperimentSetup& setup, const fs::path& folder)>;
 
 template <auto measure>
@@ -76,7 +76,7 @@ ExperimentSetup setup_of(const ExperimentOptions& options) {
   return setup;
 }
 
-// What an interrupted run lacks; empty when it went to its end.
+// The parts that an interrupted run lacks; empty when it went to its end.
 std::string missing_from(const std::vector<ReportSection>& sections, const std::string& stopped_in) {
   std::string text;
   for (const ReportSection& section : sections)
@@ -175,7 +175,7 @@ void add_experiment(Command app, Run& run_later) {
   command.add_flag("--force", options->force, OutputFolder::force_help);
   command.add_option("--rig", options->rig,
                      "Camera and instrument (the first), with camera_from_rcm; else the built-in configs/paper.yaml");
-  command.add_option("--seed", options->seed, "Of positions, background and noise").shows_default().seed_number();
+  command.add_option("--seed", options->seed, "Seed of positions, background and noise").shows_default().seed_number();
   command.add_option("--method", options->method, "centerline: the paper's; surface: the default; or both")
       .shows_default()
       .one_of({"both", "centerline", "surface"});

@@ -201,7 +201,7 @@ int run_show(const RigOptions& options) {
       1e3 * usual_print_error_m, 1e3 * print_rad);
   if (options.out.empty()) return 0;
   write_marker_picture(options.out, instrument.name, instrument.marker, options.viewing.viewing());
-  std::printf("picture: %s\n", options.out.c_str());
+  std::printf("image: %s\n", options.out.c_str());
   return 0;
 }
 
@@ -265,7 +265,7 @@ void add_marker(Command app, Run& run_later) {
 
   auto showing = std::make_shared<RigOptions>();
   Command show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
-  show.add_option("--out", showing->out, "Write a picture too: .svg, .pdf or .png; a file of that name is replaced");
+  show.add_option("--out", showing->out, "Write an image too: .svg, .pdf or .png; a file of that name is replaced");
   add_viewing(show, showing->viewing);
   show.footer("Example:\n  lapservo marker show --rig configs/example.yaml --out marker.svg");
   show.runs(run_later, [showing] { return run_show(*showing); });

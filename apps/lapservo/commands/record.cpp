@@ -51,7 +51,7 @@ double stamp_since_1970_s(double stamp_s, const Clock& clock) {
   return since_1970_s() - (std::isfinite(stamp_s) ? clock.now_s() - stamp_s : 0);
 }
 
-// What comes, into the bag.
+// Writes arriving messages into the bag.
 class Recording {
  public:
   Recording(const RecordOptions& options, const std::optional<Rig>& rig, Transports& transports, const Clock& clock)
@@ -74,7 +74,7 @@ class Recording {
  private:
   template <typename Image>
   void add(const std::string& topic, Image&& message) {
-    // Of a stream that is a little faster all are kept.
+    // A stream that is a little faster is kept whole.
     if (message.stamp_s < next_image_s_ && message.stamp_s > next_image_s_ - 2 / fps_) return;
     next_image_s_ = message.stamp_s + 0.75 / fps_;
     recorder_.add(topic, std::forward<Image>(message));
@@ -312,7 +312,8 @@ void add_record(Command app, Run& run_later) {
   command.add_option("--instrument", options->instrument,
                      "For --move: the arm's name in the rig, where it has several");
   command
-      .add_option("--scale", options->scale, "Of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
+      .add_option("--scale", options->scale,
+                  "Scale of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
       .shows_default()
       .number_between(0.05, 4);
   command.add_option("--joint-limits", options->joint_limits,

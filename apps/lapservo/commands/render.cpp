@@ -189,9 +189,11 @@ void add_render(Command app, Run& run_later) {
   command.add_option("--count", options->count, "How many random configurations")
       .shows_default()
       .whole_number_between(1, 100000);
-  command.add_option("--seed", options->seed, "Of configurations, background and noise").shows_default().seed_number();
+  command.add_option("--seed", options->seed, "Seed of configurations, background and noise")
+      .shows_default()
+      .seed_number();
   command.add_flag("--moving", options->moving, "A smooth path through random configurations");
-  command.add_option("--background", options->background, "A picture, or tissue").shows_default();
+  command.add_option("--background", options->background, "An image, or tissue").shows_default();
   command.add_option("--light", options->light, "Exposure, 1 is normal").shows_default().number_between(0.01, 10.0);
   command.add_option("--smoke", options->smoke, "Share of grey veil, 0 to 1").shows_default().number_between(0.0, 1.0);
   command.add_option("--blood", options->blood, "Share of the marker covered, 0 to 0.9")
@@ -210,8 +212,8 @@ void add_render(Command app, Run& run_later) {
       .shows_default()
       .number_between(0.0, 1.0);
   command.add_option("--format", options->format, "png or jpg").shows_default().one_of({"png", "jpg"});
-  command.add_flag("--video", options->video, "Write video.mp4 instead of pictures");
-  command.add_option("--fps", options->fps, "Of the video").shows_default().number_between(0.1, 1000.0);
+  command.add_flag("--video", options->video, "Write video.mp4 instead of images");
+  command.add_option("--fps", options->fps, "Frame rate of the video").shows_default().number_between(0.1, 1000.0);
   command.add_flag("--force", options->force, OutputFolder::force_help);
   command.footer("Example:\n  lapservo render --rig configs/example.yaml --out frames --count 50 --moving --blood 0.2");
   command.runs(run_later, [options] { return run(*options); });

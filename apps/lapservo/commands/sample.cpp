@@ -59,7 +59,7 @@ instruments:
       offset: [0, 0, 0, 0]
 )";
 
-// Of the simulated arm, in the order of the rig's joints.
+// Limits of the simulated arm, in the order of the rig's joints.
 constexpr const char* joint_limits = R"(lower: [-1.5, -1.5, 0.01, -7]
 upper: [1.5, 1.5, 0.24, 7]
 rate: [0.4, 0.4, 0.04, 1.5]

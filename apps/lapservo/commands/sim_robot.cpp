@@ -87,7 +87,7 @@ int run(const SimRobotOptions& options) {
     robot.advance(time_s);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
-  std::printf("%ld set-points came\n", robot.statistics().count);
+  std::printf("%ld setpoints came\n", robot.statistics().count);
   return 0;
 }
 
@@ -97,7 +97,7 @@ void add_sim_robot(Command app, Run& run_later) {
   auto options = std::make_shared<SimRobotOptions>();
   Command command =
       app.add_subcommand("sim-robot", "Be an arm and its camera, simulated, for another process to steer.");
-  command.add_option("--rig", options->rig, "What stands before the camera");
+  command.add_option("--rig", options->rig, "The scene before the camera");
   command.add_option("--transport", options->transport, "ros2 or ros1").shows_default();
   command.add_option("--arm", options->arm, "Namespace of its CRTK topics, where no other arm is").shows_default();
   command.add_option("--camera", options->camera, "Namespace of image_raw and camera_info").shows_default();
@@ -105,7 +105,7 @@ void add_sim_robot(Command app, Run& run_later) {
       .finite_number()
       .delimiter(',')
       .expected(4);
-  command.add_option("--seed", options->seed, "Of start, tissue, noise, jitter").shows_default().seed_number();
+  command.add_option("--seed", options->seed, "Seed of start, tissue, noise, jitter").shows_default().seed_number();
   command.add_option("--latency-ms", options->latency_ms, "From exposure to publication")
       .shows_default()
       .number_between(0.0, 1000.0);

@@ -46,7 +46,7 @@ struct TrackOptions : FrameOptions {
   int frames = 0;
 };
 
-// What is known to be read before the first frame; rigs beside the frames come with them.
+// The inputs that are known before the first frame; rigs beside the frames come with them.
 InputFiles inputs_of(const TrackOptions& options) {
   InputFiles inputs;
   std::error_code error;
@@ -65,7 +65,7 @@ void refuse_outputs(const TrackOptions& options, const InputFiles& inputs) {
     throw InputError(options.out, "is the place for --out and --overlay, expected two places");
 }
 
-// Which rig a frame is to be tracked with: the one named by --rig, else NAME.rig.yaml beside the picture, else rig.yaml
+// Which rig a frame is to be tracked with: the one named by --rig, else NAME.rig.yaml beside the image, else rig.yaml
 // in its folder. The tracker begins anew when the rig changes.
 class RigByFrame {
  public:
@@ -95,7 +95,7 @@ class RigByFrame {
     if (!tracker_) tracker_.emplace(*rig_, tracking_);
     return *tracker_;
   }
-  /// What comes are pictures that may have nothing to do with one another: each is searched whole.
+  /// The frames may be unrelated images: each is searched whole.
   void expect_pictures() { tracking_.frame_budget.reset(); }
   const std::shared_ptr<const Rig>& rig() const { return rig_; }
   /// Those that were found beside the input, in words; empty where --rig names one.
@@ -212,7 +212,7 @@ class TrackRun {
         source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
     if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
       rigs_.expect_pictures();
-    if (options.view) view_.emplace("track", "use --overlay to write pictures instead");
+    if (options.view) view_.emplace("track", "use --overlay to write images instead");
     if (options.web.port) web_.emplace(options.web, page_config_of(options, source_));
     if (!options.page_only) csv_.emplace(options.out);
     if (!options.overlay.empty()) overlay_ = open_overlay_writer(options.overlay, source_);
@@ -251,7 +251,8 @@ class TrackRun {
       const double came_s = clock_.now_s() - (live_ ? live_->age_s() : 0);
       Tracker& tracker = rigs_.tracker_for(*frame);
       try {
-        const auto& observations = frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
+        const auto& observations =
+            frame->flaw ? tracker.refuse(*frame->flaw) : tracker.track(frame->bgr, frame->time_s);
         tally_.add(observations);
         if (registration_.add(observations)) say_moved(options_, *frame);
         diagnosis().add(frame->bgr, observations);
@@ -335,12 +336,12 @@ int run(const TrackOptions& options) {
   return TrackRun(options).run();
 }
 
-// What both commands take.
+// Options of both commands.
 void add_input_options(Command command, TrackOptions& options) {
   command
       .add_option(
           "input", options.input,
-          "Picture, folder of pictures, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
+          "Image, folder of images, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
           "topic "
           "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
       .required();
@@ -355,7 +356,7 @@ void add_input_options(Command command, TrackOptions& options) {
   command.add_flag("--deinterlace", options.deinterlace,
                    "For interlaced video (status: interlaced): track the field of the even rows; the same as "
                    "deinterlace: true in the rig's camera");
-  command.add_option("--fps", options.fps, "Frames per second of a folder's pictures")
+  command.add_option("--fps", options.fps, "Frames per second of a folder's images")
       .shows_default()
       .number_between(0.001, 100000.0);
 }
@@ -365,7 +366,7 @@ void add_input_options(Command command, TrackOptions& options) {
 void add_track(Command app, Run& run_later) {
   auto options = std::make_shared<TrackOptions>();
   Command command =
-      app.add_subcommand("track", "Measure the instruments in pictures, a video, a bag or a camera's frames.");
+      app.add_subcommand("track", "Measure the instruments in images, a video, a bag or a camera's frames.");
   add_input_options(command, *options);
   command
       .add_option("--out", options->out,
@@ -373,7 +374,7 @@ void add_track(Command app, Run& run_later) {
                   "killed, the rows are in NAME.part, which the next run of that name writes over")
       .shows_default();
   command.add_option("--overlay", options->overlay,
-                     "Write pictures (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
+                     "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
                      "same name");
   command.add_flag("--view", options->view, "Show a live window");
   add_web_options(command, options->web);
@@ -389,7 +390,7 @@ void add_view(Command app, Run& run_later) {
   options->page_only = true;
   options->out.clear();
   Command command =
-      app.add_subcommand("view", "Show what is measured in pictures, a video or a camera's frames on a page.");
+      app.add_subcommand("view", "Show what is measured in images, a video or a camera's frames on a page.");
   add_input_options(command, *options);
   add_page_options(command, options->web);
   command.footer(

@@ -43,11 +43,11 @@ void refuse_topic_outside_bags(const std::string& option, const std::string& top
 }
 
 void add_image_topic_option(Command command, std::string& image_topic) {
-  command.add_option("--image-topic", image_topic, "Of a bag with several: the topic whose images are meant");
+  command.add_option("--image-topic", image_topic, "In a bag with several: the topic of the images");
 }
 
 void add_video_options(Command command, FrameOptions& options) {
-  command.add_option("--colour-matrix", options.colour_matrix, "Of a video, whatever it names; else as it names")
+  command.add_option("--colour-matrix", options.colour_matrix, "Colour matrix of a video, in the place of its own")
       .one_of({"bt601", "bt709", "bt2020"});
   command
       .add_option("--chroma-location", options.chroma_location,

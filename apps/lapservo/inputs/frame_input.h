@@ -12,7 +12,7 @@ namespace lapservo::app {
 /// How a command reads its frames.
 struct FrameOptions {
   std::string image_topic;   ///< of a bag: see internal::image_topic_of()
-  double fps = 30;           ///< of a folder of pictures
+  double fps = 30;           ///< of a folder of images
   bool deinterlace = false;  ///< one field of each frame is tracked; also where the rig's camera says so
   std::string colour_matrix, chroma_location;  ///< see VideoReading
 };

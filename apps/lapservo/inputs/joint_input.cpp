@@ -59,7 +59,7 @@ void add_joint_options(Command command, CalibrateOptions& options, const std::st
 
 void add_joint_topic_option(Command command, std::string& joint_topic) {
   command.add_option("--joint-topic", joint_topic,
-                     "Of a bag with several: the topic of the arm's measured joints; else .../INSTRUMENT/measured_js, "
+                     "In a bag with several: the topic of the arm's measured joints; else .../INSTRUMENT/measured_js, "
                      "or the only measured_js");
 }
 

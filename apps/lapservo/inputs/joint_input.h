@@ -8,7 +8,7 @@
 
 namespace lapservo::app {
 
-/// What the joints read while frames were taken.
+/// The joints' readings during the frames.
 struct JointInput {
   Joints joints;
   internal::JointRecording recording;
@@ -18,9 +18,9 @@ struct JointInput {
 void add_joint_options(Command command, CalibrateOptions& options, const std::string& help);
 void add_joint_topic_option(Command command, std::string& joint_topic);
 
-/// Of --joints, a CSV or a bag. The instrument's joints are meant; where it has none, the recording's own four in the
-/// order theta, phi, rho, psi. A bag's stamps go with those of `frames`, which may be nullptr. Throws InputError for
-/// what is none of them.
+/// Joints of --joints, a CSV or a bag. Reads the instrument's joints; where it has none, the recording's own four in
+/// the order theta, phi, rho, psi. A bag's stamps go with those of `frames`, which may be nullptr. Throws InputError
+/// for other files.
 JointInput read_joint_input(const CalibrateOptions& options, const Instrument& instrument, const FrameSource* frames);
 
 /// The same, and without --joints of the input itself where it is a bag; nullopt without any.

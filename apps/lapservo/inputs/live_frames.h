@@ -14,9 +14,9 @@ class LiveFrames : public internal::LiveSource {
   /// See LiveImages.
   LiveFrames(const std::string& text, const Camera& camera);
 
-  /// Of the frame given last, since it came.
+  /// Age of the last frame, since its arrival.
   double age_s() const { return clock_.now_s() - last_s_; }
-  /// What became of those that are no frames, in words; empty when there were none.
+  /// Counts of unusable images, in words; empty when there were none.
   std::string dropped() const { return images_.counts().text(); }
 
  protected:

@@ -20,8 +20,8 @@ class Transports {
   explicit Transports(std::string node_name) : node_name_(std::move(node_name)) {}
   /// Throws as make_transport().
   internal::Transport& get(const std::string& transport, const std::string& option);
-  /// Of a topic (ros2:/image_raw), or that one of an arm (ros2:PSM1): empty where others publish it, else that nobody
-  /// does, and the topics that are there with their types. Throws as get().
+  /// For a topic (ros2:/image_raw), or that one of an arm (ros2:PSM1): empty where it has a publisher, else that it has
+  /// none, and the existing topics with their types. Throws as get().
   std::string unpublished(const std::string& text, const std::string& option, const std::string& of_arm = "");
 
  private:

@@ -44,7 +44,7 @@ std::optional<cv::aruco::Dictionary> dictionary_of(const Board& board) {
   return {};
 }
 
-// OpenCV's search for a chessboard draws from its thread's random numbers: each picture from the same ones, whatever
+// OpenCV's search for a chessboard draws from its thread's random numbers: each image from the same ones, whatever
 // was looked at before.
 class SameRandomNumbers {
  public:
@@ -58,7 +58,7 @@ class SameRandomNumbers {
 };
 
 std::vector<BoardCorner> find_chessboard(const Board& board, const cv::Mat& grey, bool thorough) {
-  // Half of the size first: quick, and noise and sharpening matter less. What is found is measured elsewhere.
+  // Half of the size first: quick, and noise and sharpening matter less. The corners are measured elsewhere.
   std::vector<cv::Point2f> points;
   constexpr int large_px = 800;
   const cv::Size size(board.columns, board.rows);

@@ -27,7 +27,7 @@ struct BoardCorner {
   Eigen::Vector2d raw_px;
 };
 
-/// What is wrong with it, for an error message: empty when nothing is.
+/// The problem with it, for an error message: empty without one.
 std::string board_problem(const Board& board);
 
 /// Corners to about a tenth of a pixel: all of a chessboard's, or those of a ChArUco board that are in view. Empty when

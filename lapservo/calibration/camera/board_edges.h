@@ -39,7 +39,7 @@ struct EdgePixels {
   std::vector<EdgePixel> pixels;
 };
 
-/// Edges between the corners that were found, where they are long enough to be measured and wholly in the picture.
+/// Edges between the corners that were found, where they are long enough to be measured and wholly in the image.
 /// `board_from`: the board's pose in the camera frame. Green's geometry; those of blue and red differ by far less than
 /// `reach_px`.
 std::vector<EdgePixels> edges_of(const Board& board, const std::vector<BoardCorner>& corners, const Camera& camera,

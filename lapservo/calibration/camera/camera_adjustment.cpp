@@ -30,7 +30,7 @@ struct ViewUnknowns {
 };
 
 constexpr double loss_scale_sigmas = 3;
-// What neighbouring edges share and a fit of one doesn't tell: a floor for its sigma.
+// The common error of neighbouring edges, which a fit of one does not show: a floor for its sigma.
 constexpr double least_sigma_px = 0.01;
 constexpr double shift_sigma_px = 0.2;
 
@@ -74,7 +74,7 @@ struct EdgeCost {
   }
 };
 
-// What demosaicing and chroma filters shift blue and red by, all over the picture, is no magnification.
+// Shifts of blue and red by demosaicing and chroma filters, equal all over the image, are no magnification.
 struct ShiftPrior {
   template <typename T>
   bool operator()(const T* shifts_px, T* residuals) const {

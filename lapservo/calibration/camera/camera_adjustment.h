@@ -21,7 +21,7 @@ struct EdgePoint {
   int channel;         ///< 0 blue, 1 green, 2 red
 };
 
-/// What of the camera is free; else k3 is 0, and fy is fx.
+/// The free parameters of the camera; otherwise k3 is 0, and fy is fx.
 struct CameraFreedom {
   bool k3 = true, aspect = true;
 };

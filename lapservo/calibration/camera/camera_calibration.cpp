@@ -168,7 +168,7 @@ void add_residuals(const CameraAdjustment& adjustment, const MeasuredEdges& edge
   calibration.rms_px = rms(all);
 }
 
-// The same from the same pictures: what the last digits of sums are hangs on where in memory the numbers lie.
+// The same from the same images: what the last digits of sums are hangs on where in memory the numbers lie.
 Camera rounded_by_sigmas(Camera camera, const CameraSigmas& sigmas) {
   camera.fx_px = rounded_by_sigma(camera.fx_px, sigmas.fx_px);
   camera.fy_px = rounded_by_sigma(camera.fy_px, sigmas.fy_px);
@@ -199,7 +199,7 @@ struct Tilts {
   double up_down_rad = 0, sideways_rad = 0;  // the largest
 };
 
-// The board's normal about the picture's axes, by a camera of a usual field of view: good enough for advice.
+// The board's normal about the image's axes, by a camera of a usual field of view: good enough for advice.
 Tilts tilts_of(const std::vector<BoardView>& views, const cv::Size& size) {
   const double focal_px = 1.1 * size.width;
   const cv::Matx33d matrix(focal_px, 0, size.width / 2.0, 0, focal_px, size.height / 2.0, 0, 0, 1);
@@ -219,7 +219,7 @@ Tilts tilts_of(const std::vector<BoardView>& views, const cv::Size& size) {
   return tilts;
 }
 
-// Which parts of the picture, by row and column, hold a corner in some view.
+// Which parts of the image, by row and column, hold a corner in some view.
 std::array<std::array<bool, 4>, 3> parts_seen(const std::vector<BoardView>& views, const cv::Size& size) {
   std::array<std::array<bool, 4>, 3> seen{};
   const auto part = [](double at_px, int size_px, int parts) {
@@ -238,7 +238,7 @@ bool BoardViews::add(const std::string& name, const cv::Mat& bgr, bool always) {
   if (view.corners.size() < least_corners) return false;
   ++found_;
   // The places of a few corners tell position, distance and tilt.
-  constexpr double different = 0.06;  // of the picture's width
+  constexpr double different = 0.06;  // of the image's width
   const auto distance_px = [&](const BoardView& other) {
     double most = 0;
     int shared = 0;
@@ -294,7 +294,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   Camera without = start;
   without.chromatic_aberration = {};
   auto fit = first_fit(board, views, without);
-  if (!fit) return refuse("the views are too alike to tell the camera");
+  if (!fit) return refuse("the views are too alike to determine the camera");
 
   // Edges about the fit, and the fit about the edges.
   std::optional<CameraAdjustment> adjustment;
@@ -302,7 +302,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
     told("edges in green");
     adjustment = adjust_camera(fit->camera, fit->camera_from_board, measured(board, views, *fit, false, false).points,
                                {false, true}, at_iteration);
-    if (!adjustment) return refuse("the views are too alike to tell the camera");
+    if (!adjustment) return refuse("the views are too alike to determine the camera");
     fit = fit_of(*adjustment);
   }
   if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
@@ -320,7 +320,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   told("edges in all colours");
   const MeasuredEdges edges = measured(board, views, *fit, true, false);
   adjustment = adjust_what_shows(*fit, edges, at_iteration);
-  if (!adjustment) return refuse("the views are too alike to tell the camera");
+  if (!adjustment) return refuse("the views are too alike to determine the camera");
   calibration.camera = rounded_by_sigmas(adjustment->camera, adjustment->sigmas);
   calibration.sigmas = adjustment->sigmas;
   calibration.bright_wider_px = adjustment->bright_wider_px[green];
@@ -328,7 +328,7 @@ CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardVi
   add_residuals(*adjustment, edges, calibration);
   if (const std::string why = too_alike(*adjustment); !why.empty()) return refuse(why);
   if (!is_invertible(calibration.camera))
-    return refuse("the distortion that fits the views can't be inverted at the picture's border: show the board there");
+    return refuse("the distortion that fits the views can't be inverted at the image's border: show the board there");
   return calibration;
 }
 

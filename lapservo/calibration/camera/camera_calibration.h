@@ -18,7 +18,7 @@
 
 namespace lapservo::internal {
 
-/// A picture in which the board was found.
+/// An image in which the board was found.
 struct BoardView {
   std::string name;
   cv::Mat bgr;
@@ -30,7 +30,7 @@ class BoardViews {
  public:
   BoardViews(Board board, std::size_t most) : board_(std::move(board)), most_(most) {}
 
-  /// Keeps the picture when its board lies elsewhere than in all that were kept, or, with `always`, wherever it lies.
+  /// Keeps the image when its board lies elsewhere than in all that were kept, or, with `always`, wherever it lies.
   /// Returns whether a board was found.
   bool add(const std::string& name, const cv::Mat& bgr, bool always);
   const std::vector<BoardView>& views() const { return views_; }
@@ -46,7 +46,7 @@ class BoardViews {
   int found_ = 0;
 };
 
-/// What the next pictures should show: "fill the lower left", "tilt the board". Empty when nothing is missing.
+/// What the next images should show: "fill the lower left", "tilt the board". Empty when nothing is missing.
 std::string advice(const std::vector<BoardView>& views, const cv::Size& size);
 
 struct CameraCalibration {
@@ -54,7 +54,7 @@ struct CameraCalibration {
   std::string refusal;
   Camera camera;
   CameraSigmas sigmas;
-  std::optional<ResponseFit> response;  ///< nullopt where the pictures don't tell: the camera's is as it was
+  std::optional<ResponseFit> response;  ///< nullopt where the images don't tell: the camera's is as it was
   std::vector<double> view_rms_px;      ///< of edges about the fit, by view, green
   double rms_px = 0;
   std::vector<Rigid3> poses;   ///< camera_from_board, by view

@@ -206,7 +206,7 @@ TEST(CalibrateCamera, ReadsCharucoBoards) {
   scene.columns = 7, scene.rows = 5;
   BoardViews views(charuco, 50);
   for (const Rigid3& pose : board_poses(scene, camera, 6, 190)) {
-    // Pixel of the pattern to twice the picture's.
+    // Pixel of the pattern to twice the image's.
     const Eigen::Matrix3d r = pose.rotation.toRotationMatrix();
     Eigen::Matrix3d from_board, camera_matrix, board_from_pattern, twice;
     from_board << r.col(0), r.col(1), pose.translation;

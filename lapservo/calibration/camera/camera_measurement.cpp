@@ -16,8 +16,8 @@ namespace lapservo::internal {
 namespace {
 
 constexpr std::size_t enough_live_views = 12;
-// Of a video four frames a second are looked at, as a hand moves a board, and of a long one at least so many, and four
-// for each view that is wanted: the corners of 1280x720 take some 60 ms to find.
+// Searches four frames a second of a video, as a hand moves a board, and in a long one at least so many, and four for
+// each view that is needed: the corners of 1280x720 take some 60 ms to find.
 int every_of_video(const FrameSource& source, std::size_t most_views) {
   constexpr int enough_frames = 120;
   const int quarter_second = std::max(1, static_cast<int>(source.frames_per_second() / 4));
@@ -106,7 +106,7 @@ CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings,
   measured.views = recordings.take_views();
   if (measured.views.empty()) {
     measured.calibration.refusal = fmt::format(
-        "the board is in none of {} pictures{}: look at the board's number of inner corners, show it wholly, sharp, "
+        "the board is in none of {} images{}: look at the board's number of inner corners, show it wholly, sharp, "
         "with a white margin",
         read.looked_at, read.damaged());
     return measured;

@@ -27,21 +27,21 @@ struct BoardWords {
 };
 Board board_of(const BoardWords& words, const BoardWords::Names& names = {});
 
-/// Gathers views of a board: every picture of folders; of videos and cameras those that differ, of four frames a second
+/// Gathers views of a board: every image of folders; of videos and cameras those that differ, of four frames a second
 /// or fewer.
 class BoardRecordings {
  public:
-  /// `rig`: whose camera took them, which tells their size; else the first one does.
+  /// `rig`: its camera took them and gives their size; else the first one does.
   BoardRecordings(const Board& board, std::size_t most_views, const std::optional<Rig>& rig);
 
-  /// Of a live camera until the views suffice; `say` is told what it should be shown next. Throws InputError at a
-  /// picture of another size.
+  /// Gathers views of a live camera until they suffice; `say` receives advice for the next view. Throws InputError at
+  /// an image of another size.
   void look_at(FrameSource& source, const std::string& name, const JobWatch& watch,
                const std::function<void(const std::string&)>& say = {});
 
   const FramesRead& read() const { return read_; }
   const std::vector<std::string>& without_board() const { return without_board_; }
-  /// Of the pictures; nullopt before the first one, where no rig tells it.
+  /// Size of the images; nullopt before the first one, where no rig gives it.
   const std::optional<cv::Size>& size() const { return size_; }
   /// Those chosen; empties this.
   std::vector<BoardView> take_views() { return views_.take(); }
@@ -54,14 +54,14 @@ class BoardRecordings {
   std::vector<std::string> without_board_;
 };
 
-/// A camera, measured, and the pictures that it was measured by.
+/// A camera, measured, and the images that it was measured by.
 struct CameraMeasurement {
   CameraCalibration calibration;  ///< or its refusal
   std::vector<BoardView> views;
-  std::string advice;  ///< what more pictures should show; empty when nothing is missing
+  std::string advice;  ///< what more images should show; empty when nothing is missing
 };
 
-/// Of what the recordings show.
+/// Counts of the recordings.
 CameraMeasurement measure_camera(const Board& board, BoardRecordings recordings, const Camera& start,
                                  const JobWatch& watch);
 

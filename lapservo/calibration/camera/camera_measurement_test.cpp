@@ -7,7 +7,7 @@
 namespace lapservo::internal {
 namespace {
 
-// A video of flat pictures.
+// A video of flat images.
 class FlatVideo : public FrameSource {
  public:
   FlatVideo(int frames, double fps) : frames_(frames), fps_(fps) {}

@@ -74,7 +74,7 @@ ArmResidual difference(const Camera& camera, const Marker& marker, double time_s
   const Eigen::Vector3d a = expected * middle, b = seen * middle;
   const double axis_rad = std::atan2((expected.rotation * z).cross(seen.rotation * z).norm(),
                                      (expected.rotation * z).dot(seen.rotation * z));
-  // What lies behind the camera has no image: as far off as the image is wide.
+  // A point behind the camera has no image: it counts as far off as the image is wide.
   const double pixel_px =
       a.z() > 1e-3 ? std::min<double>(camera.width_px, (camera.raw_from_point(a) - camera.raw_from_point(b)).norm())
                    : camera.width_px;

@@ -10,7 +10,7 @@
 
 namespace lapservo::internal {
 
-/// A number that a recording tells, and one standard deviation of it.
+/// A number from a recording, and one standard deviation of it.
 struct Told {
   double value = 0, sigma = 0;
   /// Larger than `limit`, and by more than chance makes it.
@@ -29,10 +29,10 @@ struct TrackedPsi {
   double time_s, psi_rad;
 };
 
-/// What a recording of a marker in motion and of its arm's joints tells of a rig: what each of its faults alone makes
-/// of where the marker is expected, the others taken out. Values are sizes, none below 0.
+/// The faults of a rig by a recording of a marker in motion and of its arm's joints: the displacement of the expected
+/// marker by each fault alone, the others removed. Values are sizes, none below 0.
 struct ArmCheck {
-  /// Why it is not told, and what to do about it: then nothing else counts. Empty when it is.
+  /// The reason why it is not observable, and the remedy: then the other fields are void. Empty when it is observable.
   std::string refusal;
   std::string region;                        ///< between which readings each joint moved: all of this holds there
   std::vector<ArmResidual> by_rig, at_best;  ///< as the rig has it, and as it would after a calibration

@@ -125,7 +125,7 @@ std::string FrameDiagnosis::cause_in_frames() const {
     return fmt::format("{} of {} frames are interlaced: --deinterlace tracks one field of each", interlaced_, frames_);
   if (std::all_of(kept_.begin(), kept_.end(), is_dark))
     return fmt::format(
-        "the frames are nearly black (values up to {:.0f} of 255): look at the light; 16-bit pictures that hold 8 to "
+        "the frames are nearly black (values up to {:.0f} of 255): look at the light; 16-bit images that hold 8 to "
         "12 bits are to be scaled to the whole range",
         dark_level);
   if (std::all_of(kept_.begin(), kept_.end(), is_grey))

@@ -18,7 +18,7 @@ class FrameDiagnosisTest : public ::testing::Test {
  protected:
   const Rig rig = scenes::usual_rig();
 
-  // Frames of the rig as `change` leaves them, tracked and diagnosed by `believed`.
+  // Frames of the rig as `change` leaves them, tracked and diagnosed with `believed`.
   template <typename Change>
   std::string text(const Rig& believed, Change change) const {
     FrameDiagnosis diagnosis(believed);

@@ -16,7 +16,7 @@
 namespace lapservo::internal {
 namespace {
 
-// Of the length from the first boundary to the last one. Perspective changes them by some 0.02.
+// Fractions of the length from the first boundary to the last one. Perspective changes them by some 0.02.
 using Shares = std::array<double, 3>;
 constexpr double most_off = 0.06;
 

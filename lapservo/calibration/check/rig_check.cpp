@@ -83,7 +83,7 @@ class Advisor {
   }
 
   void light() {
-    const std::string where = f_.light ? "the marker" : "the picture";
+    const std::string where = f_.light ? "the marker" : "the image";
     if (clipped())
       add(true,
           fmt::format("{} is overexposed: {:.0f} % of its pixels are saturated", where,
@@ -103,7 +103,7 @@ class Advisor {
       add(true, fmt::format("the bands' hues are {:.0f} degrees from the rig's", f_.hue_error_deg),
           "lapservo calibrate colour", "the marker is found where its colours are near the limit now");
     if (!f_.light && !clipped() && !dark())
-      add(true, found_text() + ": its colours are not the picture's", "lapservo calibrate colour",
+      add(true, found_text() + ": its colours are not the image's", "lapservo calibrate colour",
           "finding it at all; look at diameter_m too, and whether the marker is in view");
   }
 
@@ -140,7 +140,7 @@ class Advisor {
           fmt::format("{} of {} frames are marker_mismatch: the print is not the rig's", f_.mismatched, f_.frames),
           "lapservo calibrate marker", "psi, where it is refused now");
     else if (!print.refusal.empty() && f_.light)
-      add(false, "whether the print is the rig's can't be told: " + print.refusal,
+      add(false, "whether the print is the rig's is unknown: " + print.refusal,
           "record a full turn, then lapservo check", "a print 0.1 mm off costs tens of mrad of psi");
   }
 
@@ -195,18 +195,18 @@ class Advisor {
     }
     if (!f_.rcm) return;
     if (!f_.rcm->refusal.empty())
-      add(false, "whether the RCM is right can't be told: " + f_.rcm->refusal, "record a swing, then lapservo check",
+      add(false, "whether the RCM is right is unknown: " + f_.rcm->refusal, "record a swing, then lapservo check",
           "an RCM that is off bends every pose");
     else if (f_.rcm->distance_m && f_.rcm->distance_m->exceeds(2 * rig_limits.place_m))
       add(true,
           fmt::format("the axes meet {:.1f} mm from the rig's RCM (sigma {:.1f} mm)", 1e3 * f_.rcm->distance_m->value,
                       1e3 * f_.rcm->distance_m->sigma),
           std::string(command) + " --joints", "poses that the RCM does not bend");
-    add(false, "delay, focal length and the joints' offsets can't be told without the joints",
-        "lapservo check --joints", "the same page with them");
+    add(false, "delay, focal length and the joints' offsets are unknown without the joints", "lapservo check --joints",
+        "the same page with them");
   }
 
-  // Where nothing above tells why.
+  // Without any reason above.
   void found() {
     if (seldom_found() && std::none_of(advice_.begin(), advice_.end(), [](const Advice& a) { return a.needed; }))
       add(true, found_text(), "lapservo track --overlay, to see what hides it", "a loop that does not hold");
@@ -214,7 +214,7 @@ class Advisor {
 
   void view() {
     if (f_.light && f_.width_px < rig_limits.width_px)
-      add(true, fmt::format("the shaft is {:.0f} px wide in the picture", f_.width_px),
+      add(true, fmt::format("the shaft is {:.0f} px wide in the image", f_.width_px),
           "come nearer, or use more of the camera's resolution", "sigma falls with the square of the size");
     if (f_.work_space && f_.work_space->good < rig_limits.work_space)
       add(true,

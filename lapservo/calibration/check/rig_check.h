@@ -31,7 +31,7 @@ struct RigLimits {
 };
 inline constexpr RigLimits rig_limits;
 
-/// What a recording tells of a print. Empty refusal: all of it.
+/// The check of a print by a recording. Empty refusal: all of it is valid.
 struct PrintCheck {
   std::string refusal;
   double before_px = 0, after_px = 0;  ///< boundaries about the rig's print, and about the one that fits best
@@ -73,7 +73,7 @@ struct RigFindings {
   std::optional<WorkSpace> work_space;
 };
 
-/// What the frames tell; the optional parts are the caller's to add.
+/// Measurements from the frames; the optional parts are the caller's to add.
 RigFindings findings_of(const Rig& rig, std::size_t instrument, const RigEvidence& evidence);
 
 /// One thing to do.
@@ -84,8 +84,8 @@ struct Advice {
   std::string gain;     ///< what it would gain
 };
 
-/// What to do, the first thing first: in the order in which one makes the next one wrong (light, colours, encoding,
-/// camera, print, what moves, delay, registration, the view), what is needed before what may be.
+/// Remedies in the order of their dependence (light, colours, encoding, camera, print, joints' motion, delay,
+/// registration, the view), necessary ones before possible ones.
 std::vector<Advice> advice_on(const RigFindings& findings);
 
 }  // namespace lapservo::internal

@@ -98,7 +98,7 @@ class CheckRig : public ::testing::Test {
   const JointRecording joints = joints_meanwhile();
 };
 
-// What blood hides is found in the one picture that there is, however long that takes.
+// A boundary under blood is found in the only image there is, however long that takes.
 TEST(RigEvidence, SearchesEachPictureWhole) {
   Rig rig = true_rig();
   MarkerSigmas& sigmas = rig.instruments[0].marker.sigmas;  // a print that was measured may show little of itself
@@ -113,7 +113,7 @@ TEST(RigEvidence, SearchesEachPictureWhole) {
   EXPECT_EQ(evidence.count(Status::ok), 1);
 }
 
-// With a print that is off, so that all of the trackers have something to do.
+// With a misprinted marker, so that all of the trackers have something to do.
 TEST(RigEvidence, IsTheSameFromOneCoreAndFromTwo) {
   Rig rig = true_rig();
   rig.instruments[0].marker.bands_upper_m[0] += 0.05e-3;
@@ -145,7 +145,7 @@ TEST(RigEvidence, IsTheSameFromOneCoreAndFromTwo) {
     EXPECT_EQ(keys_of_one[i].sighting.tau_rad, keys_of_two[i].sighting.tau_rad);
 }
 
-// What both halves throw reaches the caller once, wherever they ran.
+// An exception of both halves reaches the caller once, wherever they ran.
 TEST(RigEvidence, PassesErrorsOn) {
   for (const auto cores : {RigEvidence::Cores::one, RigEvidence::Cores::two}) {
     RigEvidence evidence(true_rig(), 0, cores);
@@ -185,7 +185,7 @@ TEST_F(CheckRig, NamesAWrongRegistrationFirst) {
   EXPECT_NEAR(findings.arm->place_m->value, 9.85e-3, 0.3e-3);
 }
 
-// A sign of pitch that is wrong shows nowhere in these pictures.
+// A sign of pitch that is wrong shows nowhere in these images.
 TEST_F(CheckRig, CallsNoRigGoodWhereAJointStoodStill) {
   instrument.joints->sign[1] *= -1;
   const RigFindings findings = found_out(rig, rendered(60, {}, 0.01), joints_meanwhile(0, 0.01));

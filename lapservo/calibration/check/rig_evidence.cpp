@@ -25,7 +25,7 @@ Rig free_rig(Rig rig, double tolerance_m, double focal_change) {
   return rig;
 }
 
-// The pictures may have nothing to do with one another, and no robot waits for them.
+// The images may have nothing to do with one another, and no robot waits for them.
 Tracker whole_search(const Rig& rig) {
   return Tracker(rig, {.frame_budget = std::nullopt});
 }

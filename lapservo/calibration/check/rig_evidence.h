@@ -35,7 +35,7 @@ struct PictureLight {
   double clipped = 0;  ///< median over frames of the fraction with a saturated channel
 };
 
-/// Looks at a recording's frames with all that tells whether the rig is right.
+/// Passes a recording's frames through all measurements that test the rig.
 class RigEvidence {
  public:
   /// How many cores frames are looked at with; both find the same.
@@ -46,12 +46,12 @@ class RigEvidence {
   /// Then it also throws what was wrong with one before. Returns whether the marker was found by the image alone.
   bool add(const cv::Mat& bgr, double time_s);
 
-  // What follows waits for all frames that were added.
+  // These functions wait for all frames that were added.
   const std::vector<FrameEvidence>& frames() const;
   /// By the image alone, whatever the print; with TimedPose::by_focal.
   const std::vector<TimedPose>& poses() const;
   std::vector<TrackedPsi> tracked_psi() const;
-  /// Nullopt when the marker's edges are too few to tell.
+  /// Nullopt when the marker's edges are too few.
   std::optional<MarkerResponse::Result> response() const;
   PictureLight picture() const;
   int count(Status status) const;
@@ -65,7 +65,7 @@ class RigEvidence {
     FreeTrackers(const Rig& rig, double tolerance_m);
     Tracker at, longer, shorter;
   };
-  // What those see of the marker.
+  // Their measurements of the marker.
   struct FreeSight {
     std::optional<MarkerLight> light;
     double width_px = 0;

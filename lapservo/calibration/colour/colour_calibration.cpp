@@ -165,7 +165,7 @@ std::string refusal_of(const MeasuredHues& measured, std::size_t frames, const s
         "lower the exposure",
         100 * measured.clipped);
   if (measured.moved_m < least_move_m && measured.turned_rad < least_turn_rad)
-    return "the frames are all alike: move the instrument through the picture and turn it, 10 s or more";
+    return "the frames are all alike: move the instrument through the image and turn it, 10 s or more";
   const double apart_deg =
       std::min({hue_gap_deg(hues[0], hues[1]), hue_gap_deg(hues[1], hues[2]), hue_gap_deg(hues[0], hues[2])});
   if (apart_deg < least_apart_deg)
@@ -228,7 +228,7 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
             : fmt::format("as it is: no usual one brings channels nearer at {} edges, they lie {:.3f} px apart",
                           result->edges, result->before_px);
   } else {
-    calibration.response_found = "as it is: too few edges tell it; come nearer";
+    calibration.response_found = "as it is: too few edges; come nearer";
   }
   Rig better = with_hues(rig, instrument, hues_deg);
   if (calibration.response) better.camera.response = *calibration.response;

@@ -354,7 +354,8 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   calibration.seam_may_lag = last->lags;
   if (calibration.seam_views < min_seam_views)
     return refused(
-        "the seam is not seen well enough to tell where the print begins: film it slowly passing the camera, without "
+        "the seam is not visible well enough to locate the beginning of the print: film it slowly passing the camera, "
+        "without "
         "glare");
   if (!settled) return refused("the fit does not settle: more frames, sharper ones, or a rig nearer to the print");
   calibration.after_px = summary_of(*last, fit.measured(), fit.marker(), 2).rms_px;

@@ -19,8 +19,8 @@ struct ArmGuess {
   std::optional<std::size_t> open_sign;  ///< a joint whose other sign explains the motion about as well
 };
 
-/// Signs, offsets and rotation by the axes and turns of poses whose joints are known; `rcm_m`: where the axes meet.
-/// Of equal descriptions that which register_arm() promises.
+/// Signs, offsets and rotation by the axes and rolls of poses whose joints are known; `rcm_m`: the intersection of the
+/// axes. Among equal descriptions it returns that which register_arm() promises.
 ArmGuess guess_arm(const Instrument& instrument, const std::vector<TimedPose>& poses,
                    const std::vector<std::array<double, 4>>& joints, const Eigen::Vector3d& rcm_m,
                    double rho_per_joint);

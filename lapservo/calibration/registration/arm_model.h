@@ -15,8 +15,8 @@ namespace lapservo::internal {
 /// Times sigma: what goes with the pose (the side of the marker that is seen, a codec's habits) is neither noise nor
 /// common to all frames, and in no covariance. On rendered motions it doubles the errors (docs/notes/calibration.md).
 inline constexpr double unmodelled_sigmas = 2;
-/// Of an arm's numbers: as the residuals scatter, times this, but nowhere smaller than by the information alone: in
-/// directions that the motion leaves open, residuals scatter little.
+/// Sigmas of an arm's numbers: from the residuals' scatter, times this, but nowhere smaller than from the information
+/// alone: in directions that the motion leaves open, residuals scatter little.
 Eigen::MatrixXd arm_covariance(const FrameFit& fit);
 
 /// Which faults an arm's model may have beside a wrong registration.
@@ -34,7 +34,7 @@ class ArmModel {
     Block translation;  ///< of the RCM frame (3)
     Block offsets;      ///< of phi, rho, psi
     Block delay;
-    /// What frames have in common and no number of them averages out: the scale of distances, the axis' tilt along the
+    /// Errors that all frames share, so that they do not average out: the scale of distances, the axis' tilt along the
     /// view.
     Block scale, tilt;
     Block backlash;  ///< of those joints that move
@@ -52,7 +52,7 @@ class ArmModel {
   Joints joints(const Eigen::VectorXd& x) const;
   std::array<double, 4> backlash_of(const Eigen::VectorXd& x) const;
 
-  /// Off across the view (2) and along it; the axis turned in the picture and tilted along the view; turned about it.
+  /// Off across the view (2) and along it; the axis turned in the image and tilted along the view; turned about it.
   Eigen::MatrixXd residuals(const Eigen::VectorXd& x) const;
 
   const std::vector<TimedPose>& poses() const { return poses_; }

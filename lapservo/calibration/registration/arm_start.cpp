@@ -52,7 +52,8 @@ ArmStart start_arm(const Instrument& instrument, const std::vector<TimedPose>& p
     return start.refusal = still + ": " + swing_more, start;
   const auto meeting = axes_meeting_point(poses);
   if (!meeting)
-    return start.refusal = std::string("the shaft's axes are too alike to tell where they meet: ") + swing_more, start;
+    return start.refusal = std::string("the shaft's axes are too alike to locate their intersection: ") + swing_more,
+           start;
   std::vector<double> rho_m;
   for (const TimedPose& pose : poses) rho_m.push_back((pose.origin() - meeting->point_m).dot(pose.axis()));
 

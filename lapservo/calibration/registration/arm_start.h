@@ -13,13 +13,13 @@
 
 namespace lapservo::internal {
 
-/// Poses that a registration needs at least, and what to do where their motion tells too little.
+/// The least number of poses for a registration, and the remedy where their motion is too small.
 inline constexpr std::size_t min_registration_poses = 40;
 inline constexpr auto swing_more =
     "swing the instrument by 0.5 rad in both directions, insert it by 20 mm and turn it, in 20 s or more";
 std::string too_few_poses(std::size_t poses);
 
-/// What a fit of an arm starts from.
+/// The start of a fit of an arm.
 struct ArmStart {
   /// Why there is none, and what to do about it: then nothing else counts. Empty when there is one.
   std::string refusal;

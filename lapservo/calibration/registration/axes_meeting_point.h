@@ -15,7 +15,7 @@ struct AxesMeetingPoint {
   std::vector<double> misses_m;  ///< of each axis
 };
 
-/// Nullopt when they are too few or too alike to tell.
+/// Nullopt when they are too few or too alike.
 std::optional<AxesMeetingPoint> axes_meeting_point(const std::vector<TimedPose>& poses,
                                                    const AtIteration& at_iteration = {});
 

@@ -8,7 +8,7 @@
 
 namespace lapservo::internal {
 
-/// What two recordings of one motion tell of each other before anything is known of where the arm stands.
+/// The relation of two recordings of one motion, independent of the arm's place.
 struct DelaySearch {
   double delay_s = 0;  ///< a frame's stamp minus the joints' clock at its exposure
   /// How much of what the marker does the joints explain at this delay: 0 nothing, 1 all.

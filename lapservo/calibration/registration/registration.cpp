@@ -19,12 +19,12 @@
 namespace lapservo::internal {
 namespace {
 
-// What a registration that is worth writing is known to.
+// Largest sigmas of a registration that may be written.
 constexpr double max_sigma_m = 3e-3, max_sigma_rad = 0.02;
 
 constexpr double unmodelled = unmodelled_sigmas * unmodelled_sigmas;  // times the variance
 
-// Of the four numbers x y z w, for a small turn about the frame's own axes.
+// Jacobian of the four numbers x y z w for a small rotation about the frame's own axes.
 Eigen::Vector4d quaternion_sigma(const Eigen::Quaterniond& q, const Eigen::Matrix3d& turn_covariance) {
   Eigen::Matrix<double, 4, 3> slopes;
   for (Eigen::Index i = 0; i < 3; ++i) {
@@ -61,8 +61,8 @@ Eigen::Quaterniond usual_rotation(const std::vector<TimedPose>& poses) {
   return Eigen::Quaterniond(axes).normalized();
 }
 
-// Half of what a frame says of its turn about the axis is the film's, the print's and the picture's processing: common
-// to all frames, and not told from psi's offset.
+// Half of a frame's error of the roll is the film's, the print's and the image's processing: common to all frames, and
+// indistinguishable from psi's offset.
 double common_turn_rad(const std::vector<TimedPose>& poses) {
   std::vector<double> sigmas_rad;
   for (const TimedPose& pose : poses) sigmas_rad.push_back(pose.marker.sigma_roll_rad);
@@ -152,7 +152,7 @@ Registration register_rcm(const Instrument& instrument, const std::vector<TimedP
     sigma_m = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   }
   if (!meeting || sigma_m.norm() > max_sigma_m)
-    return result.refusal = std::string("the shaft's axes are too alike to tell where they meet: ") + swing_more,
+    return result.refusal = std::string("the shaft's axes are too alike to locate their intersection: ") + swing_more,
            result;
   const bool known = instrument.camera_from_rcm.has_value();
   result.camera_from_rcm = {known ? instrument.camera_from_rcm->rotation : usual_rotation(poses), meeting->point_m};

@@ -14,7 +14,7 @@
 
 namespace lapservo::internal {
 
-/// What is left at one frame: the marker as it was seen against where the registration has it.
+/// The residual at one frame: the marker as measured relative to its place by the registration.
 struct RegistrationResidual {
   double time_s;
   double position_m, axis_rad, roll_rad;  ///< sizes; with joints all three, else how far the axis misses the RCM
@@ -26,7 +26,7 @@ struct Registration {
   std::string refusal;
   Rigid3 camera_from_rcm;
   Eigen::Vector3d sigma_translation_m = Eigen::Vector3d::Zero();
-  /// Of x y z w; nullopt where the rotation is a convention or the rig's.
+  /// Sigmas of x y z w; nullopt where the rotation is a convention or the rig's.
   std::optional<Eigen::Vector4d> sigma_quaternion;
   double sigma_rotation_rad = 0;  ///< of the angle of a rotation between the true one and this
 
@@ -37,12 +37,13 @@ struct Registration {
     double image_delay_s = 0, sigma_image_delay_s = 0;
     std::array<double, 4> backlash{};  ///< between joint readings and instrument, rad and m
     JointRanges ranges{};              ///< of the joints' readings
-    /// Of a turn of camera_from_rcm about its own axes (3), of its translation (3), of the offsets of phi, rho, psi.
+    /// Covariance of a rotation of camera_from_rcm about its own axes (3), of its translation (3), of the offsets of
+    /// phi, rho, psi.
     Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
   };
   std::optional<Arm> arm;
 
-  std::vector<std::string> unknown;  ///< what these data do not tell, one sentence each
+  std::vector<std::string> unknown;  ///< quantities that these data do not determine, one sentence each
   std::vector<RegistrationResidual> residuals;
 };
 

@@ -55,7 +55,7 @@ MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::strin
   if (table.with_rcm > 0 && poses.all.empty())
     poses.none = fmt::format(
         "its {} rows were measured with a camera_from_rcm, through which their axes pass whether it is right or not: "
-        "give the pictures, or track them with a rig without it",
+        "give the images, or track them with a rig without it",
         table.with_rcm);
   else if (table.rows == 0)
     poses.none = fmt::format("has no row of {}", instrument);

@@ -21,17 +21,17 @@ struct MeasuredPoses {
   FramesRead read;
 };
 
-/// Of a marker in motion, tracked without what is to be measured. Throws InputError as read_frames().
+/// Calibrates by a marker in motion, tracked without the quantities to measure. Throws InputError as read_frames().
 MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
                               const JobWatch& watch);
 
-/// Of a CSV of observations that were tracked without camera_from_rcm. Throws InputError as read_poses().
+/// Calibrates by a CSV of observations that were tracked without camera_from_rcm. Throws InputError as read_poses().
 MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::string& instrument);
 
 /// The instrument with what was measured; what was not stays.
 Instrument registered(Instrument instrument, const Registration& registration);
 
-/// What was measured, in mm, mrad and ms; `before` is NaN where the rig had nothing. `before` has the joints that the
+/// Results in mm, mrad and ms; `before` is NaN where the rig had no value. `before` has the joints that the
 /// registration was made with.
 std::vector<CalibratedNumber> registered_numbers(const Instrument& before, const Registration& registration);
 

@@ -94,7 +94,7 @@ Rigid3 marker_at(const Instrument& instrument, const std::array<double, 4>& read
   return camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
 }
 
-// What a user has: names only.
+// A user's joints: names only.
 Instrument with_names_only(Instrument instrument) {
   const double theta_offset = instrument.joints->offset[0];
   instrument.camera_from_rcm.reset(), instrument.image_delay_s.reset();
@@ -146,7 +146,7 @@ TEST(RegisterArm, OfTwoDescriptionsTakesTheRigs) {
   known.camera_from_rcm->rotation =
       known.camera_from_rcm->rotation * Eigen::AngleAxisd(0.15, Eigen::Vector3d(1, 2, 3).normalized());
   known.camera_from_rcm->translation += Eigen::Vector3d(5e-3, -5e-3, 8e-3);
-  known.joints->sign[0] = 1;  // wrong: the rig's rotation tells
+  known.joints->sign[0] = 1;  // wrong: the rig's rotation shows it
   const auto found = register_arm(known, data.poses, data.recording, "joints.csv");
   ASSERT_EQ(found.refusal, "");
   EXPECT_EQ(found.arm->joints.sign, data.truth.joints->sign);

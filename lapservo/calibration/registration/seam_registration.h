@@ -10,7 +10,7 @@ namespace lapservo::internal {
 
 /// Where the seam lies on the instrument.
 struct SeamRegistration {
-  std::string refusal;  ///< why it can't be told; empty when it can
+  std::string refusal;  ///< the reason why it is not observable; empty when it is
   double seam_rad = 0, sigma_rad = 0;
   std::size_t frames = 0;  ///< within the recording
 };

@@ -22,7 +22,7 @@ Instrument instrument_with_joints() {
   return instrument;
 }
 
-// A turn in 20 s; frames carry poses as a calibration leaves them, with the marker's seam believed at seam_rad.
+// A rotation in 20 s; frames carry poses as a calibration leaves them, with the marker's seam assumed at seam_rad.
 struct Turn {
   Instrument instrument = instrument_with_joints();
   MarkerCalibration calibration;

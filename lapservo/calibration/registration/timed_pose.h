@@ -15,8 +15,8 @@ struct TimedPose {
   double time_s = 0;
   Observation::MarkerPose marker;
 
-  /// What the same frame says where the focal length is larger by 1, to first order: where the origin moves to and how
-  /// the marker turns, in the camera frame. Zero where it was not asked.
+  /// The change of the frame's pose per unit of focal length, to first order: the motion of the origin and the rotation
+  /// of the marker, in the camera frame. Zero where it was not requested.
   struct ByFocal {
     Eigen::Vector3d origin_m = Eigen::Vector3d::Zero(), turn_rad = Eigen::Vector3d::Zero();
   };

@@ -7,8 +7,8 @@
 
 namespace lapservo::internal {
 
-/// The orientation (1 upright, 2 to 8 turned or mirrored) that a JPEG, PNG, TIFF or WebP asks its viewers for, by EXIF
-/// or TIFF tag 0x0112; nullopt where it says nothing that can be understood.
+/// The orientation (1 upright, 2 to 8 rotated or mirrored) that a JPEG, PNG, TIFF or WebP sets for its viewers, by EXIF
+/// or TIFF tag 0x0112; nullopt without a valid one.
 std::optional<std::size_t> exif_orientation(std::span<const std::uint8_t> picture);
 
 }  // namespace lapservo::internal

@@ -30,7 +30,7 @@ bool has_jpeg_extension(const fs::path& name) {
 std::vector<std::uint8_t> encode_image(const fs::path& name, const cv::Mat& image) {
   const std::string extension = lower_case(name.extension().string());
   const auto bytes = encoded_as(extension, image);
-  if (bytes.empty()) throw InputError(name.string(), "can't be written as a picture");
+  if (bytes.empty()) throw InputError(name.string(), "can't be written as an image");
   return bytes;
 }
 

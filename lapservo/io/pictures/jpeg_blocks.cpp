@@ -35,7 +35,7 @@ float step_between(const JpegBorderLight& above, const JpegBorderLight& below) {
   return 1.5F * (below.upper - above.lower) - 0.5F * (below.upper_inner - above.lower_inner);
 }
 
-// Of a block's mean, in brightness levels.
+// Error of a block's mean, in brightness levels.
 float quantum_of(const JQUANT_TBL& scale) {
   return static_cast<float>(scale.quantval[0]) / 8;
 }

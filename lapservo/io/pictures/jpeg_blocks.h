@@ -13,7 +13,7 @@ struct JpegBorderLight {
   float upper = 0, upper_inner = 0, lower = 0, lower_inner = 0;
 };
 
-/// Of one colour component, by its minimum coded units (MCU, one or more blocks).
+/// Layout of one colour component, by its minimum coded units (MCU, one or more blocks).
 struct JpegComponent {
   std::vector<float> steps;  // jpeg_dc_shift.h
   float quantum = 0;
@@ -22,7 +22,7 @@ struct JpegComponent {
   bool has_impossible = false;         // a block that is darker than black or brighter than white as a whole
 };
 
-/// Of the component's coefficients, all of which have been read. May leave by the library's error_exit.
+/// Borders from the component's coefficients, all of which have been read. May leave by the library's error_exit.
 void read_component(jpeg_decompress_struct& info, int index, jvirt_barray_ptr coefficients, JpegComponent& component);
 
 }  // namespace lapservo::internal

@@ -16,9 +16,9 @@ constexpr float least_shift_in_quanta = 1.5F;  // one is what rounding makes of 
 constexpr float least_shift_over_spread = 2;   // a shift is the same everywhere, a scene's edge along a row is not
 constexpr float max_spread_over_usual = 1.5F;
 constexpr float rounding_spread = 0.5F;  // levels, of blocks without any noise
-constexpr float least_noise = 0.3F;      // levels: of camera's pictures, not of drawn ones
+constexpr float least_noise = 0.3F;      // levels: of camera's images, not of drawn ones
 constexpr float min_spread_over_usual = 0.4F;
-constexpr int max_tries = 4096;    // of a picture made to take time; cameras' have some hundreds
+constexpr int max_tries = 4096;    // of an image made to take time; cameras' have some hundreds
 constexpr int borders_beside = 3;  // of which most have to show the shift, or nothing
 
 using Steps = std::vector<float>;
@@ -27,13 +27,13 @@ Steps part(const JpegBlocks& blocks, int begin, int end) {
   return {blocks.steps.begin() + begin, blocks.steps.begin() + end};
 }
 
-// Of three borders in four; the others may be those of blocks that were misread.
+// Noise that three borders in four stay below; the others may belong to misread blocks.
 float spread_about(Steps steps, float from) {
   for (float& step : steps) step = std::abs(step - from);
   return quantile(steps, 0.75) + rounding_spread;
 }
 
-// Of the borders around those that a shift from block `first` on would show in.
+// Borders around those in which a shift from block `first` on would show.
 float usual_spread(const JpegBlocks& blocks, int first) {
   const int count = static_cast<int>(blocks.steps.size()), end = first + blocks.columns;
   Steps around = part(blocks, std::max(first - 2 * blocks.columns, blocks.columns), first);
@@ -46,7 +46,7 @@ float median_of_three(const float* steps) {
   return std::max(std::min(steps[0], steps[1]), std::min(std::max(steps[0], steps[1]), steps[2]));
 }
 
-// Bars, labels and masks in a picture have edges along rows. A shift from block `first` on shows up to the end of its
+// Bars, labels and masks in an image have edges along rows. A shift from block `first` on shows up to the end of its
 // row and from the beginning of the next one, and in nothing before and behind.
 bool is_wrapped(const JpegBlocks& blocks, int first) {
   const int next_row = (first / blocks.columns + 1) * blocks.columns, end = first + blocks.columns;
@@ -58,13 +58,13 @@ bool is_wrapped(const JpegBlocks& blocks, int first) {
          std::abs(behind) < std::abs(shift) / 2;
 }
 
-// Of all from block `first` on.
+// Shift of all blocks from block `first` on.
 std::optional<float> shift_from(const JpegBlocks& blocks, int first) {
   const int next_row = (first / blocks.columns + 1) * blocks.columns, end = first + blocks.columns;
   const Steps borders = part(blocks, first, end);
   const float shift = median(Steps(borders));
   const float spread = spread_about(borders, shift), usual = usual_spread(blocks, first);
-  // What was drawn has no noise, and edges as even as a shift's.
+  // Drawn images have no noise, and edges as even as a shift's.
   if (usual < least_noise + rounding_spread || spread < min_spread_over_usual * usual) return std::nullopt;
   const float least = std::max({least_shift, least_shift_in_quanta * blocks.quantum, least_shift_over_spread * spread});
   if (std::abs(shift) < least || spread > max_spread_over_usual * usual) return std::nullopt;

@@ -13,7 +13,7 @@ namespace jpeg_dc_shift_test {
 constexpr std::uint64_t seed = 20261122;
 constexpr int columns = 40, rows = 20;
 
-// Borders of a picture with texture, and with blocks beyond all measure every now and then.
+// Borders of an image with texture, and with blocks beyond all measure every now and then.
 std::vector<float> texture(Random& random) {
   std::vector<float> steps(columns * rows);
   for (float& step : steps) step = static_cast<float>(random.normal() * (random.bits() % 8 == 0 ? 20 : 1));
@@ -76,7 +76,7 @@ TEST(DcShift, WhatIsDrawnIsNone) {
       EXPECT_FALSE(dc_shift({drawn, 0.25F, columns, 0})) << "alone, from block " << first;
       std::vector<float> over = texture(random);
       for (int i = std::max(first, columns); i < first + columns; ++i) over[static_cast<std::size_t>(i)] = 30;
-      EXPECT_FALSE(dc_shift({over, 0.25F, columns, 0})) << "over a picture, from block " << first;
+      EXPECT_FALSE(dc_shift({over, 0.25F, columns, 0})) << "over an image, from block " << first;
     }
 }
 

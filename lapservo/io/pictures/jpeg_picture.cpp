@@ -13,7 +13,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int max_scans = 64;  // of a progressive picture; some files have thousands, to take minutes
+constexpr int max_scans = 64;  // of a progressive image; some files have thousands, to take minutes
 
 // The library leaves by longjmp, so nothing here or in what reads may have a destructor of its own.
 struct Decoder {
@@ -87,7 +87,7 @@ void read_blocks(Decoder& decoder, std::span<const std::uint8_t> bytes, Blocks& 
   jpeg_finish_decompress(&decoder.info);
 }
 
-// All data first, so that their blocks are there beside the picture.
+// All data first, so that their blocks are there beside the image.
 void read_picture(Decoder& decoder, std::span<const std::uint8_t> bytes, Blocks& blocks, cv::Mat& image) {
   if (setjmp(decoder.leave) != 0) return;
   read_header(decoder, bytes);

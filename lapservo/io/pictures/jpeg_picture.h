@@ -8,8 +8,8 @@
 
 namespace lapservo::internal {
 
-/// What a decoder made of a file: a picture in 8-bit BGR (empty when not even its header could be read), and the first
-/// thing it complained of (empty: nothing).
+/// A decoder's result for a file: an image in 8-bit BGR (empty when not even its header could be read), and the first
+/// complaint of the decoder (empty: none).
 struct DecodedPicture {
   cv::Mat bgr;
   std::string complaint;
@@ -18,8 +18,8 @@ struct DecodedPicture {
 /// By libjpeg, whose warnings OpenCV swallows, and as jpeg_complaint() has it.
 DecodedPicture decode_jpeg(std::span<const std::uint8_t> bytes);
 
-/// What it complains of when it reads the coefficients only, in a third of the time; or, where it has no complaint,
-/// what can't come from a camera: colours that are shifted from some block on (jpeg_dc_shift.h).
+/// The decoder's complaint when it reads the coefficients only, in a third of the time; or, without a complaint, a
+/// defect that no camera makes: colours that are shifted from some block on (jpeg_dc_shift.h).
 std::string jpeg_complaint(std::span<const std::uint8_t> bytes);
 
 }  // namespace lapservo::internal

@@ -93,7 +93,7 @@ Layout layout_of(AVPixelFormat format) {
   return deep ? Layout{AV_PIX_FMT_BGR48, CV_16UC3} : Layout{AV_PIX_FMT_BGR24, CV_8UC3};
 }
 
-// Of lossy WebP, which has JPEG's place of chroma; empty for all others.
+// JPEG's chroma location for lossy WebP; empty for all others.
 cv::Mat pixels_of_yuv(const AVFrame& frame) {
   const AVPixFmtDescriptor& format = *av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame.format));
   cv::Mat bgr;

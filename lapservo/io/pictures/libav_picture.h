@@ -9,7 +9,7 @@
 
 namespace lapservo::internal {
 
-/// The name of a format that libav_decode() reads, by a picture's first bytes: "BMP", "PNM", "TIFF", "WebP"; empty for
+/// The name of a format that libav_decode() reads, by an image's first bytes: "BMP", "PNM", "TIFF", "WebP"; empty for
 /// anything else.
 std::string libav_format(std::span<const std::uint8_t> bytes);
 
@@ -17,8 +17,8 @@ std::string libav_format(std::span<const std::uint8_t> bytes);
 /// when the decoder complains or leaves out pixels, and for other formats.
 cv::Mat libav_decode(std::span<const std::uint8_t> bytes);
 
-/// Of 8-bit grey or BGR, without loss, as the ending of a name wants it: .bmp, .tif, .tiff, .webp, .ppm, .pgm (grey).
-/// Empty for other endings and pixels.
+/// Encodes 8-bit grey or BGR without loss, by the ending of a name: .bmp, .tif, .tiff, .webp, .ppm, .pgm (grey). Empty
+/// for other endings and pixels.
 std::vector<std::uint8_t> libav_encode(const std::string& extension, const cv::Mat& image);
 
 }  // namespace lapservo::internal

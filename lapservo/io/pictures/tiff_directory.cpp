@@ -10,7 +10,7 @@ namespace lapservo::internal {
 namespace {
 using Bytes = std::span<const std::uint8_t>;
 
-// Of an unsigned type; 0 of others.
+// Size of an unsigned type; 0 for others.
 std::size_t bytes_of_type(std::size_t type) {
   constexpr std::size_t is_byte = 1, is_short = 3, is_long = 4;
   return type == is_byte ? 1 : type == is_short ? 2 : type == is_long ? 4 : 0;

@@ -16,7 +16,7 @@ namespace {
 constexpr int side_px = 96;
 const cv::Scalar before(40, 40, 200), after(200, 90, 60);
 
-// Of an edge that leans, in all phases to the samples; compression then adds noise to a mean but no shift.
+// Place of a leaning edge, in all phases to the samples; compression then adds noise to a mean but no shift.
 double place_px(int row) {
   return side_px / 2 + 0.23 * (row - side_px / 2);
 }

@@ -58,7 +58,7 @@ std::unique_ptr<OverlayWriter> open_overlay_writer(const fs::path& path, const F
   if (source.kind() == Kind::image && has_image_extension(path)) return std::make_unique<PictureOverlay>(path);
   if (source.kind() == Kind::image || source.kind() == Kind::folder) {
     if (fs::exists(path, error) && !fs::is_directory(path, error))
-      throw InputError(path.string(), "is a file, expected a folder for the pictures");
+      throw InputError(path.string(), "is a file, expected a folder for the images");
     return std::make_unique<FolderOverlay>(path);
   }
   if (fs::is_directory(path, error))

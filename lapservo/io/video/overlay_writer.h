@@ -9,8 +9,8 @@
 
 namespace lapservo::internal {
 
-/// Where `--overlay PATH` goes: a picture for a picture (when PATH ends like one), a folder of pictures for pictures, a
-/// video for videos and cameras. Pictures appear whole, one by one; a video when committed.
+/// Where `--overlay PATH` goes: an image for an image (when PATH ends like one), a folder of images for images, a
+/// video for videos and cameras. Images appear whole, one by one; a video when committed.
 class OverlayWriter {
  public:
   virtual ~OverlayWriter() = default;

@@ -35,7 +35,7 @@ class ReadAhead : public FrameSource {
   double frames_per_second() const override { return frames_per_second_; }
   std::optional<double> first_stamp_s() const override { return first_stamp_s_; }
   std::string remark() const override { return remark_; }
-  /// Of what was read: after it, nothing more is.
+  /// The end of the source: no frame follows it.
   std::string complaint() const override {
     stop();
     return source_->complaint();

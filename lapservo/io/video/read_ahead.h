@@ -6,9 +6,9 @@
 
 namespace lapservo::internal {
 
-/// The same frames, complaints and exceptions, read by a thread of its own while those before are looked at: a video's
-/// decoding takes as long as the looking. It begins with the first next(), and stays a few frames ahead at most. Not
-/// for live sources, whose frames are to be the newest. One thread asks.
+/// The same frames, complaints and exceptions, read by a thread of its own while the previous ones are processed:
+/// decoding a video takes as long as processing it. It begins with the first next(), and stays a few frames ahead at
+/// most. Not for live sources, whose frames have to be the newest. For one calling thread.
 std::unique_ptr<FrameSource> read_ahead(std::unique_ptr<FrameSource> source);
 
 }  // namespace lapservo::internal

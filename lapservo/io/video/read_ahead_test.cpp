@@ -8,7 +8,7 @@
 namespace lapservo::internal {
 namespace {
 
-// So many frames of one pixel, then the end or an exception; counts how many were asked for.
+// So many frames of one pixel, then the end or an exception; counts the requests.
 class Counted : public FrameSource {
  public:
   Counted(int count, bool throws, std::atomic<int>& read) : count_(count), throws_(throws), read_(read) {}
@@ -41,7 +41,7 @@ TEST(ReadAhead, GivesTheSameFramesInTheirOrderAndTheEndAgainAndAgain) {
     EXPECT_EQ(source->frames_per_second(), 10);
     EXPECT_EQ(source->first_stamp_s(), 7);
     EXPECT_EQ(source->kind(), FrameSource::Kind::video);
-    EXPECT_EQ(read, 0);  // nobody asked yet
+    EXPECT_EQ(read, 0);  // no request yet
     for (int i = 0; i < count; ++i) {
       const auto frame = source->next();
       ASSERT_TRUE(frame);

@@ -13,7 +13,7 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 
-// Tried on rendered frames with a sensor's noise (docs/notes/decisions.md): as large, as near to the picture and as
+// Tried on rendered frames with a sensor's noise (docs/notes/decisions.md): as large, as near to the image and as
 // fast to read as MPEG-4 part 2 was.
 constexpr int ticks_per_second =
     60'000;  // whole periods of 24, 25, 30, 50 and 60 frames a second; MPEG-4's largest: 65535
@@ -45,8 +45,8 @@ void set_quality(AVCodecContext& codec) {
   }
 }
 
-// What sRGB becomes by Rec. 601's matrix: what swscale makes of BGR unless told otherwise, and reads back as. Chroma's
-// samples lie amid four pixels, which is not what a reader takes for granted.
+// The values of sRGB by Rec. 601's matrix: swscale's default for BGR, in both directions. Chroma's samples lie amid
+// four pixels, which is not a reader's default.
 void set_colors(AVCodecContext& codec) {
   codec.color_range = AVCOL_RANGE_MPEG;
   codec.colorspace = AVCOL_SPC_SMPTE170M;

@@ -11,11 +11,11 @@
 
 namespace lapservo::internal {
 
-/// What is to be said of a video when this FFmpeg has no libx264: that it is MPEG-4 part 2; else empty.
+/// A remark on videos when this FFmpeg has no libx264: that they are MPEG-4 part 2; else empty.
 std::string video_remark();
 
 /// A video file while it is written, by FFmpeg's libraries: H.264 (libx264) that browsers play, in Rec. 601's limited
-/// range and with chroma's samples amid four pixels, which the file says, as VideoReader reads it back. Pictures of an
+/// range and with chroma's samples amid four pixels, which the file says, as VideoReader reads it back. Images of an
 /// odd width or height, which 4:2:0 can't hold, are 4:4:4, which not every browser plays. Without libx264 it is MPEG-4
 /// part 2.
 class VideoEncoder {

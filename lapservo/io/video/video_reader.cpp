@@ -101,7 +101,7 @@ class VideoReader::State {
     av_dict_free(&options);
     format_.reset(opened ? format : nullptr);
     if (!opened || avformat_find_stream_info(format, nullptr) < 0)
-      throw InputError(source_, kind_ == Kind::file ? "can't be read, expected a picture or a video"
+      throw InputError(source_, kind_ == Kind::file ? "can't be read, expected an image or a video"
                                                     : "can't be opened, expected a camera or stream");
     deadline_ = Clock::time_point::max();  // the file keeps asking; whoever measures slowly is not late
   }
@@ -162,7 +162,7 @@ class VideoReader::State {
            !jpeg_complaint({packet.data, static_cast<std::size_t>(std::max(0, packet.size))}).empty();
   }
 
-  // What is predicted from a damaged frame is damaged too, up to the next that stands alone.
+  // Frames predicted from a damaged one are damaged too, up to the next that stands alone.
   Image delivered() {
     const bool flawed = (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0 || frame_->decode_error_flags != 0;
     const bool packet_flawed = std::exchange(tainted_, false);

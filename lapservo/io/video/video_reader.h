@@ -24,9 +24,9 @@ class VideoReader {
   /// A stream (rtsp://...) is waited for as long when it falls silent, and has ended then.
   enum class Kind { file, stream };
 
-  /// Throws InputError when it holds no video that can be decoded, or one that is to be turned for display: a
-  /// calibration belongs to the pixels in one orientation and nobody can tell to which.
-  /// Opening may take no longer than `patience`; reading may.
+  /// Throws InputError when it holds no video that can be decoded, or one with an orientation for display: a
+  /// calibration belongs to the pixels in one orientation, and it is unknown which.
+  /// `patience` bounds the time of opening, not that of reading.
   explicit VideoReader(const std::filesystem::path& path, std::chrono::milliseconds patience = std::chrono::seconds(5),
                        Kind kind = Kind::file, const VideoReading& reading = {});
   ~VideoReader();

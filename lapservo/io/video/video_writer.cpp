@@ -40,7 +40,7 @@ void VideoWriter::add(const cv::Mat& frame, std::optional<double> time_s) {
   if (failed_) return;
   try {
     encoder_->add(frame, time_s);
-  } catch (const InputError&) {  // commit() tells, once whoever writes other results has written them
+  } catch (const InputError&) {  // commit() reports it, after the writers of other results have finished
     failed_ = true;
   }
 }

@@ -22,7 +22,7 @@ struct YuvColors {
   bool operator==(const YuvColors&) const = default;
 };
 
-/// Of images that name none: as players and GStreamer have it, Rec. 709's from 720 rows on, else Rec. 601's.
+/// Matrix of images without a tag: as in players and GStreamer, Rec. 709's from 720 rows on, else Rec. 601's.
 inline YuvMatrix usual_matrix(int height_px) {
   return height_px >= 720 ? YuvMatrix::bt709 : YuvMatrix::bt601;
 }

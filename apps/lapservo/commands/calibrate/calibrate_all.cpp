@@ -112,7 +112,7 @@ class Guide {
       throw InputError("--redo", fmt::format("{} needs {}: {}", step.name, step.flag, step.what_to_record));
   }
 
-  // What goes on for ever can't be told from what was done before, and the Ctrl-C that ends it would end all steps.
+  // An endless input can't be distinguished from a finished one, and the Ctrl-C that ends it would end all steps.
   static void expect_recording(const Step& step) {
     if (input_state(*step.input).empty())
       throw InputError(step.flag, fmt::format("is {}, expected a folder with files, a video or a bag; `lapservo {}` "
@@ -125,11 +125,10 @@ class Guide {
     std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm)};
     if (!o.aruco.empty()) board.insert(board.end(), {"--aruco", o.aruco});
     return {
-        {"camera",
-         "12 or more pictures of a chessboard: near, sharp, tilted to all sides, in every part of the picture",
+        {"camera", "12 or more images of a chessboard: near, sharp, tilted to all sides, in every part of the image",
          &o.boards, "--boards", "", board, [this](const auto& options) { return run_camera(options); }},
         {"colour",
-         "the mounted marker moved through the picture, 10 s",
+         "the mounted marker moved through the image, 10 s",
          &o.motion,
          "--motion",
          "",
@@ -235,7 +234,7 @@ std::string recorded(const AllOptions& options, const std::string& name, const c
     recording.move = name;
   } else {
     if (!asks(options))
-      throw InputError("--camera", "needs a terminal where it is asked when to record, or --enable-motion");
+      throw InputError("--camera", "needs a terminal, on which a person starts the recordings, or --enable-motion");
     std::fprintf(stderr, "\n%s: %s\n  Enter begins, and ends it: ", name.c_str(), what);
     std::string line;
     std::getline(std::cin, line);
@@ -290,7 +289,7 @@ void add_calibrate_all(Command parent, Run& run_later) {
   Command command = parent.add_subcommand(
       "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.");
   command.add_option("--rig", options->rig, "The rig as it is known so far; each step replaces it").required();
-  command.add_option("--boards", options->boards, "For the camera: pictures of a chessboard");
+  command.add_option("--boards", options->boards, "For the camera: images of a chessboard");
   command.add_option("--board", options->board, "Its inner corners, COLUMNSxROWS, for example 9x6");
   command.add_option("--square-mm", options->square_mm, "Width of its squares").number_between(0.1, 1000.0);
   command.add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
@@ -307,22 +306,23 @@ void add_calibrate_all(Command parent, Run& run_later) {
       "A live system's images, as `lapservo record` takes them: what is missing of --turn and --swing is "
       "recorded into RIG.recordings; delete it to have it recorded anew");
   command.add_option("--robot", options->robot, "and its arm: ros2:PSM1 or ros1:PSM1");
-  command.add_flag("--enable-motion", options->enable_motion,
-                   "Move the arm for these recordings, see `lapservo record --move`; else a person does, and is asked");
+  command.add_flag(
+      "--enable-motion", options->enable_motion,
+      "Move the arm for these recordings, see `lapservo record --move`; else a person does, guided by questions");
   command.add_option("--joint-limits", options->joint_limits, "For --enable-motion: YAML of the arm's joints");
   command.add_option("--report", options->report, "The check's HTML page with figures");
   command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
   add_video_options(command, *options);
   command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
-  command.add_option("--fps", options->fps, "Frames per second of folders of pictures")
+  command.add_option("--fps", options->fps, "Frames per second of folders of images")
       .shows_default()
       .number_between(0.001, 1000.0);
   command.add_option("--redo", options->redo, "A step that is done again though it was done, with those after it")
       .one_of({"camera", "colour", "marker", "registration", "check"});
   command.add_flag("--no-questions", options->no_questions,
-                   "Leave out what no option names; on a terminal it is asked for");
+                   "Leave out what no option names; a terminal prompts for it");
   command.footer(
-      "What was done, by which command and when stands beside the rig (RIG.calibration.yaml): a second run goes on "
+      "RIG.calibration.yaml beside the rig lists each step with its command and time: a second run goes on "
       "where\n"
       "the first one stopped. A step is done again when its recording, its command, an earlier step or the rig "
       "changed.\n"

@@ -76,7 +76,7 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
   for (const CalibratedNumber& n : calibrated_numbers(Camera{}, calibration))
     std::printf("  %-24s %12.6f   sigma %.6f\n", n.name.c_str(), n.after, n.sigma);
   if (!calibration.response) {
-    std::printf("response: as it was, these pictures don't tell it\n");
+    std::printf("response: unchanged, these images don't determine it\n");
     return;
   }
   const ResponseFit& response = *calibration.response;
@@ -84,7 +84,7 @@ void print_result(const std::vector<BoardView>& views, const CameraCalibration& 
               camera.response.kind == Response::Kind::table ? "a table" : response.nearest.c_str(), 255 * response.low,
               255 * response.high, response.sigma);
   if (response.sharpening > 0)
-    std::printf("the pictures are sharpened (by %.2f over %.1f px): switch it off where the camera can\n",
+    std::printf("the images are sharpened (by %.2f over %.1f px): switch it off where the camera can\n",
                 response.sharpening, response.sharpening_px);
 }
 
@@ -135,7 +135,7 @@ void add_calibrate_camera(Command parent, Run& run_later) {
       "camera", "Measure a camera with a chessboard: matrix, distortion, lateral chromatic aberration, response.");
   command
       .add_option("input", options->inputs,
-                  "Pictures of the board from different sides: pictures, folders, a video, a bag, a camera or a stream")
+                  "Images of the board from different sides: images, folders, a video, a bag, a camera or a stream")
       .required();
   add_image_topic_option(command, options->image_topic);
   add_video_options(command, *options);
@@ -153,11 +153,11 @@ void add_calibrate_camera(Command parent, Run& run_later) {
       .shows_default()
       .whole_number_between(4, 200);
   command.footer(
-      "Show the whole board, flat and sharp, in 12 or more pictures: in every part of the picture, near, and tilted "
+      "Show the whole board, flat and sharp, in 12 or more images: in every part of the image, near, and tilted "
       "by\n"
       "20 to 40 degrees to all sides; fix exposure and focus. A camera is looked at until its views suffice, or "
       "Ctrl-C.\n"
-      "All numbers are written with one standard deviation each (sigma_...), the response's where the pictures tell "
+      "All numbers are written with one standard deviation each (sigma_...), the response's where the images determine "
       "it.\n"
       "Example:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml");
   command.runs(run_later, [options] { return calibrate_camera(*options); });

@@ -86,17 +86,16 @@ void add_calibrate_colour(Command parent, Run& run_later) {
   Command command = parent.add_subcommand(
       "colour", "Measure the hues of a mounted marker's bands as the camera has them, and how it encodes light.");
   command
-      .add_option("input", options->input,
-                  "The marker in motion: pictures, a folder, a video, or a camera until Ctrl-C")
+      .add_option("input", options->input, "The marker in motion: images, a folder, a video, or a camera until Ctrl-C")
       .required();
   add_calibrate_options(command, *options);
   command.add_flag("--replace-response", options->replace_response,
                    "Also a response that calibrate camera measured (sigma_response), which stays else");
   command.add_flag("--view", options->view, "Show the segmentation before and after in a window");
   command.footer(
-      "Move the instrument through the picture and turn it, 10 s or more, wholly in view and not overexposed. The "
+      "Move the instrument through the image and turn it, 10 s or more, wholly in view and not overexposed. The "
       "rig's\n"
-      "hues may be up to 60 degrees off; the response is written where the frames tell another than the rig's.\n"
+      "hues may be up to 60 degrees off; the response is written where the frames show another than the rig's.\n"
       "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml");
   command.runs(run_later, [options] { return calibrate_colour(*options); });
 }

@@ -9,7 +9,7 @@
 
 namespace lapservo::app {
 
-/// What the subcommands that measure one instrument of a rig from frames are told.
+/// Options of the subcommands that measure one instrument of a rig from frames.
 struct CalibrateOptions : FrameOptions {
   std::string input, rig, out, instrument, joints, report, joint_topic;
 };
@@ -17,7 +17,7 @@ struct CalibrateOptions : FrameOptions {
 /// All but the input and the joints, which each subcommand describes itself.
 void add_calibrate_options(Command command, CalibrateOptions& options);
 
-/// Of these, those that say how the recording is read and which instrument is meant.
+/// Those options that say how the recording is read and which instrument is meant.
 void add_recording_options(Command command, CalibrateOptions& options);
 
 /// Place in the rig of the instrument of that name, or of the only one where none is given. Throws InputError where
@@ -30,10 +30,10 @@ inline std::size_t instrument_meant(const Rig& rig, const CalibrateOptions& opti
 /// Throws InputError when a result would go over an input, or check's page over the rig.
 void refuse_outputs_over_inputs(const CalibrateOptions& options, const Rig& rig);
 
-/// What a source could not read, on stderr, when there is such.
+/// Prints on stderr the parts that a source could not read.
 void say_complaint(const std::string& input, const std::string& complaint);
 
-/// Ends a job at Ctrl-C and tells how far it is (progress.h), until it is destroyed.
+/// Ends a job at Ctrl-C and shows its progress (progress.h), until it is destroyed.
 internal::JobWatch watched_job();
 
 /// Says on stderr why nothing was written; returns the exit code.

@@ -20,7 +20,7 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-// What the joints are compared with must be there before the work.
+// The joints are compared with these, which must be there before the work.
 std::optional<JointsOfTurn> joints_of_turn(const CalibrateOptions& options, const Instrument& instrument,
                                            const FrameSource& frames) {
   if (options.joints.empty()) return std::nullopt;
@@ -59,12 +59,12 @@ int calibrate_marker(const CalibrateOptions& options) {
   std::printf("\nboundaries miss the print by %.3f px rms before, %.3f px after\n", calibration.before_px,
               calibration.after_px);
   std::printf(
-      "diameter_m is the rig's (%.3f mm): pictures tell lengths in diameters; a smaller shaft nearer by looks "
+      "diameter_m is the rig's (%.3f mm): images give lengths in diameters; a smaller shaft nearer by looks "
       "the same\n",
       1e3 * instrument.marker.diameter_m);
   if (calibration.seam_may_lag)
     std::printf(
-        "the pictures look compressed, and the turn does not go both ways: if they come from a video, which leaves the "
+        "the images look compressed, and the turn does not go both ways: if they come from a video, which leaves the "
         "seam a little behind, psi is some mrad off; turn the instrument there and back\n");
   if (!joints) std::printf("seam_rad is the rig's: where the seam lies on the instrument takes --joints\n");
   rig.instruments[index].marker = calibration.marker;
@@ -80,13 +80,13 @@ void add_calibrate_marker(Command parent, Run& run_later) {
       "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.");
   command
       .add_option("input", options->input,
-                  "Pictures of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
+                  "Images of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
       .required();
   add_calibrate_options(command, *options);
   add_joint_options(
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
-      "bag, the input itself for example: seam_rad too, which pictures alone can't tell");
+      "bag, the input itself for example: for seam_rad too, which images alone can't determine");
   command.footer(
       "Turn the instrument about its axis once, or a little more, in 20 to 60 s, near and sharp, the whole marker in "
       "view;\n"

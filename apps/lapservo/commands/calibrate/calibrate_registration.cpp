@@ -118,7 +118,7 @@ void add_calibrate_registration(Command parent, Run& run_later) {
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
       "bag; without it those in the input, where it is a bag. Without any only the RCM's position can be "
-      "told");
+      "determined");
   command.footer(
       "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "
       "it\n"

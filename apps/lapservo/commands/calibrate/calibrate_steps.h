@@ -25,7 +25,7 @@ struct CalibrateColourOptions : CalibrateOptions {
   bool view = false, replace_response = false;
 };
 
-// What the subcommands of these names do. Each returns the exit code, 0 or 1, and throws InputError for bad input.
+// The jobs of the subcommands of these names. Each returns the exit code, 0 or 1, and throws InputError for bad input.
 int calibrate_camera(const CalibrateCameraOptions& options);
 int calibrate_colour(const CalibrateColourOptions& options);
 int calibrate_marker(const CalibrateOptions& options);

@@ -59,7 +59,7 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
   return start;
 }
 
-// What the user gets of a run: the log, the picture, the progress, the last lines.
+// The user's view of a run: the log, the image, the progress, the last lines.
 class Watcher : public RunObserver {
  public:
   Watcher(const Rig& rig, FeatureModel true_model, const Simulator& simulator, RunFolder* folder, LiveView* view,

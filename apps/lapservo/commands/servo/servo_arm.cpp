@@ -40,7 +40,7 @@ std::string list_of(const Joints& joints, const Eigen::Vector4d& q) {
   return text;
 }
 
-// The trajectory, until somebody wants a set-point instead. All in the loop's thread.
+// The trajectory, until somebody wants a setpoint instead. All in the loop's thread.
 class Goal {
  public:
   explicit Goal(Trajectory trajectory) : trajectory_(std::make_shared<Trajectory>(std::move(trajectory))) {}
@@ -53,7 +53,7 @@ class Goal {
   std::shared_ptr<Trajectory> trajectory_;
 };
 
-// What changes is said once, in one line.
+// Every change is reported once, in one line.
 class ArmWatcher : public RunObserver {
  public:
   ArmWatcher(const ServoOptions& options, const RunConfig& run, Supervisor& arm, const CrtkRobot& robot,
@@ -95,7 +95,7 @@ class ArmWatcher : public RunObserver {
   bool obey_page(const ControlTick& tick, double time_s) {
     page_->tell(tick, time_s, state_);
     const bool ends = page_->command(arm_, tick.input.time_s);
-    if (ends) say(time_s, "end: asked for on the page");
+    if (ends) say(time_s, "end: requested on the page");
     return ends;
   }
   void say_state(double time_s, const std::string& state) {
@@ -112,7 +112,7 @@ class ArmWatcher : public RunObserver {
     if (refusal_.valid() && refusal_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
       const std::string refusal = refusal_.get();
       if (!wanted_ && asked_.registration != decision.registration) {
-        wanted_ = asked_;  // it was asked of where the endoscope stood before
+        wanted_ = asked_;  // it was checked for an earlier place of the endoscope
       } else if (!wanted_) {
         begin_or_refuse(refusal, time_s);
       }
@@ -138,7 +138,7 @@ class ArmWatcher : public RunObserver {
   void begin_or_refuse(const std::string& refusal, double time_s) {
     if (!refusal.empty()) return say(time_s, "refused: " + refusal);
     goal_.replace({0, [at = asked_.trajectory.at, time_s](double now_s) { return at(now_s - time_s); }});
-    say(time_s, std::string("a ") + (asked_.name == "set_point" ? "set-point" : "trajectory") + " came");
+    say(time_s, std::string("a ") + (asked_.name == "set_point" ? "setpoint" : "trajectory") + " came");
   }
   void say_images(double time_s) {
     if (const auto ended = images_.ended(); ended && !said_ended_) {
@@ -172,9 +172,9 @@ class ArmWatcher : public RunObserver {
     std::string name;
     double duration_s = 0;
     Trajectory trajectory;
-    int registration = 0;  ///< ServoDecision::registration when it was asked
+    int registration = 0;  ///< ServoDecision::registration when it was requested
   };
-  std::optional<Wanted> wanted_;  // to be asked about next
+  std::optional<Wanted> wanted_;  // to be checked next
   Wanted asked_;
   Summary summary_;
   std::optional<double> start_s_;
@@ -182,12 +182,11 @@ class ArmWatcher : public RunObserver {
   std::string state_, said_counts_;
   bool said_ended_ = false;
   std::size_t said_motions_ = 0;
-  std::future<std::string>
-      refusal_;  // of what was asked about, empty when it can be followed; last: it uses the others
+  std::future<std::string> refusal_;  // of the checked goal, empty when it can be followed; last: it uses the others
 };
 
 int end_by_page() {
-  std::printf("end: asked for on the page\n");
+  std::printf("end: requested on the page\n");
   return 1;
 }
 
@@ -224,7 +223,7 @@ InterlockConfig interlock_of(const ServoOptions& options, const RunConfig& confi
 }
 
 void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
-  std::printf("%ld joint states; set-points: %ld sent, %ld withheld; dropped: %ld malformed, %ld repeated, %ld late, ",
+  std::printf("%ld joint states; setpoints: %ld sent, %ld withheld; dropped: %ld malformed, %ld repeated, %ld late, ",
               arm.joint_states, arm.set_points, arm.withheld, arm.malformed, arm.repeated, arm.late);
   std::printf("%ld after a jump of the clock, %ld without a stamp\n", arm.jumped, arm.unstamped);
   std::printf("%ld images%s%s\n", images.taken, images.text().empty() ? "" : "; ", images.text().c_str());
@@ -275,7 +274,7 @@ int steer_arm(const ServoOptions& options) {
     refuse_infeasible(trajectory, duration_s(options), feature_model(config.rig), config.controller, start,
                       trajectory_name(options));
   if (const std::string missing = robot.not_granted(); options.enable_motion && !missing.empty())
-    std::printf("set-points leave without %s, see docs/ros.md\n", missing.c_str());
+    std::printf("setpoints leave without %s, see docs/ros.md\n", missing.c_str());
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
 

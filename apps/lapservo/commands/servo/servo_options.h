@@ -14,7 +14,7 @@
 
 namespace lapservo::app {
 
-/// What `lapservo servo` was asked for.
+/// Options of `lapservo servo`.
 struct ServoOptions {
   std::string rig, robot, camera, joint_limits, trajectory = "paper", method = "default", tracker, controller,
                                                 delay = "estimate", out, replay, image_topic, joint_topic,
@@ -41,13 +41,13 @@ const Joints& joints_of(const ServoOptions& options, const Rig& rig);
 /// Whether "page" or "topics" may say stop and start, and set goals.
 bool may_command(const ServoOptions& options, std::string_view who);
 
-/// What is asked for, else 60 in the simulation and 120 with an arm, where an image waits for the next period.
+/// The option, else 60 in the simulation and 120 with an arm, where an image waits for the next period.
 double periods_per_s(const ServoOptions& options);
-/// What is asked for, else 20.
+/// The option, else 20.
 double duration_s(const ServoOptions& options);
 
 Trajectory trajectory_of(const ServoOptions& options);
-/// What the trajectory is called in complaints.
+/// The trajectory's name in messages.
 std::string trajectory_name(const ServoOptions& options);
 
 }  // namespace lapservo::app

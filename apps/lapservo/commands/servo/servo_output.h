@@ -17,7 +17,7 @@ namespace lapservo::app {
 
 /// A line of a run's, at once.
 void say(double time_s, const std::string& what);
-/// What a hold for that reason waits for the operator to do; empty where it goes on by itself.
+/// The operator's action that ends a hold for that reason; empty where it ends by itself.
 std::string_view operators_part(HoldReason reason);
 /// "track", "hold: marker_lost", "hold: endoscope_measured (...)" with the operator's part: the words of page, terminal
 /// and window.
@@ -32,7 +32,7 @@ class RunFolder {
  public:
   /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
   RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller);
-  /// What can't be written is said once, and never ends the run.
+  /// A failure to write is reported once, and never ends the run.
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
   /// False where something could not be written.
   bool commit();
@@ -43,7 +43,7 @@ class RunFolder {
   bool failed_ = false;
 };
 
-/// What the run came to, for the last lines.
+/// The results of the run, for the last lines.
 class Summary {
  public:
   /// By the truth, where it is known, else by the estimate. `block`: see block_of().

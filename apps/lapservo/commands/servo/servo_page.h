@@ -18,7 +18,7 @@ class ServoPage {
 
   /// `state`: in words.
   void tell(const ControlTick& tick, double time_s, const std::string& state);
-  /// Passes on what was asked for on it; true when that ends the run.
+  /// Passes the page's commands on; true when one ends the run.
   bool command(Supervisor& arm, double now_s);
 
  private:

@@ -36,7 +36,7 @@ class RecordedClock : public Clock {
   double now_s_;
 };
 
-// What CRTK says of an arm that somebody else moves: taken for enabled while it says something, deaf to what is sent.
+// A CRTK arm that another program moves: enabled while it sends joint states, deaf to setpoints.
 class RecordedArm : public Robot {
  public:
   RecordedArm(const JointRecording& recording, const Joints& joints, const Clock& clock) : clock_(clock) {
