@@ -19,7 +19,7 @@ class CMakeBuild(build_ext):
         if "LAPSERVO_BUILD" not in os.environ:
             subprocess.run(["cmake", "-S", SOURCE, "-B", build, "--preset", "package", f"-DPython_EXECUTABLE={sys.executable}"],
                            check=True)
-            subprocess.run(["cmake", "--build", build, "--target", "lapservo_python"], check=True)
+            subprocess.run(["cmake", "--build", build, "--target", "lapservo_python_types"], check=True)
         built = list((build / "python" / "lapservo").glob("_lapservo.*.so"))
         if len(built) != 1:
             sys.exit(f"{build}: has no Python extension: install the packages of the groups tool and python "
@@ -27,6 +27,7 @@ class CMakeBuild(build_ext):
         target = pathlib.Path(self.get_ext_fullpath(ext.name))
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(built[0], target)
+        shutil.copyfile(built[0].parent / "__init__.pyi", target.parent / "__init__.pyi")
 
 
 version = re.search(r"VERSION (\d+\.\d+\.\d+)", (SOURCE / "CMakeLists.txt").read_text().split("project(", 1)[1])[1]

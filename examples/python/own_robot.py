@@ -72,7 +72,8 @@ def on_tick(tick):
 
 
 limits = [-1, 0.6, 0.03, -4], [1, 2.5, 0.2, 4], [0.4, 0.4, 0.04, 1.5], [2, 2, 0.2, 7.5]  # positions, rate, acceleration
-lapservo.run(arm, camera, Clock(arm, camera), rig, lapservo.paper_trajectory(), 10, joint_limits=limits, on_tick=on_tick)
+controller = lapservo.Controller(rig, joint_limits=limits)
+lapservo.run(arm, camera, Clock(arm, camera), rig, lapservo.paper_trajectory(), 10, controller=controller, on_tick=on_tick)
 s, r, l, d = np.max(errors, axis=0)
 print(f"largest errors in the last second: s {1000 * s:.2f} mrad; r {r:.2f}, l {l:.2f}, d {d:.2f} px")
 sys.exit(0 if s < 0.005 and max(r, l, d) < 1 else 1)

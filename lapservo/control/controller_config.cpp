@@ -84,8 +84,8 @@ void check_learning(const ControllerConfig& config) {
   require_positive("probing.joint_time_s", config.probing.joint_time_s);
 }
 
-constexpr Words<ControlMode, 4> mode_words{{{ControlMode::fused, "default"},
-                                            {ControlMode::fused, "fused"},
+constexpr Words<ControlMode, 4> mode_words{{{ControlMode::fused, "fused"},
+                                            {ControlMode::fused, "default"},
                                             {ControlMode::paper, "paper"},
                                             {ControlMode::uncalibrated, "uncalibrated"}}};
 static_assert(names_all(mode_words, ControlMode::uncalibrated));

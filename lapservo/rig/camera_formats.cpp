@@ -1,6 +1,8 @@
 #include "lapservo/rig/camera_formats.h"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <initializer_list>
 #include <optional>
 #include <string_view>
@@ -117,11 +119,8 @@ CameraTexts read_kalibr(Fields fields) {
   return camera;
 }
 
-std::string yaml_of(CameraTexts camera) {
-  // Models of more coefficients begin with plumb_bob's; those that are zero say nothing.
-  auto& d = camera.distortion;
-  while (d.size() > 5 && is_zero(d.back())) d.pop_back();
-  if (d.size() > 5) d.resize(std::max<std::size_t>(8, d.size()), "0");
+std::string yaml_of(const CameraTexts& camera) {
+  const auto& d = camera.distortion;
   return fmt::format(
       "image_width: {}\nimage_height: {}\ndistortion_model: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}]}}\n"
       "distortion_coefficients: {{rows: 1, cols: {}, data: [{}]}}\n",
@@ -150,6 +149,17 @@ std::string with_rig_keys(const std::string& text, const std::string& source) {
     throw InputError(source, "is a Kalibr camchain of several cameras, expected one: keep the rig's as cam0");
   if (root["cam0"].present()) return yaml_of(read_kalibr({root["cam0"], source, "a Kalibr camchain"}));
   return text;
+}
+
+// Drivers leave k3 out, or all where there is no distortion, and write it as rational_polynomial with k4 k5 k6 of 0.
+const char* expected_distortion(std::span<const double> coefficients) {
+  constexpr std::array<std::size_t, 6> sizes{0, 4, 5, 8, 12, 14};
+  if (std::find(sizes.begin(), sizes.end(), coefficients.size()) == sizes.end())
+    return "k1 k2 p1 p2 k3, of which k3 or all may be left out, or k4 k5 k6 of 0 follow";
+  const auto others = coefficients.subspan(std::min<std::size_t>(5, coefficients.size()));
+  if (std::any_of(others.begin(), others.end(), [](double k) { return k != 0; }))
+    return "k4 k5 k6 of 0: a rational lens is not modelled (lapservo calibrate camera fits plumb_bob)";
+  return nullptr;
 }
 
 }  // namespace lapservo::internal

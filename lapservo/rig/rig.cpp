@@ -9,6 +9,7 @@
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "lapservo/core/known_keys.h"
 #include "lapservo/core/yaml_field.h"
@@ -66,23 +67,18 @@ std::array<double, N> parse_matrix(const YamlField& field, int rows, int columns
   return numbers;
 }
 
-// ROS's plumb_bob: k1 k2 p1 p2 k3. Drivers leave k3 out, or all of them where there is no distortion, and write it as
-// rational_polynomial with k4 k5 k6 of 0.
 std::array<double, 5> parse_distortion(const YamlField& field) {
-  constexpr auto expected = "k1 k2 p1 p2 k3, of which k3 or all may be left out, or k4 k5 k6 of 0 follow";
   expect_keys(field, {{"rows", "cols", "data"}, {}});
   const YamlField data = field["data"];
-  const auto items = data.list(expected);
-  if (items.size() != 0 && items.size() != 4 && items.size() != 5 && items.size() != 8)
-    data.fail(data.value_text(), expected);
-  std::array<double, 8> numbers{};
+  std::vector<double> numbers;
   constexpr double any = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < items.size(); ++i) numbers[i] = items[i].number_between(-any, any, "a finite number");
-  if (!items.empty()) check_shape(field, 1, static_cast<int>(items.size()));
-  if (numbers[5] != 0 || numbers[6] != 0 || numbers[7] != 0)
-    data.fail(data.value_text(),
-              "k4 k5 k6 of 0: a rational lens is not modelled (lapservo calibrate camera fits plumb_bob)");
-  return {numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]};
+  for (const YamlField& item : data.list("k1 k2 p1 p2 k3"))
+    numbers.push_back(item.number_between(-any, any, "a finite number"));
+  if (const char* expected = expected_distortion(numbers)) data.fail(data.value_text(), expected);
+  if (!numbers.empty()) check_shape(field, 1, static_cast<int>(numbers.size()));
+  std::array<double, 5> coefficients{};
+  std::copy_n(numbers.begin(), std::min(numbers.size(), coefficients.size()), coefficients.begin());
+  return coefficients;
 }
 
 void check_distortion_model(const YamlField& field) {

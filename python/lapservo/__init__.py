@@ -4,6 +4,15 @@ Arrays are numpy's; lengths are metres, angles radians, pictures uint8[H, W, 3] 
 Configurations q are theta, phi, rho, psi; features are s, r, l, d (docs/frames.md).
 """
 
+try:
+    from ._lapservo import __version__
+except ImportError as error:
+    import sys
+
+    raise ImportError(
+        f"{error}: lapservo is built for Debian's Python, run /usr/bin/python3 (this is {sys.executable})"
+    ) from error
+
 from ._calibration import (
     CalibratedNumber,
     Calibration,
@@ -34,6 +43,7 @@ from ._lapservo import (
     Marker,
     MarkerPose,
     Observation,
+    ObservationCsv,
     RcmEstimate,
     Renderer,
     Rig,
@@ -42,7 +52,6 @@ from ._lapservo import (
     SteadyClock,
     Tracker,
     Trajectory,
-    __version__,
     camera_from_marker,
     design_marker,
     estimate_rcm,
@@ -56,6 +65,11 @@ from ._lapservo import (
     sinusoids,
     via_points,
 )
+try:
+    from ._lapservo import Ros2Camera, Ros2Robot  # not in a build without Cyclone DDS
+except ImportError:
+    pass
+from ._observation import Sigmas
 from ._status import Status
 
 __all__ = [name for name in dir() if not name.startswith("_")]

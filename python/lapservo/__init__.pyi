@@ -1,5 +1,6 @@
 import os
 from collections.abc import Callable, Sequence
+from types import TracebackType
 from typing import Optional, Union, overload
 
 import numpy as np
@@ -18,30 +19,15 @@ from ._calibration import (
     calibrate_registration as calibrate_registration,
 )
 from ._display import Picture as Picture
+from ._errors import InputError as InputError
+from ._observation import Sigmas as Sigmas
 from ._status import Status as Status
 
 _Array = NDArray[np.float64]
 _Image = NDArray[np.uint8]
 _Path = Union[str, os.PathLike[str]]
-_Three = Sequence[float]
 
 __version__: str
-
-class InputError(ValueError):
-    source: str
-    field: str
-    value: str
-    expectation: str
-    problem: str
-    def __init__(
-        self,
-        message: str,
-        source: str = ...,
-        field: str = ...,
-        value: str = ...,
-        expectation: str = ...,
-        problem: str = ...,
-    ) -> None: ...
 
 class Camera:
     def __init__(
@@ -50,7 +36,7 @@ class Camera:
         height_px: int,
         matrix: ArrayLike,
         *,
-        distortion: Sequence[float] = ...,
+        distortion: ArrayLike = ...,
         response: Union[str, float, tuple[Sequence[float], Sequence[float]]] = ...,
         chromatic_aberration: tuple[float, float] = ...,
         deinterlace: bool = ...,
@@ -80,9 +66,9 @@ class Marker:
         self,
         *,
         diameter_m: float,
-        bands_upper_m: _Three,
-        bands_lower_m: _Three,
-        hues_deg: _Three = ...,
+        bands_upper_m: ArrayLike,
+        bands_lower_m: ArrayLike,
+        hues_deg: ArrayLike = ...,
         seam_rad: float = ...,
         tolerance_m: float = ...,
         wrap_m: float = ...,
@@ -119,7 +105,7 @@ class Marker:
     ) -> float: ...
 
 class Joints:
-    def __init__(self, names: Sequence[str], *, sign: Sequence[float] = ..., offset: Sequence[float] = ...) -> None: ...
+    def __init__(self, names: Sequence[str], *, sign: ArrayLike = ..., offset: ArrayLike = ...) -> None: ...
     @property
     def names(self) -> list[str]: ...
     @property
@@ -204,8 +190,19 @@ class Observation:
     def edges_covariance_px2(self) -> Optional[_Array]: ...
     @property
     def marker_pose(self) -> Optional[MarkerPose]: ...
+    @property
+    def sigma(self) -> Sigmas: ...
+    def to_dict(self) -> dict[str, Union[str, float, None]]: ...
     def overlay(self, image: _Image) -> _Image: ...
     def show(self, image: _Image) -> Picture: ...
+
+class ObservationCsv:
+    def __init__(self, path: _Path) -> None: ...
+    def add(self, observations: Sequence[Observation], frame: Optional[Frame] = ...) -> None: ...
+    def __enter__(self) -> ObservationCsv: ...
+    def __exit__(
+        self, kind: Optional[type[BaseException]], error: Optional[BaseException], trace: Optional[TracebackType]
+    ) -> None: ...
 
 class Frame:
     @property
@@ -307,6 +304,30 @@ class Clock:
 class SteadyClock(Clock):
     def __init__(self) -> None: ...
 
+class Ros2Robot(Robot):
+    def __init__(
+        self,
+        arm: str,
+        rig: Rig,
+        controller: Controller,
+        clock: SteadyClock,
+        *,
+        enable_motion: bool = ...,
+        wait_s: float = ...,
+    ) -> None: ...
+    def hold(self, on: bool) -> None: ...
+    @property
+    def blocked(self) -> str: ...
+    @property
+    def operating_state(self) -> str: ...
+
+class Ros2Camera(ImageStream):
+    def __init__(self, topic: str, rig: Rig, clock: SteadyClock) -> None: ...
+    @property
+    def dropped(self) -> str: ...
+    @property
+    def complaint(self) -> str: ...
+
 class Trajectory:
     def __init__(
         self, duration_s: float, at: Callable[[float], tuple[ArrayLike, ArrayLike, ArrayLike]]
@@ -326,6 +347,7 @@ class Controller:
         gains_per_s: Optional[ArrayLike] = ...,
         delay_s: Optional[float] = ...,
         window_margin_px: float = ...,
+        joint_limits: Optional[Union[_Path, Sequence[ArrayLike]]] = ...,
     ) -> None: ...
     @property
     def mode(self) -> str: ...
@@ -375,10 +397,7 @@ class Renderer:
         film_m: float = ...,
         seed: int = ...,
     ) -> None: ...
-    @overload
     def render(self, q: ArrayLike, seed: int = ...) -> _Image: ...
-    @overload
-    def render(self, q: Sequence[ArrayLike], seed: int = ...) -> _Image: ...
 
 class Simulator(Robot, ImageStream, Clock):
     def __init__(
@@ -405,7 +424,7 @@ def design_marker(
     *,
     length_m: Optional[float] = ...,
     min_band_m: Optional[float] = ...,
-    hues_deg: _Three = ...,
+    hues_deg: ArrayLike = ...,
     focal_px: float = ...,
     distance_m: float = ...,
     print_error_m: float = ...,
@@ -418,6 +437,7 @@ def open_frames(
     deinterlaced: bool = ...,
     colour_matrix: str = ...,
     chroma_location: str = ...,
+    image_topic: str = ...,
 ) -> FrameSource: ...
 def paper_trajectory() -> Trajectory: ...
 def print_marker(
@@ -434,7 +454,6 @@ def run(
     *,
     controller: Optional[Controller] = ...,
     rcm_px: Optional[ArrayLike] = ...,
-    joint_limits: Optional[Sequence[ArrayLike]] = ...,
     own_thread: bool = ...,
     on_tick: Optional[Callable[[ControlTick], Optional[bool]]] = ...,
 ) -> None: ...
@@ -442,4 +461,4 @@ def set_point(features: ArrayLike) -> Trajectory: ...
 def sinusoids(
     offset: ArrayLike, amplitude: ArrayLike, omega_rad_s: ArrayLike, phase_rad: ArrayLike = ...
 ) -> Trajectory: ...
-def via_points(points: Sequence[ArrayLike], max_rate: ArrayLike, dwell_s: float = ...) -> Trajectory: ...
+def via_points(points: ArrayLike, max_rate: ArrayLike, dwell_s: float = ...) -> Trajectory: ...

@@ -6,7 +6,7 @@ import html
 import math
 import pathlib
 import tempfile
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,7 @@ class Picture:
     """A picture that a notebook shows; `image` is uint8[H, W, 3], blue green red."""
 
     def __init__(self, image: NDArray[np.uint8]) -> None:
-        self.image = image
-        _core._png(image[:1])  # what can't be shown is refused here
+        self.image = _core._picture(image)  # what can't be shown is refused here
 
     def _repr_png_(self) -> bytes:
         return _core._png(self.image)  # type: ignore[no-any-return]
@@ -38,24 +37,19 @@ def _table(caption: str, header: list[str], rows: list[list[str]], notes: list[s
             + "".join(f"<p>{html.escape(note)}</p>" for note in notes if note))
 
 
-def _number(value: float) -> str:
-    return f"{value:.6g}" if math.isfinite(value) else ""
-
-
-def _sigmas(covariance: Any) -> Any:
-    return np.sqrt(np.diag(covariance))
+def _number(value: Optional[float]) -> str:
+    return f"{value:.6g}" if value is not None and math.isfinite(value) else ""
 
 
 def _observation(seen: Any) -> str:
     """The numbers; the overlay takes the frame, which an observation doesn't keep: show(image)."""
-    rows = []
+    rows: list[Any] = []
+    sigma = seen.sigma
     if seen.q is not None:
-        names = ("theta [rad]", "phi [rad]", "rho [m]", "psi [rad]")
-        rows += [list(row) for row in zip(names, seen.q, _sigmas(seen.q_covariance))]
+        rows += zip(("theta [rad]", "phi [rad]", "rho [m]", "psi [rad]"), seen.q, sigma[:4])
     if seen.features is not None:
-        names = ("s [rad]", "r [px]", "l [px]", "d [px]")
-        rows += [list(row) for row in zip(names, seen.features, _sigmas(seen.features_covariance))]
-        rows.append(["tau [rad]", seen.tau_rad, seen.sigma_tau_rad])
+        rows += zip(("s [rad]", "r [px]", "l [px]", "d [px]"), seen.features, sigma[5:])
+        rows.append(("tau [rad]", seen.tau_rad, sigma.tau))
     stamp = "" if seen.stamp_s is None else f", {seen.stamp_s:.3f} s"
     caption = f"{seen.instrument}: {seen.status.value}{stamp}"
     return _table(caption, ["", "value", "sigma"], [[n, _number(v), _number(s)] for n, v, s in rows], [])

@@ -4,7 +4,8 @@ class InputError(ValueError):
     str() is one line naming source, field, value and expectation; problem is set where the source has no fields.
     """
 
-    def __init__(self, message, source="", field="", value="", expectation="", problem=""):
+    def __init__(self, message: str, source: str = "", field: str = "", value: str = "", expectation: str = "",
+                 problem: str = "") -> None:
         super().__init__(message, source, field, value, expectation, problem)
         self.source = source
         self.field = field
@@ -12,5 +13,5 @@ class InputError(ValueError):
         self.expectation = expectation
         self.problem = problem
 
-    def __str__(self):
-        return self.args[0]
+    def __str__(self) -> str:
+        return str(self.args[0])

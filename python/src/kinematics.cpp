@@ -24,16 +24,16 @@ class Kinematics {
   explicit Kinematics(const Rig& rig) : model_(feature_model(rig)) {
     if (!model_) throw InputError("Kinematics", "camera_from_rcm", "missing", "a rig whose first instrument has one");
   }
-  std::optional<Eigen::Vector4d> features(const Eigen::Vector4d& q) const {
-    const auto state = model_(q);
+  std::optional<Eigen::Vector4d> features(const Array<"q", 4>& q) const {
+    const auto state = model_(q.value);
     return state ? std::optional(state->features) : std::nullopt;
   }
-  std::optional<Eigen::Matrix4d> jacobian(const Eigen::Vector4d& q) const {
-    const auto state = model_(q);
+  std::optional<Eigen::Matrix4d> jacobian(const Array<"q", 4>& q) const {
+    const auto state = model_(q.value);
     return state ? std::optional(state->jacobian) : std::nullopt;
   }
-  std::optional<Eigen::Vector4d> inverse(const Eigen::Vector4d& features, const Eigen::Vector4d& guess) const {
-    const auto found = newton_inverse(model_, features, guess, Scales{});
+  std::optional<Eigen::Vector4d> inverse(const Array<"features", 4>& features, const Array<"guess", 4>& guess) const {
+    const auto found = newton_inverse(model_, features.value, guess.value, Scales{});
     return found && found->converged ? std::optional(found->q) : std::nullopt;
   }
 
@@ -67,10 +67,10 @@ q is float[4]: theta, phi [rad], rho [m], psi [rad]; features are float[4]: s [r
            "The q near `guess` that shows these features; None when none is found.");
   m.def(
       "camera_from_marker",
-      [](const Instrument& instrument, const Eigen::Vector4d& q) {
+      [](const Instrument& instrument, const Array<"q", 4>& q) {
         if (!instrument.camera_from_rcm)
           throw InputError("camera_from_marker", "camera_from_rcm", "missing", "an instrument that has one");
-        const JointVector joints = JointVector::from_vector(q);
+        const JointVector joints = JointVector::from_vector(q.value);
         return matrix_of(camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(joints),
                                             joints.psi_rad));
       },

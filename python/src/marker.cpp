@@ -22,13 +22,13 @@ Marker checked(const Marker& marker) {
   return marker;
 }
 
-Marker make_marker(double diameter_m, const std::array<double, 3>& bands_upper_m,
-                   const std::array<double, 3>& bands_lower_m, const std::array<double, 3>& hues_deg, double seam_rad,
-                   double tolerance_m, double wrap_m, double skew_m, double gap_rad) {
+Marker make_marker(double diameter_m, const Array<"bands_upper_m", 3>& bands_upper_m,
+                   const Array<"bands_lower_m", 3>& bands_lower_m, const Array<"hues_deg", 3>& hues_deg,
+                   double seam_rad, double tolerance_m, double wrap_m, double skew_m, double gap_rad) {
   Marker marker;
   marker.diameter_m = diameter_m;
-  marker.bands_upper_m = bands_upper_m, marker.bands_lower_m = bands_lower_m;
-  marker.hues_deg = hues_deg;
+  marker.bands_upper_m = std_array(bands_upper_m), marker.bands_lower_m = std_array(bands_lower_m);
+  marker.hues_deg = std_array(hues_deg);
   marker.seam_rad = seam_rad;
   marker.tolerance_m = tolerance_m;
   marker.wrap_m = wrap_m, marker.skew_m = skew_m, marker.gap_rad = gap_rad;
@@ -101,11 +101,11 @@ void bind_marker(py::module_& m) {
   m.def(
       "design_marker",
       [](double diameter_m, std::optional<double> length_m, std::optional<double> min_band_m,
-         const std::array<double, 3>& hues_deg, double focal_px, double distance_m, double print_error_m) {
+         const Array<"hues_deg", 3>& hues_deg, double focal_px, double distance_m, double print_error_m) {
         DesignSpec spec;
         spec.diameter_m = diameter_m;
         spec.length_m = length_m, spec.min_band_m = min_band_m;
-        spec.hues_deg = hues_deg;
+        spec.hues_deg = std_array(hues_deg);
         spec.viewing.focal_px = focal_px, spec.viewing.distance_m = distance_m;
         spec.print_error_m = print_error_m;
         const py::gil_scoped_release others_run;

@@ -8,6 +8,7 @@ namespace py = pybind11;
 
 PYBIND11_MODULE(_lapservo, m) {
   using namespace lapservo::python;
+  m.attr("__module__") = "lapservo";  // what help() and pickles name
   m.attr("__version__") = LAPSERVO_VERSION;
   py::register_local_exception_translator([](std::exception_ptr thrown) {
     try {
@@ -22,9 +23,13 @@ PYBIND11_MODULE(_lapservo, m) {
   });
   bind_rig(m);
   bind_tracker(m);
+  bind_table(m);
   bind_marker(m);
   bind_kinematics(m);
   bind_servo(m);
   bind_simulation(m);
   bind_calibration(m);
+#ifdef LAPSERVO_ROS2
+  bind_ros2(m);
+#endif
 }

@@ -7,6 +7,8 @@
 
 #include "cameras/camera.h"
 #include "lapservo/core/error.h"
+#include "recordings/bag_frames.h"
+#include "recordings/open_bag.h"
 
 namespace lapservo::python {
 namespace {
@@ -57,10 +59,10 @@ class IteratedFrames : public FrameSource {
     return frame;
   }
   static cv::Mat picture_of(const py::object& item) {
-    if (!py::isinstance<Image>(item))
+    if (!py::isinstance<py::array>(item))
       throw InputError(named, "item", std::string(py::str(py::type::of(item))),
                        "uint8[H, W, 3], (time_s, uint8[H, W, 3]) or lapservo.Frame");
-    return view_of(item.cast<Image>(), named).clone();
+    return view_of(item, named).clone();
   }
 
   py::iterator iterator_;
@@ -71,18 +73,30 @@ class IteratedFrames : public FrameSource {
   int index_ = 0;
 };
 
+void check_rate(double fps) {
+  if (!(fps >= 0.001 && fps <= 1000))
+    throw InputError("fps", "number", fmt::format("{}", fps), "0.001 to 1000 frames per second");
+}
+
 }  // namespace
+
+std::unique_ptr<FrameSource> open_path(const std::string& path, double fps, const VideoReading& reading,
+                                       const std::string& image_topic) {
+  check_rate(fps);
+  if (internal::is_bag(path)) return std::make_unique<internal::BagFrames>(internal::open_bag(path), image_topic);
+  if (!image_topic.empty()) throw InputError("image_topic", "name", image_topic, "'' for what is no bag, as " + path);
+  return internal::open_camera_or_file(path, fps, {}, nullptr, reading);
+}
 
 bool is_path(const py::object& given) {
   return py::isinstance<py::str>(given) || py::hasattr(given, "__fspath__");
 }
 
 GivenFrames::GivenFrames(const py::object& given, double fps, bool of_one_recording) : kept(given), name(named) {
-  if (!(fps >= 0.001 && fps <= 1000))
-    throw InputError("fps", "number", std::string(py::str(py::float_(fps))), "0.001 to 1000 frames per second");
+  check_rate(fps);
   if (is_path(given)) {
     name = given.cast<std::filesystem::path>().string();
-    owned = internal::open_camera_or_file(name, fps);
+    owned = open_path(name, fps);
   } else if (!py::isinstance<FrameSource>(given)) {
     owned = std::make_unique<IteratedFrames>(given, fps, of_one_recording);
   }

@@ -8,10 +8,15 @@
 
 namespace lapservo::python {
 
+/// The frames of an image, a folder, a video, a bag or a camera. `image_topic`: of a bag with several. Throws
+/// InputError as internal::open_camera_or_file() and internal::BagFrames, and for `fps` beyond 0.001 to 1000.
+std::unique_ptr<FrameSource> open_path(const std::string& path, double fps, const VideoReading& reading = {},
+                                       const std::string& image_topic = {});
+
 /// A str or what os.PathLike is.
 bool is_path(const py::object& given);
 
-/// Frames that Python gives, by one of: a path (a picture, a folder, a video, a camera), a FrameSource, or anything
+/// Frames that Python gives, by one of: a path (an image, a folder, a video, a camera), a FrameSource, or anything
 /// that is iterated over: uint8[H, W, 3], (time_s, uint8[H, W, 3]) or Frame. Created and destroyed with Python's lock,
 /// used without.
 struct GivenFrames {

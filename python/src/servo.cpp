@@ -1,4 +1,4 @@
-#include <array>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <pybind11/functional.h>
@@ -7,10 +7,14 @@
 #include <variant>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/trajectory.h"
 #include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
+#include "lapservo/crtk/arm_limits.h"
+#include "lapservo/crtk/joint_map.h"
 #include "lapservo/robot/robot.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/controller_file.h"
@@ -18,8 +22,10 @@
 #include "lapservo/servo/image_window.h"
 #include "lapservo/servo/run.h"
 #include "python/src/bindings.h"
+#include "python/src/controller.h"
 #include "python/src/conversions.h"
 #include "python/src/observed.h"
+#include "python/src/python_frames.h"
 
 namespace lapservo::python {
 namespace {
@@ -34,6 +40,13 @@ OperatingState operating_state_of(const std::string& word) {
   throw InputError("JointState", "operating_state", word, "DISABLED, ENABLED, PAUSED or FAULT");
 }
 
+// Of so many items, given by a method of Python's.
+py::sequence sequence_of(const py::object& given, std::size_t size, const char* method, const char* expected) {
+  if (!py::isinstance<py::sequence>(given) || py::len(given) != size)
+    throw InputError(method, "value", py::str(py::type::of(given)).cast<std::string>(), expected);
+  return py::reinterpret_borrow<py::sequence>(given);
+}
+
 // The ports, implemented in Python.
 class PythonRobot : public Robot {
  public:
@@ -42,9 +55,10 @@ class PythonRobot : public Robot {
     const py::gil_scoped_acquire mine;
     const py::function method = py::get_override(static_cast<const Robot*>(this), "readings");
     if (!method) return Robot::readings();
+    using Reading = Array<"Robot.readings()", 4, 1, Numbers::any>;
     std::vector<JointReading> readings;
-    for (const auto& [time_s, q] : method().cast<std::vector<std::pair<double, Eigen::Vector4d>>>())
-      readings.push_back({time_s, JointVector::from_vector(q)});
+    for (const auto& [time_s, q] : method().cast<std::vector<std::pair<double, Reading>>>())
+      readings.push_back({time_s, JointVector::from_vector(q.value)});
     return readings;
   }
   void send(const JointPath& path) override { PYBIND11_OVERRIDE_PURE(void, Robot, send, path); }
@@ -67,19 +81,21 @@ class PythonImageStream : public ImageStream {
     if (!method) throw py::type_error("ImageStream.newest() is not implemented");
     const py::object given = method();
     if (given.is_none()) return std::nullopt;
-    const auto [time_s, image] = given.cast<std::pair<double, py::array>>();
-    if (!py::isinstance<Image>(image))
-      throw InputError("ImageStream.newest()", "dtype", py::str(image.dtype()).cast<std::string>(), "uint8");
-    return StampedImage{time_s, view_of(image, "ImageStream.newest()").clone()};
+    const auto pair = sequence_of(given, 2, "ImageStream.newest()", "(time_s, uint8[H, W, 3]) or None");
+    return StampedImage{py::object(pair[0]).cast<double>(), view_of(pair[1], "ImageStream.newest()").clone()};
   }
 };
 
 void bind_ports(py::module_& m) {
   py::class_<JointState>(m, "JointState", "What an arm says of itself.")
-      .def(py::init([](double time_s, const Eigen::Vector4d& q, const std::string& operating_state, bool follows,
-                       bool started, const std::string& blocked) {
-             return JointState{time_s,  JointVector::from_vector(q), operating_state_of(operating_state), follows,
-                               started, blocked_of(blocked)};
+      .def(py::init([](double time_s, const Array<"q", 4, 1, Numbers::any>& q, const std::string& operating_state,
+                       bool follows, bool started, const std::string& blocked) {
+             return JointState{time_s,
+                               JointVector::from_vector(q.value),
+                               operating_state_of(operating_state),
+                               follows,
+                               started,
+                               blocked_of(blocked)};
            }),
            py::arg("time_s"), py::arg("q"), py::arg("operating_state") = "ENABLED", py::arg("follows") = true,
            py::arg("started") = false, py::arg("blocked") = "none",
@@ -159,9 +175,11 @@ arrival.)");
 }
 
 DesiredFeatures desired_of(const py::object& given) {
-  const auto [features, rate, acceleration] =
-      given.cast<std::tuple<Eigen::Vector4d, Eigen::Vector4d, Eigen::Vector4d>>();
-  return {features, rate, acceleration};
+  const auto all = sequence_of(given, 3, "Trajectory.at()", "(features, rates, accelerations), each float[4]");
+  const auto four = [&](std::size_t i) -> Eigen::Vector4d {
+    return numbers_of(all[i], "Trajectory.at()", 4, 1, Numbers::any);
+  };
+  return {four(0), four(1), four(2)};
 }
 
 // A Python function may be called and let go by any thread.
@@ -188,37 +206,62 @@ void bind_trajectories(py::module_& m) {
             return std::tuple(desired.features, desired.rate, desired.acceleration);
           },
           py::arg("time_s"), "(features, rates, accelerations), each float[4].");
-  m.def("set_point", &set_point, py::arg("features"), "Trajectory that stays at float[4].");
+  m.def(
+      "set_point", [](const Array<"features", 4>& features) { return set_point(features.value); }, py::arg("features"),
+      "Trajectory that stays at float[4].");
   m.def(
       "paper_trajectory", [] { return sinusoids(paper_sinusoids()); }, "Section V-D's.");
   m.def(
       "sinusoids",
-      [](const Eigen::Vector4d& offset, const Eigen::Vector4d& amplitude, const Eigen::Vector4d& omega_rad_s,
-         const Eigen::Vector4d& phase_rad) {
-        return sinusoids({offset, amplitude, omega_rad_s, phase_rad});
+      [](const Array<"offset", 4>& offset, const Array<"amplitude", 4>& amplitude,
+         const Array<"omega_rad_s", 4>& omega_rad_s, const Array<"phase_rad", 4>& phase_rad) {
+        return sinusoids({offset.value, amplitude.value, omega_rad_s.value, phase_rad.value});
       },
       py::arg("offset"), py::arg("amplitude"), py::arg("omega_rad_s"),
       py::arg("phase_rad") = Eigen::Vector4d(Eigen::Vector4d::Zero()), "offset + amplitude sin(omega t + phase).");
-  m.def("via_points", &via_points, py::arg("points"), py::arg("max_rate"), py::arg("dwell_s") = 0.0,
-        "From point to point, at rest in each, by minimum-jerk motions within max_rate.");
+  m.def(
+      "via_points",
+      [](const Array<"points", Eigen::Dynamic, 4>& points, const Array<"max_rate", 4>& max_rate, double dwell_s) {
+        return via_points(rows_of(points.value), max_rate.value, dwell_s);
+      },
+      py::arg("points"), py::arg("max_rate"), py::arg("dwell_s") = 0.0,
+      "From point to point, at rest in each, by minimum-jerk motions within max_rate.");
   m.def(
       "load_trajectory", [](const std::filesystem::path& path) { return trajectory_from_csv(path); }, py::arg("path"),
       "A spline through a CSV's rows of time_s,s_rad,r_px,l_px,d_px.");
 }
 
-ControllerConfig make_controller(const Rig& rig, const std::string& mode, const std::optional<std::string>& path,
-                                 double period_s, const std::optional<Eigen::Vector4d>& gains_per_s,
-                                 const std::optional<double>& delay_s, double window_margin_px) {
+JointLimits joint_limits_of(const py::object& given, const Rig& rig) {
+  if (is_path(given)) {
+    const auto& joints = rig.instruments.front().joints;
+    if (!joints)
+      throw InputError("Controller", "rig", "without joints", "the arm's joints, with a file of joint_limits");
+    return internal::limits_of_q(*joints, internal::load_arm_limits(given.cast<std::filesystem::path>()));
+  }
+  if (!py::isinstance<py::sequence>(given) || py::len(given) != 4)
+    throw InputError("joint_limits", "a path, or lower, upper, rate and acceleration of q, expected float[4] each");
+  const py::sequence rows = given;
+  const auto row = [&](py::ssize_t i) { return Array<"joint_limits", 4>::of(rows[static_cast<std::size_t>(i)]).value; };
+  return {row(0), row(1), row(2), row(3)};
+}
+
+Controller make_controller(const Rig& rig, const std::string& mode, const std::optional<std::string>& path,
+                           double period_s, const std::optional<Array<"gains_per_s", 4>>& gains_per_s,
+                           const std::optional<double>& delay_s, double window_margin_px,
+                           const std::optional<py::object>& joint_limits) {
   const auto known = control_mode_from_string(mode);
   if (!known) throw InputError("Controller", "mode", mode, "default, fused, paper or uncalibrated");
-  ControllerConfig config = *known == ControlMode::paper ? paper_controller(period_s) : ControllerConfig{};
+  Controller config{*known == ControlMode::paper ? paper_controller(period_s) : ControllerConfig{}, false};
   config.mode = *known;
   config.period_s = period_s;
   config.window = image_window(rig.camera, window_margin_px);
-  if (gains_per_s) config.gains.per_s = *gains_per_s;
+  if (gains_per_s) config.gains.per_s = gains_per_s->value;
   if (delay_s) config.observer.delay_s = *delay_s;
-  if (path) config = load_controller(*path, config);
-  return checked(config);
+  if (joint_limits) config.limits = joint_limits_of(*joint_limits, rig);
+  config.has_joint_limits = joint_limits.has_value();
+  if (path) static_cast<ControllerConfig&>(config) = load_controller(*path, config);
+  static_cast<ControllerConfig&>(config) = checked(config);
+  return config;
 }
 
 class PythonObserver : public RunObserver {
@@ -307,16 +350,15 @@ void bind_tick(py::module_& m) {
 }
 
 void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared_ptr<Rig>& rig,
-              const Trajectory& trajectory, double duration_s, const std::optional<ControllerConfig>& controller,
-              const std::optional<Eigen::Vector2d>& rcm_px, const std::optional<std::array<Eigen::Vector4d, 4>>& limits,
-              bool own_thread, py::object on_tick) {
+              const Trajectory& trajectory, double duration_s, const std::optional<Controller>& controller,
+              const std::optional<Array<"rcm_px", 2>>& rcm_px, bool own_thread, py::object on_tick) {
   RunConfig config;
   config.rig = *rig;
-  config.controller =
-      controller ? *controller : make_controller(*rig, "fused", {}, ControllerConfig{}.period_s, {}, {}, 20);
-  config.rcm_px = rcm_px;
-  if (limits) config.arm_limits = JointLimits{(*limits)[0], (*limits)[1], (*limits)[2], (*limits)[3]};
-  if (limits) config.controller.limits = *config.arm_limits;
+  const Controller used =
+      controller ? *controller : make_controller(*rig, "fused", {}, ControllerConfig{}.period_s, {}, {}, 20, {});
+  config.controller = used;
+  if (used.has_joint_limits) config.arm_limits = used.limits;
+  if (rcm_px) config.rcm_px = rcm_px->value;
   config.tracking_thread = own_thread ? TrackingThread::own : TrackingThread::callers;
   if (config.controller.mode == ControlMode::paper) config.tracker.method = Method::centerline;
   const JointVector start = robot.state().q;
@@ -332,26 +374,34 @@ void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared
 void bind_servo(py::module_& m) {
   bind_ports(m);
   bind_trajectories(m);
-  py::class_<ControllerConfig>(m, "Controller", "How a loop steers.")
+  py::class_<Controller>(m, "Controller", "How a loop steers.")
       .def(
           py::init(&make_controller), py::arg("rig"), py::kw_only(), py::arg("mode") = "fused",
           py::arg("path") = py::none(), py::arg("period_s") = ControllerConfig{}.period_s,
           py::arg("gains_per_s") = py::none(), py::arg("delay_s") = py::none(), py::arg("window_margin_px") = 20.0,
+          py::arg("joint_limits") = py::none(),
           "mode: 'fused', 'paper' or 'uncalibrated'; path: a controller.yaml, read over the rest; delay_s: known, else "
-          "estimated.")
-      .def_property_readonly("mode", [](const ControllerConfig& self) { return std::string(to_string(self.mode)); })
-      .def_readonly("period_s", &ControllerConfig::period_s)
-      .def("to_yaml", &controller_yaml, "What a controller.yaml can say of it.");
+          "estimated; joint_limits: the path of a file of the arm's, as configs/joint_limits/psm-classic.yaml, or "
+          "lower, "
+          "upper, rate and acceleration of q, float[4] each.")
+      .def_property_readonly("mode", [](const Controller& self) { return std::string(to_string(self.mode)); })
+      .def_property_readonly("period_s", [](const Controller& self) { return self.period_s; })
+      .def(
+          "to_yaml", [](const Controller& self) { return controller_yaml(self); },
+          "What a controller.yaml can say of it.")
+      .def("__repr__", [](const Controller& self) {
+        return fmt::format("<lapservo.Controller {} every {:.4f} s>", to_string(self.mode), self.period_s);
+      });
   bind_tick(m);
   m.def("run", &run_loop, py::arg("robot"), py::arg("images"), py::arg("clock"), py::arg("rig"), py::arg("trajectory"),
         py::arg("duration_s"), py::kw_only(), py::arg("controller") = py::none(), py::arg("rcm_px") = py::none(),
-        py::arg("joint_limits") = py::none(), py::arg("own_thread") = false, py::arg("on_tick") = py::none(),
+        py::arg("own_thread") = false, py::arg("on_tick") = py::none(),
         R"(The servo loop: reads the joints, sees, decides, sends, then tells on_tick, once every period.
 
 It holds by itself, within the tick, on a missing or stale image, a lost marker, an outlier or numbers that are not
 finite, and goes on when all is well again within 2 s. After anything else, above all an arm that was not enabled, it
 holds until JointState.started; this call is the first start, and counts when the arm has been ready for 0.5 s.
-joint_limits: lower, upper, rate and acceleration of q, float[4] each, needed where Robot.is_simulated() is False.
+Where Robot.is_simulated() is False, the controller needs joint_limits.
 own_thread: vision in a thread of its own, so that setpoints never wait for it (for real arms). on_tick(ControlTick) may
 return False, which ends the run. However it ends, the arm brakes to rest. With camera_from_rcm a trajectory that can't be followed from the arm's joints, by reach, limits or
 the image's window, raises InputError before anything moves.)");

@@ -23,13 +23,13 @@ class RigRenderer {
         renderer_(rig_.camera, shafts(rig_, film_m), make_tissue(rig_.camera.width_px, rig_.camera.height_px, seed),
                   options) {}
 
-  Image render(const std::vector<Eigen::Vector4d>& q, std::uint64_t seed) {
+  Image render(const Array<"q", Eigen::Dynamic, 4>& given, std::uint64_t seed) {
+    const std::vector<Eigen::Vector4d> q = rows_of(given.value);
     if (q.size() != rig_.instruments.size())
       throw InputError("Renderer.render", "q", std::to_string(q.size()) + " configurations",
                        "one for each instrument: " + std::to_string(rig_.instruments.size()));
     std::vector<ShaftPlacement> placements;
     for (std::size_t i = 0; i < q.size(); ++i) {
-      if (!q[i].allFinite()) throw InputError("Renderer.render", "q", "not finite", "numbers");
       if (!rig_.instruments[i].camera_from_rcm)
         throw InputError("Renderer", "camera_from_rcm", "missing", "a transform: it says where the instrument is");
       placements.push_back(placement_of(rig_.instruments[i], JointVector::from_vector(q[i])));
@@ -47,17 +47,18 @@ class RigRenderer {
   Renderer renderer_;
 };
 
-std::unique_ptr<Simulator> make_simulator(const Rig& rig, const Eigen::Vector4d& q, std::uint64_t seed,
+std::unique_ptr<Simulator> make_simulator(const Rig& rig, const Array<"q", 4>& q, std::uint64_t seed,
                                           double frame_rate_hz, double latency_s, double exposure_s,
-                                          const Eigen::Vector4d& joint_offset, const Eigen::Vector4d& backlash) {
+                                          const Array<"joint_offset", 4>& joint_offset,
+                                          const Array<"backlash", 4>& backlash) {
   SimulatorConfig config;
   config.seed = seed;
   config.endoscope.frame_rate_hz = frame_rate_hz;
   config.endoscope.latency_s = latency_s;
   config.endoscope.exposure_s = exposure_s;
-  config.arm.joint_offset = joint_offset;
-  config.arm.backlash = backlash;
-  return std::make_unique<Simulator>(rig, config, JointVector::from_vector(q));
+  config.arm.joint_offset = joint_offset.value;
+  config.arm.backlash = backlash.value;
+  return std::make_unique<Simulator>(rig, config, JointVector::from_vector(q.value));
 }
 
 }  // namespace
@@ -78,13 +79,8 @@ void bind_simulation(py::module_& m) {
            py::arg("rig"), py::kw_only(), py::arg("blur_px") = usual.sensor.blur_px, py::arg("noise") = 1.0,
            py::arg("light") = 1.0, py::arg("smoke") = 0.0, py::arg("film_m") = ShaftModel{}.film_m, py::arg("seed") = 1,
            "noise, light: as factors; smoke: a veil, 0 to 1; film_m: of the print's film; seed: of the tissue.")
-      .def(
-          "render",
-          [](RigRenderer& self, const Eigen::Vector4d& q, std::uint64_t seed) {
-            return self.render(std::vector<Eigen::Vector4d>{q}, seed);
-          },
-          py::arg("q"), py::arg("seed") = 1, "uint8[H, W, 3] of a rig of one instrument; seed: of the noise.")
-      .def("render", &RigRenderer::render, py::arg("q"), py::arg("seed") = 1, "The same with one q per instrument.");
+      .def("render", &RigRenderer::render, py::arg("q"), py::arg("seed") = 1,
+           "uint8[H, W, 3]. q: float[N, 4], a row an instrument, or float[4] of a rig of one; seed: of the noise.");
 
   const ArmConfig arm;
   const EndoscopeConfig endoscope;

@@ -7,7 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include "cameras/camera.h"
+#include <fmt/format.h>
+
 #include "lapservo/core/error.h"
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/image_file.h"
@@ -18,6 +19,8 @@
 #include "python/src/bindings.h"
 #include "python/src/conversions.h"
 #include "python/src/observed.h"
+#include "python/src/python_frames.h"
+#include "python/src/state.h"
 
 namespace lapservo::python {
 namespace {
@@ -84,71 +87,26 @@ std::string summary(const Observed& seen) {
   return text + numbers;
 }
 
-Image overlay(const Observed& seen, const Image& image) {
-  const cv::Mat bgr = view_of(image);
+Image overlay(const Observed& seen, const Picture<"image">& image) {
   const py::gil_scoped_release others_run;
   std::vector<Observation> all(1, seen.observation);
   Rig rig{seen.rig->camera, {}, {}};
   if (const auto index = internal::instrument_index(*seen.rig, seen.observation.instrument))
     rig.instruments.push_back(seen.rig->instruments[*index]);
-  const cv::Mat drawn = draw_overlay(bgr, rig, all);
+  const cv::Mat drawn = draw_overlay(image.bgr, rig, all);
   const py::gil_scoped_acquire mine;
   return array_of(drawn);
 }
 
-// As bytes, to be pickled: every member is a number or holds numbers.
-py::tuple rigid_state(const Rigid3& pose) {
-  return py::make_tuple(Eigen::Vector4d(pose.rotation.coeffs()), pose.translation);
-}
-Rigid3 rigid_from_state(const py::tuple& state) {
-  return {Eigen::Quaterniond(state[0].cast<Eigen::Vector4d>()), state[1].cast<Eigen::Vector3d>()};
+py::tuple state_of_observed(const Observed& seen) {
+  return py::make_tuple(state_of(*seen.rig), state_of(seen.observation), seen.stamp_s);
 }
 
-py::tuple state_of(const Observed& seen) {
-  const Observation& o = seen.observation;
-  const Features& f = o.features;
-  const py::object rcm =
-      o.rcm ? py::object(py::make_tuple(o.rcm->q.vector(), o.rcm->covariance)) : py::object(py::none());
-  const py::object marker =
-      o.marker ? py::object(py::make_tuple(rigid_state(o.marker->camera_from_marker), o.marker->sigma_xy_m,
-                                           o.marker->sigma_z_m, o.marker->sigma_axis_rad, o.marker->sigma_roll_rad))
-               : py::object(py::none());
-  return py::make_tuple(*seen.rig, seen.stamp_s, static_cast<int>(o.status), o.instrument, rcm, marker,
-                        py::make_tuple(o.tau_rad, o.sigma_tau_rad), o.edges_ideal_px, o.edges_raw_px,
-                        o.edges_covariance_px2, py::make_tuple(f.s_rad, f.r_px, f.l_px, f.d_px, f.cross_ratio),
-                        rigid_state(o.camera_from_unrolled), o.psi_rad,
-                        py::make_tuple(static_cast<int>(o.refused.what), rigid_state(o.refused.camera_from_unrolled),
-                                       o.refused.psi_rad, o.refused.edges_raw_px));
-}
-
-Observed from_state(const py::tuple& state) {
-  Observed seen;
-  seen.rig = std::make_shared<const Rig>(state[0].cast<Rig>());
-  seen.stamp_s = state[1].cast<std::optional<double>>();
-  Observation& o = seen.observation;
-  o.status = static_cast<Status>(state[2].cast<int>());
-  o.instrument = state[3].cast<std::string>();
-  if (!state[4].is_none()) {
-    const auto rcm = state[4].cast<py::tuple>();
-    o.rcm = {JointVector::from_vector(rcm[0].cast<Eigen::Vector4d>()), rcm[1].cast<Eigen::Matrix4d>()};
-  }
-  if (!state[5].is_none()) {
-    const auto marker = state[5].cast<py::tuple>();
-    o.marker = {rigid_from_state(marker[0]), marker[1].cast<double>(), marker[2].cast<double>(),
-                marker[3].cast<double>(), marker[4].cast<double>()};
-  }
-  std::tie(o.tau_rad, o.sigma_tau_rad) = state[6].cast<std::pair<double, double>>();
-  o.edges_ideal_px = state[7].cast<std::array<Eigen::Vector2d, 4>>();
-  o.edges_raw_px = state[8].cast<std::array<Eigen::Vector2d, 4>>();
-  o.edges_covariance_px2 = state[9].cast<EdgesCovariance>();
-  const auto features = state[10].cast<py::tuple>();
-  o.features = {features[0].cast<double>(), features[1].cast<std::optional<double>>(), features[2].cast<double>(),
-                features[3].cast<double>(), features[4].cast<double>()};
-  o.camera_from_unrolled = rigid_from_state(state[11]);
-  o.psi_rad = state[12].cast<double>();
-  const auto refused = state[13].cast<py::tuple>();
-  o.refused = {static_cast<Observation::Refused::What>(refused[0].cast<int>()), rigid_from_state(refused[1]),
-               refused[2].cast<double>(), refused[3].cast<std::array<Eigen::Vector2d, 4>>()};
+Observed observed_from(const py::tuple& state) {
+  const auto rig = std::make_shared<Rig>();
+  set_state(state[0], *rig);
+  Observed seen{{}, rig, state[2].cast<std::optional<double>>()};
+  set_state(state[1], seen.observation);
   return seen;
 }
 
@@ -158,16 +116,22 @@ void bind_observation(py::module_& m) {
   m.attr("_statuses") = words;
 
   using Pose = Observation::MarkerPose;
-  py::class_<Pose>(m, "MarkerPose", R"(The marker's pose, with or without an RCM.
+  py::class_<Pose> pose_type(m, "MarkerPose", R"(The marker's pose, with or without an RCM.
 
-Origin at the marker's proximal end on the axis, z along the axis to the tip, x towards tau = 0.)")
+Origin at the marker's proximal end on the axis, z along the axis to the tip, x towards tau = 0.)");
+  bind_state(pose_type);
+  pose_type
       .def_property_readonly(
           "camera_from_marker", [](const Pose& pose) { return matrix_of(pose.camera_from_marker); },
           "float[4, 4], metres")
       .def_readonly("sigma_xy_m", &Pose::sigma_xy_m, "of the origin, across the camera's axis")
       .def_readonly("sigma_z_m", &Pose::sigma_z_m, "of its depth")
       .def_readonly("sigma_axis_rad", &Pose::sigma_axis_rad, "of the angle between the axis and the true one")
-      .def_readonly("sigma_roll_rad", &Pose::sigma_roll_rad, "about the axis");
+      .def_readonly("sigma_roll_rad", &Pose::sigma_roll_rad, "about the axis")
+      .def("__repr__", [](const Pose& pose) {
+        const Eigen::Vector3d& at = pose.camera_from_marker.translation;
+        return fmt::format("<lapservo.MarkerPose at {:.5f}, {:.5f}, {:.5f} m>", at.x(), at.y(), at.z());
+      });
 
   py::class_<Observed>(m, "Observation", R"(What one frame tells of one instrument.
 
@@ -213,9 +177,16 @@ Sigmas are one standard deviation. Of an observation whose status is not ok, eve
       .def_property_readonly(
           "marker_pose", [](const Observed& seen) { return is_ok(seen) ? seen.observation.marker : std::nullopt; },
           "MarkerPose; None by method 'centerline'")
-      .def("overlay", &overlay, py::arg("image").noconvert(),
+      .def("overlay", &overlay, py::arg("image"),
            "The frame with what was seen drawn in, as a new uint8[H, W, 3]; what was refused in dashes.")
-      .def(py::pickle(&state_of, &from_state))
+      .def(py::pickle(&state_of_observed, &observed_from))
+      .def(
+          "__eq__",
+          [](const Observed& a, const Observed& b) {
+            return *a.rig == *b.rig && a.stamp_s == b.stamp_s && equal(a.observation, b.observation);
+          },
+          py::is_operator())
+      .def("__hash__", &hash_of)
       .def("__repr__", [](const Observed& seen) { return "<lapservo.Observation " + summary(seen) + ">"; });
 }
 
@@ -230,16 +201,17 @@ class SafeTracker {
   SafeTracker(std::shared_ptr<const Rig> rig, const TrackerOptions& options)
       : rig_(std::move(rig)), tracker_(*rig_, options) {}
 
-  std::vector<Observed> track(const Image& image, std::optional<double> stamp_s) {
-    const cv::Mat bgr = view_of(image);
+  std::vector<Observed> track(const Picture<"image">& image, const std::optional<Number<"stamp_s">>& stamp_s) {
     const py::gil_scoped_release others_run;
     const std::lock_guard lock(mutex_);
-    return observed(tracker_.track(bgr, stamp_s), rig_, stamp_s);
+    const auto at_s = stamp_s ? std::optional(stamp_s->value) : std::nullopt;
+    return observed(tracker_.track(image.bgr, at_s), rig_, at_s);
   }
   std::vector<Observed> track_frame(const Frame& frame) {
     const py::gil_scoped_release others_run;
     const std::lock_guard lock(mutex_);
-    return observed(frame.flaw ? tracker_.refuse(*frame.flaw) : tracker_.track(frame.bgr, frame.time_s), rig_, frame.time_s);
+    return observed(frame.flaw ? tracker_.refuse(*frame.flaw) : tracker_.track(frame.bgr, frame.time_s), rig_,
+                    frame.time_s);
   }
   void reset() {
     const py::gil_scoped_release others_run;
@@ -254,15 +226,18 @@ class SafeTracker {
 };
 
 void bind_frames(py::module_& m) {
-  py::class_<Frame>(m, "Frame", "A picture of a source.")
-      .def_property_readonly(
+  py::class_<Frame> type(m, "Frame", "A picture of a source.");
+  bind_state(type);
+  type.def_property_readonly(
           "image", [](const Frame& frame) { return array_of(frame.bgr); }, "uint8[H, W, 3]")
       .def_readonly("index", &Frame::index, "from 0")
       .def_readonly("time_s", &Frame::time_s, "since the first frame")
       .def_readonly("file", &Frame::file, "the picture's path; empty for videos and cameras")
       .def_property_readonly(
           "flaw", [](const Frame& frame) { return frame.flaw ? status_to_python(*frame.flaw) : py::none(); },
-          "Status: why nothing is to be measured in it, or None");
+          "Status: why nothing is to be measured in it, or None")
+      .def("__repr__",
+           [](const Frame& self) { return fmt::format("<lapservo.Frame {} at {:.6f} s>", self.index, self.time_s); });
   py::class_<FrameSource>(m, "FrameSource", "Frames of pictures, a video or a camera, to be iterated over once.")
       .def_property_readonly("frame_count", &FrameSource::frame_count, "where it is known beforehand")
       .def_property_readonly("frames_per_second", &FrameSource::frames_per_second)
@@ -279,19 +254,21 @@ void bind_frames(py::module_& m) {
   m.def(
       "open_frames",
       [](const std::filesystem::path& input, double fps, bool deinterlaced, const std::string& colour_matrix,
-         const std::string& chroma_location) {
-        return internal::open_camera_or_file(input.string(), fps, {}, nullptr,
-                                             {deinterlaced, colour_matrix, chroma_location});
+         const std::string& chroma_location, const std::string& image_topic) {
+        return open_path(input.string(), fps, {deinterlaced, colour_matrix, chroma_location}, image_topic);
       },
       py::arg("input"), py::arg("fps") = 30.0, py::arg("deinterlaced") = false, py::arg("colour_matrix") = "",
-      py::arg("chroma_location") = "",
-      "A picture, a folder of pictures (with `fps`), a video, 'rtsp://...', '/dev/video0' or 'gst:PIPELINE': a "
-      "FrameSource. `deinterlaced`: one field of each frame is tracked. `colour_matrix` ('bt601', 'bt709', "
-      "'bt2020') and `chroma_location` ('left', 'centre', 'top-left') of a video, in place of what it names.");
+      py::arg("chroma_location") = "", py::arg("image_topic") = "",
+      "An image, a folder of images (with `fps`), a video, a bag of ROS 1 or 2, 'rtsp://...', '/dev/video0' or "
+      "'gst:PIPELINE': a FrameSource. `deinterlaced`: one field of each frame is tracked. `colour_matrix` ('bt601', "
+      "'bt709', 'bt2020') and `chroma_location` ('left', 'centre', 'top-left') of a video, in place of its tags; "
+      "`image_topic`: in a bag with several.");
+  m.def(
+      "_picture", [](const Picture<"image">& image) { return image.kept; }, py::arg("image"));
   m.def(
       "_png",
-      [](const Image& image) {
-        const auto bytes = internal::encode_png(view_of(image));
+      [](const Picture<"image">& image) {
+        const auto bytes = internal::encode_png(image.bgr);
         return py::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
       },
       py::arg("image"));
@@ -327,12 +304,12 @@ Holds what it learnt from the frame before. Threads may share it; frames are the
            "deinterlace: track the field of the even rows; frame_budget: what a frame may cost, in counted units of "
            "about half a microsecond (a longer search goes on in the next frame), or None: as much as it takes, which "
            "pictures that don't follow one another need.")
-      .def("track", &SafeTracker::track, py::arg("image").noconvert(), py::arg("stamp_s") = py::none(),
+      .def("track", &SafeTracker::track_frame, py::arg("frame"),
+           "The same of a Frame; one that is flawed is refused, with its flaw for a status.")
+      .def("track", &SafeTracker::track, py::arg("image"), py::arg("stamp_s") = py::none(),
            R"(list[Observation], one per instrument, of uint8[H, W, 3] in blue green red, of the rig's size.
 
 The image is not copied; other Python threads run meanwhile.)")
-      .def("track", &SafeTracker::track_frame, py::arg("frame"),
-           "The same of a Frame; one that is flawed is refused, with its flaw for a status.")
       .def("reset", &SafeTracker::reset, "Forgets the frame before: the next one is searched anew.");
 }
 

@@ -74,9 +74,15 @@ def test_the_ros_node_publishes_what_it_sees(ros, tmp_path):
     assert np.abs(np.array(heard[0].position) - q).max() < 0.005
 
 
-def test_each_example_runs_here():
-    here = pathlib.Path(__file__).read_text()
-    assert all(f'"{path.name}"' in here for path in EXAMPLES.glob("*.py"))
+#: Debian has no rclpy, ROS 2's Python: this one is compiled only.
+NOT_RUN = ("ros2_node.py",)
+
+
+def test_each_example_runs():
+    tests = "".join((SOURCE / "python" / "tests" / name).read_text() for name in ("test_examples.py", "test_ros2.py"))
+    for path in EXAMPLES.glob("*.py"):
+        compile(path.read_text(), path, "exec")
+        assert f'"{path.name}"' in tests
 
 
 def test_what_the_page_shows_runs(monkeypatch, tmp_path):

@@ -87,35 +87,10 @@ def test_rows_of_an_image_may_lie_apart(rig, image):
     assert np.array_equal(a.q, b.q)
 
 
-@pytest.mark.parametrize("bad", [lambda i: i[:, :, :2], lambda i: i[0], lambda i: i[:, ::2], lambda i: i[:, :, ::-1],
-                                 lambda i: i[:-1]])
-def test_other_arrays_are_refused(rig, image, bad):
-    with pytest.raises(lapservo.InputError):
-        lapservo.Tracker(rig).track(bad(image))
-
-
-def test_other_types_are_refused(rig, image):
-    with pytest.raises(TypeError):
-        lapservo.Tracker(rig).track(image.astype(float))
-
-
 def test_an_overlay_is_a_new_picture(rig, image):
     before = image.copy()
     drawn = lapservo.Tracker(rig).track(image)[0].overlay(image)
     assert drawn.shape == image.shape and not np.array_equal(drawn, image) and np.array_equal(image, before)
-
-
-def test_results_pickle(rig, image):
-    for seen in (lapservo.Tracker(rig).track(image)[0], lapservo.Tracker(free(rig)).track(image, 1.0)[0]):
-        again = pickle.loads(pickle.dumps(seen))
-        assert repr(again) == repr(seen) and again.stamp_s == seen.stamp_s
-        assert np.array_equal(again.features, seen.features, equal_nan=True)
-        assert np.array_equal(again.edges_covariance_px2, seen.edges_covariance_px2)
-        assert np.array_equal(again.overlay(image), seen.overlay(image))
-    assert pickle.loads(pickle.dumps(rig)).to_yaml() == rig.to_yaml()
-    joints = pickle.loads(pickle.dumps(rig.instruments[0].joints))
-    assert joints.names == rig.instruments[0].joints.names and joints.sign == rig.instruments[0].joints.sign
-    assert joints.offset == rig.instruments[0].joints.offset
 
 
 def test_threads_share_a_tracker(rig, image):
@@ -149,10 +124,6 @@ def test_a_rig_of_keywords_is_that_of_the_file(rig):
             hues_deg=marker.hues_deg, seam_rad=marker.seam_rad),
             camera_from_rcm=rig.instruments[0].camera_from_rcm)])
     assert np.allclose(lapservo.Kinematics(again).features(Q), lapservo.Kinematics(rig).features(Q), atol=1e-9)
-    with pytest.raises(lapservo.InputError):
-        lapservo.Instrument("x", marker, camera_from_rcm=np.diag([1, 1, 2, 1.0]))
-    with pytest.raises(lapservo.InputError):
-        lapservo.Camera(100, 100, np.ones((3, 3)))
 
 
 configurations = st.tuples(st.floats(-0.3, 0.3), st.floats(1.3, 1.8), st.floats(0.05, 0.08), st.floats(-3, 3))
@@ -282,16 +253,6 @@ def test_what_a_port_raises_leaves_the_run(rig):
         errors_of_a_run(rig, lapservo.Robot(), simulator, simulator)
 
 
-def test_other_types_of_a_camera_are_refused(rig, image):
-    class Floats(lapservo.ImageStream):
-        def newest(self):
-            return 0.0, image / 255.0
-
-    simulator = lapservo.Simulator(rig, Q)
-    with pytest.raises(lapservo.InputError, match="float64"):
-        errors_of_a_run(rig, simulator, Floats(), simulator)
-
-
 def test_a_run_ends_when_told(rig):
     simulator, ticks = lapservo.Simulator(rig, Q), []
 
@@ -338,6 +299,9 @@ def test_trajectories(tmp_path):
 def test_a_controller_says_what_a_file_can(rig):
     controller = lapservo.Controller(rig, mode="paper", period_s=1 / 30, delay_s=0.05)
     assert controller.mode == "paper" and "delay_s: 0.05" in controller.to_yaml()
+    fused = lapservo.Controller(rig, mode="fused")
+    assert fused.mode == "fused" and "mode: fused" in fused.to_yaml() and "fused" in repr(fused)
+    assert lapservo.Controller(rig, mode="default").mode == "fused"
     with pytest.raises(lapservo.InputError) as caught:
         lapservo.Controller(rig, mode="fast")
     assert caught.value.field == "mode"

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -10,29 +11,35 @@
 namespace lapservo::internal {
 namespace {
 
-void append(std::string& row, std::optional<double> value, int decimals) {
-  row += ',';
-  if (value && std::isfinite(*value)) row += fmt::format("{:.{}f}", *value, decimals);
-}
+constexpr int of_sigma = -1;
 
-void append_sigma(std::string& row, std::optional<double> value) {
-  row += ',';
-  if (value && std::isfinite(*value)) row += fmt::format("{:.4g}", *value);
-}
+// The columns after `status`, in their order.
+class Numbers {
+ public:
+  explicit Numbers(const Observation& observation) : known_(observation.status == Status::ok) {}
+  void add(std::optional<double> value, int decimals) {
+    if (!known_ || (value && !std::isfinite(*value))) value.reset();
+    all_.push_back({value, decimals});
+  }
+  void add_sigma(std::optional<double> value) { add(value, of_sigma); }
+  std::vector<ObservationNumber> all() && { return std::move(all_); }
 
-void append_marker(std::string& row, const std::optional<Observation::MarkerPose>& marker) {
+ private:
+  bool known_;
+  std::vector<ObservationNumber> all_;
+};
+
+void add_marker(Numbers& numbers, const std::optional<Observation::MarkerPose>& marker) {
   const auto of_marker = [&](auto get) { return marker ? std::optional<double>(get(*marker)) : std::nullopt; };
   for (Eigen::Index i = 0; i < 3; ++i)
-    append(row, of_marker([&](const auto& m) { return m.camera_from_marker.translation[i]; }), 8);
+    numbers.add(of_marker([&](const auto& m) { return m.camera_from_marker.translation[i]; }), 8);
   for (Eigen::Index i = 0; i < 4; ++i)  // x y z w
-    append(row, of_marker([&](const auto& m) { return m.camera_from_marker.rotation.coeffs()[i]; }), 8);
-  append_sigma(row, of_marker([](const auto& m) { return m.sigma_xy_m; }));
-  append_sigma(row, of_marker([](const auto& m) { return m.sigma_z_m; }));
-  append_sigma(row, of_marker([](const auto& m) { return m.sigma_axis_rad; }));
-  append_sigma(row, of_marker([](const auto& m) { return m.sigma_roll_rad; }));
+    numbers.add(of_marker([&](const auto& m) { return m.camera_from_marker.rotation.coeffs()[i]; }), 8);
+  numbers.add_sigma(of_marker([](const auto& m) { return m.sigma_xy_m; }));
+  numbers.add_sigma(of_marker([](const auto& m) { return m.sigma_z_m; }));
+  numbers.add_sigma(of_marker([](const auto& m) { return m.sigma_axis_rad; }));
+  numbers.add_sigma(of_marker([](const auto& m) { return m.sigma_roll_rad; }));
 }
-
-constexpr std::size_t measured_columns = 34;
 
 }  // namespace
 
@@ -45,28 +52,36 @@ const char* const observation_csv_header =
     "marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
     "sigma_marker_xy_m,sigma_marker_z_m,sigma_axis_rad,sigma_roll_rad";
 
+std::vector<ObservationNumber> observation_numbers(const Observation& observation) {
+  Numbers numbers(observation);
+  const auto& rcm = observation.rcm;
+  const auto of_q = [&](auto get) { return rcm ? std::optional<double>(get(*rcm)) : std::nullopt; };
+  numbers.add(of_q([](const auto& r) { return r.q.theta_rad; }), 7);
+  numbers.add(of_q([](const auto& r) { return r.q.phi_rad; }), 7);
+  numbers.add(of_q([](const auto& r) { return r.q.rho_m; }), 8);
+  numbers.add(of_q([](const auto& r) { return r.q.psi_rad; }), 7);
+  numbers.add(observation.tau_rad, 7);
+  for (Eigen::Index i = 0; i < 4; ++i)
+    numbers.add_sigma(of_q([&](const auto& r) { return std::sqrt(r.covariance(i, i)); }));
+  numbers.add_sigma(observation.sigma_tau_rad);
+  for (const Eigen::Vector2d& edge : observation.edges_raw_px) numbers.add(edge.x(), 4), numbers.add(edge.y(), 4);
+  const Features& f = observation.features;
+  numbers.add(f.s_rad, 7);
+  numbers.add(f.r_px, 4);
+  numbers.add(f.l_px, 4);
+  numbers.add(f.d_px, 4);
+  numbers.add(f.cross_ratio, 7);
+  add_marker(numbers, observation.marker);
+  return std::move(numbers).all();
+}
+
 std::string observation_csv_row(int frame, double time_s, const std::string& file, const Observation& observation) {
   std::string row = fmt::format("{},{:.6f},{},{},{}", frame, time_s, csv_field(file), csv_field(observation.instrument),
                                 to_string(observation.status));
-  if (observation.status != Status::ok) return row.append(measured_columns, ',');
-  const auto& rcm = observation.rcm;
-  const auto of_q = [&](auto get) { return rcm ? std::optional<double>(get(*rcm)) : std::nullopt; };
-  append(row, of_q([](const auto& r) { return r.q.theta_rad; }), 7);
-  append(row, of_q([](const auto& r) { return r.q.phi_rad; }), 7);
-  append(row, of_q([](const auto& r) { return r.q.rho_m; }), 8);
-  append(row, of_q([](const auto& r) { return r.q.psi_rad; }), 7);
-  append(row, observation.tau_rad, 7);
-  for (Eigen::Index i = 0; i < 4; ++i)
-    append_sigma(row, of_q([&](const auto& r) { return std::sqrt(r.covariance(i, i)); }));
-  append_sigma(row, observation.sigma_tau_rad);
-  for (const Eigen::Vector2d& edge : observation.edges_raw_px) append(row, edge.x(), 4), append(row, edge.y(), 4);
-  const Features& f = observation.features;
-  append(row, f.s_rad, 7);
-  append(row, f.r_px, 4);
-  append(row, f.l_px, 4);
-  append(row, f.d_px, 4);
-  append(row, f.cross_ratio, 7);
-  append_marker(row, observation.marker);
+  for (const auto& [value, decimals] : observation_numbers(observation)) {
+    row += ',';
+    if (value) row += decimals == of_sigma ? fmt::format("{:.4g}", *value) : fmt::format("{:.{}f}", *value, decimals);
+  }
   return row;
 }
 

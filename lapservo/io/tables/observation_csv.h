@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "lapservo/core/row_file.h"
 #include "lapservo/vision/observation.h"
@@ -10,6 +12,14 @@ namespace lapservo::internal {
 
 /// The header line of an observation CSV (docs/output.md), without the line's end.
 extern const char* const observation_csv_header;
+
+/// A number of a row, where it is known; of `decimals` digits after the point, or as a sigma below 0.
+struct ObservationNumber {
+  std::optional<double> value;
+  int decimals = 0;
+};
+/// Those of the columns after `status`.
+std::vector<ObservationNumber> observation_numbers(const Observation& observation);
 
 /// One row of it, without the line's end. Unknown values are empty fields.
 std::string observation_csv_row(int frame, double time_s, const std::string& file, const Observation& observation);

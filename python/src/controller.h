@@ -1,0 +1,12 @@
+#pragma once
+
+#include "lapservo/control/controller_config.h"
+
+namespace lapservo::python {
+
+/// Remembers whether its limits are the arm's own, which an arm that is not simulated needs.
+struct Controller : ControllerConfig {
+  bool has_joint_limits = false;
+};
+
+}  // namespace lapservo::python

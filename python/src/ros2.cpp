@@ -1,0 +1,103 @@
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/crtk/crtk_robot.h"
+#include "lapservo/crtk/image_receiver.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/robot/steady_clock.h"
+#include "python/src/bindings.h"
+#include "python/src/controller.h"
+#include "python/src/conversions.h"
+#include "transports/ros2/ros2_transport.h"
+
+namespace lapservo::python {
+namespace {
+using namespace internal;
+
+// A node, destroyed after what speaks by it.
+struct Node {
+  Ros2Transport transport{"lapservo"};
+};
+
+class Ros2Robot : private Node, public CrtkRobot {
+ public:
+  Ros2Robot(const std::string& arm, const InterlockConfig& interlock, const Clock& clock)
+      : CrtkRobot(transport, arm, interlock, clock) {}
+};
+
+class Ros2Camera : private Node, public ImageStream {
+ public:
+  Ros2Camera(const std::string& topic, const Camera& camera, const Clock& clock)
+      : receiver_(camera.width_px, camera.height_px) {
+    const auto sink = [this, &clock](auto&& message) { receiver_.receive(std::move(message), clock.now_s()); };
+    subscription_ = topic.ends_with("/compressed") ? transport.subscribe_compressed_images(topic, sink)
+                                                   : transport.subscribe_images(topic, sink);
+  }
+  std::optional<StampedImage> newest() override { return receiver_.newest(); }
+  std::string dropped() const { return receiver_.counts().text(); }
+  std::string complaint() const { return receiver_.complaint(); }
+
+ private:
+  ImageReceiver receiver_;
+  Transport::Subscription subscription_;  // last: it uses the receiver
+};
+
+// Until the arm's joints are known, so that run() knows where a trajectory begins.
+void wait_for_joints(const Ros2Robot& robot, const std::string& arm, double wait_s) {
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
+  while (robot.counts().joint_states == 0 || robot.blocked() == Blocked::no_joint_states) {
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    if (std::chrono::steady_clock::now() >= end)
+      throw InputError("Ros2Robot",
+                       fmt::format("no {} with the rig's joints within {:g} s", topic_of(arm, "measured_js"), wait_s));
+    const py::gil_scoped_release others_run;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+}
+
+std::unique_ptr<Ros2Robot> make_robot(const std::string& arm, const Rig& rig, const Controller& controller,
+                                      const SteadyClock& clock, bool enable_motion, double wait_s) {
+  const auto& joints = rig.instruments.front().joints;
+  if (!joints) throw InputError("Ros2Robot", "rig", "without joints", "the arm's joints: names, sign, offset");
+  InterlockConfig interlock{.joints = *joints, .limits = controller.limits};
+  interlock.motion_enabled = enable_motion;
+  auto robot = std::make_unique<Ros2Robot>(arm, interlock, clock);
+  wait_for_joints(*robot, arm, wait_s);
+  return robot;
+}
+
+}  // namespace
+
+void bind_ros2(py::module_& m) {
+  py::class_<Ros2Robot, Robot>(m, "Ros2Robot", R"(A CRTK arm over ROS 2, behind the interlock of `lapservo servo`.
+
+ROS need not be installed. A thread of its own samples the last path 500 times a second; when anything is amiss nothing
+is sent.)")
+      .def(py::init(&make_robot), py::arg("arm"), py::arg("rig"), py::arg("controller"), py::arg("clock"),
+           py::kw_only(), py::arg("enable_motion") = false, py::arg("wait_s") = 15.0, py::keep_alive<1, 5>(),
+           "arm: its namespace, 'PSM1'; rig: with the arm's joints; controller: whose limits no set-point exceeds, of "
+           "joint_limits; enable_motion: else nothing is sent; wait_s: for the arm's joints, without which InputError "
+           "is raised.")
+      .def("hold", &Ros2Robot::hold, py::arg("on"), "A person's wish: the arm brakes to rest and stays; False goes on.")
+      .def_property_readonly(
+          "blocked", [](const Ros2Robot& self) { return std::string(to_string(self.blocked())); },
+          "why the arm is not moved (docs/statuses.md), or 'none'")
+      .def_property_readonly("operating_state", &Ros2Robot::operating_state, "what the arm said last");
+  py::class_<Ros2Camera, ImageStream>(m, "Ros2Camera", "The newest image of a topic of ROS 2.")
+      .def(py::init([](const std::string& topic, const Rig& rig, const SteadyClock& clock) {
+             return std::make_unique<Ros2Camera>(topic, rig.camera, clock);
+           }),
+           py::arg("topic"), py::arg("rig"), py::arg("clock"), py::keep_alive<1, 4>(),
+           "topic: '/endoscope/image_raw', or '.../compressed'; images must have the size of the rig's camera.")
+      .def_property_readonly("dropped", &Ros2Camera::dropped, "counts of images that were not used, or ''")
+      .def_property_readonly("complaint", &Ros2Camera::complaint, "why the last of them was not used, or ''");
+}
+
+}  // namespace lapservo::python

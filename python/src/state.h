@@ -1,0 +1,158 @@
+#pragma once
+#include <concepts>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+
+#include "lapservo/io/frame_source.h"
+#include "lapservo/rig/rig.h"
+#include "lapservo/vision/observation.h"
+#include "python/src/conversions.h"
+
+// Copies, pickles and comparisons of values, by their members.
+namespace lapservo::python {
+
+inline auto members(Rigid3& v) {
+  return std::tie(v.rotation.coeffs(), v.translation);
+}
+inline auto members(JointVector& v) {
+  return std::tie(v.theta_rad, v.phi_rad, v.rho_m, v.psi_rad);
+}
+inline auto members(CameraSigmas& v) {
+  return std::tie(v.fx_px, v.fy_px, v.cx_px, v.cy_px, v.distortion, v.blue, v.red);
+}
+inline auto members(ChromaticAberration& v) {
+  return std::tie(v.blue, v.red);
+}
+inline auto members(Response& v) {
+  return std::tie(v.kind, v.gamma, v.table_light, v.table_value, v.sigma, v.sigma_light, v.sigma_value);
+}
+inline auto members(Camera& v) {
+  return std::tie(v.width_px, v.height_px, v.fx_px, v.fy_px, v.cx_px, v.cy_px, v.distortion, v.response, v.deinterlace,
+                  v.chromatic_aberration, v.sigmas);
+}
+inline auto members(MarkerSigmas& v) {
+  return std::tie(v.diameter_m, v.hues_deg, v.bands_upper_m, v.bands_lower_m, v.seam_rad, v.wrap_m, v.skew_m, v.gap_rad,
+                  v.tolerance_m);
+}
+inline auto members(Marker& v) {
+  return std::tie(v.diameter_m, v.hues_deg, v.bands_upper_m, v.bands_lower_m, v.seam_rad, v.tolerance_m, v.wrap_m,
+                  v.skew_m, v.gap_rad, v.sigmas);
+}
+inline auto members(Joints& v) {
+  return std::tie(v.names, v.sign, v.offset, v.sigma_offset);
+}
+inline auto members(Instrument& v) {
+  return std::tie(v.name, v.marker, v.camera_from_rcm, v.joints, v.image_delay_s, v.sigma_translation_m,
+                  v.sigma_quaternion_xyzw, v.sigma_image_delay_s);
+}
+inline auto members(Rig& v) {
+  return std::tie(v.camera, v.instruments, v.camera_file);
+}
+inline auto members(Observation::Rcm& v) {
+  return std::tie(v.q, v.covariance);
+}
+inline auto members(Observation::MarkerPose& v) {
+  return std::tie(v.camera_from_marker, v.sigma_xy_m, v.sigma_z_m, v.sigma_axis_rad, v.sigma_roll_rad);
+}
+inline auto members(Observation::Refused& v) {
+  return std::tie(v.what, v.camera_from_unrolled, v.psi_rad, v.edges_raw_px);
+}
+inline auto members(Features& v) {
+  return std::tie(v.s_rad, v.r_px, v.l_px, v.d_px, v.cross_ratio);
+}
+inline auto members(Observation& v) {
+  return std::tie(v.status, v.instrument, v.rcm, v.marker, v.tau_rad, v.sigma_tau_rad, v.edges_ideal_px, v.edges_raw_px,
+                  v.edges_covariance_px2, v.features, v.camera_from_unrolled, v.psi_rad, v.refused);
+}
+inline auto members(Frame& v) {
+  return std::tie(v.bgr, v.index, v.time_s, v.file, v.flaw);
+}
+
+template <typename T>
+concept HasMembers = requires(T& value) {
+  members(value);
+};
+template <typename T>
+constexpr bool is_optional = false;
+template <typename T>
+constexpr bool is_optional<std::optional<T>> = true;
+
+/// Of what pickle knows: tuples, numbers, texts, arrays.
+template <typename T>
+py::object state_of(T value) {
+  if constexpr (HasMembers<T>) {
+    return std::apply([](const auto&... all) { return py::make_tuple(state_of(all)...); }, members(value));
+  } else if constexpr (is_optional<T>) {
+    return value ? state_of(*value) : py::none();
+  } else if constexpr (std::is_enum_v<T>) {
+    return py::int_(static_cast<int>(value));
+  } else if constexpr (std::same_as<T, cv::Mat>) {
+    return array_of(value);
+  } else if constexpr (std::same_as<T, std::filesystem::path>) {
+    return py::str(value.string());  // Python's empty path is "."
+  } else {
+    return py::cast(std::move(value));
+  }
+}
+
+template <typename T>
+void set_state(const py::handle& state, T& value) {
+  if constexpr (HasMembers<T>) {
+    const auto all = py::reinterpret_borrow<py::tuple>(state);
+    std::size_t i = 0;
+    std::apply([&](auto&... each) { (set_state(all[i++], each), ...); }, members(value));
+  } else if constexpr (is_optional<T>) {
+    if (!state.is_none()) set_state(state, value.emplace());
+  } else if constexpr (std::is_enum_v<T>) {
+    value = static_cast<T>(state.cast<int>());
+  } else if constexpr (std::same_as<T, cv::Mat>) {
+    value = view_of(state, "state").clone();
+  } else if constexpr (std::same_as<T, std::filesystem::path>) {
+    value = state.cast<std::string>();
+  } else {
+    value = state.cast<T>();
+  }
+}
+
+template <typename T>
+bool equal(T a, T b) {
+  if constexpr (std::equality_comparable<T>) {
+    return a == b;
+  } else if constexpr (is_optional<T>) {
+    return a && b ? equal(*a, *b) : !a && !b;
+  } else if constexpr (std::same_as<T, cv::Mat>) {
+    return a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0;
+  } else {
+    return std::apply(
+        [&](const auto&... of_a) {
+          return std::apply([&](const auto&... of_b) { return (equal(of_a, of_b) && ...); }, members(b));
+        },
+        members(a));
+  }
+}
+
+/// Of values that are ==, the same.
+inline py::ssize_t hash_of(const py::object& self) {
+  return py::hash(py::repr(self));
+}
+
+/// Pickles, which make copies too, and ==.
+template <typename T, typename... Options>
+void bind_state(py::class_<T, Options...>& type) {
+  type.def(py::pickle([](const T& value) { return py::tuple(state_of(value)); },
+                      [](const py::tuple& state) {
+                        T value;
+                        set_state(state, value);
+                        return value;
+                      }))
+      .def(
+          "__eq__", [](const T& a, const T& b) { return equal(a, b); }, py::is_operator())
+      .def("__hash__", &hash_of);
+}
+
+}  // namespace lapservo::python

@@ -1,0 +1,78 @@
+"""An arm and an endoscope over ROS 2, and its bags, in Python."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import Q, SOURCE
+
+import lapservo
+
+TOOL = os.environ["LAPSERVO_TOOL"]
+LIMITS = SOURCE / "configs" / "joint_limits" / "psm-classic.yaml"
+RIG = SOURCE / "configs" / "paper.yaml"
+if not hasattr(lapservo, "Ros2Robot"):
+    pytest.skip("built without Cyclone DDS", allow_module_level=True)
+
+
+@pytest.fixture(scope="module")
+def theatre(tmp_path_factory):
+    """The environment of a simulated arm and endoscope, which are at work."""
+    environment = {"ROS_LOCALHOST_ONLY": "1", "ROS_DOMAIN_ID": "61"}
+    os.environ.update(environment)
+    arm = subprocess.Popen([TOOL, "sim-robot", "--rig", RIG, "--start", ",".join(map(str, Q))], stdout=subprocess.DEVNULL)
+    yield os.environ
+    arm.terminate()
+    arm.wait()
+    for name in environment:
+        del os.environ[name]
+
+
+def test_an_arm_is_steered_and_a_bag_of_it_is_read(theatre, rig, tmp_path):
+    ran = subprocess.run([sys.executable, SOURCE / "examples" / "python" / "ros2_robot.py", "SIM_PSM1", RIG, LIMITS, "6",
+                          "--enable-motion"], capture_output=True, text=True, env=theatre)
+    assert ran.returncode == 0 and ran.stdout.startswith("errors at the end: "), ran.stderr
+    bag = tmp_path / "swing.bag"
+    subprocess.run([TOOL, "record", "--rig", RIG, "--robot", "ros2:SIM_PSM1", "--camera", "ros2:/endoscope/image_raw",
+                    "--duration", "2", "--out", bag], check=True, capture_output=True, env=theatre)
+    frames = list(lapservo.open_frames(bag))
+    assert len(frames) > 5 and frames[0].image.shape == (720, 1280, 3)
+    assert all(a.time_s < b.time_s for a, b in zip(frames, frames[1:]))
+    assert lapservo.Tracker(rig).track(frames[-1])[0].ok
+    assert len(list(lapservo.open_frames(bag, image_topic="/endoscope/image_raw"))) == len(frames)
+    with pytest.raises(lapservo.InputError, match="/other"):
+        lapservo.open_frames(bag, image_topic="/other")
+    with pytest.raises(lapservo.InputError, match="is no bag"):
+        lapservo.open_frames(RIG, image_topic="/endoscope/image_raw")
+
+
+def test_without_motion_enabled_nothing_is_sent_and_a_goal_that_can_not_be_reached_is_refused(theatre, rig):
+    clock = lapservo.SteadyClock()
+    controller = lapservo.Controller(rig, period_s=1 / 60, joint_limits=LIMITS)
+    images = lapservo.Ros2Camera("/endoscope/image_raw", rig, clock)
+    robot = lapservo.Ros2Robot("SIM_PSM1", rig, controller, clock)
+    before, ticks = robot.state(), []
+    assert not before.follows
+    with pytest.raises(lapservo.InputError, match="can't be followed"):
+        lapservo.run(robot, images, clock, rig, lapservo.set_point([0, 0, 0, 0]), 1, controller=controller)
+    goal = lapservo.Kinematics(rig).features(before.q) + [0.02, 10, 5, 5]
+    lapservo.run(robot, images, clock, rig, lapservo.set_point(goal), 1.5, controller=controller, own_thread=True,
+                 on_tick=ticks.append)
+    assert any(tick.image is not None for tick in ticks) and robot.operating_state == "ENABLED"
+    assert np.abs(robot.state().q - before.q).max() < 1e-3
+
+
+def test_what_is_not_there_is_said(theatre, rig):
+    clock = lapservo.SteadyClock()
+    controller = lapservo.Controller(rig)
+    with pytest.raises(lapservo.InputError, match="no /PSM9/measured_js with the rig's joints within 0.3 s"):
+        lapservo.Ros2Robot("PSM9", rig, controller, clock, wait_s=0.3)
+    bare = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM1", rig.instruments[0].marker)])
+    with pytest.raises(lapservo.InputError, match="joints"):
+        lapservo.Ros2Robot("SIM_PSM1", bare, controller, clock)
+    with pytest.raises(lapservo.InputError, match="joints"):
+        lapservo.Controller(bare, joint_limits=LIMITS)
+    with pytest.raises(lapservo.InputError, match="none.yaml"):
+        lapservo.Controller(rig, joint_limits="none.yaml")
