@@ -205,6 +205,21 @@ TEST(Verification, APrintThatMayWellBeOffIsNotTrusted) {
   EXPECT_EQ(validate(shot.sight.scene(), fit), Status::ok) << "off, it would make little of psi";
 }
 
+// Asked again of what is added to sigma once a fit was validated: turns within the exposure, sides that one alone
+// holds.
+TEST(Verification, PsiIsToldWithASigmaOfUseOnly) {
+  FineFit fit = fit_from_truth(usual_shot(1));
+  const Eigen::Index psi = fit.unknowns.size() - 1;
+  fit.covariance(psi, psi) = 0.03 * 0.03;
+  EXPECT_TRUE(tells_psi(fit));
+  EXPECT_EQ(validate(usual_shot(1).sight.scene(), fit), Status::ok);
+  fit.covariance(psi, psi) += 0.03 * 0.03;
+  EXPECT_FALSE(tells_psi(fit));
+  EXPECT_EQ(validate(usual_shot(1).sight.scene(), fit), Status::uncertain);
+  fit.psi_variance_by_tolerance = 0.03 * 0.03;
+  EXPECT_TRUE(tells_psi(fit)) << "who sets a tolerance wants to live with it";
+}
+
 // The same picture says more to one who measured the print: who did knows where its boundaries lie.
 TEST(Verification, ThePrintIsNeverSuspiciousWhereItsBandsWereMeasured) {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
