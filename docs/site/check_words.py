@@ -37,7 +37,7 @@ def comments_of_c(text: str) -> list[tuple[int, str]]:
             continue
         for match in token.finditer(line):
             if match[1] is None:
-                if " " in match[0].strip('" ') and not re.search(r"/picture|\('picture'\)", match[0]):  # a path of the page's
+                if " " in match[0].strip('" '):
                     found.append((number, match[0].strip('"')))
             elif last == number - 1 and not line[: match.start()].strip():
                 found[-1] = (found[-1][0], found[-1][1] + " " + match[1].strip())
@@ -68,7 +68,7 @@ def main() -> int:
         else:
             continue
         for number, text in prose:
-            text = re.sub(r"`[^`]*`", "`", text)
+            text = re.sub(r"`[^`]*`|/picture\b|'picture'|lapservo\.Picture", "`", text)  # names, too
             found = WORDS.search(text) or BEGINNINGS.search(text)
             if found:
                 hits.append(f"{name}:{number}: {found[0].strip()}: {text}")

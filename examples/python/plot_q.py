@@ -19,7 +19,7 @@ for frame in lapservo.open_frames(sys.argv[1]):
 if not rows:
     sys.exit("no frame shows the instrument, or the rig has no camera_from_rcm")
 table = np.array(rows)
-table[:, 4] = np.unwrap(table[:, 4])  # psi, which is told in (-pi, pi], over whole turns
+table[:, 4] = np.unwrap(table[:, 4])  # psi, which is measured in (-pi, pi], over whole turns
 figure, axes = pyplot.subplots(4, 1, sharex=True, figsize=(7, 8))
 for i, name in enumerate(["theta [rad]", "phi [rad]", "rho [m]", "psi [rad]"]):
     axes[i].errorbar(table[:, 0], table[:, 1 + i], table[:, 5 + i], fmt=".-")

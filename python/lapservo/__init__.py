@@ -1,6 +1,6 @@
 """See and steer a laparoscopic instrument by its camera.
 
-Arrays are numpy's; lengths are metres, angles radians, pictures uint8[H, W, 3] in blue green red as OpenCV has them.
+Arrays are numpy's; lengths are metres, angles radians, images uint8[H, W, 3] in blue green red as OpenCV has them.
 Configurations q are theta, phi, rho, psi; features are s, r, l, d (docs/frames.md).
 """
 

@@ -1,4 +1,4 @@
-"""What a rig says, measured: the command line's `calibrate`, with arrays in and values out."""
+"""Measures the values of a rig: the command line's `calibrate`, with arrays in and values out."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from . import _lapservo as _core  # type: ignore[attr-defined]
 _Array = NDArray[np.float64]
 _Image = NDArray[np.uint8]
 _Path = Union[str, "os.PathLike[str]"]
-#: A path (a picture, a folder, a video, a camera), a FrameSource, or what gives, one after another, uint8[H, W, 3],
+#: A path (an image, a folder, a video, a camera), a FrameSource, or what gives, one after another, uint8[H, W, 3],
 #: (time_s, uint8[H, W, 3]) or Frame.
 Frames = Union[_Path, Any, Iterable[Any]]
 #: Done, of how many where that is known, a remark.
@@ -37,7 +37,7 @@ class CalibratedNumber:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What every calibration has.
+    """The fields of every calibration.
 
     `rig` is the Rig with what was measured; `yaml` the same as the command line writes it.
     """
@@ -57,10 +57,10 @@ class Calibration:
 
 @dataclass(frozen=True, eq=False)
 class CameraCalibration(Calibration):
-    """Matrix, distortion, lateral chromatic aberration and response, from pictures of a board.
+    """Matrix, distortion, lateral chromatic aberration and response, from images of a board.
 
-    rms_px: what edges miss the fit by. views: name, corners, rms [px] of each picture that was used. advice: what more
-    pictures should show, or ''. sigma_response: of encoded values (0 to 1), None where the pictures don't tell the
+    rms_px: what edges miss the fit by. views: name, corners, rms [px] of each image that was used. advice: what more
+    images should show, or ''. sigma_response: of encoded values (0 to 1), None where the images don't determine the
     response. sharpening: its strength, 0 for none.
     """
 
@@ -96,7 +96,7 @@ class MarkerCalibration(Calibration):
     Of `looked_at` frames the marker was found in `found`; `frames` of them, from all sides, are used, `seam_views` of
     these show the seam. Boundaries miss the rig's print by before_px rms and the calibrated one by after_px.
     seam_may_lag: the frames look like a compressed video's and turn one way only: psi may be some mrad off, which a turn
-    there and back would tell.
+    there and back would show it.
     """
 
     instrument: str
@@ -122,7 +122,7 @@ class RegistrationCalibration(Calibration):
     rotation is a convention or the rig's, as sigma_rotation_rad. With joints: sigma_offset and backlash float[4] (rad,
     rad, m, rad), image_delay_s and its sigma; None without. residuals: float[N, 4], a row a frame: time [s], place [m],
     axis [rad], roll [rad]; without joints the place is how far the axis misses the RCM. unknown: what these data don't
-    tell, a sentence each.
+    determine, a sentence each.
     """
 
     instrument: str
@@ -139,7 +139,7 @@ class RegistrationCalibration(Calibration):
 
     @property
     def joints(self) -> Any:
-        """The Joints as they were measured; None where neither joints nor rig told them."""
+        """The Joints as they were measured; None where neither joints nor rig have them."""
         return _named(self.rig, self.instrument).joints
 
 
@@ -165,11 +165,11 @@ def calibrate_camera(
 ) -> CameraCalibration:
     """Measures a camera with a chessboard, or a ChArUco board of a `dictionary` as DICT_4X4_50.
 
-    pictures: a path or several, or uint8[H, W, 3] one after another; board: inner corners, '9x6'; square_m: a square's
+    `pictures`: a path or several, or uint8[H, W, 3] one after another; board: inner corners, '9x6'; square_m: a square's
     width; marker_m: a ChArUco marker's width, else 3/4 of a square; views: at most, of a video. rig: a Rig or its path,
     whose response is where the search starts; without it the result's rig is None and yaml the camera's own.
 
-    Raises InputError for what can't be used, and with `problem` where the pictures don't tell.
+    Raises InputError for what can't be used, and with `problem` where the images don't suffice.
     """
     several = isinstance(pictures, (list, tuple)) and all(isinstance(each, (str, os.PathLike)) for each in pictures)
     inputs = list(pictures) if several else [pictures]  # type: ignore[arg-type]
@@ -194,7 +194,7 @@ def calibrate_colour(
     rig: a Rig or its path, its hues up to 60 degrees off; instrument: its name, where the rig has several;
     replace_response: also a response that calibrate_camera measured; fps: of a folder or of arrays.
 
-    Raises InputError for what can't be used, and with `problem` where the frames don't tell.
+    Raises InputError for what can't be used, and with `problem` where the frames don't suffice.
     """
     return _result(
         ColourCalibration,
@@ -218,7 +218,7 @@ def calibrate_marker(
     m, rad]: the seam too, which takes the rig's camera_from_rcm and joints; instrument: its name, where the rig has
     several; fps: of a folder or of arrays.
 
-    Raises InputError for what can't be used, and with `problem` where the frames don't tell.
+    Raises InputError for what can't be used, and with `problem` where the frames don't suffice.
     """
     return _result(
         MarkerCalibration,
@@ -242,7 +242,7 @@ def calibrate_registration(
     path, or arrays by name, time_s [s] and four joints [rad, rad, m, rad], by a clock up to 3 s off; without any only
     the RCM's place is measured. rig: a Rig or its path; fps: of a folder or of arrays.
 
-    Raises InputError for what can't be used, and with `problem` where the frames don't tell.
+    Raises InputError for what can't be used, and with `problem` where the frames don't suffice.
     """
     return _result(
         RegistrationCalibration,

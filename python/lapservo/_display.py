@@ -16,7 +16,7 @@ from . import _lapservo as _core  # type: ignore[attr-defined]
 
 
 class Picture:
-    """A picture that a notebook shows; `image` is uint8[H, W, 3], blue green red."""
+    """An image that a notebook shows; `image` is uint8[H, W, 3], blue green red."""
 
     def __init__(self, image: NDArray[np.uint8]) -> None:
         self.image = _core._picture(image)  # what can't be shown is refused here
@@ -101,7 +101,7 @@ def _calibration_table(result: _calibration.Calibration) -> str:
 
 
 def _show(self: Any, image: NDArray[np.uint8]) -> Picture:
-    """The overlay as a notebook shows it: a Picture, with the new uint8[H, W, 3] in `image`."""
+    """The overlay as a notebook shows it: a `Picture`, with the new uint8[H, W, 3] in `image`."""
     return Picture(self.overlay(image))
 
 

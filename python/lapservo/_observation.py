@@ -1,4 +1,4 @@
-"""What an observation says of its own certainty."""
+"""Sigmas and tables of an observation."""
 
 from __future__ import annotations
 

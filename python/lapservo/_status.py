@@ -20,8 +20,8 @@ class Status(Enum):
     poor_fit = "poor_fit", "something was found that does not look like the marker on closer sight"
     uncertain = "uncertain", "found, but the rotation's standard deviation is too large to be of use"
     marker_mismatch = "marker_mismatch", "the print is not as the rig says: calibrate the marker"
-    damaged = "damaged", "the decoder of the picture or video complained: its pixels are not the camera's"
-    few_colors = "few_colors", "the picture has no more colours than a palette: its pixels are not the camera's"
+    damaged = "damaged", "the decoder of the image or video complained: its pixels are not the camera's"
+    few_colors = "few_colors", "the image has no more colours than a palette: its pixels are not the camera's"
     interlaced = "interlaced", "the frame is made of two fields, of two moments: use deinterlace"
 
 

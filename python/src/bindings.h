@@ -1,7 +1,7 @@
 #pragma once
 #include <pybind11/pybind11.h>
 
-/// What each file adds to the module.
+/// The part of the module that each file adds.
 namespace lapservo::python {
 void bind_rig(pybind11::module_& m);
 void bind_tracker(pybind11::module_& m);

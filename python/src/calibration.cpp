@@ -20,7 +20,7 @@
 #include "python/src/conversions.h"
 #include "python/src/python_frames.h"
 
-// What python/lapservo/_calibration.py makes its results of.
+// The data from which python/lapservo/_calibration.py makes its results.
 namespace lapservo::python {
 namespace {
 using namespace internal;
@@ -72,7 +72,7 @@ void expect_result(const std::string& refusal, const std::string& source) {
   if (!refusal.empty()) throw InputError(source, refusal);
 }
 
-// What every result has: without a rig, `camera` is what was measured.
+// The fields of every result: without a rig, `camera` is the measured one.
 py::dict result_of(std::optional<GivenRig> measured, const Camera& camera, const std::vector<CalibratedNumber>& numbers,
                    const std::string& complaint) {
   py::list rows;

@@ -17,13 +17,13 @@
 namespace lapservo::python {
 namespace py = pybind11;
 
-/// A picture as numpy has it: uint8[H, W, 3], blue green red.
+/// An image as numpy has it: uint8[H, W, 3], blue green red.
 using Image = py::array_t<std::uint8_t>;
 
 /// The same pixels, not copied: valid as long as the array is. Rows may lie apart, pixels of a row may not. Throws
 /// InputError naming `argument` for anything else.
 cv::Mat view_of(const py::handle& image, const char* argument);
-/// An array that owns the picture.
+/// An array that owns the image.
 Image array_of(const cv::Mat& bgr);
 
 /// A 4 x 4 matrix.
@@ -31,16 +31,16 @@ Eigen::Matrix4d matrix_of(const Rigid3& a_from_b);
 inline std::optional<Eigen::Matrix4d> matrix_of(const std::optional<Rigid3>& a_from_b) {
   return a_from_b ? std::optional(matrix_of(*a_from_b)) : std::nullopt;
 }
-/// Of a 4 x 4 matrix, or of its upper three rows. Throws InputError naming `argument` for what is no rigid transform to
-/// 1e-6.
+/// The transform of a 4 x 4 matrix, or of its upper three rows. Throws InputError naming `argument` unless it is rigid
+/// to 1e-6.
 Rigid3 rigid_of(const py::handle& a_from_b, const char* argument);
 
 enum class Numbers { finite, any };
-/// Of what numpy makes an array of. Eigen::Dynamic rows: any number. One column: the array may be a row, a column or
+/// Converts anything that numpy makes an array of. Eigen::Dynamic rows: any number. One column: the array may be a row, a column or
 /// one-dimensional; a row alone is a matrix of one row. Throws InputError naming `argument`.
 Eigen::MatrixXd numbers_of(const py::handle& given, const char* argument, int rows, int columns,
                            Numbers numbers = Numbers::finite);
-/// Of a matrix of four columns.
+/// Rows of a matrix of four columns.
 std::vector<Eigen::Vector4d> rows_of(const Eigen::Matrix<double, Eigen::Dynamic, 4>& matrix);
 /// A finite one. Throws InputError naming `argument`.
 double number_of(const py::handle& given, const char* argument);

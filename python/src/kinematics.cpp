@@ -83,7 +83,7 @@ q is float[4]: theta, phi [rad], rho [m], psi [rad]; features are float[4]: s [r
       .def_property_readonly(
           "covariance_px2",
           [](const RcmEstimate& e) { return e.status == RcmStatus::ok ? e.covariance_px2 : std::nullopt; },
-          "float[2, 2]; None when there are too few lines to tell")
+          "float[2, 2]; None when there are too few lines")
       .def_readonly("lines", &RcmEstimate::lines, "positions that differ")
       .def_readonly("outliers", &RcmEstimate::outliers, "of them")
       .def_readonly("near_parallel", &RcmEstimate::near_parallel, "the estimate is poor along the lines");

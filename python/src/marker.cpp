@@ -114,7 +114,7 @@ void bind_marker(py::module_& m) {
       py::arg("diameter_m"), py::kw_only(), py::arg("length_m") = py::none(), py::arg("min_band_m") = py::none(),
       py::arg("hues_deg") = usual.hues_deg, py::arg("focal_px") = Viewing{}.focal_px,
       py::arg("distance_m") = Viewing{}.distance_m, py::arg("print_error_m") = 0.0,
-      "The marker whose rotation is told best where it is told worst, for a shaft and a camera. Default length: three "
+      "The marker with the smallest worst-case sigma of the roll, for a shaft and a camera. Default length: three "
       "diameters; InputError when none fits.");
   m.def(
       "print_marker",

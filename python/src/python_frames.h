@@ -20,9 +20,9 @@ bool is_path(const py::object& given);
 /// that is iterated over: uint8[H, W, 3], (time_s, uint8[H, W, 3]) or Frame. Created and destroyed with Python's lock,
 /// used without.
 struct GivenFrames {
-  /// `fps` gives times to the pictures of a folder and to those without. Throws InputError as
-  /// internal::open_camera_or_file(). What is iterated over is refused, as it comes, where a time is not finite or,
-  /// `of_one_recording`, does not rise.
+  /// `fps` gives times to the images of a folder and to those without. Throws InputError as
+  /// internal::open_camera_or_file(). Refuses an iterated frame whose time is not finite or, `of_one_recording`,
+  /// does not rise.
   GivenFrames(const py::object& given, double fps, bool of_one_recording = true);
 
   py::object kept;  ///< what `source` is of

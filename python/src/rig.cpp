@@ -166,7 +166,7 @@ q = sign * joints + offset, rad and m.)");
       .def("__repr__",
            [](const Joints& joints) { return fmt::format("<lapservo.Joints {}>", fmt::join(joints.names, ", ")); });
   bind_state(joints_type);
-  py::class_<Instrument> type(m, "Instrument", "What wears a marker, and where it enters the body.");
+  py::class_<Instrument> type(m, "Instrument", "An instrument with a marker, and the place where it enters the body.");
   bind_state(type);
   type.def(py::init(&make_instrument), py::arg("name"), py::arg("marker"), py::kw_only(),
            py::arg("camera_from_rcm") = py::none(), py::arg("joints") = py::none(),
@@ -206,7 +206,7 @@ towards the tip.)");
 with the field, its value and what was expected.)");
   bind_state(type);
   type.def(py::init([](const Camera& camera, const std::vector<Instrument>& instruments) {
-             // What can't be said by a type is checked where files are checked.
+             // The checks of files apply to values, too.
              return parse_rig(internal::rig_yaml({camera, instruments}), "Rig");
            }),
            py::arg("camera"), py::arg("instruments"))

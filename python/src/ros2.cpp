@@ -82,7 +82,7 @@ ROS need not be installed. A thread of its own samples the last path 500 times a
 is sent.)")
       .def(py::init(&make_robot), py::arg("arm"), py::arg("rig"), py::arg("controller"), py::arg("clock"),
            py::kw_only(), py::arg("enable_motion") = false, py::arg("wait_s") = 15.0, py::keep_alive<1, 5>(),
-           "arm: its namespace, 'PSM1'; rig: with the arm's joints; controller: whose limits no set-point exceeds, of "
+           "arm: its namespace, 'PSM1'; rig: with the arm's joints; controller: whose limits no setpoint exceeds, of "
            "joint_limits; enable_motion: else nothing is sent; wait_s: for the arm's joints, without which InputError "
            "is raised.")
       .def("hold", &Ros2Robot::hold, py::arg("on"), "A person's wish: the arm brakes to rest and stays; False goes on.")

@@ -40,7 +40,7 @@ OperatingState operating_state_of(const std::string& word) {
   throw InputError("JointState", "operating_state", word, "DISABLED, ENABLED, PAUSED or FAULT");
 }
 
-// Of so many items, given by a method of Python's.
+// Converts so many items of a Python method's result.
 py::sequence sequence_of(const py::object& given, std::size_t size, const char* method, const char* expected) {
   if (!py::isinstance<py::sequence>(given) || py::len(given) != size)
     throw InputError(method, "value", py::str(py::type::of(given)).cast<std::string>(), expected);
@@ -72,7 +72,7 @@ class PythonClock : public Clock {
   void sleep_until(double time_s) override { PYBIND11_OVERRIDE_PURE(void, Clock, sleep_until, time_s); }
 };
 
-// newest() gives (time_s, image) or None. The picture is copied: the array may be written to again.
+// newest() gives (time_s, image) or None. The image is copied: the array may be written to again.
 class PythonImageStream : public ImageStream {
  public:
   std::optional<StampedImage> newest() override {
@@ -87,7 +87,7 @@ class PythonImageStream : public ImageStream {
 };
 
 void bind_ports(py::module_& m) {
-  py::class_<JointState>(m, "JointState", "What an arm says of itself.")
+  py::class_<JointState>(m, "JointState", "State of an arm.")
       .def(py::init([](double time_s, const Array<"q", 4, 1, Numbers::any>& q, const std::string& operating_state,
                        bool follows, bool started, const std::string& blocked) {
              return JointState{time_s,
@@ -114,7 +114,7 @@ void bind_ports(py::module_& m) {
       .def_property_readonly("blocked", [](const JointState& self) { return std::string(to_string(self.blocked)); });
 
   py::class_<JointPath>(m, "JointPath",
-                        R"(Set-points over time. Where no newer path comes it brakes to rest by itself.)")
+                        R"(Setpoints over time. Where no newer path comes it brakes to rest by itself.)")
       .def("copy", [](const JointPath& self) { return JointPath(self); })
       .def(
           "at",
@@ -143,7 +143,7 @@ own rate, and forgets it as soon as it is not enabled.)")
           },
           "list of (time_s, float[4]): of the joints, all since the last call, for an arm that reads them more often "
           "than "
-          "the loop asks. May be left out.")
+          "the loop calls it. May be left out.")
       .def("send", &Robot::send, py::arg("path"), py::call_guard<py::gil_scoped_release>(),
            "Follow this JointPath from now on; it is yours.")
       .def("release", &Robot::release, py::call_guard<py::gil_scoped_release>(),
@@ -329,7 +329,7 @@ void bind_tick(py::module_& m) {
       .def_property_readonly(
           "velocity", [](const Tick& self) { return self.step().velocity; }, "float[4], of the joints: rad/s, m/s")
       .def_property_readonly(
-          "delay_s", [](const Tick& self) { return self.step().delay_s; }, "of the images, as believed now")
+          "delay_s", [](const Tick& self) { return self.step().delay_s; }, "of the images, estimated")
       .def_property_readonly("registration_contradicted",
                              [](const Tick& self) { return self.tick.decision.registration_contradicted; })
       .def_property_readonly("sent", [](const Tick& self) { return self.tick.decision.send; })
@@ -388,7 +388,7 @@ void bind_servo(py::module_& m) {
       .def_property_readonly("period_s", [](const Controller& self) { return self.period_s; })
       .def(
           "to_yaml", [](const Controller& self) { return controller_yaml(self); },
-          "What a controller.yaml can say of it.")
+          "Its text as a controller.yaml.")
       .def("__repr__", [](const Controller& self) {
         return fmt::format("<lapservo.Controller {} every {:.4f} s>", to_string(self.mode), self.period_s);
       });
@@ -396,7 +396,7 @@ void bind_servo(py::module_& m) {
   m.def("run", &run_loop, py::arg("robot"), py::arg("images"), py::arg("clock"), py::arg("rig"), py::arg("trajectory"),
         py::arg("duration_s"), py::kw_only(), py::arg("controller") = py::none(), py::arg("rcm_px") = py::none(),
         py::arg("own_thread") = false, py::arg("on_tick") = py::none(),
-        R"(The servo loop: reads the joints, sees, decides, sends, then tells on_tick, once every period.
+        R"(The servo loop: reads the joints, measures, decides, sends, then calls on_tick, once every period.
 
 It holds by itself, within the tick, on a missing or stale image, a lost marker, an outlier or numbers that are not
 finite, and goes on when all is well again within 2 s. After anything else, above all an arm that was not enabled, it

@@ -82,7 +82,7 @@ constexpr bool is_optional = false;
 template <typename T>
 constexpr bool is_optional<std::optional<T>> = true;
 
-/// Of what pickle knows: tuples, numbers, texts, arrays.
+/// The state in types that pickle knows: tuples, numbers, texts, arrays.
 template <typename T>
 py::object state_of(T value) {
   if constexpr (HasMembers<T>) {
@@ -136,7 +136,7 @@ bool equal(T a, T b) {
   }
 }
 
-/// Of values that are ==, the same.
+/// Equal for values that are ==.
 inline py::ssize_t hash_of(const py::object& self) {
   return py::hash(py::repr(self));
 }

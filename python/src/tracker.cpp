@@ -133,7 +133,7 @@ Origin at the marker's proximal end on the axis, z along the axis to the tip, x 
         return fmt::format("<lapservo.MarkerPose at {:.5f}, {:.5f}, {:.5f} m>", at.x(), at.y(), at.z());
       });
 
-  py::class_<Observed>(m, "Observation", R"(What one frame tells of one instrument.
+  py::class_<Observed>(m, "Observation", R"(The measurement of one instrument in one frame.
 
 Sigmas are one standard deviation. Of an observation whose status is not ok, every number is None.)")
       .def_property_readonly("status", [](const Observed& seen) { return status_to_python(seen.observation.status); })
@@ -226,19 +226,19 @@ class SafeTracker {
 };
 
 void bind_frames(py::module_& m) {
-  py::class_<Frame> type(m, "Frame", "A picture of a source.");
+  py::class_<Frame> type(m, "Frame", "An image of a source.");
   bind_state(type);
   type.def_property_readonly(
           "image", [](const Frame& frame) { return array_of(frame.bgr); }, "uint8[H, W, 3]")
       .def_readonly("index", &Frame::index, "from 0")
       .def_readonly("time_s", &Frame::time_s, "since the first frame")
-      .def_readonly("file", &Frame::file, "the picture's path; empty for videos and cameras")
+      .def_readonly("file", &Frame::file, "the image's path; empty for videos and cameras")
       .def_property_readonly(
           "flaw", [](const Frame& frame) { return frame.flaw ? status_to_python(*frame.flaw) : py::none(); },
           "Status: why nothing is to be measured in it, or None")
       .def("__repr__",
            [](const Frame& self) { return fmt::format("<lapservo.Frame {} at {:.6f} s>", self.index, self.time_s); });
-  py::class_<FrameSource>(m, "FrameSource", "Frames of pictures, a video or a camera, to be iterated over once.")
+  py::class_<FrameSource>(m, "FrameSource", "Frames of images, a video or a camera, to be iterated over once.")
       .def_property_readonly("frame_count", &FrameSource::frame_count, "where it is known beforehand")
       .def_property_readonly("frames_per_second", &FrameSource::frames_per_second)
       .def_property_readonly("remark", &FrameSource::remark,
@@ -274,7 +274,7 @@ void bind_frames(py::module_& m) {
       py::arg("image"));
   m.def(
       "read_image", [](const std::filesystem::path& path) { return array_of(read_image(path)); }, py::arg("path"),
-      "uint8[H, W, 3] of a picture file; InputError for what is damaged, has a palette or is to be turned.");
+      "uint8[H, W, 3] of an image file; InputError for a damaged file, a palette or an orientation.");
 }
 
 }  // namespace
@@ -303,7 +303,7 @@ Holds what it learnt from the frame before. Threads may share it; frames are the
            "method: 'surface', or the paper's 'centerline'; single: every frame on its own, searched whole; "
            "deinterlace: track the field of the even rows; frame_budget: what a frame may cost, in counted units of "
            "about half a microsecond (a longer search goes on in the next frame), or None: as much as it takes, which "
-           "pictures that don't follow one another need.")
+           "images that don't follow one another need.")
       .def("track", &SafeTracker::track_frame, py::arg("frame"),
            "The same of a Frame; one that is flawed is refused, with its flaw for a status.")
       .def("track", &SafeTracker::track, py::arg("image"), py::arg("stamp_s") = py::none(),

@@ -1,4 +1,4 @@
-"""install.py BUILD: `pip install .` into a folder of its own, from what BUILD has built, and a picture tracked by it."""
+"""install.py BUILD: `pip install .` into a folder of its own, from what BUILD has built, and an image tracked by it."""
 
 import os
 import pathlib

@@ -51,7 +51,7 @@ class Recordings:
         (folder / "rig.yaml").write_text(self.rig.to_yaml())
 
     def record(self, name, motion, frames):
-        """Pictures and joints."""
+        """Images and joints."""
         poses = self.folder / f"{name}.csv"
         poses.write_text("theta_rad,phi_rad,rho_m,psi_rad\n" + "".join(row(motion(i / FPS)) for i in range(frames)))
         subprocess.run([TOOL, "render", "--rig", self.folder / "rig.yaml", "--poses", poses, "--out", self.folder / name],

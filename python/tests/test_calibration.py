@@ -22,7 +22,7 @@ def swing(recordings):
 
 
 def expect_whole(result, rig):
-    """What all results have: a rig to go on with, numbers, what a notebook shows, a pickle."""
+    """The common fields of all results: a rig to go on with, numbers, what a notebook shows, a pickle."""
     assert lapservo.Rig.parse(result.yaml).to_yaml() == result.rig.to_yaml()
     assert result.numbers and all(np.isfinite([n.after, n.sigma]).all() for n in result.numbers)
     assert result._repr_html_().count("<tr>") == len(result.numbers) + 1

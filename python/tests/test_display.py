@@ -1,4 +1,4 @@
-"""What a notebook shows is well-formed and says what the object holds."""
+"""The notebook's display is well-formed and has the object's values."""
 
 import xml.etree.ElementTree as xml
 

@@ -1,7 +1,7 @@
 """Every block of commands and code in README.md, CONTRIBUTING.md and docs/ is run, in its page's order.
 
-A page has a folder with what it takes for granted: the recordings of `lapservo sample`. What is not run, or not to its end, stands in lists with the reason: here,
-and in doc_shell.py. A block that is in no list and does not run fails.
+A page has a folder with the files that it presumes: the recordings of `lapservo sample`. Lists here and in doc_shell.py name the blocks that
+are not run, or not to their end, with the reason. A block that is in no list and does not run fails.
 """
 
 import re
