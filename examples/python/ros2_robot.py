@@ -25,6 +25,6 @@ def on_tick(tick):
 lapservo.run(robot, images, clock, rig, lapservo.set_point(goal), float(sys.argv[4]), controller=controller,
              own_thread=True, on_tick=on_tick)
 if not errors:
-    sys.exit(f"no image shows the instrument: {images.complaint or robot.blocked}")
+    sys.exit(f"no image shows the instrument: {images.complaint or robot.state().blocked}")
 s, r, l, d = errors[-1]
 print(f"errors at the end: s {1000 * s:.2f} mrad; r {r:.2f}, l {l:.2f}, d {d:.2f} px")

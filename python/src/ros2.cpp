@@ -50,9 +50,9 @@ class Ros2Camera : private Node, public ImageStream {
 };
 
 // Until the arm's joints are known, so that run() knows where a trajectory begins.
-void wait_for_joints(const Ros2Robot& robot, const std::string& arm, double wait_s) {
+void wait_for_joints(Ros2Robot& robot, const std::string& arm, double wait_s) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(wait_s);
-  while (robot.counts().joint_states == 0 || robot.blocked() == Blocked::no_joint_states) {
+  while (!(robot.state().time_s > 0)) {
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
     if (std::chrono::steady_clock::now() >= end)
       throw InputError("Ros2Robot",
@@ -84,12 +84,7 @@ is sent.)")
            py::kw_only(), py::arg("enable_motion") = false, py::arg("wait_s") = 15.0, py::keep_alive<1, 5>(),
            "arm: its namespace, 'PSM1'; rig: with the arm's joints; controller: whose limits no setpoint exceeds, of "
            "joint_limits; enable_motion: else nothing is sent; wait_s: for the arm's joints, without which InputError "
-           "is raised.")
-      .def("hold", &Ros2Robot::hold, py::arg("on"), "A person's wish: the arm brakes to rest and stays; False goes on.")
-      .def_property_readonly(
-          "blocked", [](const Ros2Robot& self) { return std::string(to_string(self.blocked())); },
-          "why the arm is not moved (docs/statuses.md), or 'none'")
-      .def_property_readonly("operating_state", &Ros2Robot::operating_state, "what the arm said last");
+           "is raised.");
   py::class_<Ros2Camera, ImageStream>(m, "Ros2Camera", "The newest image of a topic of ROS 2.")
       .def(py::init([](const std::string& topic, const Rig& rig, const SteadyClock& clock) {
              return std::make_unique<Ros2Camera>(topic, rig.camera, clock);

@@ -60,7 +60,7 @@ def test_without_motion_enabled_nothing_is_sent_and_a_goal_that_can_not_be_reach
     goal = lapservo.Kinematics(rig).features(before.q) + [0.02, 10, 5, 5]
     lapservo.run(robot, images, clock, rig, lapservo.set_point(goal), 1.5, controller=controller, own_thread=True,
                  on_tick=ticks.append)
-    assert any(tick.image is not None for tick in ticks) and robot.operating_state == "ENABLED"
+    assert any(tick.image is not None for tick in ticks) and robot.state().operating_state == "ENABLED"
     assert np.abs(robot.state().q - before.q).max() < 1e-3
 
 
