@@ -13,7 +13,7 @@ constexpr double jump_s = 0.25;         // a fastest message is not faster than 
 constexpr double drift_s_per_s = 1e-3;  // twice what adjtime slews by
 constexpr double disorder_s = 1e-3;     // by which a sender's threads stamp out of order
 constexpr double way_s = 0.05;          // by which two messages' ways differ
-constexpr double patience_s = 1;        // with late messages only
+constexpr double patience_s = 1;        // with messages that are late by the same
 
 constexpr Words<StampVerdict, 5> verdict_words{{{StampVerdict::fresh, "fresh"},
                                                 {StampVerdict::repeated, "repeated"},
@@ -31,7 +31,7 @@ std::string_view to_string(StampVerdict verdict) {
 void StampClock::start_anew(const Stamped& message) {
   last_ = message;
   older_.reset();
-  late_since_s_.reset();
+  late_.reset();
   offset_s_ = message.arrival_s - message.stamp_s;
 }
 
@@ -48,9 +48,14 @@ bool StampClock::was_set_back(const Stamped& message) {
   return advance_s > 0 && std::abs(advance_s - (message.arrival_s - before->arrival_s)) < way_s;
 }
 
+// By the same time: one that varies is not a clock's.
 bool StampClock::stays_late(const Stamped& message) {
-  if (!late_since_s_) late_since_s_ = message.arrival_s;
-  return message.arrival_s - *late_since_s_ > patience_s;
+  const double difference_s = message.arrival_s - message.stamp_s;
+  if (!late_) late_ = Late{message.arrival_s, difference_s, difference_s};
+  late_->least_s = std::min(late_->least_s, difference_s);
+  late_->most_s = std::max(late_->most_s, difference_s);
+  if (late_->most_s - late_->least_s > way_s) late_ = Late{message.arrival_s, difference_s, difference_s};
+  return message.arrival_s - late_->since_s > patience_s;
 }
 
 StampClock::Reading StampClock::read(double stamp_s, double arrival_s) {
@@ -72,7 +77,7 @@ StampClock::Reading StampClock::read(double stamp_s, double arrival_s) {
     start_anew(message);
     return {StampVerdict::jumped, 0};
   }
-  late_since_s_.reset();
+  late_.reset();
   last_time_s_ = std::max(last_time_s_, stamp_s + offset_s_);
   return {StampVerdict::fresh, last_time_s_};
 }

@@ -19,7 +19,7 @@ std::string_view to_string(StampVerdict verdict);
 /// Puts a sender's stamps on the loop's clock without asking that both computers agree on the time: the smallest
 /// difference between arrival and stamp is taken for that of the clocks. So a time is as if the message had travelled
 /// as fast as the fastest one. The difference may drift by 1 ms a second. A clock that is set costs two messages; where
-/// that looks like a way that has become longer, a second.
+/// that looks like a way that has become longer, and stays as long, a second.
 class StampClock {
  public:
   /// `late_s`: so much longer on its way than the fastest is late.
@@ -42,7 +42,10 @@ class StampClock {
 
   double late_s_;
   std::optional<Stamped> last_, older_;  // older_: the message before, when its stamp lay behind that of last_
-  std::optional<double> late_since_s_;
+  struct Late {
+    double since_s = 0, least_s = 0, most_s = 0;  ///< arrival minus stamp
+  };
+  std::optional<Late> late_;
   double offset_s_ = 0, last_time_s_ = 0;
 };
 

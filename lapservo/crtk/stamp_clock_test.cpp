@@ -96,6 +96,17 @@ TEST(StampClock, AWayThatStaysLongerCountsAfterASecond) {
   EXPECT_NEAR(late, 100, 2);
 }
 
+// A computer that is overloaded: none of its late messages counts, however long it lasts.
+TEST(StampClock, AWayThatVariesStaysLate) {
+  StampClock clock(0.05);
+  ASSERT_EQ(clock.read(epoch_s, 1).verdict, StampVerdict::fresh);
+  for (int k = 0; k < 1000; ++k) {
+    const double now_s = 3 + k * period_s, travel_s = 0.2 + 0.1 * std::sin(0.05 * k);
+    const auto verdict = clock.read(epoch_s + now_s - 1 - travel_s, now_s).verdict;
+    EXPECT_TRUE(verdict == StampVerdict::late || verdict == StampVerdict::repeated) << k;
+  }
+}
+
 // A pause of the network: what was stored on the way is late, what was sent after it is fresh.
 TEST(StampClock, APauseIsNoJump) {
   StampClock clock(0.05);
