@@ -60,13 +60,8 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
   const JointMessage sent = transport.joints("/PSM1/servo_jp").front();
   EXPECT_EQ(sent.names, (std::vector<std::string>{"yaw", "pitch", "insertion", "roll", "wrist"}));
   EXPECT_EQ(sent.positions, (std::vector<double>{0.1, 1.5, 0.1, 0.2, 0.7}));
-<<<<<<< HEAD
-  EXPECT_EQ(sent.velocities, std::vector<double>(5, 0.0));  // at rest
-  clock.now = 10.2;                                         // nothing came since
-=======
   EXPECT_EQ(sent.velocities, std::vector<double>(5, 0.0));
   clock.now = 10.2;  // nothing came since
->>>>>>> cdb9b1e (Test of set-points: form)
   ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
   EXPECT_EQ(robot.state().blocked, Blocked::old_joint_states);
 }

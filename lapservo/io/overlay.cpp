@@ -189,8 +189,9 @@ std::string features_text(const Features& f) {
                      decimals(f.d_px, 1));
 }
 
-// Where two lines of text stand beside a shaft, inside the image where there is such a place: as near to the marker's
-// middle as it goes, on either side. `along`: the axis, a unit vector; `half_px`: half the shaft's width.
+// Where two lines of text stand beside a shaft, as near to the marker's middle as it goes, on either side; in an image
+// that is too small for that, on the side with more room. `along`: the axis, a unit vector; `half_px`: half the shaft's
+// width.
 Eigen::Vector2d place_beside(const Pen& pen, const std::array<std::string, 2>& lines, const Eigen::Vector2d& middle,
                              const Eigen::Vector2d& along, double half_px) {
   const cv::Size first = pen.text_size(lines[0]), second = pen.text_size(lines[1]);
@@ -203,6 +204,11 @@ Eigen::Vector2d place_beside(const Pen& pen, const std::array<std::string, 2>& l
   const auto is_inside = [&](const Eigen::Vector2d& centre) {
     return ((centre - half).array() >= 0).all() && ((centre + half).array() <= corner.array()).all();
   };
+  const auto held_inside = [&](const Eigen::Vector2d& centre) -> Eigen::Vector2d {
+    return centre.cwiseMin(corner - half).cwiseMax(half);
+  };
+  const auto from_axis_px = [&](const Eigen::Vector2d& centre) { return std::abs((centre - middle).dot(across)); };
+  const Eigen::Vector2d left = held_inside(middle + clear_px * across), right = held_inside(middle - clear_px * across);
   Eigen::Vector2d best = middle + clear_px * across;
   const double step_px = 10 * pen.scale(), longest_px = corner.norm();
   for (double slid_px = 0; slid_px < longest_px && !is_inside(best); slid_px += step_px)
@@ -211,6 +217,7 @@ Eigen::Vector2d place_beside(const Pen& pen, const std::array<std::string, 2>& l
         if (const Eigen::Vector2d centre = middle + side * clear_px * across + way * slid_px * along;
             !is_inside(best) && is_inside(centre))
           best = centre;
+  if (!is_inside(best)) best = from_axis_px(left) > from_axis_px(right) ? left : right;
   return best - half + Eigen::Vector2d(pad, pad + first.height);
 }
 
