@@ -111,10 +111,12 @@ class Advisor {
     if (!f_.response || !f_.response->better || f_.response->before_px < rig_limits.response_px) return;
     add(true,
         fmt::format(
-            "the camera encodes light otherwise than the rig says, rather as {}: edges of channels that rise and "
+            "the camera encodes light otherwise than the rig says{}, rather as {}: edges of channels that rise and "
             "fall at one place lie {:.2f} px apart",
-            f_.response->name, f_.response->before_px),
-        "lapservo calibrate camera, or calibrate colour",
+            f_.response_measured ? " and a board did" : "", f_.response->name, f_.response->before_px),
+        f_.response_measured ? "switch off the camera's sharpening and record again; where that changes nothing, "
+                               "lapservo calibrate colour --replace-response"
+                             : "lapservo calibrate colour",
         fmt::format("edges {:.2f} px nearer to each other, and psi with them",
                     f_.response->before_px - f_.response->after_px));
   }
@@ -280,6 +282,7 @@ RigFindings findings_of(const Rig& rig, std::size_t instrument, const RigEvidenc
       findings.hue_error_deg =
           std::max(findings.hue_error_deg, hue_gap_deg(findings.light->hues_deg[band], of.marker.hues_deg[band]));
   findings.response = evidence.response();
+  findings.response_measured = rig.camera.response.sigma.has_value();
   findings.registered = of.camera_from_rcm.has_value();
   return findings;
 }

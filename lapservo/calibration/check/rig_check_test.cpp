@@ -216,7 +216,12 @@ TEST_F(CheckRig, NamesBadLightFirst) {
 
 TEST_F(CheckRig, NamesAWrongResponseFirst) {
   rig.camera.response = {Response::Kind::power, 1.8};
-  expect_first(found_out(rig, pictures(), joints), "encodes light otherwise than the rig says, rather as srgb");
+  expect_first(found_out(rig, pictures(), joints),
+               "encodes light otherwise than the rig says, rather as srgb: edges of channels");
+  rig.camera.response.sigma = 0.0025;  // by a board: the marker contradicts it, and only this replaces it
+  const RigFindings findings = found_out(rig, pictures(), joints);
+  expect_first(findings, "than the rig says and a board did, rather as srgb");
+  expect_first(findings, "lapservo calibrate colour --replace-response");
 }
 
 TEST_F(CheckRig, WithoutJointsComparesTheRcm) {

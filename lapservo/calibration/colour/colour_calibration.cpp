@@ -220,8 +220,10 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
     if (!keep_response) calibration.response = result->better;
     calibration.response_found =
         result->better && keep_response
-            ? fmt::format("as it is: kept, though the marker alone says {}, as it does when the camera sharpens",
-                          result->name)
+            ? fmt::format(
+                  "as it is: kept, though the marker alone says {}, which contradicts the board that measured it. A "
+                  "camera that sharpens makes it so; where it does not, --replace-response takes the marker's",
+                  result->name)
         : result->better
             ? fmt::format("{}: channels that rise at {} edges lie {:.3f} px from those that fall, {:.3f} px before",
                           result->name, result->edges, result->after_px, result->before_px)
