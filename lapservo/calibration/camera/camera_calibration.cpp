@@ -67,7 +67,7 @@ std::optional<LensFit> first_fit(const Board& board, const std::vector<BoardView
   try {
     cv::calibrateCamera(on_board, in_picture, views.front().bgr.size(), matrix, distortion, rotations, translations,
                         cv::CALIB_FIX_K3);
-  } catch (const cv::Exception&) {  // of views that tell nothing
+  } catch (const cv::Exception&) {  // of uninformative views
     return std::nullopt;
   }
   fit.camera.fx_px = matrix.at<double>(0, 0), fit.camera.fy_px = matrix.at<double>(1, 1);
@@ -123,7 +123,7 @@ MeasuredEdges measured(const Board& board, const std::vector<BoardView>& views, 
   return result;
 }
 
-// As many as tell all that there is to tell.
+// More of them add no information.
 std::vector<BoardEdgeProfile> some_of(std::vector<BoardEdgeProfile> profiles, std::size_t most) {
   if (profiles.size() <= most) return profiles;
   std::vector<BoardEdgeProfile> some;
@@ -136,7 +136,7 @@ struct Refined {
   CameraAdjustment adjustment;
 };
 
-// What the views can't tell from nothing stays nothing: k3, and pixels that are not square.
+// Unobservable parameters stay zero: k3, and pixels that are not square.
 std::optional<CameraAdjustment> adjust_what_shows(const LensFit& fit, const MeasuredEdges& edges,
                                                   const AtIteration& at_iteration) {
   CameraFreedom freedom;
@@ -182,7 +182,7 @@ Camera rounded_by_sigmas(Camera camera, const CameraSigmas& sigmas) {
   return camera;
 }
 
-// Empty where the views tell enough.
+// Empty where the views suffice.
 std::string too_alike(const CameraAdjustment& adjustment) {
   const Camera& camera = adjustment.camera;
   const CameraSigmas& sigmas = adjustment.sigmas;
@@ -237,7 +237,7 @@ bool BoardViews::add(const std::string& name, const cv::Mat& bgr, bool always) {
   BoardView view{name, bgr, find_board(board_, bgr, always)};
   if (view.corners.size() < least_corners) return false;
   ++found_;
-  // The places of a few corners tell position, distance and tilt.
+  // The places of a few corners determine position, distance and tilt.
   constexpr double different = 0.06;  // of the image's width
   const auto distance_px = [&](const BoardView& other) {
     double most = 0;

@@ -46,7 +46,7 @@ class BoardViews {
   int found_ = 0;
 };
 
-/// What the next images should show: "fill the lower left", "tilt the board". Empty when nothing is missing.
+/// Advice for the next images: "fill the lower left", "tilt the board". Empty when nothing is missing.
 std::string advice(const std::vector<BoardView>& views, const cv::Size& size);
 
 struct CameraCalibration {
@@ -54,7 +54,7 @@ struct CameraCalibration {
   std::string refusal;
   Camera camera;
   CameraSigmas sigmas;
-  std::optional<ResponseFit> response;  ///< nullopt where the images don't tell: the camera's is as it was
+  std::optional<ResponseFit> response;  ///< nullopt where the images do not determine it: the camera's response stays
   std::vector<double> view_rms_px;      ///< of edges about the fit, by view, green
   double rms_px = 0;
   std::vector<Rigid3> poses;   ///< camera_from_board, by view
@@ -62,7 +62,7 @@ struct CameraCalibration {
 };
 
 /// Matrix, distortion, lateral chromatic aberration and response of the camera that took the views, all of one size.
-/// `start` gives the response to begin with. `progress` is told what is done.
+/// `start` gives the response to begin with. `progress` receives the finished steps.
 CameraCalibration calibrate_camera(const Board& board, const std::vector<BoardView>& views, const Camera& start,
                                    const std::function<void(const std::string&)>& progress = {},
                                    const AtIteration& at_iteration = {});

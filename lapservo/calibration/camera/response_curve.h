@@ -60,9 +60,9 @@ ResponseCurve nearest_curve(const std::function<double(double)>& value_of);
 /// Even in what sRGB makes of light: fine in the dark. Rises everywhere, from 0 to 1.
 Response table_of(const ResponseCurve& curve);
 
-/// What cameras' curves are like, where images leave it open: standard ones, with contrast (a logistic curve about a
-/// middle) and shoulders of several strengths; and what differs from all of these. `whitening` times a curve's
-/// difference from `mean` has a standard deviation of 1 in each element; it is upper triangular.
+/// Prior of cameras' curves, where images leave it open: standard ones, with contrast (a logistic curve about a middle)
+/// and shoulders of several strengths; and the deviation from all of these. `whitening` times a curve's difference from
+/// `mean` has a standard deviation of 1 in each element; it is upper triangular.
 struct UsualCurves {
   ResponseCurve mean = ResponseCurve::Zero();
   Eigen::Matrix<double, curve_numbers, curve_numbers> whitening;

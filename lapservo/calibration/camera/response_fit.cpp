@@ -21,18 +21,19 @@
 namespace lapservo::internal {
 namespace {
 
-// Those at like angles to the rows of pixels: how blurred edges differ from a normal distribution's at so many steps on
-// either side. What filters on pixels make of a lens' blur is symmetric and no more.
+// Edges at like angles to the rows of pixels share the deviation of their blur from a normal distribution at so many
+// steps on either side. A lens' blur after filters on pixels is symmetric and no more.
 constexpr int shape_numbers = 8;
 constexpr std::array shape_angles_rad{rad_from_deg(6), rad_from_deg(12), rad_from_deg(24), rad_from_deg(46)};
 using Shape = std::array<double, shape_numbers>;
 
 constexpr double max_sharpening_reach_px = 7;
-// Before the fit, one sigma: reflectances at different places of the board (gloss, veil), edges about the geometry's.
+// Before the fit, one sigma: reflectances at different places of the board (specular light, veil), edges about the
+// geometry's.
 constexpr double ratio_sigma = 0.03, offset_sigma_px = 0.02, log_blur_sigma = 0.3;
 constexpr double strength_sigma = 0.5, usual_mask_px = 1.5, log_mask_sigma = 0.3, shape_sigma = 0.02;
 
-// Of all edges.
+// Unknowns that all edges share.
 struct SharedUnknowns {
   std::array<double, curve_numbers> curve{};
   double log_ratio = 0;                                          // of dark over bright reflectance
@@ -65,7 +66,7 @@ T encoded_by(const Response& response, const T& light) {
   }
 }
 
-// What a fit takes for given.
+// The fixed inputs of a fit.
 struct Given {
   const Response* response = nullptr;  // null where the curve is free
   bool sharpened = false;
@@ -251,7 +252,7 @@ class ProfileFit {
     solver_.num_threads = 1;  // the same to the last bit, every time
   }
 
-  /// Of values over their sigmas.
+  /// Mean square of values over their sigmas.
   double misfit() const {
     double squares = 0;
     int count = 0;
@@ -318,7 +319,7 @@ class ProfileFit {
     given_.sharpened = sharpened;
     return run();
   }
-  // What is given is fixed.
+  // Given parameters are fixed.
   bool run() {
     const auto fix = [&](double* block, bool fixed) {
       if (fixed)

@@ -24,8 +24,8 @@ struct ResponseFit {
 
 /// The response from blurred edges of a board that lie where the geometry has them: bright and dark squares are equally
 /// wide in light, a blurred edge is symmetric in light, and the squares' reflectances are the same wherever the board
-/// is and however much light falls on it. With `try_named` a named response is taken where it explains
-/// the edges as well. nullopt when edges are too few or too alike to tell.
+/// is and however much light falls on it. With `try_named` a named response is taken where it explains the edges as
+/// well. nullopt when edges are too few or too alike.
 std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& profiles, const Response& start,
                                         bool try_named, const AtIteration& at_iteration);
 
