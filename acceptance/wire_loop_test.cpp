@@ -475,12 +475,12 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   const auto ears = named_transport(GetParam(), "ears");
   Spy spy(*ears);
   // Pitch stands near a limit, as the arm reads it: said before anything moves.
-  testing::write_file(folder_ / "limits.yaml",
+  testing::write_file(folder_ / "cramped.yaml",
                       "lower: [-1, -1, 0.01, -4]\nupper: [1, 0.03, 0.2, 4]\n"
                       "rate: [0.4, 0.4, 0.04, 1.5]\nacceleration: [2, 2, 0.2, 7.5]\n");
   auto cramped = moving;
   std::replace(cramped.begin(), cramped.end(), file("swing"), file("cramped"));
-  cramped.insert(cramped.end(), {"--joint-limits", file("limits.yaml")});
+  std::replace(cramped.begin(), cramped.end(), file("limits.yaml"), file("cramped.yaml"));
   Process still(cramped, file("still.txt"));
   EXPECT_EQ(still.wait(), 1);
   EXPECT_NE(said("still.txt").find("the arm was not moved: outer_pitch would move by 0.0"), std::string::npos)
