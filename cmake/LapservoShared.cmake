@@ -1,6 +1,7 @@
 # liblapservo.so: the folders that have public headers as one shared library, which exports what is public and nothing of
 # lapservo::internal. The tool, Python and the tests need what is internal and take the folders' static libraries.
 get_property(lapservo_public_modules GLOBAL PROPERTY LAPSERVO_PUBLIC_MODULES)
+get_property(lapservo_components GLOBAL PROPERTY LAPSERVO_COMPONENTS)
 if(LAPSERVO_SANITIZE)  # nobody who is not sanitized could link it
   return()
 endif()
