@@ -36,8 +36,8 @@ inline std::optional<Eigen::Matrix4d> matrix_of(const std::optional<Rigid3>& a_f
 Rigid3 rigid_of(const py::handle& a_from_b, const char* argument);
 
 enum class Numbers { finite, any };
-/// Converts anything that numpy makes an array of. Eigen::Dynamic rows: any number. One column: the array may be a row, a column or
-/// one-dimensional; a row alone is a matrix of one row. Throws InputError naming `argument`.
+/// Converts anything that numpy makes an array of. Eigen::Dynamic rows: any number. One column: the array may be a row,
+/// a column or one-dimensional; a row alone is a matrix of one row. Throws InputError naming `argument`.
 Eigen::MatrixXd numbers_of(const py::handle& given, const char* argument, int rows, int columns,
                            Numbers numbers = Numbers::finite);
 /// Rows of a matrix of four columns.

@@ -387,8 +387,7 @@ void bind_servo(py::module_& m) {
       .def_property_readonly("mode", [](const Controller& self) { return std::string(to_string(self.mode)); })
       .def_property_readonly("period_s", [](const Controller& self) { return self.period_s; })
       .def(
-          "to_yaml", [](const Controller& self) { return controller_yaml(self); },
-          "Its text as a controller.yaml.")
+          "to_yaml", [](const Controller& self) { return controller_yaml(self); }, "Its text as a controller.yaml.")
       .def("__repr__", [](const Controller& self) {
         return fmt::format("<lapservo.Controller {} every {:.4f} s>", to_string(self.mode), self.period_s);
       });
