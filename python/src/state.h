@@ -107,7 +107,10 @@ void set_state(const py::handle& state, T& value) {
     std::size_t i = 0;
     std::apply([&](auto&... each) { (set_state(all[i++], each), ...); }, members(value));
   } else if constexpr (is_optional<T>) {
-    if (!state.is_none()) set_state(state, value.emplace());
+    if (state.is_none()) return;
+    typename T::value_type held{};
+    set_state(state, held);
+    value = std::move(held);
   } else if constexpr (std::is_enum_v<T>) {
     value = static_cast<T>(state.cast<int>());
   } else if constexpr (std::same_as<T, cv::Mat>) {
