@@ -180,37 +180,37 @@ TEST(RegisterArm, ErrorsAreAsTheirSigmasSayBacklashOrNot) {
 
 // Within the swing, and 30 degrees and 20 mm beside it.
 TEST(RegisterArm, PlacesMarkersAsTheirSigmasSayBesideTheSwing) {
-  for (const double beside : {0.0, 1.0}) {
-    Eigen::Array3d squares = Eigen::Array3d::Zero();
-    int count = 0;
-    for (std::uint64_t seed = 1; seed <= 12; ++seed) {
-      Motion motion;
-      motion.seed = seed, motion.seconds = 10;
-      if (seed % 2) motion.backlash = {0.01, 0.01, 1e-3, 0.03};
-      motion.common_turn_rad = 0.5e-3 * Random(100 + seed).normal();  // half of a frame's sigma
-      const Recorded data = recorded(motion);
-      const auto found = register_arm(with_names_only(data.truth), data.poses, data.recording, "joints.csv");
-      ASSERT_EQ(found.refusal, "");
-      Instrument registered = data.truth;
-      registered.camera_from_rcm = found.camera_from_rcm, registered.joints = found.arm->joints;
-      const JointRanges& ranges = found.arm->ranges;
+  constexpr int seeds = 36;
+  std::array<Eigen::Array3d, 2> squares{Eigen::Array3d::Zero(), Eigen::Array3d::Zero()};
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    Motion motion;
+    motion.seed = seed, motion.seconds = 10;
+    if (seed % 2) motion.backlash = {0.01, 0.01, 1e-3, 0.03};
+    motion.common_turn_rad = 0.5e-3 * Random(100 + seed).normal();  // half of a frame's sigma
+    const Recorded data = recorded(motion);
+    const auto found = register_arm(with_names_only(data.truth), data.poses, data.recording, "joints.csv");
+    ASSERT_EQ(found.refusal, "");
+    Instrument registered = data.truth;
+    registered.camera_from_rcm = found.camera_from_rcm, registered.joints = found.arm->joints;
+    const JointRanges& ranges = found.arm->ranges;
+    for (const std::size_t beside : {0U, 1U})
       for (const double theta : {0.0, 1.0})
         for (const double phi : {0.0, 1.0}) {
           std::array<double, 4> at = ranges.low;
-          for (std::size_t j = 0; j < 3; ++j) {
-            const double part = j == 0 ? theta : j == 1 ? phi : 1;
-            at[j] += part * ranges.travel(j) + (2 * part - 1) * beside * (j == 2 ? 0.02 : 0.5236);
+          for (std::size_t k = 0; k < 3; ++k) {
+            const double part = k == 0 ? theta : k == 1 ? phi : 1, side = beside == 0 ? 0 : 2 * part - 1;
+            at[k] += part * ranges.travel(k) + side * (k == 2 ? 0.02 : 0.5236);
           }
           const Rigid3 is = marker_at(data.truth, at), placed = marker_at(registered, at);
           const Eigen::Vector3d turn = rotation_vector_of(is.rotation.conjugate() * placed.rotation);
           const auto sigma = placement_sigma(data.truth.marker, found, at);
-          squares += Eigen::Array3d((placed.translation - is.translation).norm() / sigma.place_m,
-                                    turn.head<2>().norm() / sigma.axis_rad, turn.z() / sigma.roll_rad)
-                         .square();
-          ++count;
+          squares[beside] += Eigen::Array3d((placed.translation - is.translation).norm() / sigma.place_m,
+                                            turn.head<2>().norm() / sigma.axis_rad, turn.z() / sigma.roll_rad)
+                                 .square();
         }
-    }
-    const Eigen::Array3d z = (squares / count).sqrt();
+  }
+  for (const std::size_t beside : {0U, 1U}) {
+    const Eigen::Array3d z = (squares[beside] / (4 * seeds)).sqrt();
     EXPECT_TRUE((z > 0.5).all() && (z < 1.5).all()) << beside << ": " << z.transpose();
   }
 }
