@@ -39,9 +39,11 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
   const auto joints = [&](const char* topic, void (Interlock::*tell)(const JointMessage&, double)) {
     subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, topic), [this, tell](JointMessage&& message) {
       const double arrival_s = clock_.now_s();
-      const std::lock_guard lock(mutex_);
+      std::unique_lock lock(mutex_);
       (interlock_.*tell)(message, arrival_s);
-      say_complaint();
+      const std::string complaint = new_complaint();
+      lock.unlock();  // stderr may block, and command() needs the interlock
+      if (!complaint.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", arm_.c_str(), complaint.c_str());
     }));
   };
   joints("measured_js", &Interlock::on_measured);
@@ -102,12 +104,10 @@ std::optional<Eigen::Vector4d> CrtkRobot::set_point() const {
   return interlock_.set_point();
 }
 
-// At once, and again when it changes.
-void CrtkRobot::say_complaint() {
-  const std::string& complaint = interlock_.complaint();
-  if (complaint == said_) return;
-  said_ = complaint;
-  if (!said_.empty()) std::fprintf(stderr, "lapservo: %s: %s\n", arm_.c_str(), said_.c_str());
+std::string CrtkRobot::new_complaint() {
+  if (interlock_.complaint() == said_) return {};
+  said_ = interlock_.complaint();
+  return said_;
 }
 
 void CrtkRobot::command() {

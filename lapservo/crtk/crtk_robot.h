@@ -37,7 +37,7 @@ class CrtkRobot : public Robot {
 
  private:
   void command();
-  void say_complaint();
+  std::string new_complaint();  ///< empty unless it has changed
 
   const Clock& clock_;
   double period_s_;
