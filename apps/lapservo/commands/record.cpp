@@ -201,10 +201,7 @@ void expect_possible(const RecordOptions& options) {
   if (options.rig.empty()) throw InputError("--move", "needs --rig, whose joints entry names the arm's joints");
   if (!options.enable_motion)
     throw InputError("--move", "moves the arm: give --enable-motion too, once nothing is in its way");
-  if (options.joint_limits.empty())
-    throw InputError("--move",
-                     "needs --joint-limits, the limits of the arm's joints, for example "
-                     "configs/joint_limits/psm-classic.yaml");
+  require_joint_limits("--move", options.joint_limits);
 }
 
 bool line_was_entered() {

@@ -58,4 +58,11 @@ std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_
   throw InputError(option, "is " + transport + ", expected ros2 or ros1");
 }
 
+void require_joint_limits(const std::string& option, const std::string& joint_limits) {
+  if (joint_limits.empty())
+    throw InputError(option,
+                     "needs --joint-limits, the limits of the arm's joints, for example "
+                     "configs/joint_limits/psm-classic.yaml");
+}
+
 }  // namespace lapservo::app

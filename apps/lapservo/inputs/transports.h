@@ -21,4 +21,7 @@ Address address_of(const std::string& text, const std::string& option);
 std::unique_ptr<internal::Transport> make_transport(const std::string& transport, const std::string& node_name,
                                                     const std::string& option);
 
+/// Throws InputError, naming `option`, which moves an arm, when the file of the arm's limits is not given.
+void require_joint_limits(const std::string& option, const std::string& joint_limits);
+
 }  // namespace lapservo::app

@@ -233,10 +233,7 @@ void say_counts(const InterlockCounts& arm, const ImageCounts& images) {
 
 int steer_arm(const ServoOptions& options) {
   const Address address = address_of(options.robot, "--robot");
-  if (options.enable_motion && options.joint_limits.empty())
-    throw InputError("--enable-motion",
-                     "needs --joint-limits, the limits of the arm's joints, for example "
-                     "configs/joint_limits/psm-classic.yaml");
+  if (options.enable_motion) require_joint_limits("--enable-motion", options.joint_limits);
   RunConfig config = run_config_of(options);
   const Rig rig = config.rig;
   const InterlockConfig interlock = interlock_of(options, config);
