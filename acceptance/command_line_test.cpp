@@ -439,7 +439,7 @@ TEST_F(CommandLine, FlawedPicturesHaveAWordOfTheirOwn) {
   cv::Mat few = cv::imread("out/frames/0000.jpg");
   few &= cv::Scalar(0xc0, 0xc0, 0xc0);
   cv::imwrite("in/few.png", few);
-  for (const auto& [file, word] : {std::pair{in("damaged.jpg", damaged), "damaged"}, {"in/few.png", "few_colors"}}) {
+  for (const auto& [file, word] : {std::pair{in("damaged.jpg", damaged), "damaged"}, {"in/few.png", "few_colours"}}) {
     EXPECT_EQ(run("track " + file + " --rig configs/example.yaml --out out/obs.csv"), 1);
     EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "status"), word);
   }

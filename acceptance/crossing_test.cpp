@@ -72,12 +72,12 @@ void print_head() {
 cv::Mat make_colourful(cv::Size size, Random& random) {
   cv::Mat light(size, CV_32FC3, cv::Scalar(0.1, 0.1, 0.15));
   for (int i = 0; i < 60; ++i) {
-    std::array<double, 3> color;
-    for (double& channel : color) channel = random.uniform(0.01, 0.5);
+    std::array<double, 3> colour;
+    for (double& channel : colour) channel = random.uniform(0.01, 0.5);
     const int u = static_cast<int>(random.uniform(0, size.width)), v = static_cast<int>(random.uniform(0, size.height));
     const int half_u = static_cast<int>(random.uniform(10, 70)), half_v = static_cast<int>(random.uniform(10, 70));
     cv::ellipse(light, {u, v}, {half_u, half_v}, random.uniform(0, 180), 0, 360,
-                cv::Scalar(color[0], color[1], color[2]), cv::FILLED, cv::LINE_AA);
+                cv::Scalar(colour[0], colour[1], colour[2]), cv::FILLED, cv::LINE_AA);
   }
   cv::GaussianBlur(light, light, {}, 1);
   return light;

@@ -197,7 +197,7 @@ TEST(OurVideo, IsReadByOpenCv) {
 
 // A blurred edge between two colours, which goes down or to the right by a sixteenth, so that it lies in every way
 // between pixels.
-cv::Mat edge_of_colors(bool down) {
+cv::Mat edge_of_colours(bool down) {
   const cv::Vec3d green(40, 160, 80), purple(170, 50, 110);
   constexpr int size = 256;
   cv::Mat image(size, size, CV_8UC3);
@@ -231,13 +231,13 @@ std::array<double, 3> places_px(const cv::Mat& bgr, bool down) {
 
 // Colour differences, which a video has for four pixels together, keep their place: a reader that places their samples
 // on the left pixels' columns, as H.264 has it by default, would shift them by half a pixel.
-TEST(Videos, LeaveColorsWhereTheyAre) {
+TEST(Videos, LeaveColoursWhereTheyAre) {
   constexpr double farthest_px = 0.2;  // by compression
   const testing::TemporaryFolder folder;
   const auto path = folder / "a.mp4";
   for (const bool ours : {true, false})
     for (const bool down : {true, false}) {
-      const cv::Mat image = edge_of_colors(down);
+      const cv::Mat image = edge_of_colours(down);
       if (ours) {
         VideoWriter writer(path, 30);
         for (int i = 0; i < 3; ++i) writer.add(image);

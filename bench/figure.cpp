@@ -17,7 +17,7 @@ using namespace lapservo::internal;
 struct Shown {
   std::string_view name, instruments, title;
   Draw draw;
-  int color;
+  int colour;
 };
 constexpr std::array<Shown, 9> shown{{{"apriltag/decimate_1", "-", "AprilTag, decimate 1", Draw::dashed, 1},
                                       {"apriltag/decimate_2", "-", "AprilTag, decimate 2", Draw::line_and_points, 1},
@@ -56,7 +56,7 @@ int main(int argc, char** argv) {
   plot.x = {"image", "megapixels", {}, {}, true};
   plot.y = {"time", "ms", {}, {}, true};
   for (const Shown& one : shown) {
-    Series series{std::string(one.title), {}, {}, one.draw, one.color};
+    Series series{std::string(one.title), {}, {}, one.draw, one.colour};
     for (const auto& [megapixels, milliseconds] : medians[{std::string(one.name), std::string(one.instruments)}])
       series.x.push_back(megapixels), series.y.push_back(milliseconds);
     if (!series.x.empty()) plot.series.push_back(series);

@@ -67,7 +67,7 @@ void fit(benchmark::State& state) {
   const ImageView image(moving_frames(rig)[0]);
   const auto table = rig.camera.response.table();
   const LightImage light(image, table, ChannelGeometry(rig.camera));
-  const ColorClasses classes(rig.instruments);
+  const ColourClasses classes(rig.instruments);
   const Scene scene{image, rig.camera, classes, instrument.marker, classes.of_bands(0)};
   JointVector q = configurations(rig, 0)[0];
   q.theta_rad += 1e-3, q.phi_rad -= 1e-3, q.rho_m += 2e-4, q.psi_rad += 0.01;

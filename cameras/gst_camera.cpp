@@ -76,28 +76,28 @@ ChromaSite site_of(const GstVideoInfo& info, bool is_jpeg) {
   return packed || info.chroma_site == GST_VIDEO_CHROMA_SITE_UNKNOWN ? ChromaSite::left : ChromaSite::centre;
 }
 
-YuvColors colors_of(const GstVideoInfo& info) {
-  YuvColors colors;
-  colors.full_range = info.colorimetry.range == GST_VIDEO_COLOR_RANGE_0_255;
+YuvColours colours_of(const GstVideoInfo& info) {
+  YuvColours colours;
+  colours.full_range = info.colorimetry.range == GST_VIDEO_COLOR_RANGE_0_255;
   const bool is_601 = info.colorimetry.matrix == GST_VIDEO_COLOR_MATRIX_BT601;
   switch (info.colorimetry.matrix) {
     case GST_VIDEO_COLOR_MATRIX_FCC:
-      colors.matrix = YuvMatrix::fcc;
+      colours.matrix = YuvMatrix::fcc;
       break;
     case GST_VIDEO_COLOR_MATRIX_BT709:
-      colors.matrix = YuvMatrix::bt709;
+      colours.matrix = YuvMatrix::bt709;
       break;
     case GST_VIDEO_COLOR_MATRIX_SMPTE240M:
-      colors.matrix = YuvMatrix::smpte240m;
+      colours.matrix = YuvMatrix::smpte240m;
       break;
     case GST_VIDEO_COLOR_MATRIX_BT2020:
-      colors.matrix = YuvMatrix::bt2020;
+      colours.matrix = YuvMatrix::bt2020;
       break;
     default:
       break;
   }
-  colors.chroma = site_of(info, is_601 && colors.full_range);
-  return colors;
+  colours.chroma = site_of(info, is_601 && colours.full_range);
+  return colours;
 }
 
 struct Layout {
@@ -130,7 +130,7 @@ bool convert(const GstVideoFrame& frame, cv::Mat& bgr) {
     picture.steps[i] = GST_VIDEO_FRAME_PLANE_STRIDE(&frame, i);
   }
   picture.by_field = GST_VIDEO_FRAME_IS_INTERLACED(&frame);
-  return convert_to_bgr(picture, colors_of(info), bgr);
+  return convert_to_bgr(picture, colours_of(info), bgr);
 }
 
 void require_gstreamer() {

@@ -60,7 +60,7 @@ std::optional<Frame> BagFrames::next() {
   auto picture = index_ == 0 ? std::optional(Picture{first_->stamp_s, std::exchange(first_->bgr, {})}) : read();
   if (!picture) return std::nullopt;
   Frame frame{std::move(picture->bgr), index_++, picture->stamp_s - first_->stamp_s, {}, {}};
-  if (has_few_colors(frame.bgr)) frame.flaw = Status::few_colors;
+  if (has_few_colours(frame.bgr)) frame.flaw = Status::few_colours;
   return frame;
 }
 

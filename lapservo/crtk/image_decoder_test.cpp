@@ -85,7 +85,7 @@ TEST(ImageDecoder, ChromaOfYuv422IsInterpolatedFromTheLeftOfEachTwoPixels) {
 
 // An evenly coloured scene through each pattern: the first row's first two letters are its first two pixels.
 TEST(ImageDecoder, BayerPatternsByTheirLetters) {
-  const cv::Vec3b color(40, 120, 220);
+  const cv::Vec3b colour(40, 120, 220);
   for (const std::string pattern : {"rggb", "bggr", "gbrg", "grbg"})
     for (const bool deep : {false, true}) {
       ImageMessage message;
@@ -96,10 +96,10 @@ TEST(ImageDecoder, BayerPatternsByTheirLetters) {
         for (int u = 0; u < 12; ++u) {
           const char letter = pattern[2 * (v % 2) + u % 2];
           if (deep) message.data.push_back(99);
-          message.data.push_back(letter == 'b' ? color[0] : letter == 'g' ? color[1] : color[2]);
+          message.data.push_back(letter == 'b' ? colour[0] : letter == 'g' ? colour[1] : colour[2]);
         }
       const cv::Vec3b got = bgr_at(decode(message), 5, 6);
-      for (int i = 0; i < 3; ++i) EXPECT_NEAR(got[i], color[i], 2) << message.encoding;
+      for (int i = 0; i < 3; ++i) EXPECT_NEAR(got[i], colour[i], 2) << message.encoding;
     }
 }
 

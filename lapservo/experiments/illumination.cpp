@@ -83,7 +83,7 @@ cv::Mat example(const ExperimentSetup& setup, Stage& stage, const JointVector& q
 }
 
 Series by_position(const IlluminationResult::OfMethod& of_method) {
-  Series series{method_title(of_method.method), {}, {}, Draw::points, method_color(of_method.method)};
+  Series series{method_title(of_method.method), {}, {}, Draw::points, method_colour(of_method.method)};
   for (const IlluminationResult::Largest& largest : of_method.largest) {
     series.x.push_back(largest.position + 1);
     series.y.push_back(largest.px);
@@ -92,7 +92,7 @@ Series by_position(const IlluminationResult::OfMethod& of_method) {
 }
 
 Series by_light(const IlluminationResult::OfMethod& of_method) {
-  Series series{method_title(of_method.method), {}, {}, Draw::line_and_points, method_color(of_method.method)};
+  Series series{method_title(of_method.method), {}, {}, Draw::line_and_points, method_colour(of_method.method)};
   for (int light = 0; light < light_count; ++light) {
     std::vector<double> distances;
     for (const IlluminationResult::Point& point : of_method.points)

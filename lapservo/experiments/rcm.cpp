@@ -74,7 +74,7 @@ Figure robust_figure(Plot plot, const std::string& caption) {
 
 Figure cloud_of_intersections(const RcmResult::OfMethod& of_method, const Eigen::Vector2d& true_px) {
   Plot plot = error_plane("Intersections about the truth: " + method_title(of_method.method));
-  Series series{"of two lines", {}, {}, Draw::points, method_color(of_method.method)};
+  Series series{"of two lines", {}, {}, Draw::points, method_colour(of_method.method)};
   for (const RcmResult::Intersection& at : of_method.intersections)
     if (at.set == 0) {
       series.x.push_back(at.px.x() - true_px.x());
@@ -109,7 +109,7 @@ Plot fractions_within(const RcmResult& result) {
             {{"half of them", 50}},
             false};
   for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), {}, {}, Draw::line, method_color(of_method.method)};
+    Series series{method_title(of_method.method), {}, {}, Draw::line, method_colour(of_method.method)};
     const auto distances = distances_of(of_method, 0);
     for (int percent = 1; percent <= 100; ++percent) {
       series.x.push_back(quantile_of(distances, 0.01 * percent));
@@ -132,7 +132,7 @@ Plot fan(const RcmResult& result, const Camera& camera) {
       "The centre lines of the first set meet in the RCM", {"u", "px", {}, {}}, {"v", "px", {}, {}}, {}, {}, true};
   const double right = camera.width_px - 1, bottom = camera.height_px - 1;
   plot.series.push_back({"image", {0, right, right, 0, 0}, {0, 0, bottom, bottom, 0}, Draw::dashed, -1});
-  Series extended{"", {}, {}, Draw::line, -1}, seen{"e0 to e3", {}, {}, Draw::line, method_color(of_method.method)};
+  Series extended{"", {}, {}, Draw::line, -1}, seen{"e0 to e3", {}, {}, Draw::line, method_colour(of_method.method)};
   const auto gap = [](Series& series) { series.x.push_back(std::nan("")), series.y.push_back(std::nan("")); };
   const auto add = [](Series& series, const Eigen::Vector2d& p) {
     series.x.push_back(p.x()), series.y.push_back(p.y());

@@ -45,7 +45,7 @@ Plot one_trial(const RotationResult& result) {
     reference.y.push_back(true_rotation_rad(step));
   }
   for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), {}, {}, Draw::points, method_color(of_method.method)};
+    Series series{method_title(of_method.method), {}, {}, Draw::points, method_colour(of_method.method)};
     for (const RotationResult::Sample& sample : of_method.samples)
       if (sample.set == 0 && sample.trial == 0) {
         series.x.push_back(sample.time_s());
@@ -65,7 +65,7 @@ Plot distribution_by_trial(const RotationResult::OfMethod& of_method) {
             {},
             {{"no error", 0}},
             false};
-  Series series{"", {}, {}, Draw::boxes, method_color(of_method.method)};
+  Series series{"", {}, {}, Draw::boxes, method_colour(of_method.method)};
   for (const RotationResult::Sample& sample : of_method.samples)
     if (sample.set == 0) {
       series.x.push_back(initial_rotation_rad(sample.trial));
@@ -83,7 +83,7 @@ Plot error_against_true(const RotationResult::OfMethod& of_method) {
             {},
             {{"no error", 0}},
             false};
-  Series series{"", {}, {}, Draw::points, method_color(of_method.method)};
+  Series series{"", {}, {}, Draw::points, method_colour(of_method.method)};
   for (const RotationResult::Sample& sample : of_method.samples)
     if (sample.set == 0) {
       series.x.push_back(sample.true_rad);
@@ -106,7 +106,7 @@ Plot deviation_by_trial(const RotationResult& result) {
     paper.y.push_back(1e3 * RotationResult::paper_deviation_rad[static_cast<std::size_t>(trial)]);
   }
   for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), paper.x, {}, Draw::line_and_points, method_color(of_method.method)};
+    Series series{method_title(of_method.method), paper.x, {}, Draw::line_and_points, method_colour(of_method.method)};
     for (std::size_t trial = 0; trial < RotationResult::trials; ++trial)
       series.y.push_back(1e3 * of_method.by_trial[trial].deviation);
     plot.series.push_back(std::move(series));

@@ -11,7 +11,7 @@ std::string method_title(Method method) {
   return method == Method::centerline ? "the paper\u2019s method" : "the default";
 }
 
-int method_color(Method method) {
+int method_colour(Method method) {
   return method == Method::centerline ? 1 : 0;
 }
 

@@ -29,6 +29,6 @@ Rig without_registration(Rig rig);
 /// "the paper's method" or "the default".
 std::string method_title(Method method);
 /// The colour of a method's series in every plot.
-int method_color(Method method);
+int method_colour(Method method);
 
 }  // namespace lapservo::internal

@@ -28,9 +28,9 @@ void write_data(const TimeTable& table, const std::filesystem::path& path) {
   file.commit();
 }
 
-Series over_time(const TimeTable& table, const std::string& column, std::string legend, int color, Draw draw,
+Series over_time(const TimeTable& table, const std::string& column, std::string legend, int colour, Draw draw,
                  double scale) {
-  Series series{std::move(legend), table.time_s, table.column(column).values, draw, color};
+  Series series{std::move(legend), table.time_s, table.column(column).values, draw, colour};
   for (double& value : series.y) value *= scale;
   return series;
 }

@@ -26,7 +26,7 @@ struct TimeTable {
 void write_data(const TimeTable& table, const std::filesystem::path& path);
 
 /// A column as a line of a plot over time, its values multiplied by `scale`.
-Series over_time(const TimeTable& table, const std::string& column, std::string legend, int color,
+Series over_time(const TimeTable& table, const std::string& column, std::string legend, int colour,
                  Draw draw = Draw::line, double scale = 1);
 
 }  // namespace lapservo::internal

@@ -67,12 +67,12 @@ Plot figure_7(const TrackingResult& result, const FeatureName& feature) {
   const std::string column = std::string("error_") + feature.column;
   Plot plot =
       time_plot(fmt::format("Error of {}", feature.name), fmt::format("error of {}", feature.name), feature.unit, {});
-  int color = 0;
+  int colour = 0;
   for (const auto& [id, name] :
        {std::pair{"default", "the default"}, std::pair{"paper", "the paper\u2019s law, Algorithm 1"},
         std::pair{"paper_surface", "the paper\u2019s law, our tracker"}})
     if (const TrackingRun* run = run_of(result, id))
-      plot.series.push_back(over_time(run->table, column, name, color++, Draw::line, feature.scale));
+      plot.series.push_back(over_time(run->table, column, name, colour++, Draw::line, feature.scale));
   return plot;
 }
 

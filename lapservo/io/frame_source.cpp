@@ -69,8 +69,8 @@ class VideoSource : public FrameSource {
     Frame frame{std::move(image->bgr), index_++, image->time_s, {}, {}};
     if (image->damaged) {
       frame.flaw = Status::damaged;
-    } else if (has_few_colors(frame.bgr)) {
-      frame.flaw = Status::few_colors;
+    } else if (has_few_colours(frame.bgr)) {
+      frame.flaw = Status::few_colours;
     }
     return frame;
   }

@@ -176,21 +176,21 @@ cv::Mat bgr8_from(const cv::Mat& image, const std::string& source) {
   }
 }
 
-bool has_few_colors(const cv::Mat& bgr) {
+bool has_few_colours(const cv::Mat& bgr) {
   constexpr int palette = 256;
   std::vector<bool> seen(std::size_t{1} << 24);
-  int colors = 0;
-  bool any_color = false;
+  int colours = 0;
+  bool any_colour = false;
   for (int v = 0; v < bgr.rows; ++v)
     for (int u = 0; u < bgr.cols; ++u) {
       const auto& p = bgr.at<cv::Vec3b>(v, u);
-      const std::size_t color = std::size_t{p[0]} | std::size_t{p[1]} << 8 | std::size_t{p[2]} << 16;
-      if (seen[color]) continue;
-      seen[color] = true;
-      any_color = any_color || p[0] != p[1] || p[1] != p[2];
-      if (++colors > palette) return false;
+      const std::size_t colour = std::size_t{p[0]} | std::size_t{p[1]} << 8 | std::size_t{p[2]} << 16;
+      if (seen[colour]) continue;
+      seen[colour] = true;
+      any_colour = any_colour || p[0] != p[1] || p[1] != p[2];
+      if (++colours > palette) return false;
     }
-  return any_color;
+  return any_colour;
 }
 
 Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& source) {
@@ -212,8 +212,8 @@ Picture decode_picture(std::span<const std::uint8_t> bytes, const std::string& s
   picture.low_bits = is_deep && cv::norm(picture.bgr, cv::NORM_INF) <= most_of_12_bits;
   if (!decoded.complaint.empty()) {
     picture.flaw = Status::damaged;
-  } else if (has_few_colors(picture.bgr)) {
-    picture.flaw = Status::few_colors;
+  } else if (has_few_colours(picture.bgr)) {
+    picture.flaw = Status::few_colours;
   }
   return picture;
 }

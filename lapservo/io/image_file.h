@@ -18,7 +18,7 @@ bool has_image_extension(const std::filesystem::path& path);
 /// Whether the name ends like that of an image in HEIC or AVIF, which are not read.
 bool has_unread_extension(const std::filesystem::path& path);
 
-/// An image in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained, `few_colors`
+/// An image in 8-bit BGR, and why nothing is to be measured in it: `damaged` when its decoder complained, `few_colours`
 /// when it has no more colours than a palette.
 struct Picture {
   cv::Mat bgr;
@@ -39,7 +39,7 @@ cv::Mat decode_image(std::span<const std::uint8_t> bytes, const std::string& sou
 
 /// Whether an 8-bit BGR image has colours, but no more than a palette (256): each then stands for many, and the edges
 /// between them are not where the light's were.
-bool has_few_colors(const cv::Mat& bgr);
+bool has_few_colours(const cv::Mat& bgr);
 
 /// 8-bit BGR of any supported pixel type, as above.
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source);

@@ -19,8 +19,8 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-const cv::Scalar white(255, 255, 255), dark(20, 20, 20), outline_color(255, 255, 255), boundary_color(40, 220, 255),
-    axis_color(80, 80, 255), rcm_color(255, 200, 80), refused_color(60, 140, 255);
+const cv::Scalar white(255, 255, 255), dark(20, 20, 20), outline_colour(255, 255, 255), boundary_colour(40, 220, 255),
+    axis_colour(80, 80, 255), rcm_colour(255, 200, 80), refused_colour(60, 140, 255);
 constexpr double line_height = 30;  // of labels
 
 // Draws at a sixteenth of a pixel, thinner on small frames.
@@ -28,13 +28,13 @@ class Pen {
  public:
   explicit Pen(cv::Mat& canvas) : canvas_(canvas), scale_(std::max(1.0, canvas.cols / 1280.0)) {}
 
-  void polyline(const std::vector<Eigen::Vector2d>& points, const cv::Scalar& color, double width = 1.4) {
+  void polyline(const std::vector<Eigen::Vector2d>& points, const cv::Scalar& colour, double width = 1.4) {
     std::vector<cv::Point> fixed;
     for (const Eigen::Vector2d& p : points) fixed.push_back(at(p));
     cv::polylines(canvas_, fixed, false, dark, thickness(width) + 2, cv::LINE_AA, bits);
-    cv::polylines(canvas_, fixed, false, color, thickness(width), cv::LINE_AA, bits);
+    cv::polylines(canvas_, fixed, false, colour, thickness(width), cv::LINE_AA, bits);
   }
-  void dashes(const std::vector<Eigen::Vector2d>& points, const cv::Scalar& color) {
+  void dashes(const std::vector<Eigen::Vector2d>& points, const cv::Scalar& colour) {
     const double dash_px = 7 * scale_;
     double along_px = 0;
     for (std::size_t i = 1; i < points.size(); ++i) {
@@ -42,26 +42,26 @@ class Pen {
       const int parts = static_cast<int>(std::clamp<double>(step.norm() / dash_px * 4, 1, max_parts));
       for (int part = 0; part < parts; ++part) {
         if (std::fmod(along_px, 2 * dash_px) < dash_px)
-          polyline({points[i - 1] + step * part / parts, points[i - 1] + step * (part + 1) / parts}, color);
+          polyline({points[i - 1] + step * part / parts, points[i - 1] + step * (part + 1) / parts}, colour);
         along_px += step.norm() / parts;
       }
     }
   }
-  void cross(const Eigen::Vector2d& p, const cv::Scalar& color) {
+  void cross(const Eigen::Vector2d& p, const cv::Scalar& colour) {
     const double arm = 6 * scale_;
-    polyline({p - Eigen::Vector2d(arm, arm), p + Eigen::Vector2d(arm, arm)}, color);
-    polyline({p - Eigen::Vector2d(arm, -arm), p + Eigen::Vector2d(arm, -arm)}, color);
+    polyline({p - Eigen::Vector2d(arm, arm), p + Eigen::Vector2d(arm, arm)}, colour);
+    polyline({p - Eigen::Vector2d(arm, -arm), p + Eigen::Vector2d(arm, -arm)}, colour);
   }
-  void dot(const Eigen::Vector2d& p, const cv::Scalar& color) {
+  void dot(const Eigen::Vector2d& p, const cv::Scalar& colour) {
     const int radius = static_cast<int>(3.5 * scale_ * (1 << bits));
     cv::circle(canvas_, at(p), radius, dark, cv::FILLED, cv::LINE_AA, bits);
-    cv::circle(canvas_, at(p), radius * 5 / 8, color, cv::FILLED, cv::LINE_AA, bits);
+    cv::circle(canvas_, at(p), radius * 5 / 8, colour, cv::FILLED, cv::LINE_AA, bits);
   }
-  void arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const cv::Scalar& color) {
+  void arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const cv::Scalar& colour) {
     const Eigen::Vector2d along = (to - from).normalized(), across(-along.y(), along.x());
-    polyline({from, to}, color, 2);
+    polyline({from, to}, colour, 2);
     polyline({to - 12 * scale_ * along + 6 * scale_ * across, to, to - 12 * scale_ * along - 6 * scale_ * across},
-             color, 2);
+             colour, 2);
   }
   // The size of a label's text, without its background.
   cv::Size text_size(const std::string& text) const {
@@ -124,7 +124,7 @@ class DrawnMarker {
     for (const double side : {-1.0, 1.0}) {
       std::vector<Eigen::Vector2d> line;
       for (int i = 0; i <= steps; ++i) line.push_back(at(side, marker_.length_m() * (-0.15 + 1.3 * i / steps)));
-      stroke(pen, line, style, outline_color);
+      stroke(pen, line, style, outline_colour);
     }
   }
   void draw_boundary(Pen& pen, std::size_t k, Style style) const {
@@ -134,21 +134,21 @@ class DrawnMarker {
       const double across = 2.0 * i / steps - 1;
       const double tau = wrap_two_pi(marker_azimuth_rad(marker_, azimuth_rad(across), psi_rad_));
       if (last_tau >= 0 && std::abs(tau - last_tau) > pi) {  // the seam: boundaries jump there
-        stroke(pen, curve, style, boundary_color);
+        stroke(pen, curve, style, boundary_colour);
         curve.clear();
       }
       last_tau = tau;
       if (!is_printed(marker_, tau)) continue;
       curve.push_back(at(across, boundaries_m(marker_, tau)[k]));
     }
-    stroke(pen, curve, style, boundary_color);
+    stroke(pen, curve, style, boundary_colour);
   }
 
  private:
   static constexpr int steps = 48;
   double azimuth_rad(double across) const { return view_->facing_azimuth_rad + across * view_->half_visible_rad; }
-  static void stroke(Pen& pen, const std::vector<Eigen::Vector2d>& line, Style style, const cv::Scalar& color) {
-    style == Style::found ? pen.polyline(line, color) : pen.dashes(line, refused_color);
+  static void stroke(Pen& pen, const std::vector<Eigen::Vector2d>& line, Style style, const cv::Scalar& colour) {
+    style == Style::found ? pen.polyline(line, colour) : pen.dashes(line, refused_colour);
   }
 
   const Camera& camera_;
@@ -165,8 +165,8 @@ void draw_rcm(Pen& pen, const Camera& camera, const Instrument& instrument, cons
   if (!ideal_px) return;
   const Eigen::Vector2d px = camera.raw_from_ideal(*ideal_px);
   if (!(px.x() >= 0 && px.x() < camera.width_px && px.y() >= 0 && px.y() < camera.height_px)) return;
-  pen.dashes({px, o.edges_raw_px[0]}, rcm_color);
-  pen.cross(px, rcm_color);
+  pen.dashes({px, o.edges_raw_px[0]}, rcm_colour);
+  pen.cross(px, rcm_colour);
   pen.label("RCM", px + Eigen::Vector2d(12, -8) * pen.scale());
 }
 
@@ -228,8 +228,8 @@ void draw_found(Pen& pen, const Camera& camera, const Instrument& instrument, co
   for (std::size_t k = 0; k < 4; ++k) marker.draw_boundary(pen, k, Style::found);
   draw_rcm(pen, camera, instrument, o);
   const Eigen::Vector2d proximal = o.edges_raw_px[0], distal = o.edges_raw_px[3];
-  pen.arrow(proximal, distal + 0.25 * (distal - proximal), axis_color);
-  for (const Eigen::Vector2d& edge : o.edges_raw_px) pen.dot(edge, boundary_color);
+  pen.arrow(proximal, distal + 0.25 * (distal - proximal), axis_colour);
+  for (const Eigen::Vector2d& edge : o.edges_raw_px) pen.dot(edge, boundary_colour);
 
   double half_px = 0;
   for (const double end_m : {0.0, instrument.marker.length_m()})
@@ -251,8 +251,8 @@ void draw_refused(Pen& pen, const Camera& camera, const Instrument& instrument, 
     }
   }
   if (refused.what == What::edges) {
-    pen.dashes({refused.edges_raw_px.front(), refused.edges_raw_px.back()}, refused_color);
-    for (const Eigen::Vector2d& edge : refused.edges_raw_px) pen.cross(edge, refused_color);
+    pen.dashes({refused.edges_raw_px.front(), refused.edges_raw_px.back()}, refused_colour);
+    for (const Eigen::Vector2d& edge : refused.edges_raw_px) pen.cross(edge, refused_colour);
   }
 }
 

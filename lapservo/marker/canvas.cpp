@@ -56,7 +56,7 @@ Canvas::~Canvas() {
   if (surface_) cairo_surface_destroy(surface_);
 }
 
-void Canvas::polygon(const std::vector<PointMm>& points, const PrintColor& fill) {
+void Canvas::polygon(const std::vector<PointMm>& points, const PrintColour& fill) {
   cairo_new_path(cairo_);
   cairo_set_source_rgb(cairo_, fill.r, fill.g, fill.b);
   for (const PointMm& p : points) cairo_line_to(cairo_, p.x, p.y);
@@ -64,9 +64,9 @@ void Canvas::polygon(const std::vector<PointMm>& points, const PrintColor& fill)
   cairo_fill(cairo_);
 }
 
-void Canvas::line(const std::vector<PointMm>& points, const PrintColor& color, double width_mm, bool dashed) {
+void Canvas::line(const std::vector<PointMm>& points, const PrintColour& colour, double width_mm, bool dashed) {
   cairo_new_path(cairo_);  // text leaves a current point behind
-  cairo_set_source_rgb(cairo_, color.r, color.g, color.b);
+  cairo_set_source_rgb(cairo_, colour.r, colour.g, colour.b);
   cairo_set_line_width(cairo_, width_mm);
   const double dash[] = {1.0, 1.0};
   cairo_set_dash(cairo_, dash, dashed ? 2 : 0, 0);
@@ -95,7 +95,7 @@ void Canvas::text(const std::string& text, PointMm at, double height_mm, Anchor 
 }
 
 void Canvas::arrow(PointMm from, PointMm to) {
-  const PrintColor black{0, 0, 0};
+  const PrintColour black{0, 0, 0};
   const double length = std::hypot(to.x - from.x, to.y - from.y);
   const double ax = (to.x - from.x) / length, ay = (to.y - from.y) / length;
   line({from, {to.x - 1.5 * ax, to.y - 1.5 * ay}}, black, 0.3);

@@ -23,8 +23,8 @@ class Canvas {
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
-  void polygon(const std::vector<PointMm>& points, const PrintColor& fill);
-  void line(const std::vector<PointMm>& points, const PrintColor& color, double width_mm, bool dashed = false);
+  void polygon(const std::vector<PointMm>& points, const PrintColour& fill);
+  void line(const std::vector<PointMm>& points, const PrintColour& colour, double width_mm, bool dashed = false);
   enum class Anchor { left, middle, right };
   void text(const std::string& text, PointMm at, double height_mm, Anchor anchor = Anchor::left, double turn_deg = 0);
   /// How far a text of this height reaches.

@@ -15,7 +15,7 @@ using namespace internal;
 namespace {
 
 using Anchor = Canvas::Anchor;
-const PrintColor black{0, 0, 0}, grey{0.55, 0.55, 0.55}, pale{0.93, 0.93, 0.93};
+const PrintColour black{0, 0, 0}, grey{0.55, 0.55, 0.55}, pale{0.93, 0.93, 0.93};
 
 constexpr double tab_mm = 4, gap_mm = 12, edge_mm = 10;  // the last: nearer to the paper's edge printers cut off
 
@@ -36,7 +36,7 @@ void draw_bands(Canvas& canvas, const Marker& marker, PointMm corner, double hei
                     {corner.x + next_upper, corner.y},
                     {corner.x + next_lower, corner.y + height_mm},
                     {corner.x + lower, corner.y + height_mm}},
-                   print_color(marker.hues_deg[band]));
+                   print_colour(marker.hues_deg[band]));
     upper = next_upper, lower = next_lower;
   }
 }
@@ -119,7 +119,7 @@ void draw_curve(Canvas& canvas, PointMm corner, double width, double height, con
 
 }  // namespace
 
-PrintColor print_color(double hue_deg) {
+PrintColour print_colour(double hue_deg) {
   constexpr double saturation = 0.97, value = 0.85;
   const auto channel = [&](double n) {
     const double k = std::fmod(n + hue_deg / 60, 6.0);

@@ -9,10 +9,10 @@
 namespace lapservo {
 
 /// Printed colour of a hue, sRGB values in [0, 1].
-struct PrintColor {
+struct PrintColour {
   double r, g, b;
 };
-PrintColor print_color(double hue_deg);
+PrintColour print_colour(double hue_deg);
 
 enum class Paper { a4, letter };
 

@@ -46,7 +46,7 @@ constexpr double rounding_mm = 0.01;
 
 // A filled polygon on a page, millimetres from its top left corner, y down.
 struct Polygon {
-  Vector3d color;
+  Vector3d colour;
   std::vector<Vector2d> points_mm;
 
   Eigen::AlignedBox2d box() const {
@@ -124,7 +124,7 @@ Page read_pdf(const std::filesystem::path& path) {
   if (!content.starts_with(turned)) throw std::runtime_error("the PDF's page is not turned y down");
   std::istringstream words(content);
   std::vector<double> stack;
-  Vector3d color = Vector3d::Zero();
+  Vector3d colour = Vector3d::Zero();
   std::vector<std::vector<Vector2d>> outlines;
   for (std::string word; words >> word;) {
     if (const auto value = parse_finite(word)) {
@@ -135,7 +135,7 @@ Page read_pdf(const std::filesystem::path& path) {
     const auto point = [&](std::size_t i) {
       return Vector2d(mm_per_point * stack.at(n - i), mm_per_point * stack.at(n - i + 1));
     };
-    if (word == "rg") color = {stack.at(n - 3), stack.at(n - 2), stack.at(n - 1)};
+    if (word == "rg") colour = {stack.at(n - 3), stack.at(n - 2), stack.at(n - 1)};
     if (word == "m") outlines.push_back({point(2)});
     if (word == "l") outlines.back().push_back(point(2));
     if (word == "re") {
@@ -144,7 +144,7 @@ Page read_pdf(const std::filesystem::path& path) {
     }
     if (word == "f")
       for (const auto& outline : outlines)
-        if (outline.size() > 2) page.polygons.push_back({color, outline});
+        if (outline.size() > 2) page.polygons.push_back({colour, outline});
     if (word == "f" || word == "S" || word == "n") outlines.clear();
     stack.clear();
   }
@@ -152,15 +152,15 @@ Page read_pdf(const std::filesystem::path& path) {
 }
 
 // In the order in which they were drawn.
-std::vector<Polygon> polygons_of(const Page& page, const PrintColor& color) {
+std::vector<Polygon> polygons_of(const Page& page, const PrintColour& colour) {
   std::vector<Polygon> found;
   for (const Polygon& polygon : page.polygons)
-    if ((polygon.color - Vector3d(color.r, color.g, color.b)).norm() < 1e-3) found.push_back(polygon);
+    if ((polygon.colour - Vector3d(colour.r, colour.g, colour.b)).norm() < 1e-3) found.push_back(polygon);
   return found;
 }
 
 std::vector<Polygon> bands_of(const Page& page, double hue_deg) {
-  return polygons_of(page, print_color(hue_deg));
+  return polygons_of(page, print_colour(hue_deg));
 }
 
 // Rolls the sheet, which lies before the reader (x right, y down, z away), around a cylinder behind it whose axis
@@ -289,7 +289,7 @@ TEST(PrintSheet, KeepsAwayFromThePapersEdges) {
       for (const auto& match : matches(text, std::regex(R"re(d="M ([\d.]+) ([\d.]+) L ([\d.]+) ([\d.]+) ?")re")))
         for (const int i : {1, 3}) points.emplace_back(number(match[i]), number(match[i + 1]));
       for (const Polygon& polygon : page.polygons)
-        if (polygon.color != Vector3d::Ones())  // else the page itself
+        if (polygon.colour != Vector3d::Ones())  // else the page itself
           points.insert(points.end(), polygon.points_mm.begin(), polygon.points_mm.end());
       for (const Vector2d& p : points)
         EXPECT_TRUE(p.x() > 10 && p.y() > 10 && p.x() < page.width_mm - 10 && p.y() < page.height_mm - 10)
@@ -377,16 +377,16 @@ TEST(MarkerPicture, IsAlsoAPng) {
   EXPECT_NE(bytes.find("IEND"), std::string::npos);
 }
 
-double hue_of_deg(const PrintColor& c) {
+double hue_of_deg(const PrintColour& c) {
   return deg_from_rad(wrap_two_pi(std::atan2(std::sqrt(3.0) * (c.g - c.b), 2 * c.r - c.g - c.b)));
 }
 
-TEST(PrintColor, HasTheHueAndIsPrintable) {
+TEST(PrintColour, HasTheHueAndIsPrintable) {
   // The hexagon's hue and the circle's agree at multiples of 30 degrees.
   for (int hue_deg = 0; hue_deg < 360; hue_deg += 30) {
-    const PrintColor color = print_color(hue_deg);
-    EXPECT_NEAR(std::remainder(hue_of_deg(color) - hue_deg, 360), 0, 1e-6) << hue_deg;
-    for (const double value : {color.r, color.g, color.b}) EXPECT_TRUE(value >= 0 && value <= 1) << hue_deg;
+    const PrintColour colour = print_colour(hue_deg);
+    EXPECT_NEAR(std::remainder(hue_of_deg(colour) - hue_deg, 360), 0, 1e-6) << hue_deg;
+    for (const double value : {colour.r, colour.g, colour.b}) EXPECT_TRUE(value >= 0 && value <= 1) << hue_deg;
   }
 }
 

@@ -95,13 +95,13 @@ std::string number(double value) {
   return fmt::format("{:.4g}", value);
 }
 
-std::string color_class(int color) {
-  return color < 0 ? "grey" : fmt::format("c{}", color % 5);
+std::string colour_class(int colour) {
+  return colour < 0 ? "grey" : fmt::format("c{}", colour % 5);
 }
 
 // A point's mark, of about the same area for every shape.
-std::string shape_path(int color, double x, double y, double size) {
-  switch (color < 0 ? 0 : color % 5) {
+std::string shape_path(int colour, double x, double y, double size) {
+  switch (colour < 0 ? 0 : colour % 5) {
     case 1:
       return fmt::format("M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z", x - 0.9 * size, y - 0.9 * size, 1.8 * size, 1.8 * size,
                          -1.8 * size);
@@ -160,9 +160,10 @@ std::string points_of(const Plot& plot, const Layout& layout, const Series& seri
   std::string text;
   for (std::size_t i = 0; i < series.x.size(); ++i) {
     if (!drawable(layout, series, i)) continue;
-    text += fmt::format(
-        "<path class=\"{}{}\" d=\"{}\"><title>{}</title></path>\n", point_class(series.draw), color_class(series.color),
-        shape_path(series.color, layout.x(series.x[i]), layout.y(series.y[i]), size), hover_text(plot, series, i));
+    text += fmt::format("<path class=\"{}{}\" d=\"{}\"><title>{}</title></path>\n", point_class(series.draw),
+                        colour_class(series.colour),
+                        shape_path(series.colour, layout.x(series.x[i]), layout.y(series.y[i]), size),
+                        hover_text(plot, series, i));
   }
   return text;
 }
@@ -182,13 +183,13 @@ Box box_of(const std::vector<double>& values) {
   return box;
 }
 
-std::string box_at(const Layout& layout, double x_px, double half_px, const Box& box, const std::string& color) {
+std::string box_at(const Layout& layout, double x_px, double half_px, const Box& box, const std::string& colour) {
   const double low = layout.y(box.low), high = layout.y(box.high), middle = layout.y(box.median);
-  return fmt::format("<path class=\"bar s-{0}\" d=\"M{1:.1f} {2:.1f}V{3:.1f}M{1:.1f} {4:.1f}V{5:.1f}\"/>", color, x_px,
+  return fmt::format("<path class=\"bar s-{0}\" d=\"M{1:.1f} {2:.1f}V{3:.1f}M{1:.1f} {4:.1f}V{5:.1f}\"/>", colour, x_px,
                      layout.y(box.low_whisker), low, high, layout.y(box.high_whisker)) +
-         fmt::format("<path class=\"box s-{0} f-{0}\" d=\"M{1:.1f} {2:.1f}h{3:.1f}V{4:.1f}h{5:.1f}z\"/>", color,
+         fmt::format("<path class=\"box s-{0} f-{0}\" d=\"M{1:.1f} {2:.1f}h{3:.1f}V{4:.1f}h{5:.1f}z\"/>", colour,
                      x_px - half_px, low, 2 * half_px, high, -2 * half_px) +
-         fmt::format("<path class=\"line s-{0}\" d=\"M{1:.1f} {2:.1f}h{3:.1f}\"/>\n", color, x_px - half_px, middle,
+         fmt::format("<path class=\"line s-{0}\" d=\"M{1:.1f} {2:.1f}h{3:.1f}\"/>\n", colour, x_px - half_px, middle,
                      2 * half_px);
 }
 
@@ -197,11 +198,11 @@ std::string boxes_of(const Plot& plot, const Layout& layout, const Series& serie
   for (std::size_t i = 0; i < series.x.size(); ++i)
     if (drawable(layout, series, i)) by_x[series.x[i]].push_back(series.y[i]);
   const double room_px = std::abs(layout.x.at_high_px - layout.x.at_low_px) / (static_cast<double>(by_x.size()) + 1);
-  Series beyond{series.name, {}, {}, Draw::points, series.color};
+  Series beyond{series.name, {}, {}, Draw::points, series.colour};
   std::string text;
   for (const auto& [x, values] : by_x) {
     const Box box = box_of(values);
-    text += box_at(layout, layout.x(x), std::min(12.0, 0.3 * room_px), box, color_class(series.color));
+    text += box_at(layout, layout.x(x), std::min(12.0, 0.3 * room_px), box, colour_class(series.colour));
     for (const double value : values)
       if (value < box.low_whisker || value > box.high_whisker) beyond.x.push_back(x), beyond.y.push_back(value);
   }
@@ -225,7 +226,7 @@ std::string drawn(const Plot& plot, const Layout& layout, const Series& given) {
   const Series series = many ? thinned(given, static_cast<int>(width_px)) : given;
   std::string text;
   if (has_line(series.draw))
-    text += fmt::format("<path class=\"line s-{}{}\" d=\"{}\"/>\n", color_class(series.color),
+    text += fmt::format("<path class=\"line s-{}{}\" d=\"{}\"/>\n", colour_class(series.colour),
                         series.draw == Draw::dashed ? " dashed" : "", line_path(layout, series));
   return text + (has_points(series.draw) ? points_of(plot, layout, series) : hover_points_of(plot, layout, series));
 }
@@ -254,13 +255,13 @@ std::vector<LegendEntry> legend_of(const Plot& plot) {
 std::string drawn(const LegendEntry& entry) {
   std::string text;
   const double middle = entry.y_px - 4.5;
-  const int color = entry.series ? entry.series->color : -1;
+  const int colour = entry.series ? entry.series->colour : -1;
   if (!entry.series || has_line(entry.series->draw) || !has_points(entry.series->draw))
-    text += fmt::format("<path class=\"line s-{}{}\" d=\"M{:.1f} {:.1f}h22\"/>", color_class(color),
+    text += fmt::format("<path class=\"line s-{}{}\" d=\"M{:.1f} {:.1f}h22\"/>", colour_class(colour),
                         !entry.series || entry.series->draw == Draw::dashed ? " dashed" : "", entry.x_px, middle);
   if (entry.series && has_points(entry.series->draw))
-    text += fmt::format("<path class=\"{}{}\" d=\"{}\"/>", point_class(entry.series->draw), color_class(color),
-                        shape_path(color, entry.x_px + 11, middle, 4));
+    text += fmt::format("<path class=\"{}{}\" d=\"{}\"/>", point_class(entry.series->draw), colour_class(colour),
+                        shape_path(colour, entry.x_px + 11, middle, 4));
   return text +
          fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", entry.x_px + 28, entry.y_px, escaped(entry.name));
 }

@@ -6,10 +6,10 @@
 
 namespace lapservo::internal {
 
-/// How a series is drawn. Its colour and the shape of its points follow from `Series::color`. `rings`: points as larger
-/// outlines, which show around points of another series at the same places. `boxes`: the points of
-/// equal x as one box from quartile to quartile with its median; whiskers to the farthest point within 1.5 times the
-/// box's height, the points beyond as points.
+/// How a series is drawn. Its colour and the shape of its points follow from `Series::colour`. `rings`: points as
+/// larger outlines, which show around points of another series at the same places. `boxes`: the points of equal x as
+/// one box from quartile to quartile with its median; whiskers to the farthest point within 1.5 times the box's height,
+/// the points beyond as points.
 enum class Draw { line, dashed, points, rings, line_and_points, boxes };
 
 /// A run of points, in the units of the axes. Points that are not finite leave a gap.
@@ -17,7 +17,7 @@ struct Series {
   std::string name;
   std::vector<double> x, y;
   Draw draw = Draw::line;
-  int color = 0;  ///< 0 to 4, of the report's palette; -1 grey
+  int colour = 0;  ///< 0 to 4, of the report's palette; -1 grey
 };
 
 struct Axis {

@@ -119,9 +119,9 @@ Plot hostile_plot() {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
   const std::string name = "<script>&\"'</title>";
   Plot plot{name, {name, name, {}, {}}, {name, name, {}, {}}, {}, {{name, 3}}, false};
-  int color = -1;
+  int colour = -1;
   for (const Draw draw : {Draw::line, Draw::dashed, Draw::points, Draw::rings, Draw::line_and_points})
-    plot.series.push_back({name, {0, 1, nan, 3, 4, -infinity}, {1, infinity, 2, nan, 5, 0}, draw, color++});
+    plot.series.push_back({name, {0, 1, nan, 3, 4, -infinity}, {1, infinity, 2, nan, 5, 0}, draw, colour++});
   return plot;
 }
 

@@ -8,7 +8,7 @@
 
 namespace lapservo::internal {
 
-Light printed_color(double hue_deg) {
+Light printed_colour(double hue_deg) {
   constexpr double saturation = 0.91, value = 0.84;
   const auto channel = [&](double n) {
     const double k = std::fmod(n + hue_deg / 60, 6.0);
@@ -29,9 +29,9 @@ std::array<Light, 8> reflectances(const Marker& marker) {
   std::array<Light, 8> of_part;
   const auto set = [&](Part part, const Light& light) { of_part.at(static_cast<std::size_t>(part)) = light; };
   set(Part::nothing, Light::Zero());
-  set(Part::band_0, printed_color(marker.hues_deg[0]));
-  set(Part::band_1, printed_color(marker.hues_deg[1]));
-  set(Part::band_2, printed_color(marker.hues_deg[2]));
+  set(Part::band_0, printed_colour(marker.hues_deg[0]));
+  set(Part::band_1, printed_colour(marker.hues_deg[1]));
+  set(Part::band_2, printed_colour(marker.hues_deg[2]));
   set(Part::shaft, Light::Constant(0.023F));
   set(Part::film_edge, Light::Zero());  // that of the band there
   set(Part::tip, Light::Constant(0.2F));

@@ -46,6 +46,6 @@ Lighting at_power(Lighting lighting, float power);
 std::array<Light, 8> reflectances(const Marker& marker);
 
 /// Reflectance in linear light of a printed hue: HSV(hue, 0.91, 0.84) in sRGB values, b g r.
-Light printed_color(double hue_deg);
+Light printed_colour(double hue_deg);
 
 }  // namespace lapservo::internal

@@ -32,7 +32,7 @@ struct NoiseRow {
   const float *organ, *fold, *grain, *vessel;
 };
 
-void color_row(const NoiseRow& noise, int width_px, float* light) {
+void colour_row(const NoiseRow& noise, int width_px, float* light) {
   constexpr float liver[3] = {0.035F, 0.022F, 0.13F}, fat[3] = {0.16F, 0.38F, 0.62F}, pink[3] = {0.22F, 0.2F, 0.5F},
                   blood[3] = {0.03F, 0.015F, 0.22F};
   for (int u = 0; u < width_px; ++u) {
@@ -42,10 +42,10 @@ void color_row(const NoiseRow& noise, int width_px, float* light) {
     const float to_blood = std::clamp(0.7F * (1 - thin / 0.035F), 0.0F, 1.0F);
     const float shade = std::max(0.05F, 0.75F + 0.45F * noise.fold[u] + 0.08F * noise.grain[u]);
     for (int c = 0; c < 3; ++c) {
-      float color = liver[c] + (pink[c] - liver[c]) * to_pink;
-      color += (fat[c] - color) * to_fat;
-      color += (blood[c] - color) * to_blood;
-      light[3 * u + c] = color * shade;
+      float colour = liver[c] + (pink[c] - liver[c]) * to_pink;
+      colour += (fat[c] - colour) * to_fat;
+      colour += (blood[c] - colour) * to_blood;
+      light[3 * u + c] = colour * shade;
     }
   }
 }
@@ -97,8 +97,8 @@ cv::Mat make_tissue(int width_px, int height_px, std::uint64_t seed) {
                 vessel = octaves(width_px, height_px, 8, 4, random);
   cv::Mat light(height_px, width_px, CV_32FC3);
   for (int v = 0; v < height_px; ++v)
-    color_row({organ.ptr<float>(v), fold.ptr<float>(v), grain.ptr<float>(v), vessel.ptr<float>(v)}, width_px,
-              light.ptr<float>(v));
+    colour_row({organ.ptr<float>(v), fold.ptr<float>(v), grain.ptr<float>(v), vessel.ptr<float>(v)}, width_px,
+               light.ptr<float>(v));
   add_highlights(light, random);
   darken_outside_field(light);
   return light;

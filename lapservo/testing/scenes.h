@@ -54,13 +54,13 @@ class Sight {
   Scene scene(std::size_t instrument = 0) const;
   const LightImage& light() const { return light_; }
   const ImageView& view() const { return view_; }
-  const ColorClasses& classes() const { return classes_; }
+  const ColourClasses& classes() const { return classes_; }
 
  private:
   Rig rig_;
   cv::Mat bgr_;
   ImageView view_;
-  ColorClasses classes_;
+  ColourClasses classes_;
   std::array<float, 256> table_;
   LightImage light_;
 };

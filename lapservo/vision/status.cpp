@@ -15,7 +15,7 @@ constexpr Words<Status, 11> status_words{{{Status::ok, "ok"},
                                           {Status::uncertain, "uncertain"},
                                           {Status::marker_mismatch, "marker_mismatch"},
                                           {Status::damaged, "damaged"},
-                                          {Status::few_colors, "few_colors"},
+                                          {Status::few_colours, "few_colours"},
                                           {Status::interlaced, "interlaced"}}};
 static_assert(names_all(status_words, Status::interlaced));
 

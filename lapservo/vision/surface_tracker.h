@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/rig/rig.h"
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/memory/frame_clock.h"
 #include "lapservo/vision/memory/instrument_memory.h"
 #include "lapservo/vision/memory/print_record.h"
@@ -52,7 +52,7 @@ class SurfaceTracker {
   Rig rig_;
   bool single_;
   std::optional<double> frame_budget_;
-  ColorClasses classes_;
+  ColourClasses classes_;
   std::array<float, 256> light_;
   ChannelGeometry channels_;
   FrameClock clock_;

@@ -311,7 +311,7 @@ std::vector<cv::Mat> rivals_that_change_places(const Rig& both, Random& random, 
   for (;;) {
     const auto configurations = apart(both, random);
     cv::Mat frame = scenes::render(both, configurations, seed);
-    const ColorClasses classes(both.instruments);
+    const ColourClasses classes(both.instruments);
     std::vector<cv::Mat> frames;
     std::vector<std::size_t> largest;
     for (std::size_t hidden = 0; hidden < 2; ++hidden) {

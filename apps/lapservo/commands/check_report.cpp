@@ -26,9 +26,9 @@ using Point = std::optional<std::pair<double, double>>;
 
 // A point for each item that has one.
 template <typename Items, typename PointOf>
-void add_points(Plot& plot, const std::string& name, int color, const Items& items, PointOf point_of,
+void add_points(Plot& plot, const std::string& name, int colour, const Items& items, PointOf point_of,
                 Draw draw = Draw::points) {
-  Series series{name, {}, {}, draw, color};
+  Series series{name, {}, {}, draw, colour};
   for (const auto& item : items)
     if (const Point point = point_of(item)) series.x.push_back(point->first), series.y.push_back(point->second);
   if (!series.x.empty()) plot.series.push_back(std::move(series));
@@ -99,7 +99,7 @@ Plot print_plot(const std::vector<PrintResidual>& residuals) {
 }
 
 // Light where sigma is small, orange at the limit, dark beyond it; the lightness alone distinguishes them, too.
-cv::Scalar color_of(double sigma_rad) {
+cv::Scalar colour_of(double sigma_rad) {
   const double part = std::min(1.0, sigma_rad / (2 * rig_limits.sigma_rad));
   const cv::Scalar small(250, 240, 225), large(20, 70, 190);
   return small + part * (large - small);
@@ -123,7 +123,7 @@ Picture map_picture(const SigmaMap& map) {
       const auto at = static_cast<std::size_t>(row * SigmaMap::columns + column);
       const auto& sigma_rad = map.sigma_rad[at];
       if (map.lost[at]) cv::rectangle(canvas, cell, cv::Scalar(60, 60, 60), cv::FILLED);
-      if (sigma_rad) cv::rectangle(canvas, cell, color_of(*sigma_rad), cv::FILLED);
+      if (sigma_rad) cv::rectangle(canvas, cell, colour_of(*sigma_rad), cv::FILLED);
       cv::rectangle(canvas, cell, cv::Scalar(200, 200, 200));
       const bool beyond = map.lost[at] || (sigma_rad && *sigma_rad > 1.4 * rig_limits.sigma_rad);
       const cv::Scalar ink = beyond ? cv::Scalar(255, 255, 255) : cv::Scalar(50, 50, 50);

@@ -163,7 +163,7 @@ int run_print(const RigOptions& options) {
 // Rows of tau, columns along the shaft; colours on a terminal, else the band's number.
 void show_in_terminal(const Marker& marker) {
   constexpr int rows = 16, columns = 48;
-  const bool colors = ::isatty(STDOUT_FILENO) != 0;
+  const bool colours = ::isatty(STDOUT_FILENO) != 0;
   for (int row = 0; row < rows; ++row) {
     const double tau_rad = two_pi * (row + 0.5) / rows;
     const auto e = boundaries_m(marker, tau_rad);
@@ -171,9 +171,9 @@ void show_in_terminal(const Marker& marker) {
     for (int column = 0; column < columns; ++column) {
       const double along_m = marker.length_m() * (column + 0.5) / columns;
       const std::size_t band = along_m < e[1] ? 0 : (along_m < e[2] ? 1 : 2);
-      const PrintColor c = print_color(marker.hues_deg[band]);
-      line += colors ? fmt::format("\033[48;2;{:.0f};{:.0f};{:.0f}m \033[0m", 255 * c.r, 255 * c.g, 255 * c.b)
-                     : std::to_string(band);
+      const PrintColour c = print_colour(marker.hues_deg[band]);
+      line += colours ? fmt::format("\033[48;2;{:.0f};{:.0f};{:.0f}m \033[0m", 255 * c.r, 255 * c.g, 255 * c.b)
+                      : std::to_string(band);
     }
     std::puts(line.c_str());
   }

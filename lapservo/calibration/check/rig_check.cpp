@@ -11,7 +11,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
 #include "lapservo/marker/sensitivity.h"
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 
 namespace lapservo::internal {
 namespace {
@@ -48,7 +48,7 @@ std::optional<MarkerLight> typical_light(const std::vector<FrameEvidence>& frame
   light.clipped = median_over(frames, [](const FrameEvidence& f) { return f.light->clipped; });
   light.value = median_over(frames, [](const FrameEvidence& f) { return f.light->value; });
   light.chroma = median_over(frames, [](const FrameEvidence& f) { return f.light->chroma; });
-  light.colored = median_over(frames, [](const FrameEvidence& f) { return f.light->colored; });
+  light.coloured = median_over(frames, [](const FrameEvidence& f) { return f.light->coloured; });
   for (std::size_t band = 0; band < 3; ++band)
     light.hues_deg[band] = median_over(frames, [&](const FrameEvidence& f) { return f.light->hues_deg[band]; });
   return light;

@@ -11,7 +11,7 @@
 #include "lapservo/calibration/colour/marker_response.h"
 #include "lapservo/calibration/fit/robust_scale.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/tracker.h"
 
 namespace lapservo::internal {
@@ -239,7 +239,7 @@ ColourCalibration calibrate_colour(const Rig& rig, std::size_t instrument, const
 }
 
 cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig) {
-  const ColorClasses classes(rig.instruments);
+  const ColourClasses classes(rig.instruments);
   std::vector<cv::Vec3b> paints(static_cast<std::size_t>(classes.count()) + 1);
   for (std::size_t i = 0; i < rig.instruments.size(); ++i)
     for (std::size_t band = 0; band < 3; ++band) {
@@ -253,8 +253,8 @@ cv::Mat segmentation_picture(const cv::Mat& bgr, const Rig& rig) {
   picture *= 0.6;
   for (int v = 0; v < bgr.rows; ++v)
     for (int u = 0; u < bgr.cols; ++u)
-      if (const auto color = classes(bgr.ptr(v) + 3 * static_cast<std::ptrdiff_t>(u)))
-        picture.at<cv::Vec3b>(v, u) = paints[color];
+      if (const auto colour = classes(bgr.ptr(v) + 3 * static_cast<std::ptrdiff_t>(u)))
+        picture.at<cv::Vec3b>(v, u) = paints[colour];
   return picture;
 }
 

@@ -9,7 +9,7 @@
 #include "lapservo/sim/renderer.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/scenes.h"
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 
 namespace lapservo::internal {
 namespace {

@@ -122,7 +122,7 @@ cv::Mat pixels_of(const libav::Frame& decoded) {
 struct Encoding {
   std::string_view extension;
   const char* encoder;
-  AVPixelFormat color, grey;  ///< none: grey is written as colour, or colour as grey
+  AVPixelFormat colour, grey;  ///< none: grey is written as colour, or colour as grey
   const char *option = nullptr, *value = nullptr;
 };
 constexpr std::array encodings{
@@ -155,8 +155,8 @@ cv::Mat laid_out(const cv::Mat& image, AVPixelFormat format) {
 }
 
 AVPixelFormat format_of(const Encoding& encoding, bool is_grey) {
-  if (is_grey) return encoding.grey != AV_PIX_FMT_NONE ? encoding.grey : encoding.color;
-  return encoding.color != AV_PIX_FMT_NONE ? encoding.color : encoding.grey;
+  if (is_grey) return encoding.grey != AV_PIX_FMT_NONE ? encoding.grey : encoding.colour;
+  return encoding.colour != AV_PIX_FMT_NONE ? encoding.colour : encoding.grey;
 }
 
 libav::Codec open_encoder(const Encoding& encoding, AVPixelFormat format, const cv::Mat& pixels) {

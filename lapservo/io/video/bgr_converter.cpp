@@ -80,9 +80,9 @@ libav::Scaler scaler_of(const cv::Size& size, AVPixelFormat format, const Place&
   return sws_init_context(scaler.get(), nullptr, nullptr) < 0 ? nullptr : std::move(scaler);
 }
 
-void set_colors(SwsContext& scaler, const YuvColors& colors) {
+void set_colours(SwsContext& scaler, const YuvColours& colours) {
   constexpr int unity = 1 << 16;
-  sws_setColorspaceDetails(&scaler, sws_getCoefficients(coefficients_of(colors.matrix)), colors.full_range ? 1 : 0,
+  sws_setColorspaceDetails(&scaler, sws_getCoefficients(coefficients_of(colours.matrix)), colours.full_range ? 1 : 0,
                            sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, unity, unity);
 }
 
@@ -120,10 +120,10 @@ bool BgrConverter::set_up(const Source& source) {
   const int fields = source.by_field ? 2 : 1;
   const cv::Size size(source.width_px, source.height_px), scaled(size.width, size.height / fields);
   for (int field = 0; field < fields; ++field) {
-    const Place chroma = place_in(source.colors.chroma, format, source.by_field, field);
+    const Place chroma = place_in(source.colours.chroma, format, source.by_field, field);
     libav::Scaler scaler = scaler_of(scaled, source.format, chroma, has_chroma(format));
     if (!scaler) return false;
-    if (!is_rgb(format)) set_colors(*scaler, source.colors);
+    if (!is_rgb(format)) set_colours(*scaler, source.colours);
     scalers_.push_back(std::move(scaler));
   }
   for (cv::Mat& plane : planes_) plane = has_chroma(format) ? plane_of(size) : cv::Mat();
@@ -131,12 +131,12 @@ bool BgrConverter::set_up(const Source& source) {
   return true;
 }
 
-bool BgrConverter::convert(const AVFrame& frame, const YuvColors& colors, bool by_field, cv::Mat& bgr) {
+bool BgrConverter::convert(const AVFrame& frame, const YuvColours& colours, bool by_field, cv::Mat& bgr) {
   const AVPixelFormat format = pixel_format_of(frame);
   const AVPixFmtDescriptor* const description = av_pix_fmt_desc_get(format);
   if (!description) return false;
   const bool split = by_field && has_chroma(*description) && description->log2_chroma_h == 1 && frame.height % 4 == 0;
-  const Source source{frame.width, frame.height, format, colors, split};
+  const Source source{frame.width, frame.height, format, colours, split};
   if (source != source_ && !set_up(source)) return false;
   bgr.create(frame.height, frame.width, CV_8UC3);
   const bool to_planes = !planes_[0].empty();

@@ -18,15 +18,15 @@ AVPixelFormat pixel_format_of(const AVFrame& frame);
 /// samples that are repeated instead shift colour boundaries by up to half a pixel.
 class BgrConverter {
  public:
-  /// `colors`: of frames that hold no RGB. `by_field`: the rows are two fields', and chroma that has fewer rows (4:2:0)
-  /// belongs to each by itself. False for pixels that swscale can't read.
-  bool convert(const AVFrame& frame, const YuvColors& colors, bool by_field, cv::Mat& bgr);
+  /// `colours`: of frames that hold no RGB. `by_field`: the rows are two fields', and chroma that has fewer rows
+  /// (4:2:0) belongs to each by itself. False for pixels that swscale can't read.
+  bool convert(const AVFrame& frame, const YuvColours& colours, bool by_field, cv::Mat& bgr);
 
  private:
   struct Source {
     int width_px = 0, height_px = 0;
     AVPixelFormat format = AV_PIX_FMT_NONE;
-    YuvColors colors;
+    YuvColours colours;
     bool by_field = false;
     bool operator==(const Source&) const = default;
   };

@@ -27,9 +27,9 @@ cv::Mat edges() {
   for (int row = 0; row < side_px; ++row)
     for (int i = 0; i < side_px; ++i) {
       const double share = std::clamp(i + 0.5 - place_px(row), 0.0, 1.0);
-      const cv::Scalar color = (1 - share) * before + share * after;
+      const cv::Scalar colour = (1 - share) * before + share * after;
       for (const cv::Point& at : {cv::Point(i, row), cv::Point(side_px + row, i)})
-        picture(cv::Rect(at, cv::Size(1, 1))).setTo(color);
+        picture(cv::Rect(at, cv::Size(1, 1))).setTo(colour);
     }
   return picture;
 }

@@ -47,7 +47,7 @@ void set_quality(AVCodecContext& codec) {
 
 // The values of sRGB by Rec. 601's matrix: swscale's default for BGR, in both directions. Chroma's samples lie amid
 // four pixels, which is not a reader's default.
-void set_colors(AVCodecContext& codec) {
+void set_colours(AVCodecContext& codec) {
   codec.color_range = AVCOL_RANGE_MPEG;
   codec.colorspace = AVCOL_SPC_SMPTE170M;
   codec.color_primaries = AVCOL_PRI_BT709;
@@ -108,7 +108,7 @@ void VideoEncoder::open_codec(const cv::Size& size, double frames_per_second) {
   codec_->max_b_frames = 0;  // so that times are in order in containers that know no other
   if (file_->oformat->flags & AVFMT_GLOBALHEADER) codec_->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   set_quality(*codec_);
-  set_colors(*codec_);
+  set_colours(*codec_);
   if (avcodec_open2(codec_.get(), encoder, nullptr) < 0) refuse();
 }
 

@@ -18,7 +18,7 @@ extern "C" {
 #include "lapservo/io/pictures/jpeg_picture.h"
 #include "lapservo/io/video/bgr_converter.h"
 #include "lapservo/io/video/libav.h"
-#include "lapservo/io/video/yuv_colors.h"
+#include "lapservo/io/video/yuv_colours.h"
 
 namespace lapservo::internal {
 namespace {
@@ -44,7 +44,7 @@ class VideoReader::State {
         kind_(kind),
         patience_(patience),
         fields_(reading.deinterlaced),
-        given_(given_colors(reading.colour_matrix, reading.chroma_location)) {
+        given_(given_colours(reading.colour_matrix, reading.chroma_location)) {
     av_log_set_level(AV_LOG_QUIET);
     open();
     stream_ = format_->streams[choose_stream()];
@@ -209,12 +209,12 @@ class VideoReader::State {
 
   // By each frame's own tags: a stream's may change.
   void convert() {
-    const auto colors = yuv_colors_of(*frame_, stream_->codecpar->codec_id, of_software_, given_);
-    if (!colors)
+    const auto colours = yuv_colours_of(*frame_, stream_->codecpar->codec_id, of_software_, given_);
+    if (!colours)
       throw InputError(source_, "colour matrix", av_color_space_name(frame_->colorspace),
                        "bt709, smpte170m, bt470bg, bt2020nc, fcc or smpte240m (convert it: ffmpeg -i IN -vf "
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
-    if (!converter_.convert(*frame_, *colors, fields_, last_))
+    if (!converter_.convert(*frame_, *colours, fields_, last_))
       throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
     if (frames_ == 0 && !given_.matrix) remark_ = remark_on_matrix(*frame_, of_software_);
   }
@@ -228,7 +228,7 @@ class VideoReader::State {
   libav::Packet packet_{av_packet_alloc()};
   libav::Frame frame_{av_frame_alloc()};
   bool fields_;
-  GivenColors given_;
+  GivenColours given_;
   std::string remark_;
   bool of_software_ = false;  // a software encoder wrote the stream
   BgrConverter converter_;

@@ -32,7 +32,7 @@ AVPixelFormat format_of(YuvPicture::Layout layout) {
 }  // namespace
 
 // swscale reads beyond the ends of rows: a copy has room for that.
-bool convert_to_bgr(const YuvPicture& picture, const YuvColors& colors, cv::Mat& bgr) {
+bool convert_to_bgr(const YuvPicture& picture, const YuvColours& colours, cv::Mat& bgr) {
   thread_local BgrConverter converter;  // which serves images of one kind after another
   const AVPixelFormat format = format_of(picture.layout);
   const libav::Frame frame(av_frame_alloc());
@@ -43,7 +43,7 @@ bool convert_to_bgr(const YuvPicture& picture, const YuvColors& colors, cv::Mat&
   if (av_frame_get_buffer(frame.get(), 0) < 0) return false;
   auto planes = picture.planes;
   av_image_copy(frame->data, frame->linesize, planes.data(), picture.steps.data(), format, frame->width, frame->height);
-  return converter.convert(*frame, colors, picture.by_field, bgr);
+  return converter.convert(*frame, colours, picture.by_field, bgr);
 }
 
 }  // namespace lapservo::internal

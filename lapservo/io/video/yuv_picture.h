@@ -15,11 +15,11 @@ enum class YuvMatrix { bt601, bt709, bt2020, fcc, smpte240m };
 enum class ChromaSite { left, centre, top_left, top, bottom_left, bottom };
 
 /// How luma and chroma become red, green and blue.
-struct YuvColors {
+struct YuvColours {
   YuvMatrix matrix = YuvMatrix::bt601;
   bool full_range = false;  ///< 0 to 255 and not 16 to 235
   ChromaSite chroma = ChromaSite::left;
-  bool operator==(const YuvColors&) const = default;
+  bool operator==(const YuvColours&) const = default;
 };
 
 /// Matrix of images without a tag: as in players and GStreamer, Rec. 709's from 720 rows on, else Rec. 601's.
@@ -39,6 +39,6 @@ struct YuvPicture {
 
 /// 8-bit BGR of it; in the memory of `bgr` where that is of its size and type. False where it has no size that can be
 /// converted.
-bool convert_to_bgr(const YuvPicture& picture, const YuvColors& colors, cv::Mat& bgr);
+bool convert_to_bgr(const YuvPicture& picture, const YuvColours& colours, cv::Mat& bgr);
 
 }  // namespace lapservo::internal

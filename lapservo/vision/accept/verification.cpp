@@ -9,7 +9,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
-#include "lapservo/vision/accept/color_evidence.h"
+#include "lapservo/vision/accept/colour_evidence.h"
 #include "lapservo/vision/memory/print_record.h"
 
 namespace lapservo::internal {
@@ -32,7 +32,7 @@ double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azim
 }
 
 // The print's fault, not the scene's: a boundary is not where it should be on lines on which nothing hides it.
-bool misses_a_boundary(const Scene& scene, const FineFit& fit, const ColorAgreement& agreement) {
+bool misses_a_boundary(const Scene& scene, const FineFit& fit, const ColourAgreement& agreement) {
   if (agreement.matching <= limits.unhidden_matching || fit.blur.boundaries_px >= limits.unblurred_px) return false;
   for (std::size_t k = 0; k < 4; ++k) {
     if (fit.in_image[k] < limits.enough_lines || fit.used[k] >= limits.missed_fraction * fit.in_image[k]) continue;
@@ -68,7 +68,7 @@ int fewest_lines(const FineFit& fit) {
 bool is_the_markers(const Scene& scene, const FineFit& fit, std::size_t boundary) {
   if (fit.used[boundary] >= fewest_lines(fit)) return true;
   return fit.used[boundary] >= limits.confirmed_lines &&
-         lines_with_both_colors(scene, fit.unknowns.pose(), boundary, fit.lines) >= limits.confirmed_lines;
+         lines_with_both_colours(scene, fit.unknowns.pose(), boundary, fit.lines) >= limits.confirmed_lines;
 }
 
 // Whether points are missed since the camera's processing scatters them, as clipped colours do, and not since blood
@@ -104,7 +104,7 @@ bool would_show_a_print_that_is_off(const Scene& scene, const FineFit& fit, bool
 }
 
 // Another instrument's colours beside a marker that shows as it should are no reason to doubt it.
-bool shows_wholly_among_others(const Scene& scene, const ColorAgreement& agreement, const FineFit& fit) {
+bool shows_wholly_among_others(const Scene& scene, const ColourAgreement& agreement, const FineFit& fit) {
   return scene.among_others && agreement.matching > limits.matching_among_others &&
          fit.located_fraction() > limits.located_among_others;
 }
@@ -128,7 +128,7 @@ double max_sigma_suspected_rad(const FineFit& fit) {
 }
 
 // Sigma of psi, and whom to blame when it is too large: the print or the picture.
-Status validate_sigma(const Scene& scene, const FineFit& fit, const ColorAgreement& agreement) {
+Status validate_sigma(const Scene& scene, const FineFit& fit, const ColourAgreement& agreement) {
   const bool off = fit.print_off_probability > limits.certainly_off;
   const double limit = squared(off ? limits.max_sigma_print_off_rad : limits.max_sigma_psi_rad);
   const double by_tolerance = fit.psi_variance_by_tolerance;
@@ -159,10 +159,10 @@ bool tells_psi(const FineFit& fit) {
          squared(told_times * limits.max_sigma_told_rad) + limits.tolerance_slack * fit.psi_variance_by_tolerance;
 }
 
-ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
+ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose) {
   constexpr int azimuths = 13, places = 40, margin = 5;
   constexpr double beside_radii = 1.2;
-  ColorAgreement agreement;
+  ColourAgreement agreement;
   const auto view = view_cylinder(pose.camera_from_unrolled, scene.marker.radius_m());
   if (!view) return agreement;
   const double length_m = scene.marker.length_m(), ring_m = 0.1 * length_m;
@@ -188,18 +188,18 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
       const bool on_marker = band >= 1 && band <= 3;
       total += on_marker;
       const Eigen::Vector3d point = base + along_m * axis;
-      const std::uint8_t color = on_marker ? scene.class_on_shaft(point) : scene.class_at_point(point);
-      if (color == Scene::outside) continue;
-      const bool ours = scene.is_ours(color);
+      const std::uint8_t colour = on_marker ? scene.class_on_shaft(point) : scene.class_at_point(point);
+      if (colour == Scene::outside) continue;
+      const bool ours = scene.is_ours(colour);
       if (!on_marker) {
         const std::size_t end = band < 1 ? 0 : 1;
         const double past_m = end == 0 ? ends_m[0] - along_m : along_m - ends_m[3];
-        if (past_m < ring_m) ++ring[end], spilled[end] += color == scene.bands[2 * end];
+        if (past_m < ring_m) ++ring[end], spilled[end] += colour == scene.bands[2 * end];
         ++outer, beyond += ours;
         continue;
       }
       ++inside;
-      const bool match = color == scene.bands[static_cast<std::size_t>(band - 1)];
+      const bool match = colour == scene.bands[static_cast<std::size_t>(band - 1)];
       matching += match, wrong += ours && !match;
     }
   }
@@ -207,8 +207,8 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
     const Eigen::Vector3d base = pose.camera_from_unrolled * surface_point(beside_radii * scene.marker.radius_m(),
                                                                            view->facing_azimuth_rad + side * pi / 2, 0);
     for (int k = 0; k < places; ++k) {
-      const std::uint8_t color = scene.class_at_point(base + length_m * (k + 0.5) / places * axis);
-      if (color != Scene::outside) ++flank, beside += scene.is_ours(color);
+      const std::uint8_t colour = scene.class_at_point(base + length_m * (k + 0.5) / places * axis);
+      if (colour != Scene::outside) ++flank, beside += scene.is_ours(colour);
     }
   }
   const auto fraction = [](int part, int whole) { return whole ? static_cast<double>(part) / whole : 0; };
@@ -219,7 +219,7 @@ ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose) {
 
 Status validate(const Scene& scene, const FineFit& fit) {
   if (!fit.converged) return Status::poor_fit;
-  const ColorAgreement agreement = color_agreement(scene, fit.unknowns.pose());
+  const ColourAgreement agreement = colour_agreement(scene, fit.unknowns.pose());
   const bool in_image = agreement.in_image > limits.wholly_in_image;
   const Status too_little = in_image || !scene.others.empty() ? Status::occluded : Status::cut;
   if (agreement.in_image < limits.min_in_image) return too_little;

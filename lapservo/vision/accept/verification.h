@@ -96,7 +96,7 @@ struct ValidationLimits {
 inline constexpr ValidationLimits validation_limits;
 
 /// How well the frame's colours agree with the marker at a pose, over a grid of its visible surface.
-struct ColorAgreement {
+struct ColourAgreement {
   double matching = 0;  ///< fraction of the samples inside the image that have the predicted colour
   double wrong = 0;     ///< fraction that has another of the marker's colours
   double in_image = 0;  ///< fraction of the visible surface that lies inside the image
@@ -104,7 +104,7 @@ struct ColorAgreement {
   double beside = 0;    ///< fraction of the places just outside both sides that has a marker's colour
   double spilled = 0;   ///< fraction of the ring just beyond an end that has that end's colour, of both the larger
 };
-ColorAgreement color_agreement(const Scene& scene, const ShaftPose& pose);
+ColourAgreement colour_agreement(const Scene& scene, const ShaftPose& pose);
 
 /// Enough of the boundary points are located to blame the print or the registration.
 bool is_well_seen(const FineFit& fit);

@@ -30,7 +30,7 @@ TEST(Verification, ARightPoseIsOk) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
     EXPECT_EQ(validate(shot.sight.scene(), fit_from_truth(shot)), Status::ok);
-    const ColorAgreement agreement = color_agreement(shot.sight.scene(), scenes::pose_of(shot.rig, 0, shot.q));
+    const ColourAgreement agreement = colour_agreement(shot.sight.scene(), scenes::pose_of(shot.rig, 0, shot.q));
     EXPECT_GT(agreement.matching, 0.85);
     EXPECT_LT(agreement.wrong, 0.02);
     EXPECT_EQ(agreement.in_image, 1);
@@ -68,13 +68,13 @@ TEST(Verification, APoseThatTheColoursContradictIsNotOk) {
     const Shot& shot = usual_shot(seed);
     const Scene scene = shot.sight.scene();
     const FineFit right = fit_from_truth(shot);
-    const double matching = color_agreement(scene, right.unknowns.pose()).matching;
+    const double matching = colour_agreement(scene, right.unknowns.pose()).matching;
     for (const UnknownVector& wrong : {change(0, 0, 0, 2.5), change(0, 0, 8e-3, 0), change(0, 0, -8e-3, 0),
                                        change(0.3, 0, 0, 0), change(-0.3, 0, 0, 0)}) {
       FineFit fit = right;
       fit.unknowns = right.unknowns.changed_by(wrong);
       EXPECT_NE(validate(scene, fit), Status::ok) << wrong.transpose();
-      EXPECT_LT(color_agreement(scene, fit.unknowns.pose()).matching, matching - 0.1) << wrong.transpose();
+      EXPECT_LT(colour_agreement(scene, fit.unknowns.pose()).matching, matching - 0.1) << wrong.transpose();
     }
   }
 }
@@ -249,14 +249,14 @@ TEST(Verification, AMarkerOutsideOfTheImageIsCut) {
   aside.camera_from_unrolled.translation.x() += 0.2;
   fit.unknowns = PoseUnknowns::free(aside);
   EXPECT_EQ(validate(shot.sight.scene(), fit), Status::cut);
-  EXPECT_EQ(color_agreement(shot.sight.scene(), aside).in_image, 0);
+  EXPECT_EQ(colour_agreement(shot.sight.scene(), aside).in_image, 0);
 }
 
 TEST(Verification, TissueIsNotOk) {
   const Shot& shot = usual_shot(1);
   const Sight empty(shot.rig, scenes::render_nothing(shot.rig, 2));
   EXPECT_NE(validate(empty.scene(), fit_from_truth(shot)), Status::ok);
-  EXPECT_LT(color_agreement(empty.scene(), scenes::pose_of(shot.rig, 0, shot.q)).matching, 0.05);
+  EXPECT_LT(colour_agreement(empty.scene(), scenes::pose_of(shot.rig, 0, shot.q)).matching, 0.05);
 }
 
 }  // namespace

@@ -242,8 +242,8 @@ bool is_enough(std::span<const PooledEdge> edges) {
 }
 
 bool clips(const EdgeVector& edge) {
-  const auto colors = edge.segment<6>(edge_before);
-  return colors.minCoeff() < 0 || colors.maxCoeff() > 1;
+  const auto colours = edge.segment<6>(edge_before);
+  return colours.minCoeff() < 0 || colours.maxCoeff() > 1;
 }
 
 // Levenberg and Marquardt's way.

@@ -17,7 +17,7 @@ class Grid {
   static constexpr int reach = 2;  // cells: bridges a highlight along the shaft and blotches of blood
   static constexpr int around = 2 * reach + 1;
 
-  Grid(const ImageView& image, const ColorClasses& classes, int grid_px)
+  Grid(const ImageView& image, const ColourClasses& classes, int grid_px)
       : grid_px_(grid_px), columns_(image.width_px / grid_px), rows_(image.height_px / grid_px) {
     cells_.resize(static_cast<std::size_t>(stride()) * static_cast<std::size_t>(rows_ + 2 * reach));
     for (int row = 0; row < rows_; ++row) {
@@ -25,12 +25,12 @@ class Grid {
       const std::span<std::uint8_t> line(&at(first), static_cast<std::size_t>(columns_));
       classes.classify(image.pixel(grid_px / 2, grid_px / 2 + row * grid_px), 3 * static_cast<std::ptrdiff_t>(grid_px),
                        line);
-      add_colored(line, first);
+      add_coloured(line, first);
     }
   }
 
   /// Cells that had a colour at first.
-  const std::vector<int>& colored() const { return colored_; }
+  const std::vector<int>& coloured() const { return coloured_; }
   std::uint8_t& at(int cell) { return cells_[static_cast<std::size_t>(cell)]; }
   /// `around` cells from the left to the right of a neighbour `rows` further down.
   std::uint8_t* row_around(int cell, int rows) { return &at(cell + rows * stride() - reach); }
@@ -41,28 +41,28 @@ class Grid {
   }
 
  private:
-  void add_colored(std::span<const std::uint8_t> line, int first) {
+  void add_coloured(std::span<const std::uint8_t> line, int first) {
     constexpr std::size_t at_once = 8;  // few have a colour
     for (std::size_t i = 0; i < line.size(); i += at_once) {
       const std::size_t count = std::min(at_once, line.size() - i);
       std::uint64_t any = 0;
       std::memcpy(&any, &line[i], count);
       for (std::size_t j = i; any && j < i + count; ++j)
-        if (line[j]) colored_.push_back(first + static_cast<int>(j));
+        if (line[j]) coloured_.push_back(first + static_cast<int>(j));
     }
   }
 
   int stride() const { return columns_ + 2 * reach; }
   int grid_px_, columns_, rows_;
   std::vector<std::uint8_t> cells_;
-  std::vector<int> colored_;
+  std::vector<int> coloured_;
 };
 
 // Sensor noise in the dark has colours too, but neighbours do not share them.
 void drop_lonely(Grid& grid) {
   constexpr int least_alike = 3;
   std::vector<int> lonely;
-  for (const int cell : grid.colored()) {
+  for (const int cell : grid.coloured()) {
     int count = -1;  // itself
     for (int row = -1; row <= 1; ++row) {
       const std::uint8_t* places = grid.row_around(cell, row);
@@ -120,12 +120,12 @@ bool lie_near(const Box& a, const Box& b) {
 
 }  // namespace
 
-std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int min_samples) {
+std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classes, int grid_px, int min_samples) {
   Grid grid(image, classes, grid_px);
   drop_lonely(grid);
   std::vector<Blob> blobs;
   std::vector<int> stack;
-  for (const int seed : grid.colored()) {
+  for (const int seed : grid.coloured()) {
     if (!grid.at(seed)) continue;
     Blob blob = take_blob(grid, seed, stack);
     blob.grid_px = grid_px;
@@ -136,7 +136,7 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes
   return blobs;
 }
 
-std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& classes) {
+std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes) {
   constexpr int grid_px = 8;
   constexpr std::size_t max_blobs = 6;  // bounds the time that tissue with the marker's colours costs
   auto blobs = find_blobs(image, classes, grid_px, min_blob_samples);

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/image/image_view.h"
 
 namespace lapservo::internal {
@@ -12,7 +12,7 @@ namespace lapservo::internal {
 struct Blob {
   struct Sample {
     int u, v;
-    std::uint8_t color;
+    std::uint8_t colour;
   };
   std::vector<Sample> samples;
   int grid_px = 0;  ///< distance of neighbouring samples
@@ -22,10 +22,10 @@ struct Blob {
 inline constexpr int min_blob_samples = 8;
 
 /// All groups of coloured samples of at least `min_samples`, largest first. Touches one pixel in grid_px^2 only.
-std::vector<Blob> find_blobs(const ImageView& image, const ColorClasses& classes, int grid_px, int min_samples);
+std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classes, int grid_px, int min_samples);
 
 /// As many of them as detection looks at, on its grid.
-std::vector<Blob> largest_blobs(const ImageView& image, const ColorClasses& classes);
+std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes);
 
 /// The same, but as one those that blood may have parted: nearer to one another than half of what the larger one
 /// reaches over.

@@ -16,10 +16,10 @@ namespace {
 
 constexpr int width_px = 640, height_px = 480, grid_px = 8, min_samples = 8;
 
-ColorClasses usual_classes() {
+ColourClasses usual_classes() {
   Instrument instrument;
   instrument.marker.hues_deg = {90, 180, 270};
-  return ColorClasses({instrument});
+  return ColourClasses({instrument});
 }
 
 const std::array<cv::Vec3b, 3> band_bgr{cv::Vec3b(20, 200, 110), cv::Vec3b(200, 200, 20), cv::Vec3b(200, 20, 110)};
@@ -53,7 +53,7 @@ std::vector<Blob> search(const cv::Mat& image) {
 }
 
 TEST(BlobSearch, FindsAMarkerWhereverItLiesAndHoweverItIsTurned) {
-  const ColorClasses classes = usual_classes();
+  const ColourClasses classes = usual_classes();
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     Random random(seed);
@@ -72,7 +72,7 @@ TEST(BlobSearch, FindsAMarkerWhereverItLiesAndHoweverItIsTurned) {
     for (const Blob::Sample& sample : blobs[0].samples) {
       const auto x = strip.along(sample.u, sample.v);
       ASSERT_TRUE(x);
-      EXPECT_EQ(sample.color, classes.of_band(0, static_cast<std::size_t>(3 * *x)));
+      EXPECT_EQ(sample.colour, classes.of_band(0, static_cast<std::size_t>(3 * *x)));
     }
   }
 }

@@ -150,7 +150,7 @@ struct InWideBlur {
 
 // Whether the pixels on both sides have the colours that should be there. A blurred band tints the shaft beyond its
 // end.
-bool colors_agree(const Frame& frame, const BoundaryPlace& place, float offset_px) {
+bool colours_agree(const Frame& frame, const BoundaryPlace& place, float offset_px) {
   const std::size_t k = place.measurement.group;
   const Eigen::Vector2d at_px = place.point_px + static_cast<double>(offset_px) * place.along;
   const double on_band_px = 0.8 * place.line.before, on_shaft_px = on_band_px + 1.5 * place.line.blur_px;
@@ -275,7 +275,7 @@ struct Candidate {
   const BoundaryPlace* place;
   const InWideBlur* wide;  // nullptr in usual blur
   const EdgeFit* edge;
-  bool colors_agree;
+  bool colours_agree;
 };
 
 // Keeps the candidates of one boundary whose change of light is what most see where the colours agree; gives each its
@@ -286,13 +286,13 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
   for (std::size_t c = 0; c < 3; ++c) {
     values.clear();
     for (const Candidate& candidate : candidates)
-      if (candidate.colors_agree) values.push_back(candidate.edge->step[c]);
+      if (candidate.colours_agree) values.push_back(candidate.edge->step[c]);
     if (values.size() < edge_limits.min_alike) return;
     typical[c] = median(values);
   }
   values.clear();
   for (const Candidate& candidate : candidates)
-    if (candidate.colors_agree) values.push_back(candidate.edge->residual_variance);
+    if (candidate.colours_agree) values.push_back(candidate.edge->residual_variance);
   const double typical_variance = median(values);
   const float typical_square = dot(typical, typical);
   for (const auto& [place, wide, edge, agree] : candidates) {
@@ -370,7 +370,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
     for (std::size_t i = 0; i < places.size(); ++i)
       if (places[i].measurement.group == k && edges[i].converged)
         candidates.push_back({&places[i], wide ? &in_wide_blur[i] : nullptr, &edges[i],
-                              colors_agree(frame, places[i], edges[i].offset_px)});
+                              colours_agree(frame, places[i], edges[i].offset_px)});
     trust(candidates, blur, out);
   }
 }

@@ -6,7 +6,7 @@
 #include <cstddef>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/vision/search/explained_colors.h"
+#include "lapservo/vision/search/explained_colours.h"
 
 namespace lapservo::internal {
 namespace {

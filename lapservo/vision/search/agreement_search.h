@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "lapservo/core/random.h"
-#include "lapservo/vision/search/explained_colors.h"
+#include "lapservo/vision/search/explained_colours.h"
 #include "lapservo/vision/search/work_budget.h"
 #include "lapservo/vision/shaft/scene.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
@@ -12,9 +12,9 @@
 namespace lapservo::internal {
 
 /// For markers that blood hides in large parts, where fitted sides and ends mislead: climbs to where a marker of any
-/// rotation explains most of the frame's colours (explained_colors.h), from the start's depth and nearer ones, and from
-/// there at the rotations that do. Only for unknowns with an RCM. May stop after every step of a climb and go on in the
-/// next frame: the marker moves less between them than a climb reaches.
+/// rotation explains most of the frame's colours (explained_colours.h), from the start's depth and nearer ones, and
+/// from there at the rotations that do. Only for unknowns with an RCM. May stop after every step of a climb and go on
+/// in the next frame: the marker moves less between them than a climb reaches.
 class AgreementSearch {
  public:
   AgreementSearch(const PoseUnknowns& start, const Rigid3& camera_from_rcm, double length_m);

@@ -11,7 +11,7 @@
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/scenes.h"
-#include "lapservo/vision/search/explained_colors.h"
+#include "lapservo/vision/search/explained_colours.h"
 
 namespace lapservo::internal {
 namespace agreement_search_test {
@@ -86,7 +86,7 @@ TEST(AgreementSearch, GoesOnFromWhereItsBudgetEnded) {
 }
 
 // What the search climbs: the truth lies higher than what is beside it, however much blood there is.
-TEST(ExplainedColors, AreMostAtTheTruth) {
+TEST(ExplainedColours, AreMostAtTheTruth) {
   int higher = 0, asked = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     const BloodyShot shot(seed);
@@ -102,7 +102,7 @@ TEST(ExplainedColors, AreMostAtTheTruth) {
   EXPECT_EQ(higher, asked);
 }
 
-TEST(ExplainedColors, OfAnyRotationAreAtLeastThoseOfEach) {
+TEST(ExplainedColours, OfAnyRotationAreAtLeastThoseOfEach) {
   const BloodyShot shot(3);
   const Scene scene = shot.sight.scene();
   const double of_any = explained_area_px2(scene, shot.truth().pose(), false);
@@ -114,7 +114,7 @@ TEST(ExplainedColors, OfAnyRotationAreAtLeastThoseOfEach) {
 }
 
 // A search keeps only what is better: of anything else it may be told that it is nothing.
-TEST(ExplainedColors, AreTheSameWhereOnlyMoreThanOthersAreAskedFor) {
+TEST(ExplainedColours, AreTheSameWhereOnlyMoreThanOthersAreAskedFor) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const BloodyShot shot(seed);
     const Scene scene = shot.sight.scene();

@@ -43,10 +43,10 @@ Eigen::Vector3d point_on(const ShaftPose& pose, const Marker& marker, double azi
 }
 
 // The stretch of a section with the most marker colour in it.
-Stretch<float> most_colorful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
+Stretch<float> most_colourful_stretch(std::span<const std::uint8_t> classes, const Scene& scene) {
   return heaviest_stretch(0, static_cast<int>(classes.size()), [&](int i) {
-    const std::uint8_t color = classes[static_cast<std::size_t>(i)];
-    return scene.is_ours(color) ? 1.0F : (color == Scene::outside ? -0.2F : -0.8F);
+    const std::uint8_t colour = classes[static_cast<std::size_t>(i)];
+    return scene.is_ours(colour) ? 1.0F : (colour == Scene::outside ? -0.2F : -0.8F);
   });
 }
 
@@ -69,11 +69,11 @@ SidePoints measure_sides(const Scene& scene, const ShaftPose& pose, const Cylind
     classes.clear();
     double hidden_px = 0;  // of the shaft, beyond the image
     for (int i = -reach; i <= reach; ++i) {
-      const std::uint8_t color = scene.class_beside(middle + i * step_px * across);
-      classes.push_back(color);
-      if (color == Scene::outside && std::abs(i) * step_px < half_px) hidden_px += step_px;
+      const std::uint8_t colour = scene.class_beside(middle + i * step_px * across);
+      classes.push_back(colour);
+      if (colour == Scene::outside && std::abs(i) * step_px < half_px) hidden_px += step_px;
     }
-    const Stretch<float> stretch = most_colorful_stretch(classes, scene);
+    const Stretch<float> stretch = most_colourful_stretch(classes, scene);
     const double width_px = (stretch.last - stretch.first + 1) * step_px;
     if (hidden_px > max_hidden * 2 * half_px ||
         width_px < coarse_fit_limits.narrowest_section * (2 * half_px - hidden_px) ||
@@ -204,9 +204,9 @@ class RotationScore {
       std::array<int, 3> sums{};
       sums_[i][0] = sums;
       for (std::size_t k = 0; k < samples_along; ++k) {
-        const std::uint8_t color = surface.lines[i].classes[k];
-        const bool ours = scene.is_ours(color);
-        for (std::size_t band = 0; band < 3; ++band) sums[band] += 2 * (color == scene.bands[band]) - ours;
+        const std::uint8_t colour = surface.lines[i].classes[k];
+        const bool ours = scene.is_ours(colour);
+        for (std::size_t band = 0; band < 3; ++band) sums[band] += 2 * (colour == scene.bands[band]) - ours;
         sums_[i][k + 1] = sums;
         seen_ += ours;
       }

@@ -50,7 +50,7 @@ std::optional<BlobShape> shape_of(const Scene& scene, const Blob& blob) {
   BlobShape shape;
   shape.band_centres.fill(Eigen::Vector2d::Zero());
   for (const Blob::Sample& sample : blob.samples) {
-    const auto band = std::find(scene.bands.begin(), scene.bands.end(), sample.color);
+    const auto band = std::find(scene.bands.begin(), scene.bands.end(), sample.colour);
     const auto ideal = scene.camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
     if (band == scene.bands.end() || !ideal) continue;
     const auto index = static_cast<std::size_t>(band - scene.bands.begin());
@@ -117,13 +117,13 @@ struct Section {
 std::optional<Section> section_at(const Scene& scene, const ImageFrame& frame, double x, double reach_px,
                                   double step_px) {
   const int reach = static_cast<int>(reach_px / step_px);
-  const auto color_at = [&](int i) { return scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px))); };
-  const Stretch<double> colored =
-      heaviest_stretch(-reach, reach + 1, [&](int i) { return scene.is_ours(color_at(i)) ? 1 : -0.8; });
-  if (colored.sum * step_px < 4) return std::nullopt;
-  return Section{(colored.first - 0.5) * step_px - coarse_fit_limits.contour_inset_px,
-                 (colored.last + 0.5) * step_px + coarse_fit_limits.contour_inset_px,
-                 color_at(colored.first - 1) == Scene::outside, color_at(colored.last + 1) == Scene::outside};
+  const auto colour_at = [&](int i) { return scene.class_at(scene.camera.raw_from_ideal(frame.at(x, i * step_px))); };
+  const Stretch<double> coloured =
+      heaviest_stretch(-reach, reach + 1, [&](int i) { return scene.is_ours(colour_at(i)) ? 1 : -0.8; });
+  if (coloured.sum * step_px < 4) return std::nullopt;
+  return Section{(coloured.first - 0.5) * step_px - coarse_fit_limits.contour_inset_px,
+                 (coloured.last + 0.5) * step_px + coarse_fit_limits.contour_inset_px,
+                 colour_at(coloured.first - 1) == Scene::outside, colour_at(coloured.last + 1) == Scene::outside};
 }
 
 // Points on the sides, in the outline's frame.

@@ -26,15 +26,15 @@ class Rewards {
  public:
   explicit Rewards(const std::array<std::uint8_t, 3>& bands) {
     constexpr std::uint8_t another = Scene::outside - 1;
-    const std::array<std::uint8_t, 6> colors{another, 0, Scene::outside, bands[0], bands[1], bands[2]};
+    const std::array<std::uint8_t, 6> colours{another, 0, Scene::outside, bands[0], bands[1], bands[2]};
     kind_.fill(0);
-    for (std::size_t kind = 0; kind < colors.size(); ++kind) {
-      kind_[colors[kind]] = static_cast<std::uint8_t>(kind);
+    for (std::size_t kind = 0; kind < colours.size(); ++kind) {
+      kind_[colours[kind]] = static_cast<std::uint8_t>(kind);
       for (std::size_t state = 0; state < states; ++state)
-        of_kind_[kind][state] = line_reward(state, colors[kind], bands);
+        of_kind_[kind][state] = line_reward(state, colours[kind], bands);
     }
   }
-  const std::array<float, states>& of(std::uint8_t color) const { return of_kind_[kind_[color]]; }
+  const std::array<float, states>& of(std::uint8_t colour) const { return of_kind_[kind_[colour]]; }
 
  private:
   std::array<std::uint8_t, 256> kind_;

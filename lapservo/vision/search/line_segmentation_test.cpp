@@ -45,10 +45,10 @@ Line clean_line(const std::array<std::size_t, 4>& boundaries, std::size_t count)
 
 TEST(LineSegmentation, IsTheBestOfAllSplits) {
   Random random(1);
-  const std::array<std::uint8_t, 6> colors{0, 1, 2, 3, 4, Scene::outside};
+  const std::array<std::uint8_t, 6> colours{0, 1, 2, 3, 4, Scene::outside};
   for (int i = 0; i < 400; ++i) {
     Line line(1 + random.bits() % 11);
-    for (std::uint8_t& color : line) color = colors[random.bits() % colors.size()];
+    for (std::uint8_t& colour : line) colour = colours[random.bits() % colours.size()];
     if (i % 2) std::sort(line.begin(), line.end());  // in the right order, so that splits are worth something
     double best = -1e9;
     for (std::size_t state = 0; state < 5; ++state) best = std::max(best, best_from(line, 0, state));
@@ -85,8 +85,8 @@ TEST(LineSegmentation, StandsBlotchesAndNoise) {
   constexpr int lines = 300;
   for (int i = 0; i < lines; ++i) {
     Line line = clean_line(boundaries, 160);
-    for (std::uint8_t& color : line)
-      if (random.uniform() < 0.1) color = static_cast<std::uint8_t>(random.bits() % 4);
+    for (std::uint8_t& colour : line)
+      if (random.uniform() < 0.1) colour = static_cast<std::uint8_t>(random.bits() % 4);
     const auto blotch = line.begin() + static_cast<std::ptrdiff_t>(random.uniform(30, 110));
     std::fill(blotch, blotch + 8, 0);
     const LineSegmentation split = segment_line(line, bands);
@@ -109,8 +109,8 @@ TEST(LineSegmentation, SeesNoBoundaryBeyondTheImageOrWithoutColours) {
   std::fill(line.begin(), line.begin() + 50, Scene::outside);
   split = segment_line(line, bands);
   EXPECT_EQ(split.seen, (std::array{false, true, true, true}));
-  for (const std::uint8_t color : {std::uint8_t{0}, std::uint8_t{4}, Scene::outside})
-    EXPECT_EQ(segment_line(Line(160, color), bands).seen, (std::array<bool, 4>{})) << int{color};
+  for (const std::uint8_t colour : {std::uint8_t{0}, std::uint8_t{4}, Scene::outside})
+    EXPECT_EQ(segment_line(Line(160, colour), bands).seen, (std::array<bool, 4>{})) << int{colour};
   EXPECT_EQ(segment_line({}, bands).seen, (std::array<bool, 4>{}));
 }
 

@@ -10,7 +10,7 @@
 
 #include "lapservo/core/angles.h"
 #include "lapservo/core/statistics.h"
-#include "lapservo/vision/search/explained_colors.h"
+#include "lapservo/vision/search/explained_colours.h"
 #include "lapservo/vision/search/line_segmentation.h"
 
 namespace lapservo::internal {
@@ -52,7 +52,7 @@ struct Fan {
 // A place of a blob that has one of the marker's colours.
 struct Place {
   double alpha_rad, beta_rad;
-  std::uint8_t color;
+  std::uint8_t colour;
 };
 
 // Alpha is continuous over the blob.
@@ -60,13 +60,13 @@ std::vector<Place> places_of(const Scene& scene, const Blob& blob, const RaysFro
   std::vector<Place> places;
   places.reserve(blob.samples.size());
   for (const Blob::Sample& sample : blob.samples) {
-    if (!scene.is_ours(sample.color)) continue;
+    if (!scene.is_ours(sample.colour)) continue;
     const auto ideal_px = scene.camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
     if (!ideal_px) continue;
     const Eigen::Vector3d ray = scene.camera.ray_from_ideal(*ideal_px);
     const double alpha_rad = rays.alpha_rad(ray);
     const double middle_rad = places.empty() ? alpha_rad : places.front().alpha_rad;
-    places.push_back({middle_rad + wrap_pi(alpha_rad - middle_rad), rays.beta_rad(ray), sample.color});
+    places.push_back({middle_rad + wrap_pi(alpha_rad - middle_rad), rays.beta_rad(ray), sample.colour});
   }
   return places;
 }
@@ -100,12 +100,12 @@ double fraction_in_order(const Scene& scene, const Fan& fan, const std::vector<P
     return all[std::min(parts - 1, static_cast<std::size_t>(std::max(0.0, line)) * parts / line_count)];
   };
   for (const Place& place : places) {
-    if (place.color == scene.bands[0]) part_of(place).first_rad.push_back(place.beta_rad);
-    if (place.color == scene.bands[2]) part_of(place).last_rad.push_back(place.beta_rad);
+    if (place.colour == scene.bands[0]) part_of(place).first_rad.push_back(place.beta_rad);
+    if (place.colour == scene.bands[2]) part_of(place).last_rad.push_back(place.beta_rad);
   }
   int middle = 0, in_order = 0;
   for (const Place& place : places) {
-    if (place.color != scene.bands[1]) continue;
+    if (place.colour != scene.bands[1]) continue;
     const Part& part = part_of(place);
     const auto before = std::count_if(part.first_rad.begin(), part.first_rad.end(),
                                       [&](double beta_rad) { return beta_rad < place.beta_rad; });

@@ -4,8 +4,8 @@
 
 namespace lapservo::internal {
 
-std::uint8_t Scene::unless_explained(const Eigen::Vector2d& raw_px, std::uint8_t color) const {
-  return explained_by(others, raw_px, color) ? outside : color;
+std::uint8_t Scene::unless_explained(const Eigen::Vector2d& raw_px, std::uint8_t colour) const {
+  return explained_by(others, raw_px, colour) ? outside : colour;
 }
 
 bool Scene::hidden_by_others(const Eigen::Vector2d& raw_px, double depth_m) const {

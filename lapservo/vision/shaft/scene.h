@@ -6,7 +6,7 @@
 
 #include "lapservo/geometry/camera.h"
 #include "lapservo/marker/marker.h"
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/image/image_view.h"
 #include "lapservo/vision/image/lens_field.h"
 #include "lapservo/vision/shaft/shaft_cover.h"
@@ -19,7 +19,7 @@ class PrintRecord;
 struct Scene {
   const ImageView& image;
   const Camera& camera;
-  const ColorClasses& classes;
+  const ColourClasses& classes;
   const Marker& marker;
   std::array<std::uint8_t, 3> bands;            ///< colour class of each band
   std::span<const ShaftCover* const> others{};  ///< that were found, near enough to hide it or to touch it
@@ -37,8 +37,8 @@ struct Scene {
   }
   /// The same, and `outside` where another instrument's marker shows.
   std::uint8_t class_beside(const Eigen::Vector2d& raw_px) const {
-    const std::uint8_t color = class_at(raw_px);
-    return others.empty() ? color : unless_explained(raw_px, color);
+    const std::uint8_t colour = class_at(raw_px);
+    return others.empty() ? colour : unless_explained(raw_px, colour);
   }
   /// The same at a point before the camera, [m] in its frame; `outside` also when it lies behind it or is hidden.
   std::uint8_t class_at_point(const Eigen::Vector3d& point_in_camera) const {
@@ -57,11 +57,11 @@ struct Scene {
     return !others.empty() && hidden_by_others(raw_px, depth_m);
   }
   /// Whether it is the class of one of the marker's bands.
-  bool is_ours(std::uint8_t color) const { return color == bands[0] || color == bands[1] || color == bands[2]; }
+  bool is_ours(std::uint8_t colour) const { return colour == bands[0] || colour == bands[1] || colour == bands[2]; }
 
  private:
   // Not inline: they are needed seldom, and what looks at every pixel of a line is short without them.
-  std::uint8_t unless_explained(const Eigen::Vector2d& raw_px, std::uint8_t color) const;
+  std::uint8_t unless_explained(const Eigen::Vector2d& raw_px, std::uint8_t colour) const;
   bool hidden_by_others(const Eigen::Vector2d& raw_px, double depth_m) const;
 };
 

@@ -13,11 +13,11 @@ TEST(Scene, ShowsNoPointThatTheLensFoldsIntoTheImage) {
   const scenes::Sight sight(rig, cv::Mat(rig.camera.height_px, rig.camera.width_px, CV_8UC3, cv::Scalar(20, 200, 20)));
   const Scene scene = sight.scene();
   const Eigen::Vector3d ahead(0.005, 0, 0.1), aside(0.18, 0, 0.1);
-  const std::uint8_t color = scene.class_at({400, 300});
+  const std::uint8_t colour = scene.class_at({400, 300});
   for (const Eigen::Vector3d& point : {ahead, aside})
-    EXPECT_EQ(scene.class_at(rig.camera.raw_from_point(point)), color);
-  EXPECT_EQ(scene.class_at_point(ahead), color);
-  EXPECT_EQ(scene.class_on_shaft(ahead), color);
+    EXPECT_EQ(scene.class_at(rig.camera.raw_from_point(point)), colour);
+  EXPECT_EQ(scene.class_at_point(ahead), colour);
+  EXPECT_EQ(scene.class_on_shaft(ahead), colour);
   EXPECT_EQ(scene.class_at_point(aside), Scene::outside);
   EXPECT_EQ(scene.class_on_shaft(aside), Scene::outside);
 }

@@ -149,7 +149,7 @@ void ShaftCover::fill(const Section& section, const Marker& marker, const EndsOf
         ends_m[std::min(static_cast<std::size_t>(inside * static_cast<double>(lines)), lines - 1)];
     for (std::size_t band = 0; band < 3; ++band)
       if (section.along_m > line_ends_m[band] - doubt_m && section.along_m < line_ends_m[band + 1] + doubt_m)
-        cell.colors |= bit(bands[band]);
+        cell.colours |= bit(bands[band]);
   }
 }
 
@@ -177,7 +177,7 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
   const double length_px = std::max(1.0, along_px.norm());
   int samples = 0;
   for (const Blob::Sample& sample : blob.samples) {
-    if (std::find(bands.begin(), bands.end(), sample.color) == bands.end()) continue;
+    if (std::find(bands.begin(), bands.end(), sample.colour) == bands.end()) continue;
     const auto ideal_px = camera.ideal_from_raw(Eigen::Vector2d(sample.u, sample.v));
     if (!ideal_px) continue;
     const Eigen::Vector2d& place_px = *ideal_px;
@@ -190,9 +190,9 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
   return samples >= min_blob_samples;
 }
 
-bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t color) {
+bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t colour) {
   return std::any_of(others.begin(), others.end(), [&](const ShaftCover* other) {
-    return other->explains(raw_px.x() + 0.5, raw_px.y() + 0.5, color);
+    return other->explains(raw_px.x() + 0.5, raw_px.y() + 0.5, colour);
   });
 }
 
@@ -200,7 +200,7 @@ std::vector<Blob> without(const std::vector<Blob>& blobs, std::span<const ShaftC
   std::vector<Blob> left;
   for (Blob blob : blobs) {
     std::erase_if(blob.samples, [&](const Blob::Sample& sample) {
-      return explained_by(others, Eigen::Vector2d(sample.u, sample.v), sample.color);
+      return explained_by(others, Eigen::Vector2d(sample.u, sample.v), sample.colour);
     });
     if (static_cast<int>(blob.samples.size()) >= min_blob_samples) left.push_back(std::move(blob));
   }

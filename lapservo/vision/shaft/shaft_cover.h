@@ -32,9 +32,9 @@ class ShaftCover {
   bool drawn() const { return drawn_; }
 
   /// Whether a pixel of this colour class shows the marker, as far as colours tell.
-  bool explains(double u_px, double v_px, std::uint8_t color) const {
+  bool explains(double u_px, double v_px, std::uint8_t colour) const {
     const auto cell = index(u_px, v_px);
-    return cell && (cells_[*cell].colors & bit(color)) != 0;
+    return cell && (cells_[*cell].colours & bit(colour)) != 0;
   }
   /// Whether the shaft lies before what is seen there at this depth (z in the camera's frame).
   bool hides(double u_px, double v_px, double depth_m) const {
@@ -44,8 +44,8 @@ class ShaftCover {
 
  private:
   struct Cell {
-    float axis_depth_m = 0;    // 0: not covered
-    std::uint32_t colors = 0;  // a bit for each class that may show
+    float axis_depth_m = 0;     // 0: not covered
+    std::uint32_t colours = 0;  // a bit for each class that may show
   };
   // The shaft at one place along it.
   struct Section {
@@ -55,7 +55,7 @@ class ShaftCover {
   };
   static constexpr std::size_t lines = 24;
   using EndsOfLines = std::array<std::array<double, 4>, lines>;  // where each visible line crosses the boundaries [m]
-  static constexpr std::uint32_t bit(std::uint8_t color) { return color == 0 || color > 31 ? 0 : 1U << color; }
+  static constexpr std::uint32_t bit(std::uint8_t colour) { return colour == 0 || colour > 31 ? 0 : 1U << colour; }
 
   static constexpr double most_px = 1e6;
   std::optional<std::size_t> index(double u_px, double v_px) const {
@@ -83,7 +83,7 @@ bool lies_beside(const Camera& camera, const Marker& others_marker, const ShaftP
                  const std::array<std::uint8_t, 3>& bands);
 
 /// Whether the marker of one of them shows in a pixel of this colour class, as far as colours tell.
-bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t color);
+bool explained_by(std::span<const ShaftCover* const> others, const Eigen::Vector2d& raw_px, std::uint8_t colour);
 
 /// What the instruments that are known to be in the image leave of them, largest first. The parts of one that lies
 /// behind another stay together.

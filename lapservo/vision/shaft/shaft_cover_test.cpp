@@ -30,7 +30,7 @@ TEST(ShaftCover, ExplainsTheMarkersPixels) {
     ASSERT_FALSE(it.blobs.empty());
     std::size_t explained = 0;
     for (const Blob::Sample& sample : it.blobs[0].samples)
-      explained += it.cover.explains(sample.u, sample.v, sample.color);
+      explained += it.cover.explains(sample.u, sample.v, sample.colour);
     EXPECT_GT(static_cast<double>(explained), 0.95 * static_cast<double>(it.blobs[0].samples.size()));
     EXPECT_FALSE(lies_beside(it.scene.camera, it.scene.marker, it.pose, it.blobs[0], it.scene.bands));
   }
@@ -47,7 +47,7 @@ TEST(ShaftCover, LeavesWhatLiesBesideIt) {
   const ShaftCover* cover = &it.cover;
   EXPECT_EQ(without({beside}, {&cover, 1}).size(), 1U);
   EXPECT_TRUE(lies_beside(it.scene.camera, it.scene.marker, it.pose, beside, it.scene.bands));
-  for (Blob::Sample& sample : beside.samples) sample.color = 200;
+  for (Blob::Sample& sample : beside.samples) sample.colour = 200;
   EXPECT_FALSE(lies_beside(it.scene.camera, it.scene.marker, it.pose, beside, it.scene.bands)) << "others' colours";
 }
 

@@ -53,7 +53,7 @@ std::optional<Sighting> sighting_of(const Scene& scene, const PoseUnknowns& unkn
   const ShaftPose& pose = unknowns.pose();
   const auto tau_rad = facing_tau_rad(scene.marker, pose);
   if (!tau_rad) return std::nullopt;
-  const ColorAgreement agreement = color_agreement(scene, pose);
+  const ColourAgreement agreement = colour_agreement(scene, pose);
   if (agreement.in_image < 0.9 || agreement.matching < min_matching || agreement.wrong > max_wrong ||
       agreement.beside > max_beside)
     return std::nullopt;
@@ -90,7 +90,7 @@ std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImag
     if (!coarse.shows_rotation() || coarse.has_rival()) return;
     const auto sighting = refined(scene, light, coarse, {}, {});
     if (!sighting) return;
-    const double score = color_agreement(scene, sighting->unknowns.pose()).matching + sighting->settled;
+    const double score = colour_agreement(scene, sighting->unknowns.pose()).matching + sighting->settled;
     if (score > best_score) best_score = score, best = sighting;
   };
   for (const Blob& blob : blobs) {

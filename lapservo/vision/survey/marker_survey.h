@@ -10,7 +10,7 @@
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/camera/camera_departure.h"
 #include "lapservo/vision/colour/blob_search.h"
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 #include "lapservo/vision/model/fine_fit.h"
 #include "lapservo/vision/shaft/shaft_pose.h"
 #include "lapservo/vision/survey/seam_edges.h"
@@ -42,7 +42,7 @@ class MarkerSurvey {
 
   Rig rig_;
   std::size_t instrument_;
-  ColorClasses classes_;
+  ColourClasses classes_;
   std::array<float, 256> light_;
   std::optional<Sighting> last_;
 };
@@ -98,7 +98,7 @@ class ViewMeasurer {
   std::optional<Sighting> settled(const MarkerView& view, const Marker& marker, const Sighting& sighting) const;
 
  private:
-  ColorClasses classes_;
+  ColourClasses classes_;
   std::array<std::uint8_t, 3> bands_;
   std::array<float, 256> light_;
 };

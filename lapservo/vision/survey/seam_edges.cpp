@@ -183,9 +183,9 @@ std::array<double, 3> shaft_light(const SeamView& view, double blur_px) {
 }
 
 // The bands' and, beyond what the lamp does, their shading; the shaft's; the highlights'.
-enum SeamColor : int { left_band, left_shading, right_band, right_shading, bare_shaft, first_gloss };
-constexpr int seam_colors = first_gloss + static_cast<int>(gloss_exponents.size());
-using SeamBasis = Eigen::Matrix<double, Eigen::Dynamic, seam_colors>;
+enum SeamColour : int { left_band, left_shading, right_band, right_shading, bare_shaft, first_gloss };
+constexpr int seam_colours = first_gloss + static_cast<int>(gloss_exponents.size());
+using SeamBasis = Eigen::Matrix<double, Eigen::Dynamic, seam_colours>;
 
 // How much of each colour a sample shows when the upper edge lies at `upper_m` and the other one `gap_m` before it.
 SeamBasis basis_of(const Section& section, double upper_m, double gap_m, double blur_px, double radius_m) {
@@ -198,7 +198,7 @@ SeamBasis basis_of(const Section& section, double upper_m, double gap_m, double 
   const double lower_m = upper_m - gap_m, per_upper = scale_at(upper_m) / blur_px,
                per_lower = scale_at(lower_m) / blur_px;
   const auto samples = static_cast<Eigen::Index>(section.x_m.size());
-  SeamBasis basis(samples, seam_colors);
+  SeamBasis basis(samples, seam_colours);
   for (Eigen::Index i = 0; i < samples; ++i) {
     const double x = section.x_m[static_cast<std::size_t>(i)], turn = x / radius_m;
     const double left = normal_cdf((lower_m - x) * per_lower), right = normal_cdf((x - upper_m) * per_upper);
@@ -227,34 +227,34 @@ Eigen::VectorXd light_of(const Profile& profile, std::size_t channel, const Eige
   return light;
 }
 
-using SeamColors = Eigen::Matrix<double, seam_colors, 1>;
+using SeamColours = Eigen::Matrix<double, seam_colours, 1>;
 
 // The colours that fit a profile's light best. In units of a hundredth of white: shading over a radian is of the
 // light's size, highlights are up to a third of white, the shaft's light is known to a third.
-class ColorFit {
+class ColourFit {
  public:
-  ColorFit(const SeamBasis& basis, const Eigen::VectorXd& used)
+  ColourFit(const SeamBasis& basis, const Eigen::VectorXd& used)
       : weighted_(basis.transpose() * used.asDiagonal()), information_(weighted_.lazyProduct(basis)) {
     for (const int shading : {left_shading, right_shading}) information_(shading, shading) += unit * unit;
     for (const int band : {left_band, right_band}) information_(band, band) += 1e-9;
     constexpr double by_gloss = unit / gloss_sigma;
-    for (int gloss = first_gloss; gloss < seam_colors; ++gloss) information_(gloss, gloss) += by_gloss * by_gloss;
+    for (int gloss = first_gloss; gloss < seam_colours; ++gloss) information_(gloss, gloss) += by_gloss * by_gloss;
   }
 
-  SeamColors colors(const Eigen::VectorXd& light, double shaft) const {
+  SeamColours colours(const Eigen::VectorXd& light, double shaft) const {
     const double shaft_sigma = 0.3 * shaft + 0.005, weight = unit * unit / (shaft_sigma * shaft_sigma);
     SeamInformation information = information_;
-    SeamColors gradient = weighted_.lazyProduct(light);
+    SeamColours gradient = weighted_.lazyProduct(light);
     information(bare_shaft, bare_shaft) += weight;
     gradient[bare_shaft] += shaft * weight;
     return solve_symmetric(information, gradient);
   }
 
  private:
-  using SeamInformation = Eigen::Matrix<double, seam_colors, seam_colors>;
+  using SeamInformation = Eigen::Matrix<double, seam_colours, seam_colours>;
   static constexpr double unit = 0.01, gloss_sigma = 0.3;
 
-  Eigen::Matrix<double, seam_colors, Eigen::Dynamic> weighted_;
+  Eigen::Matrix<double, seam_colours, Eigen::Dynamic> weighted_;
   SeamInformation information_;
 };
 
@@ -267,11 +267,11 @@ Eigen::VectorXd residuals(const Section& section, double upper_m, double gap_m, 
   Eigen::Index at = 0;
   for (const Profile& profile : section.profiles) {
     const Eigen::VectorXd used = used_samples(profile);
-    const ColorFit fit(basis, used);
+    const ColourFit fit(basis, used);
     for (std::size_t c = 0; c < section.channels; ++c, at += samples) {
       const Eigen::VectorXd light = light_of(profile, c, used);
-      const SeamColors colors = fit.colors(light, section.shaft[c]);
-      out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(light - basis.lazyProduct(colors));
+      const SeamColours colours = fit.colours(light, section.shaft[c]);
+      out.segment(at, samples) = std::sqrt(profile.stations) * used.cwiseProduct(light - basis.lazyProduct(colours));
     }
   }
   return out;
@@ -358,12 +358,12 @@ Section processed(const Section& section, const SeamFit& found, double seen_px, 
   Section out = section;
   for (Profile& profile : out.profiles) {
     const Eigen::VectorXd used = used_samples(profile);
-    const ColorFit fit(seen, used);
+    const ColourFit fit(seen, used);
     std::vector<std::array<double, 3>> light(section.x_m.size());
     for (std::size_t c = 0; c < 3; ++c) {
-      const SeamColors colors = fit.colors(light_of(profile, c, used), section.shaft[c]);
+      const SeamColours colours = fit.colours(light_of(profile, c, used), section.shaft[c]);
       for (std::size_t i = 0; i < light.size(); ++i)
-        light[i][c] = true_basis.row(static_cast<Eigen::Index>(i)).dot(colors);
+        light[i][c] = true_basis.row(static_cast<Eigen::Index>(i)).dot(colours);
     }
     FilteredLight filtered = filtered_light(light_of_value, processing, light);
     if (grey)
@@ -376,9 +376,9 @@ Section processed(const Section& section, const SeamFit& found, double seen_px, 
 }
 
 // By all channels; what the processing moves the edges by is taken off.
-std::optional<SeamFit> fit_by_colors(const Section& section, const SeamSearch& search, double blur_px,
-                                     const std::optional<PictureProcessing>& processing,
-                                     const std::array<float, 256>& light_of_value) {
+std::optional<SeamFit> fit_by_colours(const Section& section, const SeamSearch& search, double blur_px,
+                                      const std::optional<PictureProcessing>& processing,
+                                      const std::array<float, 256>& light_of_value) {
   auto found = fit(section, search, blur_px);
   if (!found || !processing) return found;
   const Section seen = processed(section, *found, blur_px, search.radius_m, *processing, light_of_value, false);
@@ -389,13 +389,13 @@ std::optional<SeamFit> fit_by_colors(const Section& section, const SeamSearch& s
 }
 
 // By the grey picture: colour differences are blurred far wider, over the gap and into each other.
-std::optional<SeamFit> fit_by_luma(const Section& colors, const Section& grey, const SeamSearch& search,
-                                   double colors_px, const PictureProcessing& processing,
+std::optional<SeamFit> fit_by_luma(const Section& colours, const Section& grey, const SeamSearch& search,
+                                   double colours_px, const PictureProcessing& processing,
                                    const std::array<float, 256>& light_of_value) {
   const double grey_px = std::sqrt(processing.blur_px * processing.blur_px + seam_sampling_px2);
   auto found = fit(grey, search, grey_px);
   if (!found) return std::nullopt;
-  Section made = processed(colors, *found, colors_px, search.radius_m, processing, light_of_value, true);
+  Section made = processed(colours, *found, colours_px, search.radius_m, processing, light_of_value, true);
   made.channels = grey.channels, made.shaft = grey.shaft;
   SeamSearch again = search;
   again.expected_gap_m = found->gap_m;
@@ -454,7 +454,7 @@ std::optional<SeamEdges> measure_seam(const Scene& scene, const LightImage& ligh
     in_grey->shaft = shaft_light(grey_view, blur_px), in_grey->channels = 1;
     found = fit_by_luma(*section, *in_grey, search, blur_px, *processing, light.light_of_value());
   } else {
-    found = fit_by_colors(*section, search, blur_px, processing, light.light_of_value());
+    found = fit_by_colours(*section, search, blur_px, processing, light.light_of_value());
   }
   if (!found) return std::nullopt;
 

@@ -16,16 +16,16 @@ namespace {
 
 constexpr std::size_t min_lines_of_side = 4;
 constexpr int filters_reach_px = 8;  // beyond the samples, so that what is filtered there has neighbours
-constexpr int contour_iterations = 6, rounds_of_colors = 4;
+constexpr int contour_iterations = 6, rounds_of_colours = 4;
 
-constexpr int contour_colors = 3;  // around, the contour's step, the shading inside
-using ContourBasis = Eigen::Matrix<double, Eigen::Dynamic, contour_colors>;
-using ContourColors = Eigen::Matrix<double, contour_colors, 3>;
+constexpr int contour_colours = 3;  // around, the contour's step, the shading inside
+using ContourBasis = Eigen::Matrix<double, Eigen::Dynamic, contour_colours>;
+using ContourColours = Eigen::Matrix<double, contour_colours, 3>;
 
 // fit_contour's model: a row a pixel from `first_px` on.
 ContourBasis contour_model(int first_px, int count, double contour_px, double blur_px, double radius_px) {
   const BlurredEdges& edges = BlurredEdges::instance();
-  ContourBasis basis(count, contour_colors);
+  ContourBasis basis(count, contour_colours);
   for (int i = 0; i < count; ++i) {
     const BlurredEdge edge = edges.at(static_cast<float>((first_px + i - contour_px) / blur_px));
     const auto root = static_cast<double>(edge.root), three_halves = static_cast<double>(edge.three_halves);
@@ -36,11 +36,11 @@ ContourBasis contour_model(int first_px, int count, double contour_px, double bl
 }
 
 // What the profile's light is made of. Nullopt where much of it is saturated.
-std::optional<ContourColors> colors_of(const EdgeProfile& profile, double contour_px, double blur_px,
-                                       double radius_px) {
+std::optional<ContourColours> colours_of(const EdgeProfile& profile, double contour_px, double blur_px,
+                                         double radius_px) {
   const auto count = static_cast<int>(profile.count);
   const ContourBasis basis = contour_model(static_cast<int>(profile.first_px), count, contour_px, blur_px, radius_px);
-  ContourColors colors;
+  ContourColours colours;
   for (int c = 0; c < 3; ++c) {
     const auto channel = static_cast<std::size_t>(c);
     Eigen::Matrix3d normal = 1e-6 * Eigen::Matrix3d::Identity();
@@ -54,18 +54,18 @@ std::optional<ContourColors> colors_of(const EdgeProfile& profile, double contou
       ++used;
     }
     if (2 * used < count) return std::nullopt;
-    colors.col(c) = normal.ldlt().solve(gradient);
+    colours.col(c) = normal.ldlt().solve(gradient);
   }
-  return colors;
+  return colours;
 }
 
 // The profile that the processing makes of a contour of these colours at 0.
-EdgeProfile processed_profile(const EdgeProfile& like, const ContourColors& colors, const LightImage& light,
+EdgeProfile processed_profile(const EdgeProfile& like, const ContourColours& colours, const LightImage& light,
                               const PictureProcessing& processing, double blur_px, double radius_px) {
   const int first_px = static_cast<int>(like.first_px) - filters_reach_px;
   const int count = static_cast<int>(like.count) + 2 * filters_reach_px;
   const Eigen::Matrix<double, Eigen::Dynamic, 3> true_light =
-      contour_model(first_px, count, 0, blur_px, radius_px) * colors;
+      contour_model(first_px, count, 0, blur_px, radius_px) * colours;
   std::vector<std::array<double, 3>> samples(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i)
     for (int c = 0; c < 3; ++c)
@@ -104,19 +104,19 @@ std::optional<double> bias_on_line(const LightImage& light, const Measurement& m
   };
   if (!contains(-line.before) || !contains(line.after)) return std::nullopt;
   const EdgeProfile seen = sample_profile(light, line);
-  const auto seen_colors = colors_of(seen, 0, blur.sides_px, radius_px);
-  if (!seen_colors) return std::nullopt;
+  const auto seen_colours = colours_of(seen, 0, blur.sides_px, radius_px);
+  if (!seen_colours) return std::nullopt;
   // Those that the processing makes these of.
-  ContourColors colors = *seen_colors;
+  ContourColours colours = *seen_colours;
   double bias_px = 0;
-  for (int round = 0; round < rounds_of_colors; ++round) {
+  for (int round = 0; round < rounds_of_colours; ++round) {
     const EdgeProfile made =
-        processed_profile(seen, colors, light, processing, light_blur_px(blur, processing), radius_px);
+        processed_profile(seen, colours, light, processing, light_blur_px(blur, processing), radius_px);
     const EdgeFit fit =
         fit_contour(made, static_cast<float>(blur.sides_px), static_cast<float>(radius_px), contour_iterations);
     if (!fit.converged) return std::nullopt;
     bias_px = static_cast<double>(fit.offset_px);
-    colors += *seen_colors - colors_of(made, bias_px, blur.sides_px, radius_px).value();
+    colours += *seen_colours - colours_of(made, bias_px, blur.sides_px, radius_px).value();
   }
   return bias_px;
 }

@@ -1,4 +1,4 @@
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,19 +10,19 @@ double hue_gap_deg(double a_deg, double b_deg) {
 
 std::optional<double> hue_deg_of(double b, double g, double r) {
   const double highest = std::max({b, g, r}), chroma = highest - std::min({b, g, r});
-  if (chroma < color_limits.min_chroma || chroma < color_limits.min_saturation * highest) return std::nullopt;
+  if (chroma < colour_limits.min_chroma || chroma < colour_limits.min_saturation * highest) return std::nullopt;
   if (highest == r) return 60 * (g - b) / chroma;
   if (highest == g) return 120 + 60 * (b - r) / chroma;
   return 240 + 60 * (r - g) / chroma;
 }
 
-ColorClasses::ColorClasses(const std::vector<Instrument>& instruments) {
+ColourClasses::ColourClasses(const std::vector<Instrument>& instruments) {
   for (const Instrument& instrument : instruments) {
     std::array<std::uint8_t, 3> band_classes{};
     for (std::size_t band = 0; band < 3; ++band) {
       const double hue_deg = instrument.marker.hues_deg[band];
       auto same = std::find_if(hues_deg_.begin(), hues_deg_.end(), [&](double other_deg) {
-        return hue_gap_deg(hue_deg, other_deg) < color_limits.merge_deg;
+        return hue_gap_deg(hue_deg, other_deg) < colour_limits.merge_deg;
       });
       if (same == hues_deg_.end()) same = hues_deg_.insert(hues_deg_.end(), hue_deg);
       band_classes[band] = static_cast<std::uint8_t>(1 + (same - hues_deg_.begin()));
@@ -30,7 +30,7 @@ ColorClasses::ColorClasses(const std::vector<Instrument>& instruments) {
     bands_.push_back(band_classes);
   }
 
-  std::vector<double> reach_deg(hues_deg_.size(), color_limits.widest_reach_deg);
+  std::vector<double> reach_deg(hues_deg_.size(), colour_limits.widest_reach_deg);
   for (std::size_t i = 0; i < hues_deg_.size(); ++i)
     for (std::size_t j = 0; j < hues_deg_.size(); ++j)
       if (i != j) reach_deg[i] = std::min(reach_deg[i], hue_gap_deg(hues_deg_[i], hues_deg_[j]) / 2);

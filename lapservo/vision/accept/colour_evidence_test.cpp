@@ -1,4 +1,4 @@
-#include "lapservo/vision/accept/color_evidence.h"
+#include "lapservo/vision/accept/colour_evidence.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +15,7 @@
 #include "lapservo/vision/accept/verification.h"
 
 namespace lapservo::internal {
-namespace color_evidence_test {
+namespace colour_evidence_test {
 namespace {
 
 using scenes::Shot;
@@ -26,15 +26,15 @@ ShaftPose moved_along(const Shot& shot, double along_m) {
   return shot.truth(true).changed_by(Eigen::Vector4d(0, 0, along_m, 0)).pose();
 }
 
-TEST(ColorEvidence, ShowsBothColorsBesideABoundaryOnly) {
+TEST(ColourEvidence, ShowsBothColoursBesideABoundaryOnly) {
   constexpr int lines = 40;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
     const Scene scene = shot.sight.scene();
     for (const std::size_t boundary : {1U, 2U}) {
-      EXPECT_GT(lines_with_both_colors(scene, moved_along(shot, 0), boundary, lines), lines / 2);
-      EXPECT_LE(lines_with_both_colors(scene, moved_along(shot, 1.5e-3), boundary, lines), 1);
+      EXPECT_GT(lines_with_both_colours(scene, moved_along(shot, 0), boundary, lines), lines / 2);
+      EXPECT_LE(lines_with_both_colours(scene, moved_along(shot, 1.5e-3), boundary, lines), 1);
     }
   }
 }
@@ -56,7 +56,7 @@ cv::Mat with_blood_along(const Shot& shot, std::size_t boundary) {
   return bloody;
 }
 
-TEST(ColorEvidence, NothingHidesABoundaryButBlood) {
+TEST(ColourEvidence, NothingHidesABoundaryButBlood) {
   constexpr int lines = 40;
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -73,7 +73,7 @@ TEST(ColorEvidence, NothingHidesABoundaryButBlood) {
   }
 }
 
-TEST(ColorEvidence, WhatSpillsIsAnEndElsewhereAndNoNoise) {
+TEST(ColourEvidence, WhatSpillsIsAnEndElsewhereAndNoNoise) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
@@ -87,11 +87,11 @@ TEST(ColorEvidence, WhatSpillsIsAnEndElsewhereAndNoNoise) {
       for (int u = 0; u < noisy.cols; ++u)
         if (random.uniform(0, 1) < 0.2) noisy.at<cv::Vec3b>(v, u) = {200, 20, 110};
     const Sight sight(shot.rig, noisy);
-    EXPECT_GT(color_agreement(sight.scene(), right).spilled, 0.12);
+    EXPECT_GT(colour_agreement(sight.scene(), right).spilled, 0.12);
     EXPECT_LT(spilled_in_patches(sight.scene(), right), 0.12);
   }
 }
 
 }  // namespace
-}  // namespace color_evidence_test
+}  // namespace colour_evidence_test
 }  // namespace lapservo::internal

@@ -1,4 +1,4 @@
-#include "lapservo/vision/search/explained_colors.h"
+#include "lapservo/vision/search/explained_colours.h"
 
 #include <algorithm>
 #include <array>
@@ -129,8 +129,8 @@ constexpr Gains gains_beyond{sample_gains.blood_beyond, sample_gains.bare_beyond
 
 // `here`: the bands that may show there; none beyond the marker's ends.
 double gain(const std::uint8_t* bgr, std::uint8_t seen, std::uint8_t here) {
-  const std::size_t of_color = 2 + static_cast<std::size_t>((seen & here) != 0);
-  const std::size_t shows = seen ? of_color : static_cast<std::size_t>(is_grey(bgr));
+  const std::size_t of_colour = 2 + static_cast<std::size_t>((seen & here) != 0);
+  const std::size_t shows = seen ? of_colour : static_cast<std::size_t>(is_grey(bgr));
   return here ? gains_on_marker[shows] : gains_beyond[shows];
 }
 

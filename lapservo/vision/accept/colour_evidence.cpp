@@ -1,4 +1,4 @@
-#include "lapservo/vision/accept/color_evidence.h"
+#include "lapservo/vision/accept/colour_evidence.h"
 
 #include <algorithm>
 #include <array>
@@ -20,12 +20,12 @@ double along_px_per_m(const Scene& scene, const ShaftPose& pose, double azimuth_
 }
 
 // Of four neighbours, how many have a pixel's colour.
-int neighbours_alike(const Scene& scene, const Eigen::Vector2d& raw_px, std::uint8_t color) {
+int neighbours_alike(const Scene& scene, const Eigen::Vector2d& raw_px, std::uint8_t colour) {
   constexpr double apart_px = 1.5;
   int alike = 0;
   for (const double aside : {-apart_px, apart_px}) {
-    alike += scene.class_at({raw_px.x() + aside, raw_px.y()}) == color;
-    alike += scene.class_at({raw_px.x(), raw_px.y() + aside}) == color;
+    alike += scene.class_at({raw_px.x() + aside, raw_px.y()}) == colour;
+    alike += scene.class_at({raw_px.x(), raw_px.y() + aside}) == colour;
   }
   return alike;
 }
@@ -43,10 +43,10 @@ double spilled_beyond(const Scene& scene, const ShaftPose& pose, const CylinderV
           pose.camera_from_unrolled * surface_point(scene.marker.radius_m(),
                                                     visible_azimuth_rad(view, reach, i, azimuths),
                                                     distal ? length_m + past_m : -past_m);
-      const std::uint8_t color = scene.class_at_point(point);
-      if (color == Scene::outside) continue;
+      const std::uint8_t colour = scene.class_at_point(point);
+      if (colour == Scene::outside) continue;
       ++seen;
-      spilled += color == of_end && neighbours_alike(scene, scene.camera.raw_from_point(point), color) >= least_alike;
+      spilled += colour == of_end && neighbours_alike(scene, scene.camera.raw_from_point(point), colour) >= least_alike;
     }
   return seen ? static_cast<double>(spilled) / seen : 0;
 }
@@ -75,20 +75,20 @@ int count_lines(const Scene& scene, const ShaftPose& pose, std::size_t boundary,
 
 }  // namespace
 
-int lines_with_both_colors(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
+int lines_with_both_colours(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
   constexpr std::array<double, 2> beside_px{2.5, 4};  // beyond what a lens blurs
-  return count_lines(scene, pose, boundary, lines, [&](const auto& color_at) {
+  return count_lines(scene, pose, boundary, lines, [&](const auto& colour_at) {
     return std::all_of(beside_px.begin(), beside_px.end(), [&](double px) {
-      return color_at(-px) == scene.bands[boundary - 1] && color_at(px) == scene.bands[boundary];
+      return colour_at(-px) == scene.bands[boundary - 1] && colour_at(px) == scene.bands[boundary];
     });
   });
 }
 
 int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines) {
   constexpr double beside_px = 4;
-  return count_lines(scene, pose, boundary, lines, [&](const auto& color_at) {
-    return (boundary == 0 || scene.is_ours(color_at(-beside_px))) &&
-           (boundary == 3 || scene.is_ours(color_at(beside_px)));
+  return count_lines(scene, pose, boundary, lines, [&](const auto& colour_at) {
+    return (boundary == 0 || scene.is_ours(colour_at(-beside_px))) &&
+           (boundary == 3 || scene.is_ours(colour_at(beside_px)));
   });
 }
 

@@ -1,4 +1,4 @@
-#include "lapservo/vision/colour/color_classes.h"
+#include "lapservo/vision/colour/colour_classes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,14 +17,14 @@ using Bgr = std::array<std::uint8_t, 3>;
 
 constexpr double widest_reach_deg = 34;
 
-ColorClasses classes_of(const std::vector<Hues>& instruments_hues_deg) {
+ColourClasses classes_of(const std::vector<Hues>& instruments_hues_deg) {
   std::vector<Instrument> instruments;
   for (const Hues& hues_deg : instruments_hues_deg) {
     Instrument instrument;
     instrument.marker.hues_deg = hues_deg;
     instruments.push_back(instrument);
   }
-  return ColorClasses(instruments);
+  return ColourClasses(instruments);
 }
 
 double gap_deg(double a_deg, double b_deg) {
@@ -58,9 +58,9 @@ double reach_deg(const Hues& hues_deg, std::size_t i) {
 const std::vector<Hues> designs{{90, 180, 270}, {150, 220, 285}, {60, 100, 300}, {350, 110, 230}};
 
 // Five bits a channel leave a hue uncertain by 60 degrees of their quantum in the chroma.
-TEST(ColorClasses, TheTableIsTheNearestHueWithinItsReach) {
+TEST(ColourClasses, TheTableIsTheNearestHueWithinItsReach) {
   for (const Hues& hues_deg : designs) {
-    const ColorClasses classes = classes_of({hues_deg});
+    const ColourClasses classes = classes_of({hues_deg});
     Random random(1);
     int ours_checked = 0, others_checked = 0;
     for (int i = 0; i < 30000; ++i) {
@@ -86,9 +86,9 @@ TEST(ColorClasses, TheTableIsTheNearestHueWithinItsReach) {
   }
 }
 
-TEST(ColorClasses, ReachAsFarToEitherSideOfAHue) {
+TEST(ColourClasses, ReachAsFarToEitherSideOfAHue) {
   for (const double hue_deg : {20.0, 90.0, 180.0, 270.0, 345.0}) {
-    const ColorClasses classes = classes_of({{hue_deg, hue_deg + 120, hue_deg + 240}});
+    const ColourClasses classes = classes_of({{hue_deg, hue_deg + 120, hue_deg + 240}});
     const auto reach = [&](double direction) {
       double off_deg = 0;
       while (off_deg < 60 && classes(from_hsv(hue_deg + direction * off_deg, 1, 0.9).data()) == classes.of_band(0, 0))
@@ -101,15 +101,15 @@ TEST(ColorClasses, ReachAsFarToEitherSideOfAHue) {
 }
 
 // Exposure, shading and white balance act on light: the print's classes stand them.
-TEST(ColorClasses, APrintKeepsItsClassUnderOtherLight) {
+TEST(ColourClasses, APrintKeepsItsClassUnderOtherLight) {
   const Hues hues_deg{90, 180, 270};
-  const ColorClasses classes = classes_of({hues_deg});
+  const ColourClasses classes = classes_of({hues_deg});
   const Response srgb;
   Random random(2);
   for (std::size_t band = 0; band < 3; ++band)
     for (int i = 0; i < 1000; ++i) {
       const double exposure = random.uniform(0.05, 1.3);
-      const Light print = printed_color(hues_deg[band]);
+      const Light print = printed_colour(hues_deg[band]);
       Bgr pixel;
       for (int c = 0; c < 3; ++c) {
         const double light = print[c] * exposure * random.uniform(0.8, 1.25);
@@ -121,9 +121,9 @@ TEST(ColorClasses, APrintKeepsItsClassUnderOtherLight) {
     }
 }
 
-TEST(ColorClasses, GreyAndDarkHaveNoColour) {
+TEST(ColourClasses, GreyAndDarkHaveNoColour) {
   for (const Hues& hues_deg : designs) {
-    const ColorClasses classes = classes_of({hues_deg});
+    const ColourClasses classes = classes_of({hues_deg});
     for (int value = 0; value < 256; ++value) {
       const Bgr grey{static_cast<std::uint8_t>(value), static_cast<std::uint8_t>(value),
                      static_cast<std::uint8_t>(value)};
@@ -141,8 +141,8 @@ TEST(ColorClasses, GreyAndDarkHaveNoColour) {
   }
 }
 
-TEST(ColorClasses, InstrumentsShareTheClassesOfTheirHues) {
-  const ColorClasses classes = classes_of({{90, 180, 270}, {270, 90, 180}, {95, 350, 265}});
+TEST(ColourClasses, InstrumentsShareTheClassesOfTheirHues) {
+  const ColourClasses classes = classes_of({{90, 180, 270}, {270, 90, 180}, {95, 350, 265}});
   EXPECT_EQ(classes.count(), 4);
   for (std::size_t band = 0; band < 3; ++band)
     EXPECT_EQ(classes.of_band(0, band), classes.of_band(1, (band + 1) % 3)) << band;

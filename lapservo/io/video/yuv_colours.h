@@ -14,13 +14,13 @@ namespace lapservo::internal {
 bool names_software_encoder(std::span<const std::uint8_t> bytes);
 
 /// In place of what a stream names.
-struct GivenColors {
+struct GivenColours {
   std::optional<YuvMatrix> matrix;
   std::optional<ChromaSite> chroma;
 };
 
 /// By the words of VideoReading, of which each may be empty. Throws InputError for others.
-GivenColors given_colors(const std::string& colour_matrix, const std::string& chroma_location);
+GivenColours given_colours(const std::string& colour_matrix, const std::string& chroma_location);
 
 /// By `given`, else by the frame's tags (AVFrame::colorspace, color_range, chroma_location), which decoders take from
 /// the stream. Without a matrix usual_matrix(), without a range the limited one. Without a place of chroma the
@@ -28,8 +28,8 @@ GivenColors given_colors(const std::string& colour_matrix, const std::string& ch
 /// software encoder wrote the stream; where that names no matrix either, swscale made it of RGB, as for OpenCV and
 /// `ffmpeg` without options, by Rec. 601's matrix and with chroma amid the pixels, whatever the height. Nullopt for a
 /// matrix that swscale does not know.
-std::optional<YuvColors> yuv_colors_of(const AVFrame& frame, AVCodecID codec, bool of_software,
-                                       const GivenColors& given);
+std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, bool of_software,
+                                         const GivenColours& given);
 
 /// How a frame without a matrix is read, in words, where players would read it otherwise than OpenCV or FFmpeg may have
 /// written it; else empty.

@@ -12,13 +12,13 @@
 namespace lapservo::internal {
 
 /// Which pixels have a colour. Hues of the samples' tissue: red to yellow, vessels violet.
-struct ColorLimits {
+struct ColourLimits {
   double merge_deg = 20;         ///< hues this close are one colour to the camera
   double widest_reach_deg = 34;  ///< no hue reaches further, else tissue and vessels have the marker's colours
   double min_saturation = 0.18;  ///< smoke (--smoke 0.55) leaves a quarter of the print's
   double min_chroma = 22;        ///< of 255: below it noise makes hues, most of all in the dark
 };
-inline constexpr ColorLimits color_limits;
+inline constexpr ColourLimits colour_limits;
 
 /// HSV hue of encoded values, degrees in (-60, 300], or nullopt for what is too grey or too dark to have one.
 std::optional<double> hue_deg_of(double b, double g, double r);
@@ -29,9 +29,9 @@ double hue_gap_deg(double a_deg, double b_deg);
 /// Which of the markers' colours a pixel has: 0 for none, else 1, 2, ... for the rig's distinct hues. A pixel has a
 /// colour when it is colourful and its HSV hue lies nearer to it than half the way to the next, so that exposure,
 /// shading and moderate white balance need no tuning. Looked up from the 5 high bits of each channel: 32 KiB.
-class ColorClasses {
+class ColourClasses {
  public:
-  explicit ColorClasses(const std::vector<Instrument>& instruments);
+  explicit ColourClasses(const std::vector<Instrument>& instruments);
 
   std::uint8_t operator()(const std::uint8_t* bgr) const { return table_[index(bgr)]; }
   /// Of pixels that lie `step_bytes` apart, as many as `classes` has places.

@@ -11,7 +11,7 @@ namespace lapservo::internal {
 
 /// On how many of so many lines along the marker both of an inner boundary's colours show beside it. An edge of blood
 /// has one of them at most.
-int lines_with_both_colors(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
+int lines_with_both_colours(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);
 
 /// And on how many nothing hides a boundary: colours of the marker, whichever, show on both sides, of an end inside.
 int lines_in_clear_view(const Scene& scene, const ShaftPose& pose, std::size_t boundary, int lines);

@@ -19,7 +19,7 @@ namespace {
 constexpr int patch_px = 64;
 const std::array<cv::Vec3b, 4> patches{cv::Vec3b{0, 0, 255}, {0, 255, 0}, {255, 0, 0}, {128, 128, 128}};
 
-struct Colors {
+struct Colours {
   const char* matrix;  // as FFmpeg's scale names it, and as its option -colorspace does
   const char* tag;
   const char* range;
@@ -46,26 +46,26 @@ void expect_patches(const cv::Mat& bgr, int tolerance) {
   }
 }
 
-class VideoColors : public ::testing::TestWithParam<std::tuple<Colors, Coding>> {};
+class VideoColours : public ::testing::TestWithParam<std::tuple<Colours, Coding>> {};
 
 // False where FFmpeg or the encoder is missing.
-bool write_patches(const std::filesystem::path& path, const Colors& colors, const Coding& coding,
+bool write_patches(const std::filesystem::path& path, const Colours& colours, const Coding& coding,
                    const std::filesystem::path& scratch) {
   const cv::Mat picture = patches_of(patch_px);
   testing::write_file(scratch, std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
   const std::string command =
       "ffmpeg -v quiet -y -stream_loop 2 -f rawvideo -pix_fmt bgr24 -s 256x64 -r 25 -i '" + scratch.string() +
-      "' -vf scale=out_color_matrix=" + colors.matrix + ":out_range=" + colors.range +
-      ":flags=accurate_rnd+full_chroma_int,setparams=colorspace=" + colors.tag + ":range=" + colors.range + " " +
-      coding.options + " -colorspace " + colors.tag + " -color_range " + colors.range + " '" + path.string() + "'";
+      "' -vf scale=out_color_matrix=" + colours.matrix + ":out_range=" + colours.range +
+      ":flags=accurate_rnd+full_chroma_int,setparams=colorspace=" + colours.tag + ":range=" + colours.range + " " +
+      coding.options + " -colorspace " + colours.tag + " -color_range " + colours.range + " '" + path.string() + "'";
   return std::system(command.c_str()) == 0;
 }
 
-TEST_P(VideoColors, ReadAsTheirTagsSay) {
-  const auto& [colors, coding] = GetParam();
+TEST_P(VideoColours, ReadAsTheirTagsSay) {
+  const auto& [colours, coding] = GetParam();
   const testing::TemporaryFolder folder;
   const auto path = folder / (std::string("a.") + coding.ending);
-  if (!write_patches(path, colors, coding, folder / "raw"))
+  if (!write_patches(path, colours, coding, folder / "raw"))
     GTEST_SKIP() << "FFmpeg here can't write " << coding.options;
   const auto source = open_frame_source(path.string(), 30);
   int frames = 0;
@@ -138,10 +138,10 @@ TEST(VideoFields, HaveTheirOwnChroma) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Tags, VideoColors,
-    ::testing::Combine(::testing::Values(Colors{"bt709", "bt709", "tv"}, Colors{"bt709", "bt709", "pc"},
-                                         Colors{"bt601", "smpte170m", "tv"}, Colors{"bt601", "bt470bg", "pc"},
-                                         Colors{"bt2020", "bt2020nc", "tv"}, Colors{"smpte240m", "smpte240m", "tv"}),
+    Tags, VideoColours,
+    ::testing::Combine(::testing::Values(Colours{"bt709", "bt709", "tv"}, Colours{"bt709", "bt709", "pc"},
+                                         Colours{"bt601", "smpte170m", "tv"}, Colours{"bt601", "bt470bg", "pc"},
+                                         Colours{"bt2020", "bt2020nc", "tv"}, Colours{"smpte240m", "smpte240m", "tv"}),
                        ::testing::Values(Coding{"-c:v libx264 -qp 0 -pix_fmt yuv444p", "mp4"},
                                          Coding{"-c:v libx264 -crf 2 -pix_fmt yuv420p", "mkv"},
                                          Coding{"-c:v libx265 -x265-params lossless=1:log-level=-1 -pix_fmt yuv444p",

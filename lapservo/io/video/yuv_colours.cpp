@@ -1,4 +1,4 @@
-#include "lapservo/io/video/yuv_colors.h"
+#include "lapservo/io/video/yuv_colours.h"
 
 #include <algorithm>
 #include <array>
@@ -98,12 +98,12 @@ bool names_software_encoder(std::span<const std::uint8_t> bytes) {
                      [&](std::string_view name) { return text.find(name) != std::string_view::npos; });
 }
 
-GivenColors given_colors(const std::string& colour_matrix, const std::string& chroma_location) {
+GivenColours given_colours(const std::string& colour_matrix, const std::string& chroma_location) {
   static const std::map<std::string, YuvMatrix> matrices{
       {"bt601", YuvMatrix::bt601}, {"bt709", YuvMatrix::bt709}, {"bt2020", YuvMatrix::bt2020}};
   static const std::map<std::string, ChromaSite> sites{
       {"left", ChromaSite::left}, {"centre", ChromaSite::centre}, {"top-left", ChromaSite::top_left}};
-  GivenColors given;
+  GivenColours given;
   if (const auto found = matrices.find(colour_matrix); found != matrices.end()) given.matrix = found->second;
   if (const auto found = sites.find(chroma_location); found != sites.end()) given.chroma = found->second;
   if (!colour_matrix.empty() && !given.matrix)
@@ -113,23 +113,23 @@ GivenColors given_colors(const std::string& colour_matrix, const std::string& ch
   return given;
 }
 
-std::optional<YuvColors> yuv_colors_of(const AVFrame& frame, AVCodecID codec, bool of_software,
-                                       const GivenColors& given) {
-  if (is_rgb(frame)) return YuvColors();
+std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, bool of_software,
+                                         const GivenColours& given) {
+  if (is_rgb(frame)) return YuvColours();
   const bool from_rgb = of_software && names_no_matrix(frame);
-  YuvColors colors;
+  YuvColours colours;
   if (given.matrix) {
-    colors.matrix = *given.matrix;
+    colours.matrix = *given.matrix;
   } else if (names_no_matrix(frame)) {
-    colors.matrix = from_rgb ? YuvMatrix::bt601 : usual_matrix(frame.height);
+    colours.matrix = from_rgb ? YuvMatrix::bt601 : usual_matrix(frame.height);
   } else if (const auto matrix = matrix_of(frame.colorspace)) {
-    colors.matrix = *matrix;
+    colours.matrix = *matrix;
   } else {
     return std::nullopt;
   }
-  colors.full_range = pixel_format_of(frame) != frame.format || frame.color_range == AVCOL_RANGE_JPEG;
-  colors.chroma = given.chroma.value_or(site_of(frame, codec, from_rgb));
-  return colors;
+  colours.full_range = pixel_format_of(frame) != frame.format || frame.color_range == AVCOL_RANGE_JPEG;
+  colours.chroma = given.chroma.value_or(site_of(frame, codec, from_rgb));
+  return colours;
 }
 
 std::string remark_on_matrix(const AVFrame& frame, bool of_software) {
