@@ -18,9 +18,9 @@ namespace {
 constexpr std::uint32_t max_px = 16384;
 constexpr std::size_t max_compressed = std::size_t{64} << 20;
 
-// How pixels lie, and what makes BGR of them: one of OpenCV's conversions; keep: they are BGR; uyvy, yuyv: they are
-// that.
-constexpr int keep = -1, uyvy = -2, yuyv = -3;
+// How pixels lie, and what makes BGR of them: one of OpenCV's conversions; keep: they are BGR; uyvy, yuyv, nv12: they
+// are that.
+constexpr int keep = -1, uyvy = -2, yuyv = -3, nv12 = -4;
 struct Encoding {
   std::string_view name;
   int channels, bytes;  // of a channel
@@ -39,6 +39,7 @@ constexpr std::array encodings{
     Encoding{"uyvy", 2, 1, uyvy},
     Encoding{"yuv422_yuy2", 2, 1, yuyv},
     Encoding{"yuyv", 2, 1, yuyv},
+    Encoding{"nv12", 1, 1, nv12},  // not in image_encodings.h; as NVIDIA's nodes publish it
     Encoding{"bayer_rggb8", 1, 1, cv::COLOR_BayerBG2BGR},
     Encoding{"bayer_bggr8", 1, 1, cv::COLOR_BayerRG2BGR},
     Encoding{"bayer_gbrg8", 1, 1, cv::COLOR_BayerGR2BGR},
@@ -60,15 +61,17 @@ std::string shown(std::string text) {
 BadImage bad_encoding(const std::string& encoding) {
   if (encoding == "mono8" || encoding == "mono16")
     return {encoding + " has no colours, by which the marker is found: publish bgr8, rgb8, yuv422 or bayer_*"};
-  return {"encoding " + shown(encoding) + ", expected bgr8, rgb8, bgra8, rgba8, bgr16, rgb16, yuv422 or bayer_*"};
+  return {"encoding " + shown(encoding) + ", expected bgr8, rgb8, bgra8, rgba8, bgr16, rgb16, yuv422, nv12 or bayer_*"};
 }
 
-// By the matrix of its height; chroma lies on the left of each two pixels, as cameras send it.
-DecodedImage bgr_of(const cv::Mat& pixels, YuvPicture::Layout layout) {
-  const YuvPicture picture{layout, pixels.size(), {pixels.data}, {static_cast<int>(pixels.step)}};
+// By the matrix of its height; chroma lies on the left of each two pixels, as cameras send it. Chroma of nv12 lies in
+// the rows below luma's.
+DecodedImage bgr_of(const cv::Mat& pixels, cv::Size size, YuvPicture::Layout layout) {
+  const int step = static_cast<int>(pixels.step);
+  const YuvPicture picture{layout, size, {pixels.ptr(0), pixels.data + pixels.step * size.height}, {step, step}};
   cv::Mat bgr;
-  if (!convert_to_bgr(picture, {usual_matrix(pixels.rows)}, bgr))
-    return BadImage{fmt::format("size {}x{}", pixels.cols, pixels.rows)};
+  if (!convert_to_bgr(picture, {usual_matrix(size.height)}, bgr))
+    return BadImage{fmt::format("size {}x{}", size.width, size.height)};
   return bgr;
 }
 
@@ -86,23 +89,29 @@ DecodedImage decode(const ImageMessage& message) {
                                   [&](const Encoding& known) { return known.name == message.encoding; });
   if (found == encodings.end()) return bad_encoding(message.encoding);
   const auto [width, height, step] = std::array{message.width, message.height, message.step};
-  if (width == 0 || height == 0 || width > max_px || height > max_px || (found->channels == 2 && width % 2 != 0))
+  const bool half_chroma = found->conversion == nv12;
+  if (width == 0 || height == 0 || width > max_px || height > max_px ||
+      ((found->channels == 2 || half_chroma) && width % 2 != 0) || (half_chroma && height % 2 != 0))
     return BadImage{fmt::format("size {}x{}", width, height)};
   const std::size_t row = std::size_t{width} * found->channels * found->bytes;
-  if (step < row || message.data.size() < std::size_t{step} * (height - 1) + row)
+  const std::uint32_t rows = half_chroma ? height / 2 * 3 : height;
+  if (step < row || message.data.size() < std::size_t{step} * (rows - 1) + row)
     return BadImage{
         fmt::format("{} bytes with a step of {} for {}x{} {}", message.data.size(), step, width, height, found->name)};
-  const cv::Mat bytes(static_cast<int>(height), static_cast<int>(row), CV_8UC1,
+  const cv::Mat bytes(static_cast<int>(rows), static_cast<int>(row), CV_8UC1,
                       const_cast<std::uint8_t*>(message.data.data()), step);
   cv::Mat pixels = found->bytes == 2 ? upper_bytes(bytes, message.is_bigendian) : bytes;
   pixels = pixels.reshape(found->channels);
+  const cv::Size size(static_cast<int>(width), static_cast<int>(height));
   switch (found->conversion) {
     case keep:
       return pixels.clone();
     case uyvy:
-      return bgr_of(pixels, YuvPicture::Layout::uyvy);
+      return bgr_of(pixels, size, YuvPicture::Layout::uyvy);
     case yuyv:
-      return bgr_of(pixels, YuvPicture::Layout::yuyv);
+      return bgr_of(pixels, size, YuvPicture::Layout::yuyv);
+    case nv12:
+      return bgr_of(pixels, size, YuvPicture::Layout::nv12);
     default:
       break;
   }

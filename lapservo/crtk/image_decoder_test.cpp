@@ -48,20 +48,74 @@ TEST(ImageDecoder, ADecodedImageIsItsOwn) {
   EXPECT_EQ(bgr_at(image, 0, 0), before);
 }
 
-// UYVY and YUYV by the equations of BT.601 with its limited range.
-TEST(ImageDecoder, Yuv422) {
-  ImageMessage uyvy = message_of("yuv422", 2, 2), yuy2 = message_of("yuv422_yuy2", 2, 2);
-  for (int row = 0; row < 2; ++row)
-    for (int pair = 0; pair < 2; ++pair) {
-      std::uint8_t* const a = &uyvy.data[row * uyvy.step + 4 * pair];
-      std::uint8_t* const b = &yuy2.data[row * yuy2.step + 4 * pair];
-      a[0] = b[1] = 90, a[1] = b[0] = 100, a[2] = b[3] = 170, a[3] = b[2] = 120;
+// Luma and both chroma of a colour by the equations of Rec. 601 (below 720 rows) or 709, limited range.
+std::array<std::uint8_t, 3> yuv_of(const cv::Vec3b& bgr, int rows) {
+  const double kr = rows >= 720 ? 0.2126 : 0.299, kb = rows >= 720 ? 0.0722 : 0.114;
+  const double b = bgr[0] / 255.0, g = bgr[1] / 255.0, r = bgr[2] / 255.0;
+  const double y = kr * r + (1 - kr - kb) * g + kb * b;
+  const auto byte = [](double value) { return static_cast<std::uint8_t>(std::lround(value)); };
+  return {byte(16 + 219 * y), byte(128 + 112 * (b - y) / (1 - kb)), byte(128 + 112 * (r - y) / (1 - kr))};
+}
+
+// A message of 8 columns, all of one colour.
+ImageMessage message_of_colour(const std::string& encoding, const cv::Vec3b& bgr, int rows) {
+  const auto [y, u, v] = yuv_of(bgr, rows);
+  const std::uint8_t b = bgr[0], g = bgr[1], r = bgr[2];
+  const auto bayer = [&](const char* letters) {
+    std::vector<std::uint8_t> cells;
+    for (int i = 0; i < 4; ++i) cells.push_back(letters[i] == 'r' ? r : letters[i] == 'g' ? g : b);
+    return cells;
+  };
+  const bool is_deep = encoding.find("16") != std::string::npos;
+  std::vector<std::uint8_t> pattern;  // of a row, repeated
+  std::vector<std::uint8_t> below;    // of every second row
+  if (encoding.starts_with("bayer")) {
+    const std::vector<std::uint8_t> cells = bayer(encoding.substr(6, 4).c_str());
+    pattern = {cells[0], cells[1]}, below = {cells[2], cells[3]};
+  } else if (encoding == "yuv422" || encoding == "uyvy") {
+    pattern = {u, y, v, y};
+  } else if (encoding == "yuv422_yuy2" || encoding == "yuyv") {
+    pattern = {y, u, y, v};
+  } else if (encoding == "nv12") {
+    pattern = {y};
+  } else {
+    pattern = encoding.starts_with("rgb") ? std::vector<std::uint8_t>{r, g, b} : std::vector<std::uint8_t>{b, g, r};
+    if (encoding.find('a') != std::string::npos) pattern.push_back(255);
+  }
+  if (below.empty()) below = pattern;
+  ImageMessage message;
+  message.width = 8, message.height = static_cast<std::uint32_t>(rows), message.encoding = encoding;
+  const std::size_t pixel_cells = encoding.starts_with("bayer") || encoding == "nv12"              ? 1
+                                  : pattern.size() == 4 && encoding.find('y') != std::string::npos ? 2
+                                                                                                   : pattern.size();
+  for (int row = 0; row < rows; ++row)
+    for (std::size_t i = 0; i < 8 * pixel_cells; ++i) {
+      const auto& cells = row % 2 == 0 ? pattern : below;
+      if (is_deep) message.data.push_back(77);  // the lower byte
+      message.data.push_back(cells[i % cells.size()]);
     }
-  const double y = 1.164 * (100 - 16);
-  const cv::Vec3d expected(y + 2.017 * (90 - 128), y - 0.392 * (90 - 128) - 0.813 * (170 - 128),
-                           y + 1.596 * (170 - 128));
-  for (const ImageMessage& message : {uyvy, yuy2})
-    for (int i = 0; i < 3; ++i) EXPECT_NEAR(bgr_at(decode(message), 1, 2)[i], expected[i], 2) << message.encoding;
+  message.step = static_cast<std::uint32_t>(message.data.size() / rows);
+  if (encoding == "nv12")
+    for (int i = 0; i < rows / 2 * 4; ++i) message.data.insert(message.data.end(), {u, v});
+  return message;
+}
+
+TEST(ImageDecoder, PureColoursStayPureInEveryEncoding) {
+  for (const char* encoding :
+       {"bgr8",        "8UC3",        "rgb8",         "bgra8",        "rgba8",        "bgr16",       "rgb16",
+        "yuv422",      "uyvy",        "yuv422_yuy2",  "yuyv",         "nv12",         "bayer_rggb8", "bayer_bggr8",
+        "bayer_gbrg8", "bayer_grbg8", "bayer_rggb16", "bayer_bggr16", "bayer_gbrg16", "bayer_grbg16"})
+    for (const int rows : {6, 720})
+      for (const cv::Vec3b& bgr :
+           {cv::Vec3b(0, 0, 255), cv::Vec3b(0, 255, 0), cv::Vec3b(255, 0, 0), cv::Vec3b(128, 128, 128)}) {
+        const DecodedImage image = decode(message_of_colour(encoding, bgr, rows));
+        ASSERT_TRUE(std::holds_alternative<cv::Mat>(image)) << encoding << ": " << why(image);
+        ASSERT_EQ(std::get<cv::Mat>(image).size(), cv::Size(8, rows));
+        for (const int row : {2, 3})
+          for (const int column : {3, 4})
+            for (int i = 0; i < 3; ++i)
+              EXPECT_NEAR(bgr_at(image, row, column)[i], bgr[i], 2) << encoding << ' ' << rows << ' ' << i;
+      }
 }
 
 // Chroma is a slope, and its samples lie on the even columns.
@@ -122,12 +176,16 @@ TEST(ImageDecoder, RefusesWithTheReason) {
   message = message_of("yuv422", 2);
   message.width = 3;
   EXPECT_EQ(why(decode(message)), "size 3x2");
+  message = message_of("nv12", 1);
+  EXPECT_EQ(why(decode(message)), "10 bytes with a step of 5 for 4x2 nv12");
+  message.height = 3;
+  EXPECT_EQ(why(decode(message)), "size 4x3");
 }
 
 TEST(ImageDecoder, WhateverTheFieldsHoldItAnswers) {
   Random random(1);
   const auto number = [&] { return static_cast<std::uint32_t>(std::abs(random.normal()) * 8); };
-  const std::array words{"bgr8", "rgb16", "yuv422", "bayer_rggb8", "bayer_gbrg16", "mono8", ""};
+  const std::array words{"bgr8", "rgb16", "yuv422", "nv12", "bayer_rggb8", "bayer_gbrg16", "mono8", ""};
   for (int k = 0; k < 3000; ++k) {
     ImageMessage message;
     message.width = number(), message.height = number(), message.step = number() * 4;
