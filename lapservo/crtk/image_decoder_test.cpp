@@ -177,7 +177,7 @@ TEST(ImageDecoder, RefusesWithTheReason) {
   message.width = 3;
   EXPECT_EQ(why(decode(message)), "size 3x2");
   message = message_of("nv12", 1);
-  EXPECT_EQ(why(decode(message)), "10 bytes with a step of 5 for 4x2 nv12");
+  EXPECT_EQ(why(decode(message)), "14 bytes with a step of 7 for 4x2 nv12");
   message.height = 3;
   EXPECT_EQ(why(decode(message)), "size 4x3");
 }
