@@ -318,9 +318,6 @@ TEST_F(CommandLine, OutputsThatCannotBe) {
                  {"obs.csv", "can't be written"});
   expect_refused("track in/grey.png --rig configs/example.yaml --out in/grey.png", {"grey.png", "the input itself"});
   expect_refused("track in/grey.png --rig configs/example.yaml --method guess --out out/obs.csv", {"guess"});
-  unsetenv("DISPLAY");
-  unsetenv("WAYLAND_DISPLAY");
-  expect_refused("track in/grey.png --rig configs/example.yaml --view --out out/obs.csv", {"--view", "display"});
 }
 
 TEST_F(CommandLine, RenderingWhatCannotBe) {

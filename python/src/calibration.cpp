@@ -157,7 +157,7 @@ py::dict calibrate_colour(const py::object& frames, const py::object& rig, const
   result["response"] = calibration.response_found;
   result["found_before"] = calibration.found_before;
   result["found"] = calibration.found;
-  result["frames"] = measured.frames.size();
+  result["frames"] = measured.frames;
   return result;
 }
 

@@ -30,8 +30,8 @@ ENOUGH = {
 }
 #: A device that is not here: the line is right when that is all that is said.
 CAMERA, NO_CAMERA = "/dev/video0", "/dev/video-none"
-#: What the tests have in its place: a recording for the first camera, no screen, any port that is free.
-INSTEAD = {r"lapservo (track|view) 0 ": r"lapservo \1 swing.mp4 ", r"--view\b": "", r"--web\b": "--web 0",
+#: What the tests have in its place: a recording for the first camera, any port that is free.
+INSTEAD = {r"lapservo (track|view) 0 ": r"lapservo \1 swing.mp4 ", r"--web\b": "--web 0",
            r"lapservo view\b": "lapservo view --web 0", CAMERA: NO_CAMERA}
 #: Exit code 1: what was found is not good enough, or the arm is not yet where it shall be.
 MAY_BE_1 = re.compile(r"\S*lapservo (check|servo (?!--replay run/)|calibrate all) ")

@@ -14,7 +14,6 @@
 #include <fmt/format.h>
 
 #include "apps/lapservo/cli/interrupt.h"
-#include "apps/lapservo/cli/live_view.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/cli/web_view.h"
@@ -40,7 +39,7 @@ namespace fs = std::filesystem;
 struct TrackOptions : FrameOptions {
   std::string input, rig, out = "obs.csv", overlay;
   std::string method = "surface";
-  bool single = false, view = false;
+  bool single = false;
   WebOptions web;
   bool page_only = false;  ///< `lapservo view`: at the input's own pace, and without --out
   int frames = 0;
@@ -212,7 +211,6 @@ class TrackRun {
         source_(live_ ? static_cast<FrameSource&>(*live_) : *file_) {
     if (source_.kind() == FrameSource::Kind::image || source_.kind() == FrameSource::Kind::folder)
       rigs_.expect_pictures();
-    if (options.view) view_.emplace("track", "use --overlay to write images instead");
     if (options.web.port) web_.emplace(options.web, page_config_of(options, source_));
     if (!options.page_only) csv_.emplace(options.out);
     if (!options.overlay.empty()) overlay_ = open_overlay_writer(options.overlay, source_);
@@ -270,11 +268,7 @@ class TrackRun {
   bool pass_on(const Frame& frame, const std::vector<Observation>& observations, double came_s) {
     for (const Observation& observation : observations)
       if (csv_) csv_->add(frame.index, frame.time_s, frame.file.filename().string(), observation);
-    if (overlay_ || view_) {
-      const cv::Mat picture = draw_overlay(frame.bgr, *rigs_.rig(), observations);
-      if (overlay_) overlay_->add(frame, picture);
-      if (view_ && !view_->show(picture)) return false;
-    }
+    if (overlay_) overlay_->add(frame, draw_overlay(frame.bgr, *rigs_.rig(), observations));
     if (!web_) return true;
     web_->show({frame.bgr, rigs_.rig(), observations, clock_.now_s() - came_s});
     return !web_->wishes().stop;
@@ -317,7 +311,6 @@ class TrackRun {
   std::unique_ptr<LiveFrames> live_;
   std::unique_ptr<FrameSource> file_;
   FrameSource& source_;
-  std::optional<LiveView> view_;
   std::optional<WebView> web_;
   std::optional<ObservationCsv> csv_;
   std::unique_ptr<OverlayWriter> overlay_;
@@ -376,7 +369,6 @@ void add_track(Command app, Run& run_later) {
   command.add_option("--overlay", options->overlay,
                      "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
                      "same name");
-  command.add_flag("--view", options->view, "Show a live window");
   add_web_options(command, options->web);
   command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
       .shows_default()

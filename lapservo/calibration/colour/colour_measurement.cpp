@@ -4,6 +4,7 @@
 #include <string>
 
 #include <fmt/format.h>
+#include <opencv2/core.hpp>
 
 #include "lapservo/calibration/check/frame_diagnosis.h"
 #include "lapservo/core/rounded_sigma.h"
@@ -11,27 +12,25 @@
 namespace lapservo::internal {
 
 ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
-                                 bool keep_response, const JobWatch& watch,
-                                 const std::function<void(const cv::Mat&)>& look) {
+                                 bool keep_response, const JobWatch& watch) {
   constexpr std::size_t most = 48;
   SpreadFrames kept(most);
   const bool live = recording.source.kind() == FrameSource::Kind::live;
   ColourMeasurement measured;
   measured.read = read_frames(recording, rig, live ? 10 : 1, watch, [&](const cv::Mat& bgr, double) {
     kept.add(bgr);
-    if (look) look(bgr);
     return fmt::format(", {} kept", kept.frames().size());
   });
   // A camera goes on for ever: the user ends what is enough.
   if (measured.read.stopped && !live) return measured.calibration.refusal = "stopped", measured;
-  measured.frames = kept.frames();
+  measured.frames = kept.frames().size();
   int step = 0;
-  measured.calibration =
-      calibrate_colour(rig, instrument, measured.frames, keep_response,
-                       [&](const std::string& what) { watch.tell(std::nullopt, ++step, ": " + what); });
+  measured.calibration = calibrate_colour(rig, instrument, kept.frames(), keep_response, [&](const std::string& what) {
+    watch.tell(std::nullopt, ++step, ": " + what);
+  });
   if (!measured.calibration.refusal.empty()) {
     FrameDiagnosis diagnosis(rig);
-    for (const cv::Mat& bgr : measured.frames) diagnosis.add(bgr, {});
+    for (const cv::Mat& bgr : kept.frames()) diagnosis.add(bgr, {});
     measured.calibration.refusal += diagnosis.cause();
   }
   return measured;

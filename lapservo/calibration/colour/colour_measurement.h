@@ -1,10 +1,7 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <vector>
-
-#include <opencv2/core.hpp>
 
 #include "lapservo/calibration/calibrated_number.h"
 #include "lapservo/calibration/colour/colour_calibration.h"
@@ -12,18 +9,17 @@
 
 namespace lapservo::internal {
 
-/// Colours, measured, and the frames that they were measured in.
+/// Colours, measured, and in how many frames.
 struct ColourMeasurement {
   ColourCalibration calibration;  ///< or its refusal
-  std::vector<cv::Mat> frames;
+  std::size_t frames = 0;
   FramesRead read;
 };
 
-/// Calibrates by a marker in motion; `look` receives every frame, a live camera's until it is stopped. keep_response:
-/// see calibrate_colour(). Throws InputError as read_frames().
+/// Calibrates by a marker in motion, a live camera's until it is stopped. keep_response: see calibrate_colour(). Throws
+/// InputError as read_frames().
 ColourMeasurement measure_colour(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
-                                 bool keep_response, const JobWatch& watch,
-                                 const std::function<void(const cv::Mat&)>& look = {});
+                                 bool keep_response, const JobWatch& watch);
 
 /// The hues, in degrees.
 std::vector<CalibratedNumber> calibrated_numbers(const Marker& before, const ColourCalibration& calibration);

@@ -1,14 +1,8 @@
+#include <cstddef>
 #include <cstdio>
 #include <memory>
-#include <optional>
-#include <string>
-#include <vector>
-
-#include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
 
 #include "apps/lapservo/cli/interrupt.h"
-#include "apps/lapservo/cli/live_view.h"
 #include "apps/lapservo/cli/subcommands.h"
 #include "apps/lapservo/commands/calibrate/calibrate_steps.h"
 #include "apps/lapservo/inputs/frame_input.h"
@@ -20,21 +14,6 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-cv::Mat halved(const cv::Mat& picture) {
-  cv::Mat small;
-  cv::resize(picture, small, {}, 0.5, 0.5, cv::INTER_AREA);
-  return small;
-}
-
-// The frame, what the rig's colours are in it, and what the calibrated ones are.
-cv::Mat before_and_after(const cv::Mat& frame, const Rig& before, const Rig& after) {
-  cv::Mat row;
-  cv::hconcat(std::vector<cv::Mat>{halved(frame), halved(segmentation_picture(frame, before)),
-                                   halved(segmentation_picture(frame, after))},
-              row);
-  return row;
-}
-
 void print(const Instrument& instrument, const ColourCalibration& calibration, std::size_t frames) {
   std::printf("%s: found in %d of %zu frames before, in %d after\n\n          hue before   after   sigma [deg]\n",
               instrument.name.c_str(), calibration.found_before, frames, calibration.found);
@@ -42,12 +21,6 @@ void print(const Instrument& instrument, const ColourCalibration& calibration, s
     std::printf("  band %zu   %8.1f   %7.1f   %5.1f\n", band, instrument.marker.hues_deg[band],
                 calibration.hues_deg[band], calibration.sigma_hues_deg[band]);
   std::printf("\nresponse: %s\n", calibration.response_found.c_str());
-}
-
-// Until the user has seen them. It was Ctrl-C that ended live frames: it does not end this.
-void show(LiveView& view, const std::vector<cv::Mat>& kept, const Rig& before, const Rig& after, bool live) {
-  for (std::size_t i = 0; i < kept.size() && (live || !interrupted()); ++i)
-    if (!view.show(before_and_after(kept[i], before, after))) return;
 }
 
 }  // namespace
@@ -58,24 +31,18 @@ int calibrate_colour(const CalibrateColourOptions& options) {
   const Instrument& instrument = rig.instruments[index];
   refuse_outputs_over_inputs(options, rig);
   const auto source = open_frames(options.input, options, &rig.camera);
-  std::optional<LiveView> view;
-  if (options.view) view.emplace("calibrate colour", "`lapservo check --out` writes a page with the segmentation");
   AtomicFile out(options.out);
   watch_for_interrupts();
 
   const bool live = source->kind() == FrameSource::Kind::live;
   const bool keep_response = !options.replace_response && rig.camera.response.sigma.has_value();
-  const ColourMeasurement measured = measure_colour(rig, index, {*source, options.input, options.deinterlace},
-                                                    keep_response, watched_job(), [&](const cv::Mat& bgr) {
-                                                      if (view && live) view->show(segmentation_picture(bgr, rig));
-                                                    });
+  const ColourMeasurement measured =
+      measure_colour(rig, index, {*source, options.input, options.deinterlace}, keep_response, watched_job());
   const ColourCalibration& calibration = measured.calibration;
   if (live || !measured.read.stopped) say_complaint(options.input, measured.read.complaint);
   if (!calibration.refusal.empty()) return refuse_calibration(options, calibration.refusal);
-  print(instrument, calibration, measured.frames.size());
-  const Rig after = with_colour(rig, index, calibration);
-  if (view) show(*view, measured.frames, rig, after, live);
-  out.stream() << rig_yaml(after, options.out);
+  print(instrument, calibration, measured.frames);
+  out.stream() << rig_yaml(with_colour(rig, index, calibration), options.out);
   out.commit();
   std::printf("rig: %s\n", options.out.c_str());
   return 0;
@@ -91,7 +58,6 @@ void add_calibrate_colour(Command parent, Run& run_later) {
   add_calibrate_options(command, *options);
   command.add_flag("--replace-response", options->replace_response,
                    "Also a response that calibrate camera measured (sigma_response), which stays else");
-  command.add_flag("--view", options->view, "Show the segmentation before and after in a window");
   command.footer(
       "Move the instrument through the image and turn it, 10 s or more, wholly in view and not overexposed. The "
       "rig's\n"

@@ -22,7 +22,7 @@ struct CalibrateCameraOptions : FrameOptions {
 };
 
 struct CalibrateColourOptions : CalibrateOptions {
-  bool view = false, replace_response = false;
+  bool replace_response = false;
 };
 
 // The jobs of the subcommands of these names. Each returns the exit code, 0 or 1, and throws InputError for bad input.

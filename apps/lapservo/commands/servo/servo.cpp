@@ -59,16 +59,14 @@ JointVector joints_at_start(const ServoOptions& options, const Trajectory& traje
   return start;
 }
 
-// The user's view of a run: the log, the image, the progress, the last lines.
+// The user's view of a run: the log, the page, the progress, the last lines.
 class Watcher : public RunObserver {
  public:
-  Watcher(const Rig& rig, FeatureModel true_model, const Simulator& simulator, RunFolder* folder, LiveView* view,
-          int ticks, bool strict, ServoPage* page, Supervisor& arm)
-      : rig_(rig),
-        true_model_(std::move(true_model)),
+  Watcher(FeatureModel true_model, const Simulator& simulator, RunFolder* folder, int ticks, bool strict,
+          ServoPage* page, Supervisor& arm)
+      : true_model_(std::move(true_model)),
         simulator_(simulator),
         folder_(folder),
-        view_(view),
         progress_(std::make_unique<Progress>(ticks)),
         strict_(strict),
         page_(page),
@@ -82,7 +80,7 @@ class Watcher : public RunObserver {
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));
     if (strict_ && summary_.registration_contradicted()) return false;
     if (page_ && !obey_page(tick, state)) return false;
-    return !interrupted() && (!view_ || show(*view_, tick, rig_, state));
+    return !interrupted();
   }
   const Summary& finish() {
     progress_.reset();
@@ -96,11 +94,9 @@ class Watcher : public RunObserver {
     return !page_->command(arm_, tick.input.time_s);
   }
 
-  Rig rig_;
   FeatureModel true_model_;
   const Simulator& simulator_;
   RunFolder* folder_;
-  LiveView* view_;
   std::unique_ptr<Progress> progress_;
   bool strict_;
   ServoPage* page_;
@@ -110,8 +106,6 @@ class Watcher : public RunObserver {
 };
 
 int simulate(const ServoOptions& options) {
-  std::optional<LiveView> view;
-  if (options.view) view.emplace("servo", "use --out to write a log instead");
   RunConfig config = run_config_of(options);
   const Rig true_rig = true_rig_of(options, config.rig);
   const FeatureModel true_model = feature_model(true_rig);
@@ -131,7 +125,7 @@ int simulate(const ServoOptions& options) {
   if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
   watch_for_interrupts();
 
-  Watcher watcher(config.rig, true_model, simulator, folder ? &*folder : nullptr, view ? &*view : nullptr,
+  Watcher watcher(true_model, simulator, folder ? &*folder : nullptr,
                   static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict,
                   page ? &*page : nullptr, arm);
   lapservo::run(arm, simulator, simulator, config, trajectory, duration_s(options), watcher);
@@ -248,7 +242,6 @@ void add_result_options(Command command, ServoOptions& options) {
   command.add_flag("--force", options.force, OutputFolder::force_help);
   command.add_flag("--strict", options.strict,
                    "End with exit code 1 when the images contradict the rig's camera_from_rcm or lens");
-  command.add_flag("--view", options.view, "Show it live");
   add_web_options(command, options.web);
 }
 
@@ -303,7 +296,7 @@ void add_servo(Command app, Run& run_later) {
       "is read per control period (gains_per_s = K times --fps) and omega per second.\n"
       "Examples:\n"
       "  lapservo servo --rig configs/paper.yaml --robot sim --out run\n"
-      "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,4 --view\n"
+      "  lapservo servo --rig configs/paper.yaml --robot sim --set-point 0.9,795,365,212 --hide 3,4 --web\n"
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
       "  lapservo servo --replay run/log.csv\n"
       "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");

@@ -57,8 +57,7 @@ class Goal {
 class ArmWatcher : public RunObserver {
  public:
   ArmWatcher(const ServoOptions& options, const RunConfig& run, Supervisor& arm, const CrtkRobot& robot,
-             const LiveImages& images, LoopTopics& topics, Goal& goal, RunFolder* folder, LiveView* view,
-             ServoPage* page)
+             const LiveImages& images, LoopTopics& topics, Goal& goal, RunFolder* folder, ServoPage* page)
       : options_(options),
         run_(run),
         arm_(arm),
@@ -67,7 +66,6 @@ class ArmWatcher : public RunObserver {
         topics_(topics),
         goal_(goal),
         folder_(folder),
-        view_(view),
         page_(page) {}
 
   bool on_tick(const ControlTick& tick) override {
@@ -86,7 +84,7 @@ class ArmWatcher : public RunObserver {
     if (!options_.enable_motion) say_what_would_be_sent(time_s);
     if (page_ && obey_page(tick, time_s)) return false;
     if (options_.strict && summary_.registration_contradicted()) return false;
-    return !interrupted() && (!view_ || show(*view_, tick, run_.rig, state_));
+    return !interrupted();
   }
   const Summary& summary() const { return summary_; }
 
@@ -166,7 +164,6 @@ class ArmWatcher : public RunObserver {
   LoopTopics& topics_;
   Goal& goal_;
   RunFolder* folder_;
-  LiveView* view_;
   ServoPage* page_;
   struct Wanted {
     std::string name;
@@ -240,8 +237,6 @@ int steer_arm(const ServoOptions& options) {
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   config.tracking_thread = TrackingThread::own;
   const Trajectory trajectory = trajectory_of(options);
-  std::optional<LiveView> view;
-  if (options.view) view.emplace("servo", "use --out to write a log instead");
 
   std::optional<ServoPage> page;
   if (options.web.port)
@@ -277,8 +272,7 @@ int steer_arm(const ServoOptions& options) {
 
   LoopTopics topics(transport, rig, "endoscope", may_command(options, "topics"));
   Goal goal(trajectory);
-  ArmWatcher watcher(options, config, arm, robot, images, topics, goal, folder ? &*folder : nullptr,
-                     view ? &*view : nullptr, its_page);
+  ArmWatcher watcher(options, config, arm, robot, images, topics, goal, folder ? &*folder : nullptr, its_page);
   if (page && page->command(arm, clock.now_s())) return end_by_page();
   lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());

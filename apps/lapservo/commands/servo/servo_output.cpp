@@ -5,13 +5,11 @@
 #include <limits>
 
 #include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
 
 #include "lapservo/control/tracking_law.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
-#include "lapservo/io/overlay.h"
 #include "lapservo/servo/controller_file.h"
 
 namespace lapservo::app {
@@ -148,16 +146,6 @@ std::string Summary::holds_text() const {
         "of the rig, and r is off by what is wrong with them",
         contradicted_, ticks_);
   return text;
-}
-
-bool show(LiveView& view, const ControlTick& tick, const Rig& rig, const std::string& state) {
-  if (!tick.seen) return true;
-  Rig now = rig;
-  now.instruments.front().camera_from_rcm = tick.decision.camera_from_rcm;
-  cv::Mat picture = draw_overlay(tick.seen->image.bgr, now, tick.seen->observations);
-  const std::string label = fmt::format("{:.2f} s  {}", tick.input.time_s, state);
-  cv::putText(picture, label, {16, 32}, cv::FONT_HERSHEY_SIMPLEX, 0.8, {255, 255, 255}, 2, cv::LINE_AA);
-  return view.show(picture);
 }
 
 }  // namespace lapservo::app

@@ -6,7 +6,6 @@
 #include <string_view>
 #include <vector>
 
-#include "apps/lapservo/cli/live_view.h"
 #include "apps/lapservo/cli/output_folder.h"
 #include "apps/lapservo/commands/servo/servo_options.h"
 #include "lapservo/robot/supervisor.h"
@@ -71,8 +70,5 @@ class Summary {
   std::optional<std::string> held_at_end_;  // by the last tick, and why
   Convergence convergence_;
 };
-
-/// The image of a tick, if it has one, with what was seen and its state. False when the window was closed.
-bool show(LiveView& view, const ControlTick& tick, const Rig& rig, const std::string& state);
 
 }  // namespace lapservo::app

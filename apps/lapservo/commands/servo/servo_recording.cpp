@@ -88,9 +88,8 @@ class RecordedImages : public ImageStream {
 
 class RecordingWatcher : public RunObserver {
  public:
-  RecordingWatcher(const RecordedImages& images, const Rig& rig, RunFolder* folder, LiveView* view,
-                   std::optional<int> total, bool strict)
-      : images_(images), rig_(rig), folder_(folder), view_(view), progress_(total), strict_(strict) {}
+  RecordingWatcher(const RecordedImages& images, RunFolder* folder, std::optional<int> total, bool strict)
+      : images_(images), folder_(folder), progress_(total), strict_(strict) {}
 
   bool on_tick(const ControlTick& tick) override {
     if (!start_s_) start_s_ = tick.input.time_s;
@@ -105,7 +104,7 @@ class RecordingWatcher : public RunObserver {
     }
     progress_.show(images_.count(), "");
     if (strict_ && summary_.registration_contradicted()) return false;
-    return !images_.ended() && !interrupted() && (!view_ || show(*view_, tick, rig_, state_));
+    return !images_.ended() && !interrupted();
   }
   const Summary& summary() const { return summary_; }
   bool acted() const { return acted_; }
@@ -113,9 +112,7 @@ class RecordingWatcher : public RunObserver {
 
  private:
   const RecordedImages& images_;
-  const Rig& rig_;
   RunFolder* folder_;
-  LiveView* view_;
   Progress progress_;
   bool strict_;
   Summary summary_;
@@ -139,8 +136,6 @@ int decide_on_recording(const ServoOptions& options) {
   const Rig rig = config.rig;
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
-  std::optional<LiveView> view;
-  if (options.view) view.emplace("servo", "use --out to write a log instead");
 
   const auto bag = open_bag(options.replay);
   BagFrames frames(bag, options.image_topic);
@@ -158,8 +153,7 @@ int decide_on_recording(const ServoOptions& options) {
   if (!options.out.empty()) folder.emplace(options, asked_s, rig, config.controller);
   watch_for_interrupts();
 
-  RecordingWatcher watcher(images, rig, folder ? &*folder : nullptr, view ? &*view : nullptr, frames.frame_count(),
-                           options.strict);
+  RecordingWatcher watcher(images, folder ? &*folder : nullptr, frames.frame_count(), options.strict);
   lapservo::run(arm, images, clock, config, trajectory, asked_s, watcher);
   std::printf("decided on %.1f s of a recording, %d images and the joints; nothing was sent%s\n", watcher.duration_s(),
               images.count(), watcher.summary().holds_text().c_str());
