@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# report.sh BENCH.json FIGURE_PROGRAM: writes the medians of a run of lapservo_bench into docs/performance.md and README.md (between
-# their marks) and draws docs/performance.svg with bench/figure.cpp. Needs jq. CPU times of one run, so that ratios mean something.
+# report.sh BENCH.json: writes the medians of a run of lapservo_bench into docs/performance.md and README.md (between their
+# marks). Needs jq. CPU times of one run, so that ratios mean something.
 # Prints the required figures; exit code 1 when one was missed.
 set -euo pipefail
-json=$1 figure_of=$2
-page=$(dirname "$0")/../docs/performance.md figure=$(dirname "$0")/../docs/performance.svg
+json=$1
+page=$(dirname "$0")/../docs/performance.md
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
@@ -91,7 +91,5 @@ between_marks "$page" "$scratch/measured"
 "$(dirname "$0")/readme_figures.sh" "$page" > "$scratch/sentence"
 between_marks "$(dirname "$0")/../README.md" "$scratch/sentence"
 
-"$figure_of" "$scratch/medians" > "$scratch/figure.svg"
-cp "$scratch/figure.svg" "$figure"
 cat "$scratch/requirements"
 ! grep -qF '**no**' "$scratch/requirements"
