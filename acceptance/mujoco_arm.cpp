@@ -10,27 +10,11 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/core/error.h"
-
 namespace lapservo::internal {
 namespace {
 
 constexpr double physics_step_s = 0.001;
 constexpr std::array names{"theta", "phi", "rho", "psi"};
-
-void check(bool right, const char* field, const Eigen::Ref<const Eigen::VectorXd>& value, const char* expected) {
-  if (!right)
-    throw InputError("arm", field, fmt::format("{}", fmt::join(value.data(), value.data() + value.size(), " ")),
-                     expected);
-}
-
-void check_positive(const char* field, const Eigen::Vector4d& value) {
-  check(value.allFinite() && (value.array() > 0).all(), field, value, "above 0");
-}
-
-void check_not_negative(const char* field, const Eigen::Vector4d& value) {
-  check(value.allFinite() && (value.array() >= 0).all(), field, value, "0 or more");
-}
 
 // Stiff enough that what friction holds does not creep.
 constexpr const char* motor_of = R"(
@@ -57,26 +41,7 @@ double transmitted(double motor_ahead, double speed, double play, double stiffne
   return stretched == 0 ? 0 : stiffness * stretched + damping * speed;
 }
 
-}  // namespace
-
-const MujocoArmConfig& MujocoArmConfig::checked() const {
-  joints.checked();
-  check(std::isfinite(carriage_kg) && carriage_kg > 0, "carriage_kg", Eigen::VectorXd::Constant(1, carriage_kg),
-        "above 0");
-  check(std::isfinite(carriage_behind_m), "carriage_behind_m", Eigen::VectorXd::Constant(1, carriage_behind_m),
-        "finite");
-  check(gravity_in_rcm.allFinite(), "gravity_in_rcm", gravity_in_rcm, "finite");
-  check_positive("motor_inertia", motor_inertia);
-  check_not_negative("link_inertia", link_inertia);
-  check_positive("stiffness", stiffness);
-  check_not_negative("transmission_damping", transmission_damping);
-  check_not_negative("friction", friction);
-  check_positive("proportional_gain", proportional_gain);
-  check_not_negative("derivative_gain", derivative_gain);
-  check_positive("largest_force", largest_force);
-  return *this;
-}
-
+// The arm in MuJoCo's language (MJCF): links theta, phi, rho, psi in the RCM's frame, a motor beside each.
 std::string mjcf_of(const MujocoArmConfig& config) {
   const Eigen::Vector3d& g = config.gravity_in_rcm;
   std::string text = fmt::format(
@@ -110,6 +75,8 @@ std::string mjcf_of(const MujocoArmConfig& config) {
   return text + "  </equality>\n</mujoco>\n";
 }
 
+}  // namespace
+
 // Joints of the model are in the order in which they are declared: four motors, then theta, phi, rho, psi.
 struct MujocoArm::Physics {
   struct DeleteModel {
@@ -130,7 +97,7 @@ struct MujocoArm::Physics {
     std::array<char, 1000> error{};
     model.reset(mj_loadXML(name, files.get(), error.data(), static_cast<int>(error.size())));
     mj_deleteVFS(files.get());
-    if (!model) throw InputError("arm", fmt::format("MuJoCo does not take its model: {}", error.data()));
+    if (!model) throw std::runtime_error(fmt::format("MuJoCo does not take its model: {}", error.data()));
     data.reset(mj_makeData(model.get()));
   }
 
@@ -144,10 +111,7 @@ struct MujocoArm::Physics {
   Joints setpoints() { return Joints(data->ctrl); }
 };
 
-MujocoArm::MujocoArm(const MujocoArmConfig& config, const Eigen::Vector4d& q_measured) : config_(config.checked()) {
-  check(q_measured.allFinite() && (q_measured.array() >= config.joints.lower.array()).all() &&
-            (q_measured.array() <= config.joints.upper.array()).all(),
-        "start", q_measured, "within lower and upper");
+MujocoArm::MujocoArm(const MujocoArmConfig& config, const Eigen::Vector4d& q_measured) : config_(config) {
   physics_ = std::make_unique<Physics>(mjcf_of(config));
   Physics& p = *physics_;
   p.motors() = p.links() = q_measured + config.joints.joint_offset;
@@ -164,12 +128,10 @@ MujocoArm::MujocoArm(const MujocoArmConfig& config, const Eigen::Vector4d& q_mea
 MujocoArm::~MujocoArm() = default;
 
 void MujocoArm::servo_jp(const Eigen::Vector4d& setpoint) {
-  if (!setpoint.allFinite()) fault();
-  if (!faulted_) setpoint_ = setpoint.cwiseMax(config_.joints.lower).cwiseMin(config_.joints.upper);
+  setpoint_ = setpoint.cwiseMax(config_.joints.lower).cwiseMin(config_.joints.upper);
 }
 
 void MujocoArm::step(double dt_s) {
-  if (!(dt_s >= 0 && dt_s < 1e6)) throw std::invalid_argument("time passes by 0 or more");
   constexpr double rounding = 1e-9;
   for (ahead_s_ += dt_s; ahead_s_ >= physics_step_s - rounding; ahead_s_ -= physics_step_s) physics_step();
   ahead_s_ = std::max(0.0, ahead_s_);
@@ -206,11 +168,6 @@ Eigen::Vector4d MujocoArm::true_jp() const {
 
 Eigen::Vector4d MujocoArm::true_velocity() const {
   return physics_->link_speeds();
-}
-
-void MujocoArm::fault() {
-  if (!faulted_) setpoint_ = motors();
-  faulted_ = true;
 }
 
 void MujocoArm::block(int joint) {

@@ -1,12 +1,10 @@
 #pragma once
 
 #include <memory>
-#include <string>
 
 #include <Eigen/Core>
 
 #include "lapservo/sim/arm.h"
-#include "lapservo/sim/simulated_arm.h"
 
 namespace lapservo::internal {
 
@@ -26,31 +24,20 @@ struct MujocoArmConfig {
   Eigen::Vector4d proportional_gain{350, 350, 5000, 0.5};  ///< of the servos: N m/rad, N/m
   Eigen::Vector4d derivative_gain{7, 7, 100, 0.01};        ///< N m s/rad, N s/m
   Eigen::Vector4d largest_force{10, 10, 30, 0.2};          ///< of the motors: N m, N
-
-  /// Returns itself if all its numbers make sense; else throws InputError naming the first field that doesn't.
-  const MujocoArmConfig& checked() const;
 };
-
-/// The arm in MuJoCo's language (MJCF): links theta, phi, rho, psi in the RCM's frame, a motor beside each.
-std::string mjcf_of(const MujocoArmConfig& config);
 
 /// An arm whose dynamics are MuJoCo's, in steps of 1 ms: each joint has a motor with a PD servo, friction and an
 /// encoder, and moves its link through an elastic transmission with backlash; gravity pulls.
-class MujocoArm : public SimulatedArm {
+class MujocoArm {
  public:
-  /// At rest with these measured joints, which must lie within the limits (else InputError): the servos bear the
-  /// weight.
+  /// At rest with these measured joints: the servos bear the weight.
   MujocoArm(const MujocoArmConfig& config, const Eigen::Vector4d& q_measured);
-  ~MujocoArm() override;
+  ~MujocoArm();
 
-  void servo_jp(const Eigen::Vector4d& setpoint) override;
-  void step(double dt_s) override;
-  Eigen::Vector4d measured_jp() const override;
-  Eigen::Vector4d true_jp() const override;
-  bool faulted() const override { return faulted_; }
-  void fault() override;
-  void recover() override { faulted_ = false; }
-
+  void servo_jp(const Eigen::Vector4d& setpoint);
+  void step(double dt_s);
+  Eigen::Vector4d measured_jp() const;
+  Eigen::Vector4d true_jp() const;
   Eigen::Vector4d true_velocity() const;
   const Eigen::Vector4d& setpoint() const { return setpoint_; }
   /// Something keeps the link of this joint (0 to 3) where it is, until release().
@@ -66,7 +53,6 @@ class MujocoArm : public SimulatedArm {
   std::unique_ptr<Physics> physics_;
   Eigen::Vector4d setpoint_;
   double ahead_s_ = 0;  ///< of the last physics step
-  bool faulted_ = false;
 };
 
 }  // namespace lapservo::internal

@@ -1,11 +1,8 @@
 #include "acceptance/mujoco_arm.h"
 
 #include <cmath>
-#include <limits>
 
 #include <gtest/gtest.h>
-
-#include "lapservo/core/error.h"
 
 namespace lapservo::internal {
 namespace {
@@ -89,34 +86,6 @@ TEST(MujocoArm, PushesAgainstWhatBlocksItAndGoesOnWhenItIsReleased) {
     arm.step(1);
     EXPECT_GT(arm.true_jp()[joint] - truth, 0.75 * push[joint]);
   }
-}
-
-TEST(MujocoArm, DoesNotDependOnHowFinelyItIsStepped) {
-  MujocoArm fine(exact_encoders(), start), coarse(exact_encoders(), start);
-  const Eigen::Vector4d setpoint = fine.setpoint() + Eigen::Vector4d(0.02, 0.02, 0.002, 0.1);
-  fine.servo_jp(setpoint), coarse.servo_jp(setpoint);
-  for (int k = 0; k < 300; ++k) fine.step(1.0 / 3000);
-  coarse.step(0.1);
-  EXPECT_TRUE(((fine.true_jp() - coarse.true_jp()).cwiseAbs().array() < small.array()).all());
-}
-
-TEST(MujocoArm, FaultsAtASetPointThatIsNotFinite) {
-  MujocoArm arm({}, start);
-  Eigen::Vector4d setpoint = arm.setpoint();
-  setpoint[1] = std::numeric_limits<double>::quiet_NaN();
-  arm.servo_jp(setpoint);
-  EXPECT_TRUE(arm.faulted());
-  arm.step(0.5);
-  EXPECT_TRUE(arm.true_jp().allFinite());
-  arm.recover();
-  EXPECT_FALSE(arm.faulted());
-}
-
-TEST(MujocoArm, RefusesNumbersThatMakeNoSense) {
-  MujocoArmConfig config;
-  config.stiffness[2] = 0;
-  EXPECT_THROW(MujocoArm(config, start), InputError);
-  EXPECT_THROW(MujocoArm({}, Eigen::Vector4d(0, 1.5, 0.5, 0)), InputError);
 }
 
 }  // namespace
