@@ -10,9 +10,9 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/random.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/sim/edge_probe.h"
 #include "lapservo/sim/shaft_lighting.h"
 #include "lapservo/sim/shaft_tracer.h"
+#include "lapservo/sim/test_edge_probe.h"
 #include "lapservo/sim/tissue.h"
 
 namespace lapservo::internal {

@@ -10,9 +10,9 @@
 #include "lapservo/io/image_file.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
-#include "lapservo/sim/edge_probe.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/renderer.h"
+#include "lapservo/sim/test_edge_probe.h"
 #include "lapservo/testing/sample_frames.h"
 
 namespace lapservo::internal {

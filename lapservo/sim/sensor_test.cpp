@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "lapservo/sim/edge_probe.h"
 #include "lapservo/sim/optics.h"
+#include "lapservo/sim/test_edge_probe.h"
 
 namespace lapservo::internal {
 namespace {

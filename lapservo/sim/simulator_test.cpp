@@ -7,7 +7,7 @@
 
 #include "lapservo/core/error.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/sim/edge_probe.h"
+#include "lapservo/sim/test_edge_probe.h"
 #include "lapservo/testing/sample_frames.h"
 
 namespace lapservo::internal {
@@ -226,19 +226,6 @@ TEST(Simulator, RefusesNonsense) {
   EXPECT_THROW(simulator.move_endoscope({.translation_m = {0, 2, 0}}), InputError);
   rig.instruments.clear();
   EXPECT_THROW(Simulator(rig, {}, {0, 1.5, 0.1, 0}), InputError);
-}
-
-TEST(Simulator, KeepsTheNewestReadingsWhereNobodyTakesThem) {
-  const Rig rig = small_rig();
-  SimulatorConfig config;
-  config.endoscope.pictures = false;
-  Simulator simulator(rig, config, in_view(rig));
-  for (int k = 1; k <= 1100; ++k) simulator.sleep_until(1e-3 * k);
-  const auto readings = simulator.readings();
-  ASSERT_EQ(readings.size(), 1000U);
-  EXPECT_NEAR(readings.front().time_s, 0.101, 1e-9);
-  EXPECT_NEAR(readings.back().time_s, 1.1, 1e-9);
-  EXPECT_TRUE(simulator.readings().empty());
 }
 
 }  // namespace
