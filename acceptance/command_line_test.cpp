@@ -259,12 +259,6 @@ TEST_F(CommandLine, PagesThatCanNotBeServed) {
 }
 #endif
 
-TEST_F(CommandLine, NothingFoundIsOne) {
-  write_grey("in/grey.png");
-  EXPECT_EQ(run("track in/grey.png --rig configs/example.yaml --out out/obs.csv"), 1);
-  EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "status"), "no_marker");
-}
-
 TEST_F(CommandLine, UnknownWordsGetTheNearestKnownOne) {
   expect_refused("trak in/a.png", {"trak is unknown, the nearest is track"});
   expect_refused("track in/a.png --rigg=rig.yaml", {"--rigg is unknown, the nearest is --rig"});
@@ -288,14 +282,6 @@ TEST_F(CommandLine, PicturesThatAreNone) {
   expect_refused(track("in/empty.png"), {"empty.png", "is empty"});
   fs::create_directories("in/folder");
   expect_refused(track("in/folder"), {"folder", "no images"});
-}
-
-TEST_F(CommandLine, GreyDeepAndTransparentPicturesAreAccepted) {
-  cv::imwrite("in/grey.png", cv::Mat(720, 1280, CV_8UC1, cv::Scalar(90)));
-  cv::imwrite("in/deep.png", cv::Mat(720, 1280, CV_16UC3, cv::Scalar(9000, 9000, 9000)));
-  cv::imwrite("in/alpha.png", cv::Mat(720, 1280, CV_8UC4, cv::Scalar(90, 90, 90, 10)));
-  for (const char* name : {"grey.png", "deep.png", "alpha.png"})
-    EXPECT_EQ(run(std::string("track in/") + name + " --rig configs/example.yaml --out out/obs.csv"), 1) << name;
 }
 
 // More of them in the tests of the rig.
@@ -458,24 +444,6 @@ TEST_F(CommandLine, AVideoThatEndsEarlyIsMeasuredAndSaysSo) {
   const std::size_t rows = CsvTable::read("out/obs.csv").rows();
   EXPECT_GE(rows, 3U);
   EXPECT_LT(rows, 12U);
-}
-
-TEST_F(CommandLine, ANameWithALineEndIsQuoted) {
-  fs::create_directories("in/folder");
-  write_grey("in/folder/a.png");
-  fs::rename("in/folder/a.png", "in/folder/a\nb.png");
-  EXPECT_EQ(run("track in/folder --rig configs/example.yaml --out out/obs.csv"), 1);
-  EXPECT_EQ(CsvTable::read("out/obs.csv").text(0, "file"), "a\nb.png");
-}
-
-TEST_F(CommandLine, WhatHasNoEndIsRefused) {
-  fs::create_symlink("/dev/zero", "in/endless.png");
-  expect_refused(track("in/endless.png"), {"endless.png", "larger than 256 MiB"});
-  in("sparse.png", "x");
-  fs::resize_file("in/sparse.png", std::uintmax_t{8} << 30);
-  expect_refused(track("in/sparse.png"), {"sparse.png", "larger than 256 MiB"});
-  expect_refused("track /dev/zero --rig configs/example.yaml --out out/obs.csv", {"/dev/zero", "no file"});
-  expect_refused("estimate-rcm /dev/zero --out out/rcm.csv", {"/dev/zero", "larger than 256 MiB"});
 }
 
 TEST_F(CommandLine, TheLeastFramesASecondThatServoTakesWork) {

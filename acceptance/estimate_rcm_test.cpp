@@ -148,16 +148,6 @@ TEST_F(EstimateRcm, RepeatedRowsAndVeryManyOfThem) {
   EXPECT_NEAR(CsvTable::read("c.csv").number(0, "rcm_u_px"), -300, 2);
 }
 
-TEST_F(EstimateRcm, RefusesTenParallelLines) {
-  std::string rows = header;
-  for (int i = 0; i < 10; ++i)
-    rows += std::to_string(i) + ",PSM1,ok,100," + std::to_string(100 + 20 * i) + ",400," +
-            std::to_string(100 + 20 * i) + (i % 2 ? ".001\n" : "\n");
-  EXPECT_EQ(run("estimate-rcm " + write("parallel.csv", rows)), 1);
-  expect_in(output(), "weighted: none (parallel");
-  expect_in(output(), "pairwise: none (parallel");
-}
-
 TEST_F(EstimateRcm, WarnsOfWhatTheNumbersDoNotTell) {
   const std::string one = "0,PSM1,ok,100,100,300,100\n";
   EXPECT_EQ(run("estimate-rcm " + write("narrow.csv", header + one + "1,PSM1,ok,100,200,300,205\n")), 0);
@@ -191,12 +181,6 @@ TEST_F(EstimateRcm, RefusesBadInput) {
   const std::string before = read_file(good);
   expect_refused(good + " --out " + good, {"good.csv", "input"});
   EXPECT_EQ(read_file(good), before);
-}
-
-TEST_F(EstimateRcm, HelpShowsAnExample) {
-  expect_done("estimate-rcm --help");
-  expect_in(output(), "Example");
-  expect_in(output(), "--sigma-px");
 }
 
 }  // namespace

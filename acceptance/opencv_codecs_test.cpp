@@ -19,7 +19,6 @@
 #include "lapservo/io/video/video_reader.h"
 #include "lapservo/io/video/video_writer.h"
 #include "lapservo/testing/temporary_folder.h"
-#include "lapservo/testing/videos.h"
 
 namespace lapservo::internal {
 namespace {
@@ -117,55 +116,6 @@ TEST(Decoding, OfWebPWithLossIsAsNearToTheOriginalAsOpenCvs) {
     EXPECT_LE(cv::norm(ours, original), 1.05 * cv::norm(opencvs, original)) << type;
     const cv::Scalar shift = cv::mean(ours) - cv::mean(opencvs);
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(shift[c], 0, 0.2) << type << " " << c;
-  }
-}
-
-constexpr int frames = testing::video_frames;
-using testing::read_file;
-using testing::read_video;
-using testing::VideoRead;
-
-void write_video(const std::filesystem::path& path, const char* codec) {
-  cv::VideoWriter video(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]),
-                        25, testing::video_size);
-  ASSERT_TRUE(video.isOpened()) << path;
-  testing::for_each_picture([&](const cv::Mat& image) { video.write(image); });
-}
-
-TEST(OpenCvsVideo, GivesEveryFrame) {
-  const testing::TemporaryFolder folder;
-  for (const auto& [name, codec] :
-       {std::pair{"a.mp4", "mp4v"}, {"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
-    write_video(folder / name, codec);
-    const VideoRead whole = read_video(folder / name);
-    EXPECT_EQ(whole.frames, frames) << name;
-    EXPECT_EQ(whole.damaged, 0) << name;
-    EXPECT_EQ(whole.complaint, "") << name;
-  }
-}
-
-TEST(OpenCvsVideo, ThatEndsEarlySaysSo) {
-  const testing::TemporaryFolder folder;
-  for (const auto& [name, codec] : {std::pair{"a.mkv", "mp4v"}, {"a.avi", "MJPG"}, {"a.ts", "mp4v"}}) {
-    write_video(folder / name, codec);
-    const std::string whole = read_file(folder / name);
-    testing::write_file(folder / name, whole.substr(0, whole.size() / 2));
-    const VideoRead half = read_video(folder / name);
-    EXPECT_LT(half.frames, frames) << name;
-    EXPECT_NE(half.complaint, "") << name;
-  }
-}
-
-// The decoder notices damage within its data most of the time; then the frame and the video as a whole say so.
-TEST(OpenCvsVideo, HasItsDamagedFramesMarked) {
-  const testing::TemporaryFolder folder;
-  for (const auto& [name, codec] : {std::pair{"a.mp4", "mp4v"}, {"a.avi", "MJPG"}}) {
-    write_video(folder / name, codec);
-    const std::string whole = read_file(folder / name);
-    testing::write_file(folder / name, testing::with_damage(whole, whole.size() / 3, 3));
-    const VideoRead damaged = read_video(folder / name);
-    EXPECT_GE(damaged.damaged, 1) << name;
-    EXPECT_NE(damaged.complaint, "") << name;
   }
 }
 

@@ -656,17 +656,6 @@ TEST_P(WireLoop, ATopicThatNobodyPublishesEndsWithTheTopicsThatAreThere) {
       EXPECT_NE(said(output).find(words), std::string::npos) << words << " in: " << said(output);
 }
 
-TEST_P(FirstWireLoop, ThePageStartsNothingWithoutEnableMotion) {
-  Arm room(GetParam(), rig_);
-  const auto ears = named_transport(GetParam(), "ears");
-  Spy spy(*ears);
-  const auto loop = servo(600, "servo.txt", false, {"--web", "0"});
-  const int port = page_port();
-  expect_soon_said("would send ");
-  EXPECT_EQ(testing::http_status(testing::http_post(port, testing::start_path())), 403);
-  sleep(0.3);
-  EXPECT_EQ(spy.count(), 0u);
-}
 #endif
 
 TEST_P(FirstWireLoop, StopsAndStartsAndTakesSetPointsAndTrajectoriesByTopic) {

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <string>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -31,13 +30,6 @@ TEST(OutputTarget, FollowsLinksToFiles) {
   EXPECT_EQ(OutputTarget(folder / "second").file, fs::canonical(folder / "sub/there.csv"));
   EXPECT_TRUE(OutputTarget(folder / "second").existing);
   EXPECT_FALSE(OutputTarget(folder / "sub/new.csv").existing);
-}
-
-TEST(OutputTarget, KnowsWhatIsNoRegularFile) {
-  const TemporaryFolder folder;
-  ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
-  for (const fs::path& path : {fs::path("/dev/null"), fs::path("/dev/full"), fs::path("/dev/stdout"), folder / "fifo"})
-    EXPECT_TRUE(OutputTarget(path).is_stream()) << path;
 }
 
 TEST(OutputTarget, RefusesWhatCanNotBeAFile) {

@@ -66,16 +66,6 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
   EXPECT_EQ(robot.state().blocked, Blocked::old_joint_states);
 }
 
-TEST(CrtkRobot, ANoticedCommandOfSomebodyElseStopsIt) {
-  TestTransport transport;
-  StandingClock clock;
-  CrtkRobot robot(transport, "/PSM1", config_of(true), clock);
-  send_a_path(transport, clock, robot);
-  transport.say("/PSM1/servo_jp", JointMessage{});
-  ASSERT_TRUE(wait_for([&] { return !robot.set_point(); }));
-  EXPECT_EQ(robot.state().blocked, Blocked::foreign_command);
-}
-
 TEST(OperatorPresence, IsAButtonThatIsPressedThroughoutAndSaysSo) {
   TestTransport transport;
   StandingClock clock;
@@ -96,15 +86,6 @@ TEST(OperatorPresence, IsAButtonThatIsPressedThroughoutAndSaysSo) {
     EXPECT_FALSE(presence.was_present());
     EXPECT_TRUE(presence.was_present());
   }
-}
-
-TEST(CrtkRobot, ObservingItSendsNothing) {
-  TestTransport transport;
-  StandingClock clock;
-  CrtkRobot robot(transport, "PSM1", config_of(false), clock);
-  send_a_path(transport, clock, robot);
-  ASSERT_TRUE(wait_for([&] { return robot.counts().withheld > 5; }));
-  EXPECT_TRUE(transport.joints("/PSM1/servo_jp").empty());
 }
 
 }  // namespace

@@ -47,17 +47,6 @@ std::string refusal(std::span<const std::uint8_t> bytes) {
   return input_error([&] { decode_image(bytes, "p"); });
 }
 
-TEST(Image, ComesBackAsItWasWritten) {
-  Random random(seed);
-  const TemporaryFolder folder;
-  for (const char* name : {"a.png", "a.bmp", "a.tif", "a.webp", "a.ppm"}) {
-    const cv::Mat image = random_image<std::uint8_t>(17, 23, CV_8UC3, random);
-    write_image(folder / name, image);
-    EXPECT_TRUE(same(read_image(folder / name), image)) << name << ", seed " << seed;
-  }
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 5) << "nothing temporary is left";
-}
-
 TEST(Image, GreyIsRepeatedOverTheChannels) {
   Random random(seed);
   const cv::Mat grey = random_image<std::uint8_t>(9, 7, CV_8UC1, random);
@@ -301,14 +290,6 @@ TEST(Image, ThatCanNotBeWrittenIsNamedAndLeavesNothing) {
   EXPECT_EQ(said("none/a.png"), place + "none/a.png: can't be written: No such file or directory");
   EXPECT_EQ(said("taken.png"), place + "taken.png: is a folder, expected a file to write");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the folder";
-}
-
-TEST(Image, AFailedWriteKeepsWhatWasThere) {
-  const TemporaryFolder folder;
-  const cv::Mat image(4, 4, CV_8UC3, cv::Scalar::all(7));
-  write_image(folder / "a.png", image);
-  EXPECT_NE(input_error([&] { write_image(folder / "a.png", cv::Mat()); }), "");
-  EXPECT_TRUE(same(read_image(folder / "a.png"), image));
 }
 
 TEST(HasImageExtension, GoesByTheNamesEndInAnyCase) {

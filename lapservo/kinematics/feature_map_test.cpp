@@ -103,20 +103,6 @@ TEST(FeatureMap, ValueIsThatOfTheCentreLine) {
     }
 }
 
-TEST(FeatureMap, CentreLinePassesThroughTheProjectedRcm) {
-  constexpr std::uint64_t seed = 33;
-  Random random(seed);
-  for (const ImageModel& model : testing::image_models()) {
-    const Eigen::Vector2d o = *projected_rcm_px(model.camera, model.camera_from_rcm);
-    for (int trial = 0; trial < 50; ++trial) {
-      const FeaturePoint point = *feature_map(model, testing::visible_configuration(model, random)).point;
-      const Eigen::Vector2d direction(std::sin(point.f[0]), std::cos(point.f[0]));
-      const Eigen::Vector2d arm = point.ideal_px[0] - o;
-      EXPECT_NEAR(direction.x() * arm.y() - direction.y() * arm.x(), 0, 1e-8 * arm.norm()) << "seed " << seed;
-    }
-  }
-}
-
 // At the seam only d jumps, by the step of the print there; on both sides the Jacobian is that side's derivative.
 TEST(FeatureMap, JumpsInDAtTheSeamAndNowhereElse) {
   constexpr std::uint64_t seed = 34;

@@ -92,16 +92,6 @@ TEST(DesignMarker, RefusesALengthIntoWhichNoBandsFit) {
             "length: no marker: three bands of at least 3.0 mm that change over the turn do not fit into 9.0 mm");
 }
 
-TEST(DesignMarker, RefusesWhatMakesNoMarker) {
-  DesignSpec wide, close;
-  wide.diameter_m = 0.2, wide.length_m = 0.03;
-  close.hues_deg = {90, 100, 270};
-  EXPECT_EQ(testing::input_error([&] { design_marker(wide); }),
-            "marker: diameter_m: is 0.2, expected 0.0005 to 0.1 (metres)");
-  EXPECT_EQ(testing::input_error([&] { design_marker(close); }),
-            "marker: hues_deg[1]: is 100, expected hues at least 40 degrees apart");
-}
-
 TEST(WorstSigma, IsTheLargestOverTheTurn) {
   Random random(seed);
   for (int i = 0; i < 20; ++i) {

@@ -67,14 +67,6 @@ class PerfectWorld {
   double time_s_ = 0;
 };
 
-TEST(Servo, Tracks) {
-  PerfectWorld world;
-  const ServoDecision last = world.steps(240);
-  EXPECT_EQ(last.control.action, ControlAction::track);
-  EXPECT_EQ(last.control.reason, HoldReason::none);
-  EXPECT_LT(last.control.error.norm(), 0.01);
-}
-
 TEST(Servo, SaysThatImagesContradictTheRegistration) {
   PerfectWorld world;
   EXPECT_FALSE(world.steps(60).registration_contradicted);
@@ -113,25 +105,6 @@ TEST(RegistrationWatch, SaysOnceThatShaftsMissTheRcmWhichTheyPassed) {
   EXPECT_EQ(frames(two, {misses, other}, 20), 1);
 }
 
-TEST(Servo, HoldsWithinAPeriodWhenTheMarkerIsLostAndGoesOnWithoutAJump) {
-  PerfectWorld world;
-  world.steps(10);
-  world.visible = false;
-  ServoDecision decision = world.step();
-  EXPECT_EQ(decision.control.action, ControlAction::hold);
-  EXPECT_EQ(decision.control.reason, HoldReason::marker_lost);
-  decision = world.steps(60);
-  EXPECT_EQ(decision.control.velocity, Eigen::Vector4d::Zero());
-  world.visible = true;
-  const Eigen::Vector4d before = world.q();
-  decision = world.step();
-  EXPECT_EQ(decision.control.action, ControlAction::track);
-  const JointLimits limits;
-  EXPECT_TRUE(
-      ((world.q() - before).cwiseAbs().array() <= 0.5 * limits.acceleration.array() * period_s * period_s + 1e-12)
-          .all());
-}
-
 TEST(Servo, SendsNothingToAnArmThatIsNotEnabledAndStartsAnewWhereItIs) {
   PerfectWorld world;
   world.steps(20);
@@ -164,18 +137,6 @@ TEST(Servo, AMeasuredJointThatIsNotANumberLeavesEverythingFinite) {
   }
   world.broken_joints = false;
   EXPECT_LT(world.steps(300).control.error.norm(), 0.01);
-}
-
-// An arm that is held back: no wind-up, and it goes on once it has stood still and is free.
-TEST(Servo, AnArmThatDoesNotFollowIsLeftAloneUntilItRests) {
-  PerfectWorld world;
-  world.steps(3);
-  world.push({0.3, 0, 0, 0});
-  world.stuck = true;
-  EXPECT_EQ(world.steps(2).control.reason, HoldReason::wild_joints);  // so far at once: accepted once it stays there
-  EXPECT_EQ(world.step().control.reason, HoldReason::not_following);
-  world.stuck = false;
-  EXPECT_LT(world.steps(400).control.error.norm(), 0.05);
 }
 
 // Offsets that are off by a quarter turn: said, and nothing is moved.
@@ -219,16 +180,6 @@ TEST(Servo, ReadingsBetweenTicksTellWhereTheJointsWereAtAnImage) {
     return worst;
   };
   EXPECT_LT(worst_px(true), worst_px(false) / 5);
-}
-
-TEST(Servo, WithoutImagesItHolds) {
-  PerfectWorld world;
-  world.sees = false;
-  EXPECT_EQ(world.steps(5).control.reason, HoldReason::no_image_yet);
-  world.sees = true;
-  EXPECT_EQ(world.steps(30).control.action, ControlAction::track);
-  world.sees = false;
-  EXPECT_EQ(world.steps(30).control.reason, HoldReason::stale_image);
 }
 
 // The same arm before an endoscope that may move; its images are tracked with what the servo goes by, and come a tick

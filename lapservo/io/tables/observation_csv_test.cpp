@@ -177,34 +177,5 @@ TEST(ObservationCsv, NamesMayHoldCommasAndQuotes) {
   EXPECT_EQ(table.text(0, "instrument"), observation.instrument);
 }
 
-TEST(ObservationCsv, AppearsWholeWhenCommittedAndElseNotAtAll) {
-  const testing::TemporaryFolder folder;
-  Random random(seed);
-  {
-    ObservationCsv csv(folder / "dropped.csv");
-    csv.add(0, 0, "", random_observation(random));
-  }
-  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
-  ObservationCsv csv(folder / "obs.csv");
-  csv.add(0, 0, "", random_observation(random));
-  Observation other;
-  other.instrument = "PSM2";
-  csv.add(0, 0, "", other);
-  csv.add(1, 1.0 / 30, "", random_observation(random));
-  EXPECT_FALSE(std::filesystem::exists(folder / "obs.csv"));
-  csv.commit();
-  const CsvTable table = CsvTable::read(folder / "obs.csv");
-  ASSERT_EQ(table.rows(), 3U);
-  EXPECT_EQ(table.text(1, "instrument"), "PSM2");
-  EXPECT_EQ(table.number(2, "time_s"), 0.033333);
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1) << "nothing but the result";
-}
-
-TEST(ObservationCsv, SaysAtOnceThatItCanNotBeWritten) {
-  const testing::TemporaryFolder folder;
-  const std::string path = (folder / "none/obs.csv").string();
-  EXPECT_TRUE(testing::input_error([&] { ObservationCsv csv(path); }).starts_with(path + ": can't be written"));
-}
-
 }  // namespace observation_csv_test
 }  // namespace lapservo::internal

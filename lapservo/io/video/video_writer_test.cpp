@@ -60,36 +60,6 @@ TEST(VideoWriter, SaysThatChromasSamplesLieAmidFourPixels) {
   }
 }
 
-TEST(VideoWriter, OnAFullDiskIsNoSuccess) {
-  const TemporaryFolder folder;
-  const auto previous = std::signal(SIGXFSZ, SIG_IGN);
-  struct rlimit old {};
-  ::getrlimit(RLIMIT_FSIZE, &old);
-  for (const std::string extension : {".mp4", ".avi", ".mkv", ".ts"}) {
-    const fs::path path = folder / ("a" + extension);
-    std::uintmax_t whole = 0;
-    {
-      VideoWriter video(path, 30);
-      write_noise(video, 20);
-      whole = fs::file_size(path);
-    }
-    for (const double part : {0.0, 0.3, 0.9}) {
-      const struct rlimit small { static_cast<rlim_t>(part* static_cast<double>(whole)), old.rlim_max };
-      const std::string said = input_error([&] {
-        VideoWriter video(path, 30);
-        ::setrlimit(RLIMIT_FSIZE, &small);
-        write_noise(video, 20);
-      });
-      ::setrlimit(RLIMIT_FSIZE, &old);
-      EXPECT_TRUE(said.starts_with(path.string() + ": c")) << extension << " " << part << ": " << said;
-      EXPECT_EQ(fs::file_size(path), whole) << "the old one stays";
-    }
-    fs::remove(path);
-    EXPECT_TRUE(fs::is_empty(folder.path()));
-  }
-  std::signal(SIGXFSZ, previous);
-}
-
 TEST(VideoWriter, RefusesWhatCanNotHoldOne) {
   const TemporaryFolder folder;
   const auto said = [&](const fs::path& path) {
