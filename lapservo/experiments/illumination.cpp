@@ -83,12 +83,12 @@ cv::Mat example(const ExperimentSetup& setup, Stage& stage, const JointVector& q
 }
 
 Series by_position(const IlluminationResult::OfMethod& of_method) {
-  Series series{method_title(of_method.method), {}, {}, Draw::points, method_colour(of_method.method)};
-  for (const IlluminationResult::Largest& largest : of_method.largest) {
-    series.x.push_back(largest.position + 1);
-    series.y.push_back(largest.px);
-  }
-  return series;
+  return series_of(
+      method_title(of_method.method), of_method.largest,
+      [](const IlluminationResult::Largest& largest) {
+        return PlotPoint({largest.position + 1, largest.px});
+      },
+      Draw::points, method_colour(of_method.method));
 }
 
 Series by_light(const IlluminationResult::OfMethod& of_method) {
@@ -102,25 +102,6 @@ Series by_light(const IlluminationResult::OfMethod& of_method) {
     series.y.push_back(spread_of(distances).mean);
   }
   return series;
-}
-
-Plot map_of_points(const IlluminationResult::OfMethod& of_method, const Camera& camera) {
-  Plot plot{"Where the points were (" + method_title(of_method.method) + ")",
-            {"u", "px", 0, camera.width_px},
-            {"v", "px", 0, camera.height_px},
-            {},
-            {},
-            true};
-  for (int k = 0; k < 4; ++k) {
-    Series series{fmt::format("e{}", k), {}, {}, Draw::points, k};
-    for (const IlluminationResult::Point& point : of_method.points)
-      if (point.point == k && point.light == 0) {
-        series.x.push_back(point.raw_px.x());
-        series.y.push_back(point.raw_px.y());
-      }
-    plot.series.push_back(std::move(series));
-  }
-  return plot;
 }
 
 Plot distance_plot(const std::string& title, Axis x, const std::string& y, const IlluminationResult& result,
@@ -254,8 +235,6 @@ ReportSection section_of(const IlluminationResult& result, const ExperimentSetup
   section.figures.push_back({distance_plot("Distance to the centroid, by light", {"power of the lamps", "%", 30, 110},
                                            "distance to centroid", result, by_light),
                              "Mean over all positions and points, each measurement counted."});
-  section.figures.push_back({map_of_points(result.methods.back(), setup.rig.camera),
-                             "All positions under the least light: they cover the field of view."});
   section.figures.push_back(
       {Picture{"One position under the four lights", result.example_bgr},
        percents() + " of the power, with what " + method_title(result.methods.back().method) + " saw."});

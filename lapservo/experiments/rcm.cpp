@@ -57,47 +57,22 @@ std::vector<double> distances_of(const RcmResult::OfMethod& of_method, double mi
   return distances;
 }
 
-Plot error_plane(const std::string& title) {
-  Plot plot{title, {"error in u", "px", {}, {}}, {"error in v", "px", {}, {}}, {}, {}, true};
-  plot.series.push_back({"truth", {0}, {0}, Draw::points, -1});
-  return plot;
-}
-
 // With its scale for most of the points, and how many are beyond it.
-Figure robust_figure(Plot plot, const std::string& caption) {
+Figure cloud_of_intersections(const RcmResult::OfMethod& of_method, const Eigen::Vector2d& true_px) {
+  const auto of_set = [&](const RcmResult::Intersection& at) {
+    return at.set == 0 ? PlotPoint({at.px.x() - true_px.x(), at.px.y() - true_px.y()}) : std::nullopt;
+  };
+  Plot plot{"Intersections about the truth: " + method_title(of_method.method),
+            {"error in u", "px", {}, {}},
+            {"error in v", "px", {}, {}},
+            {{"truth", {0}, {0}, Draw::points, -1},
+             series_of("of two lines", of_method.intersections, of_set, Draw::points, method_colour(of_method.method))},
+            {},
+            true};
   limit_to_most(plot);
   const std::size_t outside = points_outside(plot);
-  const std::string where =
-      outside == 0 ? "All lie within the plot." : fmt::format("{} of them lie outside the plot.", outside);
-  return {std::move(plot), caption + " " + where};
-}
-
-Figure cloud_of_intersections(const RcmResult::OfMethod& of_method, const Eigen::Vector2d& true_px) {
-  Plot plot = error_plane("Intersections about the truth: " + method_title(of_method.method));
-  Series series{"of two lines", {}, {}, Draw::points, method_colour(of_method.method)};
-  for (const RcmResult::Intersection& at : of_method.intersections)
-    if (at.set == 0) {
-      series.x.push_back(at.px.x() - true_px.x());
-      series.y.push_back(at.px.y() - true_px.y());
-    }
-  plot.series.push_back(std::move(series));
-  return robust_figure(std::move(plot), fmt::format("The {} pairs of the first set.", RcmResult::pairs));
-}
-
-Figure cloud_of_estimates(const RcmResult::OfMethod& of_method) {
-  Plot plot = error_plane("Estimates about the truth: " + method_title(of_method.method));
-  for (const bool pairwise : {true, false}) {
-    const auto& of = pairwise ? of_method.pairwise : of_method.least_squares;
-    Series series{estimator_name(pairwise), {}, {}, Draw::points, pairwise ? 1 : 0};
-    for (const RcmResult::Estimate& estimate : of.estimates) {
-      series.x.push_back(estimate.error_px.x());
-      series.y.push_back(estimate.error_px.y());
-    }
-    plot.series.push_back(std::move(series));
-  }
-  return robust_figure(
-      std::move(plot),
-      fmt::format("One estimate from each of {} sets; both estimators, the same lines.", RcmResult::sets));
+  return {std::move(plot),
+          fmt::format("The {} pairs of the first set, of which {} lie outside the plot.", RcmResult::pairs, outside)};
 }
 
 // The fraction of the intersections within a distance.
@@ -321,7 +296,6 @@ ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) 
   section.figures.push_back({fractions_within(result), fmt::format("All {} sets.", RcmResult::sets)});
   section.figures.push_back(
       {fan(result, result.rig.camera), "As " + method_title(result.methods.back().method) + " saw them."});
-  for (const auto& of_method : result.methods) section.figures.push_back(cloud_of_estimates(of_method));
   section.tables.push_back(by_estimator(result));
   const Eigen::Vector3d& at_m = result.rig.instruments[0].camera_from_rcm->translation;
   section.notes = {

@@ -44,15 +44,12 @@ Plot one_trial(const RotationResult& result) {
     reference.x.push_back(RotationResult::turn_s * step / RotationResult::steps);
     reference.y.push_back(true_rotation_rad(step));
   }
-  for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), {}, {}, Draw::points, method_colour(of_method.method)};
-    for (const RotationResult::Sample& sample : of_method.samples)
-      if (sample.set == 0 && sample.trial == 0) {
-        series.x.push_back(sample.time_s());
-        series.y.push_back(sample.measured_rad);
-      }
-    plot.series.push_back(std::move(series));
-  }
+  const auto of_trial = [](const RotationResult::Sample& sample) {
+    return sample.set == 0 && sample.trial == 0 ? PlotPoint({sample.time_s(), sample.measured_rad}) : std::nullopt;
+  };
+  for (const auto& m : result.methods)
+    plot.series.push_back(
+        series_of(method_title(m.method), m.samples, of_trial, Draw::points, method_colour(m.method)));
   plot.series.push_back(std::move(reference));
   return plot;
 }
@@ -65,53 +62,10 @@ Plot distribution_by_trial(const RotationResult::OfMethod& of_method) {
             {},
             {{"no error", 0}},
             false};
-  Series series{"", {}, {}, Draw::boxes, method_colour(of_method.method)};
-  for (const RotationResult::Sample& sample : of_method.samples)
-    if (sample.set == 0) {
-      series.x.push_back(initial_rotation_rad(sample.trial));
-      series.y.push_back(1e3 * sample.error_rad());
-    }
-  plot.series.push_back(std::move(series));
-  return plot;
-}
-
-// Where in a turn the errors are.
-Plot error_against_true(const RotationResult::OfMethod& of_method) {
-  Plot plot{"Error against rotation, " + method_title(of_method.method),
-            {"true rotation", "rad", {}, {}},
-            {"error", "mrad", {}, {}},
-            {},
-            {{"no error", 0}},
-            false};
-  Series series{"", {}, {}, Draw::points, method_colour(of_method.method)};
-  for (const RotationResult::Sample& sample : of_method.samples)
-    if (sample.set == 0) {
-      series.x.push_back(sample.true_rad);
-      series.y.push_back(1e3 * sample.error_rad());
-    }
-  plot.series.push_back(std::move(series));
-  return plot;
-}
-
-Plot deviation_by_trial(const RotationResult& result) {
-  Plot plot{"Table I: standard deviation of the error",
-            {"initial rotation", "rad", {}, {}},
-            {"standard deviation", "mrad", {}, {}, true},
-            {},
-            {},
-            false};
-  Series paper{"the paper", {}, {}, Draw::line_and_points, -1};
-  for (int trial = 0; trial < RotationResult::trials; ++trial) {
-    paper.x.push_back(initial_rotation_rad(trial));
-    paper.y.push_back(1e3 * RotationResult::paper_deviation_rad[static_cast<std::size_t>(trial)]);
-  }
-  for (const auto& of_method : result.methods) {
-    Series series{method_title(of_method.method), paper.x, {}, Draw::line_and_points, method_colour(of_method.method)};
-    for (std::size_t trial = 0; trial < RotationResult::trials; ++trial)
-      series.y.push_back(1e3 * of_method.by_trial[trial].deviation);
-    plot.series.push_back(std::move(series));
-  }
-  plot.series.push_back(std::move(paper));
+  const auto of_set = [](const RotationResult::Sample& sample) {
+    return sample.set == 0 ? PlotPoint({initial_rotation_rad(sample.trial), 1e3 * sample.error_rad()}) : std::nullopt;
+  };
+  plot.series = {series_of("", of_method.samples, of_set, Draw::boxes, method_colour(of_method.method))};
   return plot;
 }
 
@@ -190,9 +144,6 @@ std::vector<Figure> figures_of(const RotationResult& result) {
       "that. ";
   for (const auto& of_method : result.methods)
     figures.push_back({distribution_by_trial(of_method), boxes + "Mind the scale."});
-  figures.push_back({deviation_by_trial(result), "The first set, on a logarithmic scale."});
-  for (const auto& of_method : result.methods)
-    figures.push_back({error_against_true(of_method), "Every frame of the first set. Mind the scale."});
   return figures;
 }
 

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace lapservo::internal {
@@ -19,6 +20,17 @@ struct Series {
   Draw draw = Draw::line;
   int colour = 0;  ///< 0 to 4, of the report's palette; -1 grey
 };
+
+using PlotPoint = std::optional<std::pair<double, double>>;
+
+/// A point for each item that has one: `point_of` gives a PlotPoint.
+template <typename Items, typename PointOf>
+Series series_of(std::string name, const Items& items, PointOf point_of, Draw draw, int colour) {
+  Series series{std::move(name), {}, {}, draw, colour};
+  for (const auto& item : items)
+    if (const PlotPoint point = point_of(item)) series.x.push_back(point->first), series.y.push_back(point->second);
+  return series;
+}
 
 struct Axis {
   std::string label, unit;

@@ -22,22 +22,17 @@ Plot over_time(const std::string& title, const std::string& label, const std::st
   return plot;
 }
 
-using Point = std::optional<std::pair<double, double>>;
-
-// A point for each item that has one.
 template <typename Items, typename PointOf>
 void add_points(Plot& plot, const std::string& name, int colour, const Items& items, PointOf point_of,
                 Draw draw = Draw::points) {
-  Series series{name, {}, {}, draw, colour};
-  for (const auto& item : items)
-    if (const Point point = point_of(item)) series.x.push_back(point->first), series.y.push_back(point->second);
+  Series series = series_of(name, items, point_of, draw, colour);
   if (!series.x.empty()) plot.series.push_back(std::move(series));
 }
 
 Plot arm_plot(const ArmCheck& arm, const std::string& title, const std::string& unit, double factor,
               double ArmResidual::*what) {
   Plot plot = over_time(title, "off by", unit);
-  const auto point = [&](const ArmResidual& r) { return Point({r.time_s, factor * (r.*what)}); };
+  const auto point = [&](const ArmResidual& r) { return PlotPoint({r.time_s, factor * (r.*what)}); };
   add_points(plot, "as the rig has it", 1, arm.by_rig, point, Draw::rings);
   add_points(plot, "after a calibration", 0, arm.at_best, point);
   return plot;
@@ -47,7 +42,7 @@ Plot encoder_plot(const ArmCheck& arm) {
   Plot plot = time_plot("Rotation against encoder", "psi beyond the encoder", "mrad", {});
   plot.references = {{"the encoder", 0}};
   add_points(plot, "as the rig has it", 1, arm.beyond_encoder, [](const TrackedPsi& off) {
-    return Point({off.time_s, 1e3 * off.psi_rad});
+    return PlotPoint({off.time_s, 1e3 * off.psi_rad});
   });
   return plot;
 }
@@ -55,7 +50,7 @@ Plot encoder_plot(const ArmCheck& arm) {
 Plot sigma_plot(const std::vector<FrameEvidence>& frames) {
   Plot plot = over_time("Sigma of psi", "sigma", "mrad");
   add_points(plot, "sigma", 0, frames, [](const FrameEvidence& frame) {
-    return frame.status == Status::ok ? Point({frame.time_s, 1e3 * frame.sigma_roll_rad}) : std::nullopt;
+    return frame.status == Status::ok ? PlotPoint({frame.time_s, 1e3 * frame.sigma_roll_rad}) : std::nullopt;
   });
   return plot;
 }
@@ -63,7 +58,7 @@ Plot sigma_plot(const std::vector<FrameEvidence>& frames) {
 Plot light_plot(const std::vector<FrameEvidence>& frames) {
   Plot plot = over_time("Light on the marker", "brightest channel", "of 255");
   add_points(plot, "brightest channel", 0, frames, [](const FrameEvidence& frame) {
-    return frame.light ? Point({frame.time_s, frame.light->value}) : std::nullopt;
+    return frame.light ? PlotPoint({frame.time_s, frame.light->value}) : std::nullopt;
   });
   return plot;
 }
@@ -188,7 +183,7 @@ std::vector<Figure> figures_of(const CheckedRig& checked) {
   if (f.rcm && f.rcm->refusal.empty()) {
     Plot plot = over_time("Axes and the RCM", "miss", "mm");
     add_points(plot, "miss", 0, f.rcm->misses_m, [](const auto& miss) {
-      return Point({miss.first, 1e3 * miss.second});
+      return PlotPoint({miss.first, 1e3 * miss.second});
     });
     figures.push_back({std::move(plot), "By how much each frame's axis misses the point where they meet."});
   }
