@@ -3,13 +3,15 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
-#include "lapservo/sim/render_queue.h"
+#include "lapservo/core/workers.h"
 #include "lapservo/sim/same_moment.h"
 
 namespace lapservo {
@@ -37,8 +39,14 @@ const EndoscopeConfig& EndoscopeConfig::checked() const {
   return *this;
 }
 
-struct Endoscope::Queue : RenderQueue {
-  using RenderQueue::RenderQueue;
+// Renders in whichever thread is free, each with a renderer of its own.
+struct Endoscope::Queue {
+  Queue(Renderer renderer, int threads) : workers(threads) {
+    for (int i = 1; i < threads; ++i) renderers.push_back(renderer.clone());
+    renderers.push_back(std::move(renderer));
+  }
+  std::vector<Renderer> renderers;
+  Workers workers;  // the first to go: they use the renderers
 };
 
 Endoscope::Endoscope(const Camera& camera, const std::vector<ShaftModel>& shafts, const cv::Mat& background,
@@ -77,7 +85,12 @@ void Endoscope::expose(const Exposure& shafts) {
   picture.stamp_s = std::max({picture.exposed_s + config_.latency_s + jitter_s, closes_s, last_stamp_s_});
   last_stamp_s_ = picture.stamp_s;
   std::future<cv::Mat> rendered;
-  if (queue_) rendered = queue_->render({shafts, noise_seed, light_ * gains_});
+  if (queue_)
+    rendered = queue_->workers.run(
+        [&renderers = queue_->renderers, shafts, noise_seed, gains = Light(light_ * gains_)](std::size_t thread) {
+          renderers[thread].set_gains(gains);
+          return renderers[thread].render_exposure(shafts, noise_seed);
+        });
   on_the_way_.push_back({std::move(picture), std::move(rendered)});
 }
 

@@ -50,7 +50,7 @@ RigEvidence::RigEvidence(const Rig& rig, std::size_t instrument, Cores cores)
       tolerant_(rig, print_tolerance_m),
       key_frames_(rig, instrument),
       response_(rig.camera),
-      worker_(cores == Cores::two ? SerialWorker::Thread::own : SerialWorker::Thread::none) {}
+      worker_(cores == Cores::two ? 1 : 0) {}
 
 void RigEvidence::look_at_light(const cv::Mat& bgr, const Observation& seen, FreeSight& sight) {
   const Marker& marker = rig_.instruments[instrument_].marker;
@@ -110,7 +110,7 @@ bool RigEvidence::add(const cv::Mat& bgr, double time_s) {
   // apart, as now the one and then the other takes longer.
   constexpr std::size_t most_unfinished = 4;
   finish_all_but(most_unfinished - 1);
-  auto as_it_is = worker_.run([this, bgr, time_s] {
+  auto as_it_is = worker_.run([this, bgr, time_s](std::size_t) {
     key_frames_.add(bgr, time_s);
     return tracked_as_it_is(bgr, time_s);
   });

@@ -13,7 +13,7 @@
 #include "lapservo/calibration/colour/marker_response.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
 #include "lapservo/calibration/registration/timed_pose.h"
-#include "lapservo/core/serial_worker.h"
+#include "lapservo/core/workers.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/vision/tracker.h"
 
@@ -93,7 +93,7 @@ class RigEvidence {
   // When they are finished changes nothing that can be seen.
   mutable std::vector<FrameEvidence> frames_;
   mutable std::deque<Unfinished> unfinished_;
-  SerialWorker worker_;  // the last to come and the first to go: it uses the trackers
+  Workers worker_;  // the last to come and the first to go: it uses the trackers
 };
 
 }  // namespace lapservo::internal
