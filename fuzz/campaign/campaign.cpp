@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -17,6 +18,7 @@
 #include <vector>
 
 #include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 
 #include "fuzz/require_observation.h"
@@ -24,7 +26,6 @@
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/io/frame_source.h"
-#include "lapservo/io/pictures/image_encoding.h"
 #include "lapservo/io/video/video_writer.h"
 #include "lapservo/kinematics/rcm_kinematics.h"
 #include "lapservo/rig/rig.h"
@@ -144,7 +145,8 @@ std::vector<Sample> samples(const Rig& rig, const fs::path& folder) {
   }
   std::vector<Sample> all;
   for (const char* extension : {".png", ".jpg", ".bmp", ".tif", ".webp", ".ppm"}) {
-    const auto bytes = encode_image(std::string("sample") + extension, frames[0]);
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(extension, frames[0], bytes);
     all.push_back({extension, {bytes.begin(), bytes.end()}, {psi_rad[0]}});
   }
   for (const char* extension : {".mkv", ".mp4", ".avi", ".ts"}) {

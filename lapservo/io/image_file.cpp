@@ -14,9 +14,10 @@
 #include "lapservo/core/input_file.h"
 #include "lapservo/core/lower_case.h"
 #include "lapservo/io/pictures/exif_orientation.h"
-#include "lapservo/io/pictures/image_encoding.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/io/pictures/jpeg_picture.h"
 #include "lapservo/io/pictures/libav_picture.h"
+#include "lapservo/io/pictures/png_encoding.h"
 #include "lapservo/io/pictures/png_picture.h"
 #include "lapservo/io/pictures/tiff_directory.h"
 #include "lapservo/io/tables/numbers.h"
@@ -149,6 +150,15 @@ bool has_image_extension(const fs::path& path) {
   return std::find(known.begin(), known.end(), extension) != known.end();
 }
 
+bool has_jpeg_extension(const fs::path& path) {
+  const std::string extension = lower_case(path.extension().string());
+  return extension == ".jpg" || extension == ".jpeg";
+}
+
+bool is_written(const fs::path& path) {
+  return has_jpeg_extension(path) || lower_case(path.extension().string()) == ".png";
+}
+
 bool has_unread_extension(const fs::path& path) {
   const std::string extension = lower_case(path.extension().string());
   return extension == ".heic" || extension == ".heif" || extension == ".avif";
@@ -235,7 +245,9 @@ cv::Mat read_image(const fs::path& path) {
 }
 
 void write_image(const fs::path& path, const cv::Mat& image) {
-  const auto bytes = encode_image(path, image);
+  const auto bytes = has_jpeg_extension(path) ? encode_jpeg(image) : encode_png(image);
+  if (bytes.empty() || !is_written(path))
+    throw InputError(path.string(), "can't be written as an image, expected a name that ends in .png or .jpg");
   write_file(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 

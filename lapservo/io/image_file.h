@@ -15,6 +15,12 @@ namespace lapservo {
 /// Whether the name ends like an image's (png, jpg, jpeg, bmp, tif, tiff, webp, ppm, pgm).
 bool has_image_extension(const std::filesystem::path& path);
 
+/// Whether the name ends like a JPEG's (jpg, jpeg).
+bool has_jpeg_extension(const std::filesystem::path& path);
+
+/// Whether write_image() writes what is named so: PNG or JPEG.
+bool is_written(const std::filesystem::path& path);
+
 /// Whether the name ends like that of an image in HEIC or AVIF, which are not read.
 bool has_unread_extension(const std::filesystem::path& path);
 
@@ -44,6 +50,7 @@ bool has_few_colours(const cv::Mat& bgr);
 /// 8-bit BGR of any supported pixel type, as above.
 cv::Mat bgr8_from(const cv::Mat& image, const std::string& source);
 
-/// Writes whole or not at all: see write_file(). Throws InputError when that fails.
+/// A PNG or JPEG by the ending of the name, whole or not at all: see write_file(). 8-bit grey or BGR, PNG also alpha
+/// and 16 bits; JPEG of quality 95. Throws InputError for anything else, and when that fails.
 void write_image(const std::filesystem::path& path, const cv::Mat& image);
 }  // namespace lapservo

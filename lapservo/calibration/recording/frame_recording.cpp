@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "lapservo/core/error.h"
-#include "lapservo/io/pictures/image_encoding.h"
+#include "lapservo/io/image_file.h"
 #include "lapservo/vision/image/interlacing.h"
 
 namespace lapservo::internal {

@@ -6,10 +6,8 @@
 #include <string_view>
 
 extern "C" {
-#include <libavutil/opt.h>
 #include <libavutil/pixdesc.h>
 }
-#include <opencv2/imgproc.hpp>
 
 #include "lapservo/io/video/bgr_converter.h"
 #include "lapservo/io/video/libav.h"
@@ -119,70 +117,6 @@ cv::Mat pixels_of(const libav::Frame& decoded) {
   return pixels;
 }
 
-struct Encoding {
-  std::string_view extension;
-  const char* encoder;
-  AVPixelFormat colour, grey;  ///< none: grey is written as colour, or colour as grey
-  const char *option = nullptr, *value = nullptr;
-};
-constexpr std::array encodings{
-    Encoding{".bmp", "bmp", AV_PIX_FMT_BGR24, AV_PIX_FMT_GRAY8},
-    Encoding{".tif", "tiff", AV_PIX_FMT_RGB24, AV_PIX_FMT_GRAY8, "compression_algo", "lzw"},
-    Encoding{".tiff", "tiff", AV_PIX_FMT_RGB24, AV_PIX_FMT_GRAY8, "compression_algo", "lzw"},
-    Encoding{".webp", "libwebp", AV_PIX_FMT_RGB32, AV_PIX_FMT_NONE, "lossless", "1"},
-    Encoding{".ppm", "ppm", AV_PIX_FMT_RGB24, AV_PIX_FMT_NONE},
-    Encoding{".pgm", "pgm", AV_PIX_FMT_NONE, AV_PIX_FMT_GRAY8},
-};
-
-cv::Mat recoloured(const cv::Mat& pixels, int conversion) {
-  cv::Mat result;
-  cv::cvtColor(pixels, result, conversion);
-  return result;
-}
-
-cv::Mat laid_out(const cv::Mat& image, AVPixelFormat format) {
-  const bool is_grey = image.channels() == 1;
-  switch (format) {
-    case AV_PIX_FMT_GRAY8:
-      return is_grey ? image : recoloured(image, cv::COLOR_BGR2GRAY);
-    case AV_PIX_FMT_RGB32:
-      return recoloured(image, is_grey ? cv::COLOR_GRAY2BGRA : cv::COLOR_BGR2BGRA);
-    case AV_PIX_FMT_RGB24:
-      return recoloured(image, is_grey ? cv::COLOR_GRAY2RGB : cv::COLOR_BGR2RGB);
-    default:
-      return is_grey ? recoloured(image, cv::COLOR_GRAY2BGR) : image;
-  }
-}
-
-AVPixelFormat format_of(const Encoding& encoding, bool is_grey) {
-  if (is_grey) return encoding.grey != AV_PIX_FMT_NONE ? encoding.grey : encoding.colour;
-  return encoding.colour != AV_PIX_FMT_NONE ? encoding.colour : encoding.grey;
-}
-
-libav::Codec open_encoder(const Encoding& encoding, AVPixelFormat format, const cv::Mat& pixels) {
-  const AVCodec* codec = avcodec_find_encoder_by_name(encoding.encoder);
-  libav::Codec context(codec ? avcodec_alloc_context3(codec) : nullptr);
-  if (!context) return nullptr;
-  context->width = pixels.cols;
-  context->height = pixels.rows;
-  context->pix_fmt = format;
-  context->time_base = {1, 1};
-  context->thread_count = 1;
-  if (encoding.option && av_opt_set(context->priv_data, encoding.option, encoding.value, 0) < 0) return nullptr;
-  return avcodec_open2(context.get(), codec, nullptr) == 0 ? std::move(context) : nullptr;
-}
-
-libav::Frame frame_around(const cv::Mat& pixels, AVPixelFormat format) {
-  libav::Frame frame(av_frame_alloc());
-  if (!frame) return nullptr;
-  frame->width = pixels.cols;
-  frame->height = pixels.rows;
-  frame->format = format;
-  frame->data[0] = pixels.data;
-  frame->linesize[0] = static_cast<int>(pixels.step);
-  return frame;
-}
-
 }  // namespace
 
 std::string libav_format(std::span<const std::uint8_t> bytes) {
@@ -198,22 +132,6 @@ cv::Mat libav_decode(std::span<const std::uint8_t> bytes) {
   const bool whole = !pixels.empty() && pixels.size() == again.size() && pixels.type() == again.type() &&
                      cv::norm(pixels, again, cv::NORM_INF) == 0;
   return whole ? pixels : cv::Mat();
-}
-
-std::vector<std::uint8_t> libav_encode(const std::string& extension, const cv::Mat& image) {
-  const auto encoding =
-      std::find_if(encodings.begin(), encodings.end(), [&](const Encoding& e) { return e.extension == extension; });
-  if (encoding == encodings.end() || image.empty() || (image.type() != CV_8UC1 && image.type() != CV_8UC3)) return {};
-  av_log_set_level(AV_LOG_QUIET);
-  const AVPixelFormat format = format_of(*encoding, image.channels() == 1);
-  const cv::Mat pixels = laid_out(image, format);
-  const libav::Codec encoder = open_encoder(*encoding, format, pixels);
-  const libav::Frame frame = frame_around(pixels, format);
-  const libav::Packet packet(av_packet_alloc());
-  if (!encoder || !frame || !packet || avcodec_send_frame(encoder.get(), frame.get()) < 0) return {};
-  avcodec_send_frame(encoder.get(), nullptr);
-  if (avcodec_receive_packet(encoder.get(), packet.get()) < 0) return {};
-  return {packet->data, packet->data + packet->size};
 }
 
 }  // namespace lapservo::internal

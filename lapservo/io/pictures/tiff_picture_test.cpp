@@ -17,7 +17,15 @@ void append(Bytes& bytes, std::uint32_t value, int size) {
   for (int i = 0; i < size; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
 
-enum Tag : std::uint16_t { compression = 259, photometric = 262, samples_a_pixel = 277, extra_samples = 338 };
+enum Tag : std::uint16_t {
+  compression = 259,
+  photometric = 262,
+  samples_a_pixel = 277,
+  page_number = 297,
+  tile_width = 322,
+  extra_samples = 338,
+  sample_format = 339
+};
 
 // Two columns and rows of 8 bits a sample in one strip, little-endian; with these tags in place of plain RGB's.
 Bytes tiff(const Bytes& strip, const std::map<std::uint16_t, std::uint32_t>& tags) {
@@ -95,6 +103,10 @@ TEST(Tiff, IsRefusedWhereItHasFewerRowsThanItSays) {
 TEST(Tiff, OfAKindThatIsNotReadIsRefused) {
   EXPECT_EQ(refusal(tiff(rgb, {{photometric, 6}})), "p: is a TIFF in YCbCr, which is not read: convert it to PNG");
   for (const std::uint32_t jpeg : {6U, 7U}) EXPECT_NE(refusal(tiff(rgb, {{compression, jpeg}})), "");
+  EXPECT_EQ(refusal(tiff(rgb, {{sample_format, 3}})),
+            "p: pixel type: is floating point or signed, expected 8 or 16 bits a channel");
+  EXPECT_NE(refusal(tiff(rgb, {{tile_width, 3}})), "");
+  EXPECT_EQ(refusal(tiff(rgb, {{page_number, 3}})), "") << "what no decoder knows may stand there";
 }
 
 }  // namespace tiff_picture_test

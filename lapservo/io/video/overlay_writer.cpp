@@ -27,7 +27,9 @@ class FolderOverlay : public OverlayWriter {
  public:
   explicit FolderOverlay(const fs::path& folder) : folder_(folder) {}
   void add(const Frame& frame, const cv::Mat& overlay) override {
-    write_image(folder_.path() / frame.file.filename(), overlay);
+    fs::path path = folder_.path() / frame.file.filename();
+    if (!is_written(path)) path += ".png";
+    write_image(path, overlay);
   }
   void commit() override {}
 
@@ -55,7 +57,9 @@ class VideoOverlay : public OverlayWriter {
 std::unique_ptr<OverlayWriter> open_overlay_writer(const fs::path& path, const FrameSource& source) {
   using Kind = FrameSource::Kind;
   std::error_code error;
-  if (source.kind() == Kind::image && has_image_extension(path)) return std::make_unique<PictureOverlay>(path);
+  if (source.kind() == Kind::image && is_written(path)) return std::make_unique<PictureOverlay>(path);
+  if (source.kind() == Kind::image && has_image_extension(path))
+    throw InputError(path.string(), "ends like an image that is not written, expected .png or .jpg");
   if (source.kind() == Kind::image || source.kind() == Kind::folder) {
     if (fs::exists(path, error) && !fs::is_directory(path, error))
       throw InputError(path.string(), "is a file, expected a folder for the images");
