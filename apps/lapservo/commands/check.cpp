@@ -1,11 +1,9 @@
-#include <algorithm>
 #include <cstdio>
 #include <future>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
@@ -17,55 +15,13 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/calibration/check/rig_check.h"
+#include "lapservo/calibration/check/work_space.h"
 #include "lapservo/calibration/colour/colour_calibration.h"
-#include "lapservo/experiments/sigma_map.h"
 #include "lapservo/io/frame_source.h"
 
 namespace lapservo::app {
 using namespace internal;
 namespace {
-
-// Near and far of where the marker was, where it was measured.
-std::vector<double> depths_of(const std::vector<TimedPose>& poses) {
-  std::vector<double> depths_m;
-  for (const TimedPose& pose : poses) depths_m.push_back(pose.origin().z());
-  std::sort(depths_m.begin(), depths_m.end());
-  const std::size_t tenth = depths_m.size() / 10;
-  return {depths_m[tenth], depths_m[depths_m.size() - 1 - tenth]};
-}
-
-// The poses at which the rig's own tracker measured, with its sigmas.
-std::vector<MeasuredSigma> measured_sigmas(const RigEvidence& evidence, const Marker& marker) {
-  std::vector<MeasuredSigma> measured;
-  auto frame = evidence.frames().begin();
-  for (const TimedPose& pose : evidence.poses()) {
-    while (frame != evidence.frames().end() && frame->time_s < pose.time_s) ++frame;
-    if (frame == evidence.frames().end() || frame->status != Status::ok) continue;
-    // The marker's own frame is an unrolled one, too: x towards tau = 0, where psi + seam is 0.
-    measured.push_back({pose.marker.camera_from_marker, -marker.seam_rad, frame->sigma_roll_rad});
-  }
-  return measured;
-}
-
-void look_over_work_space(const Rig& rig, std::size_t index, const RigEvidence& evidence, CheckedRig& checked) {
-  const auto measured = measured_sigmas(evidence, rig.instruments[index].marker);
-  if (measured.empty()) return;
-  checked.maps = sigma_maps(rig, index, depths_of(evidence.poses()), measured);
-  WorkSpace work_space;
-  int good = 0;
-  for (const SigmaMap& map : checked.maps) {
-    const auto lost = static_cast<int>(std::count(map.lost.begin(), map.lost.end(), true));
-    work_space.places += lost, work_space.lost += lost;
-    for (const auto& sigma_rad : map.sigma_rad) {
-      if (!sigma_rad) continue;
-      ++work_space.places, good += *sigma_rad <= rig_limits.sigma_rad;
-      work_space.worst_rad = std::max(work_space.worst_rad, *sigma_rad);
-    }
-  }
-  if (work_space.places == 0) return;
-  work_space.good = static_cast<double>(good) / work_space.places;
-  checked.findings.work_space = work_space;
-}
 
 void print(const CheckedRig& checked) {
   for (const CheckLine& line : check_lines(checked)) std::printf("  %-26s %s\n", line.name.c_str(), line.found.c_str());
@@ -121,7 +77,8 @@ int check(const CalibrateOptions& options) {
     else
       checked.findings.rcm = check_rcm(instrument, evidence.poses());
     progress.show(2, " of 3: the work space");
-    look_over_work_space(rig, index, evidence, checked);
+    WorkSpaceSurvey survey = survey_work_space(rig, index, evidence);
+    checked.maps = std::move(survey.maps), checked.findings.work_space = survey.work_space;
     progress.show(3, " of 3: the print");
     if (print.valid()) checked.findings.print = print.get();
   }

@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/calibration/check/rig_check.h"
-#include "lapservo/experiments/sigma_map.h"
+#include "lapservo/calibration/check/work_space.h"
 
 namespace lapservo::app {
 

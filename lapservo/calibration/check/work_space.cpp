@@ -1,4 +1,4 @@
-#include "lapservo/experiments/sigma_map.h"
+#include "lapservo/calibration/check/work_space.h"
 
 #include <algorithm>
 #include <cmath>
@@ -87,6 +87,28 @@ std::optional<double> sigma_at(Judge& judge, const Rigid3& shaft) {
   return std::sqrt(squares / found);
 }
 
+// Near and far of where the marker was, where it was measured.
+std::vector<double> depths_of(const std::vector<TimedPose>& poses) {
+  std::vector<double> depths_m;
+  for (const TimedPose& pose : poses) depths_m.push_back(pose.origin().z());
+  std::sort(depths_m.begin(), depths_m.end());
+  const std::size_t tenth = depths_m.size() / 10;
+  return {depths_m[tenth], depths_m[depths_m.size() - 1 - tenth]};
+}
+
+// The poses at which the rig's own tracker measured, with its sigmas.
+std::vector<MeasuredSigma> measured_sigmas(const RigEvidence& evidence, const Marker& marker) {
+  std::vector<MeasuredSigma> measured;
+  auto frame = evidence.frames().begin();
+  for (const TimedPose& pose : evidence.poses()) {
+    while (frame != evidence.frames().end() && frame->time_s < pose.time_s) ++frame;
+    if (frame == evidence.frames().end() || frame->status != Status::ok) continue;
+    // The marker's own frame is an unrolled one, too: x towards tau = 0, where psi + seam is 0.
+    measured.push_back({pose.marker.camera_from_marker, -marker.seam_rad, frame->sigma_roll_rad});
+  }
+  return measured;
+}
+
 }  // namespace
 
 std::vector<SigmaMap> sigma_maps(const Rig& rig, std::size_t instrument, const std::vector<double>& depths_m,
@@ -114,6 +136,28 @@ std::vector<SigmaMap> sigma_maps(const Rig& rig, std::size_t instrument, const s
     maps.push_back(map);
   }
   return maps;
+}
+
+WorkSpaceSurvey survey_work_space(const Rig& rig, std::size_t instrument, const RigEvidence& evidence) {
+  WorkSpaceSurvey survey;
+  const auto measured = measured_sigmas(evidence, rig.instruments[instrument].marker);
+  if (measured.empty()) return survey;
+  survey.maps = sigma_maps(rig, instrument, depths_of(evidence.poses()), measured);
+  WorkSpace work_space;
+  int good = 0;
+  for (const SigmaMap& map : survey.maps) {
+    const auto lost = static_cast<int>(std::count(map.lost.begin(), map.lost.end(), true));
+    work_space.places += lost, work_space.lost += lost;
+    for (const auto& sigma_rad : map.sigma_rad) {
+      if (!sigma_rad) continue;
+      ++work_space.places, good += *sigma_rad <= rig_limits.sigma_rad;
+      work_space.worst_rad = std::max(work_space.worst_rad, *sigma_rad);
+    }
+  }
+  if (work_space.places == 0) return survey;
+  work_space.good = static_cast<double>(good) / work_space.places;
+  survey.work_space = work_space;
+  return survey;
 }
 
 }  // namespace lapservo::internal

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "lapservo/calibration/check/rig_check.h"
 #include "lapservo/rig/rig.h"
 
 namespace lapservo::internal {
@@ -31,5 +32,13 @@ struct MeasuredSigma {
 /// light, noise and blur. `measured`: at least one.
 std::vector<SigmaMap> sigma_maps(const Rig& rig, std::size_t instrument, const std::vector<double>& depths_m,
                                  const std::vector<MeasuredSigma>& measured);
+
+/// The view that the rig has of its work space: maps at the near and the far end of where the marker was, and both
+/// taken together. Empty where no frame is measured.
+struct WorkSpaceSurvey {
+  std::vector<SigmaMap> maps;
+  std::optional<WorkSpace> work_space;
+};
+WorkSpaceSurvey survey_work_space(const Rig& rig, std::size_t instrument, const RigEvidence& evidence);
 
 }  // namespace lapservo::internal

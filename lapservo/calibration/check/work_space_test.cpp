@@ -1,4 +1,4 @@
-#include "lapservo/experiments/sigma_map.h"
+#include "lapservo/calibration/check/work_space.h"
 
 #include <algorithm>
 
