@@ -9,34 +9,23 @@
 #include <unistd.h>
 
 #include "lapservo/core/error.h"
+#include "lapservo/core/file_descriptor.h"
 
 namespace lapservo::internal {
 namespace {
 
 constexpr int patience_ms = 5000;
 
-class Descriptor {
- public:
-  // Not blocking: to open a pipe that nobody writes would take for ever.
-  explicit Descriptor(const std::filesystem::path& path)
-      : number_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {}
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int number() const { return number_; }
-
- private:
-  int number_;
-};
-
 class InputFile {
  public:
   InputFile(const std::filesystem::path& path, std::size_t max_bytes, std::string_view expected)
-      : source_(path.string()), expected_(expected), max_bytes_(max_bytes), descriptor_(path) {
+      : source_(path.string()),
+        expected_(expected),
+        max_bytes_(max_bytes),
+        // Not blocking: to open a pipe that nobody writes would take for ever.
+        descriptor_(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)) {
     struct stat about {};
-    if (descriptor_.number() < 0 || ::fstat(descriptor_.number(), &about) != 0) fail("can't be opened");
+    if (!descriptor_.is_open() || ::fstat(descriptor_.number(), &about) != 0) fail("can't be opened");
     if (S_ISDIR(about.st_mode)) fail("is a folder");
     if (S_ISREG(about.st_mode) && static_cast<std::size_t>(about.st_size) > max_bytes) fail_too_large();
   }
@@ -69,7 +58,7 @@ class InputFile {
 
   std::string source_, expected_;
   std::size_t max_bytes_;
-  Descriptor descriptor_;
+  FileDescriptor descriptor_;
 };
 
 }  // namespace
