@@ -1,13 +1,15 @@
 #include "lapservo/calibration/registration/registration_measurement.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
-#include <utility>
 
 #include <fmt/format.h>
 
 #include "lapservo/calibration/check/frame_diagnosis.h"
-#include "lapservo/calibration/registration/pose_table.h"
+#include "lapservo/core/csv.h"
+#include "lapservo/core/error.h"
 #include "lapservo/core/rounded_sigma.h"
 #include "lapservo/vision/tracker.h"
 
@@ -22,6 +24,25 @@ std::array<double, N> rounded_sigmas(const Numbers& sigmas) {
   std::array<double, N> rounded;
   std::transform(sigmas.begin(), sigmas.end(), rounded.begin(), rounded_sigma);
   return rounded;
+}
+
+TimedPose pose_in(const CsvTable& table, std::size_t row, const std::string& source) {
+  const auto number = [&](const char* column) { return table.number(row, column); };
+  const auto sigma = [&](const char* column) {
+    if (const double value = number(column); value > 0) return value;
+    throw InputError(source, "row " + std::to_string(row + 1) + ": " + column, table.text(row, column), "above 0");
+  };
+  TimedPose pose;
+  pose.time_s = number("time_s");
+  pose.marker.camera_from_marker.translation = {number("marker_x_m"), number("marker_y_m"), number("marker_z_m")};
+  const Eigen::Quaterniond rotation(number("marker_qw"), number("marker_qx"), number("marker_qy"), number("marker_qz"));
+  if (!(std::abs(rotation.norm() - 1) < 2e-4) || !(pose.origin().norm() > 0))
+    throw InputError(source, "row " + std::to_string(row + 1) + ": marker pose", "no pose",
+                     "a unit quaternion and a place before the camera");
+  pose.marker.camera_from_marker.rotation = rotation.normalized();
+  pose.marker.sigma_xy_m = sigma("sigma_marker_xy_m"), pose.marker.sigma_z_m = sigma("sigma_marker_z_m");
+  pose.marker.sigma_axis_rad = sigma("sigma_axis_rad"), pose.marker.sigma_roll_rad = sigma("sigma_roll_rad");
+  return pose;
 }
 
 }  // namespace
@@ -49,15 +70,29 @@ MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const Fram
 }
 
 MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::string& instrument) {
-  PoseTable table = read_poses(path, instrument);
+  const CsvTable table = CsvTable::read(path);
   MeasuredPoses poses;
-  poses.all = std::move(table.poses);
-  if (table.with_rcm > 0 && poses.all.empty())
+  int rows = 0, with_rcm = 0;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    if (table.text(row, "instrument") != instrument) continue;
+    ++rows;
+    if (table.text(row, "status") != "ok" || table.text(row, "marker_x_m").empty()) continue;
+    if (!table.text(row, "theta_rad").empty()) {
+      ++with_rcm;
+      continue;
+    }
+    const TimedPose pose = pose_in(table, row, path.string());
+    if (!poses.all.empty() && !(pose.time_s > poses.all.back().time_s))
+      throw InputError(path.string(), "row " + std::to_string(row + 1) + ": time_s", table.text(row, "time_s"),
+                       "later than the row before: the clock jumps");
+    poses.all.push_back(pose);
+  }
+  if (with_rcm > 0 && poses.all.empty())
     poses.none = fmt::format(
         "its {} rows were measured with a camera_from_rcm, through which their axes pass whether it is right or not: "
         "give the images, or track them with a rig without it",
-        table.with_rcm);
-  else if (table.rows == 0)
+        with_rcm);
+  else if (rows == 0)
     poses.none = fmt::format("has no row of {}", instrument);
   return poses;
 }

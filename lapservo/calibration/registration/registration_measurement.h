@@ -21,11 +21,13 @@ struct MeasuredPoses {
   FramesRead read;
 };
 
-/// Calibrates by a marker in motion, tracked without the quantities to measure. Throws InputError as read_frames().
+/// From a marker in motion, tracked without the quantities to measure. Throws InputError as read_frames().
 MeasuredPoses poses_in_frames(const Rig& rig, std::size_t instrument, const FrameRecording& recording,
                               const JobWatch& watch);
 
-/// Calibrates by a CSV of observations that were tracked without camera_from_rcm. Throws InputError as read_poses().
+/// The poses of one instrument's marker in a CSV of observations (docs/output.md). Rows that were measured with a
+/// camera_from_rcm are left out: their axes pass through it whether it is right or not. Throws InputError for a table
+/// of another kind, for numbers that are none and for times that fall.
 MeasuredPoses poses_in_table(const std::filesystem::path& path, const std::string& instrument);
 
 /// The instrument with what was measured; what was not stays.

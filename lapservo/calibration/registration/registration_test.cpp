@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "lapservo/calibration/registration/pose_table.h"
+#include "lapservo/calibration/registration/registration_measurement.h"
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/random.h"
@@ -298,7 +298,7 @@ TEST(JointRecording, IsRefinedSmoothlyAndKeepsItsPauses) {
   EXPECT_FALSE(fine.at(1.5) || fine.at(-0.1) || fine.at(9));
 }
 
-TEST(PoseTable, LeavesOutWhatACameraFromRcmBent) {
+TEST(PosesInTable, LeavesOutWhatACameraFromRcmBent) {
   const lapservo::testing::TemporaryFolder folder;
   const std::string header =
       "time_s,instrument,status,theta_rad,marker_x_m,marker_y_m,marker_z_m,marker_qx,marker_qy,marker_qz,marker_qw,"
@@ -307,13 +307,13 @@ TEST(PoseTable, LeavesOutWhatACameraFromRcmBent) {
   const auto path = folder / "obs.csv";
   const auto read = [&](const std::string& rows) {
     lapservo::testing::write_file(path, header + rows);
-    return read_poses(path, "A");
+    return poses_in_table(path, "A");
   };
-  const PoseTable table = read("0,A,ok,," + pose + "1,A,ok,0.3," + pose + "1,B,ok,," + pose + "2,A,cut,,,,,,,,,,,,\n");
-  ASSERT_EQ(table.poses.size(), 1U);
-  EXPECT_EQ(table.rows, 3U);
-  EXPECT_EQ(table.with_rcm, 1U);
-  EXPECT_DOUBLE_EQ(table.poses[0].marker.sigma_roll_rad, 2e-3);
+  const auto found = read("0,A,ok,," + pose + "1,A,ok,0.3," + pose + "1,B,ok,," + pose + "2,A,cut,,,,,,,,,,,,\n");
+  ASSERT_EQ(found.all.size(), 1U);
+  EXPECT_EQ(found.none, "");
+  EXPECT_DOUBLE_EQ(found.all[0].marker.sigma_roll_rad, 2e-3);
+  EXPECT_NE(read("1,A,ok,0.3," + pose).none.find("its 1 rows were measured with a camera_from_rcm"), std::string::npos);
   EXPECT_NE(lapservo::testing::input_error([&] { read("1,A,ok,," + pose + "0,A,ok,," + pose); }).find("clock jumps"),
             std::string::npos);
   EXPECT_NE(lapservo::testing::input_error([&] { read("0,A,ok,,0,0,1,0,0,0,2,1,1,1,1\n"); }).find("no pose"),
