@@ -82,24 +82,34 @@ def test_sigmas_are_roots_of_covariances(rig, image):
     assert set(lapservo.Tracker(rig).track(np.full_like(image, 90))[0].sigma) == {None}
 
 
-def test_a_table_is_the_command_lines(tmp_path):
-    folder, out = SOURCE / "acceptance" / "frames" / "png", tmp_path / "obs.csv"
+@pytest.mark.parametrize("folder", sorted(p.parent for p in (SOURCE / "acceptance" / "frames").glob("*/rig.yaml")),
+                         ids=lambda folder: folder.name)
+def test_a_table_is_the_command_lines(folder, tmp_path):
+    out = tmp_path / "obs.csv"
     subprocess.run([os.environ["LAPSERVO_TOOL"], "track", folder, "--rig", folder / "rig.yaml", "--out", out], check=True,
                    capture_output=True)
     tracker, seen = lapservo.Tracker(lapservo.Rig.load(folder / "rig.yaml"), frame_budget=None), []
     with lapservo.ObservationCsv(tmp_path / "ours.csv") as table:
         for frame in lapservo.open_frames(folder):
-            seen += tracker.track(frame)
-            table.add(seen[-1:], frame)
+            observations = tracker.track(frame)
+            table.add(observations, frame)
+            seen += observations
     assert (tmp_path / "ours.csv").read_bytes() == out.read_bytes()
     with open(out) as file:
-        for ours, row in zip(seen, csv.DictReader(file)):
-            numbers = ours.to_dict()
-            assert numbers.pop("status") == row["status"] and numbers.pop("instrument") == row["instrument"]
-            assert numbers.pop("stamp_s") == pytest.approx(float(row["time_s"]), abs=1e-6)
-            assert [*numbers] == [*row][5:]
-            for name, value in numbers.items():
-                assert row[name] == "" if value is None else value == pytest.approx(float(row[name]), rel=1e-3, abs=1e-4)
+        rows = list(csv.DictReader(file))
+    assert len(seen) == len(rows) and any(each.ok for each in seen)
+    for ours, row in zip(seen, rows):
+        numbers = ours.to_dict()
+        assert numbers.pop("status") == row["status"] and numbers.pop("instrument") == row["instrument"]
+        assert numbers.pop("stamp_s") == pytest.approx(float(row["time_s"]), abs=1e-6)
+        assert [*numbers] == [*row][5:]
+        for name, value in numbers.items():
+            assert row[name] == "" if value is None else value == pytest.approx(float(row[name]), rel=1e-3, abs=1e-4)
+        if ours.ok:
+            assert ours.edges_px.ravel().tolist() == [numbers[f"e{i}_{k}_px"] for i in range(4) for k in "uv"]
+            assert [ours.tau_rad, *ours.features[[0, 2]]] == [numbers[name] for name in ("tau_rad", "s_rad", "l_px")]
+            q = [numbers[name] for name in ("theta_rad", "phi_rad", "rho_m", "psi_rad")]
+            assert q == (4 * [None] if ours.q is None else ours.q.tolist())
 
 
 def test_a_table_of_arrays_takes_stamps_and_after_an_exception_there_is_none(rig, image, tmp_path):
