@@ -575,29 +575,38 @@ TEST_P(WireLoop, ASecondPublisherIsNoticedWithin100MillisecondsAndHoldsUntilASta
   loop->wait();
 }
 
-TEST_P(WireLoop, MovesOnlyWhileTheOperatorPressesAPedal) {
+TEST_P(WireLoop, MovesOnlyWhileTheOperatorPressesAPedalOfEitherType) {
   Arm room(GetParam(), rig_);
   const auto ears = named_transport(GetParam(), "ears");
-  Spy spy(*ears);
   const auto command = ears->string_publisher("/lapservo/PSM1/command");
-  const auto pedal = ears->joy_publisher("/footpedals/coag");
-  const auto press = [&](int button) { pedal({now_s(), {button}}); };
-  const auto loop = servo(600, "servo.txt", true, {"--operator-present", "/footpedals/coag"});
-  expect_soon_said("hold: operator_absent");
-  EXPECT_EQ(spy.count(), 0u);
-  ASSERT_TRUE(spy.count_exceeds(300, [&] { press(1); })) << said("servo.txt");
-  const double released_s = now_s();
-  press(0);
-  expect_soon_said("hold: operator_absent", said("servo.txt").rfind("track"));
-  sleep(1);
-  EXPECT_FALSE(spy.moves_after(released_s + allowed_s + rest_s));
-  const std::size_t held = spy.count();
-  for (int i = 0; i < 100; ++i) press(1), sleep(0.01);
-  EXPECT_EQ(spy.count(), held);
-  ASSERT_TRUE(spy.count_exceeds(held + 100, [&] { press(1), command({now_s(), "start"}); })) << said("servo.txt");
-  loop->signal(SIGINT);
-  loop->wait();
-  spy.expect_no_jump();
+  const auto joy = ears->joy_publisher("/footpedals/coag");
+  const auto button = ears->bool_publisher("/operator_present");
+  const std::vector<std::pair<std::string, std::function<void(bool)>>> pedals{
+      {"/footpedals/coag",
+       [&](bool pressed) {
+         joy({now_s(), {pressed}});
+       }},
+      {"/operator_present", [&](bool pressed) { button({pressed}); }}};
+  for (const auto& [topic, press] : pedals) {
+    SCOPED_TRACE(topic);
+    Spy spy(*ears);
+    const auto loop = servo(600, "servo.txt", true, {"--operator-present", topic});
+    expect_soon_said("hold: operator_absent");
+    EXPECT_EQ(spy.count(), 0u);
+    ASSERT_TRUE(spy.count_exceeds(300, [&] { press(true); })) << said("servo.txt");
+    const double released_s = now_s();
+    press(false);
+    expect_soon_said("hold: operator_absent", said("servo.txt").rfind("track"));
+    sleep(1);
+    EXPECT_FALSE(spy.moves_after(released_s + allowed_s + rest_s));
+    const std::size_t held = spy.count();
+    for (int i = 0; i < 100; ++i) press(true), sleep(0.01);
+    EXPECT_EQ(spy.count(), held);
+    ASSERT_TRUE(spy.count_exceeds(held + 100, [&] { press(true), command({now_s(), "start"}); })) << said("servo.txt");
+    loop->signal(SIGINT);
+    loop->wait();
+    spy.expect_no_jump();
+  }
 }
 
 #ifdef LAPSERVO_WEB

@@ -70,7 +70,9 @@ TEST(OperatorPresence, IsAButtonThatIsPressedThroughoutAndSaysSo) {
   TestTransport transport;
   StandingClock clock;
   OperatorPresence presence(transport, "/pedal", clock);
-  const auto say = [&](const std::vector<std::int32_t>& buttons) { transport.say("/pedal", JoyMessage{0, buttons}); };
+  const auto say = [&](const std::vector<std::int32_t>& buttons) {
+    transport.say("/pedal", first_button(JoyMessage{0, buttons}));
+  };
   EXPECT_FALSE(presence.was_present());
   say({1});
   EXPECT_TRUE(presence.was_present());

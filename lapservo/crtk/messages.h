@@ -51,6 +51,14 @@ struct JoyMessage {
   std::vector<std::int32_t> buttons;  ///< 1 where pressed
 };
 
+/// std_msgs/Bool: a button.
+struct BoolMessage {
+  bool value = false;
+};
+inline BoolMessage first_button(const JoyMessage& message) {
+  return {!message.buttons.empty() && message.buttons.front() == 1};
+}
+
 /// sensor_msgs/Image.
 struct ImageMessage {
   double stamp_s = 0;

@@ -32,6 +32,9 @@ inline void expect_same(const JoyMessage& heard, const JoyMessage& sent) {
   EXPECT_NEAR(heard.stamp_s, sent.stamp_s, 1e-6);
   EXPECT_EQ(heard.buttons, sent.buttons);
 }
+inline void expect_same(const BoolMessage& heard, const BoolMessage& sent) {
+  EXPECT_EQ(heard.value, sent.value);
+}
 inline void expect_same(const TrajectoryMessage& heard, const TrajectoryMessage& sent) {
   EXPECT_NEAR(heard.stamp_s, sent.stamp_s, 1e-6);
   EXPECT_EQ(heard.names, sent.names);
@@ -68,16 +71,20 @@ const CompressedImageMessage sample_jpeg{sample_stamp_s, "jpeg", {7, 8}};
 /// Messages that `from` sends on the topic `in` + KIND arrive at `to` on `out` + KIND, for each kind but the operating
 /// state.
 inline void expect_carries_each_kind(Transport& from, const std::string& in, Transport& to, const std::string& out) {
-  const auto carry = [&]<typename Message>(const std::string& kind, auto publisher, auto subscribe,
-                                           const Message& sent) {
+  const auto carry_as = [&]<typename Message>(const std::string& kind, auto publisher, auto subscribe, const auto& sent,
+                                              const Message& heard) {
     TestInbox<Message> inbox;
     const auto subscription = (to.*subscribe)(out + kind, inbox.handler());
     const auto say = (from.*publisher)(in + kind);
-    expect_same(inbox.get([&] { say(sent); }), sent);
+    expect_same(inbox.get([&] { say(sent); }), heard);
+  };
+  const auto carry = [&](const std::string& kind, auto publisher, auto subscribe, const auto& sent) {
+    carry_as(kind, publisher, subscribe, sent, sent);
   };
   carry("joints", &Transport::joint_publisher, &Transport::subscribe_joints, sample_joints);
   carry("text", &Transport::string_publisher, &Transport::subscribe_strings, sample_string);
-  carry("joy", &Transport::joy_publisher, &Transport::subscribe_joys, sample_joy);
+  carry_as("joy", &Transport::joy_publisher, &Transport::subscribe_buttons, sample_joy, BoolMessage{true});
+  carry("bool", &Transport::bool_publisher, &Transport::subscribe_buttons, BoolMessage{true});
   carry("trajectory", &Transport::trajectory_publisher, &Transport::subscribe_trajectories, sample_trajectory);
   carry("compressed", &Transport::compressed_image_publisher, &Transport::subscribe_compressed_images, sample_jpeg);
   ImageMessage large{sample_stamp_s, 640, 360, 1920, "bgr8", true, {}};

@@ -21,6 +21,7 @@ class TestTransport : public Transport {
   }
   Publisher<StringMessage> string_publisher(const std::string& topic) override { return keep(topic, strings_); }
   Publisher<JoyMessage> joy_publisher(const std::string& topic) override { return keep(topic, joys_); }
+  Publisher<BoolMessage> bool_publisher(const std::string& topic) override { return keep(topic, bools_); }
   Publisher<TrajectoryMessage> trajectory_publisher(const std::string& topic) override {
     return keep(topic, trajectories_);
   }
@@ -47,8 +48,8 @@ class TestTransport : public Transport {
   Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) override {
     return add(string_handlers_[topic], std::move(handler));
   }
-  Subscription subscribe_joys(const std::string& topic, Handler<JoyMessage> handler) override {
-    return add(joy_handlers_[topic], std::move(handler));
+  Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) override {
+    return add(button_handlers_[topic], std::move(handler));
   }
   Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> handler) override {
     return add(trajectory_handlers_[topic], std::move(handler));
@@ -65,7 +66,7 @@ class TestTransport : public Transport {
   void say(const std::string& topic, const JointMessage& message) { tell(joint_handlers_[topic], message); }
   void say(const std::string& topic, const OperatingStateMessage& message) { tell(state_handlers_[topic], message); }
   void say(const std::string& topic, const StringMessage& message) { tell(string_handlers_[topic], message); }
-  void say(const std::string& topic, const JoyMessage& message) { tell(joy_handlers_[topic], message); }
+  void say(const std::string& topic, const BoolMessage& message) { tell(button_handlers_[topic], message); }
   void say(const std::string& topic, const TrajectoryMessage& message) { tell(trajectory_handlers_[topic], message); }
   std::vector<PoseMessage> poses(const std::string& topic) { return poses_[topic]; }
   std::vector<DiagnosticMessage> diagnostics(const std::string& topic) { return diagnostics_[topic]; }
@@ -119,6 +120,7 @@ class TestTransport : public Transport {
   std::map<std::string, std::vector<OperatingStateMessage>> states_;
   std::map<std::string, std::vector<StringMessage>> strings_;
   std::map<std::string, std::vector<JoyMessage>> joys_;
+  std::map<std::string, std::vector<BoolMessage>> bools_;
   std::map<std::string, std::vector<TrajectoryMessage>> trajectories_;
   std::map<std::string, std::vector<ImageMessage>> images_;
   std::map<std::string, std::vector<CompressedImageMessage>> compressed_;
@@ -129,7 +131,7 @@ class TestTransport : public Transport {
   std::map<std::string, Handlers<JointMessage>> joint_handlers_;
   std::map<std::string, Handlers<OperatingStateMessage>> state_handlers_;
   std::map<std::string, Handlers<StringMessage>> string_handlers_;
-  std::map<std::string, Handlers<JoyMessage>> joy_handlers_;
+  std::map<std::string, Handlers<BoolMessage>> button_handlers_;
   std::map<std::string, Handlers<TrajectoryMessage>> trajectory_handlers_;
   std::map<std::string, Handlers<ImageMessage>> image_handlers_;
   std::map<std::string, Handlers<CompressedImageMessage>> compressed_handlers_;

@@ -30,6 +30,7 @@ class Transport {
   virtual Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) = 0;
   virtual Publisher<StringMessage> string_publisher(const std::string& topic) = 0;
   virtual Publisher<JoyMessage> joy_publisher(const std::string& topic) = 0;
+  virtual Publisher<BoolMessage> bool_publisher(const std::string& topic) = 0;
   virtual Publisher<TrajectoryMessage> trajectory_publisher(const std::string& topic) = 0;
   virtual Publisher<ImageMessage> image_publisher(const std::string& topic) = 0;
   virtual Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) = 0;
@@ -42,7 +43,8 @@ class Transport {
   virtual Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) = 0;
   virtual Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> handler) = 0;
   virtual Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) = 0;
-  virtual Subscription subscribe_joys(const std::string& topic, Handler<JoyMessage> handler) = 0;
+  /// Whether a button is pressed: a std_msgs/Bool, or the first button of a sensor_msgs/Joy, by the publisher's type.
+  virtual Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) = 0;
   virtual Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> handler) = 0;
   virtual Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) = 0;
   virtual Subscription subscribe_compressed_images(const std::string& topic,

@@ -109,6 +109,13 @@ std::optional<Message> decode_ros1(std::span<const std::uint8_t> bytes) {
   return from.result(std::move(message));
 }
 
+template <>
+std::optional<BoolMessage> decode_ros1(std::span<const std::uint8_t> bytes) {
+  Bytes from(bytes);
+  const BoolMessage message{from.number<std::uint8_t>() != 0};
+  return from.result(BoolMessage(message));
+}
+
 template std::optional<JointMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<TrajectoryMessage> decode_ros1(std::span<const std::uint8_t>);
 template std::optional<OperatingStateMessage> decode_ros1(std::span<const std::uint8_t>);

@@ -42,6 +42,8 @@ TEST(Ros1Decoder, ReadsWhatRosWritesAndRefusesWhatIsCutShortOrLeftOver) {
   expect_read_whole_and_nothing_else(sample_state);
   expect_read_whole_and_nothing_else(sample_string);
   expect_read_whole_and_nothing_else(sample_trajectory);
+  expect_read_whole_and_nothing_else(sample_joy);
+  expect_read_whole_and_nothing_else(BoolMessage{true});
   expect_read_whole_and_nothing_else(sample_image);
   expect_read_whole_and_nothing_else(sample_jpeg);
   const auto nan = decode_ros1<JointMessage>(bytes_of(ros1_message(JointMessage{stamp_s, {"yaw"}, {NAN}})));

@@ -37,6 +37,12 @@ ros1::Joy ros1_message(const JoyMessage& message) {
   return wire;
 }
 
+ros1::Bool ros1_message(const BoolMessage& message) {
+  ros1::Bool wire;
+  wire.data = message.value;
+  return wire;
+}
+
 ros1::JointTrajectory ros1_message(const TrajectoryMessage& message) {
   auto wire = with_stamp<ros1::JointTrajectory>(message.stamp_s);
   wire.joint_names.assign(message.names.begin(), message.names.end());

@@ -12,6 +12,7 @@
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/JointState.h>
 #include <sensor_msgs/Joy.h>
+#include <std_msgs/Bool.h>
 #include <trajectory_msgs/JointTrajectory.h>
 #include <type_traits>
 
@@ -31,6 +32,7 @@ struct Ros1Allocator : std::allocator<T> {
 namespace ros1 {
 using JointState = sensor_msgs::JointState_<Ros1Allocator<std::byte>>;
 using Joy = sensor_msgs::Joy_<Ros1Allocator<std::byte>>;
+using Bool = std_msgs::Bool_<Ros1Allocator<std::byte>>;
 using JointTrajectory = trajectory_msgs::JointTrajectory_<Ros1Allocator<std::byte>>;
 using OperatingState = crtk_msgs::OperatingState_<Ros1Allocator<std::byte>>;
 using StringStamped = crtk_msgs::StringStamped_<Ros1Allocator<std::byte>>;
@@ -45,6 +47,7 @@ using Observation = lapservo_msgs::Observation_<Ros1Allocator<std::byte>>;
 // A message as ROS 1's type.
 ros1::JointState ros1_message(const JointMessage& message);
 ros1::Joy ros1_message(const JoyMessage& message);
+ros1::Bool ros1_message(const BoolMessage& message);
 ros1::JointTrajectory ros1_message(const TrajectoryMessage& message);
 ros1::OperatingState ros1_message(const OperatingStateMessage& message);
 ros1::StringStamped ros1_message(const StringMessage& message);

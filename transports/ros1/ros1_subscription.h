@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <type_traits>
 #include <utility>
 
 #include "transports/ros1/ros1_decoder.h"
@@ -32,6 +33,23 @@ template <typename Message>
 struct Ros1Received {
   std::optional<Message> message;
 };
+
+/// Either type of a button, which its publisher names.
+template <>
+struct Ros1Received<BoolMessage> {
+  std::optional<BoolMessage> message;
+  std::string type;
+};
+
+/// As Message is on the wire, in words.
+template <typename Message>
+std::string ros1_types() {
+  return ros::message_traits::datatype<Ros1Type<Message>>();
+}
+template <>
+inline std::string ros1_types<BoolMessage>() {
+  return "std_msgs/Bool or sensor_msgs/Joy";
+}
 
 /// The type of a topic that is published by the master's word, when it is another one.
 std::optional<std::string> other_type_on(const std::string& topic, const std::string& type);
@@ -80,7 +98,7 @@ class Ros1Subscription {
       handler_(std::move(*message));
     } else if (unreadable_++ == 0) {
       std::fprintf(stderr, "ROS: %s: dropping messages of %s that can't be read as %s\n", topic_.c_str(),
-                   event.getPublisherName().c_str(), ros::message_traits::datatype<Ros1Type<Message>>());
+                   event.getPublisherName().c_str(), ros1_types<Message>().c_str());
     }
   }
   // A publisher of another type refuses, of which roscpp says nothing.
@@ -99,7 +117,7 @@ class Ros1Subscription {
   std::shared_ptr<ros::CallbackQueue> queue_ = std::make_shared<ros::CallbackQueue>();
   ros::Subscriber subscriber_;
   std::atomic<bool> ended_ = false;
-  bool connected_ = false;  // or the reason was reported
+  bool connected_ = std::is_same_v<Message, BoolMessage>;  // or the reason was reported, or any type connects
   long unreadable_ = 0, refused_ = 0;
   std::thread thread_;
 };
@@ -115,6 +133,16 @@ struct MD5Sum<lapservo::internal::Ros1Received<Message>> : MD5Sum<lapservo::inte
 template <typename Message>
 struct DataType<lapservo::internal::Ros1Received<Message>> : DataType<lapservo::internal::Ros1Type<Message>> {};
 
+template <>
+struct MD5Sum<lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>> {
+  static const char* value() { return "*"; }
+};
+
+template <>
+struct DataType<lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>> {
+  static const char* value() { return "*"; }
+};
+
 template <typename Message>
 struct Definition<lapservo::internal::Ros1Received<Message>> : Definition<lapservo::internal::Ros1Type<Message>> {};
 
@@ -128,6 +156,27 @@ struct Serializer<lapservo::internal::Ros1Received<Message>> {
   static void read(Stream& stream, lapservo::internal::Ros1Received<Message>& received) {
     received.message =
         lapservo::internal::decode_ros1<Message>(std::span<const std::uint8_t>(stream.getData(), stream.getLength()));
+  }
+};
+
+template <>
+struct PreDeserialize<lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>> {
+  using Received = lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>;
+  static void notify(const PreDeserializeParams<Received>& params) {
+    params.message->type = (*params.connection_header)["type"];
+  }
+};
+
+template <>
+struct Serializer<lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>> {
+  template <typename Stream>
+  static void read(Stream& stream, lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>& received) {
+    using namespace lapservo::internal;
+    const std::span<const std::uint8_t> bytes(stream.getData(), stream.getLength());
+    if (received.type == ros::message_traits::datatype<ros1::Bool>())
+      received.message = decode_ros1<BoolMessage>(bytes);
+    if (received.type != ros::message_traits::datatype<ros1::Joy>()) return;
+    if (const auto joy = decode_ros1<JoyMessage>(bytes)) received.message = first_button(*joy);
   }
 };
 

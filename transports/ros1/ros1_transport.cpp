@@ -91,6 +91,10 @@ Transport::Publisher<JoyMessage> Ros1Transport::joy_publisher(const std::string&
   return publisher<JoyMessage>(node_, topic, few);
 }
 
+Transport::Publisher<BoolMessage> Ros1Transport::bool_publisher(const std::string& topic) {
+  return publisher<BoolMessage>(node_, topic, few);
+}
+
 Transport::Publisher<TrajectoryMessage> Ros1Transport::trajectory_publisher(const std::string& topic) {
   return publisher<TrajectoryMessage>(node_, topic, few);
 }
@@ -132,8 +136,8 @@ Transport::Subscription Ros1Transport::subscribe_strings(const std::string& topi
   return subscription<StringMessage>(node_, topic, few, handler);
 }
 
-Transport::Subscription Ros1Transport::subscribe_joys(const std::string& topic, Handler<JoyMessage> handler) {
-  return subscription<JoyMessage>(node_, topic, few, handler);
+Transport::Subscription Ros1Transport::subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) {
+  return subscription<BoolMessage>(node_, topic, few, handler);
 }
 
 Transport::Subscription Ros1Transport::subscribe_trajectories(const std::string& topic,

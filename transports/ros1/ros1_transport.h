@@ -23,6 +23,7 @@ class Ros1Transport : public Transport {
   Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) override;
   Publisher<StringMessage> string_publisher(const std::string& topic) override;
   Publisher<JoyMessage> joy_publisher(const std::string& topic) override;
+  Publisher<BoolMessage> bool_publisher(const std::string& topic) override;
   Publisher<TrajectoryMessage> trajectory_publisher(const std::string& topic) override;
   Publisher<ImageMessage> image_publisher(const std::string& topic) override;
   Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) override;
@@ -34,7 +35,7 @@ class Ros1Transport : public Transport {
   Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) override;
   Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> handler) override;
   Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) override;
-  Subscription subscribe_joys(const std::string& topic, Handler<JoyMessage> handler) override;
+  Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) override;
   Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> handler) override;
   Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) override;
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override;

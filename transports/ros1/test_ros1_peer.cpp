@@ -67,7 +67,9 @@ int main() {
   subscriptions.push_back(
       transport.subscribe_operating_state("/in/state", [&](OperatingStateMessage&& m) { state(m); }));
   const auto joy = transport.joy_publisher("/out/joy");
-  subscriptions.push_back(transport.subscribe_joys("/in/joy", [&](JoyMessage&& m) { joy(m); }));
+  subscriptions.push_back(transport.subscribe_buttons("/in/joy", [&](BoolMessage&& m) { joy({0, {m.value}}); }));
+  const auto button = transport.bool_publisher("/out/bool");
+  subscriptions.push_back(transport.subscribe_buttons("/in/bool", [&](BoolMessage&& m) { button(m); }));
   const auto trajectory = transport.trajectory_publisher("/out/trajectory");
   subscriptions.push_back(
       transport.subscribe_trajectories("/in/trajectory", [&](TrajectoryMessage&& m) { trajectory(m); }));

@@ -192,6 +192,10 @@ Transport::Publisher<JoyMessage> Ros2Transport::joy_publisher(const std::string&
   return implementation_->publisher<JoyMessage>(topic, Delivery::reliable);
 }
 
+Transport::Publisher<BoolMessage> Ros2Transport::bool_publisher(const std::string& topic) {
+  return implementation_->publisher<BoolMessage>(topic, Delivery::reliable);
+}
+
 Transport::Publisher<TrajectoryMessage> Ros2Transport::trajectory_publisher(const std::string& topic) {
   return implementation_->publisher<TrajectoryMessage>(topic, Delivery::reliable);
 }
@@ -234,8 +238,12 @@ Transport::Subscription Ros2Transport::subscribe_strings(const std::string& topi
   return implementation_->subscribe<StringMessage>(topic, {Delivery::reliable, Delivery::best_effort}, handler);
 }
 
-Transport::Subscription Ros2Transport::subscribe_joys(const std::string& topic, Handler<JoyMessage> handler) {
-  return implementation_->subscribe<JoyMessage>(topic, {Delivery::best_effort}, handler);
+// DDS matches each reader with the publishers of its type.
+Transport::Subscription Ros2Transport::subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) {
+  const auto joys = [handler](JoyMessage&& message) { handler(first_button(message)); };
+  using Both = std::pair<Subscription, Subscription>;
+  return std::make_shared<Both>(implementation_->subscribe<BoolMessage>(topic, {Delivery::best_effort}, handler),
+                                implementation_->subscribe<JoyMessage>(topic, {Delivery::best_effort}, joys));
 }
 
 Transport::Subscription Ros2Transport::subscribe_trajectories(const std::string& topic,

@@ -137,6 +137,15 @@ JoyMessage Wire<JoyMessage>::read(const Type& wire) {
   return {stamp_of(wire.header_), vector_of(wire.buttons_)};
 }
 
+void Wire<BoolMessage>::write(dds_entity_t writer, const BoolMessage& message) {
+  const Type wire{message.value};
+  dds_write(writer, &wire);
+}
+
+BoolMessage Wire<BoolMessage>::read(const Type& wire) {
+  return {wire.data_};
+}
+
 void Wire<ImageMessage>::write(dds_entity_t writer, const ImageMessage& message) {
   auto wire = with_header<Type>(message.stamp_s);
   wire.height_ = message.height;

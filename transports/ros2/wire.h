@@ -52,6 +52,14 @@ struct Wire<JoyMessage> {
 };
 
 template <>
+struct Wire<BoolMessage> {
+  using Type = std_msgs_msg_dds__Bool_;
+  static const dds_topic_descriptor_t& descriptor() { return std_msgs_msg_dds__Bool__desc; }
+  static void write(dds_entity_t writer, const BoolMessage& message);
+  static BoolMessage read(const Type& wire);
+};
+
+template <>
 struct Wire<ImageMessage> {
   using Type = sensor_msgs_msg_dds__Image_;
   static const dds_topic_descriptor_t& descriptor() { return sensor_msgs_msg_dds__Image__desc; }

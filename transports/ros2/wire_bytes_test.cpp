@@ -161,6 +161,7 @@ TEST(WireBytes, OfWhatSteersAnArm) {
   expect_fields(state, stamp);
   expect_fields(state, {{"state", "ENABLED"}, {"is_homed", "true"}, {"is_busy", "false"}});
   expect_fields(sent_as("crtk_msgs/StringStamped", StringMessage{stamp_s, "enable"}), {{"string", "enable"}});
+  expect_fields(sent_as("std_msgs/Bool", BoolMessage{true}), {{"data", "true"}});
 }
 
 TEST(WireBytes, OfPictures) {

@@ -188,8 +188,8 @@ void add_arm_options(CLI::App& command, ServoOptions& options) {
       ->capture_default_str()
       ->check(CLI::IsMember({"none", "page", "topics", "page,topics"}));
   command.add_option("--operator-present", options.operator_present,
-                     "Move the arm only while the first button of this sensor_msgs/Joy topic, for example "
-                     "/footpedals/coag, is pressed, and said to be every 0.2 s");
+                     "Move the arm only while the button of this topic, a std_msgs/Bool or the first of a "
+                     "sensor_msgs/Joy, is pressed, and said to be every 0.2 s");
   command.add_flag("--enable-motion", options.enable_motion,
                    "Move a real arm; without it nothing is sent, and what would be is said");
   command.add_option(
