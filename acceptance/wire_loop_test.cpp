@@ -29,6 +29,7 @@
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/rig/rig_writer.h"
+#include "lapservo/robot/held_button.h"
 #include "lapservo/sim_robot/sim_robot.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
@@ -631,6 +632,36 @@ TEST_P(FirstWireLoop, ThePageHoldsStartsAndEnds) {
   EXPECT_EQ(testing::http_status(testing::http_post(port, "/stop")), 202);
   loop->wait();
   EXPECT_NE(said("servo.txt").find("end: requested on the page"), std::string::npos) << said("servo.txt");
+}
+
+TEST_P(FirstWireLoop, MovesOnlyWhileThePagesButtonIsPressed) {
+  Arm room(GetParam(), rig_);
+  const auto ears = named_transport(GetParam(), "ears");
+  Spy spy(*ears);
+  const auto loop = servo(600, "servo.txt", true, {"--web", "0", "--operator-present", "page"});
+  const int port = page_port();
+  expect_soon_said("hold: operator_absent");
+  EXPECT_EQ(spy.count(), 0u);
+  const auto press = [&] { EXPECT_EQ(testing::http_status(testing::http_post(port, testing::press_path())), 202); };
+  const auto start = [&] { EXPECT_EQ(testing::http_status(testing::http_post(port, testing::start_path())), 202); };
+  for (const bool says_so : {true, false}) {  // that it is released
+    const std::size_t before = spy.count();
+    press(), start();
+    ASSERT_TRUE(spy.count_exceeds(before + 300, press)) << said("servo.txt");
+    const double released_s = now_s();
+    if (says_so) testing::http_post(port, "/release");
+    expect_soon_said("hold: operator_absent", said("servo.txt").rfind("track"));
+    sleep(1);
+    const double silent_s = says_so ? 0 : HeldButton::max_age_s;
+    EXPECT_FALSE(spy.moves_after(released_s + silent_s + allowed_s + rest_s));
+    const std::size_t held = spy.count();
+    start();  // without the button it is void, and the button without it does not move
+    for (int i = 0; i < 100; ++i) sleep(0.01), press();
+    EXPECT_EQ(spy.count(), held);
+  }
+  loop->signal(SIGINT);
+  loop->wait();
+  spy.expect_no_jump();
 }
 
 TEST_P(FirstWireLoop, ThePageEndsTheWaitForAnArm) {

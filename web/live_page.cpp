@@ -32,6 +32,12 @@ double now_s() {
   return seconds(std::chrono::steady_clock::now().time_since_epoch());
 }
 
+// When the page sent it, by this clock: what the network or a stopped process kept back is not wanted any more.
+std::optional<double> time_of(const HttpRequest& request) {
+  const auto at = request.query.find("at");
+  return at == request.query.end() ? std::nullopt : parse_finite(at->second);
+}
+
 // Includes a wrong clock: an old command may be unwanted by now.
 bool is_recent_start(double asked_s) {
   return std::abs(now_s() - asked_s) <= start_lasts_s;
@@ -157,6 +163,12 @@ HttpResponse LivePage::command(const HttpRequest& request) {
     stop_ = true;
     return plain(202, "the run ends");
   }
+  if (config_.has_run_button && path == "/press") return press(request);
+  if (config_.has_run_button && path == "/release") {
+    released_s_ = now_s();
+    run_button_.release();
+    return plain(202, "released");
+  }
   if (path != "/hold" && path != "/start") return plain(404, "there is no such command");
   if (!config_.has_loop) return plain(403, "nothing that moves is commanded here");
   if (path == "/start") return start(request);
@@ -164,24 +176,33 @@ HttpResponse LivePage::command(const HttpRequest& request) {
   return plain(202, "accepted");
 }
 
-// The page says when its button was pressed, by this clock: what the network or a stopped process kept back starts
-// nothing.
 HttpResponse LivePage::start(const HttpRequest& request) {
   if (!config_.may_start) return plain(403, "lapservo runs without --enable-motion");
-  const auto at = request.query.find("at");
-  const auto asked_s = at == request.query.end() ? std::nullopt : parse_finite(at->second);
+  const auto asked_s = time_of(request);
   if (!asked_s) return plain(400, "a start needs its time: ?at= now_s of /state");
   if (!is_recent_start(*asked_s)) return plain(409, "it came too late, nothing was started");
   start_s_ = *asked_s;
   return plain(202, "accepted");
 }
 
+HttpResponse LivePage::press(const HttpRequest& request) {
+  const auto pressed_s = time_of(request);
+  if (!pressed_s) return plain(400, "a press needs its time: ?at= now_s of /state");
+  const double now = now_s();
+  if (std::abs(now - *pressed_s) > HeldButton::max_age_s || *pressed_s <= released_s_)
+    return plain(409, "it came too late and does not count");
+  run_button_.press(std::min(*pressed_s, now));
+  return plain(202, "pressed");
+}
+
+bool LivePage::operator_present() {
+  return run_button_.was_held(now_s());
+}
+
 HttpResponse LivePage::state() {
-  nlohmann::ordered_json state{{"title", config_.title},
-                               {"has_loop", config_.has_loop},
-                               {"may_start", config_.may_start},
-                               {"live", config_.live},
-                               {"ended", over_.load()}};
+  nlohmann::ordered_json state{{"title", config_.title},         {"has_loop", config_.has_loop},
+                               {"may_start", config_.may_start}, {"has_run_button", config_.has_run_button},
+                               {"live", config_.live},           {"ended", over_.load()}};
   watched_ = true;
   const auto now = std::chrono::steady_clock::now();
   state["now_s"] = seconds(now.time_since_epoch());

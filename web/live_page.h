@@ -14,6 +14,7 @@
 #include <opencv2/core.hpp>
 
 #include "lapservo/rig/rig.h"
+#include "lapservo/robot/held_button.h"
 #include "lapservo/vision/observation.h"
 #include "web/access.h"
 #include "web/http_server.h"
@@ -28,6 +29,7 @@ struct PageConfig {
   bool live = true;                   ///< images get old; a file's do not
   bool has_loop = false;              ///< a loop that can be held and started
   bool may_start = false;
+  bool has_run_button = false;  ///< see operator_present()
   HttpLimits limits{};
 };
 
@@ -77,6 +79,9 @@ class LivePage {
   /// The commands since the last call. A start that is not taken within a second is void: its sender does not expect
   /// motion any more.
   PageWishes take_wishes();
+  /// Whether somebody pressed the page's run button throughout since the last call. A press that
+  /// the network kept back for longer than HeldButton::max_age_s does not count.
+  bool operator_present();
 
  private:
   using Time = std::chrono::steady_clock::time_point;
@@ -106,6 +111,7 @@ class LivePage {
   std::optional<HttpResponse> picture(const HttpRequest& request, bool last);
   HttpResponse command(const HttpRequest& request);
   HttpResponse start(const HttpRequest& request);
+  HttpResponse press(const HttpRequest& request);
   HttpResponse state();
   void draw();
   std::shared_ptr<const Drawn> draw_newest(std::unique_lock<std::mutex>& lock) const;
@@ -124,6 +130,8 @@ class LivePage {
   std::atomic<bool> hold_ = false, stop_ = false, over_ = false, watched_ = false;
   std::atomic<double> start_s_ = never;  ///< when it was requested
 
+  HeldButton run_button_;
+
   // The page's threads' only.
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -132,6 +140,7 @@ class LivePage {
   Shown newest_;
   std::optional<Told> told_;
   std::shared_ptr<const Drawn> drawn_;
+  double released_s_ = never;
   std::unique_ptr<HttpServer> server_;
   std::thread thread_;  // last: it uses the others
 };

@@ -21,6 +21,7 @@ namespace {
 using lapservo::testing::http;
 using lapservo::testing::http_post;
 using lapservo::testing::http_status;
+using lapservo::testing::press_path;
 using lapservo::testing::RawConnection;
 using lapservo::testing::start_path;
 
@@ -178,6 +179,37 @@ TEST(LivePage, StartsNothingLate) {
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_EQ(http_status(http_post(port, start_path(1.1))), 409);
   EXPECT_EQ(page.take_wishes().hold, true);
+}
+
+// Without an answer in time, a pressed button is a released one.
+TEST(LivePage, TheRunButtonIsPressedWhileThePageSaysSo) {
+  PageConfig config = config_of_test();
+  EXPECT_EQ(http_status(http_post(port_of(LivePage(config)), press_path())), 404);
+  config.has_run_button = true;
+  LivePage page(config);
+  const int port = port_of(page);
+  const auto press = [&](double ago_s = 0) { return http_status(http_post(port, press_path(ago_s))); };
+  EXPECT_FALSE(page.operator_present());
+  EXPECT_EQ(press(), 202);
+  EXPECT_TRUE(page.operator_present());
+  EXPECT_FALSE(page.take_wishes().hold) << "it is no start by itself";
+  std::this_thread::sleep_for(std::chrono::milliseconds(210));
+  EXPECT_FALSE(page.operator_present());
+  EXPECT_EQ(press(0.15), 202);  // on its way for so long
+  EXPECT_TRUE(page.operator_present());
+  std::this_thread::sleep_for(std::chrono::milliseconds(60));
+  EXPECT_FALSE(page.operator_present());
+  for (const double ago_s : {0.21, 5.0, -0.21}) EXPECT_EQ(press(ago_s), 409) << ago_s;
+  EXPECT_FALSE(page.operator_present());
+  for (const char* path : {"/press", "/press?at=", "/press?at=nan"})
+    EXPECT_EQ(http_status(http_post(port, path)), 400) << path;
+  // Released and pressed again between two queries; a press from before the release comes late.
+  EXPECT_EQ(press(), 202);
+  EXPECT_EQ(http_status(http_post(port, "/release")), 202);
+  EXPECT_EQ(press(0.1), 409);
+  EXPECT_EQ(press(), 202);
+  EXPECT_FALSE(page.operator_present());
+  EXPECT_TRUE(page.operator_present());
 }
 
 TEST(LivePage, RefusesStrangersAndOtherSites) {

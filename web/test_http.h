@@ -56,10 +56,16 @@ inline std::string http_post(int port, const std::string& path, const std::strin
   return http(port, "POST", path, headers + fmt::format("Origin: http://127.0.0.1:{}\r\nContent-Length: 0\r\n", port));
 }
 
-/// A request for http_post(); `ago_s`: since the button was pressed.
-inline std::string start_path(double ago_s = 0) {
+/// Requests for http_post(); `ago_s`: since the page sent it.
+inline std::string path_at(const std::string& path, double ago_s) {
   const std::chrono::duration<double> now = std::chrono::steady_clock::now().time_since_epoch();
-  return fmt::format("/start?at={:.4f}", now.count() - ago_s);
+  return fmt::format("{}?at={:.6f}", path, now.count() - ago_s);
+}
+inline std::string start_path(double ago_s = 0) {
+  return path_at("/start", ago_s);
+}
+inline std::string press_path(double ago_s = 0) {
+  return path_at("/press", ago_s);
 }
 
 /// 0 of what is no answer.

@@ -23,21 +23,21 @@ class Browser:
     def __init__(self, program, folder):
         ours, theirs = os.pipe(), os.pipe()  # Chromium reads at 3 and writes at 4
 
-        def place():
+        def redirect():
             a, b = os.dup(ours[0]), os.dup(theirs[1])
             os.dup2(a, 3)
             os.dup2(b, 4)
 
         self.process = subprocess.Popen(
             [program, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-pipe", f"--user-data-dir={folder}"],
-            preexec_fn=place, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            preexec_fn=redirect, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(ours[0])
         os.close(theirs[1])
         self.to, self.of = os.fdopen(ours[1], "wb"), os.fdopen(theirs[0], "rb")
         self.count, self.session, self.complaints, self.buffer = 0, None, [], b""
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        for domain in ("Page", "Runtime", "Log"):
+        for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(domain + ".enable")
 
     def read(self):
@@ -90,10 +90,21 @@ class Browser:
             self.call("Input.dispatchKeyEvent", type=what, key="Enter", code="Enter", windowsVirtualKeyCode=13,
                       text="\r" if what == "keyDown" else "")
 
+    def place(self, name):
+        return self.value(f"(b => ({{x: b.x + b.width / 2, y: b.y + b.height / 2}}))(document.getElementById('{name}').getBoundingClientRect())")
+
+    def mouse(self, what, name):
+        self.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, **self.place(name))
+
     def click(self, name):
-        box = self.value(f"(b => ({{x: b.x + b.width / 2, y: b.y + b.height / 2}}))(document.getElementById('{name}').getBoundingClientRect())")
         for what in ("mousePressed", "mouseReleased"):
-            self.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, **box)
+            self.mouse(what, name)
+
+    def touch(self, what, *names):
+        self.call("Input.dispatchTouchEvent", type=what, touchPoints=[self.place(name) for name in names])
+
+    def connect(self, connected):
+        self.call("Network.emulateNetworkConditions", offline=not connected, latency=0, downloadThroughput=-1, uploadThroughput=-1)
 
     def screenshot(self, path):
         with open(path, "wb") as file:
@@ -213,6 +224,56 @@ def see_the_loop(browser, tool, rig, folder):
         lapservo.wait()
 
 
+def see_the_run_button(browser, tool, rig):
+    """Nothing moves unless it is pressed, however it is released."""
+    lapservo, url = start(tool, "servo", "--rig", rig, "--robot", "sim", "--duration", "3600", "--web", "0", "--operator-present", "page")
+    press_key = lambda what, key: browser.call("Input.dispatchKeyEvent", type=what, key=key, code="Space" if key == " " else "Enter",
+                                               windowsVirtualKeyCode=32 if key == " " else 13, text=key if what == "keyDown" and key == " " else "")
+    ways = {
+        "mouse": (lambda: browser.mouse("mousePressed", "run"), lambda: browser.mouse("mouseReleased", "run")),
+        "mouse that leaves": (lambda: browser.mouse("mousePressed", "run"), lambda: browser.mouse("mouseMoved", "title")),
+        "finger": (lambda: browser.touch("touchStart", "run"), lambda: browser.touch("touchEnd")),
+        "finger that slides off": (lambda: browser.touch("touchStart", "run"), lambda: browser.touch("touchMove", "title")),
+        "space": (lambda: press_key("keyDown", " "), lambda: press_key("keyUp", " ")),
+        "enter": (lambda: press_key("keyDown", "Enter"), lambda: press_key("keyUp", "Enter")),
+        "focus": (lambda: press_key("keyDown", " "), lambda: browser.value("document.getElementById('run').blur()")),
+        "h": (lambda: press_key("keyDown", " "), lambda: browser.key("h")),
+        "a page that hangs": (lambda: press_key("keyDown", " "), lambda: browser.value("for (const end = Date.now() + 500; Date.now() < end;);")),
+        "a network that is gone": (lambda: press_key("keyDown", " "), lambda: browser.connect(False)),
+    }
+    try:
+        browser.complaints.clear()
+        browser.call("Page.navigate", url=url)
+        browser.resize(1280, 800)
+        state(browser, "hold: operator_absent")
+        assert browser.value("document.getElementById('start').hidden"), "there are two buttons that start"
+        for name, (press, let_go) in ways.items():
+            browser.value("document.getElementById('run').focus()")
+            press()
+            state(browser, "track")
+            time.sleep(0.5)
+            state(browser, "track")
+            let_go()
+            if name == "a network that is gone":
+                time.sleep(0.5)
+                browser.connect(True)
+                browser.complaints.clear()
+            # For good: what is still pressed does not start again.
+            state(browser, "hold: held" if name == "h" else "hold: operator_absent")
+            time.sleep(0.5)
+            assert "track" not in browser.value("document.getElementById('state').textContent"), name
+            assert not browser.complaints, (name, browser.complaints)
+            press_key("keyUp", " ")
+            browser.mouse("mouseReleased", "run")
+            if "slides" in name:
+                browser.touch("touchEnd")
+        browser.value("document.getElementById('stop').click()")
+        assert lapservo.wait(PATIENCE_S) in (0, 1)
+    finally:
+        lapservo.kill()
+        lapservo.wait()
+
+
 def see_the_end(browser):
     assert browser.value("document.getElementById('buttons').hidden"), "a button has nothing to act on"
     assert browser.value("document.getElementById('state').className") != "track", "what has ended looks alive"
@@ -258,6 +319,7 @@ def main():
         try:
             see_a_picture(browser, tool, picture_rig, picture, folder)
             see_the_loop(browser, tool, rig, folder)
+            see_the_run_button(browser, tool, rig)
         finally:
             browser.close()
     return 0

@@ -10,8 +10,8 @@ let number = 0, pictureCameMs = null, heardMs = null, last = null, failed = 0;
 const wait = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const text = (element, value) => { if (element.textContent !== value) element.textContent = value; };
 
-async function ask(path, options = {}) {
-  return fetch(path, { ...options, cache: "no-store", signal: AbortSignal.timeout(patienceMs) });
+async function ask(path, options = {}, ms = patienceMs) {
+  return fetch(path, { ...options, cache: "no-store", signal: AbortSignal.timeout(ms) });
 }
 
 // By the end of a number's name: its unit here, how many of them, and decimals. Angles are in rad as in files.
@@ -70,7 +70,9 @@ function showState(state) {
   text(at("title"), `lapservo ${state.title}`);
   at("start").disabled = !state.may_start;
   at("hold").disabled = !state.has_loop;
-  at("hold").hidden = at("start").hidden = !state.has_loop;
+  at("hold").hidden = !state.has_loop;
+  at("start").hidden = !state.has_loop || state.has_run_button;
+  at("run").hidden = !state.has_run_button;
   if (!at("note").dataset.said)
     text(at("note"), state.has_loop && !state.may_start ? "Start needs lapservo servo --enable-motion." : "");
   showLoop(state);
@@ -89,6 +91,7 @@ function showAges() {
   const silentS = heardMs === null ? null : (now - heardMs) / 1000;
   const lost = silentS === null || silentS > 2 || failed > 2;
   at("buttons").hidden = lost || last.ended;
+  if (at("buttons").hidden) release();
   at("alert").hidden = !lost || heardMs === null;
   if (!at("alert").hidden) text(at("alert"), `No answer for ${Math.round(silentS)} s: lapservo has ended, or the network is gone. What you see is old.`);
   const ageS = pictureCameMs === null ? null : (now - pictureCameMs) / 1000;
@@ -184,6 +187,62 @@ document.addEventListener("keydown", (event) => {
   if (!isH || event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
   if (!at("hold").disabled) command("hold");
 });
+
+// The run button: while it is pressed the page says so, again and again. After 0.2 s without a word lapservo takes it
+// for released. A press also starts, where this page may.
+const sayMs = 50, sayPatienceMs = 150;
+let pressed = false;
+
+async function sayPressed() {
+  try {
+    const answer = await ask(`press?at=${serverNowS()}`, { method: "POST" }, sayPatienceMs);
+    if (!answer.ok) text(at("note"), `run: ${(await answer.text()).trim()}`);
+    return answer.ok;
+  } catch {
+    return false;  // showAges() says it
+  }
+}
+
+async function press() {
+  if (pressed) return;
+  pressed = true;
+  at("run").setAttribute("aria-pressed", "true");
+  let started = !last.has_loop || !last.may_start;
+  while (pressed) {
+    const begin = performance.now();
+    const heard = await sayPressed();
+    if (heard && pressed && !started) {
+      started = true;
+      command("start");
+    }
+    await wait(Math.max(0, begin + sayMs - performance.now()));
+  }
+}
+
+function release() {
+  if (!pressed) return;
+  pressed = false;
+  at("run").setAttribute("aria-pressed", "false");
+  fetch("release", { method: "POST", keepalive: true }).catch(() => {});
+}
+
+const isPressKey = (event) => event.key === " " || event.key === "Enter";
+at("run").addEventListener("pointerdown", (event) => {
+  if (event.button !== 0) return;
+  if (event.target.hasPointerCapture(event.pointerId)) event.target.releasePointerCapture(event.pointerId);  // a finger that slides off lets go
+  press();
+});
+at("run").addEventListener("keydown", (event) => {
+  if (!isPressKey(event)) return;
+  event.preventDefault();
+  if (!event.repeat) press();
+});
+at("run").addEventListener("keyup", (event) => { if (isPressKey(event)) release(); });
+at("run").addEventListener("contextmenu", (event) => event.preventDefault());  // of a long press
+for (const name of ["pointerleave", "pointerup", "pointercancel", "blur"]) at("run").addEventListener(name, release);
+for (const name of ["pointerup", "blur", "pagehide"]) addEventListener(name, release);
+document.addEventListener("visibilitychange", release);
+
 setInterval(showAges, 100);
 pictures();
 states();

@@ -79,6 +79,10 @@ PageWishes WebView::wishes() {
   return page_->take_wishes();
 }
 
+bool WebView::operator_present() {
+  return page_->operator_present();
+}
+
 #else
 
 WebView::WebView(const WebOptions&, PageConfig) {
@@ -95,6 +99,9 @@ bool WebView::was_watched() const {
 }
 PageWishes WebView::wishes() {
   return {};
+}
+bool WebView::operator_present() {
+  return false;
 }
 
 #endif

@@ -35,6 +35,7 @@ class WebView {
   void end();
   bool was_watched() const;
   internal::PageWishes wishes();
+  bool operator_present();
 
  private:
   std::shared_ptr<internal::LivePage> page_;  // shared: a build without it has no destructor for it

@@ -119,8 +119,9 @@ int simulate(const ServoOptions& options) {
   Simulator simulator(true_rig, simulated, start);
   if (!options.hide.empty()) simulator.cover_marker({options.hide[0], options.hide[1]});
   std::optional<ServoPage> page;
-  if (options.web.port) page.emplace(options.web, config.rig, "servo, simulated", may_command(options, "page"), true);
+  if (options.web.port) page.emplace(options, config.rig, "servo, simulated", true);
   Supervisor arm(simulator, simulator);
+  if (options.page_says_operator_present()) arm.watch_operator([&] { return page->operator_present(); });
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
   watch_for_interrupts();
@@ -155,8 +156,19 @@ int replay_log(const ServoOptions& options) {
   return 1;
 }
 
+void check_operator_present(const ServoOptions& options) {
+  const std::string& source = options.operator_present;
+  if (source.empty()) return;
+  if (!options.replay.empty()) throw InputError("--operator-present", "is for runs, expected none with --replay");
+  if (options.page_says_operator_present() && !options.web.port)
+    throw InputError("--operator-present", "is page and there is no page, expected --web with it");
+  if (options.robot == "sim" && !options.page_says_operator_present())
+    throw InputError("--operator-present", "is " + source + ", which the simulator does not hear, expected page");
+}
+
 int run(const ServoOptions& options) {
   options.web.check();
+  check_operator_present(options);
   const bool recorded = !options.replay.empty() && is_bag(options.replay);
   if (!options.replay.empty() && options.web.port)
     throw InputError("--web", "is for runs, expected none with --replay");
@@ -188,8 +200,8 @@ void add_arm_options(CLI::App& command, ServoOptions& options) {
       ->capture_default_str()
       ->check(CLI::IsMember({"none", "page", "topics", "page,topics"}));
   command.add_option("--operator-present", options.operator_present,
-                     "Move the arm only while the button of this topic, a std_msgs/Bool or the first of a "
-                     "sensor_msgs/Joy, is pressed, and said to be every 0.2 s");
+                     "Move the arm only while a button is pressed, and said to be every 0.2 s: of this topic, a "
+                     "std_msgs/Bool or the first of a sensor_msgs/Joy; `page`: that of --web's page");
   command.add_flag("--enable-motion", options.enable_motion,
                    "Move a real arm; without it nothing is sent, and what would be is said");
   command.add_option(

@@ -239,8 +239,7 @@ int steer_arm(const ServoOptions& options) {
   const Trajectory trajectory = trajectory_of(options);
 
   std::optional<ServoPage> page;
-  if (options.web.port)
-    page.emplace(options.web, rig, "servo " + options.robot, may_command(options, "page"), options.enable_motion);
+  if (options.web.port) page.emplace(options, rig, "servo " + options.robot, options.enable_motion);
 
   Transports transports("lapservo");
   SteadyClock clock;
@@ -249,7 +248,9 @@ int steer_arm(const ServoOptions& options) {
   CrtkRobot robot(transport, address.name, interlock, clock);
   Supervisor arm(robot, clock);
   std::optional<OperatorPresence> operator_presence;
-  if (!options.operator_present.empty()) {
+  if (options.page_says_operator_present()) {
+    arm.watch_operator([&] { return page->operator_present(); });
+  } else if (!options.operator_present.empty()) {
     operator_presence.emplace(transport, options.operator_present, clock);
     arm.watch_operator([&] { return operator_presence->was_present(); });
   }

@@ -27,6 +27,9 @@ struct ServoOptions {
   std::uint64_t seed = 1;
   bool force = false, enable_motion = false, strict = false;
   WebOptions web;
+
+  /// Else a topic does, or nobody has to.
+  bool page_says_operator_present() const { return operator_present == "page"; }
 };
 
 Eigen::Vector4d four(const std::vector<double>& values);

@@ -6,11 +6,12 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-PageConfig config_of(const std::string& title, bool may_command, bool may_start) {
+PageConfig config_of(const ServoOptions& options, const std::string& title, bool may_start) {
   PageConfig config;
   config.title = title;
-  config.has_loop = may_command;
+  config.has_loop = may_command(options, "page");
   config.may_start = may_start;
+  config.has_run_button = options.page_says_operator_present();
   return config;
 }
 
@@ -30,9 +31,8 @@ PageLoop loop_of(const ControlTick& tick, double time_s) {
 
 }  // namespace
 
-ServoPage::ServoPage(const WebOptions& options, const Rig& rig, const std::string& title, bool may_command,
-                     bool may_start)
-    : web_(options, config_of(title, may_command, may_start)), rig_(std::make_shared<const Rig>(rig)) {}
+ServoPage::ServoPage(const ServoOptions& options, const Rig& rig, const std::string& title, bool may_start)
+    : web_(options.web, config_of(options, title, may_start)), rig_(std::make_shared<const Rig>(rig)) {}
 
 void ServoPage::tell(const ControlTick& tick, double time_s, const std::string& state) {
   if (tick.decision.registration != registration_) {

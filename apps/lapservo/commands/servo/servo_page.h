@@ -4,6 +4,7 @@
 #include <string>
 
 #include "apps/lapservo/cli/web_view.h"
+#include "apps/lapservo/commands/servo/servo_options.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/run.h"
@@ -13,13 +14,15 @@ namespace lapservo::app {
 /// The page of a loop.
 class ServoPage {
  public:
-  /// Whether whoever sees the page may hold and start the loop, and whether a start moves an arm.
-  ServoPage(const WebOptions& options, const Rig& rig, const std::string& title, bool may_command, bool may_start);
+  /// `may_start`: whether a start moves an arm.
+  ServoPage(const ServoOptions& options, const Rig& rig, const std::string& title, bool may_start);
 
   /// `state`: in words.
   void tell(const ControlTick& tick, double time_s, const std::string& state);
   /// Passes the page's commands on; true when one ends the run.
   bool command(Supervisor& arm, double now_s);
+  /// The page's run button.
+  bool operator_present() { return web_.operator_present(); }
 
  private:
   WebView web_;
