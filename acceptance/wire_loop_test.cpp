@@ -226,7 +226,9 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
                                        "30",
                                        "--duration",
                                        fmt::format("{}", duration_s)};
-    if (motion) arguments.insert(arguments.end(), {"--enable-motion", "--joint-limits", file("limits.yaml")});
+    if (motion)
+      arguments.insert(arguments.end(), {"--enable-motion", "--joint-limits", file("limits.yaml"), "--setpoint-readers",
+                                         std::to_string(setpoint_readers_)});
     arguments.insert(arguments.end(), more.begin(), more.end());
     return std::make_unique<Process>(arguments, file(output));
   }
@@ -260,6 +262,7 @@ class WireLoop : public ::testing::TestWithParam<std::string> {
 
   Rig rig_;
   testing::TemporaryFolder folder_;
+  int setpoint_readers_ = 2;  // the arm and this process's ears
 #ifdef LAPSERVO_ROS1
   std::unique_ptr<TestRosMaster> master_;
 #endif
@@ -472,7 +475,7 @@ TEST_P(FirstWireLoop, RecordsAnArmThatItMovesAndCalibratesFromIt) {
   Process unlimited(moving, file("unlimited.txt"));
   EXPECT_EQ(unlimited.wait(), 2);
   EXPECT_NE(said("unlimited.txt").find("--joint-limits"), std::string::npos) << said("unlimited.txt");
-  moving.insert(moving.end(), {"--joint-limits", file("limits.yaml")});
+  moving.insert(moving.end(), {"--joint-limits", file("limits.yaml"), "--setpoint-readers", "2"});
   const auto ears = named_transport(GetParam(), "ears");
   Spy spy(*ears);
   // Pitch stands near a limit, as the arm reads it: said before anything moves.
@@ -548,6 +551,40 @@ TEST_P(FirstWireLoop, IsHeldWhileASecondArmSaysThatItIsThisOne) {
   const std::size_t held = spy.count();
   sleep(0.5);
   EXPECT_EQ(spy.count(), held);
+}
+
+TEST_P(FirstWireLoop, IsHeldWhileANodeBesideTheArmReadsItsSetPoints) {
+  if (GetParam() == "ros1") GTEST_SKIP() << "this process is one node of ROS 1";
+  setpoint_readers_ = 1;
+  Arm room(GetParam(), rig_);
+  const auto ears = named_transport(GetParam(), "ears"), commander = named_transport(GetParam(), "commander");
+  const auto command = commander->string_publisher("/lapservo/PSM1/command");
+  const auto start = [&] { command({now_s(), "start"}); };
+  auto spy = std::make_unique<Spy>(*ears);  // as a recorder that was there first
+  const auto loop = servo(600);
+  expect_soon_said("hold: second_reader");
+  expect_soon_said("/PSM1/servo_jp is read by /arm, /ears, expected 1");
+  for (int i = 0; i < 100; ++i) start(), sleep(0.01);
+  EXPECT_EQ(spy->count(), 0u);
+  const auto moves = [&] {
+    const long before = room.robot().statistics().count;
+    return wait_for([&] { return start(), room.robot().statistics().count > before + 300; });
+  };
+  spy.reset();
+  ASSERT_TRUE(moves()) << said("servo.txt");
+  const std::size_t moved = said("servo.txt").size();
+  spy = std::make_unique<Spy>(*ears);
+  expect_soon_said("hold: second_reader", moved);
+  sleep(rest_s + allowed_s);
+  const long held = room.robot().statistics().count;
+  sleep(0.5);
+  EXPECT_EQ(room.robot().statistics().count, held);
+  spy.reset();
+  sleep(1);
+  EXPECT_EQ(room.robot().statistics().count, held) << "without a start";
+  ASSERT_TRUE(moves()) << said("servo.txt");
+  loop->signal(SIGINT);
+  loop->wait();
 }
 
 TEST_P(WireLoop, ASecondPublisherIsNoticedWithin100MillisecondsAndHoldsUntilAStart) {

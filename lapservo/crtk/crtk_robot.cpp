@@ -9,6 +9,8 @@
 #include <sys/resource.h>
 #include <utility>
 
+#include <fmt/format.h>
+
 namespace lapservo::internal {
 namespace {
 
@@ -33,7 +35,12 @@ std::string topic_of(const std::string& arm, const std::string& name) {
 }
 
 CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const InterlockConfig& config, const Clock& clock)
-    : clock_(clock), period_s_(config.period_s), arm_(arm), transport_(transport), interlock_(config) {
+    : clock_(clock),
+      period_s_(config.period_s),
+      arm_(arm),
+      max_readers_(config.max_readers),
+      transport_(transport),
+      interlock_(config) {
   // Who only observes is no publisher either: others may watch for those.
   if (config.motion_enabled) servo_jp_ = transport.set_point_publisher(topic_of(arm, "servo_jp"));
   const auto joints = [&](const char* topic, void (Interlock::*tell)(const JointMessage&, double)) {
@@ -69,7 +76,20 @@ CrtkRobot::~CrtkRobot() {
   subscriptions_.clear();
 }
 
+// An arm of the same name that publishes no states would follow, too.
+void CrtkRobot::look_at_readers() {
+  const std::string topic = topic_of(arm_, "servo_jp");
+  auto readers = transport_.readers(topic);
+  if (readers.size() > max_readers_ && readers != readers_)
+    std::fprintf(stderr, "lapservo: %s is read by %s, expected %zu\n", topic.c_str(),
+                 fmt::format("{}", fmt::join(readers, ", ")).c_str(), max_readers_);
+  readers_ = std::move(readers);
+  const std::lock_guard lock(mutex_);
+  interlock_.on_readers(readers_.size());
+}
+
 JointState CrtkRobot::state() {
+  if (servo_jp_) look_at_readers();
   const std::lock_guard lock(mutex_);
   return interlock_.state(clock_.now_s());
 }

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -16,7 +17,8 @@ namespace lapservo::internal {
 
 /// A CRTK arm behind a transport: measured_js, setpoint_js and operating_state come in, servo_jp goes out in a thread
 /// of its own, with real-time priority where the system grants it, as the interlock allows. Joints that are not the
-/// rig's are said on stderr. Destroyed, it sends nothing any more: the arm stays at its last setpoint.
+/// rig's, and who reads the setpoints where that are too many, are said on stderr. Destroyed, it sends nothing any
+/// more: the arm stays at its last setpoint.
 class CrtkRobot : public Robot {
  public:
   /// `arm`: the arm's namespace, for example PSM1 or /dvrk/PSM1. The transport and the clock must outlive it.
@@ -37,11 +39,14 @@ class CrtkRobot : public Robot {
 
  private:
   void command();
+  void look_at_readers();
   std::string new_complaint();  ///< empty unless it has changed
 
   const Clock& clock_;
   double period_s_;
   std::string arm_, said_;
+  std::size_t max_readers_;
+  std::set<std::string> readers_;  // the loop's thread's only
   Transport& transport_;
   mutable std::mutex mutex_;
   Interlock interlock_;

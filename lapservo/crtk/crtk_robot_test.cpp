@@ -66,6 +66,19 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
   EXPECT_EQ(robot.state().blocked, Blocked::old_joint_states);
 }
 
+TEST(CrtkRobot, SaysOnceWhoReadsBesideTheArm) {
+  ::testing::internal::CaptureStderr();
+  TestTransport transport;
+  StandingClock clock;
+  CrtkRobot robot(transport, "PSM1", config_of(true), clock);
+  send_a_path(transport, clock, robot);
+  transport.let_read({"/arm", "/recorder"});
+  for (int k = 0; k < 3; ++k) EXPECT_EQ(robot.state().blocked, Blocked::second_reader);
+  EXPECT_FALSE(robot.set_point());
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(),
+            "lapservo: /PSM1/servo_jp is read by /arm, /recorder, expected 1\n");
+}
+
 TEST(OperatorPresence, IsAButtonThatIsPressedThroughoutAndSaysSo) {
   TestTransport transport;
   StandingClock clock;

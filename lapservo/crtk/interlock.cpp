@@ -145,6 +145,7 @@ void Interlock::follow(const JointPath& path) {
 Blocked Interlock::blocked(double now_s) const {
   if (foreign_s_ && now_s - *foreign_s_ <= config_.max_age_s) return Blocked::foreign_command;
   if (second_s_ && now_s - *second_s_ <= silence_s) return Blocked::second_source;
+  if (config_.motion_enabled && readers_.value_or(1) > config_.max_readers) return Blocked::second_reader;
   if (!finite_) return Blocked::non_finite_joints;
   if (operating_state_) {
     if (operating_state_->state != to_string(OperatingState::enabled)) return Blocked::not_enabled;
@@ -155,6 +156,7 @@ Blocked Interlock::blocked(double now_s) const {
   if (now_s - measured_->time_s > config_.max_age_s) return Blocked::old_joint_states;
   if (!operating_state_) return Blocked::no_operating_state;
   if (!setpoint_ || now_s - setpoint_->time_s > config_.max_age_s) return Blocked::no_setpoint;
+  if (config_.motion_enabled && readers_ == 0u) return Blocked::no_reader;
   const Eigen::Array4d distance = (setpoint_->q - measured_->q).array().abs();
   return !moving_ && (distance > config_.max_distance.array()).any() ? Blocked::far_from_setpoint : Blocked::none;
 }

@@ -26,6 +26,7 @@ struct InterlockConfig {
   JointLimits limits;           ///< of q: positions and rates that no setpoint exceeds
   double period_s = 1.0 / 500;  ///< between setpoints
   double max_age_s = 0.07;      ///< of joint states and setpoints
+  std::size_t max_readers = 1;  ///< nodes that may read the setpoints: the arm's and, for example, a recorder's
   bool motion_enabled = false;  ///< else it observes only: no setpoint leaves
   /// Farther than this from its setpoint an arm is not started: theta, phi [rad], rho [m], psi [rad].
   Eigen::Vector4d max_distance{0.05, 0.05, 0.005, 0.2};
@@ -41,7 +42,8 @@ struct InterlockCounts {
 
 /// Turns a path into the setpoints of a CRTK arm, and reports when the arm is not ready for them. It uses only messages
 /// and times that it receives: no clock, no thread, no transport. An arm is ready while its joint states arrive, finite
-/// and freshly stamped, it is ENABLED, homed and not busy, and no other program commands it. Motion starts at the arm's
+/// and freshly stamped, it is ENABLED, homed and not busy, no other program commands it, and its setpoints have
+/// as many readers as are allowed. Motion starts at the arm's
 /// own setpoint, to which a path's start is moved; each setpoint differs from the previous one by a period's rate limit
 /// at most and lies within the limits (or nearer to them than before). Joints beyond the four stay at their setpoint of
 /// the start. A topic belongs to its first sender: messages of another one are not used before the arm has fallen
@@ -55,6 +57,8 @@ class Interlock {
   void on_measured(const JointMessage& message, double arrival_s);
   void on_setpoint(const JointMessage& message, double arrival_s);
   void on_operating_state(const OperatingStateMessage& message, double arrival_s);
+  /// So many nodes read the setpoints.
+  void on_readers(std::size_t count) { readers_ = count; }
   /// Another program sends setpoints to this arm.
   void on_foreign_command(double arrival_s);
 
@@ -115,8 +119,9 @@ class Interlock {
   ReadingBuffer readings_;
   bool finite_ = true;
   std::optional<OperatingStateMessage> operating_state_;
-  std::optional<double> foreign_s_;  // when somebody else commanded the arm last
-  Blocked untold_ = Blocked::none;   // what was amiss first since state(); other things count more than silence
+  std::optional<std::size_t> readers_;  // of the setpoints
+  std::optional<double> foreign_s_;     // when somebody else commanded the arm last
+  Blocked untold_ = Blocked::none;      // what was amiss first since state(); other things count more than silence
   std::vector<std::string> names_;
   Places places_{};
 

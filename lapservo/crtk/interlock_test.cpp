@@ -371,6 +371,31 @@ TEST(Interlock, OfTwoArmsOfANameNeitherIsMoved) {
 }
 
 // Whichever of its topics comes first.
+TEST(Interlock, MovesOnlyWhileAsManyNodesReadItsSetPointsAsMay) {
+  const std::vector<std::pair<std::size_t, Blocked>> wrong{{0, Blocked::no_reader}, {3, Blocked::second_reader}};
+  for (const auto& [readers, why] : wrong) {
+    auto config = config_of();
+    config.max_readers = 2;
+    Bench bench(config);
+    for (const std::size_t right : {1u, 2u}) {
+      bench.interlock.on_readers(right);
+      bench.control(0.5, slow);
+      EXPECT_EQ(bench.blocked, Blocked::none);
+      const int sent = bench.sent_count;
+      bench.control(0.1, slow);
+      EXPECT_GT(bench.sent_count, sent);
+      bench.interlock.on_readers(readers);
+      bench.control(0.1, slow);
+      EXPECT_EQ(bench.blocked, why);
+      EXPECT_LT(bench.last_sent_s, bench.now_s - 0.09);
+    }
+  }
+  Bench observing(config_of(false));
+  observing.interlock.on_readers(0);
+  observing.control(0.5, slow);
+  EXPECT_EQ(observing.blocked, Blocked::none);
+}
+
 TEST(Interlock, AnArmThatWasRestartedIsTheArm) {
   for (int first = 0; first < 3; ++first) {
     SCOPED_TRACE(first);

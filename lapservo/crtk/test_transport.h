@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,6 +61,7 @@ class TestTransport : public Transport {
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override {
     return add(compressed_handlers_[topic], std::move(handler));
   }
+  std::set<std::string> readers(const std::string&) const override { return readers_; }
   std::map<std::string, std::string> published() const override { return {}; }
   double stamp_now_s() const override { return stamp_s; }
 
@@ -84,6 +86,9 @@ class TestTransport : public Transport {
     for (auto& [topic, messages] : std::exchange(images_, {}))
       for (const auto& message : messages) tell(image_handlers_[topic], message);
   }
+
+  /// Who reads, from now on.
+  void let_read(std::set<std::string> readers) { readers_ = std::move(readers); }
 
   double stamp_s = 1000;
 
@@ -116,6 +121,7 @@ class TestTransport : public Transport {
   }
 
   std::mutex mutex_;
+  std::set<std::string> readers_{"/arm"};
   std::map<std::string, std::vector<JointMessage>> joints_;
   std::map<std::string, std::vector<OperatingStateMessage>> states_;
   std::map<std::string, std::vector<StringMessage>> strings_;

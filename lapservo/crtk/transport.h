@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "lapservo/crtk/messages.h"
@@ -49,6 +50,9 @@ class Transport {
   virtual Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) = 0;
   virtual Subscription subscribe_compressed_images(const std::string& topic,
                                                    Handler<CompressedImageMessage> handler) = 0;
+
+  /// The other nodes that read a topic of this transport's publishers, by their names, each once.
+  virtual std::set<std::string> readers(const std::string& topic) const = 0;
 
   /// Topics that others publish now, by their types: {"/endoscope/image_raw", "sensor_msgs/msg/Image"}, in ROS 1
   /// "sensor_msgs/Image". Empty where the middleware does not answer.

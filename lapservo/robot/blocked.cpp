@@ -6,7 +6,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<Blocked, 18> blocked_words{{{Blocked::none, "none"},
+constexpr Words<Blocked, 20> blocked_words{{{Blocked::none, "none"},
                                             {Blocked::no_joint_states, "no_joint_states"},
                                             {Blocked::old_joint_states, "old_joint_states"},
                                             {Blocked::non_finite_joints, "non_finite_joints"},
@@ -18,6 +18,8 @@ constexpr Words<Blocked, 18> blocked_words{{{Blocked::none, "none"},
                                             {Blocked::far_from_setpoint, "far_from_setpoint"},
                                             {Blocked::foreign_command, "foreign_command"},
                                             {Blocked::second_source, "second_source"},
+                                            {Blocked::second_reader, "second_reader"},
+                                            {Blocked::no_reader, "no_reader"},
                                             {Blocked::displaced, "displaced"},
                                             {Blocked::held, "held"},
                                             {Blocked::operator_absent, "operator_absent"},

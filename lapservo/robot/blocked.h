@@ -19,6 +19,8 @@ enum class Blocked {
   far_from_setpoint,  ///< the arm is not where its own setpoint is
   foreign_command,    ///< another program moves the arm
   second_source,      ///< two programs publish the states of this arm
+  second_reader,      ///< more programs than the arm's read its setpoints
+  no_reader,          ///< nobody reads its setpoints
   displaced,          ///< the arm is not where it was sent: something moved or blocked it
   held,               ///< a person said stop
   operator_absent,    ///< the operator does not press what has to be pressed

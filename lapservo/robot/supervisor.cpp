@@ -103,6 +103,10 @@ std::string Supervisor::remedy() const {
       return "another program commands the arm: end that";
     case Blocked::second_source:
       return "two programs publish the arm's states: end one of them";
+    case Blocked::second_reader:
+      return "other nodes than the arm's read servo_jp: end them, or allow their number";
+    case Blocked::no_reader:
+      return "nobody reads servo_jp: start the arm";
     case Blocked::operator_absent:
       return "press what says that the operator is present";
     default:

@@ -10,7 +10,7 @@ using Phase = SupervisorState::Phase;
 // Nothing that happened to the arm: it has not said it yet.
 bool may_come_yet(Blocked obstacle) {
   return is_silence(obstacle) || obstacle == Blocked::no_joint_states || obstacle == Blocked::no_operating_state ||
-         obstacle == Blocked::operator_absent;
+         obstacle == Blocked::no_reader || obstacle == Blocked::operator_absent;
 }
 
 // Whether a start was given in time and no stop; its commander then does not hold any more.

@@ -42,7 +42,7 @@ struct SupervisorInput {
 };
 
 /// Whether an arm may be moved. An arm is ready while it is ENABLED, homed, not busy, at its own setpoint, commanded by
-/// nobody else, and its joint states are finite and new.
+/// nobody else, alone in reading its setpoints, and its joint states are finite and new.
 ///
 /// | state      | event                                                                          | next state |
 /// | ---------- | ------------------------------------------------------------------------------ | ---------- |

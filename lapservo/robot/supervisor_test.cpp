@@ -87,7 +87,8 @@ TEST(Supervisor, NobodyHasToWaitForAnArmThatIsSimulated) {
 
 // An arm that has not spoken yet is waited for; one that says that it is not ready is not.
 TEST(Supervisor, TheFirstStartWaitsForTheArmsFirstWordsOnly) {
-  for (const Blocked blocked : {Blocked::no_joint_states, Blocked::no_operating_state, Blocked::no_setpoint}) {
+  for (const Blocked blocked :
+       {Blocked::no_joint_states, Blocked::no_operating_state, Blocked::no_setpoint, Blocked::no_reader}) {
     Bench bench;
     bench.blocked = blocked;
     bench.pass(14);
@@ -100,7 +101,7 @@ TEST(Supervisor, TheFirstStartWaitsForTheArmsFirstWordsOnly) {
     late.blocked = Blocked::none;
     EXPECT_FALSE(late.moves(2)) << to_string(blocked);
   }
-  for (const Blocked blocked : {Blocked::not_homed, Blocked::busy, Blocked::foreign_command}) {
+  for (const Blocked blocked : {Blocked::not_homed, Blocked::busy, Blocked::foreign_command, Blocked::second_reader}) {
     Bench bench;
     bench.blocked = blocked;
     bench.pass(0.1);
@@ -338,7 +339,7 @@ SupervisorInput any_input(internal::Random& random, const SupervisorInput& befor
   SupervisorInput input;
   input.time_s = before.time_s + (happens(0.002) ? -1 : 1) * random.uniform(0, happens(0.02) ? 1 : 0.1);
   const double wrong = before.arm == Blocked::none ? 0.02 : 0.6;
-  if (happens(wrong)) input.arm = static_cast<Blocked>(1 + static_cast<int>(random.uniform(0, 10)));
+  if (happens(wrong)) input.arm = static_cast<Blocked>(1 + static_cast<int>(random.uniform(0, 13)));
   input.at_rest = happens(0.7);
   input.operator_present = happens(before.operator_present ? 0.99 : 0.5);
   input.loop_holds = happens(before.loop_holds ? 0.97 : 0.03);

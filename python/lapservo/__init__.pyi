@@ -313,6 +313,7 @@ class Ros2Robot(Robot):
         clock: SteadyClock,
         *,
         enable_motion: bool = ...,
+        setpoint_readers: int = ...,
         wait_s: float = ...,
     ) -> None: ...
 

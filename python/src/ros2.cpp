@@ -1,4 +1,5 @@
 #include <chrono>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -63,11 +64,13 @@ void wait_for_joints(Ros2Robot& robot, const std::string& arm, double wait_s) {
 }
 
 std::unique_ptr<Ros2Robot> make_robot(const std::string& arm, const Rig& rig, const Controller& controller,
-                                      const SteadyClock& clock, bool enable_motion, double wait_s) {
+                                      const SteadyClock& clock, bool enable_motion, std::size_t setpoint_readers,
+                                      double wait_s) {
   const auto& joints = rig.instruments.front().joints;
   if (!joints) throw InputError("Ros2Robot", "rig", "without joints", "the arm's joints: names, sign, offset");
   InterlockConfig interlock{.joints = *joints, .limits = controller.limits};
   interlock.motion_enabled = enable_motion;
+  interlock.max_readers = setpoint_readers;
   auto robot = std::make_unique<Ros2Robot>(arm, interlock, clock);
   wait_for_joints(*robot, arm, wait_s);
   return robot;
@@ -81,9 +84,12 @@ void bind_ros2(py::module_& m) {
 ROS need not be installed. A thread of its own samples the last path 500 times a second; when anything is amiss nothing
 is sent.)")
       .def(py::init(&make_robot), py::arg("arm"), py::arg("rig"), py::arg("controller"), py::arg("clock"),
-           py::kw_only(), py::arg("enable_motion") = false, py::arg("wait_s") = 15.0, py::keep_alive<1, 5>(),
+           py::kw_only(), py::arg("enable_motion") = false, py::arg("setpoint_readers") = 1, py::arg("wait_s") = 15.0,
+           py::keep_alive<1, 5>(),
            "arm: its namespace, 'PSM1'; rig: with the arm's joints; controller: whose limits no setpoint exceeds, of "
-           "joint_limits; enable_motion: else nothing is sent; wait_s: for the arm's joints, without which InputError "
+           "joint_limits; enable_motion: else nothing is sent; setpoint_readers: nodes that may read servo_jp, the "
+           "arm's "
+           "and others; wait_s: for the arm's joints, without which InputError "
            "is raised.");
   py::class_<Ros2Camera, ImageStream>(m, "Ros2Camera", "The newest image of a topic of ROS 2.")
       .def(py::init([](const std::string& topic, const Rig& rig, const SteadyClock& clock) {

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <map>
+#include <mutex>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
 #include <stdexcept>
 #include <utility>
 
@@ -11,6 +15,33 @@
 #include "transports/ros1/ros1_subscription.h"
 
 namespace lapservo::internal {
+
+// Who reads what this transport publishes. roscpp reports it in a queue.
+class Ros1Readers {
+ public:
+  ros::CallbackQueue* queue() { return &queue_; }
+  // Called from the queue.
+  void add(const ros::SingleSubscriberPublisher& reader) {
+    if (reader.getSubscriberName() != ros::this_node::getName())
+      names_[reader.getTopic()].insert(reader.getSubscriberName());
+  }
+  void remove(const ros::SingleSubscriberPublisher& reader) {
+    auto& names = names_[reader.getTopic()];
+    if (const auto one = names.find(reader.getSubscriberName()); one != names.end()) names.erase(one);
+  }
+  std::set<std::string> of(const std::string& topic) {
+    const std::lock_guard lock(mutex_);
+    queue_.callAvailable();
+    const auto& names = names_[topic];
+    return {names.begin(), names.end()};
+  }
+
+ private:
+  std::mutex mutex_;
+  ros::CallbackQueue queue_;
+  std::map<std::string, std::multiset<std::string>> names_;  // by connections
+};
+
 namespace {
 
 constexpr std::uint32_t few = 10;    // as ROS 2 keeps by default
@@ -21,13 +52,22 @@ std::string full_name(const std::string& topic) {
 }
 
 template <typename Message>
-Transport::Publisher<Message> publisher(const std::shared_ptr<void>& node, const std::string& topic,
-                                        std::uint32_t queue_size, bool latched = false) {
-  const ros::Publisher to = ros::NodeHandle().advertise<Ros1Type<Message>>(full_name(topic), queue_size, latched);
+Transport::Publisher<Message> publisher(const std::shared_ptr<void>& node, const std::shared_ptr<Ros1Readers>& readers,
+                                        const std::string& topic, std::uint32_t queue_size, bool latched = false) {
+  ros::AdvertiseOptions options;
+  const auto peer = [](void (Ros1Readers::*tell)(const ros::SingleSubscriberPublisher&), Ros1Readers* to) {
+    return [tell, to](const ros::SingleSubscriberPublisher& reader) { (to->*tell)(reader); };
+  };
+  options.init<Ros1Type<Message>>(full_name(topic), queue_size, peer(&Ros1Readers::add, readers.get()),
+                                  peer(&Ros1Readers::remove, readers.get()));
+  options.latch = latched;
+  options.callback_queue = readers->queue();
+  const ros::Publisher to = ros::NodeHandle().advertise(options);
   if (!to) throw std::runtime_error("ROS: can't publish " + topic);
-  const auto end = [node = std::static_pointer_cast<Ros1Node>(node)](ros::Publisher* publisher) {
+  const auto end = [node = std::static_pointer_cast<Ros1Node>(node), readers](ros::Publisher* publisher) {
     const std::shared_ptr<ros::Publisher> kept(publisher);
-    node->end([&] { kept->shutdown(); }, kept);
+    using Both = std::pair<std::shared_ptr<ros::Publisher>, std::shared_ptr<Ros1Readers>>;
+    node->end([&] { kept->shutdown(); }, std::make_shared<Both>(kept, readers));
   };
   const std::shared_ptr<ros::Publisher> shared(new ros::Publisher(to), end);
   return [shared, latched](const Message& message) {
@@ -52,9 +92,14 @@ std::optional<std::string> other_type_on(const std::string& topic, const std::st
   return std::nullopt;
 }
 
-Ros1Transport::Ros1Transport(const std::string& node_name) : node_(Ros1Node::get(node_name)) {}
+Ros1Transport::Ros1Transport(const std::string& node_name)
+    : node_(Ros1Node::get(node_name)), readers_(std::make_shared<Ros1Readers>()) {}
 
 Ros1Transport::~Ros1Transport() = default;
+
+std::set<std::string> Ros1Transport::readers(const std::string& topic) const {
+  return readers_->of(full_name(topic));
+}
 
 std::map<std::string, std::string> Ros1Transport::published() const {
   ros::master::V_TopicInfo topics;
@@ -72,55 +117,55 @@ double Ros1Transport::stamp_now_s() const {
 }
 
 Transport::Publisher<JointMessage> Ros1Transport::joint_publisher(const std::string& topic) {
-  return publisher<JointMessage>(node_, topic, few);
+  return publisher<JointMessage>(node_, readers_, topic, few);
 }
 
 Transport::Publisher<JointMessage> Ros1Transport::set_point_publisher(const std::string& topic) {
-  return publisher<JointMessage>(node_, topic, 1);
+  return publisher<JointMessage>(node_, readers_, topic, 1);
 }
 
 Transport::Publisher<OperatingStateMessage> Ros1Transport::operating_state_publisher(const std::string& topic) {
-  return publisher<OperatingStateMessage>(node_, topic, few, true);
+  return publisher<OperatingStateMessage>(node_, readers_, topic, few, true);
 }
 
 Transport::Publisher<StringMessage> Ros1Transport::string_publisher(const std::string& topic) {
-  return publisher<StringMessage>(node_, topic, few);
+  return publisher<StringMessage>(node_, readers_, topic, few);
 }
 
 Transport::Publisher<JoyMessage> Ros1Transport::joy_publisher(const std::string& topic) {
-  return publisher<JoyMessage>(node_, topic, few);
+  return publisher<JoyMessage>(node_, readers_, topic, few);
 }
 
 Transport::Publisher<BoolMessage> Ros1Transport::bool_publisher(const std::string& topic) {
-  return publisher<BoolMessage>(node_, topic, few);
+  return publisher<BoolMessage>(node_, readers_, topic, few);
 }
 
 Transport::Publisher<TrajectoryMessage> Ros1Transport::trajectory_publisher(const std::string& topic) {
-  return publisher<TrajectoryMessage>(node_, topic, few);
+  return publisher<TrajectoryMessage>(node_, readers_, topic, few);
 }
 
 Transport::Publisher<ImageMessage> Ros1Transport::image_publisher(const std::string& topic) {
-  return publisher<ImageMessage>(node_, topic, newest);
+  return publisher<ImageMessage>(node_, readers_, topic, newest);
 }
 
 Transport::Publisher<CompressedImageMessage> Ros1Transport::compressed_image_publisher(const std::string& topic) {
-  return publisher<CompressedImageMessage>(node_, topic, newest);
+  return publisher<CompressedImageMessage>(node_, readers_, topic, newest);
 }
 
 Transport::Publisher<CameraInfoMessage> Ros1Transport::camera_info_publisher(const std::string& topic) {
-  return publisher<CameraInfoMessage>(node_, topic, few);
+  return publisher<CameraInfoMessage>(node_, readers_, topic, few);
 }
 
 Transport::Publisher<PoseMessage> Ros1Transport::pose_publisher(const std::string& topic) {
-  return publisher<PoseMessage>(node_, topic, few);
+  return publisher<PoseMessage>(node_, readers_, topic, few);
 }
 
 Transport::Publisher<DiagnosticMessage> Ros1Transport::diagnostic_publisher(const std::string& topic) {
-  return publisher<DiagnosticMessage>(node_, topic, few);
+  return publisher<DiagnosticMessage>(node_, readers_, topic, few);
 }
 
 Transport::Publisher<ObservationMessage> Ros1Transport::observation_publisher(const std::string& topic) {
-  return publisher<ObservationMessage>(node_, topic, few);
+  return publisher<ObservationMessage>(node_, readers_, topic, few);
 }
 
 Transport::Subscription Ros1Transport::subscribe_joints(const std::string& topic, Handler<JointMessage> handler) {

@@ -2,11 +2,14 @@
 
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "lapservo/crtk/transport.h"
 
 namespace lapservo::internal {
+
+class Ros1Readers;
 
 /// ROS 1 by roscpp: topics and types as ROS 1's nodes have them, at the master of ROS_MASTER_URI; ROS_NAMESPACE, ROS_IP
 /// and ROS_HOSTNAME as everywhere in ROS 1. All transports of a process are one node, of the first one's name, and none
@@ -40,11 +43,13 @@ class Ros1Transport : public Transport {
   Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) override;
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override;
 
+  std::set<std::string> readers(const std::string& topic) const override;
   std::map<std::string, std::string> published() const override;
   double stamp_now_s() const override;
 
  private:
-  std::shared_ptr<void> node_;  // publishers and subscriptions keep it
+  std::shared_ptr<void> node_;            // publishers and subscriptions keep it
+  std::shared_ptr<Ros1Readers> readers_;  // publishers keep it
 };
 
 }  // namespace lapservo::internal

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -64,6 +65,21 @@ TEST_F(Ros1Wire, ListsWhatOthersPublish) {
   wait_for([&] { return transport_->published().contains("/out/state"); });
   EXPECT_EQ(transport_->published().at("/out/state"), "crtk_msgs/OperatingState");
   EXPECT_FALSE(transport_->published().contains("/in/joints")) << "its own";
+}
+
+TEST_F(Ros1Wire, KnowsWhoReads) {
+  using Names = std::set<std::string>;
+  const auto say = transport_->set_point_publisher("/in/joints"), alone = transport_->joint_publisher("/nobody");
+  const auto own = transport_->subscribe_joints("/in/joints", [](JointMessage&&) {});
+  const auto become = [&](const Names& names) {
+    return wait_for([&] { return transport_->readers("in/joints") == names; });
+  };
+  EXPECT_TRUE(become({"/peer"}));
+  EXPECT_EQ(transport_->readers("/nobody"), Names());
+  peer_ = nullptr;
+  EXPECT_TRUE(become({}));
+  peer_ = peer();
+  EXPECT_TRUE(become({"/peer"}));
 }
 
 TEST_F(Ros1Wire, HearsOthersOnItsOwnTopicButNotItself) {

@@ -10,6 +10,8 @@
 #include <memory>
 #include <stdexcept>
 
+#include <fmt/format.h>
+
 #include "ros2_messages.h"
 #include "transports/ros2/discovery.h"
 #include "transports/ros2/ros2_names.h"
@@ -176,14 +178,77 @@ using WideAnnounced =
     Announcement<rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_,
                  rmw_dds_common_humble_msg_dds__NodeEntitiesInfo_, rmw_dds_common_humble_msg_dds__Gid_>;
 
+dds_topic_descriptor_t announcement_type(bool wide_gids) {
+  dds_topic_descriptor_t type = wide_gids ? rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc
+                                          : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
+  type.m_typename = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
+  return type;
+}
+
 }  // namespace
+
+// The nodes of readers, as participants announce them.
+class NodeNames {
+ public:
+  NodeNames(dds_entity_t participant, dds_entity_t topic, bool wide_gids) : wide_gids_(wide_gids) {
+    const Qos qos = qos_of(Delivery::latched);
+    dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, DDS_LENGTH_UNLIMITED);  // all participants write one instance
+    reader_ = checked(dds_create_reader(participant, topic, qos.get(), nullptr), "reader");
+  }
+  std::string of(const dds_builtintopic_endpoint_t& reader) {
+    wide_gids_ ? take<rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo_>()
+               : take<rmw_dds_common_msg_dds__ParticipantEntitiesInfo_>();
+    const Id id = id_of(reader.key.v);
+    const auto& names = names_[id_of(reader.participant_key.v)];
+    const auto name = names.find(id);
+    return name != names.end() ? name->second : program_of(id);
+  }
+
+ private:
+  using Id = std::array<std::uint8_t, sizeof(dds_guid_t)>;
+  static Id id_of(const std::uint8_t* bytes) {
+    Id id;
+    std::copy_n(bytes, id.size(), id.begin());
+    return id;
+  }
+  // By what begins the GUID: the participant, or, where Fast DDS has vendor, computer and then process, the computer.
+  static std::string program_of(const Id& guid) {
+    const bool is_fast_dds = guid[0] == 0x01 && guid[1] == 0x0f;
+    return fmt::format("{:02x}", fmt::join(guid.begin(), guid.begin() + (is_fast_dds ? 4 : 12), ""));
+  }
+  template <typename Info>
+  void take() {
+    constexpr int at_once = 16;
+    std::array<void*, at_once> samples{};
+    std::array<dds_sample_info_t, at_once> infos;
+    for (int count; (count = dds_take(reader_, samples.data(), infos.data(), at_once, at_once)) > 0;) {
+      for (int i = 0; i < count; ++i)
+        if (infos[i].valid_data) note(*static_cast<const Info*>(samples[i]));
+      dds_return_loan(reader_, samples.data(), count);
+    }
+  }
+  template <typename Info>
+  void note(const Info& info) {
+    auto& names = names_[id_of(info.gid_.data_)];
+    names.clear();
+    for (std::uint32_t i = 0; i < info.node_entities_info_seq_._length; ++i) {
+      const auto& node = info.node_entities_info_seq_._buffer[i];
+      std::string name = node.node_namespace_;
+      if (!name.ends_with('/')) name += '/';
+      name += node.node_name_;
+      for (std::uint32_t k = 0; k < node.reader_gid_seq_._length; ++k)
+        names[id_of(node.reader_gid_seq_._buffer[k].data_)] = name;
+    }
+  }
+
+  bool wide_gids_;
+  dds_entity_t reader_;
+  std::map<Id, std::map<Id, std::string>> names_;  // of readers, by their participant
+};
 
 DdsNode::DdsNode(const std::string& node_name, std::uint32_t domain)
     : name_(node_name), participant_(create_participant(domain)), wide_gids_(has_wide_gids()) {
-  dds_topic_descriptor_t type = wide_gids_ ? rmw_dds_common_humble_msg_dds__ParticipantEntitiesInfo__desc
-                                           : rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
-  type.m_typename = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
-  const dds_entity_t topic = create_topic("ros_discovery_info", type);
+  const dds_entity_t topic = create_topic("ros_discovery_info", announcement_type(wide_gids_));
   discovery_ = checked(dds_create_writer(participant_, topic, qos_of(Delivery::latched).get(), nullptr), "writer");
   announce();
 }
@@ -205,6 +270,7 @@ dds_entity_t DdsNode::create_writer(const std::string& topic, const dds_topic_de
       checked(dds_create_writer(participant_, on, qos_of(delivery).get(), listener.get()), "writer");
   dds_delete(on);  // the writer keeps it
   writers_.push_back(writer);
+  writers_of_.emplace(dds_topic_name(topic), writer);
   announce();
   return writer;
 }
@@ -227,8 +293,29 @@ dds_entity_t DdsNode::create_reader(const std::string& topic, const dds_topic_de
 void DdsNode::remove(dds_entity_t entity) {
   const std::lock_guard lock(mutex_);
   for (auto* list : {&readers_, &writers_}) list->erase(std::remove(list->begin(), list->end(), entity), list->end());
+  std::erase_if(writers_of_, [&](const auto& writer) { return writer.second == entity; });
   announce();
   dds_delete(entity);
+}
+
+std::set<std::string> DdsNode::readers(const std::string& topic) {
+  const std::lock_guard lock(mutex_);
+  if (!names_)
+    names_ = std::make_unique<NodeNames>(participant_,
+                                         create_topic("ros_discovery_info", announcement_type(wide_gids_)), wide_gids_);
+  std::set<std::string> readers;
+  const auto [begin, end] = writers_of_.equal_range(dds_topic_name(topic));
+  for (auto writer = begin; writer != end; ++writer) {
+    std::array<dds_instance_handle_t, 64> matched{};
+    const int count = dds_get_matched_subscriptions(writer->second, matched.data(), matched.size());
+    for (int i = 0; i < std::min<int>(count, matched.size()); ++i) {
+      dds_builtintopic_endpoint_t* const reader = dds_get_matched_subscription_data(writer->second, matched[i]);
+      if (!reader) continue;
+      readers.insert(names_->of(*reader));
+      dds_builtintopic_free_endpoint(reader);
+    }
+  }
+  return readers;
 }
 
 std::map<std::string, std::string> DdsNode::published() const {

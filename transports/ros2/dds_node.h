@@ -4,7 +4,9 @@
 #include <dds/dds.h>
 #include <deque>
 #include <map>
+#include <memory>
 #include <mutex>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -17,6 +19,8 @@ enum class Delivery {
   latched,      ///< reliable, transient local, the last 1
   set_point,    ///< reliable, volatile, the last 1, void after 50 ms
 };
+
+class NodeNames;
 
 /// A DDS participant that ROS 2's tools list as a node: each reader and writer is announced on ros_discovery_info.
 /// Errors of the middleware are std::runtime_error. Peers whose QoS or types don't fit are said on stderr, once a
@@ -35,6 +39,10 @@ class DdsNode {
   /// Statistics of a reader or writer.
   void remove(dds_entity_t entity);
 
+  /// Nodes of other participants that read what this one writes on a topic, each once, as in ROS; programs that are no
+  /// nodes by the beginning of their GUID. What was killed and started again counts once: it may be there for 20 s yet.
+  std::set<std::string> readers(const std::string& topic);
+
   /// Topics that other participants write, by their types; both as in ROS.
   std::map<std::string, std::string> published() const;
 
@@ -49,7 +57,9 @@ class DdsNode {
   bool wide_gids_ = false;
   std::mutex mutex_;
   std::vector<dds_entity_t> readers_, writers_;
-  std::deque<std::string> topics_;  // as their listeners name them
+  std::multimap<std::string, dds_entity_t> writers_of_;  // by topic, as in DDS
+  std::unique_ptr<NodeNames> names_;                     // once needed
+  std::deque<std::string> topics_;                       // as their listeners name them
 };
 
 }  // namespace lapservo::internal

@@ -82,6 +82,7 @@ TEST(FastDds, AnArmThatIsRestartedIsFoundWithinTwoSecondsAndGetsNoOldSetPoint) {
   ASSERT_TRUE(wait_for([&] { return say(3), !arm.heard().empty(); }));
   EXPECT_LT(Clock::now() - restarted, std::chrono::seconds(2));
   for (const double position : arm.heard()) EXPECT_EQ(position, 3);
+  EXPECT_EQ(loop.readers("/PSM1/servo_jp").size(), 1u) << "those that were killed are still there";
 }
 
 TEST(FastDds, ALoopThatEndsIsMissedAtOnce) {

@@ -7,6 +7,7 @@
 #include <deque>
 #include <functional>
 #include <map>
+#include <set>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -136,6 +137,8 @@ class Ros2Transport::Implementation {
 
   std::map<std::string, std::string> published() const { return node_->published(); }
 
+  std::set<std::string> readers(const std::string& topic) const { return node_->readers(topic); }
+
   template <typename Message>
   Publisher<Message> publisher(const std::string& topic, Delivery delivery) {
     const dds_entity_t writer = node_->create_writer(topic, Wire<Message>::descriptor(), delivery);
@@ -163,6 +166,10 @@ Ros2Transport::Ros2Transport(const std::string& node_name)
     : implementation_(std::make_shared<Implementation>(node_name)) {}
 
 Ros2Transport::~Ros2Transport() = default;
+
+std::set<std::string> Ros2Transport::readers(const std::string& topic) const {
+  return implementation_->readers(topic);
+}
 
 std::map<std::string, std::string> Ros2Transport::published() const {
   return implementation_->published();

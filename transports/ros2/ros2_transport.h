@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 
 #include "lapservo/crtk/transport.h"
@@ -38,6 +39,7 @@ class Ros2Transport : public Transport {
   Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) override;
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override;
 
+  std::set<std::string> readers(const std::string& topic) const override;
   std::map<std::string, std::string> published() const override;
   double stamp_now_s() const override;
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -25,6 +26,23 @@ namespace {
 constexpr std::chrono::seconds patience(60);
 
 constexpr double stamp_s = sample_stamp_s;
+
+std::uint32_t test_domain() {
+  const char* const domain = std::getenv("ROS_DOMAIN_ID");
+  return domain_id(domain ? domain : "");
+}
+
+// A node as in another process: what passes between it and this process's others goes through sockets.
+std::unique_ptr<DdsNode> node_elsewhere() {
+  constexpr std::uint32_t handle = 300;  // of Cyclone DDS, for a second domain of the same number
+  const std::string number = std::to_string(test_domain());
+  const std::string outside = "<CycloneDDS><Domain><Discovery><ExternalDomainId>" + number +
+                              "</ExternalDomainId></Discovery></Domain></CycloneDDS>";
+  ::setenv("CYCLONEDDS_URI", outside.c_str(), 1);
+  auto node = std::make_unique<DdsNode>("elsewhere", handle);
+  ::unsetenv("CYCLONEDDS_URI");
+  return node;
+}
 
 TEST(Ros2Transport, CarriesEveryKindOfMessage) {
   Ros2Transport from("from"), to("to");
@@ -46,6 +64,37 @@ TEST(Ros2Transport, ListsWhatOthersPublish) {
   EXPECT_FALSE(published.contains("/PSM1/measured_js")) << "its own";
 }
 
+// Each by its name, whatever it has of readers; a program that is no node by its participant's GUID.
+TEST(Ros2Transport, KnowsWhoReads) {
+  using Names = std::set<std::string>;
+  Ros2Transport own("own");
+  const auto says = own.set_point_publisher("/PSM1/servo_jp"), elsewhere = own.joint_publisher("/PSM2/servo_jp");
+  const auto subscription = own.subscribe_joints("/PSM1/servo_jp", [](JointMessage&&) {});
+  EXPECT_EQ(own.readers("/PSM1/servo_jp"), Names());
+  const auto become = [&](const Names& names) {
+    return testing::wait_for([&] { return own.readers("/PSM1/servo_jp") == names; });
+  };
+  auto arm = std::make_unique<Ros2Transport>("arm");
+  const auto subscribe = [](Ros2Transport& to) { return to.subscribe_joints("PSM1/servo_jp", [](JointMessage&&) {}); };
+  auto first = subscribe(*arm), second = subscribe(*arm);
+  EXPECT_TRUE(become({"/arm"}));
+  const auto restarted = std::make_unique<Ros2Transport>("arm");
+  const auto third = subscribe(*restarted);
+  const auto recorder = node_elsewhere();
+  const dds_entity_t reader =
+      recorder->create_reader("/PSM1/servo_jp", Wire<JointMessage>::descriptor(), Delivery::reliable);
+  EXPECT_TRUE(become({"/arm", "/elsewhere"}));
+  recorder->remove(reader);
+  EXPECT_TRUE(become({"/arm"}));
+  const dds_entity_t topic = dds_create_topic(recorder->participant(), &Wire<JointMessage>::descriptor(),
+                                              "rt/PSM1/servo_jp", nullptr, nullptr);
+  dds_create_reader(recorder->participant(), topic, nullptr, nullptr);
+  EXPECT_TRUE(testing::wait_for([&] { return own.readers("/PSM1/servo_jp").size() == 2; }));
+  EXPECT_EQ(own.readers("/PSM1/servo_jp").begin()->find_first_not_of("0123456789abcdef/"), std::string::npos);
+  EXPECT_EQ(own.readers("/PSM2/servo_jp"), Names());
+  first = second = nullptr;
+}
+
 TEST(Ros2Transport, DoesNotHearItself) {
   Ros2Transport one("one"), other("other");
   TestInbox<JointMessage> own, others;
@@ -54,23 +103,6 @@ TEST(Ros2Transport, DoesNotHearItself) {
   const auto say = one.joint_publisher("/PSM1/servo_jp");
   others.get([&] { say({stamp_s, {}, {1}}); });
   EXPECT_TRUE(own.empty());
-}
-
-std::uint32_t test_domain() {
-  const char* const domain = std::getenv("ROS_DOMAIN_ID");
-  return domain_id(domain ? domain : "");
-}
-
-// A node as in another process: what passes between it and this process's others goes through sockets.
-std::unique_ptr<DdsNode> node_elsewhere() {
-  constexpr std::uint32_t handle = 300;  // of Cyclone DDS, for a second domain of the same number
-  const std::string number = std::to_string(test_domain());
-  const std::string outside = "<CycloneDDS><Domain><Discovery><ExternalDomainId>" + number +
-                              "</ExternalDomainId></Discovery></Domain></CycloneDDS>";
-  ::setenv("CYCLONEDDS_URI", outside.c_str(), 1);
-  auto node = std::make_unique<DdsNode>("elsewhere", handle);
-  ::unsetenv("CYCLONEDDS_URI");
-  return node;
 }
 
 std::vector<double> take_positions(dds_entity_t reader) {

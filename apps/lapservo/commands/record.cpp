@@ -154,6 +154,7 @@ class MovingArm {
     InterlockConfig config;
     config.joints = *instrument.joints;
     config.motion_enabled = options.enable_motion;
+    config.max_readers = static_cast<std::size_t>(options.setpoint_readers);
     config.limits = limits_of_q(config.joints, load_arm_limits(options.joint_limits));
     // Refused now where there is no room for it, wherever the arm is.
     if (options.move == "turn") turn_motion(Eigen::Vector4d::Zero(), config.limits, options.joint_limits);
@@ -314,6 +315,13 @@ void add_record(CLI::App& app, Run& run_later) {
                   "Scale of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
       ->capture_default_str()
       ->check(number_between(0.05, 4));
+  command
+      .add_option(
+          "--setpoint-readers", options->setpoint_readers,
+          "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
+          "is not moved")
+      ->capture_default_str()
+      ->check(whole_number_between(1, 64));
   command.add_option("--joint-limits", options->joint_limits,
                      "For --move: YAML of the arm's joints, between which they stay, for example "
                      "configs/joint_limits/psm-classic.yaml");

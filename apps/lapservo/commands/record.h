@@ -8,6 +8,7 @@ namespace lapservo::app {
 struct RecordOptions {
   std::string camera, robot, rig, out, move, joint_limits, instrument;
   double duration_s = 20, scale = 1, fps = 30;
+  int setpoint_readers = 1;
   bool until_enter = false, enable_motion = false;
 };
 

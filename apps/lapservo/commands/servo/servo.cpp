@@ -208,6 +208,13 @@ void add_arm_options(CLI::App& command, ServoOptions& options) {
       "--joint-limits", options.joint_limits,
       "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml; with --enable-motion "
       "needed");
+  command
+      .add_option(
+          "--setpoint-readers", options.setpoint_readers,
+          "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
+          "is not moved")
+      ->capture_default_str()
+      ->check(whole_number_between(1, 64));
 }
 
 void add_trajectory_options(CLI::App& command, ServoOptions& options) {

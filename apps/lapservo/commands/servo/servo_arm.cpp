@@ -216,6 +216,7 @@ InterlockConfig interlock_of(const ServoOptions& options, const RunConfig& confi
   interlock.joints = joints_of(options, config.rig);
   interlock.limits = config.controller.limits;
   interlock.motion_enabled = options.enable_motion;
+  interlock.max_readers = static_cast<std::size_t>(options.setpoint_readers);
   return interlock;
 }
 

@@ -25,6 +25,7 @@ struct ServoOptions {
   std::optional<double> duration;  // s
   std::optional<double> fps;       // control periods a second, and frames of the simulation
   std::uint64_t seed = 1;
+  int setpoint_readers = 1;
   bool force = false, enable_motion = false, strict = false;
   WebOptions web;
 
