@@ -23,7 +23,6 @@
 #include "lapservo/core/random.h"
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/image_receiver.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
@@ -35,7 +34,6 @@ namespace lapservo::internal {
 namespace {
 
 const std::string raw_topic = "/endoscope/image_raw", compressed_topic = raw_topic + "/compressed";
-constexpr int jpeg_quality = 90;
 
 struct Options {
   std::string transport, images;
@@ -64,16 +62,6 @@ void be_the_arm(const Options& options, const Rig& rig, int to) {
   Simulator simulator(rig, simulated, start);
   const auto transport = named_transport(options.transport, "lapservo_bench_robot");
   SimRobotConfig config;
-  Transport::Publisher<CompressedImageMessage> say_compressed;
-  if (options.images == "compressed") {
-    say_compressed = transport->compressed_image_publisher(compressed_topic);
-    config.camera = "/nobody";  // whose raw images nobody requests
-    config.alter_image = [&](ImageMessage& image) {
-      const cv::Mat bgr(static_cast<int>(image.height), static_cast<int>(image.width), CV_8UC3, image.data.data(),
-                        image.step);
-      say_compressed({image.stamp_s, "bgr8; jpeg compressed bgr8", encode_jpeg(bgr, jpeg_quality)});
-    };
-  }
   SimRobot robot(*transport, rig, simulator, config);
   std::mutex mutex;
   std::vector<double> sent_s;

@@ -7,9 +7,12 @@
 
 #include "lapservo/crtk/crtk_robot.h"
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/io/pictures/jpeg_encoding.h"
 
 namespace lapservo::internal {
 namespace {
+
+constexpr const char* compressed_topic = "image_raw/compressed";
 
 ImageMessage image_of(const cv::Mat& bgr, double stamp_s) {
   ImageMessage message;
@@ -57,11 +60,19 @@ SimRobot::SimRobot(Transport& transport, const Rig& rig, Simulator& simulator, c
   setpoint_js_ = transport.joint_publisher(topic_of(config.arm, "setpoint_js"));
   operating_state_ = transport.operating_state_publisher(topic_of(config.arm, "operating_state"));
   image_ = transport.image_publisher(topic_of(config.camera, "image_raw"));
+  compressed_ = transport.compressed_image_publisher(topic_of(config.camera, compressed_topic));
   camera_info_ = transport.camera_info_publisher(topic_of(config.camera, "camera_info"));
   subscriptions_.push_back(
       transport.subscribe_joints(topic_of(config.arm, "servo_jp"), [this](JointMessage&& message) { obey(message); }));
   subscriptions_.push_back(transport.subscribe_strings(topic_of(config.arm, "state_command"),
                                                        [this](StringMessage&& message) { obey(message); }));
+  compressor_ = std::thread([this] { compress(); });
+}
+
+SimRobot::~SimRobot() {
+  subscriptions_.clear();
+  to_compress_.cancel();
+  compressor_.join();
 }
 
 void SimRobot::obey(const JointMessage& message) {
@@ -171,6 +182,18 @@ void SimRobot::say_images() {
     if (config_.alter_image) config_.alter_image(message);
     camera_info_(info_of(rig_.camera, message.stamp_s));
     image_(message);
+    if (!transport_.readers(topic_of(config_.camera, compressed_topic)).empty())
+      to_compress_.push_over_oldest(std::move(message));
+  }
+}
+
+// Beside the arm's joints, which would come late.
+void SimRobot::compress() {
+  constexpr int quality = 90;
+  while (auto image = to_compress_.pop()) {
+    const cv::Mat bgr(static_cast<int>(image->height), static_cast<int>(image->width), CV_8UC3, image->data.data(),
+                      image->step);
+    compressed_({image->stamp_s, "bgr8; jpeg compressed bgr8", encode_jpeg(bgr, quality)});
   }
 }
 

@@ -5,10 +5,12 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "lapservo/core/bounded_queue.h"
 #include "lapservo/crtk/transport.h"
 #include "lapservo/rig/rig.h"
 #include "lapservo/robot/operating_state.h"
@@ -38,12 +40,16 @@ struct ServoStatistics {
 };
 
 /// The simulator behind the topics of a CRTK PSM and its camera: measured_js, setpoint_js, operating_state out,
-/// servo_jp and state_command (enable, disable, pause, resume, home, unhome) in; image_raw, camera_info out. It has two
+/// servo_jp and state_command (enable, disable, pause, resume, home, unhome) in; image_raw, image_raw/compressed where
+/// somebody reads it, camera_info out. It has two
 /// wrist joints more than the rig names. Starts ENABLED and homed.
 class SimRobot {
  public:
   /// The rig's first instrument; its `joints`, or default_joints(). The arguments must outlive it.
   SimRobot(Transport& transport, const Rig& rig, Simulator& simulator, const SimRobotConfig& config);
+  ~SimRobot();
+  SimRobot(const SimRobot&) = delete;
+  SimRobot& operator=(const SimRobot&) = delete;
 
   /// Lets the simulator's time pass and says what is due.
   void advance(double time_s);
@@ -59,6 +65,7 @@ class SimRobot {
   void say_joints();
   void say_state();
   void say_images();
+  void compress();
   JointMessage message_of(const Eigen::Vector4d& q) const;
 
   Transport& transport_;
@@ -83,8 +90,11 @@ class SimRobot {
   Transport::Publisher<JointMessage> measured_js_, setpoint_js_;
   Transport::Publisher<OperatingStateMessage> operating_state_;
   Transport::Publisher<ImageMessage> image_;
+  Transport::Publisher<CompressedImageMessage> compressed_;
   Transport::Publisher<CameraInfoMessage> camera_info_;
-  std::vector<Transport::Subscription> subscriptions_;  // last: they use the others
+  std::vector<Transport::Subscription> subscriptions_;  // they use the others
+  BoundedQueue<ImageMessage> to_compress_{1};
+  std::thread compressor_;  // last: it uses the others
 };
 
 }  // namespace lapservo::internal

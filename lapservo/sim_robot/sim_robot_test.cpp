@@ -9,6 +9,7 @@
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/crtk/test_transport.h"
 #include "lapservo/testing/rigs.h"
+#include "lapservo/testing/wait_for.h"
 
 namespace lapservo::internal {
 namespace {
@@ -80,6 +81,24 @@ TEST(SimRobot, IsMovedThroughItsTopicsAndShowsItself) {
   EXPECT_EQ(statistics.wrist_moved, 0);
   EXPECT_EQ(statistics.malformed, 0);
   EXPECT_TRUE((statistics.max_step.array() <= JointLimits().rate.array() * 0.002 + 1e-9).all());
+}
+
+TEST(SimRobot, OffersItsImagesCompressedToThoseWhoReadThem) {
+  const std::string topic = "/endoscope/image_raw/compressed";
+  Room room;
+  room.transport.let_read({});
+  room.pass(0.3, Eigen::Vector4d::Zero());
+  EXPECT_TRUE(room.transport.compressed_images(topic).empty());
+  room.transport.let_read({"/viewer"});
+  ImageReceiver received(640, 360);
+  ASSERT_TRUE(testing::wait_for([&] {
+    room.pass(0.1, Eigen::Vector4d::Zero());
+    return !room.transport.compressed_images(topic).empty();
+  }));
+  received.receive(CompressedImageMessage(room.transport.compressed_images(topic).front()), room.now_s);
+  const auto image = received.newest();
+  ASSERT_TRUE(image) << received.complaint();
+  EXPECT_EQ(image->bgr.size(), cv::Size(640, 360));
 }
 
 TEST(SimRobot, ObeysStateCommandsAndNothingWhilePaused) {
