@@ -27,6 +27,8 @@ class BagMessages {
   virtual ~BagMessages() = default;
   /// nullopt at the end. Throws InputError where the bag is damaged.
   virtual std::optional<BagMessage> next() = 0;
+  /// When the latest was recorded, by the recorder's clock.
+  virtual double recorded_s() const = 0;
 };
 
 /// The port to a recording of ROS 1 or 2.

@@ -39,7 +39,31 @@ void check_clock(const JointRecording& recording, double begin_s, const std::str
                                joints_s, begin_s, images_by_start ? "images" : "joints"));
 }
 
+// The lead of a topic's stamps over the recorder's clock.
+double lead_s(const Bag& bag, const BagTopic& topic) {
+  constexpr int enough = 60;
+  const auto messages = bag.messages(topic);
+  std::optional<double> lead_s;
+  for (int i = 0; i < enough; ++i) {
+    const auto message = messages->next();
+    if (!message) break;
+    const double stamp_s = std::visit(
+        [](const auto& m) {
+          if constexpr (requires { m.stamp_s; }) return m.stamp_s;
+          return 0.0;
+        },
+        *message);
+    if (stamp_s > 0)
+      lead_s = std::max(lead_s.value_or(stamp_s - messages->recorded_s()), stamp_s - messages->recorded_s());
+  }
+  return lead_s.value_or(0);
+}
+
 }  // namespace
+
+double clock_lead_s(const Bag& bag, const BagTopic& joints, const BagTopic& images) {
+  return lead_s(bag, joints) - lead_s(bag, images);
+}
 
 std::vector<std::string> joint_names_in_bag(const Bag& bag, const BagTopic& topic) {
   const auto messages = bag.messages(topic);

@@ -156,10 +156,12 @@ class Ros1Messages : public BagMessages {
       if (!is(*fields, message_op) || !connection ||
           !std::binary_search(connections_.begin(), connections_.end(), *connection))
         continue;
+      recorded_s_ = time_in(*fields, "time").value_or(0);
       return decode_bag_message(
           type_, []<typename Message>(const ByteView& bytes) { return decode_ros1<Message>(bytes); }, *data);
     }
   }
+  double recorded_s() const override { return recorded_s_; }
 
  private:
   bool next_chunk() {
@@ -183,6 +185,7 @@ class Ros1Messages : public BagMessages {
   std::size_t next_ = 0;
   std::vector<std::uint8_t> content_;
   ByteView rest_;
+  double recorded_s_ = 0;
 };
 
 class Ros1Bag : public Bag {

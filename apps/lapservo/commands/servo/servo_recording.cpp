@@ -1,6 +1,7 @@
 #include "apps/lapservo/commands/servo/servo_recording.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdio>
 #include <memory>
@@ -126,7 +127,13 @@ JointRecording joints_of_bag(const Bag& bag, const ServoOptions& options, const 
   const BagTopic* topic = joint_topic_of(bag, options.joint_topic, rig.instruments.front().name);
   if (!topic)
     throw InputError(bag.path(), std::string("has no messages of ") + joint_type + ", expected the arm's joints");
-  return joints_in_bag(bag, *topic, joints_of(options, rig), begin_s);
+  JointRecording recording = joints_in_bag(bag, *topic, joints_of(options, rig), begin_s);
+  const double lead_s = clock_lead_s(bag, *topic, image_topic_of(bag, options.image_topic));
+  for (double& time_s : recording.time_s) time_s -= lead_s;
+  if (std::abs(lead_s) > 0.3)
+    std::printf("the arm's clock is %.2f s %s the camera's, by when both were recorded\n", std::abs(lead_s),
+                lead_s > 0 ? "ahead of" : "behind");
+  return recording;
 }
 
 }  // namespace
