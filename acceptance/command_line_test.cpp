@@ -67,13 +67,13 @@ class CommandLine : public acceptance::ToolTest {
   }
 
 #ifdef LAPSERVO_TEST_BAGS
-  // in/run.bag and in/run, a bag of ROS 2: a folder's images as PNG, and joints by the same clock.
-  void write_bags_of(const std::string& pictures, double fps, const CsvTable& joints) {
+  // in/run.bag and in/run, a bag of ROS 2: a folder's images as PNG, and joints, by a clock that is so far ahead.
+  void write_bags_of(const std::string& pictures, double fps, const CsvTable& joints, double arms_clock_s = 0) {
     constexpr double begin_s = 1700000000;
     std::vector<lapservo::testing::BagEntry> ros1, ros2;
-    const auto add = [&](const char* topic, const char* type, const auto& message) {
-      ros1.push_back({topic, type, message.stamp_s, lapservo::testing::ros1_bytes(message)});
-      ros2.push_back({topic, type, message.stamp_s, lapservo::testing::cdr_bytes(message)});
+    const auto add = [&](const char* topic, const char* type, const auto& message, double recorded_s) {
+      ros1.push_back({topic, type, recorded_s, lapservo::testing::ros1_bytes(message)});
+      ros2.push_back({topic, type, recorded_s, lapservo::testing::cdr_bytes(message)});
     };
     JointMessage reading{0, {"wrist"}, {0}};
     for (const std::string& name : joints.columns())
@@ -83,12 +83,14 @@ class CommandLine : public acceptance::ToolTest {
       reading.positions = {7};
       for (std::size_t i = 1; i < reading.names.size(); ++i)
         reading.positions.push_back(joints.number(row, reading.names[i]));
-      add("/PSM1/measured_js", "sensor_msgs/JointState", reading);
+      const double recorded_s = reading.stamp_s;
+      reading.stamp_s += arms_clock_s;
+      add("/PSM1/measured_js", "sensor_msgs/JointState", reading, recorded_s);
     }
     for (int i = 0; fs::exists(fmt::format("in/{}/{:04}.png", pictures, i)); ++i) {
       const std::string png = read_file(fmt::format("in/{}/{:04}.png", pictures, i));
       add("/endoscope/image_raw/compressed", "sensor_msgs/CompressedImage",
-          CompressedImageMessage{begin_s + i / fps, "png", {png.begin(), png.end()}});
+          CompressedImageMessage{begin_s + i / fps, "png", {png.begin(), png.end()}}, begin_s + i / fps);
     }
     lapservo::testing::write_ros1_bag("in/run.bag", ros1, "lz4");
     fs::create_directories("in/run");
@@ -348,6 +350,15 @@ TEST_F(CommandLine, ServoRunsAndReplays) {
       << controller.substr(0, controller.find("gains")) << controller.substr(controller.find("delay_s"));
   EXPECT_EQ(run("servo --replay out/run/log.csv"), 1);
   expect_in(errors(), "tick");
+  // Replay goes by the rig that the loop had, whatever was true and whatever the method used of it.
+  for (const std::string how : {"--registration-error 3,-2,1", "--method uncalibrated --rcm-px 200,150"}) {
+    const std::string folder = how.find("error") != std::string::npos ? "out/off" : "out/uncalibrated";
+    EXPECT_LT(run("servo --rig configs/paper.yaml --robot sim --duration 3 --seed 2 --out " + folder + " " + how), 2);
+    EXPECT_EQ(fs::exists(folder + "/true_rig.yaml"), folder == "out/off");
+    EXPECT_EQ(read_file(folder + "/rig.yaml"), read_file("out/run/rig.yaml"));
+    expect_done("servo --replay " + folder + "/log.csv");
+    expect_in(output(), "180 ticks reproduced bit for bit");
+  }
   // It has not converged after half a second.
   EXPECT_EQ(run("servo --rig configs/paper.yaml --robot sim --duration 0.5"), 1);
   // It converges, and then ends in a hold.
@@ -618,12 +629,25 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   expect_in(output(), "72 images and the joints; nothing was sent");
   EXPECT_EQ(output().find("not_following"), std::string::npos) << output();
   expect_done("servo --replay out/decided/log.csv");
+  const CsvTable decided = CsvTable::read("out/decided/log.csv");
   EXPECT_EQ(run(decide + "out/rig.yaml --out out/decided"), 2);
   EXPECT_EQ(run(decide + "out/rig.yaml --enable-motion"), 2);
   EXPECT_EQ(run(decide + "configs/example.yaml"), 2);
   expect_in(errors(), "joints is missing");
   EXPECT_EQ(run(decide + "out/rig.yaml --joint-topic /PSM2/measured_js"), 2);
   expect_in(errors(), "/PSM1/measured_js");
+  // An arm's clock that is wrong changes no decision.
+  for (const double off_s : {-7.5, 2.0}) {
+    write_bags_of("swing", fps, CsvTable::read("in/joints.csv"), off_s);
+    expect_done(decide + "out/rig.yaml --force --out out/decided");
+    expect_in(output(), off_s < 0 ? "the arm's clock is 7.50 s behind the camera's" : "2.00 s ahead of the camera's");
+    const CsvTable log = CsvTable::read("out/decided/log.csv");
+    ASSERT_EQ(log.rows(), decided.rows());
+    for (std::size_t row = 0; row < log.rows(); ++row)
+      EXPECT_EQ(log.text(row, "action") + log.text(row, "reason"),
+                decided.text(row, "action") + decided.text(row, "reason"))
+          << row;
+  }
 #endif
 }
 

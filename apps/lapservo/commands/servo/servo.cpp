@@ -107,7 +107,7 @@ class Watcher : public RunObserver {
 
 int simulate(const ServoOptions& options) {
   RunConfig config = run_config_of(options);
-  const Rig true_rig = true_rig_of(options, config.rig);
+  const Rig believed_rig = config.rig, true_rig = true_rig_of(options, believed_rig);
   const FeatureModel true_model = feature_model(true_rig);
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
@@ -123,7 +123,7 @@ int simulate(const ServoOptions& options) {
   Supervisor arm(simulator, simulator);
   if (options.page_says_operator_present()) arm.watch_operator([&] { return page->operator_present(); });
   std::optional<RunFolder> folder;
-  if (!options.out.empty()) folder.emplace(options, duration_s(options), true_rig, config.controller);
+  if (!options.out.empty()) folder.emplace(options, duration_s(options), believed_rig, config.controller, &true_rig);
   watch_for_interrupts();
 
   Watcher watcher(true_model, simulator, folder ? &*folder : nullptr,
@@ -143,8 +143,9 @@ int replay_log(const ServoOptions& options) {
   if (!options.rig.empty())
     throw InputError("--rig", "is " + options.rig + ", expected none: the rig beside the log counts");
   const fs::path log = options.replay, folder = log.parent_path();
-  const Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
+  Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
+  if (controller.mode == ControlMode::uncalibrated) rig.instruments.front().camera_from_rcm.reset();  // not used
   const auto ticks = read_servo_log(log);
   const auto difference = replay(ticks, rig, controller);
   if (!difference) {

@@ -10,6 +10,7 @@
 #include "lapservo/core/angles.h"
 #include "lapservo/core/atomic_file.h"
 #include "lapservo/core/error.h"
+#include "lapservo/rig/rig_writer.h"
 #include "lapservo/servo/controller_file.h"
 
 namespace lapservo::app {
@@ -65,10 +66,12 @@ std::string state_text(const ControlStep& control, const Supervisor& arm) {
   return arm.armed() || !operators_part(control.reason).empty() ? state_text(control) : arm.text();
 }
 
-RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller)
+RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller,
+                     const Rig* truth)
     : folder_(options.out, rig, inputs_of(options, rig), options.force, needed_bytes(duration_s, controller)),
       log_(folder_ / "log.csv") {
   write_file(folder_ / "controller.yaml", controller_yaml(controller));
+  if (truth && rig_yaml(*truth) != rig_yaml(rig)) write_file(folder_ / "true_rig.yaml", rig_yaml(*truth));
 }
 
 void RunFolder::add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth) {

@@ -29,8 +29,10 @@ std::string block_of(const Supervisor& arm);
 /// A run's log.csv, rig.yaml and controller.yaml.
 class RunFolder {
  public:
-  /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too.
-  RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller);
+  /// With the whole rig, whatever the method forgets of it: the frames can be tracked with it too. `truth`: the
+  /// simulation's rig, kept in true_rig.yaml where it is another one.
+  RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller,
+            const Rig* truth = nullptr);
   /// A failure to write is reported once, and never ends the run.
   void add(const ControlTick& tick, const std::optional<InstrumentTruth>& truth);
   /// False where something could not be written.
