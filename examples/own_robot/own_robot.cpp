@@ -1,8 +1,11 @@
-// own_robot RIG.yaml: ten seconds of the loop around an arm and a camera that lapservo knows nothing of.
+// own_robot RIG.yaml: ten seconds of the loop around an arm and a camera that lapservo knows nothing of. Somebody
+// presses the arm's emergency stop, enables it again, and starts.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <lapservo/lapservo.h>
+#include <string>
+#include <utility>
 
 #include "second_order_arm.h"
 
@@ -47,7 +50,7 @@ class ArmsClock : public Clock {
   double now_s() const override { return arm_.time_s(); }
   void sleep_until(double time_s) override {
     while (arm_.time_s() < time_s - 1e-9) {
-      arm_.advance(std::min(0.001, time_s - arm_.time_s()));
+      arm_.pass(std::min(0.001, time_s - arm_.time_s()));
       camera_.expose();
     }
   }
@@ -57,15 +60,34 @@ class ArmsClock : public Clock {
   Camera30& camera_;
 };
 
-// The result of the run: the error in its last second.
-class LastSecond : public RunObserver {
+// An operator stops and starts the arm, and sees the state of the loop and its error in the last second.
+class Operator : public RunObserver {
  public:
+  Operator(SecondOrderArm& arm, Supervisor& supervisor) : arm_(arm), supervisor_(supervisor) {}
+
   bool on_tick(const ControlTick& tick) override {
-    const Eigen::Vector4d error = tick.decision.control.error.cwiseAbs();
-    if (tick.input.time_s > 9) largest_ = largest_.cwiseMax(error);
+    const double time_s = tick.input.time_s, before_s = std::exchange(time_s_, time_s);
+    const auto is_now = [&](double then_s) { return before_s < then_s && then_s <= time_s; };
+    if (is_now(3)) arm_.press_emergency_stop();
+    if (is_now(3.5)) arm_.enable();  // nothing moves yet
+    if (is_now(4)) rested_ = tick.input.joints.q.vector();
+    if (is_now(5)) moved_while_held_ = tick.input.joints.q.vector() - rested_;
+    if (is_now(5)) supervisor_.start(Commander::program, time_s);
+    if (const std::string state = supervisor_.text(); state != state_) {
+      state_ = state;
+      std::printf("%.2f s  %s\n", time_s, state.empty() ? "armed" : state.c_str());
+    }
+    if (time_s > 9) largest_error_ = largest_error_.cwiseMax(tick.decision.control.error.cwiseAbs());
     return true;
   }
-  Eigen::Vector4d largest_ = Eigen::Vector4d::Zero();
+  Eigen::Vector4d largest_error_ = Eigen::Vector4d::Zero(), moved_while_held_ = Eigen::Vector4d::Constant(1);
+
+ private:
+  SecondOrderArm& arm_;
+  Supervisor& supervisor_;
+  double time_s_ = 0;
+  Eigen::Vector4d rested_ = Eigen::Vector4d::Zero();
+  std::string state_;
 };
 
 int main(int argc, char** argv) {
@@ -77,15 +99,18 @@ int main(int argc, char** argv) {
   RunConfig config;
   config.rig = rig;
   config.controller.window = image_window(rig.camera, 20);
-  config.arm_limits = JointLimits{.lower = {-1, 0.6, 0.03, -4},
-                                  .upper = {1, 2.5, 0.2, 4},
-                                  .rate = {0.4, 0.4, 0.04, 1.5},
-                                  .acceleration = {2, 2, 0.2, 7.5}};
-  LastSecond watch;
-  run(arm, camera, clock, config, sinusoids(paper_sinusoids()), 10, watch);
-  const Eigen::Vector4d& e = watch.largest_;
+  config.controller.limits = JointLimits{.lower = {-1, 0.6, 0.03, -4},
+                                         .upper = {1, 2.5, 0.2, 4},
+                                         .rate = {0.4, 0.4, 0.04, 1.5},
+                                         .acceleration = {2, 2, 0.2, 7.5}};
+  Supervisor supervisor(arm, clock);
+  Operator person(arm, supervisor);
+  run(supervisor, camera, clock, config, sinusoids(paper_sinusoids()), 10, person);
+  const Eigen::Vector4d &e = person.largest_error_, &moved = person.moved_while_held_;
+  const bool held = (moved.array().abs() < Eigen::Array4d(1e-4, 1e-4, 5e-5, 1e-4)).all();
   const bool converged = e[0] < 0.005 && e.tail<3>().maxCoeff() < 1;
-  std::printf("%s; largest errors in the last second: s %.2f mrad; r %.2f, l %.2f, d %.2f px\n",
-              converged ? "converged" : "did not converge", 1000 * e[0], e[1], e[2], e[3]);
-  return converged ? 0 : 1;
+  std::printf("%s; %s; largest errors in the last second: s %.2f mrad; r %.2f, l %.2f, d %.2f px\n",
+              held ? "held until the start" : "moved without a start", converged ? "converged" : "did not converge",
+              1000 * e[0], e[1], e[2], e[3]);
+  return held && converged ? 0 : 1;
 }
