@@ -488,6 +488,9 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
                  {"fast.csv", "limits.rate"});
   expect_refused(servo + " --robot sim --controller " + in("gains.yaml", "gains_per_s: [1, 2, 3, -4]\n"),
                  {"gains", "-4"});
+  expect_refused(servo + " --robot sim --operator-present page", {"--operator-present", "--web"});
+  expect_refused(servo + " --robot sim --operator-present /pedal", {"--operator-present", "/pedal", "page"});
+  expect_refused(servo + " --robot ros2:PSM1 --enable-motion", {"--enable-motion", "--joint-limits"});
   expect_refused("servo --replay in/log.csv", {"rig.yaml"});
   expect_refused("servo --rig configs/paper.yaml --robot sim --out /proc/nowhere", {"/proc/nowhere", "folder"});
 }

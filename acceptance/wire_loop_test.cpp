@@ -21,6 +21,7 @@
 #include <sys/wait.h>
 #include <thread>
 #include <unistd.h>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -28,6 +29,7 @@
 
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/crtk/joint_map.h"
+#include "lapservo/kinematics/centre_line.h"
 #include "lapservo/rig/rig_writer.h"
 #include "lapservo/robot/held_button.h"
 #include "lapservo/sim_robot/sim_robot.h"
@@ -805,14 +807,28 @@ TEST_P(WireLoop, SurvivesWhenEitherSideIsKilledOrStopped) {
 TEST_P(FirstWireLoop, InterruptedItBringsTheArmToRestAndSaysWhatItCameTo) {
   Arm room(GetParam(), rig_);
   const auto ears = named_transport(GetParam(), "ears");
-  Spy spy(*ears);
-  const auto loop = servo(600);
-  ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+  for (const int signal : {SIGINT, SIGTERM}) {
+    Spy spy(*ears);
+    const auto loop = servo(600);
+    ASSERT_TRUE(wait_for([&] { return spy.count() > 300; })) << said("servo.txt");
+    loop->signal(signal);
+    loop->wait();
+    spy.expect_braked();
+    spy.expect_no_jump();
+    EXPECT_NE(said("servo.txt").find("setpoints: "), std::string::npos);
+  }
+}
+
+TEST_P(FirstWireLoop, WithoutARegistrationItStartsFromTheRcmsImage) {
+  Arm room(GetParam(), rig_);
+  const Eigen::Vector2d rcm_px =
+      projected_rcm_px(rig_.camera, *std::exchange(rig_.instruments[0].camera_from_rcm, std::nullopt)).value();
+  testing::write_file(folder_ / "rig.yaml", rig_yaml(rig_));
+  const auto loop = servo(600, "servo.txt", true,
+                          {"--method", "uncalibrated", "--rcm-px", fmt::format("{},{}", rcm_px[0], rcm_px[1])});
+  expect_soon_said("  track");
   loop->signal(SIGINT);
   loop->wait();
-  spy.expect_braked();
-  spy.expect_no_jump();
-  EXPECT_NE(said("servo.txt").find("setpoints: "), std::string::npos);
 }
 
 }  // namespace

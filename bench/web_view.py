@@ -1,7 +1,7 @@
-"""The cost of the live page for the loop, and the age of its images: web_view.py LAPSERVO RIG [SECONDS].
+"""The cost of the live page and of a bag for the loop, and the age of the page's images: web_view.py LAPSERVO RIG [SECONDS].
 
 `lapservo sim-robot` and `lapservo servo` over ROS 2 on this computer, at the rig's size and 30 frames/s: without the page, with
-one viewer, and with a crowd of a thousand connections as well. Printed: how late the loop's ticks begin (of log.csv), and the
+one viewer, with a crowd of a thousand connections as well, and with `lapservo record` in its place. Printed: how late the loop's ticks begin (of log.csv), and the
 age of each image, from when the image came to the loop to when a viewer on this computer has it whole.
 """
 
@@ -9,6 +9,7 @@ import csv
 import http.client
 import os
 import re
+import signal
 import socket
 import subprocess
 import sys
@@ -76,7 +77,7 @@ class Crowd(threading.Thread):
                 one.close()
 
 
-def run(tool, rig, duration_s, web, crowded):
+def run(tool, rig, duration_s, web, crowded, recorded):
     environment = dict(os.environ, ROS_LOCALHOST_ONLY="1", ROS_DOMAIN_ID=os.environ.get("ROS_DOMAIN_ID", "87"))
     with tempfile.TemporaryDirectory() as folder:
         arm = subprocess.Popen([tool, "sim-robot", "--rig", rig, "--fps", "30"], env=environment, stdout=subprocess.DEVNULL)
@@ -86,7 +87,11 @@ def run(tool, rig, duration_s, web, crowded):
                  "--joint-limits", "configs/joint_limits/psm-classic.yaml", "--duration",
                  str(duration_s), "--fps", str(PERIODS_PER_S), "--out", folder + "/run", *(["--web", "0"] if web else [])],
                 env=environment, stdout=subprocess.PIPE, text=True)
-            viewer = crowd = None
+            viewer = crowd = bag = None
+            if recorded:
+                bag = subprocess.Popen([tool, "record", "--camera", "ros2:/endoscope/image_raw", "--robot", "ros2:SIM_PSM1", "--out",
+                                        folder + "/bag", "--duration", str(duration_s + 60)], env=environment,
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             for line in loop.stdout:
                 if found := re.match(r"page: http://127.0.0.1:(\d+)/", line):
                     viewer = Viewer(int(found[1]))
@@ -96,6 +101,9 @@ def run(tool, rig, duration_s, web, crowded):
                         time.sleep(0.5)
                         crowd.start()
             loop.wait()
+            if bag:
+                bag.send_signal(signal.SIGINT)
+                bag.wait()
             if crowd:
                 crowd.ended = True
             return lateness_ms(folder + "/run/log.csv"), viewer.ages_ms if viewer else []
@@ -107,9 +115,11 @@ def run(tool, rig, duration_s, web, crowded):
 def main():
     tool, rig = sys.argv[1:3]
     duration_s = float(sys.argv[3]) if len(sys.argv) > 3 else 12
-    for name, web, crowded in (("without the page", False, False), ("one viewer", True, False), ("and a thousand connections", True, True)):
-        late_ms, ages_ms = run(tool, rig, duration_s, web, crowded)
-        print(f"{name:28} tick late p50 {quantile(late_ms, 0.5):.2f}, p99 {quantile(late_ms, 0.99):.2f} ms", end="")
+    for name, web, crowded, recorded in (("without the page", False, False, False), ("one viewer", True, False, False),
+                                         ("and a thousand connections", True, True, False), ("one viewer and a bag", True, False, True)):
+        late_ms, ages_ms = run(tool, rig, duration_s, web, crowded, recorded)
+        late = ", ".join(f"p{100 * q:g} {quantile(late_ms, q):.2f}" for q in (0.5, 0.99, 0.999))
+        print(f"{name:28} tick late {late} ms", end="")
         if ages_ms:
             seen_s = duration_s - SETTLING_S
             print(f"; image age p50 {quantile(ages_ms, 0.5):.0f}, p95 {quantile(ages_ms, 0.95):.0f} ms, {len(ages_ms) / seen_s:.1f} images/s", end="")

@@ -657,7 +657,13 @@ class WrongThirdImage : public ImageStream {
   int images_ = 0;
 };
 
-TEST(Run, WhatVisionThrowsInItsOwnThreadEndsTheRun) {
+TEST(Run, WhatVisionThrowsInItsOwnThreadEndsTheRunAndReleasesTheArm) {
+  class Driven : public OperatedArm {
+   public:
+    using OperatedArm::OperatedArm;
+    void release() override { released = true; }
+    bool released = false;
+  };
   class Whoever : public RunObserver {
     bool on_tick(const ControlTick&) override { return true; }
   } nobody;
@@ -665,13 +671,15 @@ TEST(Run, WhatVisionThrowsInItsOwnThreadEndsTheRun) {
   SimulatorConfig simulated;
   simulated.endoscope.pictures = false;
   Simulator simulator(rig, simulated, {0.05, 1.57, 0.064, 1.2});
+  Driven arm(simulator);
   SteadyClock clock;
   Case c;
   c.thread = TrackingThread::own;
   WrongThirdImage camera(rig);
   const std::string said = testing::input_error(
-      [&] { run(simulator, camera, clock, config_of(rig, c), small_trajectory(), hangs.count(), nobody); });
+      [&] { run(arm, camera, clock, config_of(rig, c), small_trajectory(), hangs.count(), nobody); });
   EXPECT_EQ(said, "image: size: is 20x10, expected 640x360 as in the rig");
+  EXPECT_TRUE(arm.released);
 }
 
 TEST(Run, NeedsTheLimitsOfAnArmThatIsNotSimulated) {
