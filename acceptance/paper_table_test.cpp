@@ -1,9 +1,10 @@
-// docs/paper.md names files, functions and tests: all of them exist.
+// docs/paper.md names files, functions and tests, docs/notes/arm.md tests: all of them exist.
 
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -32,7 +33,7 @@ std::vector<std::string> cells(const std::string& line) {
 
 std::string all_tests(const fs::path& root) {
   std::string text;
-  for (const char* folder : {"lapservo", "acceptance"})
+  for (const char* folder : {"lapservo", "acceptance", "transports", "web"})
     for (const auto& entry : fs::recursive_directory_iterator(root / folder))
       if (entry.path().string().ends_with("_test.cpp")) text += testing::read_file(entry.path());
   return text;
@@ -55,6 +56,18 @@ TEST(PaperTable, NamesOnlyWhatThereIs) {
     ++rows;
   }
   EXPECT_GT(rows, 25);
+}
+
+TEST(ArmTable, NamesOnlyWhatThereIs) {
+  const fs::path root = testing::source_folder();
+  const std::string tests = all_tests(root), table = testing::read_file(root / "docs/notes/arm.md");
+  const std::regex name("`([A-Z]\\w+)\\.([A-Z]\\w+|\\*)`");
+  int names = 0;
+  for (auto at = std::sregex_iterator(table.begin(), table.end(), name); at != std::sregex_iterator(); ++at, ++names) {
+    const std::string test = (*at)[2] == "*" ? "" : (*at)[2].str() + ")";
+    EXPECT_NE(tests.find("(" + (*at)[1].str() + ", " + test), std::string::npos) << "no test " << at->str();
+  }
+  EXPECT_GT(names, 60);
 }
 
 }  // namespace
