@@ -475,7 +475,11 @@ TEST_F(CommandLine, ServoRefusesWhatCanNotBe) {
   const std::string servo = "servo --rig configs/paper.yaml --out out/run";
   expect_refused(servo, {"--robot", "sim"});
   expect_refused(servo + " --robot psm9", {"--robot", "psm9", "sim"});
-  expect_refused(servo + " --robot sim --set-point 0.9,795,365,900", {"--set-point", "can't be followed at 0.00 s"});
+  for (const std::string start : {"", " --start 0.05,1.57,0.064,1.2"}) {
+    const std::string unseen = servo + start + " --robot sim --set-point ";
+    expect_refused(unseen + "0.9,795,365,900", {"--set-point", "can't be followed at 0.00 s"});
+    expect_refused(unseen + "0,0,0,0 --method uncalibrated", {"--set-point", "can't be followed at 0.00 s"});
+  }
   expect_refused(servo + " --robot sim --set-point 0.9,795", {"--set-point"});
   expect_refused(servo + " --robot sim --via 1,2,3", {"--via", "four"});
   expect_refused(servo + " --robot sim --method fast", {"--method", "fast", "uncalibrated"});

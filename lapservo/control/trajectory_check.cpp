@@ -51,6 +51,12 @@ std::optional<std::string> broken_limit(const ControllerConfig& config, const Fe
   return std::nullopt;
 }
 
+// By any marker's image, whatever the camera: the third boundary lies between the two ends.
+bool can_be_shown(const Eigen::Vector4d& features) {
+  const double r_px = features[1], l_px = features[2], d_px = features[3];
+  return features.allFinite() && r_px >= 0 && d_px > 0 && d_px < l_px;
+}
+
 }  // namespace
 
 std::string Infeasible::text() const {
@@ -67,6 +73,8 @@ std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double d
   for (long i = 0; i <= steps; ++i) {
     const double time_s = step_s * static_cast<double>(i);
     const DesiredFeatures desired = trajectory.at(time_s);
+    if (!can_be_shown(desired.features)) return Infeasible{time_s, "no image shows these features"};
+    if (!model) continue;
     const auto found = newton_inverse(model, desired.features, q, config.scales);
     if (!found || !found->converged) return Infeasible{time_s, "no configuration shows these features"};
     q = found->q;
@@ -77,7 +85,6 @@ std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double d
 
 void refuse_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
                        const ControllerConfig& config, const JointVector& q_start, const std::string& source) {
-  if (!model) return;
   if (const auto problem = find_infeasible(trajectory, duration_s, model, config, q_start.vector()))
     throw InputError(source, problem->text());
 }

@@ -22,13 +22,14 @@ struct Infeasible {
 /// Walks along the trajectory from 0 to `duration_s` in steps of `step_s`, finds the configuration at each step by the
 /// inverse of the model from the previous one, starting near `q_start`, and checks: the features are reachable, the
 /// Jacobian is regular, joints and their rates are within limits, the marker's ends are within the window. nullopt when
-/// all hold. The model is the rig's: offsets between measured joints and truth are unknown beforehand.
+/// all hold. The model is the rig's: offsets between measured joints and truth are unknown beforehand. By an empty
+/// model only features that no marker shows are found: numbers that are not finite, r < 0, d outside (0, l).
 std::optional<Infeasible> find_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
                                           const ControllerConfig& config, const Eigen::Vector4d& q_start,
                                           double step_s = 0.02);
 
 /// Throws InputError, naming `source`, the time and the limit, when the trajectory can't be followed from these joints
-/// as far as the model knows. An empty model knows nothing: then nothing is checked.
+/// as far as the model knows: see find_infeasible().
 void refuse_infeasible(const Trajectory& trajectory, double duration_s, const FeatureModel& model,
                        const ControllerConfig& config, const JointVector& q_start, const std::string& source);
 

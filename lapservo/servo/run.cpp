@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
 
 #include "lapservo/control/motion_limits.h"
+#include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 #include "lapservo/servo/image_features.h"
 #include "lapservo/servo/servo.h"
@@ -49,25 +53,68 @@ class BrakesAtTheEnd {
   double lasts_s_;
 };
 
+// Those of another clock would be compared with the wrong moments.
+void refuse_other_clock(const char* source, double stamp_s, double now_s) {
+  constexpr double max_ahead_s = 1;
+  if (stamp_s - now_s > max_ahead_s)
+    throw InputError(source, "time_s", fmt::format("{:.3f}", stamp_s),
+                     fmt::format("a time of the loop's clock, which is at {:.3f}", now_s));
+}
+
+void refuse_at_once(const Supervisor& arm, const Clock& clock, const RunConfig& config, double duration_s) {
+  if (!config.arm_limits && !arm.is_simulated())
+    throw InputError("RunConfig", "arm_limits", "missing", "the limits of the arm's joints");
+  if (!std::isfinite(duration_s) || duration_s < 0)
+    throw InputError("run", "duration_s", fmt::format("{}", duration_s), "0 or more");
+  if (const double now_s = clock.now_s(); !std::isfinite(now_s))
+    throw InputError("Clock", "now_s", fmt::format("{}", now_s), "a finite time");
+}
+
+// Refuses what only the first joints and the first image show, before they move anything.
+class FirstSight {
+ public:
+  FirstSight(const RunConfig& config, const ControllerConfig& controller, const Trajectory& trajectory,
+             double duration_s)
+      : config_(config), controller_(controller), trajectory_(trajectory), duration_s_(duration_s) {}
+
+  void check(const ControlTick& tick, const Supervisor& arm) {
+    if (tick.seen && !std::exchange(saw_image_, true))
+      refuse_other_clock("ImageStream", tick.seen->image.time_s, tick.input.time_s);
+    const JointState& joints = tick.input.joints;
+    if (!joints.q.vector().allFinite() || std::exchange(saw_joints_, true)) return;
+    refuse_other_clock("JointState", joints.time_s, tick.input.time_s);
+    if (arm.is_simulated() && !joints.follows) return;
+    refuse_infeasible(trajectory_, duration_s_, feature_model(config_.rig), controller_, joints.q,
+                      config_.trajectory_name);
+  }
+
+ private:
+  const RunConfig& config_;
+  const ControllerConfig& controller_;
+  const Trajectory& trajectory_;
+  double duration_s_;
+  bool saw_joints_ = false, saw_image_ = false;
+};
+
 }  // namespace
 
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer) {
-  if (!config.arm_limits && !robot.is_simulated())
-    throw InputError("RunConfig", "arm_limits", "missing", "the limits of the arm's joints");
-  RunConfig limited = config;
-  if (config.arm_limits) limited.controller.limits = *config.arm_limits;
   Supervisor arm(robot, clock);
-  run(arm, images, clock, limited, trajectory, duration_s, observer);
+  run(arm, images, clock, config, trajectory, duration_s, observer);
 }
 
 void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer) {
-  Servo servo(config.controller, config.rig);
+  refuse_at_once(arm, clock, config, duration_s);
+  ControllerConfig controller = config.controller;
+  if (config.arm_limits) controller.limits = *config.arm_limits;
+  FirstSight first_sight(config, controller, trajectory, duration_s);
+  Servo servo(controller, config.rig);
   const auto vision = track_images(images, config.rig, config.tracker, config.rcm_px, config.tracking_thread);
-  const double period_s = config.controller.period_s, start_s = clock.now_s();
+  const double period_s = controller.period_s, start_s = clock.now_s();
   const auto ticks = std::lround(duration_s / period_s);
-  const BrakesAtTheEnd brakes(arm, clock, config.controller);
+  const BrakesAtTheEnd brakes(arm, clock, controller);
   bool go_on = true;
   int registration = 0;
   for (long k = 0; k < ticks && go_on;) {
@@ -77,6 +124,7 @@ void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& co
     tick.input.readings = arm.readings();
     tick.input.joints = arm.state();
     tick.input.desired = trajectory.at(tick.input.time_s - start_s);
+    first_sight.check(tick, arm);
     if (tick.seen) tick.input.image = tick.seen->measurement;
     tick.decision = servo.step(tick.input);
     if (tick.decision.send) arm.send(servo.path());

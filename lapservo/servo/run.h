@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include <Eigen/Core>
 
@@ -25,6 +26,7 @@ struct RunConfig {
   TrackingThread tracking_thread = TrackingThread::callers;
   /// Limits of the arm's q, in the place of controller.limits: run() needs them with an arm that is not simulated.
   std::optional<JointLimits> arm_limits{};
+  std::string trajectory_name = "trajectory";  ///< in complaints
 };
 
 /// One control tick: what the loop went by, what it decided, and the image that came, if one did.
@@ -50,11 +52,15 @@ class RunObserver {
 /// a start (see SupervisorState), and then until an image shows the instrument. A late tick shifts none of those after
 /// it. Where the endoscope moves it releases the arm, measures camera_from_rcm anew from motion that the operator
 /// makes, and continues after a start.
+///
+/// Throws InputError before anything moves: without RunConfig::arm_limits where the arm is not simulated; for a
+/// duration or a clock's time that is not finite; for joints or a first image stamped more than a second ahead of the
+/// clock; and, as soon as the joints are known, for a trajectory that can't be followed from there
+/// (refuse_infeasible()), unless nothing is moved: the arm is simulated and does not follow.
 void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 
-/// With a Supervisor of its own: this call is the first start, JointState::started every other. Throws InputError
-/// without RunConfig::arm_limits where the arm is not simulated.
+/// With a Supervisor of its own: this call is the first start, JointState::started every other.
 void run(Robot& robot, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 

@@ -701,5 +701,98 @@ TEST(Run, NeedsTheLimitsOfAnArmThatIsNotSimulated) {
   EXPECT_EQ(complaint(), "");
 }
 
+// Its joints carry the times of another clock.
+class AheadArm : public OperatedArm {
+ public:
+  AheadArm(Simulator& simulator, double ahead_s) : OperatedArm(simulator), ahead_s_(ahead_s) {}
+  JointState state() override {
+    JointState state = OperatedArm::state();
+    state.time_s += ahead_s_;
+    return state;
+  }
+
+ private:
+  double ahead_s_;
+};
+
+// The room with another clock for images, or a loop's clock that is out of order.
+class OtherClock : public ImageStream, public Clock {
+ public:
+  OtherClock(Simulator& simulator, double ahead_s, bool in_order)
+      : simulator_(simulator), ahead_s_(ahead_s), in_order_(in_order) {}
+  std::optional<StampedImage> newest() override {
+    auto image = simulator_.newest();
+    if (image) image->time_s += ahead_s_;
+    return image;
+  }
+  double now_s() const override { return in_order_ ? simulator_.now_s() : NAN; }
+  void sleep_until(double time_s) override { simulator_.sleep_until(time_s); }
+
+ private:
+  Simulator& simulator_;
+  double ahead_s_;
+  bool in_order_;
+};
+
+struct Refused {
+  Trajectory trajectory = small_trajectory();
+  ControlMode mode = ControlMode::fused;
+  bool registered = true;
+  double duration_s = 1;
+  double joints_ahead_s = 0, images_ahead_s = 0;
+  bool clock_in_order = true;
+};
+
+// The refusal of a run, in which nothing moved.
+std::string refusal_of(const Refused& refused) {
+  Case c;
+  c.mode = refused.mode;
+  const Rig rig = testing::small_test_rig();
+  RunConfig config = config_of(rig, c);
+  config.rcm_px = rcm_image_px(rig, {});
+  config.trajectory_name = "fast.csv";
+  if (!refused.registered) config.rig.instruments[0].camera_from_rcm.reset();
+  Simulator simulator(rig, {}, {0.05, 1.57, 0.064, 1.2});
+  const Eigen::Vector4d before = simulator.measured_jp();
+  AheadArm arm(simulator, refused.joints_ahead_s);
+  OtherClock others(simulator, refused.images_ahead_s, refused.clock_in_order);
+  Watcher watcher(c, rig, simulator);
+  const std::string said =
+      testing::input_error([&] { run(arm, others, others, config, refused.trajectory, refused.duration_s, watcher); });
+  EXPECT_TRUE(said.empty() || simulator.measured_jp() == before) << said;
+  EXPECT_EQ(said.find('\n'), std::string::npos) << said;
+  return said;
+}
+
+TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
+  EXPECT_EQ(refusal_of({}), "");
+  Sinusoids fast = paper_sinusoids();
+  fast.offset.tail<3>() /= 2, fast.amplitude.tail<3>() /= 2;
+  fast.omega_rad_s.setConstant(12);
+  const std::string complaint = refusal_of({.trajectory = sinusoids(fast)});
+  EXPECT_EQ(complaint.find("fast.csv: can't be followed at "), 0U) << complaint;
+  EXPECT_NE(complaint.find(" s: limits.rate"), std::string::npos) << complaint;
+  EXPECT_NE(refusal_of({.trajectory = set_point({3, 1e4, 1e4, 5e3})}), "");
+}
+
+TEST(Run, RefusesFeaturesThatNoImageShowsInEveryMode) {
+  const std::string complaint = "fast.csv: can't be followed at 0.00 s: no image shows these features";
+  for (Refused refused : {Refused{}, Refused{.mode = ControlMode::paper}, Refused{.mode = ControlMode::uncalibrated},
+                          Refused{.mode = ControlMode::uncalibrated, .registered = false}})
+    for (const Eigen::Vector4d& f : {Eigen::Vector4d(0, 0, 0, 0), Eigen::Vector4d(0.9, 400, 180, 180),
+                                     Eigen::Vector4d(0.9, NAN, 180, 100), Eigen::Vector4d(0.9, -1, 180, 100)}) {
+      refused.trajectory = {0, [f](double) { return DesiredFeatures{f}; }};
+      EXPECT_EQ(refusal_of(refused), complaint) << to_string(refused.mode) << refused.registered << f.transpose();
+    }
+}
+
+TEST(Run, RefusesOtherClocksThanTheLoops) {
+  EXPECT_EQ(refusal_of({.joints_ahead_s = 1e9}),
+            "JointState: time_s: is 1000000000.000, expected a time of the loop's clock, which is at 0.000");
+  EXPECT_EQ(refusal_of({.images_ahead_s = 1e9}).find("ImageStream: time_s: is 1000000000.0"), 0U);
+  EXPECT_EQ(refusal_of({.clock_in_order = false}), "Clock: now_s: is nan, expected a finite time");
+  EXPECT_EQ(refusal_of({.duration_s = NAN}), "run: duration_s: is nan, expected 0 or more");
+}
+
 }  // namespace
 }  // namespace lapservo::internal

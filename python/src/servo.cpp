@@ -11,14 +11,12 @@
 
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/control/trajectory.h"
-#include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 #include "lapservo/crtk/arm_limits.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/robot/robot.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/servo/controller_file.h"
-#include "lapservo/servo/image_features.h"
 #include "lapservo/servo/image_window.h"
 #include "lapservo/servo/run.h"
 #include "python/src/bindings.h"
@@ -361,9 +359,6 @@ void run_loop(Robot& robot, ImageStream& images, Clock& clock, const std::shared
   if (rcm_px) config.rcm_px = rcm_px->value;
   config.tracking_thread = own_thread ? TrackingThread::own : TrackingThread::callers;
   if (config.controller.mode == ControlMode::paper) config.tracker.method = Method::centerline;
-  const JointVector start = robot.state().q;
-  if (rig->instruments.front().camera_from_rcm && start.vector().allFinite())
-    refuse_infeasible(trajectory, duration_s, feature_model(*rig), config.controller, start, "trajectory");
   PythonObserver observer(std::move(on_tick), rig);
   const py::gil_scoped_release others_run;
   run(robot, images, clock, config, trajectory, duration_s, observer);
@@ -402,8 +397,10 @@ finite, and goes on when all is well again within 2 s. After anything else, abov
 holds until JointState.started; this call is the first start, and counts when the arm has been ready for 0.5 s.
 Where Robot.is_simulated() is False, the controller needs joint_limits.
 own_thread: vision in a thread of its own, so that setpoints never wait for it (for real arms). on_tick(ControlTick) may
-return False, which ends the run. However it ends, the arm brakes to rest. With camera_from_rcm a trajectory that can't be followed from the arm's joints, by reach, limits or
-the image's window, raises InputError before anything moves.)");
+return False, which ends the run. However it ends, the arm brakes to rest.
+
+InputError before anything moves: a trajectory that no image shows or that, with camera_from_rcm, can't be followed from
+the arm's joints by reach, limits or the image's window; missing joint_limits; joints or images ahead of the clock.)");
 }
 
 }  // namespace lapservo::python

@@ -214,8 +214,13 @@ def test_what_a_port_raises_leaves_the_run(rig):
     simulator = lapservo.Simulator(rig, Q)
     with pytest.raises(ZeroDivisionError, match="the arm's driver"):
         errors_of_a_run(rig, Broken(simulator), simulator, simulator)
+
+    class Empty(lapservo.Robot):
+        def is_simulated(self):
+            return True
+
     with pytest.raises(RuntimeError, match="pure virtual"):
-        errors_of_a_run(rig, lapservo.Robot(), simulator, simulator)
+        errors_of_a_run(rig, Empty(), simulator, simulator)
 
 
 def test_a_run_ends_when_told(rig):
@@ -233,12 +238,27 @@ def test_a_run_ends_when_told(rig):
 
 
 def test_a_goal_that_can_not_be_reached_is_refused(rig):
-    for features in ([0, 0, 0, 0], [3, 1e4, 1e4, 1e4]):
+    bare = lapservo.Rig(rig.camera, [lapservo.Instrument("PSM1", rig.instruments[0].marker)])
+    uncalibrated = lapservo.Controller(bare, mode="uncalibrated")
+    for of, features, given in ((rig, [0, 0, 0, 0], {}), (rig, [3, 1e4, 1e4, 5e3], {}),
+                                (bare, [0, 0, 0, 0], {"controller": uncalibrated, "rcm_px": [100, 100]})):
         simulator = lapservo.Simulator(rig, Q)
         arm = Arm(simulator)
-        with pytest.raises(lapservo.InputError, match="can't be followed"):
-            lapservo.run(arm, simulator, simulator, rig, lapservo.set_point(features), 1)
-        assert arm.sent == 0
+        with pytest.raises(lapservo.InputError, match="trajectory: can't be followed at 0.00 s: [^\n]*$"):
+            lapservo.run(arm, simulator, simulator, of, lapservo.set_point(features), 1, **given)
+        assert arm.sent == 0 and np.array_equal(simulator.state().q, lapservo.Simulator(rig, Q).state().q)
+
+
+def test_clocks_that_are_not_the_loops_are_refused(rig):
+    class Ahead(Arm):
+        def state(self):
+            return lapservo.JointState(1e9, Q)
+
+    simulator = lapservo.Simulator(rig, Q)
+    with pytest.raises(lapservo.InputError, match="JointState: time_s: is 1000000000.000, expected a time of the loop's"):
+        errors_of_a_run(rig, Ahead(simulator), simulator, simulator)
+    with pytest.raises(lapservo.InputError, match="duration_s: is nan"):
+        errors_of_a_run(rig, simulator, simulator, simulator, float("nan"))
 
 
 def test_a_covered_marker_makes_it_hold(rig):

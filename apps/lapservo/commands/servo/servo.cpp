@@ -20,7 +20,6 @@
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
 #include "lapservo/control/random_start.h"
-#include "lapservo/control/trajectory_check.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
 #include "lapservo/rig/single_instrument.h"
@@ -49,14 +48,10 @@ Rig true_rig_of(const ServoOptions& options, const Rig& rig) {
 
 JointVector joints_at_start(const ServoOptions& options, const Trajectory& trajectory, const RunConfig& run,
                             const FeatureModel& true_model, const Eigen::Vector4d& joint_offset) {
-  const std::string source = trajectory_name(options);
-  if (options.start.empty()) {
-    Random random(options.seed);
-    return random_start(trajectory, duration_s(options), true_model, run.controller, joint_offset, random, source);
-  }
-  const JointVector start = JointVector::from_vector(four(options.start));
-  refuse_infeasible(trajectory, duration_s(options), true_model, run.controller, start, source);
-  return start;
+  if (!options.start.empty()) return JointVector::from_vector(four(options.start));
+  Random random(options.seed);
+  return random_start(trajectory, duration_s(options), true_model, run.controller, joint_offset, random,
+                      run.trajectory_name);
 }
 
 // The user's view of a run: the log, the page, the progress, the last lines.

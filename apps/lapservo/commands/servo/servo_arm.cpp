@@ -124,9 +124,8 @@ class ArmWatcher : public RunObserver {
         std::launch::async,
         [this, wanted = asked_, q = tick.input.joints.q, camera_from_rcm = decision.camera_from_rcm]() -> std::string {
           try {
-            if (camera_from_rcm)
-              refuse_infeasible(wanted.trajectory, wanted.duration_s, feature_model(run_.rig, *camera_from_rcm),
-                                run_.controller, q, wanted.name);
+            const FeatureModel model = camera_from_rcm ? feature_model(run_.rig, *camera_from_rcm) : FeatureModel();
+            refuse_infeasible(wanted.trajectory, wanted.duration_s, model, run_.controller, q, wanted.name);
           } catch (const InputError& error) {
             return error.what();
           }
@@ -237,6 +236,7 @@ int steer_arm(const ServoOptions& options) {
   const InterlockConfig interlock = interlock_of(options, config);
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   config.tracking_thread = TrackingThread::own;
+  config.arm_limits = config.controller.limits;  // without --enable-motion they limit what is reported only
   const Trajectory trajectory = trajectory_of(options);
 
   std::optional<ServoPage> page;
@@ -263,10 +263,6 @@ int steer_arm(const ServoOptions& options) {
     std::fprintf(stderr, "lapservo: %s\n", missing.c_str());
     return 1;
   }
-  const JointVector start = arm.state().q;
-  if (config.rig.instruments.front().camera_from_rcm)
-    refuse_infeasible(trajectory, duration_s(options), feature_model(config.rig), config.controller, start,
-                      trajectory_name(options));
   if (const std::string missing = robot.not_granted(); options.enable_motion && !missing.empty())
     std::printf("setpoints leave without %s, see docs/ros.md\n", missing.c_str());
   std::optional<RunFolder> folder;

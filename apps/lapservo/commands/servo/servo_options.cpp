@@ -60,6 +60,11 @@ std::vector<Eigen::Vector4d> points_of(const std::vector<double>& numbers) {
   return points;
 }
 
+std::string trajectory_name(const ServoOptions& options) {
+  if (!options.set_point.empty()) return "--set-point";
+  return options.via.empty() ? options.trajectory : "--via";
+}
+
 }  // namespace
 
 bool may_command(const ServoOptions& options, std::string_view who) {
@@ -83,11 +88,6 @@ const Joints& joints_of(const ServoOptions& options, const Rig& rig) {
   if (!joints)
     throw InputError(options.rig, "instruments[0].joints is missing, expected the arm's joints: names, sign, offset");
   return *joints;
-}
-
-std::string trajectory_name(const ServoOptions& options) {
-  if (!options.set_point.empty()) return "--set-point";
-  return options.via.empty() ? options.trajectory : "--via";
 }
 
 Trajectory trajectory_of(const ServoOptions& options) {
@@ -114,6 +114,7 @@ RunConfig run_config_of(const ServoOptions& options) {
   RunConfig run;
   run.rig = single_instrument(load_rig(options.rig), options.rig);
   run.controller = controller_of(options, run.rig);
+  run.trajectory_name = trajectory_name(options);
   run.tracker.method = tracker_of(options, run.controller.mode);
   return run;
 }

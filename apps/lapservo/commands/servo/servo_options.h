@@ -51,7 +51,5 @@ double periods_per_s(const ServoOptions& options);
 double duration_s(const ServoOptions& options);
 
 Trajectory trajectory_of(const ServoOptions& options);
-/// The trajectory's name in messages.
-std::string trajectory_name(const ServoOptions& options);
 
 }  // namespace lapservo::app
