@@ -33,6 +33,7 @@ void add_web_options(CLI::App& command, WebOptions& options) {
       ->check(whole_number_between(0, highest_port))
       ->expected(0, 1)
       ->default_str("8080");
+  command.add_flag_callback("--view", [&options] { options.port = 8080; })->group("");
   add_listen_option(command, options);
 }
 
