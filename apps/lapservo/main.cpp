@@ -71,20 +71,21 @@ int parse_and_run(int argc, char** argv) {
       "`lapservo SUBCOMMAND --help` shows its options and an example.\n"
       "Exit codes: 0 done, 1 found nothing or did not converge, 2 bad input.");
   lapservo::app::Run run;
-  lapservo::app::add_track(app, run);
-  lapservo::app::add_view(app, run);
-  lapservo::app::add_calibrate(app, run);
-  lapservo::app::add_check(app, run);
-  lapservo::app::add_experiment(app, run);
+  const lapservo::app::Command program(&app);
+  lapservo::app::add_track(program, run);
+  lapservo::app::add_view(program, run);
+  lapservo::app::add_calibrate(program, run);
+  lapservo::app::add_check(program, run);
+  lapservo::app::add_experiment(program, run);
 #ifdef LAPSERVO_ROS2_BAGS
-  lapservo::app::add_record(app, run);
+  lapservo::app::add_record(program, run);
 #endif
-  lapservo::app::add_render(app, run);
-  lapservo::app::add_sample(app, run);
-  lapservo::app::add_servo(app, run);
-  lapservo::app::add_sim_robot(app, run);
-  lapservo::app::add_marker(app, run);
-  lapservo::app::add_estimate_rcm(app, run);
+  lapservo::app::add_render(program, run);
+  lapservo::app::add_sample(program, run);
+  lapservo::app::add_servo(program, run);
+  lapservo::app::add_sim_robot(program, run);
+  lapservo::app::add_marker(program, run);
+  lapservo::app::add_estimate_rcm(program, run);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& help) {

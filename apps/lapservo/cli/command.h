@@ -1,9 +1,13 @@
 #pragma once
 
 #include <functional>
-#include <utility>
+#include <string>
+#include <vector>
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
 
 namespace lapservo::app {
 
@@ -11,17 +15,56 @@ namespace lapservo::app {
 /// InputError for bad input, which main() prints in one line and ends with 2.
 using Run = std::function<int()>;
 
-/// Sets `run_later` when the command line names this subcommand.
-inline void runs(CLI::App& command, Run& run_later, Run run) {
-  command.callback([&run_later, run = std::move(run)] { run_later = run; });
-}
+// CLI11 reads the command line; its headers, which take seconds to compile, stay in command.cpp and main.cpp.
 
-// Checks of an option's numbers: the whole text is one finite number within [low, high]. CLI11 alone takes nan through
-// every range, -1 as an enormous unsigned and blanks as nothing.
-CLI::Validator number_between(double low, double high);
-CLI::Validator whole_number_between(double low, double high);
-CLI::Validator finite_number();
-/// Any whole number of 53 bits.
-CLI::Validator seed_number();
+/// An option of a subcommand.
+class Option {
+ public:
+  explicit Option(CLI::Option* option) : option_(option) {}
+
+  Option& required();
+  /// --help shows what it is without being given.
+  Option& shows_default();
+  /// --help leaves it out: another name of an option.
+  Option& hidden();
+  /// Takes so many values.
+  Option& expected(int count);
+  Option& delimiter(char between_values);
+  /// The option alone means this.
+  Option& without_value(const std::string& meant);
+  Option& one_of(const std::vector<std::string>& words);
+
+  // For numbers: the whole text is one finite number within [low, high], whole where the option's is. CLI11 alone takes
+  // nan through every range, -1 as an enormous unsigned and blanks as nothing.
+  Option& number_between(double low, double high);
+  Option& whole_number_between(double low, double high);
+  Option& finite_number();
+  /// Any whole number of 53 bits.
+  Option& seed_number();
+
+ private:
+  CLI::Option* option_;
+};
+
+/// The program, or a subcommand of it.
+class Command {
+ public:
+  explicit Command(CLI::App* app) : app_(app) {}
+
+  Command add_subcommand(const std::string& name, const std::string& about);
+  void require_subcommand();
+  /// Value: double, int, std::uint64_t, std::string, and optionals and vectors as command.cpp has them. It must live
+  /// until the command line is parsed.
+  template <typename Value>
+  Option add_option(const std::string& names, Value& value, const std::string& help);
+  void add_flag(const std::string& names, bool& value, const std::string& help);
+  /// The end of --help: an example.
+  void footer(const std::string& text);
+  /// Sets `run_later` when the command line names this subcommand.
+  void runs(Run& run_later, Run run);
+
+ private:
+  CLI::App* app_;
+};
 
 }  // namespace lapservo::app

@@ -11,12 +11,12 @@ namespace {
 
 constexpr int highest_port = 65535;
 
-void add_listen_option(CLI::App& command, WebOptions& options) {
+void add_listen_option(Command command, WebOptions& options) {
   command
       .add_option("--listen", options.listen,
                   "The page for others too, at this address of this computer (0.0.0.0: all); a token, printed once "
                   "with the page's address, is required then")
-      ->capture_default_str();
+      .shows_default();
 }
 
 }  // namespace
@@ -26,25 +26,27 @@ void WebOptions::check() const {
     throw InputError("--listen", "is " + listen + " and there is no page, expected --web with it");
 }
 
-void add_web_options(CLI::App& command, WebOptions& options) {
-  command
-      .add_option("--web", options.port,
-                  "Show it live on a page at this port for a browser on this computer; 0: any port that is free")
-      ->check(whole_number_between(0, highest_port))
-      ->expected(0, 1)
-      ->default_str("8080");
-  command.add_flag_callback("--view", [&options] { options.port = 8080; })->group("");
+void add_web_options(Command command, WebOptions& options) {
+  const auto add = [&](const char* name) {
+    return command
+        .add_option(name, options.port,
+                    "Show it live on a page at this port for a browser on this computer; 0: any port that is free")
+        .whole_number_between(0, highest_port)
+        .without_value("8080");
+  };
+  add("--web");
+  add("--view").hidden();
   add_listen_option(command, options);
 }
 
-void add_page_options(CLI::App& command, WebOptions& options) {
+void add_page_options(Command command, WebOptions& options) {
   options.port = 8080;
   const auto add = [&](const char* name) {
     return command.add_option(name, options.port, "The port of the page, else 8080; 0: any port that is free")
-        ->check(whole_number_between(0, highest_port));
+        .whole_number_between(0, highest_port);
   };
   add("--web");
-  add("--port")->group("");
+  add("--port").hidden();
   add_listen_option(command, options);
 }
 

@@ -18,9 +18,9 @@ struct WebOptions {
   void check() const;
 };
 /// --web and --listen.
-void add_web_options(CLI::App& command, WebOptions& options);
+void add_web_options(Command command, WebOptions& options);
 /// The same, where the page is what the command is for.
-void add_page_options(CLI::App& command, WebOptions& options);
+void add_page_options(Command command, WebOptions& options);
 
 /// The page of --web and `lapservo view`, whose address is printed.
 class WebView {

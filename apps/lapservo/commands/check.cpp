@@ -94,12 +94,12 @@ int check(const CalibrateOptions& options) {
   return checked.good_enough() ? 0 : 1;
 }
 
-void add_check(CLI::App& app, Run& run_later) {
+void add_check(Command app, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App& command = *app.add_subcommand("check", "Check whether a rig is good enough, and what to improve first.");
+  Command command = app.add_subcommand("check", "Check whether a rig is good enough, and what to improve first.");
   command.add_option("input", options->input, "A short recording of the marker in motion: a folder, a video or a bag")
-      ->required();
-  command.add_option("--rig", options->rig, "The rig to check")->required();
+      .required();
+  command.add_option("--rig", options->rig, "The rig to check").required();
   add_joint_options(
       command, *options,
       "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
@@ -111,7 +111,7 @@ void add_check(CLI::App& app, Run& run_later) {
       "Swing, insert and withdraw the instrument, and turn it about its axis once, in 10 to 60 s, the marker in view.\n"
       "Exit code 0: good enough, 1: not good enough.\n"
       "Example:\n  lapservo check swing.mp4 --joints joints.csv --rig rig.yaml --out check.html");
-  runs(command, run_later, [options] { return check(*options); });
+  command.runs(run_later, [options] { return check(*options); });
 }
 
 }  // namespace lapservo::app

@@ -164,14 +164,14 @@ int run(const EstimateRcmOptions& options) {
 
 }  // namespace
 
-void add_estimate_rcm(CLI::App& app, Run& run_later) {
+void add_estimate_rcm(Command app, Run& run_later) {
   auto options = std::make_shared<EstimateRcmOptions>();
-  CLI::App& command = *app.add_subcommand(
+  Command command = app.add_subcommand(
       "estimate-rcm", "Estimate where the RCM appears in the image, from the lines on which the instrument was seen.");
   command
       .add_option("observations", options->observations,
                   "CSV of `lapservo track`, with a rig that has no camera_from_rcm (else it only repeats that one)")
-      ->required();
+      .required();
   command.add_option("--rig", options->rig,
                      "To undistort the lines, and to compare with its camera_from_rcm where it has one");
   command.add_option("--out", options->out,
@@ -179,13 +179,13 @@ void add_estimate_rcm(CLI::App& app, Run& run_later) {
   command
       .add_option("--sigma-px", options->sigma_px,
                   "Standard deviation of e0 and e3 in either coordinate; else estimated from how badly the lines meet")
-      ->check(number_between(1e-6, 1000.0));
+      .number_between(1e-6, 1000.0);
   command
       .add_option("--common-px", options->common_px,
                   "Standard deviation of an error across the lines that all of them share and no number of lines "
                   "averages out; the default is that of `lapservo track` behind a well calibrated lens")
-      ->capture_default_str()
-      ->check(number_between(0.0, 1000.0));
+      .shows_default()
+      .number_between(0.0, 1000.0);
   command.footer(
       "Prints two estimates: weighted, by total least squares without outliers, and pairwise, the paper's mean of all\n"
       "intersections, with one standard deviation each. Lines should come from positions of the instrument that "
@@ -193,7 +193,7 @@ void add_estimate_rcm(CLI::App& app, Run& run_later) {
       "many frames of one position count as one line.\n"
       "Example:\n  lapservo track frames --rig camera_and_marker.yaml --single --out obs.csv\n"
       "  lapservo estimate-rcm obs.csv --rig camera_and_marker.yaml --out rcm.csv");
-  runs(command, run_later, [options] { return run(*options); });
+  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

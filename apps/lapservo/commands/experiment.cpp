@@ -162,27 +162,25 @@ int run(const ExperimentOptions& options) {
 
 }  // namespace
 
-void add_experiment(CLI::App& app, Run& run_later) {
+void add_experiment(Command app, Run& run_later) {
   auto options = std::make_shared<ExperimentOptions>();
-  CLI::App& command = *app.add_subcommand("experiment", "The paper's experiments, in a simulator, as a report.");
+  Command command = app.add_subcommand("experiment", "The paper's experiments, in a simulator, as a report.");
   std::vector<std::string> choices{"all"};
   for (const Named& named : experiments()) choices.push_back(named.name);
-  command.add_option("name", options->name, "Which: " + names())->required()->check(CLI::IsMember(choices));
+  command.add_option("name", options->name, "Which: " + names()).required().one_of(choices);
   command
       .add_option("--out", options->out,
                   fmt::format("Folder for report.html, the CSVs behind it and rig.yaml{}", OutputFolder::help))
-      ->required();
+      .required();
   command.add_flag("--force", options->force, OutputFolder::force_help);
   command.add_option("--rig", options->rig,
                      "Camera and instrument (the first), with camera_from_rcm; else the built-in configs/paper.yaml");
-  command.add_option("--seed", options->seed, "Seed of positions, background and noise")
-      ->capture_default_str()
-      ->check(seed_number());
+  command.add_option("--seed", options->seed, "Seed of positions, background and noise").shows_default().seed_number();
   command.add_option("--method", options->method, "centerline: the paper's; surface: the default; or both")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"both", "centerline", "surface"}));
+      .shows_default()
+      .one_of({"both", "centerline", "surface"});
   command.footer("Example:\n  lapservo experiment all --out results");
-  runs(command, run_later, [options] { return run(*options); });
+  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

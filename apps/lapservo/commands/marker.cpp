@@ -31,16 +31,16 @@ struct ViewingOptions {
   Viewing viewing() const { return {focal_px, 1e-3 * distance_mm, sigma_px}; }
 };
 
-void add_viewing(CLI::App& command, ViewingOptions& options) {
+void add_viewing(Command command, ViewingOptions& options) {
   command.add_option("--focal-px", options.focal_px, "Focal length of the camera")
-      ->capture_default_str()
-      ->check(number_between(10.0, 1e5));
+      .shows_default()
+      .number_between(10.0, 1e5);
   command.add_option("--distance-mm", options.distance_mm, "From the camera to the marker")
-      ->capture_default_str()
-      ->check(number_between(5.0, 2000.0));
+      .shows_default()
+      .number_between(5.0, 2000.0);
   command.add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line")
-      ->capture_default_str()
-      ->check(number_between(1e-4, 100.0));
+      .shows_default()
+      .number_between(1e-4, 100.0);
 }
 
 struct DesignOptions {
@@ -205,74 +205,70 @@ int run_show(const RigOptions& options) {
   return 0;
 }
 
-void add_design(CLI::App& parent, Run& run_later) {
+void add_design(Command parent, Run& run_later) {
   auto options = std::make_shared<DesignOptions>();
-  CLI::App& command = *parent.add_subcommand("design", "Choose the bands of a marker, or evaluate given ones.");
+  Command command = parent.add_subcommand("design", "Choose the bands of a marker, or evaluate given ones.");
   command.add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included")
-      ->capture_default_str()
-      ->check(number_between(0.5, 100.0));
+      .shows_default()
+      .number_between(0.5, 100.0);
   command.add_option("--length-mm", options->length_mm, "Length of the marker; default three diameters")
-      ->check(number_between(1.0, 500.0));
+      .number_between(1.0, 500.0);
   command.add_option("--smallest-band-mm", options->min_band_mm, "No band is shorter; default 3 mm or 12 px")
-      ->check(number_between(0.1, 200.0));
+      .number_between(0.1, 200.0);
   command
       .add_option(
           "--print-error-mm", options->print_error_mm,
           "Standard deviation of where each boundary is printed and cut: minimise what it does to the rotation, "
           "together with the noise; else noise alone, and what 0.1 mm does is said")
-      ->check(number_between(0.001, 10.0));
+      .number_between(0.001, 10.0);
   command.add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->capture_default_str();
+      .finite_number()
+      .delimiter(',')
+      .shows_default();
   command.add_option("--bands-upper-mm", options->upper_mm, "Evaluate this design: lengths at the upper edge")
-      ->check(finite_number())
-      ->delimiter(',');
-  command.add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge")
-      ->check(finite_number())
-      ->delimiter(',');
+      .finite_number()
+      .delimiter(',');
+  command.add_option("--bands-lower-mm", options->lower_mm, "and at the lower edge").finite_number().delimiter(',');
   command.add_option("--out", options->out, "Write the marker: block of a rig; a file of that name is replaced");
   add_viewing(command, options->viewing);
   command.footer(
       "Example:\n  lapservo marker design --diameter-mm 8.4 --distance-mm 110 --out marker.yaml\n"
       "  lapservo marker design --bands-upper-mm 3.5,3.5,17 --bands-lower-mm 9.5,9.5,5");
-  runs(command, run_later, [options] { return run_design(*options); });
+  command.runs(run_later, [options] { return run_design(*options); });
 }
 
-CLI::App& add_for_rig(CLI::App& parent, const std::string& name, const std::string& about,
-                      const std::shared_ptr<RigOptions>& options) {
-  CLI::App& command = *parent.add_subcommand(name, about);
-  command.add_option("--rig", options->rig, "The rig whose marker it is")->required();
+Command add_for_rig(Command parent, const std::string& name, const std::string& about,
+                    const std::shared_ptr<RigOptions>& options) {
+  Command command = parent.add_subcommand(name, about);
+  command.add_option("--rig", options->rig, "The rig whose marker it is").required();
   command.add_option("--instrument", options->instrument, "Its name; default the first");
   return command;
 }
 
 }  // namespace
 
-void add_marker(CLI::App& app, Run& run_later) {
-  CLI::App& marker = *app.add_subcommand("marker", "Design, print and look at markers.");
-  marker.require_subcommand(1);
+void add_marker(Command app, Run& run_later) {
+  Command marker = app.add_subcommand("marker", "Design, print and look at markers.");
+  marker.require_subcommand();
   marker.footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
   add_design(marker, run_later);
 
   auto printing = std::make_shared<RigOptions>();
-  CLI::App& print = add_for_rig(marker, "print", "Write a sheet to print at true scale.", printing);
-  print.add_option("--out", printing->out, "sheet.pdf or sheet.svg; a file of that name is replaced")->required();
-  print.add_option("--paper", printing->paper, "a4 or letter")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"a4", "letter"}));
+  Command print = add_for_rig(marker, "print", "Write a sheet to print at true scale.", printing);
+  print.add_option("--out", printing->out, "sheet.pdf or sheet.svg; a file of that name is replaced").required();
+  print.add_option("--paper", printing->paper, "a4 or letter").shows_default().one_of({"a4", "letter"});
   print.add_option("--copies", printing->copies, "Markers on the sheet, as many as fit")
-      ->capture_default_str()
-      ->check(whole_number_between(1, 100));
+      .shows_default()
+      .whole_number_between(1, 100);
   print.footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
-  runs(print, run_later, [printing] { return run_print(*printing); });
+  print.runs(run_later, [printing] { return run_print(*printing); });
 
   auto showing = std::make_shared<RigOptions>();
-  CLI::App& show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
+  Command show = add_for_rig(marker, "show", "Show what a rig's marker looks like unrolled.", showing);
   show.add_option("--out", showing->out, "Write an image too: .svg, .pdf or .png; a file of that name is replaced");
   add_viewing(show, showing->viewing);
   show.footer("Example:\n  lapservo marker show --rig configs/example.yaml --out marker.svg");
-  runs(show, run_later, [showing] { return run_show(*showing); });
+  show.runs(run_later, [showing] { return run_show(*showing); });
 }
 
 }  // namespace lapservo::app

@@ -282,46 +282,45 @@ int record(const RecordOptions& options) {
   return why.empty() && counts.images > 0 && (options.robot.empty() || counts.joints > 0) ? 0 : 1;
 }
 
-void add_record(CLI::App& app, Run& run_later) {
+void add_record(Command app, Run& run_later) {
   auto options = std::make_shared<RecordOptions>();
-  CLI::App& command =
-      *app.add_subcommand("record", "Record a camera and an arm's joints into a bag, for calibrate, check and track.");
+  Command command =
+      app.add_subcommand("record", "Record a camera and an arm's joints into a bag, for calibrate, check and track.");
   command
       .add_option("--camera", options->camera,
                   "Images: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
                   "/dev/videoN; gst:PIPELINE")
-      ->required();
+      .required();
   command.add_option("--robot", options->robot, "The arm whose measured_js is recorded too: ros2:PSM1 or ros1:PSM1");
-  command.add_option("--out", options->out, "Folder to make: a ROS 2 bag; a second of raw 720p takes 80 MB")
-      ->required();
+  command.add_option("--out", options->out, "Folder to make: a ROS 2 bag; a second of raw 720p takes 80 MB").required();
   command.add_option("--rig", options->rig,
                      "Its camera's size is that of /dev/videoN, else GStreamer's choice; also for --move");
   command.add_option("--duration", options->duration_s, "Seconds, from the first image on")
-      ->capture_default_str()
-      ->check(number_between(1, 3600));
+      .shows_default()
+      .number_between(1, 3600);
   command.add_option("--fps", options->fps, "Keep no more images a second than about so many")
-      ->capture_default_str()
-      ->check(number_between(1, 1000));
+      .shows_default()
+      .number_between(1, 1000);
   command
       .add_option(
           "--move", options->move,
           "Move the arm meanwhile, from where it is, as the calibrations want it: swing (registration, check: all "
           "joints, for --duration), turn (marker: a full turn about its axis)")
-      ->check(CLI::IsMember({"swing", "turn"}));
+      .one_of({"swing", "turn"});
   command.add_option("--instrument", options->instrument,
                      "For --move: the arm's name in the rig, where it has several");
   command
       .add_option("--scale", options->scale,
                   "Scale of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
-      ->capture_default_str()
-      ->check(number_between(0.05, 4));
+      .shows_default()
+      .number_between(0.05, 4);
   command
       .add_option(
           "--setpoint-readers", options->setpoint_readers,
           "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
           "is not moved")
-      ->capture_default_str()
-      ->check(whole_number_between(1, 64));
+      .shows_default()
+      .whole_number_between(1, 64);
   command.add_option("--joint-limits", options->joint_limits,
                      "For --move: YAML of the arm's joints, between which they stay, for example "
                      "configs/joint_limits/psm-classic.yaml");
@@ -333,7 +332,7 @@ void add_record(CLI::App& app, Run& run_later) {
       "--joint-limits.\n"
       "Example:\n  lapservo record --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --out swing\n"
       "  lapservo calibrate registration swing --rig rig.yaml --out rig.yaml");
-  runs(command, run_later, [options] { return record(*options); });
+  command.runs(run_later, [options] { return record(*options); });
 }
 
 }  // namespace lapservo::app

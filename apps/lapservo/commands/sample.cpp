@@ -181,10 +181,10 @@ int run(const std::string& folder) {
 
 }  // namespace
 
-void add_sample(CLI::App& app, Run& run_later) {
+void add_sample(Command app, Run& run_later) {
   auto folder = std::make_shared<std::string>();
-  CLI::App& command = *app.add_subcommand("sample", "Render the recordings of a first calibration, for the tutorial.");
-  command.add_option("folder", *folder, "New or empty")->required();
+  Command command = app.add_subcommand("sample", "Render the recordings of a first calibration, for the tutorial.");
+  command.add_option("folder", *folder, "New or empty").required();
   command.footer(
       "rig.yaml     camera and marker by data sheets and callipers, to begin from\n"
       "boards/      a chessboard of 9x6 inner corners and squares of 5 mm\n"
@@ -194,7 +194,7 @@ void add_sample(CLI::App& app, Run& run_later) {
       "truth.yaml   the rig that calibration should find\n"
       "joint_limits.yaml  limits of the simulated arm's joints, for servo --joint-limits\n"
       "Example:\n  lapservo sample morning");
-  runs(command, run_later, [folder] { return run(*folder); });
+  command.runs(run_later, [folder] { return run(*folder); });
 }
 
 }  // namespace lapservo::app

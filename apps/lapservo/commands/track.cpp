@@ -330,59 +330,59 @@ int run(const TrackOptions& options) {
 }
 
 // Options of both commands.
-void add_input_options(CLI::App& command, TrackOptions& options) {
+void add_input_options(Command command, TrackOptions& options) {
   command
       .add_option(
           "input", options.input,
           "Image, folder of images, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
           "topic "
           "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
-      ->required();
+      .required();
   add_image_topic_option(command, options.image_topic);
   add_video_options(command, options);
   command.add_option("--rig", options.rig,
                      "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
   command.add_option("--method", options.method, "surface: all visible lines; centerline: the paper's Algorithm 1")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"surface", "centerline"}));
+      .shows_default()
+      .one_of({"surface", "centerline"});
   command.add_flag("--single", options.single, "Treat every frame on its own, without tracking from the frame before");
   command.add_flag("--deinterlace", options.deinterlace,
                    "For interlaced video (status: interlaced): track the field of the even rows; the same as "
                    "deinterlace: true in the rig's camera");
   command.add_option("--fps", options.fps, "Frames per second of a folder's images")
-      ->capture_default_str()
-      ->check(number_between(0.001, 100000.0));
+      .shows_default()
+      .number_between(0.001, 100000.0);
 }
 
 }  // namespace
 
-void add_track(CLI::App& app, Run& run_later) {
+void add_track(Command app, Run& run_later) {
   auto options = std::make_shared<TrackOptions>();
-  CLI::App& command =
-      *app.add_subcommand("track", "Measure the instruments in images, a video, a bag or a camera's frames.");
+  Command command =
+      app.add_subcommand("track", "Measure the instruments in images, a video, a bag or a camera's frames.");
   add_input_options(command, *options);
   command
       .add_option("--out", options->out,
                   "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
                   "killed, the rows are in NAME.part, which the next run of that name writes over")
-      ->capture_default_str();
+      .shows_default();
   command.add_option("--overlay", options->overlay,
                      "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
                      "same name");
   add_web_options(command, options->web);
   command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
-      ->capture_default_str()
-      ->check(whole_number_between(0, 1000000000));
+      .shows_default()
+      .whole_number_between(0, 1000000000);
   command.footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
-  runs(command, run_later, [options] { return run(*options); });
+  command.runs(run_later, [options] { return run(*options); });
 }
 
-void add_view(CLI::App& app, Run& run_later) {
+void add_view(Command app, Run& run_later) {
   auto options = std::make_shared<TrackOptions>();
   options->page_only = true;
   options->out.clear();
-  CLI::App& command =
-      *app.add_subcommand("view", "Show what is measured in images, a video or a camera's frames on a page.");
+  Command command =
+      app.add_subcommand("view", "Show what is measured in images, a video or a camera's frames on a page.");
   add_input_options(command, *options);
   add_page_options(command, options->web);
   command.footer(
@@ -391,7 +391,7 @@ void add_view(CLI::App& app, Run& run_later) {
       "ssh -L 8080:localhost:8080 THIS_COMPUTER, or with --listen by the address that is printed.\n"
       "Example:\n"
       "  lapservo view ros2:/endoscope/image_raw --rig rig.yaml");
-  runs(command, run_later, [options] { return run(*options); });
+  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app

@@ -42,17 +42,17 @@ void refuse_topic_outside_bags(const std::string& option, const std::string& top
   if (!topic.empty()) throw InputError(option, "is " + topic + ", which is for bags, and " + input + " is none");
 }
 
-void add_image_topic_option(CLI::App& command, std::string& image_topic) {
+void add_image_topic_option(Command command, std::string& image_topic) {
   command.add_option("--image-topic", image_topic, "In a bag with several: the topic of the images");
 }
 
-void add_video_options(CLI::App& command, FrameOptions& options) {
+void add_video_options(Command command, FrameOptions& options) {
   command.add_option("--colour-matrix", options.colour_matrix, "Colour matrix of a video, in the place of its own")
-      ->check(CLI::IsMember({"bt601", "bt709", "bt2020"}));
+      .one_of({"bt601", "bt709", "bt2020"});
   command
       .add_option("--chroma-location", options.chroma_location,
                   "Place of the samples of chroma of a video, whatever it names; else as it names")
-      ->check(CLI::IsMember({"left", "centre", "top-left"}));
+      .one_of({"left", "centre", "top-left"});
 }
 
 }  // namespace lapservo::app

@@ -28,9 +28,9 @@ void say_if_undistorted(const std::string& topic, const Camera* camera);
 /// Throws InputError naming `option` where it names a topic although `input` is no bag.
 void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input);
 
-void add_image_topic_option(CLI::App& command, std::string& image_topic);
+void add_image_topic_option(Command command, std::string& image_topic);
 
 /// --colour-matrix and --chroma-location.
-void add_video_options(CLI::App& command, FrameOptions& options);
+void add_video_options(Command command, FrameOptions& options);
 
 }  // namespace lapservo::app

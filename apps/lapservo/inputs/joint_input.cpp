@@ -52,12 +52,12 @@ JointInput read_topic(const CalibrateOptions& options, const Instrument& instrum
 
 }  // namespace
 
-void add_joint_options(CLI::App& command, CalibrateOptions& options, const std::string& help) {
+void add_joint_options(Command command, CalibrateOptions& options, const std::string& help) {
   command.add_option("--joints", options.joints, help);
   add_joint_topic_option(command, options.joint_topic);
 }
 
-void add_joint_topic_option(CLI::App& command, std::string& joint_topic) {
+void add_joint_topic_option(Command command, std::string& joint_topic) {
   command.add_option("--joint-topic", joint_topic,
                      "In a bag with several: the topic of the arm's measured joints; else .../INSTRUMENT/measured_js, "
                      "or the only measured_js");

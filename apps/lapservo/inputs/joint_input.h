@@ -15,8 +15,8 @@ struct JointInput {
   std::string source;  ///< for complaints
 };
 
-void add_joint_options(CLI::App& command, CalibrateOptions& options, const std::string& help);
-void add_joint_topic_option(CLI::App& command, std::string& joint_topic);
+void add_joint_options(Command command, CalibrateOptions& options, const std::string& help);
+void add_joint_topic_option(Command command, std::string& joint_topic);
 
 /// Joints of --joints, a CSV or a bag. Reads the instrument's joints; where it has none, the recording's own four in
 /// the order theta, phi, rho, psi. A bag's stamps go with those of `frames`, which may be nullptr. Throws InputError

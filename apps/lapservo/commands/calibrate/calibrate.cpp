@@ -2,9 +2,9 @@
 
 namespace lapservo::app {
 
-void add_calibrate(CLI::App& app, Run& run_later) {
-  CLI::App& calibrate = *app.add_subcommand("calibrate", "Measure what a rig says, and write it down.");
-  calibrate.require_subcommand(1);
+void add_calibrate(Command app, Run& run_later) {
+  Command calibrate = app.add_subcommand("calibrate", "Measure what a rig says, and write it down.");
+  calibrate.require_subcommand();
   calibrate.footer(
       "Examples:\n"
       "  lapservo calibrate all --rig rig.yaml --turn turn.mp4 --swing swing.mp4 --joints joints.csv\n"

@@ -284,14 +284,14 @@ int run_all(AllOptions options) {
 
 }  // namespace
 
-void add_calibrate_all(CLI::App& parent, Run& run_later) {
+void add_calibrate_all(Command parent, Run& run_later) {
   auto options = std::make_shared<AllOptions>();
-  CLI::App& command = *parent.add_subcommand(
+  Command command = parent.add_subcommand(
       "all", "The guided way: camera, colour, marker, registration, check, each where it is not done yet.");
-  command.add_option("--rig", options->rig, "The rig as it is known so far; each step replaces it")->required();
+  command.add_option("--rig", options->rig, "The rig as it is known so far; each step replaces it").required();
   command.add_option("--boards", options->boards, "For the camera: images of a chessboard");
   command.add_option("--board", options->board, "Its inner corners, COLUMNSxROWS, for example 9x6");
-  command.add_option("--square-mm", options->square_mm, "Width of its squares")->check(number_between(0.1, 1000.0));
+  command.add_option("--square-mm", options->square_mm, "Width of its squares").number_between(0.1, 1000.0);
   command.add_option("--aruco", options->aruco, "For a ChArUco board: its markers' dictionary");
   command.add_option("--motion", options->motion, "For the colours: the marker in motion; else --swing, else --turn");
   command.add_option("--turn", options->turn,
@@ -315,10 +315,10 @@ void add_calibrate_all(CLI::App& parent, Run& run_later) {
   add_video_options(command, *options);
   command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
   command.add_option("--fps", options->fps, "Frames per second of folders of images")
-      ->capture_default_str()
-      ->check(number_between(0.001, 1000.0));
+      .shows_default()
+      .number_between(0.001, 1000.0);
   command.add_option("--redo", options->redo, "A step that is done again though it was done, with those after it")
-      ->check(CLI::IsMember({"camera", "colour", "marker", "registration", "check"}));
+      .one_of({"camera", "colour", "marker", "registration", "check"});
   command.add_flag("--no-questions", options->no_questions,
                    "Leave out what no option names; a terminal prompts for it");
   command.footer(
@@ -330,7 +330,7 @@ void add_calibrate_all(CLI::App& parent, Run& run_later) {
       "--swing swing.mp4 --joints joints.csv --report check.html\n"
       "  lapservo calibrate all --rig rig.yaml --camera ros2:/endoscope/image_raw --robot ros2:PSM1 --enable-motion "
       "--joint-limits configs/joint_limits/psm-classic.yaml");
-  runs(command, run_later, [options] { return run_all(*options); });
+  command.runs(run_later, [options] { return run_all(*options); });
 }
 
 }  // namespace lapservo::app

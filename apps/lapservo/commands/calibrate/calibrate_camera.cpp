@@ -129,32 +129,29 @@ int calibrate_camera(const CalibrateCameraOptions& options) {
   return 0;
 }
 
-void add_calibrate_camera(CLI::App& parent, Run& run_later) {
+void add_calibrate_camera(Command parent, Run& run_later) {
   auto options = std::make_shared<CalibrateCameraOptions>();
-  CLI::App& command = *parent.add_subcommand(
+  Command command = parent.add_subcommand(
       "camera", "Measure a camera with a chessboard: matrix, distortion, lateral chromatic aberration, response.");
   command
       .add_option("input", options->inputs,
                   "Images of the board from different sides: images, folders, a video, a bag, a camera or a stream")
-      ->required();
+      .required();
   add_image_topic_option(command, options->image_topic);
   add_video_options(command, *options);
-  command.add_option("--board", options->board, "Inner corners of the board, COLUMNSxROWS, for example 9x6")
-      ->required();
-  command.add_option("--square-mm", options->square_mm, "Width of a square")
-      ->required()
-      ->check(number_between(0.1, 1000.0));
+  command.add_option("--board", options->board, "Inner corners of the board, COLUMNSxROWS, for example 9x6").required();
+  command.add_option("--square-mm", options->square_mm, "Width of a square").required().number_between(0.1, 1000.0);
   command.add_option("--aruco", options->dictionary, "For a ChArUco board: its markers' dictionary, as DICT_4X4_50");
   command.add_option("--marker-mm", options->marker_mm, "For a ChArUco board: a marker's width; else 3/4 of a square")
-      ->check(number_between(0.05, 1000.0));
+      .number_between(0.05, 1000.0);
   command.add_option("--rig", options->rig, "The rig that has this camera: its response is where the search starts");
   command.add_option("--out", options->out,
                      "With --rig: the rig to write, else the rig itself is replaced. Without: the camera's file");
   command.add_option("--camera-info", options->camera_info,
                      "The camera alone, as a ROS camera_info, which a rig's camera may name");
   command.add_option("--views", options->views, "Views to choose from a video or a camera at most")
-      ->capture_default_str()
-      ->check(whole_number_between(4, 200));
+      .shows_default()
+      .whole_number_between(4, 200);
   command.footer(
       "Show the whole board, flat and sharp, in 12 or more images: in every part of the image, near, and tilted "
       "by\n"
@@ -163,7 +160,7 @@ void add_calibrate_camera(CLI::App& parent, Run& run_later) {
       "All numbers are written with one standard deviation each (sigma_...), the response's where the images determine "
       "it.\n"
       "Example:\n  lapservo calibrate camera boards/ --board 9x6 --square-mm 5 --rig rig.yaml");
-  runs(command, run_later, [options] { return calibrate_camera(*options); });
+  command.runs(run_later, [options] { return calibrate_camera(*options); });
 }
 
 }  // namespace lapservo::app

@@ -48,13 +48,13 @@ int calibrate_colour(const CalibrateColourOptions& options) {
   return 0;
 }
 
-void add_calibrate_colour(CLI::App& parent, Run& run_later) {
+void add_calibrate_colour(Command parent, Run& run_later) {
   auto options = std::make_shared<CalibrateColourOptions>();
-  CLI::App& command = *parent.add_subcommand(
+  Command command = parent.add_subcommand(
       "colour", "Measure the hues of a mounted marker's bands as the camera has them, and how it encodes light.");
   command
       .add_option("input", options->input, "The marker in motion: images, a folder, a video, or a camera until Ctrl-C")
-      ->required();
+      .required();
   add_calibrate_options(command, *options);
   command.add_flag("--replace-response", options->replace_response,
                    "Also a response that calibrate camera measured (sigma_response), which stays else");
@@ -63,7 +63,7 @@ void add_calibrate_colour(CLI::App& parent, Run& run_later) {
       "rig's\n"
       "hues may be up to 60 degrees off; the response is written where the frames show another than the rig's.\n"
       "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml");
-  runs(command, run_later, [options] { return calibrate_colour(*options); });
+  command.runs(run_later, [options] { return calibrate_colour(*options); });
 }
 
 }  // namespace lapservo::app

@@ -21,21 +21,21 @@ namespace lapservo::app {
 using namespace internal;
 namespace fs = std::filesystem;
 
-void add_calibrate_options(CLI::App& command, CalibrateOptions& options) {
-  command.add_option("--rig", options.rig, "The rig as it is known so far")->required();
+void add_calibrate_options(Command command, CalibrateOptions& options) {
+  command.add_option("--rig", options.rig, "The rig as it is known so far").required();
   command.add_option("--out", options.out, "The rig to write or replace, with what was measured; may be --rig's")
-      ->required();
+      .required();
   add_recording_options(command, options);
 }
 
-void add_recording_options(CLI::App& command, CalibrateOptions& options) {
+void add_recording_options(Command command, CalibrateOptions& options) {
   command.add_option("--instrument", options.instrument, "Its name, where the rig has several");
   command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
   add_image_topic_option(command, options.image_topic);
   add_video_options(command, options);
   command.add_option("--fps", options.fps, "Frames per second of a folder of images")
-      ->capture_default_str()
-      ->check(number_between(0.001, 1000.0));
+      .shows_default()
+      .number_between(0.001, 1000.0);
 }
 
 std::size_t named_instrument(const Rig& rig, const std::string& name, const std::string& rig_file) {

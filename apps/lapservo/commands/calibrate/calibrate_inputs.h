@@ -15,10 +15,10 @@ struct CalibrateOptions : FrameOptions {
 };
 
 /// All but the input and the joints, which each subcommand describes itself.
-void add_calibrate_options(CLI::App& command, CalibrateOptions& options);
+void add_calibrate_options(Command command, CalibrateOptions& options);
 
 /// Those options that say how the recording is read and which instrument is meant.
-void add_recording_options(CLI::App& command, CalibrateOptions& options);
+void add_recording_options(Command command, CalibrateOptions& options);
 
 /// Place in the rig of the instrument of that name, or of the only one where none is given. Throws InputError where
 /// that is open or unknown.

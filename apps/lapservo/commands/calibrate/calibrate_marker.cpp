@@ -74,14 +74,14 @@ int calibrate_marker(const CalibrateOptions& options) {
   return 0;
 }
 
-void add_calibrate_marker(CLI::App& parent, Run& run_later) {
+void add_calibrate_marker(Command parent, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App& command = *parent.add_subcommand(
+  Command command = parent.add_subcommand(
       "marker", "Measure a mounted marker's print: band lengths, a wrap that is not square, the gap at the seam.");
   command
       .add_option("input", options->input,
                   "Images of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
-      ->required();
+      .required();
   add_calibrate_options(command, *options);
   add_joint_options(
       command, *options,
@@ -93,7 +93,7 @@ void add_calibrate_marker(CLI::App& parent, Run& run_later) {
       "it may move otherwise too. For a compressed video turn it there and back. All numbers are written with one "
       "standard deviation each (sigma_...).\n"
       "Example:\n  lapservo calibrate marker turn.mp4 --rig designed.yaml --out rig.yaml");
-  runs(command, run_later, [options] { return calibrate_marker(*options); });
+  command.runs(run_later, [options] { return calibrate_marker(*options); });
 }
 
 }  // namespace lapservo::app

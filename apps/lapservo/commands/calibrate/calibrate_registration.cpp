@@ -102,9 +102,9 @@ int calibrate_registration(const CalibrateOptions& options) {
   return 0;
 }
 
-void add_calibrate_registration(CLI::App& parent, Run& run_later) {
+void add_calibrate_registration(Command parent, Run& run_later) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App& command = *parent.add_subcommand(
+  Command command = parent.add_subcommand(
       "registration",
       "Measure where the arm stands before the camera, its joints' signs and offsets, and the video's delay.");
   command
@@ -112,7 +112,7 @@ void add_calibrate_registration(CLI::App& parent, Run& run_later) {
           "input", options->input,
           "The marker in motion: a folder, a video, a bag (which brings its joints along), a camera, a stream, or "
           "a CSV of observations that were tracked without camera_from_rcm")
-      ->required();
+      .required();
   add_calibrate_options(command, *options);
   add_joint_options(
       command, *options,
@@ -126,7 +126,7 @@ void add_calibrate_registration(CLI::App& parent, Run& run_later) {
       "offset\n"
       "stays the rig's: camera_from_rcm turns with it.\n"
       "Example:\n  lapservo calibrate registration motion.mp4 --joints joints.csv --rig rig.yaml --out rig.yaml");
-  runs(command, run_later, [options] { return calibrate_registration(*options); });
+  command.runs(run_later, [options] { return calibrate_registration(*options); });
 }
 
 }  // namespace lapservo::app

@@ -180,7 +180,7 @@ int run(const ServoOptions& options) {
   throw InputError("--robot", (options.robot.empty() ? "is missing" : "is " + options.robot) + expected);
 }
 
-void add_arm_options(CLI::App& command, ServoOptions& options) {
+void add_arm_options(Command command, ServoOptions& options) {
   command.add_option("--rig", options.rig, "Camera, marker and camera_from_rcm");
   command.add_option(
       "--robot", options.robot,
@@ -193,8 +193,8 @@ void add_arm_options(CLI::App& command, ServoOptions& options) {
       .add_option("--control", options.control,
                   "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "
                   "network may publish, both, or nobody but Ctrl-C")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"none", "page", "topics", "page,topics"}));
+      .shows_default()
+      .one_of({"none", "page", "topics", "page,topics"});
   command.add_option("--operator-present", options.operator_present,
                      "Move the arm only while a button is pressed, and said to be every 0.2 s: of this topic, a "
                      "std_msgs/Bool or the first of a sensor_msgs/Joy; `page`: that of --web's page");
@@ -209,49 +209,49 @@ void add_arm_options(CLI::App& command, ServoOptions& options) {
           "--setpoint-readers", options.setpoint_readers,
           "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
           "is not moved")
-      ->capture_default_str()
-      ->check(whole_number_between(1, 64));
+      .shows_default()
+      .whole_number_between(1, 64);
 }
 
-void add_trajectory_options(CLI::App& command, ServoOptions& options) {
+void add_trajectory_options(Command command, ServoOptions& options) {
   command
       .add_option("--trajectory", options.trajectory,
                   "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
-      ->capture_default_str();
+      .shows_default();
   command.add_option("--set-point", options.set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(4);
+      .finite_number()
+      .delimiter(',')
+      .expected(4);
   command
       .add_option("--via", options.via,
                   "Instead: points s_rad,r_px,l_px,d_px,s_rad,... to pass, a second at rest in each")
-      ->check(finite_number())
-      ->delimiter(',');
+      .finite_number()
+      .delimiter(',');
   command.add_option("--duration", options.duration, "Seconds, else 20, or all of a recording")
-      ->check(number_between(0.1, 36000.0));
+      .number_between(0.1, 36000.0);
 }
 
-void add_control_options(CLI::App& command, ServoOptions& options) {
+void add_control_options(Command command, ServoOptions& options) {
   command
       .add_option("--method", options.method,
                   "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
                   "uncalibrated: learns "
                   "the Jacobian")
-      ->capture_default_str();
+      .shows_default();
   command
       .add_option("--tracker", options.tracker,
                   "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
                   "--method paper, else surface")
-      ->check(CLI::IsMember({"surface", "centerline"}));
+      .one_of({"surface", "centerline"});
   command.add_option("--controller", options.controller, "YAML: gains_per_s, limits, window, delay_s ...");
-  command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`")->capture_default_str();
+  command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`").shows_default();
   command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(2);
+      .finite_number()
+      .delimiter(',')
+      .expected(2);
 }
 
-void add_result_options(CLI::App& command, ServoOptions& options) {
+void add_result_options(Command command, ServoOptions& options) {
   command.add_option("--out", options.out,
                      std::string("Folder for log.csv, rig.yaml and controller.yaml") + OutputFolder::help);
   command.add_flag("--force", options.force, OutputFolder::force_help);
@@ -260,7 +260,7 @@ void add_result_options(CLI::App& command, ServoOptions& options) {
   add_web_options(command, options.web);
 }
 
-void add_replay_options(CLI::App& command, ServoOptions& options) {
+void add_replay_options(Command command, ServoOptions& options) {
   command.add_option(
       "--replay", options.replay,
       "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2: decide on the "
@@ -269,38 +269,36 @@ void add_replay_options(CLI::App& command, ServoOptions& options) {
   add_joint_topic_option(command, options.joint_topic);
 }
 
-void add_simulator_options(CLI::App& command, ServoOptions& options) {
+void add_simulator_options(Command command, ServoOptions& options) {
   command.add_option("--start", options.start, "sim: measured joints to start from, theta,phi,rho,psi; else random")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(4);
-  command.add_option("--seed", options.seed, "sim: of start, tissue, noise, jitter")
-      ->capture_default_str()
-      ->check(seed_number());
+      .finite_number()
+      .delimiter(',')
+      .expected(4);
+  command.add_option("--seed", options.seed, "sim: of start, tissue, noise, jitter").shows_default().seed_number();
   command.add_option("--latency-ms", options.latency_ms, "sim: from exposure to arrival")
-      ->capture_default_str()
-      ->check(number_between(0.0, 1000.0));
+      .shows_default()
+      .number_between(0.0, 1000.0);
   command
       .add_option("--fps", options.fps,
                   "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
-      ->check(number_between(6.0, 500.0));
+      .number_between(6.0, 500.0);
   command
       .add_option("--registration-error", options.registration_error,
                   "sim: x,y,z: the true RCM lies by so many mm, in the camera's frame, beside the rig's")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(3);
+      .finite_number()
+      .delimiter(',')
+      .expected(3);
   command.add_option("--hide", options.hide, "sim: cover the marker from,to seconds")
-      ->check(finite_number())
-      ->delimiter(',')
-      ->expected(2);
+      .finite_number()
+      .delimiter(',')
+      .expected(2);
 }
 
 }  // namespace
 
-void add_servo(CLI::App& app, Run& run_later) {
+void add_servo(Command app, Run& run_later) {
   auto options = std::make_shared<ServoOptions>();
-  CLI::App& command = *app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
+  Command command = app.add_subcommand("servo", "Steer the instrument along a trajectory of image features.");
   add_arm_options(command, *options);
   add_trajectory_options(command, *options);
   add_control_options(command, *options);
@@ -317,7 +315,7 @@ void add_servo(CLI::App& app, Run& run_later) {
       "  lapservo servo --rig configs/paper.yaml --robot ros2:PSM1 --camera /dev/video0 --web\n"
       "  lapservo servo --replay run/log.csv\n"
       "  lapservo servo --replay swing.bag --rig rig.yaml --out decided");
-  runs(command, run_later, [options] { return run(*options); });
+  command.runs(run_later, [options] { return run(*options); });
 }
 
 }  // namespace lapservo::app
