@@ -99,10 +99,11 @@ int main(int argc, char** argv) {
   RunConfig config;
   config.rig = rig;
   config.controller.window = image_window(rig.camera, 20);
-  config.controller.limits = JointLimits{.lower = {-1, 0.6, 0.03, -4},
-                                         .upper = {1, 2.5, 0.2, 4},
-                                         .rate = {0.4, 0.4, 0.04, 1.5},
-                                         .acceleration = {2, 2, 0.2, 7.5}};
+  config.arm_limits = JointLimits{.lower = {-1, 0.6, 0.03, -4},
+                                  .upper = {1, 2.5, 0.2, 4},
+                                  .rate = {0.4, 0.4, 0.04, 1.5},
+                                  .acceleration = {2, 2, 0.2, 7.5}};
+  config.controller.limits = *config.arm_limits;
   Supervisor supervisor(arm, clock);
   Operator person(arm, supervisor);
   run(supervisor, camera, clock, config, sinusoids(paper_sinusoids()), 10, person);
@@ -110,7 +111,7 @@ int main(int argc, char** argv) {
   const bool held = (moved.array().abs() < Eigen::Array4d(1e-4, 1e-4, 5e-5, 1e-4)).all();
   const bool converged = e[0] < 0.005 && e.tail<3>().maxCoeff() < 1;
   std::printf("%s; %s; largest errors in the last second: s %.2f mrad; r %.2f, l %.2f, d %.2f px\n",
-              held ? "held until the start" : "moved without a start", converged ? "converged" : "did not converge",
+              converged ? "converged" : "did not converge", held ? "held until the start" : "moved without a start",
               1000 * e[0], e[1], e[2], e[3]);
   return held && converged ? 0 : 1;
 }
