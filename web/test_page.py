@@ -253,6 +253,9 @@ def see_the_run_button(browser, tool, rig):
         "a network that is gone": (lambda: press_key("keyDown", " "), lambda: browser.connect(False)),
     }
     try:
+        browser.call("Page.navigate", url="about:blank")  # the page of the run before still asks
+        time.sleep(1)
+        browser.value("1")
         browser.complaints.clear()
         browser.call("Page.navigate", url=url)
         browser.resize(1280, 800)
