@@ -90,7 +90,7 @@ TEST(Ros2Transport, KnowsWhoReads) {
                                               "rt/PSM1/servo_jp", nullptr, nullptr);
   dds_create_reader(recorder->participant(), topic, nullptr, nullptr);
   EXPECT_TRUE(testing::wait_for([&] { return own.readers("/PSM1/servo_jp").size() == 2; }));
-  EXPECT_EQ(own.readers("/PSM1/servo_jp").begin()->find_first_not_of("0123456789abcdef/"), std::string::npos);
+  EXPECT_EQ(own.readers("/PSM1/servo_jp").rbegin()->find_first_not_of("0123456789abcdef"), std::string::npos);
   EXPECT_EQ(own.readers("/PSM2/servo_jp"), Names());
   first = second = nullptr;
 }
