@@ -35,7 +35,8 @@ class Ros2Messages : public BagMessages {
       const Part& part = parts_[next_++];
       const auto number = part.numbers.find({topic_.name, topic_.type});
       if (number == part.numbers.end()) continue;
-      rows_ = part.file.rows(fmt::format("SELECT data, timestamp FROM messages WHERE topic_id = {} ORDER BY id", number->second));
+      rows_ = part.file.rows(
+          fmt::format("SELECT data, timestamp FROM messages WHERE topic_id = {} ORDER BY id", number->second));
     }
     return decode_bag_message(
         topic_.type, []<typename Message>(const auto& bytes) { return decode_cdr<Message>(bytes); }, rows_->blob(0));

@@ -253,7 +253,7 @@ def see_the_run_button(browser, tool, rig):
         "a network that is gone": (lambda: press_key("keyDown", " "), lambda: browser.connect(False)),
     }
     try:
-        browser.call("Page.navigate", url="about:blank")  # the page of the run before still asks
+        browser.call("Page.navigate", url="about:blank")  # the page of the run before still polls
         time.sleep(1)
         browser.value("1")
         browser.complaints.clear()

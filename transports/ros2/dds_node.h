@@ -40,7 +40,7 @@ class DdsNode {
   void remove(dds_entity_t entity);
 
   /// Nodes of other participants that read what this one writes on a topic, each once, as in ROS; programs that are no
-  /// nodes by the beginning of their GUID. What was killed and started again counts once: it may be there for 20 s yet.
+  /// nodes by the beginning of their GUID. A killed node stays for up to 20 s and counts once with its successor.
   std::set<std::string> readers(const std::string& topic);
 
   /// Topics that other participants write, by their types; both as in ROS.

@@ -74,9 +74,11 @@ int run(const SimRobotOptions& options) {
   watch_for_interrupts();
   refuse_taken_name(*transport, config, options.arm);
   SimRobot robot(*transport, rig, simulator, config);
-  std::printf("arm %s, camera %s/image_raw and image_raw/compressed; lapservo servo --rig %s --robot %s:%s --camera %s:%s/image_raw ",
-              options.arm.c_str(), options.camera.c_str(), options.rig.c_str(), options.transport.c_str(),
-              options.arm.c_str(), options.transport.c_str(), options.camera.c_str());
+  std::printf(
+      "arm %s, camera %s/image_raw and image_raw/compressed; lapservo servo --rig %s --robot %s:%s --camera "
+      "%s:%s/image_raw ",
+      options.arm.c_str(), options.camera.c_str(), options.rig.c_str(), options.transport.c_str(), options.arm.c_str(),
+      options.transport.c_str(), options.camera.c_str());
   std::printf("--enable-motion moves it, Ctrl-C ends this\n");
   std::fflush(stdout);
   SteadyClock clock;
