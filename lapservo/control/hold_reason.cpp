@@ -6,7 +6,7 @@ namespace lapservo {
 using namespace internal;
 namespace {
 
-constexpr Words<HoldReason, 18> reason_words{{{HoldReason::none, "none"},
+constexpr Words<HoldReason, 19> reason_words{{{HoldReason::none, "none"},
                                               {HoldReason::no_image_yet, "no_image_yet"},
                                               {HoldReason::marker_lost, "marker_lost"},
                                               {HoldReason::stale_image, "stale_image"},
@@ -14,6 +14,7 @@ constexpr Words<HoldReason, 18> reason_words{{{HoldReason::none, "none"},
                                               {HoldReason::wild_joints, "wild_joints"},
                                               {HoldReason::endoscope_moved, "endoscope_moved"},
                                               {HoldReason::endoscope_measured, "endoscope_measured"},
+                                              {HoldReason::wrong_rig, "wrong_rig"},
                                               {HoldReason::outlier, "outlier"},
                                               {HoldReason::no_history, "no_history"},
                                               {HoldReason::psi_contradicted, "psi_contradicted"},

@@ -14,6 +14,7 @@ enum class HoldReason {
   wild_joints,         ///< measured joints that no arm can have come to since the last ones
   endoscope_moved,     ///< the shaft misses the RCM all of a sudden: the operator's motion is to show where it is now
   endoscope_measured,  ///< it did; goes on after the operator's start
+  wrong_rig,           ///< joints and images have disagreed from the start: ServoDecision::wrong_rig
   outlier,             ///< the latest image contradicts the measured joints and the images before
   no_history,          ///< the image is older than the measured joints
   psi_contradicted,    ///< the image shows the instrument turned farther from measured psi than max_offset allows

@@ -18,7 +18,7 @@ const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
 // Offsets from so long ago are those of before the endoscope began to move.
 constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
 
-constexpr std::size_t min_images = 30, max_images = 200;
+constexpr std::size_t min_images = 30, max_images = 200, max_compared = 40, explained_again_after = 2;
 
 // Sightings differ by one of these at least (rad, m), however fast the camera and slow the operator is.
 const Eigen::Vector4d min_motion(3e-3, 3e-3, 2e-4, 8e-3);
@@ -32,18 +32,20 @@ Eigen::Matrix<double, 8, 1> edges_of(const ImageMeasurement& image) {
   return edges;
 }
 
-bool moved(const MarkerSighting& from, const MarkerSighting& to) {
+template <class Sighting>
+bool moved(const Sighting& from, const Sighting& to) {
   return ((to.q - from.q).array().abs() >= min_motion.array()).any();
 }
 
 // The last one is always the newest, so that what an endoscope does while the instrument rests leaves one sighting
 // only. Where there are many, half of them are enough to go on with.
-void add(std::vector<MarkerSighting>& sightings, const MarkerSighting& seen) {
+template <class Sighting>
+void add(std::vector<Sighting>& sightings, const Sighting& seen, std::size_t most) {
   const std::size_t count = sightings.size();
   if (count >= 2 && !moved(sightings[count - 2], seen)) sightings.pop_back();
-  if (sightings.size() == max_images) {
+  if (sightings.size() == most) {
     std::size_t kept = 0;
-    for (std::size_t k = 0; k < max_images; k += 2) sightings[kept++] = sightings[k];
+    for (std::size_t k = 0; k < most; k += 2) sightings[kept++] = sightings[k];
     sightings.resize(kept);
   }
   sightings.push_back(seen);
@@ -69,8 +71,34 @@ void EndoscopeRecovery::see(const ServoInput& input, VisualController& controlle
   if (!image) return;
   if (!image->found && !image->marker) return drop_suspicion(controller);
   // An image that repeats is no moved endoscope: that would show another one.
-  if (!follow_joints(*image, controller) || !image->found || image->repetition != Repetition::none) return;
+  if (!follow_joints(*image, controller) || image->repetition != Repetition::none) return;
+  collect(*image, controller);
+  if (!image->found) return;
   if (auto* watching = std::get_if<Watching>(&state_)) watch(*watching, *image, controller);
+}
+
+void EndoscopeRecovery::collect(const ImageMeasurement& image, VisualController& controller) {
+  if (!image.marker || !sees_from_start_) return;
+  const Rigid3 camera_from_marker{image.marker->rotation, image.marker->position_m};
+  add(seen_, JointsAndMarker{image.time_s, measured_->q, measured_->rate, camera_from_marker}, max_compared);
+  // The operator's motion may show which number it is.
+  if (const auto why = wrong_rig(); why && why->cause == Explanation::Cause::rig && seen_.size() >= explain_at_)
+    blames_rig(controller, true);
+}
+
+// Whether the rig was wrong from the start, by a number that is `named`.
+bool EndoscopeRecovery::blames_rig(VisualController& controller, bool named) {
+  const Explanation why = explain_disagreement(seen_, instrument());
+  explain_at_ = std::min(max_compared, explained_again_after * seen_.size());
+  if (!why.is_of_the_rig() || (named && why.cause == Explanation::Cause::rig)) return false;
+  state_ = WrongRig{why};
+  controller.suspend(HoldReason::wrong_rig);
+  return true;
+}
+
+std::optional<Explanation> EndoscopeRecovery::wrong_rig() const {
+  const auto* wrong = std::get_if<WrongRig>(&state_);
+  return wrong ? std::optional(wrong->why) : std::nullopt;
 }
 
 // Without a marker there would be nothing to measure with.
@@ -80,7 +108,8 @@ void EndoscopeRecovery::watch(Watching& watching, const ImageMeasurement& image,
   watching.contradicting = contradicts ? watching.contradicting + 1 : 0;
   if (!contradicts && !(moves && image.marker)) return drop_suspicion(controller);
   if (agreeing_ < agreed_after) return;
-  if (watching.contradicting >= moved_after) return notice(watching, controller);
+  if (watching.contradicting >= moved_after)
+    return blames_rig(controller, false) ? void() : notice(watching, controller);
   watching.suspects = true;
   controller.suspend(HoldReason::endoscope_moved);
 }
@@ -104,11 +133,15 @@ bool EndoscopeRecovery::stepped(const ImageMeasurement& image, bool delay_is_kno
 }
 
 void EndoscopeRecovery::doubt(HoldReason reason, VisualController& controller) {
+  const bool watches = std::holds_alternative<Watching>(state_);
+  if (reason == HoldReason::psi_contradicted && watches && seen_.size() >= explain_at_) blames_rig(controller, true);
   if (reason != HoldReason::wild_joints && reason != HoldReason::frozen_image) return;
+  seen_.clear();
+  sees_from_start_ = false;
   agreeing_ = 0;
   drop_suspicion(controller);
   auto* watching = std::get_if<Watching>(&state_);
-  if (!watching) return measure(controller);
+  if (!watching) return wrong_rig() ? void() : measure(controller);
   if (reason == HoldReason::wild_joints) watching->offsets.clear();
 }
 
@@ -147,7 +180,8 @@ void EndoscopeRecovery::follow(const ServoInput& input, const ControlStep& step,
   if (!input.image || input.image->repetition != Repetition::none) return;
   const auto seen = sighting_of(*input.image);
   if (!seen) return;
-  if (auto* waiting = std::get_if<WaitingForStart>(&state_)) return add(waiting->sightings, *seen);
+  if (wrong_rig()) return;
+  if (auto* waiting = std::get_if<WaitingForStart>(&state_)) return add(waiting->sightings, *seen, max_images);
   wait_for_motion(std::get<WaitingForMotion>(state_), *seen, controller);
 }
 
@@ -202,7 +236,7 @@ std::optional<MarkerSighting> EndoscopeRecovery::sighting_of(const ImageMeasurem
 void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerSighting& seen,
                                         VisualController& controller) {
   Sightings& sightings = waiting.sightings;
-  add(sightings, seen);
+  add(sightings, seen, max_images);
   if (sightings.size() < waiting.fit_at) return;
   const auto found = fit(sightings);
   const bool contradicts = found && contradicts_itself(*found);
@@ -210,6 +244,7 @@ void EndoscopeRecovery::wait_for_motion(WaitingForMotion& waiting, const MarkerS
     state_ = WaitingForStart{std::move(sightings)};
     return controller.suspend(HoldReason::endoscope_measured);
   }
+  if ((!found || contradicts) && blames_rig(controller, false)) return;
   // The endoscope moved once more: the newer ones may all be of where it is now.
   if (contradicts) sightings.erase(sightings.begin(), sightings.begin() + static_cast<long>(sightings.size() / 2));
   waiting.fit_at = std::clamp(sightings.size() * 3 / 2, min_images, max_images);
@@ -225,7 +260,9 @@ void EndoscopeRecovery::start(const WaitingForStart& waiting, VisualController& 
   if (!found || contradicts_itself(*found)) return measure(controller);
   state_ = Watching{};
   agreeing_ = agreed_after;
-  camera_from_rcm_ = found->camera_from_rcm;
+  camera_from_rcm_ = rig_.instruments[0].camera_from_rcm = found->camera_from_rcm;
+  seen_.clear();
+  sees_from_start_ = true;
   ++registration_;
   controller.resume(feature_model(rig_, found->camera_from_rcm));
 }

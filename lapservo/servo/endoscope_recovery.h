@@ -10,6 +10,7 @@
 
 #include "lapservo/control/visual_controller.h"
 #include "lapservo/rig/rig.h"
+#include "lapservo/servo/disagreement.h"
 #include "lapservo/servo/offset_steps.h"
 #include "lapservo/servo/registration_fit.h"
 #include "lapservo/servo/servo_decision.h"
@@ -44,13 +45,17 @@ struct WaitingForMotion {
 struct WaitingForStart {
   Sightings sightings;
 };
+struct WrongRig {
+  Explanation why;
+};
 
 }  // namespace endoscope
 
 /// Notices that the endoscope moved, and measures camera_from_rcm anew. Noticed is that images which showed q, in
 /// agreement with the joints, show the marker as well as before but nowhere where its shaft passes the RCM, or where
 /// the joints are not: not what hides a marker, freezes an image, sets an encoder or blocks a joint does. From then on
-/// the arm is the operator's. Images and measured joints of the motion that the operator makes give camera_from_rcm;
+/// the arm is the operator's. A rig that was wrong from the start (explain_disagreement()) is no moved endoscope: the
+/// arm is held for good. Images and measured joints of the motion that the operator makes give camera_from_rcm;
 /// the loop goes by it after JointState::started, unless the newest image contradicts it.
 class EndoscopeRecovery {
  public:
@@ -59,8 +64,11 @@ class EndoscopeRecovery {
   /// The registration that images are to be tracked with from now on: only those that were count.
   int registration() const { return registration_; }
   const std::optional<Rigid3>& camera_from_rcm() const { return camera_from_rcm_; }
-  /// The endoscope moved and nobody has said start since: nothing may be sent to the arm.
+  /// The endoscope moved and nobody has said start since, or the rig is wrong: nothing may be sent to the arm.
   bool moved() const { return !std::holds_alternative<Watching>(state_); }
+  /// The wrong part of the rig, where joints and images have disagreed from the start: then nothing is measured anew.
+  std::optional<Explanation> wrong_rig() const;
+  const Instrument& instrument() const { return rig_.instruments[0]; }
 
   /// Before a step: its input. Suspends the controller, and resumes it.
   void see(const ServoInput& input, VisualController& controller);
@@ -74,7 +82,10 @@ class EndoscopeRecovery {
   using Watching = endoscope::Watching;
   using WaitingForMotion = endoscope::WaitingForMotion;
   using WaitingForStart = endoscope::WaitingForStart;
+  using WrongRig = endoscope::WrongRig;
 
+  void collect(const ImageMeasurement& image, VisualController& controller);
+  bool blames_rig(VisualController& controller, bool named);
   bool jumped(const Watching& watching, const Eigen::Vector4d& q_seen) const;
   bool stepped(const ImageMeasurement& image, bool delay_is_known);
   void watch(Watching& watching, const ImageMeasurement& image, VisualController& controller);
@@ -93,7 +104,10 @@ class EndoscopeRecovery {
   Rig rig_;
   int registration_ = 0;
   std::optional<Rigid3> camera_from_rcm_;
-  std::variant<Watching, WaitingForMotion, WaitingForStart> state_;
+  std::variant<Watching, WaitingForMotion, WaitingForStart, WrongRig> state_;
+  std::vector<JointsAndMarker> seen_;            ///< since the loop has gone by this registration
+  bool sees_from_start_ = true;                  ///< nothing but that made joints or images doubtful since then
+  std::size_t explain_at_ = 0;                   ///< so many
   int agreeing_ = 0;                             ///< images so far, at most 10
   std::optional<endoscope::Measured> measured_;  ///< at the latest image
   OffsetSteps steps_;                            ///< of images that showed q

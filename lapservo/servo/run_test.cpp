@@ -1,9 +1,11 @@
 #include "lapservo/servo/run.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -25,6 +27,7 @@
 #include "lapservo/servo/image_window.h"
 #include "lapservo/servo/replay.h"
 #include "lapservo/servo/servo_log.h"
+#include "lapservo/sim/arm.h"
 #include "lapservo/sim/simulator.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/rigs.h"
@@ -699,6 +702,70 @@ TEST(Run, NeedsTheLimitsOfAnArmThatIsNotSimulated) {
   EXPECT_EQ(complaint(), "RunConfig: arm_limits: is missing, expected the limits of the arm's joints");
   config.arm_limits.emplace();
   EXPECT_EQ(complaint(), "");
+}
+
+// An arm whose joints a rig reads with other signs and offsets: its q is sign * q + offset.
+class MisreadArm : public SimulatedArm {
+ public:
+  MisreadArm(const Eigen::Vector4d& sign, const Eigen::Vector4d& offset, const Eigen::Vector4d& q)
+      : sign_(sign), offset_(offset), arm_(ArmConfig{}, q) {}
+  void servo_jp(const Eigen::Vector4d& setpoint) override { arm_.servo_jp(sign_.cwiseProduct(setpoint - offset_)); }
+  void step(double dt_s) override { arm_.step(dt_s); }
+  Eigen::Vector4d measured_jp() const override { return sign_.cwiseProduct(arm_.measured_jp()) + offset_; }
+  Eigen::Vector4d true_jp() const override { return arm_.true_jp(); }
+  bool faulted() const override { return arm_.faulted(); }
+  void fault() override { arm_.fault(); }
+  void recover() override { arm_.recover(); }
+
+ private:
+  Eigen::Vector4d sign_, offset_;
+  Arm arm_;
+};
+
+struct Misread {
+  Eigen::Vector4d sign = Eigen::Vector4d::Ones(), offset = Eigen::Vector4d::Zero();
+  Eigen::Quaterniond turned = Eigen::Quaterniond::Identity();  ///< camera_from_rcm in the rig
+  double duration_s = 6;
+};
+
+// Held, and the operator swings the joints of the released arm.
+std::string wrong_rig_of(const Misread& misread) {
+  const Rig rig = testing::small_test_rig();
+  RunConfig config = config_of(rig, {});
+  Rigid3& believed = *config.rig.instruments[0].camera_from_rcm;
+  believed.rotation = misread.turned * believed.rotation;
+  config.controller.limits.lower.setConstant(-7), config.controller.limits.upper.setConstant(7);
+  Simulator simulator(
+      rig, {}, std::make_unique<MisreadArm>(misread.sign, misread.offset, Eigen::Vector4d(0.05, 1.57, 0.064, 1.2)));
+  OperatedArm arm(simulator);
+  Watcher watcher({}, rig, simulator, &arm);
+  run(arm, simulator, simulator, config, small_trajectory(), misread.duration_s, watcher);
+  const ServoDecision& last = watcher.done.records.back().decision;
+  for (const Record& record : watcher.done.records) {
+    EXPECT_NE(record.decision.control.reason, HoldReason::endoscope_measured) << record.input.time_s;
+    EXPECT_FALSE(record.decision.send && !record.decision.wrong_rig.empty()) << record.input.time_s;
+  }
+  EXPECT_EQ(last.control.reason == HoldReason::wrong_rig, !last.wrong_rig.empty());
+  return last.wrong_rig.empty() ? std::string(to_string(last.control.reason)) : last.wrong_rig;
+}
+
+TEST(Run, NamesWhatOfTheRigWasWrongFromTheStart) {
+  const std::array<std::string, 4> names{"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"};
+  constexpr std::array mirrored_s{1.0, 5.5, 3.0, 2.0};
+  const std::string remedy = " is wrong: run lapservo calibrate registration";
+  const Eigen::Vector4d start(0.05, 1.57, 0.064, 1.2), shift(-0.8, 0.7, 0.06, 1.5);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto joint = static_cast<Eigen::Index>(k);
+    Misread mirrored, shifted;
+    mirrored.sign[joint] = -1, mirrored.offset[joint] = 2 * start[joint], mirrored.duration_s = mirrored_s[k];
+    shifted.offset[joint] = shift[joint];
+    EXPECT_EQ(wrong_rig_of(mirrored), "joints.sign of " + names[k] + remedy);
+    // Where psi does not agree nothing moves that would distinguish its sign from its offset.
+    EXPECT_EQ(wrong_rig_of(shifted), k == 3 ? "psi_contradicted" : "joints.offset of " + names[k] + remedy);
+  }
+  Misread turned;
+  turned.turned = rotation_by({0.3, 0.4, -0.3});
+  EXPECT_EQ(wrong_rig_of(turned), "camera_from_rcm" + remedy);
 }
 
 // Its joints carry the times of another clock.

@@ -38,6 +38,7 @@ ServoDecision Servo::step(const ServoInput& input) {
   recovery_->follow(counted, decision.control, controller_);
   decision.registration = recovery_->registration();
   decision.camera_from_rcm = recovery_->camera_from_rcm();
+  if (const auto why = recovery_->wrong_rig()) decision.wrong_rig = why->text(recovery_->instrument());
   return decision;
 }
 

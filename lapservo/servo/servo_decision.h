@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "lapservo/control/control_step.h"
@@ -31,7 +32,10 @@ struct ServoDecision {
   int registration = 0;
   std::optional<Rigid3> camera_from_rcm;  ///< nullopt until that start, and where the rig has none
   bool release = false;                   ///< until that start the arm is the operator's: Robot::release()
-  bool send = false;                      ///< the arm is to follow path(); else it is left alone and holds by itself
+  /// With HoldReason::wrong_rig: what of the rig explains best that joints and images have disagreed from the start,
+  /// and the remedy, in one line. Else empty.
+  std::string wrong_rig;
+  bool send = false;  ///< the arm is to follow path(); else it is left alone and holds by itself
 };
 
 }  // namespace lapservo

@@ -330,6 +330,9 @@ void bind_tick(py::module_& m) {
           "delay_s", [](const Tick& self) { return self.step().delay_s; }, "of the images, estimated")
       .def_property_readonly("registration_contradicted",
                              [](const Tick& self) { return self.tick.decision.registration_contradicted; })
+      .def_property_readonly(
+          "wrong_rig", [](const Tick& self) { return self.tick.decision.wrong_rig; },
+          "With hold_reason 'wrong_rig': what of the rig is wrong, and the remedy; else empty")
       .def_property_readonly("sent", [](const Tick& self) { return self.tick.decision.send; })
       .def_property_readonly(
           "image",

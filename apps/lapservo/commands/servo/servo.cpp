@@ -69,7 +69,7 @@ class Watcher : public RunObserver {
 
   bool on_tick(const ControlTick& tick) override {
     const InstrumentTruth truth = truth_at(true_model_, simulator_.true_q());
-    const std::string state = state_text(tick.decision.control, arm_);
+    const std::string state = state_text(tick.decision, arm_);
     summary_.add(tick, truth, block_of(arm_));
     if (folder_) folder_->add(tick, truth);
     progress_->show(++done_, fmt::format(" ({})", to_string(tick.decision.control.action)));

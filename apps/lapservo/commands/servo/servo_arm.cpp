@@ -77,7 +77,7 @@ class ArmWatcher : public RunObserver {
       said_motions_ = motions.size();
     }
     if (folder_) folder_->add(tick, std::nullopt);
-    say_state(time_s, state_text(tick.decision.control, arm_));
+    say_state(time_s, state_text(tick.decision, arm_));
     say_images(time_s);
     topics_.publish(tick, state_ == to_string(ControlAction::track) ? "" : state_);
     obey(topics_.wishes(), tick, time_s);

@@ -33,9 +33,9 @@ InputFiles inputs_of(const ServoOptions& options, const Rig& rig) {
   return inputs;
 }
 
-std::string reason_text(HoldReason reason) {
-  const std::string_view part = operators_part(reason);
-  return std::string(to_string(reason)) + (part.empty() ? "" : fmt::format(" ({})", part));
+std::string reason_text(const ServoDecision& decision) {
+  const std::string_view part = operators_part(decision);
+  return std::string(to_string(decision.control.reason)) + (part.empty() ? "" : fmt::format(" ({})", part));
 }
 
 }  // namespace
@@ -45,7 +45,9 @@ void say(double time_s, const std::string& what) {
   std::fflush(stdout);
 }
 
-std::string_view operators_part(HoldReason reason) {
+std::string_view operators_part(const ServoDecision& decision) {
+  const HoldReason reason = decision.control.reason;
+  if (reason == HoldReason::wrong_rig) return decision.wrong_rig;
   if (reason == HoldReason::endoscope_moved)
     return "move the instrument, by hand or teleoperation, until endoscope_measured";
   if (reason == HoldReason::endoscope_measured) return "start goes on";
@@ -56,14 +58,14 @@ std::string block_of(const Supervisor& arm) {
   return arm.armed() ? "" : std::string(to_string(arm.blocked()));
 }
 
-std::string state_text(const ControlStep& control) {
-  const std::string action(to_string(control.action));
-  return control.reason == HoldReason::none ? action : action + ": " + reason_text(control.reason);
+std::string state_text(const ServoDecision& decision) {
+  const std::string action(to_string(decision.control.action));
+  return decision.control.reason == HoldReason::none ? action : action + ": " + reason_text(decision);
 }
 
-std::string state_text(const ControlStep& control, const Supervisor& arm) {
-  // Whatever else holds the arm meanwhile, the endoscope is the operator's part.
-  return arm.armed() || !operators_part(control.reason).empty() ? state_text(control) : arm.text();
+std::string state_text(const ServoDecision& decision, const Supervisor& arm) {
+  // Whatever else holds the arm meanwhile, this is the operator's part.
+  return arm.armed() || !operators_part(decision).empty() ? state_text(decision) : arm.text();
 }
 
 RunFolder::RunFolder(const ServoOptions& options, double duration_s, const Rig& rig, const ControllerConfig& controller,
@@ -118,7 +120,7 @@ void Summary::add(const ControlTick& tick, const std::optional<InstrumentTruth>&
   const bool holds = control.action == ControlAction::hold;
   const bool blocked = control.reason == HoldReason::arm_not_enabled && !block.empty();
   if (holds) ++held_[blocked ? block : std::string(to_string(control.reason))];
-  held_at_end_ = holds ? std::optional(blocked ? block : reason_text(control.reason)) : std::nullopt;
+  held_at_end_ = holds ? std::optional(blocked ? block : reason_text(tick.decision)) : std::nullopt;
   Eigen::Vector4d error = control.error;
   if (truth && truth->features) {
     error = feature_error(*truth->features, tick.input.desired.features);

@@ -17,12 +17,12 @@ namespace lapservo::app {
 /// A line of a run's, at once.
 void say(double time_s, const std::string& what);
 /// The operator's action that ends a hold for that reason; empty where it ends by itself.
-std::string_view operators_part(HoldReason reason);
+std::string_view operators_part(const ServoDecision& decision);
 /// "track", "hold: marker_lost", "hold: endoscope_measured (...)" with the operator's part: the words of page, terminal
 /// and window.
-std::string state_text(const ControlStep& control);
+std::string state_text(const ServoDecision& decision);
 /// The same, or why the arm is not moved.
-std::string state_text(const ControlStep& control, const Supervisor& arm);
+std::string state_text(const ServoDecision& decision, const Supervisor& arm);
 /// The word of Blocked for which the arm is not moved; empty while it is armed.
 std::string block_of(const Supervisor& arm);
 

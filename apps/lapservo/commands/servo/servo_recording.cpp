@@ -98,7 +98,7 @@ class RecordingWatcher : public RunObserver {
     summary_.add(tick, std::nullopt);
     if (folder_) folder_->add(tick, std::nullopt);
     acted_ |= tick.decision.control.action != ControlAction::hold;
-    if (const std::string state = state_text(tick.decision.control); state != state_) {
+    if (const std::string state = state_text(tick.decision); state != state_) {
       state_ = state;
       progress_.clear();
       say(duration_s_, state);

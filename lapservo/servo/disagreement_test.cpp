@@ -1,0 +1,115 @@
+#include "lapservo/servo/disagreement.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/random.h"
+#include "lapservo/geometry/rotation.h"
+#include "lapservo/kinematics/rcm_kinematics.h"
+#include "lapservo/testing/rigs.h"
+
+namespace lapservo::internal {
+namespace {
+
+using Cause = Explanation::Cause;
+
+// Joints on their way and what the camera sees of the instrument, 20 a second.
+struct World {
+  Eigen::Vector4d sign = Eigen::Vector4d::Ones(), offset = Eigen::Vector4d::Zero();  ///< of the joints as they are read
+  Rigid3 rcm_from_true_rcm;                                                          ///< of camera_from_rcm
+  double moves_s = 1e9, moves_for_s = 0;
+  Eigen::Vector3d moves_m{0.006, -0.004, 0.008};
+  Eigen::Vector4d swing{0.12, 0.1, 0.012, 0.5};
+  double duration_s = 3;
+};
+
+const Instrument& instrument() {
+  static const Rig rig = testing::paper_test_rig();
+  return rig.instruments[0];
+}
+
+std::vector<JointsAndMarker> seen_in(const World& world) {
+  Random random(3);
+  std::vector<JointsAndMarker> seen;
+  const Eigen::Vector4d from(0.05, 1.57, 0.064, 1.2), speed(1.1, 0.8, 1.4, 0.9);
+  const Eigen::Vector4d usual(0.02, -0.02, 0.002, 0.03);  // of a usable rig
+  for (double t = 0; t < world.duration_s; t += 0.05) {
+    const Eigen::Vector4d phase = t * speed, wave = phase.array().sin(), slope = phase.array().cos();
+    const Eigen::Vector4d q = from + world.swing.cwiseProduct(wave);
+    JointsAndMarker one;
+    one.time_s = t;
+    one.q = world.sign.cwiseProduct(q - from) + from + world.offset;
+    one.rate = world.sign.cwiseProduct(world.swing).cwiseProduct(speed).cwiseProduct(slope);
+    const Eigen::Vector4d then = q - 0.05 * world.swing.cwiseProduct(speed).cwiseProduct(slope) + usual;
+    const double moved = world.moves_for_s > 0 ? std::clamp((t - world.moves_s) / world.moves_for_s, 0.0, 1.0)
+                                               : static_cast<double>(t >= world.moves_s);
+    Rigid3 camera_from_rcm = *instrument().camera_from_rcm * world.rcm_from_true_rcm;
+    camera_from_rcm.translation += moved * world.moves_m;
+    const Rigid3 unrolled = camera_from_rcm * rcm_from_unrolled(JointVector::from_vector(then));
+    one.camera_from_marker = camera_from_marker(instrument().marker, unrolled, then[3]);
+    one.camera_from_marker.translation += 1e-4 * Eigen::Vector3d(random.normal(), random.normal(), 4 * random.normal());
+    const Eigen::Vector3d turned(random.normal(), random.normal(), random.normal());
+    one.camera_from_marker.rotation = rotation_by(3e-3 * turned) * one.camera_from_marker.rotation;
+    seen.push_back(one);
+  }
+  return seen;
+}
+
+Explanation explanation_of(const World& world) {
+  return explain_disagreement(seen_in(world), instrument());
+}
+
+TEST(Disagreement, IsNoneWhereTheRigIsUsable) {
+  EXPECT_EQ(explanation_of({}).cause, Cause::none);
+}
+
+TEST(Disagreement, NamesEachJointsSignAndOffset) {
+  for (int joint = 0; joint < 4; ++joint) {
+    SCOPED_TRACE(joint);
+    World mirrored, shifted;
+    mirrored.sign[joint] = -1;
+    const Explanation sign = explanation_of(mirrored);
+    EXPECT_EQ(sign.cause, Cause::sign);
+    EXPECT_EQ(sign.joint, joint);
+    EXPECT_NE(sign.text(instrument()).find("lapservo calibrate registration"), std::string::npos);
+    mirrored.offset[joint] = joint == 2 ? 0.03 : -1.26;
+    EXPECT_EQ(explanation_of(mirrored).cause, Cause::sign);
+    for (const double times : {1.0, -2.0}) {
+      shifted.offset[joint] = times * (joint == 2 ? 0.03 : 0.6);
+      const Explanation offset = explanation_of(shifted);
+      EXPECT_EQ(offset.cause, Cause::offset);
+      EXPECT_EQ(offset.joint, joint);
+    }
+  }
+}
+
+TEST(Disagreement, NamesARegistrationThatWasWrongFromTheStart) {
+  World world;
+  world.rcm_from_true_rcm.translation = {0.012, -0.008, 0.005};
+  EXPECT_EQ(explanation_of(world).cause, Cause::registration);
+  world.rcm_from_true_rcm = {rotation_by({0.3, 0.4, -0.3}), Eigen::Vector3d::Zero()};
+  EXPECT_EQ(explanation_of(world).cause, Cause::registration);
+}
+
+TEST(Disagreement, IsAMovedEndoscopeWhereAllAgreedBefore) {
+  for (const double for_s : {0.0, 0.6}) {
+    World world;
+    world.moves_s = 2, world.moves_for_s = for_s;
+    EXPECT_EQ(explanation_of(world).cause, Cause::moved) << for_s;
+  }
+}
+
+// Nothing moved: a wrong sign looks like a wrong offset.
+TEST(Disagreement, IsNotToldApartWhereTheDataDoNotTell) {
+  World world;
+  world.swing.setZero();
+  world.offset[1] = 0.6;
+  const Explanation still = explanation_of(world);
+  EXPECT_EQ(still.cause, Cause::rig);
+  EXPECT_NE(still.text(instrument()).find("does not show which"), std::string::npos);
+  EXPECT_EQ(explain_disagreement({}, instrument()).cause, Cause::unknown);
+}
+
+}  // namespace
+}  // namespace lapservo::internal
