@@ -263,8 +263,8 @@ int steer_arm(const ServoOptions& options) {
     std::fprintf(stderr, "lapservo: %s\n", missing.c_str());
     return 1;
   }
-  if (const std::string missing = robot.not_granted(); options.enable_motion && !missing.empty())
-    std::printf("setpoints leave without %s, see docs/ros.md\n", missing.c_str());
+  if (const std::string not_granted = robot.not_granted(); options.enable_motion && !not_granted.empty())
+    std::printf("setpoints leave without %s, see docs/ros.md\n", not_granted.c_str());
   std::optional<RunFolder> folder;
   if (!options.out.empty()) folder.emplace(options, duration_s(options), rig, config.controller);
 
