@@ -627,7 +627,9 @@ TEST_P(WireLoop, MovesOnlyWhileTheOperatorPressesAPedalOfEitherType) {
          joy({now_s(), {pressed}});
        }},
       {"/operator_present", [&](bool pressed) { button({pressed}); }}};
-  for (const auto& [topic, press] : pedals) {
+  for (const auto& pedal : pedals) {
+    const auto& topic = pedal.first;
+    const auto& press = pedal.second;
     SCOPED_TRACE(topic);
     Spy spy(*ears);
     const auto loop = servo(600, "servo.txt", true, {"--operator-present", topic});
