@@ -645,6 +645,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   expect_in(errors(), "/PSM1/measured_js");
   // An arm's clock that is wrong changes no decision.
   for (const double off_s : {-7.5, 2.0}) {
+    fs::remove_all("in/run");
     write_bags_of("swing", fps, CsvTable::read("in/joints.csv"), off_s);
     expect_done(decide + "out/rig.yaml --force --out out/decided");
     expect_in(output(), off_s < 0 ? "the arm's clock is 7.50 s behind the camera's" : "2.00 s ahead of the camera's");

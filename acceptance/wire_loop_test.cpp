@@ -697,7 +697,8 @@ TEST_P(FirstWireLoop, MovesOnlyWhileThePagesButtonIsPressed) {
     EXPECT_FALSE(spy.moves_after(released_s + silent_s + allowed_s + rest_s));
     const std::size_t held = spy.count();
     start();  // without the button it is void, and the button without it does not move
-    for (int i = 0; i < 100; ++i) sleep(0.01), press();
+    sleep(0.3);
+    for (int i = 0; i < 100; ++i) press(), sleep(0.01);
     EXPECT_EQ(spy.count(), held);
   }
   loop->signal(SIGINT);

@@ -138,9 +138,14 @@ int replay_log(const ServoOptions& options) {
   if (!options.rig.empty())
     throw InputError("--rig", "is " + options.rig + ", expected none: the rig beside the log counts");
   const fs::path log = options.replay, folder = log.parent_path();
-  Rig rig = single_instrument(load_rig(folder / "rig.yaml"), (folder / "rig.yaml").string());
+  const std::string rig_file = (folder / "rig.yaml").string();
+  Rig rig = first_instrument(load_rig(rig_file), rig_file);
   const ControllerConfig controller = load_controller(folder / "controller.yaml", {});
-  if (controller.mode == ControlMode::uncalibrated) rig.instruments.front().camera_from_rcm.reset();  // not used
+  if (controller.mode == ControlMode::uncalibrated) {
+    rig.instruments.front().camera_from_rcm.reset();  // not used
+  } else {
+    rig = single_instrument(std::move(rig), rig_file);
+  }
   const auto ticks = read_servo_log(log);
   const auto difference = replay(ticks, rig, controller);
   if (!difference) {

@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -112,8 +114,10 @@ void forget_registration(RunConfig& run, const ServoOptions& options) {
 
 RunConfig run_config_of(const ServoOptions& options) {
   RunConfig run;
-  run.rig = single_instrument(load_rig(options.rig), options.rig);
+  run.rig = first_instrument(load_rig(options.rig), options.rig);
   run.controller = controller_of(options, run.rig);
+  if (options.robot == "sim" || run.controller.mode != ControlMode::uncalibrated)
+    run.rig = single_instrument(std::move(run.rig), options.rig);
   run.trajectory_name = trajectory_name(options);
   run.tracker.method = tracker_of(options, run.controller.mode);
   return run;
