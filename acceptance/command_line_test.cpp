@@ -651,10 +651,9 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
     expect_in(output(), off_s < 0 ? "the arm's clock is 7.50 s behind the camera's" : "2.00 s ahead of the camera's");
     const CsvTable log = CsvTable::read("out/decided/log.csv");
     ASSERT_EQ(log.rows(), decided.rows());
-    for (std::size_t row = 0; row < log.rows(); ++row)
-      EXPECT_EQ(log.text(row, "action") + log.text(row, "reason"),
-                decided.text(row, "action") + decided.text(row, "reason"))
-          << row;
+    for (std::size_t i = 0; i < log.rows(); ++i)
+      EXPECT_EQ(log.text(i, "action") + log.text(i, "reason"), decided.text(i, "action") + decided.text(i, "reason"))
+          << i;
   }
 #endif
 }
