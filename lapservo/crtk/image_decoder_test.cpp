@@ -57,44 +57,42 @@ std::array<std::uint8_t, 3> yuv_of(const cv::Vec3b& bgr, int rows) {
   return {byte(16 + 219 * y), byte(128 + 112 * (b - y) / (1 - kb)), byte(128 + 112 * (r - y) / (1 - kr))};
 }
 
-// A message of 8 columns, all of one colour.
-ImageMessage message_of_colour(const std::string& encoding, const cv::Vec3b& bgr, int rows) {
+// The cells of a row that repeat, how many pixels they are, and those of every second row.
+struct Pattern {
+  std::vector<std::uint8_t> cells;
+  std::size_t pixels = 1;
+  std::vector<std::uint8_t> below = cells;
+};
+
+Pattern pattern_of(const std::string& encoding, const cv::Vec3b& bgr, int rows) {
   const auto [y, u, v] = yuv_of(bgr, rows);
   const std::uint8_t b = bgr[0], g = bgr[1], r = bgr[2];
-  const auto bayer = [&](const char* letters) {
-    std::vector<std::uint8_t> cells;
-    for (int i = 0; i < 4; ++i) cells.push_back(letters[i] == 'r' ? r : letters[i] == 'g' ? g : b);
-    return cells;
-  };
-  const bool is_deep = encoding.find("16") != std::string::npos;
-  std::vector<std::uint8_t> pattern;  // of a row, repeated
-  std::vector<std::uint8_t> below;    // of every second row
   if (encoding.starts_with("bayer")) {
-    const std::vector<std::uint8_t> cells = bayer(encoding.substr(6, 4).c_str());
-    pattern = {cells[0], cells[1]}, below = {cells[2], cells[3]};
-  } else if (encoding == "yuv422" || encoding == "uyvy") {
-    pattern = {u, y, v, y};
-  } else if (encoding == "yuv422_yuy2" || encoding == "yuyv") {
-    pattern = {y, u, y, v};
-  } else if (encoding == "nv12") {
-    pattern = {y};
-  } else {
-    pattern = encoding.starts_with("rgb") ? std::vector<std::uint8_t>{r, g, b} : std::vector<std::uint8_t>{b, g, r};
-    if (encoding.find('a') != std::string::npos) pattern.push_back(255);
+    const auto cell = [&](std::size_t i) { return encoding[6 + i] == 'r' ? r : encoding[6 + i] == 'g' ? g : b; };
+    return {{cell(0), cell(1)}, 2, {cell(2), cell(3)}};
   }
-  if (below.empty()) below = pattern;
+  if (encoding == "yuv422" || encoding == "uyvy") return {{u, y, v, y}, 2};
+  if (encoding == "yuv422_yuy2" || encoding == "yuyv") return {{y, u, y, v}, 2};
+  if (encoding == "nv12") return {{y}};
+  std::vector<std::uint8_t> cells = encoding.starts_with("rgb") ? std::vector{r, g, b} : std::vector{b, g, r};
+  if (encoding.find('a') != std::string::npos) cells.push_back(255);
+  return {cells};
+}
+
+// A message of 8 columns, all of one colour.
+ImageMessage message_of_colour(const std::string& encoding, const cv::Vec3b& bgr, int rows) {
+  const Pattern pattern = pattern_of(encoding, bgr, rows);
+  const bool is_deep = encoding.find("16") != std::string::npos;
   ImageMessage message;
   message.width = 8, message.height = static_cast<std::uint32_t>(rows), message.encoding = encoding;
-  const std::size_t pixel_cells = encoding.starts_with("bayer") || encoding == "nv12"              ? 1
-                                  : pattern.size() == 4 && encoding.find('y') != std::string::npos ? 2
-                                                                                                   : pattern.size();
   for (int row = 0; row < rows; ++row)
-    for (std::size_t i = 0; i < 8 * pixel_cells; ++i) {
-      const auto& cells = row % 2 == 0 ? pattern : below;
-      if (is_deep) message.data.push_back(77);  // the lower byte
-      message.data.push_back(cells[i % cells.size()]);
-    }
+    for (std::size_t pixel = 0; pixel < 8; pixel += pattern.pixels)
+      for (const std::uint8_t cell : row % 2 == 0 ? pattern.cells : pattern.below) {
+        if (is_deep) message.data.push_back(77);  // the lower byte
+        message.data.push_back(cell);
+      }
   message.step = static_cast<std::uint32_t>(message.data.size() / rows);
+  const auto [y, u, v] = yuv_of(bgr, rows);
   if (encoding == "nv12")
     for (int i = 0; i < rows / 2 * 4; ++i) message.data.insert(message.data.end(), {u, v});
   return message;
