@@ -314,13 +314,7 @@ void add_record(Command app, Run& run_later) {
                   "Scale of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
       .shows_default()
       .number_between(0.05, 4);
-  command
-      .add_option(
-          "--setpoint-readers", options->setpoint_readers,
-          "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
-          "is not moved")
-      .shows_default()
-      .whole_number_between(1, 64);
+  add_setpoint_readers_option(command, options->setpoint_readers);
   command.add_option("--joint-limits", options->joint_limits,
                      "For --move: YAML of the arm's joints, between which they stay, for example "
                      "configs/joint_limits/psm-classic.yaml");

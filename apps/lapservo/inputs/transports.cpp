@@ -58,6 +58,16 @@ std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_
   throw InputError(option, "is " + transport + ", expected ros2 or ros1");
 }
 
+void add_setpoint_readers_option(Command command, int& setpoint_readers) {
+  command
+      .add_option(
+          "--setpoint-readers", setpoint_readers,
+          "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
+          "is not moved")
+      .shows_default()
+      .whole_number_between(1, 64);
+}
+
 void require_joint_limits(const std::string& option, const std::string& joint_limits) {
   if (joint_limits.empty())
     throw InputError(option,

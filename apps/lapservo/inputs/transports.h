@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "apps/lapservo/cli/command.h"
 #include "lapservo/crtk/transport.h"
 
 namespace lapservo::app {
@@ -20,6 +21,9 @@ Address address_of(const std::string& text, const std::string& option);
 /// Throws InputError for one that is unknown or that this build lacks.
 std::unique_ptr<internal::Transport> make_transport(const std::string& transport, const std::string& node_name,
                                                     const std::string& option);
+
+/// --setpoint-readers of the commands that move an arm.
+void add_setpoint_readers_option(Command command, int& setpoint_readers);
 
 /// Throws InputError, naming `option`, which moves an arm, when the file of the arm's limits is not given.
 void require_joint_limits(const std::string& option, const std::string& joint_limits);

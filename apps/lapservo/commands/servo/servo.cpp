@@ -19,6 +19,7 @@
 #include "apps/lapservo/commands/servo/servo_recording.h"
 #include "apps/lapservo/inputs/frame_input.h"
 #include "apps/lapservo/inputs/joint_input.h"
+#include "apps/lapservo/inputs/transports.h"
 #include "lapservo/control/random_start.h"
 #include "lapservo/core/error.h"
 #include "lapservo/core/random.h"
@@ -209,13 +210,7 @@ void add_arm_options(Command command, ServoOptions& options) {
       "--joint-limits", options.joint_limits,
       "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml; with --enable-motion "
       "needed");
-  command
-      .add_option(
-          "--setpoint-readers", options.setpoint_readers,
-          "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
-          "is not moved")
-      .shows_default()
-      .whole_number_between(1, 64);
+  add_setpoint_readers_option(command, options.setpoint_readers);
 }
 
 void add_trajectory_options(Command command, ServoOptions& options) {
