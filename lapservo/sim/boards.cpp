@@ -99,7 +99,7 @@ cv::Mat render_board(const BoardScene& scene, const Camera& camera, const Rigid3
     for (int v = 0; v < values.rows; ++v)
       for (int u = 0; u < values.cols; ++u) {
         const double from_lamp_px2 = (u - lamp_u) * (u - lamp_u) + (v - lamp_v) * (v - lamp_v);
-        const double lamp = 1 / (1 + 2 * from_lamp_px2 / (camera.width_px * camera.width_px));
+        const double lamp = 1 / (1 + scene.falloff * from_lamp_px2 / (camera.width_px * camera.width_px));
         const double reflected = scene.dark + (scene.bright - scene.dark) * parts.at<double>(v, u);
         const double light = scene.exposure * lamp * reflected;
         const double noise = scene.noise * std::sqrt(0.25 + 0.75 * light) * random.normal();

@@ -16,6 +16,7 @@ struct BoardScene {
   double square_m = 0.005;
   double bright = 0.8, dark = 0.04;  ///< reflectances
   double exposure = 0.9;             ///< light of a white board where the lamp is brightest
+  double falloff = 2;                ///< of the lamp: its light over that at the image's width beyond, less 1; 0: even
   double blur_px = 0.8;
   double noise = 0.006;  ///< of white's light; half of it in the dark
   double sharpening = 0, sharpening_px = 1.5;

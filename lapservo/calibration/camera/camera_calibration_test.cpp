@@ -138,6 +138,68 @@ TEST(CalibrateCamera, NamesAResponseThatHasAName) {
   }
 }
 
+// The largest difference of values from `low` to `high` after the exposure that makes it smallest.
+double difference_within(const Response& is, const Response& truth, double low, double high) {
+  double best = 1;
+  for (int i = -400; i <= 400; ++i) {
+    const double exposure = std::exp(5e-4 * i);
+    double most = 0;
+    for (int k = 0; k <= 40; ++k) {
+      const double value = low + (high - low) * k / 40;
+      most = std::max(most,
+                      std::abs(is.value_from_light(std::min(1.0, exposure * truth.light_from_value(value))) - value));
+    }
+    best = std::min(best, most);
+  }
+  return best;
+}
+
+struct ResponseCase {
+  double falloff, blur_px;  // of BoardScene
+  std::string name;
+  Response response;
+};
+
+// What boards give is within two sigmas, and named where the truth has a name. Prints it.
+void expect_response(const ResponseCase& c, int views, std::uint64_t seed) {
+  Camera camera = small_camera();
+  camera.response = c.response;
+  BoardScene scene;
+  scene.blur_px = c.blur_px, scene.falloff = c.falloff;
+  const CameraCalibration found = calibrate_camera(board, views_of(scene, camera, views, seed), {});
+  ASSERT_TRUE(found.response) << found.refusal;
+  const ResponseFit& fit = *found.response;
+  const bool named = fit.response.kind != Response::Kind::table;
+  const double error = difference_within(fit.response, c.response, fit.low, fit.high);
+  std::printf("%s light, blur %.1f px, %s: %s, error %.4f, sigma %.4f, error / sigma %.2f, misfit %.2f\n",
+              c.falloff > 0 ? "uneven" : "even", c.blur_px, c.name.c_str(), named ? fit.nearest.c_str() : "table",
+              error, fit.sigma, error / fit.sigma, fit.misfit[1]);
+  std::fflush(stdout);
+  EXPECT_LE(error, 2 * fit.sigma) << c.name;
+  EXPECT_EQ(named ? fit.nearest : "table", c.response.kind == Response::Kind::table ? "table" : c.name);
+}
+
+const std::vector<std::pair<std::string, Response>> responses{{"srgb", {}},
+                                                              {"rec709", {Response::Kind::rec709}},
+                                                              {"gamma:2.2", {Response::Kind::power, 2.2}},
+                                                              {"contrast 2", contrasty(2)},
+                                                              {"contrast 4", contrasty(4)},
+                                                              {"contrast 6", contrasty(6)}};
+
+// All for docs/notes/calibration.md: --gtest_also_run_disabled_tests --gtest_filter='*MeasuresResponses'.
+TEST(CalibrateCamera, DISABLED_MeasuresResponses) {
+  const auto seed = static_cast<std::uint64_t>(testing::from_environment("LAPSERVO_BOARD_SEED", 300));
+  for (const double falloff : {0.0, 2.0})
+    for (const double blur_px : {1.6, 1.2, 0.8, 0.4})
+      for (const auto& [name, response] : responses) expect_response({falloff, blur_px, name, response}, 8, seed);
+}
+
+// Evenly lit, the edges leave a curve's contrast open.
+TEST(CalibrateCamera, TakesAUsualResponseUnlessEvenlyLitEdgesSpeakAgainstIt) {
+  for (const auto& [blur_px, i] : {std::pair{1.6, 0U}, {0.8, 2U}, {1.2, 4U}})
+    expect_response({0, blur_px, responses[i].first, responses[i].second}, 5, 310);
+}
+
 TEST(CalibrateCamera, TellsSharpeningFromTheResponse) {
   Camera camera = small_camera();
   BoardScene scene;

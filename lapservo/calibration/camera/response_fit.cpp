@@ -15,15 +15,17 @@
 #include "lapservo/calibration/camera/response_curve.h"
 #include "lapservo/calibration/fit/solve_quietly.h"
 #include "lapservo/core/angles.h"
+#include "lapservo/core/dense_matrix.h"
 #include "lapservo/core/rounded_sigma.h"
 #include "lapservo/core/statistics.h"
 
 namespace lapservo::internal {
 namespace {
 
-// Edges at like angles to the rows of pixels share the deviation of their blur from a normal distribution at so many
-// steps on either side. A lens' blur after filters on pixels is symmetric and no more.
-constexpr int shape_numbers = 8;
+// Edges at like angles to the rows of pixels share the deviation of their blur from a normal distribution: a lens' blur
+// after filters on pixels is symmetric. Hermite's polynomials of odd order times the density, as many.
+constexpr int shape_numbers = 3;
+constexpr std::array shape_sigmas{0.06, 0.03, 0.02};
 constexpr std::array shape_angles_rad{rad_from_deg(6), rad_from_deg(12), rad_from_deg(24), rad_from_deg(46)};
 using Shape = std::array<double, shape_numbers>;
 
@@ -31,7 +33,7 @@ constexpr double max_sharpening_reach_px = 7;
 // Before the fit, one sigma: reflectances at different places of the board (specular light, veil), edges about the
 // geometry's.
 constexpr double ratio_sigma = 0.03, offset_sigma_px = 0.02, log_blur_sigma = 0.3;
-constexpr double strength_sigma = 0.5, usual_mask_px = 1.5, log_mask_sigma = 0.3, shape_sigma = 0.02;
+constexpr double strength_sigma = 0.5, usual_mask_px = 1.5, log_mask_sigma = 0.3;
 
 // Unknowns that all edges share.
 struct SharedUnknowns {
@@ -86,16 +88,19 @@ struct ProfileCost {
     const int reach = given->sharpened ? static_cast<int>(max_sharpening_reach_px / profile_step_px) : 0;
     const T bright = exp(edge.log_bright), dark = exp(edge.log_bright + log_ratio + edge.log_ratio_beyond),
             blur_px = exp(edge.log_blur_px);
-    const auto rise = [&](const T& z) { return T(0.5) * erfc(-z / std::sqrt(2.0)); };
-    std::vector<T> plain;
-    for (int i = -half - reach; i <= half + reach; ++i) {
-      const T z = (T(i * profile_step_px) - edge.offset_px) / blur_px;
-      T part = rise(z);
-      if (const int from = std::abs(i); from > 0 && from <= shape_numbers)
-        part += static_cast<double>(i > 0 ? 1 : -1) * shape[from - 1];
+    const auto value_at = [&](double at_px, double spread_px2) {
+      const T z = (T(at_px) - edge.offset_px) / blur_px, z2 = z * z;
+      const T density = T(1 / std::sqrt(two_pi)) * exp(T(-0.5) * z2);
+      const T h3 = z * (z2 - 3.0) / std::sqrt(6.0), h5 = z * (z2 * (z2 - 10.0) + 15.0) / std::sqrt(120.0),
+              h7 = z * (z2 * (z2 * (z2 - 21.0) + 105.0) - 105.0) / std::sqrt(5040.0);
+      const T part = T(0.5) * erfc(-z / std::sqrt(2.0)) + density * (shape[0] * h3 + shape[1] * h5 + shape[2] * h7 -
+                                                                     T(0.5 * spread_px2) * z / (blur_px * blur_px));
       const T light = dark + (bright - dark) * part;
-      plain.push_back(given->response ? encoded_by(*given->response, light) : value_by_curve(curve, light));
-    }
+      return given->response ? encoded_by(*given->response, light) : value_by_curve(curve, light);
+    };
+    std::vector<T> plain;
+    for (std::size_t i = 0; i < profile->value.size(); ++i)
+      plain.push_back(value_at(profile->at_px[i], profile->spread_px2[i]));
     if (!given->sharpened) return plain;
     const T mask_px = exp(log_mask_px);
     std::vector<T> mask;
@@ -105,12 +110,20 @@ struct ProfileCost {
       mask.push_back(exp(T(-0.5) * z * z));
       sum += (k == 0 ? 1.0 : 2.0) * mask.back();
     }
-    std::vector<T> values;
+    std::vector<T> even, smooth;
+    for (int i = -half - reach; i <= half + reach; ++i) even.push_back(value_at(i * profile_step_px, 0));
     for (int i = 0; i <= 2 * half; ++i) {
       const auto centre = static_cast<std::size_t>(i + reach);
-      T smooth = mask[0] * plain[centre];
-      for (std::size_t k = 1; k < mask.size(); ++k) smooth += mask[k] * (plain[centre - k] + plain[centre + k]);
-      values.push_back(plain[centre] + strength * (plain[centre] - smooth / sum));
+      smooth.push_back(mask[0] * even[centre]);
+      for (std::size_t k = 1; k < mask.size(); ++k) smooth.back() += mask[k] * (even[centre - k] + even[centre + k]);
+    }
+    std::vector<T> values;
+    for (std::size_t i = 0; i < plain.size(); ++i) {
+      const double at = profile->at_px[i] / profile_step_px + half;
+      const auto from = static_cast<std::size_t>(std::clamp(static_cast<int>(at), 0, 2 * half - 1));
+      const double part = at - static_cast<double>(from);
+      const T there = smooth[from] + part * (smooth[from + 1] - smooth[from]);
+      values.push_back(plain[i] + strength * (plain[i] - there / sum));
     }
     return values;
   }
@@ -153,7 +166,7 @@ struct SharpeningPrior {
 struct ShapePrior {
   template <typename T>
   bool operator()(const T* shape, T* residuals) const {
-    for (int i = 0; i < shape_numbers; ++i) residuals[i] = shape[i] / shape_sigma;
+    for (int i = 0; i < shape_numbers; ++i) residuals[i] = shape[i] / shape_sigmas[static_cast<std::size_t>(i)];
     return true;
   }
 };
@@ -202,16 +215,53 @@ std::vector<Named> named_responses() {
   return all;
 }
 
-double curve_sigma_of(ceres::Problem& problem, const SharedUnknowns& shared, double scale, double low, double high) {
+using CurveCovariance = Eigen::Matrix<double, curve_numbers, curve_numbers, Eigen::RowMajor>;
+
+// What no number of edges averages out (rounding, light along an edge, the tails of its blur): of the full value.
+constexpr double shared_sigma = 2e-4;
+
+// The part of the profiles' information that this leaves.
+double independent_part(const std::vector<BoardEdgeProfile>& profiles) {
+  double information = 0;
+  std::size_t steps = 0;
+  for (const BoardEdgeProfile& profile : profiles) {
+    steps = std::max(steps, profile.value.size());
+    for (std::size_t i = 0; i < profile.value.size(); ++i)
+      if (std::isfinite(profile.value[i])) information += 1 / (profile.sigma[i] * profile.sigma[i]);
+  }
+  return 1 / (1 + shared_sigma * shared_sigma * information / static_cast<double>(steps));
+}
+
+// The curve by its prior and by that part of the profiles' information.
+struct CurvePosterior {
+  ResponseCurve curve;
+  CurveCovariance covariance;
+  double cost = 0;  // of the curve, less what the profiles gain by it
+};
+
+// The fit's own is that by all of the information, linear about it.
+std::optional<CurvePosterior> posterior_of(ceres::Problem& problem, const SharedUnknowns& shared, double part) {
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
   ceres::Covariance covariance(options);
   const double* curve = shared.curve.data();
   if (!covariance.Compute(std::vector<std::pair<const double*, const double*>>{{curve, curve}}, &problem))
-    return std::numeric_limits<double>::infinity();
-  Eigen::Matrix<double, curve_numbers, curve_numbers, Eigen::RowMajor> c;
-  covariance.GetCovarianceBlock(curve, curve, c.data());
-  // The curve's values at some lights, less what another exposure would be.
+    return std::nullopt;
+  CurveCovariance fitted;
+  covariance.GetCovarianceBlock(curve, curve, fitted.data());
+  const UsualCurves usual = usual_curves();
+  const Eigen::MatrixXd prior = product(usual.whitening.transpose(), usual.whitening);
+  CurvePosterior posterior;
+  posterior.covariance = inverse_of_symmetric(part * inverse_of_symmetric(fitted) + (1 - part) * prior);
+  const ResponseCurve off = curve_of(shared) - usual.mean, pull = (1 - part) * (prior * off);
+  const ResponseCurve back = posterior.covariance * pull;
+  posterior.curve = curve_of(shared) - back;
+  posterior.cost = (off.dot(prior * off) - pull.dot(back)) / 2;
+  return posterior.covariance.allFinite() ? std::optional(posterior) : std::nullopt;
+}
+
+// Of the curve's values over [low, high], the largest, less what another exposure would be.
+double sigma_of(const CurvePosterior& posterior, double low, double high) {
   constexpr int places = 41;
   Eigen::Matrix<double, places, curve_numbers> rows;
   Eigen::Matrix<double, places, 1> by_exposure;
@@ -219,15 +269,15 @@ double curve_sigma_of(ceres::Problem& problem, const SharedUnknowns& shared, dou
     const double s = low + (high - low) * i / (places - 1), light = Response{}.light_from_value(s);
     rows.row(i) = splines_at(light).transpose();
     constexpr double step = 1e-3;
+    const double* curve = posterior.curve.data();
     by_exposure[i] = value_by_curve(curve, light * (1 + step)) - value_by_curve(curve, light);
   }
   rows -= by_exposure * (by_exposure.transpose() * rows) / by_exposure.squaredNorm();
-  const double most = (rows * c * rows.transpose()).diagonal().maxCoeff();
-  return scale * std::sqrt(most);
+  return std::sqrt((rows * posterior.covariance * rows.transpose()).diagonal().maxCoeff());
 }
 
-// A named response is tried where values differ by less, and taken where the cost is no more times that of the fit.
-constexpr double max_named_distance = 0.04, named_cost = 1.03;
+// Odds of any named response before the profiles, a hundred to one, and what cameras of that name differ by.
+constexpr double named_log_odds = 4.6, named_sigma = 1e-3;
 // Sharpening is looked for where profiles miss by more sigmas without.
 constexpr double max_plain_misfit = 1.1;
 constexpr double least_strength = 0.15;  // of sharpening: less is a detail of the blur
@@ -277,19 +327,24 @@ class ProfileFit {
     return solve_for(true) && (shared_.strength >= least_strength || solve_for(false));
   }
 
-  /// The cost with a known response; what was fitted stays.
+  /// The cost with a known response, without the curve's; what was fitted stays.
   std::optional<double> cost_with(const Response& response) {
     const auto fitted = std::tuple(shared_, shapes_, edges_);
     given_.response = &response;
-    solver_.max_num_iterations = 10;
     const bool usable = run();
-    const double cost = summary_.final_cost;
+    const double cost = summary_.final_cost - curve_cost();
     std::tie(shared_, shapes_, edges_) = fitted;
     given_.response = nullptr;
     return usable ? std::optional(cost) : std::nullopt;
   }
 
   double cost() const { return summary_.final_cost; }
+  /// What the curve's prior adds.
+  double curve_cost() const {
+    ResponseCurve residuals;
+    CurvePrior()(shared_.curve.data(), residuals.data());
+    return residuals.squaredNorm() / 2;
+  }
   const SharedUnknowns& shared() const { return shared_; }
   bool sharpened() const { return given_.sharpened; }
   ceres::Problem& problem() { return problem_; }
@@ -350,18 +405,48 @@ Response rounded_by_sigma(Response table, double sigma) {
   return table;
 }
 
-// A named response that explains the profiles nearly as well is what the camera has.
-void name_response(ProfileFit& profiles, ResponseFit& fit) {
-  const double fitted_cost = profiles.cost();
-  double best_cost = std::numeric_limits<double>::max();
-  for (const auto& [name, response] : named_responses()) {
-    const double distance = difference(fit.table, response, fit.low, fit.high);
-    if (distance > max_named_distance) continue;
-    const auto cost = profiles.cost_with(response);
-    if (!cost || *cost >= best_cost) continue;
-    best_cost = *cost, fit.nearest = name, fit.named_distance = distance;
-    if (best_cost < named_cost * fitted_cost) fit.response = response;
-  }
+// The volume that the curve's prior and the profiles leave, as a part of the prior's: its logarithm.
+double log_volume(const CurveCovariance& covariance) {
+  const CurvePrior prior;
+  const Eigen::MatrixXd whitened = prior.usual.whitening * covariance * prior.usual.whitening.transpose();
+  return eigenvalues_of_symmetric((whitened + whitened.transpose()) / 2).array().max(1e-12).log().sum() / 2;
+}
+
+struct Weighed {
+  Named named;
+  double evidence = 0;  // its logarithm, less the table's
+};
+
+// By Laplace's approximation. The other numbers' volumes are alike and cancel.
+std::vector<Weighed> weigh_named(ProfileFit& profiles, const CurvePosterior& posterior, double part) {
+  const double of_table =
+      -part * (profiles.cost() - profiles.curve_cost()) - posterior.cost + log_volume(posterior.covariance);
+  std::vector<Weighed> all;
+  for (const Named& named : named_responses())
+    if (const auto cost = profiles.cost_with(named.response))
+      all.push_back({named, named_log_odds - part * *cost - of_table});
+  return all;
+}
+
+// A named response unless the profiles speak against it. Sigma is that of the mixture about the chosen one.
+void choose_response(ProfileFit& profiles, const CurvePosterior& posterior, double part, ResponseFit& fit) {
+  const std::vector<Weighed> all = weigh_named(profiles, posterior, part);
+  const auto best = std::max_element(all.begin(), all.end(),
+                                     [](const Weighed& a, const Weighed& b) { return a.evidence < b.evidence; });
+  if (best == all.end()) return;
+  fit.nearest = best->named.name;
+  if (best->evidence > 0) fit.response = best->named.response;
+  const double most = std::max(0.0, best->evidence);
+  double sum = 0, variance = 0;
+  const auto add = [&](double evidence, const Response& response, double sigma) {
+    const double weight = std::exp(evidence - most);
+    if (weight < 1e-9) return;
+    const double distance = difference(fit.response, response, fit.low, fit.high);
+    sum += weight, variance += weight * (sigma * sigma + distance * distance);
+  };
+  add(0, fit.table, fit.sigma);
+  for (const Weighed& one : all) add(one.evidence, one.named.response, named_sigma);
+  fit.sigma = std::sqrt(variance / sum);
 }
 
 }  // namespace
@@ -380,10 +465,12 @@ std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& pro
   std::vector<double> darks, brights;
   for (const BoardEdgeProfile& p : profiles) darks.push_back(p.dark), brights.push_back(p.bright);
   fit.low = quantile(darks, 0.02), fit.high = quantile(brights, 0.98);
-  fit.sigma = curve_sigma_of(fitted.problem(), fitted.shared(), std::max(1.0, fit.misfit[1]), fit.low, fit.high);
-  if (!std::isfinite(fit.sigma)) return std::nullopt;
-  fit.table = fit.response = rounded_by_sigma(table_of(curve_of(fitted.shared())), fit.sigma);
-  if (try_named) name_response(fitted, fit);
+  const double part = independent_part(profiles) / std::pow(std::max(1.0, fit.misfit[1]), 2);
+  const auto posterior = posterior_of(fitted.problem(), fitted.shared(), part);
+  if (!posterior) return std::nullopt;
+  fit.sigma = sigma_of(*posterior, fit.low, fit.high);
+  fit.table = fit.response = rounded_by_sigma(table_of(posterior->curve), fit.sigma);
+  if (try_named) choose_response(fitted, *posterior, part, fit);
   return fit;
 }
 
