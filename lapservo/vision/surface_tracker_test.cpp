@@ -269,6 +269,22 @@ TEST(SurfaceTracker, SaysThatThePrintIsNotAsTheRigSays) {
   EXPECT_GE(said, 7);
 }
 
+TEST(SurfaceTracker, BandsThatTheMarkerHasAtNoAzimuthAreAMismatch) {
+  const Rig printed = scenes::usual_rig();
+  Rig other = printed;
+  Marker& marker = other.instruments[0].marker;
+  const double length_m = marker.length_m();
+  marker.bands_upper_m = {0.1 * length_m, 0.3 * length_m, 0.6 * length_m};
+  marker.bands_lower_m = {0.2 * length_m, 0.6 * length_m, 0.2 * length_m};
+  Rig without_rcm = other;
+  without_rcm.instruments[0].camera_from_rcm.reset();
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const Shot shot(seed, {}, printed);
+    EXPECT_EQ(to_string(Tracker(other).track(shot.bgr)[0].status), "marker_mismatch") << "seed " << seed;
+    EXPECT_EQ(to_string(Tracker(without_rcm).track(shot.bgr)[0].status), "marker_mismatch") << "seed " << seed;
+  }
+}
+
 // Who says how far the print may be off gets a pose with a sigma that holds.
 TEST(SurfaceTracker, AToleranceOfThePrintEntersSigma) {
   Rig tolerant = scenes::usual_rig();

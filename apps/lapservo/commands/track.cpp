@@ -291,8 +291,8 @@ class TrackRun {
       return 1;
     }
     const std::string diagnosis = diagnosis_ ? diagnosis_->text() : "no frame came";
-    const bool misses_rcm = tally_.anything() && !diagnosis.empty();
-    const bool mismatched = !misses_rcm && say_mismatched(tally_);
+    const bool explained = tally_.anything() ? !diagnosis.empty() : diagnosis_ && !diagnosis_->cause().empty();
+    const bool mismatched = !explained && say_mismatched(tally_);
     if (!diagnosis.empty() && !mismatched)
       std::fprintf(stderr, "lapservo: %s: %s\n", options_.input.c_str(), diagnosis.c_str());
     return tally_.anything() ? 0 : 1;

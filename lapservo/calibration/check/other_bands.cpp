@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "lapservo/core/angles.h"
+#include "lapservo/marker/band_shares.h"
 #include "lapservo/marker/decoder.h"
 #include "lapservo/marker/marker.h"
 #include "lapservo/vision/tracker.h"
@@ -16,39 +16,16 @@
 namespace lapservo::internal {
 namespace {
 
-// Fractions of the length from the first boundary to the last one. Perspective changes them by some 0.02.
-using Shares = std::array<double, 3>;
-constexpr double most_off = 0.06;
-
 // On the line that faces the camera.
-std::optional<Shares> shares_in(const Observation& observation) {
+std::optional<BandShares> shares_in(const Observation& observation) {
   using What = Observation::Refused::What;
   const bool is_ok = observation.status == Status::ok;
   if (!is_ok && observation.refused.what != What::edges) return std::nullopt;
   const auto& edges = is_ok ? observation.edges_raw_px : observation.refused.edges_raw_px;
   const double length_px = (edges[3] - edges[0]).norm();
-  Shares shares{};
+  BandShares shares{};
   for (std::size_t i = 0; i < shares.size(); ++i) shares[i] = (edges[i + 1] - edges[i]).norm() / length_px;
   return shares;
-}
-
-Shares shares_of(const Marker& marker, double tau_rad) {
-  const auto boundaries = boundaries_m(marker, tau_rad);
-  Shares shares{};
-  for (std::size_t i = 0; i < shares.size(); ++i)
-    shares[i] = (boundaries[i + 1] - boundaries[i]) / (boundaries[3] - boundaries[0]);
-  return shares;
-}
-
-bool fits_somewhere(const Marker& marker, const Shares& seen) {
-  constexpr int azimuths = 72;
-  for (int k = 0; k < azimuths; ++k) {
-    const Shares shares = shares_of(marker, two_pi * k / azimuths);
-    double worst = 0;
-    for (std::size_t i = 0; i < seen.size(); ++i) worst = std::max(worst, std::abs(shares[i] - seen[i]));
-    if (worst <= most_off) return true;
-  }
-  return false;
 }
 
 // "3.5 to 17.0", of the shortest and the longest.
@@ -57,11 +34,11 @@ std::string range_mm(double a_m, double b_m) {
   return high - low < 0.1 ? fmt::format("{:.1f}", low) : fmt::format("{:.1f} to {:.1f}", low, high);
 }
 
-std::string text_of(const Marker& marker, const std::vector<Shares>& seen) {
+std::string text_of(const Marker& marker, const std::vector<BandShares>& seen) {
   std::array<std::string, 3> seen_mm, rig_mm;
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto [low, high] =
-        std::minmax_element(seen.begin(), seen.end(), [i](const Shares& a, const Shares& b) { return a[i] < b[i]; });
+    const auto [low, high] = std::minmax_element(seen.begin(), seen.end(),
+                                                 [i](const BandShares& a, const BandShares& b) { return a[i] < b[i]; });
     seen_mm[i] = range_mm((*low)[i] * marker.length_m(), (*high)[i] * marker.length_m());
     rig_mm[i] = range_mm(marker.bands_upper_m[i], marker.bands_lower_m[i]);
   }
@@ -77,12 +54,12 @@ std::string text_of(const Marker& marker, const std::vector<Shares>& seen) {
 std::string seen_other_bands(const std::vector<cv::Mat>& frames, const Rig& rig, bool deinterlaced) {
   const auto is_readable = [](const Instrument& instrument) { return decoding_problem(instrument.marker).empty(); };
   if (!std::all_of(rig.instruments.begin(), rig.instruments.end(), is_readable)) return "";
-  std::vector<std::vector<Shares>> others(rig.instruments.size());
+  std::vector<std::vector<BandShares>> others(rig.instruments.size());
   for (const cv::Mat& frame : frames) {
     const auto observations = Tracker(rig, {.method = Method::centerline, .deinterlace = deinterlaced}).track(frame);
     for (std::size_t i = 0; i < observations.size(); ++i) {
       const auto seen = shares_in(observations[i]);
-      if (seen && !fits_somewhere(rig.instruments[i].marker, *seen)) others[i].push_back(*seen);
+      if (seen && !has_band_shares(rig.instruments[i].marker, *seen)) others[i].push_back(*seen);
     }
   }
   for (std::size_t i = 0; i < others.size(); ++i)

@@ -100,7 +100,7 @@ TEST(InitialPoses, LieNearTheTruth) {
       const auto blobs = find_blobs(shot.sight.view(), shot.sight.classes(), 8, 8);
       ASSERT_FALSE(blobs.empty());
       const auto camera_from_rcm = rcm ? shot.rig.instruments[0].camera_from_rcm : std::nullopt;
-      const auto poses = initial_poses(shot.sight.scene(), blobs[0], camera_from_rcm);
+      const auto poses = initial_poses(shot.sight.scene(), blobs[0], camera_from_rcm).poses;
       ASSERT_FALSE(poses.empty());
       double nearest_px = 1e9;
       for (const PoseUnknowns& unknowns : poses) {
@@ -124,8 +124,8 @@ TEST(InitialPoses, AreNoneForABlobWithoutTheMarkersColoursInTheirOrder) {
   Blob blob;  // of one colour only
   blob.grid_px = 8;
   for (int i = 0; i < 30; ++i) blob.samples.push_back({300 + 8 * (i % 6), 200 + 8 * (i / 6), 1});
-  EXPECT_TRUE(initial_poses(shot.sight.scene(), blob, std::nullopt).empty());
-  EXPECT_TRUE(initial_poses(shot.sight.scene(), Blob{}, std::nullopt).empty());
+  EXPECT_TRUE(initial_poses(shot.sight.scene(), blob, std::nullopt).poses.empty());
+  EXPECT_TRUE(initial_poses(shot.sight.scene(), Blob{}, std::nullopt).poses.empty());
 }
 
 }  // namespace

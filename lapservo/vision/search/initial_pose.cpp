@@ -10,6 +10,7 @@
 #include "lapservo/core/statistics.h"
 #include "lapservo/geometry/rotation.h"
 #include "lapservo/kinematics/centre_line.h"
+#include "lapservo/marker/band_shares.h"
 #include "lapservo/vision/search/coarse_fit.h"
 #include "lapservo/vision/search/heaviest_stretch.h"
 #include "lapservo/vision/search/line_segmentation.h"
@@ -184,9 +185,19 @@ std::optional<Outline> find_outline(const Scene& scene, const BlobShape& shape, 
   return outline;
 }
 
-// The colours' ends along the shaft: medians over some lines between the sides.
+std::optional<BandShares> shares_of(const LineSegmentation& split) {
+  if (!std::all_of(split.seen.begin(), split.seen.end(), [](bool seen) { return seen; })) return std::nullopt;
+  BandShares shares{};
+  for (std::size_t i = 0; i < shares.size(); ++i)
+    shares[i] = (split.position[i + 1] - split.position[i]) / (split.position[3] - split.position[0]);
+  return shares;
+}
+
+// The colours' ends along the shaft, medians over some lines between the sides, and whether most of these lines show
+// bands that the marker has at no azimuth.
 struct Ends {
   std::optional<double> first_x, last_x;
+  bool other_bands = false;
 };
 Ends find_ends(const Scene& scene, const Outline& outline) {
   constexpr int lines = 9;
@@ -194,6 +205,7 @@ Ends find_ends(const Scene& scene, const Outline& outline) {
   const double length = outline.last_x - outline.first_x, margin = 0.25 * length + 10;
   const double start = outline.first_x - margin, step = (length + 2 * margin) / samples;
   std::vector<double> first, last;
+  int with_other_bands = 0;
   for (int i = 0; i < lines; ++i) {
     const double fraction = 0.5 + 0.35 * (2.0 * i / (lines - 1) - 1);
     std::array<std::uint8_t, samples> classes{};
@@ -205,11 +217,14 @@ Ends find_ends(const Scene& scene, const Outline& outline) {
     const LineSegmentation split = segment_line(classes, scene.bands);
     if (split.seen[0]) first.push_back(start + split.position[0] * step);
     if (split.seen[3]) last.push_back(start + split.position[3] * step);
+    const auto shares = shares_of(split);
+    with_other_bands += shares && !has_band_shares(scene.marker, *shares);
   }
   const auto of_two_or_more = [](std::vector<double>& values) -> std::optional<double> {
     return values.size() < 2 ? std::nullopt : std::optional(median(values));
   };
-  return {of_two_or_more(first), of_two_or_more(last)};
+  constexpr int most_of_them = 7;
+  return {of_two_or_more(first), of_two_or_more(last), with_other_bands >= most_of_them};
 }
 
 // Point of the axis behind a place on the centre line, from the width of the shaft there.
@@ -288,8 +303,7 @@ std::optional<Eigen::Vector3d> proximal_end_beside_contour(const Scene& scene, c
 
 }  // namespace
 
-std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
-                                        const std::optional<Rigid3>& camera_from_rcm) {
+InitialPoses initial_poses(const Scene& scene, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm) {
   const auto shape = shape_of(scene, blob);
   if (!shape) return {};
   Eigen::Vector2d line = shape->main_direction;
@@ -301,15 +315,18 @@ std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
   const auto outline = find_outline(scene, *shape, *along);
   if (!outline) return {};
   const Ends ends = find_ends(scene, *outline);
+  InitialPoses initial{{}, ends.other_bands};
+  std::vector<PoseUnknowns>& poses = initial.poses;
   if (outline->only_side != 0) {
-    if (!camera_from_rcm) return {};
+    if (!camera_from_rcm) return initial;
     const auto end = proximal_end_beside_contour(scene, *outline, ends, *camera_from_rcm);
     const auto q = end ? configuration_through(*camera_from_rcm, *end) : std::nullopt;
-    return q ? std::vector{PoseUnknowns::rcm(*camera_from_rcm, *q)} : std::vector<PoseUnknowns>{};
+    if (q) poses.push_back(PoseUnknowns::rcm(*camera_from_rcm, *q));
+    return initial;
   }
   const double middle_x = (outline->first_x + outline->last_x) / 2;
   const auto middle = axis_point(scene, *outline, middle_x);
-  if (!middle) return {};
+  if (!middle) return initial;
   const auto at_depth = [&](double x, double depth_m) -> Eigen::Vector3d {
     const double y = (outline->low.at(x) + outline->high.at(x)) / 2;
     return scene.camera.ray_from_ideal(outline->frame.at(x, y)) * depth_m;
@@ -321,7 +338,6 @@ std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
     if (ends.last_x) return at_depth(*ends.last_x, z_m) - length_m * image_axis;
     return at_depth(outline->first_x, z_m);
   };
-  std::vector<PoseUnknowns> poses;
   const auto add_through_rcm = [&](const Eigen::Vector3d& proximal_end) {
     if (const auto q = configuration_through(*camera_from_rcm, proximal_end))
       poses.push_back(PoseUnknowns::rcm(*camera_from_rcm, *q));
@@ -333,7 +349,7 @@ std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
       add_through_rcm(proximal_at(z_m));
     }
     add_through_rcm(proximal_at(depth_m));
-    return poses;
+    return initial;
   }
   double tilt = 0;
   if (ends.first_x && ends.last_x)
@@ -346,7 +362,7 @@ std::vector<PoseUnknowns> initial_poses(const Scene& scene, const Blob& blob,
     poses.push_back(PoseUnknowns::free({frame_along(proximal, axis.normalized()), 0}));
     if (tilt < 0.05) break;
   }
-  return poses;
+  return initial;
 }
 
 }  // namespace lapservo::internal

@@ -110,10 +110,10 @@ double reach_px(const SearchFrame& frame) {
   return of_width * frame.scene.image.width_px;
 }
 
-std::vector<PoseUnknowns> starts_in(const SearchFrame& frame, const Blob& blob,
-                                    const std::optional<Rigid3>& camera_from_rcm, WorkBudget& budget) {
-  auto starts = initial_poses(frame.scene, blob, camera_from_rcm);
-  budget.spend(starts.empty() ? costs.no_initial_poses : costs.initial_poses);
+InitialPoses starts_in(const SearchFrame& frame, const Blob& blob, const std::optional<Rigid3>& camera_from_rcm,
+                       WorkBudget& budget) {
+  InitialPoses starts = initial_poses(frame.scene, blob, camera_from_rcm);
+  budget.spend(starts.poses.empty() ? costs.no_initial_poses : costs.initial_poses);
   return starts;
 }
 
@@ -140,7 +140,8 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
 Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm,
                                    const Blob& blob, Walk& walk, WorkBudget& budget) {
   Found best;
-  const auto starts = starts_in(frame, blob, camera_from_rcm, budget);
+  const auto [starts, other_bands] = starts_in(frame, blob, camera_from_rcm, budget);
+  walk.other_bands |= other_bands;
   for (std::size_t i = walk.blobs.start(); i < starts.size(); ++i) {
     if ((camera_from_rcm || i == 0) && !budget.allows(costs.try_start())) {
       walk.blobs.stop(blob, i);
@@ -187,7 +188,7 @@ MarkerSearch::Rival MarkerSearch::look_for_rival(const SearchFrame& frame, const
   const double apart_px = rival_apart_radii * scene.marker.radius_m() /
                           fit.unknowns.pose().camera_from_unrolled.translation.norm() * scene.camera.fx_px;
   for (const Blob& blob : frame.blobs)
-    for (const PoseUnknowns& start : starts_in(frame, blob, std::nullopt, budget)) {
+    for (const PoseUnknowns& start : starts_in(frame, blob, std::nullopt, budget).poses) {
       if ((middle(start) - middle(fit.unknowns)).norm() < apart_px) continue;
       if (!budget.allows(costs.try_start())) return Rival::not_known_yet;
       const Found other = try_start(scene, frame.light, start, budget);
@@ -206,9 +207,17 @@ bool MarkerSearch::lost_candidate(const SearchFrame& frame, WorkBudget& budget) 
   return !candidate_;
 }
 
+// While the look goes on, `plain` is what the last whole one came to.
+void MarkerSearch::know(Found& plain) {
+  if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
+  if (plain_.done) other_bands_ = plain_.other_bands;
+  plain.status = status_;
+}
+
 void MarkerSearch::begin_anew(Status status) {
+  const bool other_bands = other_bands_;
   *this = MarkerSearch();
-  status_ = status;
+  status_ = status, other_bands_ = other_bands;
 }
 
 // A candidate whose rivals the budget leaves no time for waits for the next frame, in which they take what they take.
@@ -217,8 +226,7 @@ Found MarkerSearch::look_without_rcm(const SearchFrame& frame, WorkBudget& budge
   if (waited && lost_candidate(frame, budget)) begin_anew(status_);
   if (!candidate_) {
     Found plain = detect(frame, std::nullopt, plain_, budget);
-    if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
-    plain.status = status_;
+    know(plain);
     if (plain_.done) plain_ = {};
     if (!plain.fit) return plain;
     candidate_ = plain.fit;
@@ -273,7 +281,7 @@ Found MarkerSearch::hidden(const SearchFrame& frame, WorkBudget& budget) {
   const auto rest = hidden_.blobs.rest(blobs, reach_px(frame));
   if (agreement_ && !finish_agreement(frame, budget)) return {};
   for (const Blob* blob : rest) {
-    auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget);
+    auto starts = starts_in(frame, *blob, frame.camera_from_rcm, budget).poses;
     if (!frame.scene.others.empty()) {
       const auto more = rcm_starts_in(frame, *blob, budget);
       starts.insert(starts.end(), more.begin(), more.end());
@@ -374,8 +382,7 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
   }
   const bool plain_is_known = plain_.done && from_the_first;
   const bool is_mismatch = plain.status == Status::marker_mismatch;
-  if (plain.status != Status::no_marker || plain_.done) status_ = plain.status;
-  plain.status = status_;
+  know(plain);
   if (plain_.done) plain_ = {}, searches_long_ = true;
   if (!searches_long_) return plain;
   budget.allow(longs_turn_ ? step : WorkBudget::Beyond::none);
@@ -386,7 +393,9 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
 }
 
 Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {
-  return frame.camera_from_rcm ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
+  Found found = frame.camera_from_rcm ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
+  if (found.status == Status::no_marker && other_bands_) found.status = Status::marker_mismatch;
+  return found;
 }
 
 }  // namespace lapservo::internal

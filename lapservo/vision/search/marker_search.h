@@ -50,6 +50,7 @@ class MarkerSearch {
   struct Walk {
     BlobWalk blobs;
     bool done = false;
+    bool other_bands = false;  // InitialPoses
   };
   enum class Rival { none, found, not_known_yet };
 
@@ -68,9 +69,11 @@ class MarkerSearch {
   bool finish_agreement(const SearchFrame& frame, WorkBudget& budget);
   bool fit_to_results(const SearchFrame& frame, WorkBudget& budget);
   bool lost_candidate(const SearchFrame& frame, WorkBudget& budget);
+  void know(Found& plain);
   void begin_anew(Status status);
 
   Status status_ = Status::no_marker;  // of the last whole look at what shows plainly
+  bool other_bands_ = false;           // that look saw bands which the marker has at no azimuth
   Walk plain_, among_others_, free_, hidden_;
   bool mismatch_among_others_ = false;  // what is there is a print that is off
   bool searches_long_ = false;          // what shows plainly was not found

@@ -95,9 +95,9 @@ std::optional<Sighting> MarkerSurvey::detect(const Scene& scene, const LightImag
   };
   for (const Blob& blob : blobs) {
     if (const auto& camera_from_rcm = rig_.instruments[instrument_].camera_from_rcm)
-      for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm)) try_start(start);
+      for (const PoseUnknowns& start : initial_poses(scene, blob, camera_from_rcm).poses) try_start(start);
     if (!best || !best->settled)
-      for (const PoseUnknowns& start : initial_poses(scene, blob, std::nullopt)) try_start(start);
+      for (const PoseUnknowns& start : initial_poses(scene, blob, std::nullopt).poses) try_start(start);
     if (best && best->settled) break;
   }
   return best;
