@@ -78,7 +78,7 @@ class Watcher : public RunObserver {
     if (page_ && !obey_page(tick, state)) return false;
     return !interrupted();
   }
-  const Summary& finish() {
+  const RunSummary& finish() {
     progress_.reset();
     return summary_;
   }
@@ -97,7 +97,7 @@ class Watcher : public RunObserver {
   bool strict_;
   ServoPage* page_;
   Supervisor& arm_;
-  Summary summary_;
+  RunSummary summary_;
   int done_ = 0;
 };
 
@@ -126,7 +126,7 @@ int simulate(const ServoOptions& options) {
                   static_cast<int>(std::lround(duration_s(options) / config.controller.period_s)), options.strict,
                   page ? &*page : nullptr, arm);
   lapservo::run(arm, simulator, simulator, config, trajectory, duration_s(options), watcher);
-  const Summary& summary = watcher.finish();
+  const RunSummary& summary = watcher.finish();
   std::printf("method %s, seen by %s\n%s\n", std::string(to_string(config.controller.mode)).c_str(),
               config.tracker.method == Method::centerline ? "the paper's Algorithm 1" : "all visible lines",
               summary.text().c_str());

@@ -86,7 +86,7 @@ class ArmWatcher : public RunObserver {
     if (options_.strict && summary_.registration_contradicted()) return false;
     return !interrupted();
   }
-  const Summary& summary() const { return summary_; }
+  const RunSummary& summary() const { return summary_; }
 
  private:
   // True when it ends the run.
@@ -172,7 +172,7 @@ class ArmWatcher : public RunObserver {
   };
   std::optional<Wanted> wanted_;  // to be checked next
   Wanted asked_;
-  Summary summary_;
+  RunSummary summary_;
   std::optional<double> start_s_;
   double next_counts_s_ = 0, next_set_point_s_ = 0;
   std::string state_, said_counts_;
