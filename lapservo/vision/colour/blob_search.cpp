@@ -136,10 +136,24 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classe
   return blobs;
 }
 
+namespace {
+
+// As a marker does of which not all but one band is hidden.
+bool shows_two_colours(const Blob& blob) {
+  constexpr std::ptrdiff_t least = 2;
+  const std::uint8_t first = blob.samples[0].colour;
+  const auto same =
+      std::count_if(blob.samples.begin(), blob.samples.end(), [&](const Blob::Sample& s) { return s.colour == first; });
+  return same >= least && std::ssize(blob.samples) - same >= least;
+}
+
+}  // namespace
+
 std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes) {
   constexpr int grid_px = 8;
   constexpr std::size_t max_blobs = 6;  // bounds the time that tissue with the marker's colours costs
   auto blobs = find_blobs(image, classes, grid_px, min_blob_samples);
+  std::stable_partition(blobs.begin(), blobs.end(), shows_two_colours);
   if (blobs.size() > max_blobs) blobs.resize(max_blobs);
   return blobs;
 }

@@ -24,7 +24,7 @@ inline constexpr int min_blob_samples = 8;
 /// All groups of coloured samples of at least `min_samples`, largest first. Touches one pixel in grid_px^2 only.
 std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classes, int grid_px, int min_samples);
 
-/// As many of them as detection looks at, on its grid.
+/// As many of them as detection looks at, on its grid: first those of two colours and more, largest first.
 std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes);
 
 /// The same, but as one those that blood may have parted: nearer to one another than half of what the larger one

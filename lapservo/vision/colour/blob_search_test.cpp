@@ -92,6 +92,17 @@ TEST(BlobSearch, SeparatesMarkersLargestFirstAndCountsNoSampleTwice) {
     }
 }
 
+TEST(BlobSearch, LooksAtTwoColoursBeforeLargerPatchesOfOne) {
+  cv::Mat image = blank();
+  for (int i = 0; i < 8; ++i)
+    image(cv::Rect(8 + 160 * (i % 4), 8 + 120 * (i / 4), 110, 80))
+        .setTo(cv::Scalar(band_bgr[static_cast<std::size_t>(i % 3)]));
+  const Strip marker{{320, 380}, 0.2, 100, 40};
+  marker.paint(image);
+  const auto blobs = largest_blobs(ImageView(image), usual_classes());
+  for (const Blob::Sample& sample : blobs.at(0).samples) EXPECT_TRUE(marker.along(sample.u, sample.v));
+}
+
 TEST(BlobSearch, JoinsWhatBloodPartedAndNothingElse) {
   cv::Mat image = blank();
   const Strip marker{{200, 200}, 0.6, 220, 70}, blood{{200, 200}, 0.6, 50, 80}, another{{540, 400}, -0.9, 110, 45};

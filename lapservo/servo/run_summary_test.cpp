@@ -1,0 +1,48 @@
+#include "lapservo/servo/run_summary.h"
+
+#include <gtest/gtest.h>
+
+namespace lapservo::internal {
+namespace {
+
+constexpr double period_s = 0.1;
+
+class RunSummaryTest : public ::testing::Test {
+ protected:
+  void add(ControlAction action, HoldReason reason, int count, const std::string& block = {}) {
+    ControlTick tick;
+    tick.decision.control.action = action, tick.decision.control.reason = reason;
+    tick.decision.registration_contradicted = contradicted;
+    InstrumentTruth truth;
+    truth.features = Eigen::Vector4d::Zero();
+    for (int i = 0; i < count; ++i, time_s += period_s) tick.input.time_s = time_s, summary.add(tick, truth, block);
+  }
+  bool says(const std::string& part) const { return summary.text().find(part) != std::string::npos; }
+
+  RunSummary summary;
+  double time_s = 0;
+  bool contradicted = false;
+};
+
+TEST_F(RunSummaryTest, CountsHoldsByTheirReasonOrTheArms) {
+  add(ControlAction::hold, HoldReason::arm_not_enabled, 2, "not_homed");
+  add(ControlAction::hold, HoldReason::marker_lost, 3);
+  add(ControlAction::track, HoldReason::none, 15);
+  EXPECT_TRUE(says("held for 2 of 20 ticks: not_homed")) << summary.text();
+  EXPECT_TRUE(says("held for 3 of 20 ticks: marker_lost")) << summary.text();
+  EXPECT_TRUE(summary.succeeded(true));
+  add(ControlAction::hold, HoldReason::marker_lost, 1);
+  EXPECT_TRUE(says("ended in a hold: marker_lost")) << summary.text();
+  EXPECT_FALSE(summary.succeeded(false));
+}
+
+TEST_F(RunSummaryTest, AContradictedRegistrationIsNoSuccessWhenStrict) {
+  contradicted = true;
+  add(ControlAction::track, HoldReason::none, 15);
+  EXPECT_TRUE(summary.succeeded(false));
+  EXPECT_FALSE(summary.succeeded(true));
+  EXPECT_TRUE(says("registration_contradicted in 15 of 15 ticks")) << summary.text();
+}
+
+}  // namespace
+}  // namespace lapservo::internal

@@ -1,0 +1,69 @@
+#include "recordings/replayed_run.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "lapservo/core/error.h"
+#include "lapservo/crtk/interlock.h"
+#include "lapservo/rig/joint_conversion.h"
+#include "recordings/bag_joints.h"
+#include "recordings/bag_topics.h"
+#include "recordings/open_bag.h"
+
+namespace lapservo::internal {
+
+ReplayedRun::RecordedArm::RecordedArm(const JointRecording& recording, const Joints& joints, const Clock& of_run)
+    : clock(of_run) {
+  for (std::size_t i = 0; i < recording.time_s.size(); ++i)
+    all.push_back({recording.time_s[i],
+                   JointVector::from_vector(q_from_joints(joints, Eigen::Vector4d(recording.joints[i].data())))});
+  readings();
+}
+
+std::vector<JointReading> ReplayedRun::RecordedArm::readings() {
+  std::vector<JointReading> since;
+  for (; next < all.size() && all[next].time_s <= clock.now_s(); ++next) since.push_back(all[next]);
+  return since;
+}
+
+JointState ReplayedRun::RecordedArm::state() {
+  const JointReading& latest = all[std::max<std::size_t>(next, 1) - 1];
+  const bool known = clock.now_s() - latest.time_s <= InterlockConfig().max_age_s;
+  return {latest.time_s, latest.q, known ? OperatingState::enabled : OperatingState::disabled, false};
+}
+
+std::optional<StampedImage> ReplayedRun::RecordedImages::newest() {
+  std::optional<StampedImage> newest;
+  for (; next && next->time_s <= clock.now_s(); next = frames.next(), ++count)
+    if (!next->flaw) newest = StampedImage{next->time_s, next->bgr};
+  return newest;
+}
+
+ReplayedRun::ShiftedJoints ReplayedRun::joints_of_bag(const Bag& bag, const BagFrames& frames, const std::string& topic,
+                                                      const std::string& arm, const Joints& joints) {
+  const BagTopic* of_arm = joint_topic_of(bag, topic, arm);
+  if (!of_arm)
+    throw InputError(bag.path(), std::string("has no messages of ") + joint_type + ", expected the arm's joints");
+  ShiftedJoints shifted{joints_in_bag(bag, *of_arm, joints, *frames.first_stamp_s()),
+                        clock_lead_s(bag, *of_arm, image_topic_of(bag, frames.topic()))};
+  for (double& time_s : shifted.recording.time_s) time_s -= shifted.lead_s;
+  return shifted;
+}
+
+ReplayedRun::ReplayedRun(const std::string& bag, const std::string& image_topic, const std::string& joint_topic,
+                         const std::string& arm, const Joints& joints)
+    : bag_(open_bag(bag)),
+      frames_(bag_, image_topic),
+      joints_(joints_of_bag(*bag_, frames_, joint_topic, arm, joints)),
+      clock_(std::max(0.0, joints_.recording.time_s.front())),
+      arm_(joints_.recording, joints, clock_),
+      images_(frames_, clock_) {
+  duration_s_ = joints_.recording.time_s.back() - clock_.now;
+  if (!(duration_s_ > 0))
+    throw InputError(bag_->path(),
+                     fmt::format("its joints end {:.3f} s before its first image, expected both at one time",
+                                 -joints_.recording.time_s.back()));
+}
+
+}  // namespace lapservo::internal
