@@ -119,6 +119,10 @@ Found SurfaceTracker::follow_known(const ImageView& image, const LightImage& lig
   Found found = follow_it(memory.among_others);
   if (!found.fit && !memory.among_others && cover_expected(i, budget)) found = follow_it(true), followed_twice_ = true;
   if (found.fit) covers_[i].clear();  // where it was expected
+  const auto& camera_from_rcm = rig_.instruments[i].camera_from_rcm;
+  if (found.fit && !found.fit->unknowns.q() && camera_from_rcm)
+    if (Found again = follow_through_rcm(scene_of(image, i), light, *found.fit, *camera_from_rcm, budget); again.fit)
+      return again;
   return found;
 }
 

@@ -237,6 +237,11 @@ void Fitter::tell(const PrintFit& print) {
 
 }  // namespace
 
+double FineFit::misfit() const {
+  const double located = located_fraction();
+  return located * inlier_rms_sigmas * inlier_rms_sigmas + (1 - located) * inlier_sigmas * inlier_sigmas;
+}
+
 double FineFit::located_fraction() const {
   const int located = used[0] + used[1] + used[2] + used[3];
   return static_cast<double>(located) / std::max(1, in_image[0] + in_image[1] + in_image[2] + in_image[3]);

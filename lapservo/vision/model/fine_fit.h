@@ -56,6 +56,9 @@ struct FineFit {
 
   /// Of the boundary points that the image could show, the fraction that was located.
   double located_fraction() const;
+  /// Mean square of these points' residuals [sigma^2], with the inliers' limit for each that was not located: of two
+  /// fits to a frame the better one has less.
+  double misfit() const;
 };
 
 /// Whether to ask what the camera did to the picture beyond its response (picture_processing.h), which costs a tenth of

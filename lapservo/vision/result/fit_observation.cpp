@@ -4,9 +4,7 @@
 #include <cstddef>
 
 #include "lapservo/core/angles.h"
-#include "lapservo/geometry/cylinder.h"
 #include "lapservo/kinematics/centre_line.h"
-#include "lapservo/marker/azimuths.h"
 #include "lapservo/vision/result/marker_pose.h"
 
 namespace lapservo::internal {
@@ -49,19 +47,16 @@ LineSigma sigma_of(const CentreLine& line, const Scene& scene, const FineFit& fi
 
 // q of a freely fitted shaft that misses the RCM: the shaft from the RCM to the marker's proximal end. The angle
 // between it and the fitted axis is how wrong each angle may be; where that is too much, q is unknown.
-std::optional<Observation::Rcm> configuration_despite_mismatch(const Scene& scene, const FineFit& fit,
-                                                               const Rigid3& camera_from_rcm, double tau_rad) {
+std::optional<Observation::Rcm> configuration_despite_mismatch(const FineFit& fit, const Rigid3& camera_from_rcm) {
   constexpr double max_mismatch_rad = 0.03;
   const Rigid3& fitted = fit.unknowns.pose().camera_from_unrolled;
-  auto q = configuration_through(camera_from_rcm, fitted.translation);
+  const auto q = configuration_of(fit.unknowns.pose(), camera_from_rcm);
   if (!q) return std::nullopt;
   const Rigid3 through_rcm = camera_from_rcm * rcm_from_unrolled(*q);
-  const auto view = view_cylinder(through_rcm, scene.marker.radius_m());
   const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
   const double mismatch_rad = std::atan2((fitted.rotation * z).cross(through_rcm.rotation * z).norm(),
                                          (fitted.rotation * z).dot(through_rcm.rotation * z));
-  if (!view || !(mismatch_rad < max_mismatch_rad)) return std::nullopt;
-  q->psi_rad = rotation_rad(scene.marker, view->facing_azimuth_rad, tau_rad);
+  if (!(mismatch_rad < max_mismatch_rad)) return std::nullopt;
   const double angle_variance =
       mismatch_rad * mismatch_rad + fit.covariance(fit.unknowns.size() - 1, fit.unknowns.size() - 1);
   const double rho_variance = mismatch_rad * mismatch_rad * q->rho_m * q->rho_m + fit.covariance(4, 4);
@@ -94,7 +89,7 @@ Observation observation_of(const Scene& scene, const FineFit& fit, const std::op
   if (fit.unknowns.q()) {
     observation.rcm = Observation::Rcm{*fit.unknowns.q(), fit.covariance};
   } else if (camera_from_rcm) {
-    observation.rcm = configuration_despite_mismatch(scene, fit, *camera_from_rcm, line->tau_rad);
+    observation.rcm = configuration_despite_mismatch(fit, *camera_from_rcm);
   }
   if (observation.rcm) {
     observation.rcm->q.theta_rad = wrap_pi(observation.rcm->q.theta_rad);

@@ -136,6 +136,22 @@ Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& ex
   return status == Status::ok ? accepted(scene, light, fit, processing, budget) : refusal(status, fit.unknowns);
 }
 
+Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
+                         const Rigid3& camera_from_rcm, WorkBudget& budget) {
+  constexpr double most_sigmas = 3;
+  const auto q = configuration_of(free.unknowns.pose(), camera_from_rcm);
+  if (!q) return {};
+  const PoseUnknowns start = PoseUnknowns::rcm(camera_from_rcm, *q);
+  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d axis =
+      free.unknowns.pose().camera_from_unrolled.rotation.conjugate() * (start.pose().camera_from_unrolled.rotation * z);
+  const Eigen::Vector2d tilt_rad = z.cross(axis).head<2>();  // the first two unknowns of a free pose
+  if (!(tilt_rad.dot(free.covariance.topLeftCorner<2, 2>().inverse() * tilt_rad) < most_sigmas * most_sigmas))
+    return {};
+  const FineFit fit = fitted(scene, light, start, free.blur, {false, free.bias_px, free.departure}, budget);
+  return validate(scene, fit) == Status::ok ? accepted(scene, light, fit, {}, budget) : Found{};
+}
+
 // The starts of one blob, until one fits. Without the RCM they are rivals: all are tried then, in one frame.
 Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional<Rigid3>& camera_from_rcm,
                                    const Blob& blob, Walk& walk, WorkBudget& budget) {
@@ -154,7 +170,7 @@ Found MarkerSearch::detect_in_blob(const SearchFrame& frame, const std::optional
       if (!best.fit && found.status != Status::no_marker) best = found;
       continue;
     }
-    if (!best.fit || found.fit->inlier_rms_sigmas < best.fit->inlier_rms_sigmas) best = std::move(found);
+    if (!best.fit || found.fit->misfit() < best.fit->misfit()) best = std::move(found);
     if (camera_from_rcm) break;  // the starts are ways to one solution
   }
   walk.blobs.finish(blob);
@@ -263,7 +279,7 @@ bool MarkerSearch::fit_to_results(const SearchFrame& frame, WorkBudget& budget) 
     const Found found = accepted(frame.scene, frame.light, first, {}, budget);
     if (!found.fit) continue;
     has_rivals_ |= candidate_ && are_rivals(*candidate_, *found.fit);
-    if (!candidate_ || found.fit->inlier_rms_sigmas < candidate_->inlier_rms_sigmas) candidate_ = found.fit;
+    if (!candidate_ || found.fit->misfit() < candidate_->misfit()) candidate_ = found.fit;
   }
   results_.reset();
   return true;
@@ -394,8 +410,8 @@ Found MarkerSearch::look_with_rcm(const SearchFrame& frame, WorkBudget& budget) 
 
 Found MarkerSearch::look(const SearchFrame& frame, WorkBudget& budget) {
   Found found = frame.camera_from_rcm ? look_with_rcm(frame, budget) : look_without_rcm(frame, budget);
-  if (found.status == Status::no_marker && other_bands_) found.status = Status::marker_mismatch;
-  return found;
+  const bool nothing_fits = found.status == Status::no_marker || found.status == Status::poor_fit;
+  return nothing_fits && other_bands_ ? Found{Status::marker_mismatch, std::nullopt, std::nullopt} : found;
 }
 
 }  // namespace lapservo::internal

@@ -36,6 +36,11 @@ struct SearchFrame {
 Found follow(const Scene& scene, const LightImage& light, const PoseUnknowns& expected, const EdgeBlur& blur,
              const ExpectedProcessing& processing, WorkBudget& budget);
 
+/// A marker that was followed without regard to the RCM, through it: without a fit where the axis misses it by more
+/// than three sigma, or no fit through it is ok.
+Found follow_through_rcm(const Scene& scene, const LightImage& light, const FineFit& free,
+                         const Rigid3& camera_from_rcm, WorkBudget& budget);
+
 /// Looks for one marker all over a frame: first where a blob's outline says; with camera_from_rcm then along lines
 /// through it in blobs that are shared, without regard to it, and at last for markers that are hidden in large parts,
 /// which takes tens of milliseconds. What the budget does not allow is done in the frames to come, from where it

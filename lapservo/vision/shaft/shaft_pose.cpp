@@ -1,5 +1,7 @@
 #include "lapservo/vision/shaft/shaft_pose.h"
 
+#include <cmath>
+
 #include "lapservo/core/angles.h"
 #include "lapservo/geometry/cylinder.h"
 #include "lapservo/marker/azimuths.h"
@@ -10,6 +12,16 @@ std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose
   const auto view = view_cylinder(pose.camera_from_unrolled, marker.radius_m());
   if (!view) return std::nullopt;
   return wrap_two_pi(marker_azimuth_rad(marker, view->facing_azimuth_rad, pose.psi_rad));
+}
+
+std::optional<JointVector> configuration_of(const ShaftPose& pose, const Rigid3& camera_from_rcm) {
+  auto q = configuration_through(camera_from_rcm, pose.camera_from_unrolled.translation);
+  if (!q) return std::nullopt;
+  const Rigid3 through_rcm = camera_from_rcm * rcm_from_unrolled(*q);
+  const Eigen::Matrix3d roll =
+      (through_rcm.rotation.conjugate() * pose.camera_from_unrolled.rotation).toRotationMatrix();
+  q->psi_rad = pose.psi_rad + std::atan2(roll(1, 0) - roll(0, 1), roll(0, 0) + roll(1, 1));
+  return q;
 }
 
 PoseUnknowns PoseUnknowns::rcm(const Rigid3& camera_from_rcm, const JointVector& q) {

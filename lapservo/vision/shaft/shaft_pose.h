@@ -22,6 +22,10 @@ struct ShaftPose {
 /// shaft.
 std::optional<double> facing_tau_rad(const Marker& marker, const ShaftPose& pose);
 
+/// q of the shaft from the RCM to the marker's proximal end, with the pose's rotation about the axis. Nullopt where
+/// that end is the RCM.
+std::optional<JointVector> configuration_of(const ShaftPose& pose, const Rigid3& camera_from_rcm);
+
 /// Most unknowns of a fit: a pose's six, psi included, and one of the marker.
 inline constexpr int max_unknowns = 7;
 using UnknownVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_unknowns, 1>;
