@@ -22,10 +22,10 @@
 namespace lapservo::internal {
 namespace {
 
-// Edges at like angles to the rows of pixels share the deviation of their blur from a normal distribution: a lens' blur
-// after filters on pixels is symmetric. Hermite's polynomials of odd order times the density, as many.
-constexpr int shape_numbers = 3;
-constexpr std::array shape_sigmas{0.06, 0.03, 0.02};
+// Edges at like angles to the rows of pixels share the deviation of their blur from a normal distribution at so many
+// steps on either side, straight between: a lens' blur after filters on pixels is symmetric and no more.
+constexpr int shape_numbers = 8;
+constexpr double shape_sigma = 0.02;
 constexpr std::array shape_angles_rad{rad_from_deg(6), rad_from_deg(12), rad_from_deg(24), rad_from_deg(46)};
 using Shape = std::array<double, shape_numbers>;
 
@@ -88,13 +88,19 @@ struct ProfileCost {
     const int reach = given->sharpened ? static_cast<int>(max_sharpening_reach_px / profile_step_px) : 0;
     const T bright = exp(edge.log_bright), dark = exp(edge.log_bright + log_ratio + edge.log_ratio_beyond),
             blur_px = exp(edge.log_blur_px);
+    const auto shape_at = [&](double at_px) {
+      const double steps = std::min(std::abs(at_px) / profile_step_px, shape_numbers + 1.0);
+      const auto below = static_cast<std::size_t>(steps);
+      const auto number = [&](std::size_t k) { return k == 0 || k > shape_numbers ? T(0) : shape[k - 1]; };
+      const double beyond = steps - static_cast<double>(below);
+      const T deviation = (1 - beyond) * number(below) + beyond * number(below + 1);
+      return at_px < 0 ? -deviation : deviation;
+    };
     const auto value_at = [&](double at_px, double spread_px2) {
-      const T z = (T(at_px) - edge.offset_px) / blur_px, z2 = z * z;
-      const T density = T(1 / std::sqrt(two_pi)) * exp(T(-0.5) * z2);
-      const T h3 = z * (z2 - 3.0) / std::sqrt(6.0), h5 = z * (z2 * (z2 - 10.0) + 15.0) / std::sqrt(120.0),
-              h7 = z * (z2 * (z2 * (z2 - 21.0) + 105.0) - 105.0) / std::sqrt(5040.0);
-      const T part = T(0.5) * erfc(-z / std::sqrt(2.0)) + density * (shape[0] * h3 + shape[1] * h5 + shape[2] * h7 -
-                                                                     T(0.5 * spread_px2) * z / (blur_px * blur_px));
+      const T z = (T(at_px) - edge.offset_px) / blur_px;
+      const T density = T(1 / std::sqrt(two_pi)) * exp(T(-0.5) * z * z);
+      const T part = T(0.5) * erfc(-z / std::sqrt(2.0)) - density * (T(0.5 * spread_px2) * z / (blur_px * blur_px)) +
+                     shape_at(at_px);
       const T light = dark + (bright - dark) * part;
       return given->response ? encoded_by(*given->response, light) : value_by_curve(curve, light);
     };
@@ -166,7 +172,7 @@ struct SharpeningPrior {
 struct ShapePrior {
   template <typename T>
   bool operator()(const T* shape, T* residuals) const {
-    for (int i = 0; i < shape_numbers; ++i) residuals[i] = shape[i] / shape_sigmas[static_cast<std::size_t>(i)];
+    for (int i = 0; i < shape_numbers; ++i) residuals[i] = shape[i] / shape_sigma;
     return true;
   }
 };
