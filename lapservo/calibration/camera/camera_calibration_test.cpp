@@ -157,7 +157,7 @@ double difference_within(const Response& is, const Response& truth, double low, 
   return best;
 }
 
-// Of single frames of a camera with the true response that are read by another one.
+// Single frames of a camera with the true response, read by another one.
 double psi_rms_mrad(const Response& truth, const Response& read_by, std::uint64_t seed) {
   Rig rig = scenes::usual_rig();
   rig.camera.response = truth;
@@ -180,7 +180,7 @@ struct ResponseCase {
   Response response;
 };
 
-// What boards give is within two sigmas, and named where the truth has a name. Prints it.
+// The response from boards lies within two sigmas, and is named where the truth has a name. Prints it.
 void expect_response(const ResponseCase& c, int views, std::uint64_t seed, bool with_psi = false) {
   Camera camera = small_camera();
   camera.response = c.response;

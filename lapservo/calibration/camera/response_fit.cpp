@@ -223,7 +223,8 @@ std::vector<Named> named_responses() {
 
 using CurveCovariance = Eigen::Matrix<double, curve_numbers, curve_numbers, Eigen::RowMajor>;
 
-// What no number of edges averages out (rounding, light along an edge, the tails of its blur): of the full value.
+// Errors that no number of edges averages out (rounding, light along an edge, the tails of its blur), of the full
+// value.
 constexpr double shared_sigma = 2e-4;
 
 // The part of the profiles' information that this leaves.
@@ -266,7 +267,7 @@ std::optional<CurvePosterior> posterior_of(ceres::Problem& problem, const Shared
   return posterior.covariance.allFinite() ? std::optional(posterior) : std::nullopt;
 }
 
-// Of the curve's values over [low, high], the largest, less what another exposure would be.
+// The largest sigma of the curve's values over [low, high], without the part that another exposure explains.
 double sigma_of(const CurvePosterior& posterior, double low, double high) {
   constexpr int places = 41;
   Eigen::Matrix<double, places, curve_numbers> rows;
@@ -345,7 +346,7 @@ class ProfileFit {
   }
 
   double cost() const { return summary_.final_cost; }
-  /// What the curve's prior adds.
+  /// The cost of the curve's prior.
   double curve_cost() const {
     ResponseCurve residuals;
     CurvePrior()(shared_.curve.data(), residuals.data());
