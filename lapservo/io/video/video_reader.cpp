@@ -216,7 +216,7 @@ class VideoReader::State {
                        "scale=out_color_matrix=bt709 -colorspace bt709 OUT)");
     if (!converter_.convert(*frame_, *colours, fields_, last_))
       throw InputError(source_, "has pixels of a kind that can't be converted, expected a video");
-    if (frames_ == 0 && !given_.matrix) remark_ = remark_on_matrix(*frame_);
+    if (frames_ == 0 && !given_.matrix) remark_ = remark_on_matrix(*frame_, of_software_);
   }
 
   std::string source_;

@@ -121,7 +121,7 @@ std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, 
   if (given.matrix) {
     colours.matrix = *given.matrix;
   } else if (names_no_matrix(frame)) {
-    colours.matrix = usual_matrix(frame.height);
+    colours.matrix = from_rgb ? YuvMatrix::bt601 : usual_matrix(frame.height);
   } else if (const auto matrix = matrix_of(frame.colorspace)) {
     colours.matrix = *matrix;
   } else {
@@ -132,10 +132,13 @@ std::optional<YuvColours> yuv_colours_of(const AVFrame& frame, AVCodecID codec, 
   return colours;
 }
 
-std::string remark_on_matrix(const AVFrame& frame) {
+std::string remark_on_matrix(const AVFrame& frame, bool of_software) {
   const AVPixFmtDescriptor* const format = av_pix_fmt_desc_get(pixel_format_of(frame));
   const bool has_chroma = format && !is_rgb(frame) && format->nb_components >= 3;
   if (!has_chroma || !names_no_matrix(frame) || usual_matrix(frame.height) == YuvMatrix::bt601) return "";
+  if (of_software)
+    return "names no colour matrix: read as Rec. 601 with chroma amid the pixels, as OpenCV and ffmpeg write RGB; if "
+           "ffmpeg wrote a camera's video anew: --colour-matrix bt709 --chroma-location left";
   return fmt::format(
       "names no colour matrix: read as Rec. 709, as it is {} rows high; if OpenCV or ffmpeg wrote it from RGB: "
       "--colour-matrix bt601 --chroma-location centre",
