@@ -1,6 +1,7 @@
 #include "recordings/replayed_run.h"
 
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -9,7 +10,6 @@
 #include "lapservo/rig/joint_conversion.h"
 #include "recordings/bag_joints.h"
 #include "recordings/bag_topics.h"
-#include "recordings/open_bag.h"
 
 namespace lapservo::internal {
 
@@ -51,9 +51,9 @@ ReplayedRun::ShiftedJoints ReplayedRun::joints_of_bag(const Bag& bag, const BagF
   return shifted;
 }
 
-ReplayedRun::ReplayedRun(const std::string& bag, const std::string& image_topic, const std::string& joint_topic,
+ReplayedRun::ReplayedRun(std::shared_ptr<const Bag> bag, const std::string& image_topic, const std::string& joint_topic,
                          const std::string& arm, const Joints& joints)
-    : bag_(open_bag(bag)),
+    : bag_(std::move(bag)),
       frames_(bag_, image_topic),
       joints_(joints_of_bag(*bag_, frames_, joint_topic, arm, joints)),
       clock_(std::max(0.0, joints_.recording.time_s.front())),

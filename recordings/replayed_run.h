@@ -22,7 +22,7 @@ class ReplayedRun {
  public:
   /// Topics: see bag_topics.h. `arm`: the instrument's name. Throws InputError for bags without joints or images, and
   /// where the joints end before the first image.
-  ReplayedRun(const std::string& bag, const std::string& image_topic, const std::string& joint_topic,
+  ReplayedRun(std::shared_ptr<const Bag> bag, const std::string& image_topic, const std::string& joint_topic,
               const std::string& arm, const Joints& joints);
 
   /// Begins where joints and images do, and passes while somebody sleeps.

@@ -5,10 +5,12 @@
 #include <cstdio>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "apps/lapservo/cli/interrupt.h"
 #include "apps/lapservo/cli/progress.h"
 #include "apps/lapservo/commands/servo/servo_output.h"
+#include "recordings/open_bag.h"
 #include "recordings/replayed_run.h"
 
 namespace lapservo::app {
@@ -59,7 +61,8 @@ int decide_on_recording(const ServoOptions& options) {
   if (config.controller.mode == ControlMode::uncalibrated) forget_registration(config, options);
   const Trajectory trajectory = trajectory_of(options);
 
-  ReplayedRun recorded(options.replay, options.image_topic, options.joint_topic, rig.instruments.front().name,
+  auto bag = open_bag(options.replay);
+  ReplayedRun recorded(std::move(bag), options.image_topic, options.joint_topic, rig.instruments.front().name,
                        joints_of(options, rig));
   if (const double lead_s = recorded.arm_clock_lead_s(); std::abs(lead_s) > 0.3)
     std::printf("the arm's clock is %.2f s %s the camera's, by when both were recorded\n", std::abs(lead_s),
