@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <iterator>
 #include <span>
 #include <utility>
 
@@ -118,6 +119,15 @@ bool lie_near(const Box& a, const Box& b) {
   return std::hypot(aside, above) < of_length * std::max(a.diagonal_px(), b.diagonal_px());
 }
 
+// A marker does, unless all but one of its bands are hidden.
+bool shows_two_colours(const Blob& blob) {
+  constexpr std::ptrdiff_t least = 2;
+  const std::uint8_t first = blob.samples[0].colour;
+  const auto same =
+      std::count_if(blob.samples.begin(), blob.samples.end(), [&](const Blob::Sample& s) { return s.colour == first; });
+  return same >= least && std::ssize(blob.samples) - same >= least;
+}
+
 }  // namespace
 
 std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classes, int grid_px, int min_samples) {
@@ -135,19 +145,6 @@ std::vector<Blob> find_blobs(const ImageView& image, const ColourClasses& classe
             [](const Blob& a, const Blob& b) { return a.samples.size() > b.samples.size(); });
   return blobs;
 }
-
-namespace {
-
-// As a marker does of which not all but one band is hidden.
-bool shows_two_colours(const Blob& blob) {
-  constexpr std::ptrdiff_t least = 2;
-  const std::uint8_t first = blob.samples[0].colour;
-  const auto same =
-      std::count_if(blob.samples.begin(), blob.samples.end(), [&](const Blob::Sample& s) { return s.colour == first; });
-  return same >= least && std::ssize(blob.samples) - same >= least;
-}
-
-}  // namespace
 
 std::vector<Blob> largest_blobs(const ImageView& image, const ColourClasses& classes) {
   constexpr int grid_px = 8;
