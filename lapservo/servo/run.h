@@ -55,8 +55,9 @@ class RunObserver {
 ///
 /// Throws InputError before anything moves: without RunConfig::arm_limits where the arm is not simulated; for a
 /// duration or a clock's time that is not finite; for joints or a first image stamped more than a second ahead of the
-/// clock; and, as soon as the joints are known, for a trajectory that can't be followed from there
-/// (refuse_infeasible()), unless nothing is moved: the arm is simulated and does not follow.
+/// clock; and, as soon as the joints of an arm that is enabled, homed and not busy are known, for a trajectory that
+/// can't be followed from there (refuse_infeasible()), unless nothing is moved: the arm is simulated and does not
+/// follow.
 void run(Supervisor& arm, ImageStream& images, Clock& clock, const RunConfig& config, const Trajectory& trajectory,
          double duration_s, RunObserver& observer);
 

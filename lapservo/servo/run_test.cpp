@@ -768,18 +768,25 @@ TEST(Run, NamesWhatOfTheRigWasWrongFromTheStart) {
   EXPECT_EQ(wrong_rig_of(turned), "camera_from_rcm" + remedy);
 }
 
-// Its joints carry the times of another clock.
+// Its joints carry the times of another clock, and it may be on its way at first, from where no goal can be reached.
 class AheadArm : public OperatedArm {
  public:
-  AheadArm(Simulator& simulator, double ahead_s) : OperatedArm(simulator), ahead_s_(ahead_s) {}
+  AheadArm(Simulator& simulator, double ahead_s, double homing_s)
+      : OperatedArm(simulator), ahead_s_(ahead_s), homing_s_(homing_s) {}
   JointState state() override {
     JointState state = OperatedArm::state();
+    if (state.time_s < homing_s_) {
+      state.q = {0, pi / 2, -0.0156, 0};
+      state.blocked = Blocked::busy;
+    } else {
+      state.started = std::exchange(homing_s_, 0) > 0;
+    }
     state.time_s += ahead_s_;
     return state;
   }
 
  private:
-  double ahead_s_;
+  double ahead_s_, homing_s_;
 };
 
 // The room with another clock for images, or a loop's clock that is out of order.
@@ -807,6 +814,7 @@ struct Refused {
   bool registered = true;
   double duration_s = 1;
   double joints_ahead_s = 0, images_ahead_s = 0;
+  double homing_s = 0;
   bool clock_in_order = true;
 };
 
@@ -821,7 +829,7 @@ std::string refusal_of(const Refused& refused) {
   if (!refused.registered) config.rig.instruments[0].camera_from_rcm.reset();
   Simulator simulator(rig, {}, {0.05, 1.57, 0.064, 1.2});
   const Eigen::Vector4d before = simulator.measured_jp();
-  AheadArm arm(simulator, refused.joints_ahead_s);
+  AheadArm arm(simulator, refused.joints_ahead_s, refused.homing_s);
   OtherClock others(simulator, refused.images_ahead_s, refused.clock_in_order);
   Watcher watcher(c, rig, simulator);
   const std::string said =
@@ -840,6 +848,12 @@ TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
   EXPECT_EQ(complaint.find("fast.csv: can't be followed at "), 0U) << complaint;
   EXPECT_NE(complaint.find(" s: limits.rate"), std::string::npos) << complaint;
   EXPECT_NE(refusal_of({.trajectory = set_point({3, 1e4, 1e4, 5e3})}), "");
+}
+
+TEST(Run, ChecksTheGoalWhereTheArmHasBeenHomedTo) {
+  const Trajectory goal = set_point({0.9, 397, 182, 106});
+  EXPECT_EQ(refusal_of({.trajectory = goal, .homing_s = 0.3}), "");
+  EXPECT_NE(refusal_of({.trajectory = set_point({3, 1e4, 1e4, 5e3}), .homing_s = 0.3}), "");
 }
 
 TEST(Run, RefusesFeaturesThatNoImageShowsInEveryMode) {
