@@ -30,6 +30,12 @@ std::optional<std::array<std::size_t, 4>> find_names(const Names& wanted, const 
   return places;
 }
 
+// A PSM without an instrument: the discs of the sterile adapter are joints, by the names of the instrument's or not.
+bool has_no_tool(const std::vector<std::string>& names) {
+  return std::any_of(names.begin(), names.end(),
+                     [](const std::string& name) { return name.rfind("disc", 0) == 0 || name == "jaw"; });
+}
+
 }  // namespace
 
 JointLimits limits_of_q(const Joints& joints, const JointLimits& limits) {
@@ -41,18 +47,17 @@ JointLimits limits_of_q(const Joints& joints, const JointLimits& limits) {
 }
 
 std::optional<std::array<std::size_t, 4>> find_joints(const Joints& joints, const std::vector<std::string>& names) {
-  if (const auto places = find_names(joints.names, names)) return places;
   const auto other = other_names(joints);
+  if (other && has_no_tool(names)) return std::nullopt;
+  if (const auto places = find_names(joints.names, names)) return places;
   return other ? find_names(*other, names) : std::nullopt;
 }
 
 std::string unfit_joints(const Joints& joints, const std::vector<std::string>& names) {
   const auto other = other_names(joints);
-  const bool no_tool = std::any_of(names.begin(), names.end(),
-                                   [](const std::string& name) { return name.rfind("disc", 0) == 0 || name == "jaw"; });
   return fmt::format("joints are {}, expected {}{}{}", fmt::join(names, ", "), fmt::join(joints.names, ", "),
                      other ? fmt::format(" or {}", fmt::join(*other, ", ")) : "",
-                     no_tool ? ". The arm knows no instrument: name it on set_tool_type" : "");
+                     has_no_tool(names) ? ". The arm knows no instrument: name it on set_tool_type" : "");
 }
 
 }  // namespace lapservo::internal

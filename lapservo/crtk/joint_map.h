@@ -15,7 +15,8 @@ namespace lapservo::internal {
 JointLimits limits_of_q(const Joints& joints, const JointLimits& limits);
 
 /// Where the four joints stand in a message with these names. nullopt when one is missing or stands there twice. Where
-/// the rig has a dVRK PSM's names, of either 2.3 and later or before, the others count, too.
+/// the rig has a dVRK PSM's names, of either 2.3 and later or before, the others count, too, and none where the names
+/// are those of a PSM without an instrument.
 std::optional<std::array<std::size_t, 4>> find_joints(const Joints& joints, const std::vector<std::string>& names);
 
 /// Why it finds none: the names that came and those that are expected.

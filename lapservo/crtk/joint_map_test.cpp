@@ -80,7 +80,7 @@ TEST(JointMap, APsmTurnsAsItsDhTable) {
 
 TEST(JointMap, FindsTheFourAmongOthersAndRefusesMissingAndRepeatedOnes) {
   const auto places =
-      find_joints(psm(), {"wrist", "outer_roll", "outer_insertion", "outer_pitch", "outer_yaw", "jaw", "wrist"});
+      find_joints(psm(), {"wrist", "outer_roll", "outer_insertion", "outer_pitch", "outer_yaw", "gripper", "wrist"});
   ASSERT_TRUE(places);
   EXPECT_EQ(*places, (std::array<std::size_t, 4>{4, 3, 2, 1}));
   EXPECT_FALSE(find_joints(psm(), {"outer_yaw", "outer_pitch", "outer_insertion"}));
@@ -95,6 +95,12 @@ TEST(JointMap, KnowsADvrksNamesOfBothTimes) {
   joints.names = {"yaw", "pitch", "insertion", "roll"};
   EXPECT_TRUE(find_joints(joints, {"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"}));
   EXPECT_FALSE(find_joints(joints, {"outer_yaw", "pitch", "insertion", "roll"}));
+  for (const char* of_no_tool : {"jaw", "disc_4"}) {
+    auto bare = since;
+    bare.push_back(of_no_tool);
+    EXPECT_FALSE(find_joints(joints, bare)) << of_no_tool;
+    EXPECT_NE(unfit_joints(joints, bare).find("set_tool_type"), std::string::npos);
+  }
   joints.names = {"q1", "q2", "q3", "q4"};  // somebody else's arm
   EXPECT_FALSE(find_joints(joints, since));
   EXPECT_EQ(unfit_joints(joints, since),
