@@ -10,7 +10,6 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
-#include <fcntl.h>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -18,15 +17,14 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <sys/wait.h>
 #include <thread>
-#include <unistd.h>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "acceptance/process.h"
 #include "lapservo/control/paper_trajectory.h"
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/kinematics/centre_line.h"
@@ -74,41 +72,9 @@ void sleep(double duration_s) {
 }
 
 // The tool with these arguments, its output in a file; killed with the object.
-class Process {
- public:
-  Process(const std::vector<std::string>& arguments, const std::string& output) {
-    std::vector<char*> argv{const_cast<char*>(LAPSERVO_TOOL)};
-    for (const std::string& argument : arguments) argv.push_back(const_cast<char*>(argument.c_str()));
-    argv.push_back(nullptr);
-    id_ = ::fork();
-    if (id_ != 0) return;
-    const int file = ::open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-    ::dup2(file, 1);
-    ::dup2(file, 2);
-    ::execv(LAPSERVO_TOOL, argv.data());
-    ::_exit(127);
-  }
-  ~Process() {
-    if (running()) signal(SIGKILL), wait();
-  }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
-
-  void signal(int number) const { ::kill(id_, number); }
-  bool running() { return !exit_code_ && ::waitpid(id_, &status_, WNOHANG) == 0; }
-  /// Its exit code; -1 after a signal.
-  int wait() {
-    if (!exit_code_) {
-      ::waitpid(id_, &status_, 0);
-      exit_code_ = WIFEXITED(status_) ? WEXITSTATUS(status_) : -1;
-    }
-    return *exit_code_;
-  }
-
- private:
-  pid_t id_ = 0;
-  int status_ = 0;
-  std::optional<int> exit_code_;
+struct Process : acceptance::Process {
+  Process(const std::vector<std::string>& arguments, const std::string& output)
+      : acceptance::Process(LAPSERVO_TOOL, arguments, output) {}
 };
 
 // The setpoints that any listener on the arm's topics receives.
