@@ -202,7 +202,7 @@ class EndoscopeOfTheArm {
   std::thread thread_;
 };
 
-// What the loop sends.
+// The setpoints of the loop.
 class Spy {
  public:
   explicit Spy(Transport& transport)
@@ -548,7 +548,7 @@ TEST_F(Dvrk, WithoutAToolItSaysSoAndAToolThatIsChangedHolds) {
   EXPECT_EQ(judge_->faults(), 0);
 }
 
-// A NaN in servo_jp makes the console disable the arm; the loop sends none, whatever it is asked for.
+// A NaN in servo_jp makes the console disable the arm; the loop sends none.
 TEST_F(Dvrk, SendsNoNaNAndIsHeldWhenAnotherClientDoes) {
   work_until_at_goal();
   const std::size_t before = said().size();
