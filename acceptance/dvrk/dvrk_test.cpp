@@ -1,7 +1,6 @@
 // Conformance with dVRK's own software: its console with PSM1 in kinematic simulation, over ROS 1, `lapservo servo` as
-// a process, and an endoscope here that shows the instrument where the console says that it is. The arm's own joints
-// are the judge. LAPSERVO_DVRK=FOLDER names a build: FOLDER/console starts the console with the arguments that it is
-// given
+// a process, and an endoscope here that shows the instrument where the console has it. The tests measure the arm's own
+// joints. LAPSERVO_DVRK=FOLDER names a build: FOLDER/console starts the console with the arguments that it is given
 // (-j FILE) and runs until it is killed. LAPSERVO_DVRK_MINUTES=20 lets the operator work so long.
 
 #include <algorithm>
@@ -61,13 +60,13 @@ void sleep(double duration_s) {
   std::this_thread::sleep_for(std::chrono::duration<double>(duration_s));
 }
 
-// What a test can't go on without.
+// Ends a test that can't go on without this condition.
 template <typename Condition>
 void until(const std::string& what, const Condition& condition) {
   if (!wait_for(condition)) throw std::runtime_error("not within a minute: " + what);
 }
 
-// What dVRK says of its arm.
+// The arm's states as dVRK publishes them.
 class Judge {
  public:
   explicit Judge(Transport& transport) {
@@ -148,7 +147,7 @@ class Judge {
   std::vector<Transport::Subscription> subscriptions_;
 };
 
-// The endoscope's instrument stands where the judge says.
+// The endoscope's instrument, at the joints that dVRK publishes.
 class FollowedArm : public SimulatedArm {
  public:
   explicit FollowedArm(Judge& judge) : judge_(judge) {}
