@@ -62,11 +62,12 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
         interlock_.on_operating_state(message, arrival_s);
       }));
   if (config.motion_enabled)
-    subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, "servo_jp"), [this](JointMessage&&) {
-      const double arrival_s = clock_.now_s();
-      const std::lock_guard lock(mutex_);
-      interlock_.on_foreign_command(arrival_s);
-    }));
+    for (const char* topic : {"servo_jp", "servo_jr", "servo_jv", "servo_jf", "move_jp", "move_jr"})
+      subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, topic), [this](JointMessage&&) {
+        const double arrival_s = clock_.now_s();
+        const std::lock_guard lock(mutex_);
+        interlock_.on_foreign_command(arrival_s);
+      }));
   thread_ = std::thread([this] { command(); });
 }
 
