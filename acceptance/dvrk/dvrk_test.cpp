@@ -266,27 +266,26 @@ class Dvrk : public ::testing::Test {
     sleep(2);  // its trajectories need the mean of its period: homed at once, it never arrives
   }
   bool reads(const std::string& topic) const { return !transport_->readers(topic).empty(); }
-  void start_servo(const std::vector<std::string>& more = {}, const std::string& limits = "") {
+  void start_servo(const std::string& limits = "") {
     const std::string psm = (testing::source_folder() / "configs/joint_limits/psm-classic.yaml").string();
-    std::vector<std::string> arguments{"servo",
-                                       "--rig",
-                                       "rig.yaml",
-                                       "--robot",
-                                       "ros1:PSM1",
-                                       "--camera",
-                                       "ros1:/endoscope/image_raw",
-                                       "--fps",
-                                       "30",
-                                       "--set-point",
-                                       fmt::format("{},{},{},{}", goal_[0], goal_[1], goal_[2], goal_[3]),
-                                       "--duration",
-                                       "36000",
-                                       "--enable-motion",
-                                       "--joint-limits",
-                                       limits.empty() ? psm : limits,
-                                       "--setpoint-readers",
-                                       "2"};
-    arguments.insert(arguments.end(), more.begin(), more.end());
+    const std::vector<std::string> arguments{"servo",
+                                             "--rig",
+                                             "rig.yaml",
+                                             "--robot",
+                                             "ros1:PSM1",
+                                             "--camera",
+                                             "ros1:/endoscope/image_raw",
+                                             "--fps",
+                                             "30",
+                                             "--set-point",
+                                             fmt::format("{},{},{},{}", goal_[0], goal_[1], goal_[2], goal_[3]),
+                                             "--duration",
+                                             "36000",
+                                             "--enable-motion",
+                                             "--joint-limits",
+                                             limits.empty() ? psm : limits,
+                                             "--setpoint-readers",
+                                             "2"};
     servo_ = std::make_unique<acceptance::Process>(LAPSERVO_TOOL, arguments, "servo.txt");
   }
   static std::string said() { return testing::read_file("servo.txt"); }
@@ -591,13 +590,13 @@ TEST_F(Dvrk, KeepsToItsRatesAndRefusesGoalsBeyondItsLimits) {
   testing::write_file("slow.yaml", "lower: [-1, -0.9, 0.04, -4]\nupper: [1, 0.9, 0.2, 4]\n" + rest);
   start_console();
   home_and_move_to_view();
-  start_servo({}, "narrow.yaml");
+  start_servo("narrow.yaml");
   EXPECT_EQ(servo_->wait(), 2);
   EXPECT_NE(said().find("can't be followed"), std::string::npos) << said();
   EXPECT_EQ(spy_->count(), 0);
 
   const double moved_s = now_s();
-  start_servo({}, "slow.yaml");
+  start_servo("slow.yaml");
   start_until_at_goal();
   const Eigen::Array4d rate(0.1, 0.1, 0.01, 0.4);
   const auto samples = judge_->samples(moved_s);

@@ -476,6 +476,7 @@ std::optional<ResponseFit> fit_response(const std::vector<BoardEdgeProfile>& pro
   const auto posterior = posterior_of(fitted.problem(), fitted.shared(), part);
   if (!posterior) return std::nullopt;
   fit.sigma = sigma_of(*posterior, fit.low, fit.high);
+  if (!std::isfinite(fit.sigma)) return std::nullopt;
   fit.table = fit.response = rounded_by_sigma(table_of(posterior->curve), fit.sigma);
   if (try_named) choose_response(fitted, *posterior, part, fit);
   return fit;
