@@ -1,0 +1,104 @@
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "lapservo/core/angles.h"
+#include "lapservo/testing/scenes.h"
+#include "lapservo/vision/search/explained_colours.h"
+#include "lapservo/vision/search/initial_pose.h"
+#include "lapservo/vision/search/rcm_starts.h"
+
+namespace lapservo::internal {
+namespace starts_test {
+namespace {
+
+using scenes::Shot;
+using scenes::usual_shot;
+
+constexpr std::uint64_t shots = 6;
+
+Eigen::Vector2d middle_px(const Shot& shot, const ShaftPose& pose) {
+  const Eigen::Vector3d along(0, 0, shot.rig.instruments[0].marker.length_m() / 2);
+  return shot.rig.camera.raw_from_point(pose.camera_from_unrolled * along);
+}
+
+// Whether a coarse fit finds the marker from there: its middle and its depth are about right.
+bool is_near(const Shot& shot, const PoseUnknowns& start) {
+  constexpr double near_px = 25, near_depth = 0.15;
+  const ShaftPose truth = shot.truth(true).pose();
+  const double depth =
+      start.pose().camera_from_unrolled.translation.norm() / truth.camera_from_unrolled.translation.norm();
+  return (middle_px(shot, start.pose()) - middle_px(shot, truth)).norm() < near_px && std::abs(depth - 1) < near_depth;
+}
+
+bool any_is_near(const Shot& shot, const std::vector<PoseUnknowns>& starts) {
+  for (const PoseUnknowns& start : starts)
+    if (is_near(shot, start)) return true;
+  return false;
+}
+
+Blob largest_blob(const Shot& shot) {
+  return largest_blobs(shot.sight.view(), shot.sight.classes()).at(0);
+}
+
+TEST(Starts, ABlobsOutlineTellsThePoseWithTheRcmAndWithout) {
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    const InitialPoses through_rcm =
+        initial_poses(shot.sight.scene(), largest_blob(shot), shot.rig.instruments[0].camera_from_rcm);
+    const InitialPoses free = initial_poses(shot.sight.scene(), largest_blob(shot), std::nullopt);
+    EXPECT_TRUE(any_is_near(shot, through_rcm.poses));
+    EXPECT_TRUE(any_is_near(shot, free.poses));
+    for (const PoseUnknowns& start : through_rcm.poses) EXPECT_TRUE(start.q());
+    for (const PoseUnknowns& start : free.poses) EXPECT_FALSE(start.q());
+    EXPECT_FALSE(through_rcm.other_bands || free.other_bands);
+  }
+}
+
+TEST(Starts, LinesThroughTheRcmTellThePose) {
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    const Rigid3& camera_from_rcm = *shot.rig.instruments[0].camera_from_rcm;
+    const auto starts = starts_through_rcm(shot.sight.scene(), largest_blob(shot), camera_from_rcm);
+    EXPECT_LE(starts.size(), 3U);
+    EXPECT_TRUE(any_is_near(shot, starts));
+    EXPECT_TRUE(shows_bands_in_order(shot.sight.scene(), largest_blob(shot), camera_from_rcm));
+  }
+}
+
+// Another instrument's colours are in another order.
+TEST(Starts, AnotherOrderOfColoursIsNoStart) {
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    Scene another = shot.sight.scene();
+    std::swap(another.bands[1], another.bands[2]);
+    EXPECT_TRUE(initial_poses(another, largest_blob(shot), std::nullopt).poses.empty());
+    EXPECT_FALSE(shows_bands_in_order(another, largest_blob(shot), *shot.rig.instruments[0].camera_from_rcm));
+  }
+}
+
+TEST(ExplainedColours, AreMostAtTheTruth) {
+  for (std::uint64_t seed = 1; seed <= shots; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Shot& shot = usual_shot(seed);
+    const Scene scene = shot.sight.scene();
+    const PoseUnknowns truth = shot.truth(true);
+    const double of_truth_px2 = explained_area_px2(scene, truth.pose(), true);
+    for (const Eigen::Vector4d& off :
+         {Eigen::Vector4d(0, 0, 0, 1), Eigen::Vector4d(0, 0, 0, -2), Eigen::Vector4d(0, 0, 6e-3, 0),
+          Eigen::Vector4d(0, 0, -6e-3, 0), Eigen::Vector4d(0.05, 0, 0, 0), Eigen::Vector4d(0, 0.05, 0, 0)})
+      EXPECT_LT(explained_area_px2(scene, truth.changed_by(off).pose(), true), 0.9 * of_truth_px2) << off.transpose();
+    // A turn is nothing where any rotation counts, and what can't be enough is not counted to the end.
+    EXPECT_GT(explained_area_px2(scene, truth.with_psi(shot.q.psi_rad + 1).pose(), false), 0.5 * of_truth_px2);
+    EXPECT_EQ(explained_area_px2(scene, truth.pose(), true, 2 * of_truth_px2), no_area_px2);
+  }
+}
+
+}  // namespace
+}  // namespace starts_test
+}  // namespace lapservo::internal
