@@ -31,6 +31,8 @@ struct Kind {
   std::optional<double> turn_rad = {};    ///< by so much, to either side
   bool from_rest = false, lit_from_aside = false, subsampled = false;
   Off off = Off::nowhere;
+  double diameter_m = 0.0084;  ///< of the instrument; its print is as much smaller
+  bool soft_and_dim = false;   ///< 1.6 px of blur, 0.3 of the light
 };
 
 constexpr Between some_turn{-0.1, 0.1}, box{-9, 9}, smallest{11, 14}, slow{1, 6};
@@ -48,6 +50,15 @@ const std::vector<Kind> kinds{
     {.name = "ink_aside", .along_across_px = box, .turns_rad = some_turn, .off = Off::middle_ink},
     {.name = "small_bands_off", .way_px = slow, .radius_px = smallest, .off = Off::bands},
     {.name = "small_ink_aside", .way_px = slow, .radius_px = smallest, .off = Off::middle_ink},
+    {.name = "soft_dim", .soft_and_dim = true},
+    {.name = "soft_dim_bands_off", .off = Off::bands, .soft_and_dim = true},
+    {.name = "soft_dim_ink_aside", .off = Off::middle_ink, .soft_and_dim = true},
+    {.name = "5mm", .diameter_m = 5e-3},
+    {.name = "5mm_bands_off", .off = Off::bands, .diameter_m = 5e-3},
+    {.name = "5mm_ink_aside", .off = Off::middle_ink, .diameter_m = 5e-3},
+    {.name = "3mm", .diameter_m = 3e-3},
+    {.name = "3mm_bands_off", .off = Off::bands, .diameter_m = 3e-3},
+    {.name = "3mm_ink_aside", .off = Off::middle_ink, .diameter_m = 3e-3},
     {.name = "turn_0.05", .turn_rad = 0.05},
     {.name = "turn_0.1", .turn_rad = 0.1},
     {.name = "turn_0.25", .turn_rad = 0.25},
@@ -93,12 +104,19 @@ cv::Mat picture_of(const Rig& rig, const JointVector& q, const Kind& kind, const
                    std::uint64_t seed, Random& random) {
   RenderOptions options;
   if (kind.lit_from_aside) options.lighting = light_from_aside(random);
+  if (kind.soft_and_dim) options.sensor.blur_px = 1.6, options.sensor.gains = Light::Constant(0.3F);
   static const cv::Mat tissue = make_tissue(rig.camera.width_px, rig.camera.height_px, 5);
   const cv::Mat bgr = Renderer(rig.camera, {shaft_of(rig.instruments[0])}, tissue, options)
                           .render_exposure(scenes::moving_exposure(rig, q, motion), seed);
   effects::CameraEffects effects;
   effects.subsampled = kind.subsampled;
   return kind.subsampled ? effects::seen_through(effects, bgr, rig.camera) : bgr;
+}
+
+void scale(Marker& marker, double diameter_m) {
+  for (auto* bands : {&marker.bands_upper_m, &marker.bands_lower_m})
+    for (double& band_m : *bands) band_m *= diameter_m / marker.diameter_m;
+  marker.diameter_m = diameter_m;
 }
 
 Score score_kind(const Kind& kind, int frames, std::uint64_t seed) {
@@ -110,6 +128,7 @@ Score score_kind(const Kind& kind, int frames, std::uint64_t seed) {
     const auto [motion, farther] = draw(kind, random);
     Rig rig = scenes::usual_rig();
     Instrument& instrument = rig.instruments[0];
+    scale(instrument.marker, kind.diameter_m);
     instrument.camera_from_rcm->translation *= farther;
     const ViewRange range{farther * nearest_m, farther * farthest_m, {steepest_rad, border_px}};
     const Marker nominal = instrument.marker;
