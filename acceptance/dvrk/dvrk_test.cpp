@@ -1,7 +1,8 @@
-// Conformance with dVRK's own software: its console with PSM1 in kinematic simulation, over ROS 1, `lapservo servo` as
-// a process, and an endoscope here that shows the instrument where the console has it. The tests measure the arm's own
-// joints. LAPSERVO_DVRK=FOLDER names a build: FOLDER/console starts the console with the arguments that it is given
-// (-j FILE) and runs until it is killed. LAPSERVO_DVRK_MINUTES=20 lets the operator work so long.
+// Conformance with dVRK's own software: its console with PSM1, MTMR and their teleoperation in kinematic simulation,
+// over ROS 1, `lapservo servo` as a process, and an endoscope here that shows the instrument where the console has it.
+// The tests measure the arm's own joints. LAPSERVO_DVRK=FOLDER names a build: FOLDER/console starts the console with
+// the arguments that it is given (-j FILE) and runs until it is killed. LAPSERVO_DVRK_MINUTES=20 lets the operator work
+// so long.
 
 #include <algorithm>
 #include <atomic>
@@ -13,6 +14,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <geometry_msgs/PoseStamped.h>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -45,6 +47,7 @@ namespace {
 using testing::wait_for;
 using SixJoints = Eigen::Matrix<double, 6, 1>;
 using Text = std_msgs::String_<Ros1Allocator<std::byte>>;
+using Pose = geometry_msgs::PoseStamped_<Ros1Allocator<std::byte>>;
 
 constexpr double allowed_s = 0.1;  // from an operator's word to the last setpoint
 constexpr double steady_s_rad = 0.5e-3, steady_px = 0.5;
@@ -201,6 +204,60 @@ class EndoscopeOfTheArm {
   std::thread thread_;
 };
 
+// The surgeon's side of the console: MTMR moves PSM1 while the pedal is pressed and the clutch is not.
+class Teleoperation {
+ public:
+  explicit Teleoperation(Transport& transport)
+      : state_command_(transport.string_publisher("/MTMR/state_command")),
+        move_jp_(transport.joint_publisher("/MTMR/move_jp")),
+        enable_(transport.bool_publisher("/console/teleop/enable")),
+        pedal_(transport.joy_publisher("/console/emulate_operator_present")),
+        clutch_(transport.joy_publisher("/console/emulate_clutch")),
+        state_(transport.subscribe_operating_state("/MTMR/operating_state", [this](OperatingStateMessage&& message) {
+          ready_ = message.state == "ENABLED" && message.is_homed;
+        })) {}
+  static const char* configuration() {
+    return R"("psm-teleops": [{"mtm": "MTMR", "psm": "PSM1", "configure-parameter": {"align-mtm": false, )"
+           R"("ignore-jaw": true, "start-gripper-threshold": 0, "start-roll-threshold": 0, "scale": 0.2}}])";
+  }
+  void power_on() {
+    until("MTMR", [this] {
+      state_command_({now_s(), "enable"});
+      sleep(0.5);
+      state_command_({now_s(), "home"});
+      sleep(0.5);
+      return ready_.load();
+    });
+  }
+  void press() {
+    enable_({true});
+    pedal_({now_s(), {1}});
+  }
+  void work_with_clutch_and_release() {
+    sleep(0.5);
+    for (const double yaw_rad : {0.03, 0.0}) {
+      move_jp_({now_s(), {}, {yaw_rad, 0, 0, 0, 0, 0, 0}});
+      sleep(1.5);
+      clutch_({now_s(), {1}});
+      sleep(0.5);
+      clutch_({now_s(), {0}});
+      sleep(0.5);
+    }
+    pedal_({now_s(), {0}});
+    sleep(0.5);
+    enable_({false});
+    sleep(0.5);
+  }
+
+ private:
+  Transport::Publisher<StringMessage> state_command_;
+  Transport::Publisher<JointMessage> move_jp_;
+  Transport::Publisher<BoolMessage> enable_;
+  Transport::Publisher<JoyMessage> pedal_, clutch_;
+  std::atomic<bool> ready_ = false;
+  Transport::Subscription state_;
+};
+
 // The setpoints of the loop.
 class Spy {
  public:
@@ -234,9 +291,11 @@ class Dvrk : public ::testing::Test {
     node_ = std::make_unique<ros::NodeHandle>();
     judge_ = std::make_unique<Judge>(*transport_);
     spy_ = std::make_unique<Spy>(*transport_);
+    surgeon_ = std::make_unique<Teleoperation>(*transport_);
     state_command_ = transport_->string_publisher("/PSM1/state_command");
     move_jp_ = transport_->joint_publisher("/PSM1/move_jp");
     servo_jp_ = transport_->joint_publisher("/PSM1/servo_jp");
+    servo_cp_ = node_->advertise<Pose>("/PSM1/servo_cp", 1);
     set_tool_type_ = node_->advertise<Text>("/PSM1/set_tool_type", 1);
     command_ = transport_->string_publisher("/lapservo/PSM1/command");
     wish_ = transport_->joint_publisher("/lapservo/PSM1/set_point");
@@ -257,8 +316,12 @@ class Dvrk : public ::testing::Test {
   }
 
   void start_console() {
-    testing::write_file("console.json", R"({"arms": [{"name": "PSM1", "type": "PSM", "simulation": "KINEMATIC", )"
-                                        R"("arm": "arm/PSM_KIN_SIMULATED_LARGE_NEEDLE_DRIVER_400006.json"}]})");
+    testing::write_file("console.json", R"({"io": {"physical-footpedals-required": false}, "arms": [)"
+                                        R"({"name": "PSM1", "type": "PSM", "simulation": "KINEMATIC", )"
+                                        R"("arm": "arm/PSM_KIN_SIMULATED_LARGE_NEEDLE_DRIVER_400006.json"}, )"
+                                        R"({"name": "MTMR", "type": "MTM", "simulation": "KINEMATIC", )"
+                                        R"("arm": "arm/MTMR_KIN_SIMULATED.json"}], )" +
+                                            std::string(Teleoperation::configuration()) + "}");
     console_ = std::make_unique<acceptance::Process>(
         program_, std::vector<std::string>{"-j", std::filesystem::absolute("console.json").string()}, "console.txt");
     until("the console",
@@ -412,9 +475,10 @@ class Dvrk : public ::testing::Test {
   std::unique_ptr<ros::NodeHandle> node_;
   std::unique_ptr<Judge> judge_;
   std::unique_ptr<Spy> spy_;
+  std::unique_ptr<Teleoperation> surgeon_;
   Transport::Publisher<StringMessage> state_command_, command_;
   Transport::Publisher<JointMessage> move_jp_, servo_jp_, wish_;
-  ros::Publisher set_tool_type_;
+  ros::Publisher set_tool_type_, servo_cp_;
   Rig rig_;
   std::unique_ptr<EndoscopeOfTheArm> endoscope_;
   std::unique_ptr<acceptance::Process> console_, servo_;
@@ -433,6 +497,7 @@ class Dvrk : public ::testing::Test {
 };
 
 std::vector<Dvrk::Event> Dvrk::events() {
+  const auto here = ros::topic::waitForMessage<Pose>("/PSM1/measured_cp", *node_);
   const SixJoints elsewhere = view() + SixJoints{{0.05, 0.03, 0.005, 0.2, 0.1, -0.1}};
   return {
       {"pause", [this] { command("pause"); },
@@ -450,6 +515,11 @@ std::vector<Dvrk::Event> Dvrk::events() {
          for (int i = 0; i < 100; ++i) joints[0] += 2e-4, say_servo_jp(joints), sleep(0.01);
        },
        [] {}, false},
+      {"another client of servo_cp",
+       [this, here] {
+         for (int i = 0; i < 100; ++i) servo_cp_.publish(*here), sleep(0.01);
+       },
+       [] {}, false},
       {"fault",
        [this] {
          ++operators_faults_;
@@ -459,6 +529,7 @@ std::vector<Dvrk::Event> Dvrk::events() {
          for (bool away = true; !judge_->is("FAULT"); away = !away) say_servo_jp(away ? there : here), sleep(0.01);
        },
        [this] { disable_home_and_move_to_view(); }, false},
+      {"teleoperation", [this] { surgeon_->press(); }, [this] { surgeon_->work_with_clutch_and_release(); }, false},
       {"unhome", [this] { command("unhome"); }, [this] { disable_home_and_move_to_view(); }, false},
   };
 }
@@ -486,6 +557,7 @@ void Dvrk::go_through(const Event& event) {
 
 TEST_F(Dvrk, AnOperatorsWordHoldsTheLoopUntilAStart) {
   work_until_at_goal();
+  surgeon_->power_on();
   for (const Event& event : events()) go_through(event);
   EXPECT_TRUE(spy_->all_finite());
   std::printf("steady to %.2f mrad, %.2f px; last setpoint %.0f ms after a word\n", worst_rms_[0] * 1e3,
@@ -612,6 +684,7 @@ TEST_F(Dvrk, AnOperatorWorksBesideTheLoop) {
   const char* const minutes = std::getenv("LAPSERVO_DVRK_MINUTES");
   const double end_s = now_s() + 60 * (minutes ? std::atof(minutes) : 2);
   work_until_at_goal();
+  surgeon_->power_on();
   const auto all = events();
   int words = 0;
   for (; now_s() < end_s && !HasFatalFailure(); ++words) {

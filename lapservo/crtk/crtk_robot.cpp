@@ -30,6 +30,18 @@ std::string ask_for_real_time() {
 
 }  // namespace
 
+const std::map<std::string, CommandType>& motion_commands() {
+  using enum CommandType;
+  static const std::map<std::string, CommandType> commands{
+      {"servo_jp", joints},      {"servo_jr", joints},         {"servo_jv", joints},
+      {"servo_jf", joints},      {"move_jp", joints},          {"move_jr", joints},
+      {"servo_cp", pose},        {"servo_cr", pose},           {"move_cp", pose},
+      {"move_cr", pose},         {"servo_cv", twist},          {"servo_cf", wrench},
+      {"body/servo_cf", wrench}, {"spatial/servo_cf", wrench}, {"hold", nothing},
+      {"free", nothing}};
+  return commands;
+}
+
 std::string topic_of(const std::string& arm, const std::string& name) {
   return (arm.rfind('/', 0) == 0 ? "" : "/") + arm + "/" + name;
 }
@@ -62,8 +74,8 @@ CrtkRobot::CrtkRobot(Transport& transport, const std::string& arm, const Interlo
         interlock_.on_operating_state(message, arrival_s);
       }));
   if (config.motion_enabled)
-    for (const char* topic : {"servo_jp", "servo_jr", "servo_jv", "servo_jf", "move_jp", "move_jr"})
-      subscriptions_.push_back(transport.subscribe_joints(topic_of(arm, topic), [this](JointMessage&&) {
+    for (const auto& [name, type] : motion_commands())
+      subscriptions_.push_back(transport.subscribe_commands(topic_of(arm, name), type, [this](CommandMessage&&) {
         const double arrival_s = clock_.now_s();
         const std::lock_guard lock(mutex_);
         interlock_.on_foreign_command(arrival_s);

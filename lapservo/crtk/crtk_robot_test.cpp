@@ -66,14 +66,16 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
   EXPECT_EQ(robot.state().blocked, Blocked::old_joint_states);
 }
 
-TEST(CrtkRobot, ACommandOfAnotherByAnyJointTopicHolds) {
-  for (const char* topic : {"servo_jp", "servo_jr", "servo_jv", "servo_jf", "move_jp", "move_jr"}) {
+TEST(CrtkRobot, ACommandOfAnotherByAnyTopicOfMotionHolds) {
+  for (const char* topic :
+       {"servo_jp", "servo_jr", "servo_jv", "servo_jf", "move_jp", "move_jr", "servo_cp", "servo_cr", "move_cp",
+        "move_cr", "servo_cv", "servo_cf", "body/servo_cf", "spatial/servo_cf", "hold", "free"}) {
     TestTransport transport;
     StandingClock clock;
     CrtkRobot robot(transport, "PSM1", config_of(true), clock);
     send_a_path(transport, clock, robot);
     EXPECT_EQ(robot.state().blocked, Blocked::none) << topic;
-    transport.say(topic_of("PSM1", topic), JointMessage{1000.01, {}, {0.1, 1.5, 0.1, 0.2, 0.7}});
+    transport.say(topic_of("PSM1", topic), CommandMessage());
     EXPECT_EQ(robot.state().blocked, Blocked::foreign_command) << topic;
     EXPECT_FALSE(robot.set_point()) << topic;
   }

@@ -100,7 +100,7 @@ void Interlock::on_setpoint(const JointMessage& message, double arrival_s) {
   if (!moving_) {
     names_ = message.names;
     places_ = *places;
-  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_))) {
+  } else if (config_.motion_enabled && (message.names != names_ || !is_ours(*setpoint_) || goes_back(*setpoint_))) {
     on_foreign_command(arrival_s);
   }
   watch(arrival_s);
@@ -117,6 +117,21 @@ void Interlock::on_foreign_command(double arrival_s) {
   if (!config_.motion_enabled) return;
   foreign_s_ = arrival_s;
   watch(arrival_s);
+}
+
+// An arm that follows the setpoints does not go back to one that it has passed: what it reports then is of another
+// program, whose commands alternate with ours.
+bool Interlock::goes_back(const Reading& setpoint) {
+  std::optional<double> first_s, last_s;
+  for (const Sent& sent : sent_) {
+    if (((sent.q - setpoint.q).array().abs() > same_q.array() / 4).any()) continue;
+    if (!first_s) first_s = sent.time_s;
+    last_s = sent.time_s;
+  }
+  if (!first_s) return false;
+  if (*last_s < passed_s_) return true;
+  passed_s_ = std::max(passed_s_, *first_s);
+  return false;
 }
 
 // Between those that were sent of late: the arm may interpolate, and what comes back is from a moment ago.
@@ -190,6 +205,7 @@ void Interlock::start(double now_s) {
   last_ = setpoint_->q;
   shift_ = last_ - path_->at(now_s).position;
   others_ = setpoint_->positions;
+  passed_s_ = now_s;
   moving_ = true;
 }
 

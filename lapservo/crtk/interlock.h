@@ -105,6 +105,7 @@ class Interlock {
   void forget_path();
   void start(double now_s);
   bool is_ours(const Reading& setpoint) const;
+  bool goes_back(const Reading& setpoint);
   Eigen::Vector4d within_limits(const Eigen::Vector4d& wanted) const;
   bool approach(const Eigen::Vector4d& wanted);
   std::vector<double> all_joints() const;
@@ -132,6 +133,7 @@ class Interlock {
                   velocity_ = Eigen::Vector4d::Zero();
   std::vector<double> others_;  // all joints' setpoints at the start
   std::deque<Sent> sent_;
+  double passed_s_ = 0;  // setpoints that were sent before this time are behind the arm, by its reports
 };
 
 }  // namespace lapservo::internal

@@ -1,6 +1,7 @@
 #include "lapservo/crtk/interlock.h"
 
 #include <cmath>
+#include <deque>
 #include <functional>
 #include <string>
 #include <utility>
@@ -27,7 +28,8 @@ InterlockConfig config_of(bool motion_enabled = true) {
   return config;
 }
 
-// An arm that obeys at once, whose setpoint lies beside its joints (gravity), on a clock that only this test moves.
+// An arm that obeys after `lag_s`, whose setpoint lies beside its joints (gravity), on a clock that only this test
+// moves.
 class Bench {
  public:
   explicit Bench(const InterlockConfig& config = config_of()) : interlock(config), config_(config) { enable(); }
@@ -41,14 +43,16 @@ class Bench {
             {"yaw", "pitch", "wrist", "insertion", "roll"},
             {joints[0], joints[1], wrist, joints[2], joints[3]}};
   }
+  Eigen::Vector4d followed() const { return on_their_way_.empty() ? setpoint : on_their_way_.front().second; }
   // Time passes; the arm speaks and the interlock ticks. `alter` may change what the arm says, or drop it (false).
   void pass(double duration_s) {
     for (const double end_s = now_s + duration_s; now_s < end_s - 1e-9; now_s += tick_s) {
+      while (on_their_way_.size() > 1 && on_their_way_[1].first <= now_s + 1e-9) on_their_way_.pop_front();
       if (now_s >= next_joints_s_) {
         next_joints_s_ = now_s + joints_period_s;
         if (talking) {
-          interlock.on_setpoint(message(setpoint), now_s);
-          JointMessage measured = message(setpoint + sag);
+          interlock.on_setpoint(message(followed()), now_s);
+          JointMessage measured = message(followed() + sag);
           if (alter) alter(measured);
           interlock.on_measured(measured, now_s);
         }
@@ -62,6 +66,7 @@ class Bench {
       EXPECT_TRUE((step <= config_.limits.rate.array() * tick_s + 1e-12).all()) << step.transpose();
       expect_velocities(q - setpoint);
       setpoint = q;
+      if (lag_s > 0) on_their_way_.emplace_back(now_s + lag_s, q);
       last_sent_s = now_s;
       ++sent_count;
     }
@@ -85,7 +90,7 @@ class Bench {
   Interlock interlock;
   JointPath path{JointLimits().acceleration};
   Eigen::Vector4d setpoint{0.1, 1.5, 0.08, 0.5}, sag{0.004, -0.003, 0.001, 0.02};
-  double now_s = 10, wrist = 0.3, last_sent_s = 0;
+  double now_s = 10, lag_s = 0, wrist = 0.3, last_sent_s = 0;
   int sent_count = 0;
   Blocked blocked = Blocked::none;
   bool talking = true;
@@ -104,6 +109,7 @@ class Bench {
 
   InterlockConfig config_;
   double next_joints_s_ = 0;
+  std::deque<std::pair<double, Eigen::Vector4d>> on_their_way_;  // setpoints, with when they arrive
 };
 
 const Eigen::Vector4d slow(0.1, -0.1, 0.01, 0.3), fast(9, 9, 9, 9);
@@ -266,27 +272,36 @@ TEST(Interlock, NothingIsSentWhileSomebodyElseCommandsTheArm) {
   }
 }
 
-TEST(Interlock, TheArmsOwnSetPointMayComeBackLate) {
+// It executes their commands by turns: each report is of a setpoint of the last quarter of a second.
+TEST(Interlock, AnArmThatGoesBackToAnEarlierSetPointObeysSomebodyElse) {
   Bench bench;
   bench.control(0.3, slow);
-  const JointMessage old = bench.message(bench.setpoint);
-  bench.control(0.15, slow);
-  JointMessage late = old;
-  late.stamp_s = epoch_s + bench.now_s - 1e-4;
-  bench.interlock.on_setpoint(late, bench.now_s);
-  EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
+  const JointMessage engaged = bench.message(bench.setpoint);
+  bench.control(0.03, slow);
+  JointMessage foreign = engaged;
+  foreign.stamp_s = epoch_s + bench.now_s - 1e-4;
+  bench.interlock.on_setpoint(foreign, bench.now_s);
+  EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::foreign_command);
+}
+
+TEST(Interlock, TheArmMayFollowLate) {
+  Bench bench;
+  bench.lag_s = 0.24;
+  for (int k = 0; k < 20; ++k) {
+    bench.control(0.1, k % 10 < 5 ? slow : Eigen::Vector4d(-slow));
+    EXPECT_EQ(bench.blocked, Blocked::none);
+  }
+  EXPECT_GT(bench.sent_count, 950);
 }
 
 // A quarter of a second to the arm, and its answer was on its way for nearly as long as answers count.
 TEST(Interlock, TheWayBackCountsByTheStamp) {
   Bench bench;
-  bench.control(0.3, slow);
-  JointMessage late = bench.message(bench.setpoint);
-  bench.control(0.2, slow);
-  const double stamped_s = bench.now_s;
+  bench.lag_s = 0.2;
+  bench.control(0.5, slow);
+  JointMessage late = bench.message(bench.followed());
   bench.talking = false;
-  bench.pass(max_s - 2 * tick_s);
-  late.stamp_s = epoch_s + stamped_s;
+  bench.pass(max_s - 4 * tick_s);
   bench.interlock.on_setpoint(late, bench.now_s);
   EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
 }

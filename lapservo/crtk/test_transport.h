@@ -52,6 +52,9 @@ class TestTransport : public Transport {
   Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) override {
     return add(button_handlers_[topic], std::move(handler));
   }
+  Subscription subscribe_commands(const std::string& topic, CommandType, Handler<CommandMessage> handler) override {
+    return add(command_handlers_[topic], std::move(handler));
+  }
   Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> handler) override {
     return add(trajectory_handlers_[topic], std::move(handler));
   }
@@ -69,6 +72,7 @@ class TestTransport : public Transport {
   void say(const std::string& topic, const OperatingStateMessage& message) { tell(state_handlers_[topic], message); }
   void say(const std::string& topic, const StringMessage& message) { tell(string_handlers_[topic], message); }
   void say(const std::string& topic, const BoolMessage& message) { tell(button_handlers_[topic], message); }
+  void say(const std::string& topic, const CommandMessage& message) { tell(command_handlers_[topic], message); }
   void say(const std::string& topic, const TrajectoryMessage& message) { tell(trajectory_handlers_[topic], message); }
   std::vector<PoseMessage> poses(const std::string& topic) { return poses_[topic]; }
   std::vector<DiagnosticMessage> diagnostics(const std::string& topic) { return diagnostics_[topic]; }
@@ -138,6 +142,7 @@ class TestTransport : public Transport {
   std::map<std::string, Handlers<OperatingStateMessage>> state_handlers_;
   std::map<std::string, Handlers<StringMessage>> string_handlers_;
   std::map<std::string, Handlers<BoolMessage>> button_handlers_;
+  std::map<std::string, Handlers<CommandMessage>> command_handlers_;
   std::map<std::string, Handlers<TrajectoryMessage>> trajectory_handlers_;
   std::map<std::string, Handlers<ImageMessage>> image_handlers_;
   std::map<std::string, Handlers<CompressedImageMessage>> compressed_handlers_;

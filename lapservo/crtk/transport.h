@@ -46,6 +46,8 @@ class Transport {
   virtual Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) = 0;
   /// Whether a button is pressed: a std_msgs/Bool, or the first button of a sensor_msgs/Joy, by the publisher's type.
   virtual Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) = 0;
+  virtual Subscription subscribe_commands(const std::string& topic, CommandType type,
+                                          Handler<CommandMessage> handler) = 0;
   virtual Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> handler) = 0;
   virtual Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) = 0;
   virtual Subscription subscribe_compressed_images(const std::string& topic,

@@ -41,6 +41,10 @@ struct Ros1Received<BoolMessage> {
   std::string type;
 };
 
+/// Whether a topic of any type carries it.
+template <typename Message>
+constexpr bool is_of_any_type = std::is_same_v<Message, BoolMessage> || std::is_same_v<Message, CommandMessage>;
+
 /// As Message is on the wire, in words.
 template <typename Message>
 std::string ros1_types() {
@@ -49,6 +53,10 @@ std::string ros1_types() {
 template <>
 inline std::string ros1_types<BoolMessage>() {
   return "std_msgs/Bool or sensor_msgs/Joy";
+}
+template <>
+inline std::string ros1_types<CommandMessage>() {
+  return "a command";
 }
 
 /// The type of a topic that is published by the master's word, when it is another one.
@@ -86,7 +94,8 @@ class Ros1Subscription {
     constexpr double longest_s = 30;
     for (double moment_s = 1; !ended_; moment_s = std::min(2 * moment_s, longest_s)) {
       queue_->callAvailable(ros::WallDuration(moment_s));
-      if (!ended_ && !connected_) look_for_other_types();
+      if constexpr (!is_of_any_type<Message>)
+        if (!ended_ && !connected_) look_for_other_types();
     }
   }
   void take(const Event& event) {
@@ -117,7 +126,7 @@ class Ros1Subscription {
   std::shared_ptr<ros::CallbackQueue> queue_ = std::make_shared<ros::CallbackQueue>();
   ros::Subscriber subscriber_;
   std::atomic<bool> ended_ = false;
-  bool connected_ = std::is_same_v<Message, BoolMessage>;  // or the reason was reported, or any type connects
+  bool connected_ = false;  // or the reason was reported
   long unreadable_ = 0, refused_ = 0;
   std::thread thread_;
 };
@@ -133,13 +142,15 @@ struct MD5Sum<lapservo::internal::Ros1Received<Message>> : MD5Sum<lapservo::inte
 template <typename Message>
 struct DataType<lapservo::internal::Ros1Received<Message>> : DataType<lapservo::internal::Ros1Type<Message>> {};
 
-template <>
-struct MD5Sum<lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>> {
+template <typename Message>
+requires lapservo::internal::is_of_any_type<Message>
+struct MD5Sum<lapservo::internal::Ros1Received<Message>> {
   static const char* value() { return "*"; }
 };
 
-template <>
-struct DataType<lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>> {
+template <typename Message>
+requires lapservo::internal::is_of_any_type<Message>
+struct DataType<lapservo::internal::Ros1Received<Message>> {
   static const char* value() { return "*"; }
 };
 
@@ -164,6 +175,14 @@ struct PreDeserialize<lapservo::internal::Ros1Received<lapservo::internal::BoolM
   using Received = lapservo::internal::Ros1Received<lapservo::internal::BoolMessage>;
   static void notify(const PreDeserializeParams<Received>& params) {
     params.message->type = (*params.connection_header)["type"];
+  }
+};
+
+template <>
+struct Serializer<lapservo::internal::Ros1Received<lapservo::internal::CommandMessage>> {
+  template <typename Stream>
+  static void read(Stream&, lapservo::internal::Ros1Received<lapservo::internal::CommandMessage>& received) {
+    received.message.emplace();
   }
 };
 

@@ -185,6 +185,11 @@ Transport::Subscription Ros1Transport::subscribe_buttons(const std::string& topi
   return subscription<BoolMessage>(node_, topic, few, handler);
 }
 
+Transport::Subscription Ros1Transport::subscribe_commands(const std::string& topic, CommandType,
+                                                          Handler<CommandMessage> handler) {
+  return subscription<CommandMessage>(node_, topic, few, handler);
+}
+
 Transport::Subscription Ros1Transport::subscribe_trajectories(const std::string& topic,
                                                               Handler<TrajectoryMessage> handler) {
   return subscription<TrajectoryMessage>(node_, topic, few, handler);

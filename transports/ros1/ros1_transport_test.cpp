@@ -98,6 +98,20 @@ TEST_F(Ros1Wire, HearsOthersOnItsOwnTopicButNotItself) {
   for (const JointMessage& message : heard.all()) EXPECT_NE(message.positions, std::vector<double>{1});
 }
 
+TEST_F(Ros1Wire, HearsCommandsOfAnyTypeButNotItself) {
+  TestInbox<CommandMessage> joints, trajectories, own;
+  const auto nothing = CommandType::nothing;
+  const auto joint_subscription = transport_->subscribe_commands("/out/joints", nothing, joints.handler());
+  const auto trajectory_subscription =
+      transport_->subscribe_commands("/out/trajectory", nothing, trajectories.handler());
+  const auto own_subscription = transport_->subscribe_commands("/in/joints", nothing, own.handler());
+  const auto say_joints = transport_->joint_publisher("/in/joints");
+  const auto say_trajectory = transport_->trajectory_publisher("/in/trajectory");
+  joints.get([&] { say_joints({stamp_s, {}, {1}}); });
+  trajectories.get([&] { say_trajectory({stamp_s, {}, {}}); });
+  EXPECT_TRUE(own.empty());
+}
+
 TEST_F(Ros1Wire, NoTopicWaitsForAnother) {
   std::atomic<bool> release = false, blocked = false;
   const auto slow = transport_->subscribe_strings("/out/text", [&](StringMessage&&) {

@@ -57,6 +57,23 @@ bool has_volatile_publisher(dds_entity_t reader) {
   });
 }
 
+// DDS matches each reader with the publishers of its type.
+std::vector<const dds_topic_descriptor_t*> types_of(CommandType command) {
+  switch (command) {
+    case CommandType::joints:
+      return {&sensor_msgs_msg_dds__JointState__desc};
+    case CommandType::pose:
+      return {&geometry_msgs_msg_dds__PoseStamped__desc, &geometry_msgs_msg_dds__TransformStamped__desc};
+    case CommandType::twist:
+      return {&geometry_msgs_msg_dds__TwistStamped__desc};
+    case CommandType::wrench:
+      return {&geometry_msgs_msg_dds__WrenchStamped__desc};
+    case CommandType::nothing:
+      return {&std_msgs_msg_dds__Empty__desc};
+  }
+  return {};
+}
+
 // Readers of a topic with the thread that takes from them.
 class Reading {
  public:
@@ -158,6 +175,15 @@ class Ros2Transport::Implementation {
     return std::make_shared<Reading>(node_, topic, Wire<Message>::descriptor(), deliveries, taken);
   }
 
+  Subscription subscribe_commands(const std::string& topic, CommandType type, const Handler<CommandMessage>& handler) {
+    const auto taken = [handler](const void*, dds_instance_handle_t) { handler(CommandMessage()); };
+    auto readings = std::make_shared<std::vector<std::unique_ptr<Reading>>>();
+    for (const dds_topic_descriptor_t* descriptor : types_of(type))
+      readings->push_back(
+          std::make_unique<Reading>(node_, topic, *descriptor, std::vector{Delivery::best_effort}, taken));
+    return readings;
+  }
+
  private:
   std::shared_ptr<DdsNode> node_;
 };
@@ -245,12 +271,16 @@ Transport::Subscription Ros2Transport::subscribe_strings(const std::string& topi
   return implementation_->subscribe<StringMessage>(topic, {Delivery::reliable, Delivery::best_effort}, handler);
 }
 
-// DDS matches each reader with the publishers of its type.
 Transport::Subscription Ros2Transport::subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) {
   const auto joys = [handler](JoyMessage&& message) { handler(first_button(message)); };
   using Both = std::pair<Subscription, Subscription>;
   return std::make_shared<Both>(implementation_->subscribe<BoolMessage>(topic, {Delivery::best_effort}, handler),
                                 implementation_->subscribe<JoyMessage>(topic, {Delivery::best_effort}, joys));
+}
+
+Transport::Subscription Ros2Transport::subscribe_commands(const std::string& topic, CommandType type,
+                                                          Handler<CommandMessage> handler) {
+  return implementation_->subscribe_commands(topic, type, handler);
 }
 
 Transport::Subscription Ros2Transport::subscribe_trajectories(const std::string& topic,

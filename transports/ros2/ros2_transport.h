@@ -35,6 +35,7 @@ class Ros2Transport : public Transport {
   Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> handler) override;
   Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) override;
   Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) override;
+  Subscription subscribe_commands(const std::string& topic, CommandType type, Handler<CommandMessage> handler) override;
   Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> handler) override;
   Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) override;
   Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override;

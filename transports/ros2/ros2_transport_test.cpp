@@ -3,12 +3,14 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <functional>
 #include <memory>
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -16,6 +18,7 @@
 #include "lapservo/crtk/test_inbox.h"
 #include "lapservo/crtk/test_messages.h"
 #include "lapservo/testing/wait_for.h"
+#include "ros2_messages.h"
 #include "transports/ros2/dds_node.h"
 #include "transports/ros2/ros2_names.h"
 #include "transports/ros2/wire.h"
@@ -93,6 +96,27 @@ TEST(Ros2Transport, KnowsWhoReads) {
   EXPECT_EQ(own.readers("/PSM1/servo_jp").rbegin()->find_first_not_of("0123456789abcdef"), std::string::npos);
   EXPECT_EQ(own.readers("/PSM2/servo_jp"), Names());
   first = second = nullptr;
+}
+
+// As another program writes them, empty.
+TEST(Ros2Transport, HearsCommandsOfEachTypeThatDvrkReads) {
+  const std::vector<std::pair<CommandType, const dds_topic_descriptor_t*>> commands{
+      {CommandType::joints, &sensor_msgs_msg_dds__JointState__desc},
+      {CommandType::pose, &geometry_msgs_msg_dds__PoseStamped__desc},
+      {CommandType::pose, &geometry_msgs_msg_dds__TransformStamped__desc},
+      {CommandType::twist, &geometry_msgs_msg_dds__TwistStamped__desc},
+      {CommandType::wrench, &geometry_msgs_msg_dds__WrenchStamped__desc},
+      {CommandType::nothing, &std_msgs_msg_dds__Empty__desc}};
+  Ros2Transport loop("loop");
+  const auto client = node_elsewhere();
+  for (const auto& [type, descriptor] : commands) {
+    TestInbox<CommandMessage> heard;
+    const auto subscription = loop.subscribe_commands("/PSM1/command", type, heard.handler());
+    const dds_entity_t writer = client->create_writer("/PSM1/command", *descriptor, Delivery::reliable);
+    const std::vector<std::uint64_t> empty(descriptor->m_size / sizeof(std::uint64_t) + 1);
+    heard.get([writer = writer, &empty] { dds_write(writer, empty.data()); });
+    client->remove(writer);
+  }
 }
 
 TEST(Ros2Transport, DoesNotHearItself) {
