@@ -1,0 +1,8 @@
+// The tool with the experiments alone, which compile in half the time: `./dev demo`.
+
+#include "apps/lapservo/cli/program.h"
+#include "apps/lapservo/cli/subcommands.h"
+
+int main(int argc, char** argv) {
+  return lapservo::app::run_program(argc, argv, {lapservo::app::add_experiment});
+}
