@@ -48,8 +48,8 @@ struct StringMessage {
 /// A command of motion, of which only the arrival counts.
 struct CommandMessage {};
 
-/// What CRTK's commands of motion carry: joints (sensor_msgs/JointState), a pose (geometry_msgs/PoseStamped, up to dVRK
-/// 2.1 TransformStamped), a twist (TwistStamped), a wrench (WrenchStamped), or nothing (std_msgs/Empty).
+/// The content of a CRTK command of motion: joints (sensor_msgs/JointState), a pose (geometry_msgs/PoseStamped, up to
+/// dVRK 2.1 TransformStamped), a twist (TwistStamped), a wrench (WrenchStamped), or nothing (std_msgs/Empty).
 enum class CommandType { joints, pose, twist, wrench, nothing };
 
 /// sensor_msgs/Joy: foot pedals. Axes are not used.
