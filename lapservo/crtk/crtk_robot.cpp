@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <map>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -28,8 +29,7 @@ std::string ask_for_real_time() {
          (locked ? "" : "locked memory");
 }
 
-}  // namespace
-
+// CRTK's topics that move an arm, in its namespace, by what they carry.
 const std::map<std::string, CommandType>& motion_commands() {
   using enum CommandType;
   static const std::map<std::string, CommandType> commands{
@@ -41,6 +41,8 @@ const std::map<std::string, CommandType>& motion_commands() {
       {"free", nothing}};
   return commands;
 }
+
+}  // namespace
 
 std::string topic_of(const std::string& arm, const std::string& name) {
   return (arm.rfind('/', 0) == 0 ? "" : "/") + arm + "/" + name;

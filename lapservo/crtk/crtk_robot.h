@@ -1,7 +1,6 @@
 #pragma once
 
 #include <atomic>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -10,7 +9,6 @@
 #include <vector>
 
 #include "lapservo/crtk/interlock.h"
-#include "lapservo/crtk/messages.h"
 #include "lapservo/crtk/transport.h"
 #include "lapservo/robot/clock.h"
 #include "lapservo/robot/robot.h"
@@ -19,8 +17,9 @@ namespace lapservo::internal {
 
 /// A CRTK arm behind a transport: measured_js, setpoint_js and operating_state come in, servo_jp goes out in a thread
 /// of its own, with real-time priority where the system grants it, as the interlock allows. Commands of others come in
-/// by the topics of motion_commands(). Joints that are not the rig's, and who reads the setpoints where that are too
-/// many, are said on stderr. Destroyed, it sends nothing any more: the arm stays at its last setpoint.
+/// by CRTK's topics of motion, of joints and of the tool (servo_jp, move_jp, servo_cp, servo_cv, hold ...). Joints that
+/// are not the rig's, and who reads the setpoints where that are too many, are said on stderr. Destroyed, it sends
+/// nothing any more: the arm stays at its last setpoint.
 class CrtkRobot : public Robot {
  public:
   /// `arm`: the arm's namespace, for example PSM1 or /dvrk/PSM1. The transport and the clock must outlive it.
@@ -58,9 +57,6 @@ class CrtkRobot : public Robot {
   std::atomic<bool> ended_ = false;
   std::thread thread_;  // last: it uses the others
 };
-
-/// CRTK's topics that move an arm, in the arm's namespace, by what they carry.
-const std::map<std::string, CommandType>& motion_commands();
 
 /// "/PSM1/measured_js" of "PSM1" or "/PSM1" and "measured_js".
 std::string topic_of(const std::string& arm, const std::string& name);

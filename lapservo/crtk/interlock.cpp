@@ -16,6 +16,8 @@ constexpr double memory_s = 0.25;  // by which a setpoint that was sent is the a
 // program's.
 const Eigen::Vector4d same_q(2e-3, 2e-3, 2e-4, 4e-3);
 constexpr double same_other = 4e-3;
+// Tolerance of an arm's progress along the setpoints. An arm that rounds them all alike keeps their order.
+const Eigen::Vector4d same_place(1e-4, 1e-4, 1e-5, 2e-4);
 
 bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
@@ -124,7 +126,7 @@ void Interlock::on_foreign_command(double arrival_s) {
 bool Interlock::goes_back(const Reading& setpoint) {
   std::optional<double> first_s, last_s;
   for (const Sent& sent : sent_) {
-    if (((sent.q - setpoint.q).array().abs() > same_q.array() / 4).any()) continue;
+    if (((sent.q - setpoint.q).array().abs() > same_place.array()).any()) continue;
     if (!first_s) first_s = sent.time_s;
     last_s = sent.time_s;
   }
