@@ -18,6 +18,9 @@ const Eigen::Vector3d max_jump(0.03, 0.03, 0.003);
 // Offsets from so long ago are those of before the endoscope began to move.
 constexpr double offset_age_s = 0.7, offset_memory_s = 1.5;
 
+// Joints that have been silent for so long may have gone anywhere since.
+constexpr double silent_s = 0.1;
+
 constexpr std::size_t min_images = 30, max_images = 200, max_compared = 40, explained_again_after = 2;
 
 // Sightings differ by one of these at least (rad, m), however fast the camera and slow the operator is.
@@ -67,9 +70,12 @@ EndoscopeRecovery::EndoscopeRecovery(const Rig& rig)
 void EndoscopeRecovery::see(const ServoInput& input, VisualController& controller) {
   if (const auto* waiting = std::get_if<WaitingForStart>(&state_); waiting && input.joints.started)
     start(*waiting, controller);
+  if (input.joints.time_s - joints_s_ > silent_s) joints_from_s_ = input.joints.time_s;
+  joints_s_ = input.joints.time_s;
   const auto& image = input.image;
   if (!image) return;
-  if (!image->found && !image->marker) return drop_suspicion(controller);
+  const bool silent = image->time_s < joints_from_s_ || image->time_s > joints_s_ + silent_s;
+  if (silent || (!image->found && !image->marker)) return drop_suspicion(controller);
   // An image that repeats is no moved endoscope: that would show another one.
   if (!follow_joints(*image, controller) || image->repetition != Repetition::none) return;
   collect(*image, controller);

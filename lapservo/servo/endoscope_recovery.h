@@ -110,6 +110,7 @@ class EndoscopeRecovery {
   std::size_t explain_at_ = 0;                   ///< so many
   int agreeing_ = 0;                             ///< images so far, at most 10
   std::optional<endoscope::Measured> measured_;  ///< at the latest image
+  double joints_s_ = 0, joints_from_s_ = 0;      ///< when the joints were read last, and first after the last silence
   OffsetSteps steps_;                            ///< of images that showed q
   int registration_of_steps_ = 0;
   GapPath path_;                                       ///< since the offset that is trusted

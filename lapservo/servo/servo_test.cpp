@@ -197,11 +197,8 @@ class MovedEndoscope {
   void move() { camera_from_rcm_.translation += Eigen::Vector3d(0.004, -0.006, 0.01); }
 
   ServoDecision step() {
-    ServoInput input{time_s_,
-                     {time_s_, JointVector::from_vector(q_ + encoder_off), state, true, started},
-                     std::nullopt,
-                     desired_,
-                     {}};
+    if (!silent) joints_ = {time_s_, JointVector::from_vector(q_ + encoder_off)};
+    ServoInput input{time_s_, {joints_.time_s, joints_.q, state, true, started}, std::nullopt, desired_, {}};
     if (steps_++ % image_every == 0) input.image = image();
     time_s_ += period_s_;
     last_ = servo_.step(input);
@@ -241,7 +238,7 @@ class MovedEndoscope {
 
   OperatingState state = OperatingState::enabled;
   Eigen::Vector4d encoder_off = Eigen::Vector4d::Zero(), seen_off = Eigen::Vector4d::Zero();
-  bool visible = true, tells_q = true, tells_marker = true, frozen = false, started = false;
+  bool visible = true, tells_q = true, tells_marker = true, frozen = false, started = false, silent = false;
   int image_every = 1;
 
  private:
@@ -277,6 +274,7 @@ class MovedEndoscope {
   Rigid3 camera_from_rcm_ = *rig_.instruments[0].camera_from_rcm;
   DesiredFeatures desired_;
   ServoDecision last_;
+  JointReading joints_;
   Eigen::Vector4d q_ = start, q_exposed_ = start, q_shown_ = start;
   double time_s_ = 0;
   int steps_ = 0;
@@ -468,6 +466,25 @@ TEST(MovedEndoscope, IsNotMeasuredByAPictureThatFreezesMeanwhile) {
   EXPECT_EQ(world.start_anew().control.reason, HoldReason::endoscope_moved);
   ASSERT_TRUE(world.until_measured());
   EXPECT_EQ(world.start_anew().registration, 2);
+}
+
+TEST(MovedEndoscope, IsNoArmThatMovesWhileItsJointsAreSilent) {
+  MovedEndoscope world;
+  world.steps(60);
+  world.silent = true;
+  world.state = OperatingState::paused;
+  world.steps(10);
+  for (int k = 0; k < 60; ++k) {
+    world.push({0.002, 0, 2e-4, 0});
+    world.step();
+  }
+  world.silent = false;
+  world.steps(10);
+  world.state = OperatingState::enabled;
+  const ServoDecision goes_on = world.steps(360);
+  EXPECT_EQ(goes_on.registration, 0);
+  EXPECT_EQ(goes_on.control.action, ControlAction::track);
+  EXPECT_LT(goes_on.control.error.norm(), 0.1);
 }
 
 TEST(MovedEndoscope, IsNoEncoderThatIsSetWhileTheArmIsNotEnabled) {
