@@ -4,30 +4,16 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
-#include <pthread.h>
-#include <sched.h>
-#include <sys/mman.h>
-#include <sys/resource.h>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "lapservo/robot/real_time.h"
+
 namespace lapservo::internal {
 namespace {
 
-// Computing or swapping of other programs then delays setpoints less. A process without the right runs without it:
-// empty, or the parts that were not granted. Later allocations fail where lockable memory has a limit: then nothing is
-// locked.
-std::string ask_for_real_time() {
-  const sched_param priority{.sched_priority = 20};
-  const bool first = pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority) == 0;
-  rlimit limit{};
-  const bool unlimited = getrlimit(RLIMIT_MEMLOCK, &limit) == 0 && limit.rlim_cur == RLIM_INFINITY;
-  const bool locked = unlimited && mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0;
-  if (first && locked) return {};
-  return std::string(first ? "" : "real-time priority") + (first || locked ? "" : " and ") +
-         (locked ? "" : "locked memory");
-}
+constexpr int setpoint_priority = 20;
 
 // CRTK's topics that move an arm, in its namespace, by what they carry.
 const std::map<std::string, CommandType>& motion_commands() {
@@ -147,7 +133,7 @@ std::string CrtkRobot::new_complaint() {
 
 void CrtkRobot::command() {
   {
-    std::string refused = ask_for_real_time();
+    std::string refused = ask_for_real_time(setpoint_priority);
     const std::lock_guard lock(mutex_);
     not_granted_ = std::move(refused);
   }

@@ -23,6 +23,7 @@
 #include "lapservo/crtk/joint_map.h"
 #include "lapservo/crtk/operator_presence.h"
 #include "lapservo/loop_topics/loop_topics.h"
+#include "lapservo/robot/real_time.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/robot/supervisor.h"
 #include "lapservo/servo/image_features.h"
@@ -31,7 +32,8 @@ namespace lapservo::app {
 using namespace internal;
 namespace {
 
-constexpr double wait_s = 15;  // for the arm and the camera to be heard
+constexpr double wait_s = 15;      // for the arm and the camera to be heard
+constexpr int loop_priority = 10;  // below the setpoints'
 
 std::string list_of(const Joints& joints, const Eigen::Vector4d& q) {
   const Eigen::Vector4d positions = joints_from_q(joints, q);
@@ -272,6 +274,7 @@ int steer_arm(const ServoOptions& options) {
   Goal goal(trajectory);
   ArmWatcher watcher(options, config, arm, robot, images, topics, goal, folder ? &*folder : nullptr, its_page);
   if (page && page->command(arm, clock.now_s())) return end_by_page();
+  ask_for_real_time(loop_priority);  // the robot has said what is not granted
   lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
