@@ -133,7 +133,7 @@ std::string CrtkRobot::new_complaint() {
 
 void CrtkRobot::command() {
   {
-    std::string refused = ask_for_real_time(setpoint_priority);
+    std::string refused = request_real_time(setpoint_priority);
     const std::lock_guard lock(mutex_);
     not_granted_ = std::move(refused);
   }

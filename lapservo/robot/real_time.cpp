@@ -7,7 +7,7 @@
 namespace lapservo::internal {
 
 // Where lockable memory has a limit, later allocations would fail: then nothing is locked.
-std::string ask_for_real_time(int priority) {
+std::string request_real_time(int priority) {
   const sched_param parameters{.sched_priority = priority};
   const bool first = ::sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &parameters) == 0;
   rlimit limit{};

@@ -274,7 +274,7 @@ int steer_arm(const ServoOptions& options) {
   Goal goal(trajectory);
   ArmWatcher watcher(options, config, arm, robot, images, topics, goal, folder ? &*folder : nullptr, its_page);
   if (page && page->command(arm, clock.now_s())) return end_by_page();
-  ask_for_real_time(loop_priority);  // the robot has said what is not granted
+  request_real_time(loop_priority);  // the robot has said what is not granted
   lapservo::run(arm, images, clock, config, goal.trajectory(), duration_s(options), watcher);
   say_counts(robot.counts(), images.counts());
   std::printf("%s\n", watcher.summary().text().c_str());
