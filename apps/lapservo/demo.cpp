@@ -1,4 +1,4 @@
-// The tool with the experiments alone, which compile in half the time: `./dev demo`.
+// The tool with the experiments alone, two thirds of the compilation: `./dev demo`.
 
 #include "apps/lapservo/cli/program.h"
 #include "apps/lapservo/cli/subcommands.h"
