@@ -273,15 +273,42 @@ InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q) {
   return truth;
 }
 
-ServoLog::ServoLog(const std::filesystem::path& path) : file_(path, header()) {}
+ServoLog::ServoLog(const std::filesystem::path& path) : file_(path, header()), thread_([this] { write_rows(); }) {}
+
+ServoLog::~ServoLog() {
+  rows_.close();
+  if (thread_.joinable()) thread_.join();
+}
+
+void ServoLog::write_rows() {
+  try {
+    while (const auto row = rows_.pop()) file_.add(*row);
+  } catch (...) {
+    failure_ = std::current_exception();
+    failed_ = true;
+    rows_.cancel();
+  }
+}
+
+void ServoLog::throw_failure() {
+  if (failed_) std::rethrow_exception(failure_);
+}
+
+void ServoLog::commit() {
+  rows_.close();
+  if (thread_.joinable()) thread_.join();
+  throw_failure();
+  file_.commit();
+}
 
 void ServoLog::add(const ServoInput& input, const ServoDecision& decision,
                    const std::optional<InstrumentTruth>& truth) {
   std::vector<std::string> fields;
   truth ? write(fields, truth->q) : leave_empty(fields, 4);
   truth && truth->features ? write(fields, *truth->features) : leave_empty(fields, 4);
-  file_.add(fmt::format("{},{},{},{}", tick_++, joined(input_fields(input)), joined(decision_fields(decision)),
-                        joined(fields)));
+  throw_failure();
+  rows_.push(fmt::format("{},{},{},{}", tick_++, joined(input_fields(input)), joined(decision_fields(decision)),
+                         joined(fields)));
 }
 
 std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path) {

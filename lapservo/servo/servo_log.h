@@ -1,13 +1,18 @@
 #pragma once
 
+#include <atomic>
+#include <cstddef>
+#include <exception>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "lapservo/control/feature_model.h"
+#include "lapservo/core/bounded_queue.h"
 #include "lapservo/core/row_file.h"
 #include "lapservo/servo/servo_decision.h"
 
@@ -20,18 +25,32 @@ struct InstrumentTruth {
 };
 InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q);
 
-/// A run's complete log, one row a control tick, written as they come (see RowFile). Numbers are written so that
-/// reading them gives the same bits.
+/// A run's complete log, one row a control tick, written as they come (see RowFile) in a thread of its own: a disk that
+/// is busy does not delay the loop. Numbers are written so that reading them gives the same bits.
 class ServoLog {
  public:
   /// Throws InputError when the file can't be written.
   explicit ServoLog(const std::filesystem::path& path);
+  ~ServoLog();
+  ServoLog(const ServoLog&) = delete;
+  ServoLog& operator=(const ServoLog&) = delete;
+
+  /// Throws InputError when a row before could not be written.
   void add(const ServoInput& input, const ServoDecision& decision, const std::optional<InstrumentTruth>& truth);
-  void commit() { file_.commit(); }
+  /// Waits for all rows; throws InputError when one could not be written.
+  void commit();
 
  private:
+  void write_rows();
+  void throw_failure();
+
+  static constexpr std::size_t most_waiting = 4096;
   RowFile file_;
   long tick_ = 0;
+  BoundedQueue<std::string> rows_{most_waiting};
+  std::atomic<bool> failed_ = false;
+  std::exception_ptr failure_;  ///< set before failed_
+  std::thread thread_;          ///< last: it uses the others
 };
 
 /// A row of a log: the inputs, and the decision as it was written.
