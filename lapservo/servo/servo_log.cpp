@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <cstdlib>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -285,19 +286,14 @@ void ServoLog::write_rows() {
     while (const auto row = rows_.pop()) file_.add(*row);
   } catch (...) {
     failure_ = std::current_exception();
-    failed_ = true;
     rows_.cancel();
   }
-}
-
-void ServoLog::throw_failure() {
-  if (failed_) std::rethrow_exception(failure_);
 }
 
 void ServoLog::commit() {
   rows_.close();
   if (thread_.joinable()) thread_.join();
-  throw_failure();
+  if (failure_) std::rethrow_exception(failure_);
   file_.commit();
 }
 
@@ -306,9 +302,9 @@ void ServoLog::add(const ServoInput& input, const ServoDecision& decision,
   std::vector<std::string> fields;
   truth ? write(fields, truth->q) : leave_empty(fields, 4);
   truth && truth->features ? write(fields, *truth->features) : leave_empty(fields, 4);
-  throw_failure();
-  rows_.push(fmt::format("{},{},{},{}", tick_++, joined(input_fields(input)), joined(decision_fields(decision)),
-                         joined(fields)));
+  std::string row = fmt::format("{},{},{},{}", tick_++, joined(input_fields(input)), joined(decision_fields(decision)),
+                                joined(fields));
+  if (!rows_.push(std::move(row)) && failure_) std::rethrow_exception(failure_);
 }
 
 std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <exception>
 #include <filesystem>
@@ -42,14 +41,12 @@ class ServoLog {
 
  private:
   void write_rows();
-  void throw_failure();
 
   static constexpr std::size_t most_waiting = 4096;
   RowFile file_;
   long tick_ = 0;
   BoundedQueue<std::string> rows_{most_waiting};
-  std::atomic<bool> failed_ = false;
-  std::exception_ptr failure_;  ///< set before failed_
+  std::exception_ptr failure_;  ///< set before rows_ is cancelled
   std::thread thread_;          ///< last: it uses the others
 };
 
