@@ -1,12 +1,14 @@
 """The cost of the live page and of a bag for the loop, and the age of the page's images: web_view.py LAPSERVO RIG [SECONDS].
 
 `lapservo sim-robot` and `lapservo servo` over ROS 2 on this computer, at the rig's size and 30 frames/s: without the page, with
-one viewer, with a crowd of a thousand connections as well, and with `lapservo record` in its place. Printed: how late the loop's ticks begin (of log.csv), and the
-age of each image, from when the image came to the loop to when a viewer on this computer has it whole.
+one viewer, with a crowd of a thousand connections as well, and with `lapservo record` in its place. Printed: how late the loop's ticks begin (of log.csv), how
+late an empty loop of the same rate and priority wakes meanwhile (this machine's own part), and the age of each image, from when
+the image came to the loop to when a viewer on this computer has it whole.
 """
 
 import csv
 import http.client
+import multiprocessing
 import os
 import re
 import signal
@@ -18,6 +20,7 @@ import threading
 import time
 
 PERIODS_PER_S = 120
+LOOP_PRIORITY = 10  # of lapservo's loop (lapservo/robot/real_time.h)
 SETTLING_S = 2
 
 
@@ -26,12 +29,30 @@ def quantile(values, fraction):
     return values[min(len(values) - 1, int(fraction * len(values)))] if values else float("nan")
 
 
+def late(late_ms):
+    return ", ".join(f"p{100 * q:g} {quantile(late_ms, q):.2f}" for q in (0.5, 0.99, 0.999))
+
+
 def lateness_ms(log):
     """The place of each of the loop's ticks in its period, from the earliest place of a second's ticks on."""
     with open(log, newline="") as file:
         times = [float(row["time_s"]) for row in csv.DictReader(file)]
     begin = times[0]
     return [1000 * ((t - begin) - round((t - begin) * PERIODS_PER_S) / PERIODS_PER_S) for t in times if t > begin + SETTLING_S]
+
+
+def empty_loop(ended, late_ms):
+    """Wakes once a period until `ended`, does nothing, and sends how late each wake-up was."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(LOOP_PRIORITY))
+    except PermissionError:
+        print("the empty loop has no real-time priority", file=sys.stderr)
+    late, due = [], time.monotonic()
+    while not ended.is_set():
+        due += 1 / PERIODS_PER_S
+        time.sleep(max(0, due - time.monotonic()))
+        late.append(1000 * (time.monotonic() - due))
+    late_ms.put(late[SETTLING_S * PERIODS_PER_S:])
 
 
 class Viewer(threading.Thread):
@@ -87,6 +108,8 @@ def run(tool, rig, duration_s, web, crowded, recorded):
                  "--joint-limits", "configs/joint_limits/psm-classic.yaml", "--duration",
                  str(duration_s), "--fps", str(PERIODS_PER_S), "--out", folder + "/run", *(["--web", "0"] if web else [])],
                 env=environment, stdout=subprocess.PIPE, text=True)
+            empty_ended, empty_late_ms = multiprocessing.Event(), multiprocessing.Queue()
+            multiprocessing.Process(target=empty_loop, args=(empty_ended, empty_late_ms), daemon=True).start()
             viewer = crowd = bag = None
             if recorded:
                 bag = subprocess.Popen([tool, "record", "--camera", "ros2:/endoscope/image_raw", "--robot", "ros2:SIM_PSM1", "--out",
@@ -101,12 +124,13 @@ def run(tool, rig, duration_s, web, crowded, recorded):
                         time.sleep(0.5)
                         crowd.start()
             loop.wait()
+            empty_ended.set()
             if bag:
                 bag.send_signal(signal.SIGINT)
                 bag.wait()
             if crowd:
                 crowd.ended = True
-            return lateness_ms(folder + "/run/log.csv"), viewer.ages_ms if viewer else []
+            return lateness_ms(folder + "/run/log.csv"), empty_late_ms.get(), viewer.ages_ms if viewer else []
         finally:
             arm.terminate()
             arm.wait()
@@ -117,9 +141,8 @@ def main():
     duration_s = float(sys.argv[3]) if len(sys.argv) > 3 else 12
     for name, web, crowded, recorded in (("without the page", False, False, False), ("one viewer", True, False, False),
                                          ("and a thousand connections", True, True, False), ("one viewer and a bag", True, False, True)):
-        late_ms, ages_ms = run(tool, rig, duration_s, web, crowded, recorded)
-        late = ", ".join(f"p{100 * q:g} {quantile(late_ms, q):.2f}" for q in (0.5, 0.99, 0.999))
-        print(f"{name:28} tick late {late} ms", end="")
+        late_ms, empty_ms, ages_ms = run(tool, rig, duration_s, web, crowded, recorded)
+        print(f"{name:28} tick late {late(late_ms)} ms; empty loop {late(empty_ms)} ms", end="")
         if ages_ms:
             seen_s = duration_s - SETTLING_S
             print(f"; image age p50 {quantile(ages_ms, 0.5):.0f}, p95 {quantile(ages_ms, 0.95):.0f} ms, {len(ages_ms) / seen_s:.1f} images/s", end="")
