@@ -27,6 +27,7 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = tracking_period_s, window_margin_px = 20;
+constexpr double image_rate_hz = 30;  // of most endoscopes
 
 std::vector<TrackingScenario> scenarios() {
   std::vector<TrackingScenario> all{
@@ -188,6 +189,7 @@ std::optional<TrackingRun> run_scenario(const TrackingScenario& scenario, const 
   run.scenario = scenario;
   SimulatorConfig simulated;
   simulated.seed = setup.seed;
+  simulated.endoscope.frame_rate_hz = image_rate_hz;
   simulated.endoscope.latency_s = scenario.latency_s;
   const Trajectory trajectory = sinusoids(paper_sinusoids());
   Simulator simulator(setup.rig, simulated, start);
