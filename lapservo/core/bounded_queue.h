@@ -26,6 +26,15 @@ class BoundedQueue {
     return true;
   }
 
+  /// Does not wait. False, and the value is dropped, where there is no room or the queue is closed.
+  bool try_push(T value) {
+    const std::lock_guard lock(mutex_);
+    if (closed_ || values_.size() >= capacity_) return false;
+    values_.push_back(std::move(value));
+    changed_.notify_all();
+    return true;
+  }
+
   /// Does not wait: where there is no room the oldest values are dropped. With capacity 1 the newest is kept.
   void push_over_oldest(T value) {
     const std::lock_guard lock(mutex_);
@@ -53,6 +62,11 @@ class BoundedQueue {
     changed_.notify_all();
   }
 
+  bool closed() const {
+    const std::lock_guard lock(mutex_);
+    return closed_;
+  }
+
   /// Closes the queue, and drops what waits.
   void cancel() {
     std::deque<T> dropped;
@@ -64,7 +78,7 @@ class BoundedQueue {
 
  private:
   std::size_t capacity_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<T> values_;
   bool closed_ = false;

@@ -42,6 +42,14 @@ TEST(BoundedQueue, KeepsTheNewestWhereTheOldestGo) {
   EXPECT_EQ(rest_of(queue), (std::vector{3, 4}));
 }
 
+TEST(BoundedQueue, RefusesWhereThereIsNoRoomWithoutWaiting) {
+  BoundedQueue<int> queue(2);
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(queue.try_push(i), i < 2) << i;
+  queue.close();
+  EXPECT_EQ(rest_of(queue), (std::vector{0, 1}));
+  EXPECT_FALSE(queue.try_push(5));
+}
+
 TEST(BoundedQueue, NeverHoldsMoreThanItsCapacityAndLosesNothing) {
   constexpr int values = 2000;
   BoundedQueue<int> queue(3);

@@ -274,7 +274,8 @@ InstrumentTruth truth_at(const FeatureModel& true_model, const JointVector& q) {
   return truth;
 }
 
-ServoLog::ServoLog(const std::filesystem::path& path) : file_(path, header()), thread_([this] { write_rows(); }) {}
+ServoLog::ServoLog(const std::filesystem::path& path)
+    : path_(path), file_(path, header()), thread_([this] { write_rows(); }) {}
 
 ServoLog::~ServoLog() {
   rows_.close();
@@ -304,7 +305,9 @@ void ServoLog::add(const ServoInput& input, const ServoDecision& decision,
   truth && truth->features ? write(fields, *truth->features) : leave_empty(fields, 4);
   std::string row = fmt::format("{},{},{},{}", tick_++, joined(input_fields(input)), joined(decision_fields(decision)),
                                 joined(fields));
-  if (!rows_.push(std::move(row)) && failure_) std::rethrow_exception(failure_);
+  if (rows_.try_push(std::move(row))) return;
+  if (rows_.closed() && failure_) std::rethrow_exception(failure_);
+  throw InputError(path_.string(), fmt::format("the disk is too slow: {} rows wait", most_waiting));
 }
 
 std::vector<LoggedTick> read_servo_log(const std::filesystem::path& path) {

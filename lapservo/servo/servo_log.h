@@ -34,7 +34,7 @@ class ServoLog {
   ServoLog(const ServoLog&) = delete;
   ServoLog& operator=(const ServoLog&) = delete;
 
-  /// Throws InputError when a row before could not be written.
+  /// Does not wait for the disk. Throws InputError when a row before could not be written, or too many wait.
   void add(const ServoInput& input, const ServoDecision& decision, const std::optional<InstrumentTruth>& truth);
   /// Waits for all rows; throws InputError when one could not be written.
   void commit();
@@ -42,7 +42,8 @@ class ServoLog {
  private:
   void write_rows();
 
-  static constexpr std::size_t most_waiting = 4096;
+  static constexpr std::size_t most_waiting = 16384;  ///< of some 1.5 kB
+  std::filesystem::path path_;
   RowFile file_;
   long tick_ = 0;
   BoundedQueue<std::string> rows_{most_waiting};

@@ -1,8 +1,15 @@
 #include "lapservo/servo/servo_log.h"
 
+#include <array>
+#include <atomic>
 #include <cmath>
+#include <fcntl.h>
 #include <limits>
+#include <optional>
 #include <string>
+#include <sys/stat.h>
+#include <thread>
+#include <unistd.h>
 
 #include <gtest/gtest.h>
 
@@ -126,6 +133,32 @@ TEST(ServoLog, KeepsWhatIsNotANumber) {
   EXPECT_TRUE(std::isnan(q[0]));
   EXPECT_EQ(q[1], std::numeric_limits<double>::infinity());
   EXPECT_TRUE(std::signbit(q[3]));
+}
+
+// A pipe that nobody reads stands for a disk that hangs.
+TEST(ServoLog, NeverWaitsForTheDisk) {
+  const testing::TemporaryFolder folder;
+  const std::string path = folder / "log.csv";
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  const int pipe = open(path.c_str(), O_RDWR | O_NONBLOCK);
+  ASSERT_GE(pipe, 0);
+  std::optional<ServoLog> log(path);
+  const std::string complaint = testing::input_error([&] {
+    constexpr int enough = 100'000;
+    for (int i = 0; i < enough; ++i) log->add({}, {}, {});
+  });
+  EXPECT_NE(complaint.find("too slow"), std::string::npos) << complaint;
+  std::thread ending([&] { log.reset(); });
+  std::atomic<bool> ended = false;
+  std::thread reading([&] {
+    std::array<char, 65536> bytes{};
+    while (!ended)
+      if (read(pipe, bytes.data(), bytes.size()) < 0) std::this_thread::yield();
+  });
+  ending.join();
+  ended = true;
+  reading.join();
+  close(pipe);
 }
 
 TEST(ServoLog, NamesWhatIsWrong) {
