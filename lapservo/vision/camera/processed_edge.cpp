@@ -72,6 +72,27 @@ SamplesBgr filtered(const std::array<double, Size>& weights, const OnGrid& value
   return out;
 }
 
+// Values moved along the grid by less than a pixel: the parabola through three of them.
+class Shift {
+ public:
+  explicit Shift(double px) : px_(static_cast<float>(px)) {}
+
+  OnGrid of(const OnGrid& values) const { return px_ == 0 ? values : changed(values, values, -px_, px_ * px_ / 2); }
+  // By how much that changes with the shift.
+  OnGrid slope(const OnGrid& values) const { return changed(OnGrid::Zero(), values, -1, px_); }
+
+ private:
+  static OnGrid changed(OnGrid out, const OnGrid& values, float by_slope, float by_bend) {
+    constexpr int inner = edge_grid - 2;
+    const auto before = values.middleRows<inner>(0), here = values.middleRows<inner>(1),
+               after = values.middleRows<inner>(2);
+    out.middleRows<inner>(1) += by_slope / 2 * (after - before) + by_bend * (after - 2 * here + before);
+    return out;
+  }
+
+  float px_;
+};
+
 // Rec. 601's luma of b, g, r. A colour difference is a channel less luma, so a processed channel is
 // luma(filtered for luma) + channel(filtered for chroma) - luma(filtered for chroma).
 constexpr std::array<float, 3> luma_of{0.114F, 0.587F, 0.299F};
@@ -171,8 +192,8 @@ EdgeSamples mixed(const SamplesBgr& for_luma, const SamplesBgr& for_chroma) {
   return out;
 }
 
-EdgeSamples mixed(const ProcessingFilters& filters, const OnGrid& value) {
-  return mixed(filtered(filters.luma, value), filtered(filters.chroma, value));
+EdgeSamples mixed(const ProcessingFilters& filters, const OnGrid& value, const Shift& chroma) {
+  return mixed(filtered(filters.luma, value), filtered(filters.chroma, chroma.of(value)));
 }
 
 struct Clipped {
@@ -199,10 +220,10 @@ Clipped clipped(const EdgeSamples& values) {
 
 // By the values shown of one side, and what its being there adds to that by saturation: `by` is by the values before.
 template <typename Jacobian>
-void add_plateau(const ProcessingFilters& filters, const OnGrid& by, double saturation, const Eigen::Vector3d& shown,
-                 int first, Jacobian& out) {
+void add_plateau(const ProcessingFilters& filters, const Shift& shift, const OnGrid& by, double saturation,
+                 const Eigen::Vector3d& shown, int first, Jacobian& out) {
   const SamplesBgr none = SamplesBgr::Zero(), for_luma = filtered(filters.luma, by),
-                   for_chroma = filtered(filters.chroma, by);
+                   for_chroma = filtered(filters.chroma, shift.of(by));
   Eigen::Matrix<float, all_edge_rows, 3> by_channel;
   for (int c = 0; c < 3; ++c) {
     SamplesBgr one_luma = none, one_chroma = none;
@@ -229,7 +250,8 @@ PictureProcessing processing_of(const ProcessingVector& unknowns) {
           .chroma_variance_px2 = at(chroma_variance),
           .saturation = at(saturation),
           .sharpening = at(sharpening),
-          .sharpening_px = std::exp(at(log_radius))};
+          .sharpening_px = std::exp(at(log_radius)),
+          .chroma_shift_px = at(chroma_shift_px)};
 }
 
 EdgeVector edge_of(const PictureProcessing& processing, const Eigen::Vector3d& before, const Eigen::Vector3d& after,
@@ -260,31 +282,35 @@ ProcessingFilters::ProcessingFilters(const PictureProcessing& p, bool derivative
 
 EdgeSamples ProcessedEdge::values(const ProcessingFilters& filters, const PictureProcessing& processing,
                                   const EdgeVector& edge) const {
-  return clipped(mixed(filters, encode<EncodedValues>(Encoding(light_of_value_), processing, edge).value)).value;
+  const auto encoded = encode<EncodedValues>(Encoding(light_of_value_), processing, edge);
+  return clipped(mixed(filters, encoded.value, Shift(processing.chroma_shift_px))).value;
 }
 
 ProcessedEdge::Linearised ProcessedEdge::linearised(const ProcessingFilters& filters,
                                                     const PictureProcessing& processing, const EdgeVector& edge) const {
   const auto encoded = encode<Encoded>(Encoding(light_of_value_), processing, edge);
-  const SamplesBgr none = SamplesBgr::Zero(), chroma = filtered(filters.chroma, encoded.value);
+  const Shift shift(processing.chroma_shift_px);
+  const OnGrid value_of_chroma = shift.of(encoded.value);
+  const SamplesBgr none = SamplesBgr::Zero(), chroma = filtered(filters.chroma, value_of_chroma);
   OnGrid by_mosaic = encoded.by_blur;
   by_mosaic.col(1).setZero();
   Linearised out;
   const auto column = [&](ProcessingUnknown unknown) { return out.jacobian.col(static_cast<int>(unknown)); };
   using enum ProcessingUnknown;
-  column(log_blur) = mixed(filters, encoded.by_blur);
-  column(log_mosaic) = mixed(filters, by_mosaic);
-  column(chroma_variance) = mixed(none, filtered(filters.chroma_by_variance, encoded.value));
+  column(log_blur) = mixed(filters, encoded.by_blur, shift);
+  column(log_mosaic) = mixed(filters, by_mosaic, shift);
+  column(chroma_variance) = mixed(none, filtered(filters.chroma_by_variance, value_of_chroma));
   column(saturation) = mixed(none, chroma / static_cast<float>(processing.saturation));
-  column(sharpening) =
-      mixed(filtered(filters.luma_by_sharpening, encoded.value), filtered(filters.chroma_by_sharpening, encoded.value));
+  column(sharpening) = mixed(filtered(filters.luma_by_sharpening, encoded.value),
+                             filtered(filters.chroma_by_sharpening, value_of_chroma));
   column(log_radius) =
-      mixed(filtered(filters.luma_by_radius, encoded.value), filtered(filters.chroma_by_radius, encoded.value));
-  out.jacobian.col(processing_unknowns + edge_offset) = mixed(filters, encoded.by_offset);
-  out.jacobian.col(processing_unknowns + edge_gradient) = mixed(filters, encoded.by_gradient);
-  add_plateau(filters, encoded.by_before, processing.saturation, edge.segment<3>(edge_before),
+      mixed(filtered(filters.luma_by_radius, encoded.value), filtered(filters.chroma_by_radius, value_of_chroma));
+  column(chroma_shift_px) = mixed(none, filtered(filters.chroma, shift.slope(encoded.value)));
+  out.jacobian.col(processing_unknowns + edge_offset) = mixed(filters, encoded.by_offset, shift);
+  out.jacobian.col(processing_unknowns + edge_gradient) = mixed(filters, encoded.by_gradient, shift);
+  add_plateau(filters, shift, encoded.by_before, processing.saturation, edge.segment<3>(edge_before),
               processing_unknowns + edge_before, out.jacobian);
-  add_plateau(filters, encoded.by_after, processing.saturation, edge.segment<3>(edge_after),
+  add_plateau(filters, shift, encoded.by_after, processing.saturation, edge.segment<3>(edge_after),
               processing_unknowns + edge_after, out.jacobian);
   const Clipped shown = clipped(mixed(filtered(filters.luma, encoded.value), chroma));
   out.values = shown.value;

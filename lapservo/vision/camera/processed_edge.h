@@ -18,11 +18,22 @@ struct PictureProcessing {
   double saturation = 1;           ///< by which colour differences (Rec. 601) are multiplied
   double sharpening = 0;           ///< unsharp mask: so much of what the blur takes away is added
   double sharpening_px = 1.2;      ///< that blur
+  /// By how much colour differences lie beside luma, along the boundaries' normals: chroma that is read as if it were
+  /// sited elsewhere, or repeated in place of interpolated.
+  double chroma_shift_px = 0;
 };
 
 /// The same as unknowns of a fit.
-enum class ProcessingUnknown { log_blur, chroma_variance, saturation, sharpening, log_radius, log_mosaic };
-inline constexpr int processing_unknowns = 6;
+enum class ProcessingUnknown {
+  log_blur,
+  chroma_variance,
+  saturation,
+  sharpening,
+  log_radius,
+  log_mosaic,
+  chroma_shift_px
+};
+inline constexpr int processing_unknowns = 7;
 using ProcessingVector = Eigen::Matrix<double, processing_unknowns, 1>;
 PictureProcessing processing_of(const ProcessingVector& unknowns);
 
@@ -72,9 +83,9 @@ class ProcessedEdge {
   const std::array<float, 256>& light_of_value_;
 };
 
-/// Light along a line, a pixel apart, as it looks after blurred colour differences and sharpening. What is even stays
-/// as it is, so light is as the camera shows it: `saturation` has been at work. `luma` is the same without colour
-/// differences: what a grey picture made of it shows, in all channels alike.
+/// Light along a line, a pixel apart, as it looks after blurred colour differences in their place and sharpening. What
+/// is even stays as it is, so light is as the camera shows it: `saturation` has been at work. `luma` is the same
+/// without colour differences: what a grey picture made of it shows, in all channels alike.
 struct FilteredLight {
   std::vector<std::array<double, 3>> light;
   std::vector<double> luma;

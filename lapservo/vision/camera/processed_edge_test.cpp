@@ -19,6 +19,7 @@ ProcessingVector everything() {
   unknowns[static_cast<int>(log_blur)] = std::log(1.1), unknowns[static_cast<int>(chroma_variance)] = 0.8;
   unknowns[static_cast<int>(saturation)] = 1.3, unknowns[static_cast<int>(sharpening)] = 0.5;
   unknowns[static_cast<int>(log_radius)] = std::log(1.3), unknowns[static_cast<int>(log_mosaic)] = 0.1;
+  unknowns[static_cast<int>(chroma_shift_px)] = 0.4;
   return unknowns;
 }
 
