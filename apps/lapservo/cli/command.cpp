@@ -1,7 +1,9 @@
 #include "apps/lapservo/cli/command.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -11,6 +13,7 @@
 
 #include "lapservo/core/csv.h"
 #include "lapservo/core/error.h"
+#include "lapservo/core/nearest_word.h"
 
 namespace lapservo::app {
 using namespace internal;
@@ -27,6 +30,28 @@ CLI::Validator checked(const std::string& expected, bool whole, double low, doub
     return good ? std::string() : fmt::format("is {}, expected {}", text.empty() ? "empty" : text, expected);
   };
   return CLI::Validator(problem, "", "number");
+}
+
+// The first word of a command line that is no command or option, with the nearest that is one: "; trak is unknown, the
+// nearest is track"; empty where all are known.
+std::string suggestion(const CLI::App& program, int argc, char** argv) {
+  const CLI::App* command = &program;
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = std::string(argv[i]).substr(0, std::string(argv[i]).find('='));
+    std::vector<std::string> known;
+    if (word.starts_with("--")) {
+      for (const CLI::Option* option : command->get_options())
+        for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    } else if (command->get_require_subcommand_min() > 0) {
+      for (const CLI::App* subcommand : command->get_subcommands([](const CLI::App*) { return true; }))
+        known.push_back(subcommand->get_name());
+    }
+    if (known.empty()) continue;
+    if (std::find(known.begin(), known.end(), word) == known.end())
+      return "; " + word + " is unknown, the nearest is " + nearest_word(word, known);
+    if (!word.starts_with("--")) command = command->get_subcommand(word);
+  }
+  return "";
 }
 
 }  // namespace
@@ -121,6 +146,26 @@ void Command::footer(const std::string& text) {
 
 void Command::runs(Run& run_later, Run run) {
   app_->callback([&run_later, run = std::move(run)] { run_later = run; });
+}
+
+int run_subcommand(int argc, char** argv, const std::string& version, const std::vector<AddSubcommand>& subcommands) {
+  CLI::App app{"See and steer a laparoscopic instrument by its camera.", "lapservo"};
+  app.set_version_flag("--version", "lapservo " + version);
+  app.require_subcommand(1);
+  app.footer(
+      "`lapservo SUBCOMMAND --help` shows its options and an example.\n"
+      "Exit codes: 0 done, 1 found nothing or did not converge, 2 bad input.");
+  Run run;
+  for (const AddSubcommand add : subcommands) add(Command(&app), run);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    std::fprintf(stderr, "lapservo: %s%s (try --help)\n", error.what(), suggestion(app, argc, argv).c_str());
+    return 2;
+  }
+  return run();
 }
 
 }  // namespace lapservo::app

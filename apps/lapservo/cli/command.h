@@ -15,7 +15,7 @@ namespace lapservo::app {
 /// InputError for bad input, which main() prints in one line and ends with 2.
 using Run = std::function<int()>;
 
-// CLI11 reads the command line; its headers, which take seconds to compile, stay in command.cpp and main.cpp.
+// CLI11 reads the command line; its headers, which take seconds to compile, stay in command.cpp.
 
 /// An option of a subcommand.
 class Option {
@@ -66,5 +66,12 @@ class Command {
  private:
   CLI::App* app_;
 };
+
+/// Adds a subcommand (subcommands.h); `run` is set when the command line names it.
+using AddSubcommand = void (*)(Command app, Run& run);
+
+/// Parses the command line, and runs the subcommand that it names. Returns the exit code: errors of the command line
+/// are one line on stderr, and 2.
+int run_subcommand(int argc, char** argv, const std::string& version, const std::vector<AddSubcommand>& subcommands);
 
 }  // namespace lapservo::app

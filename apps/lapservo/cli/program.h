@@ -6,11 +6,7 @@
 
 namespace lapservo::app {
 
-/// One of subcommands.h.
-using AddSubcommand = void (*)(Command app, Run& run);
-
-/// Parses the command line, runs the subcommand that it names, and returns the exit code. Errors are one line on
-/// stderr.
+/// The whole program: see run_subcommand(). Errors of any kind are one line on stderr, and exit code 2.
 int run_program(int argc, char** argv, const std::vector<AddSubcommand>& subcommands);
 
 }  // namespace lapservo::app
