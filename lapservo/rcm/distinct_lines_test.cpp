@@ -56,7 +56,7 @@ TEST(DistinctLines, OfManyNoMoreThanAskedForInLinearTime) {
     EXPECT_GT(distinct.size(), 100U);
     return static_cast<double>(std::clock() - start);
   };
-  const double few = cpu_time_of(12000), many = cpu_time_of(96000);
+  const double few = cpu_time_of(4000), many = cpu_time_of(32000);
   EXPECT_LT(many, 24 * few) << "eight times the lines: 8 times when linear, 64 when quadratic";
 }
 
