@@ -71,9 +71,18 @@ class Browser:
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
 
+    def holds(self, expression):
+        """False also while the page loads or goes to another address."""
+        try:
+            return self.value(f"(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()")
+        except RuntimeError as error:
+            if "navigated" not in str(error):
+                raise
+            return False
+
     def wait_for(self, expression):
         end = time.monotonic() + PATIENCE_S
-        while not self.value(f"(() => {{ try {{ return {expression}; }} catch {{ return false; }} }})()"):  # while it loads
+        while not self.holds(expression):
             assert time.monotonic() < end, f"{expression} did not become true: {self.value('document.body.innerText')}"
             time.sleep(0.05)
 
