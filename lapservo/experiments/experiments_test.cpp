@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include <Eigen/Cholesky>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
@@ -232,6 +233,8 @@ TEST(Tracking, StoppedInItsSecondRunKeepsTheFirst) {
 
   const ReportSection section = section_of(result, setup);
   for (const std::string& title : result.missing) EXPECT_NE(section.unfinished.find(title), std::string::npos);
+  const double images_hz = tracking_simulator(result.runs[0].scenario, setup.seed).endoscope.frame_rate_hz;
+  EXPECT_NE(section.text[0].find(fmt::format("{:.0f} frames/s", images_hz)), std::string::npos) << section.text[0];
   EXPECT_EQ(section.files, std::vector<std::string>{"tracking_default.csv"});
   for (const Comparison& row : section.comparisons)
     EXPECT_FALSE(row.centerline.empty() && row.surface.empty()) << row.what;

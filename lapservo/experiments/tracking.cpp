@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <string_view>
 #include <utility>
@@ -27,7 +28,6 @@ namespace lapservo::internal {
 namespace {
 
 constexpr double period_s = tracking_period_s, window_margin_px = 20;
-constexpr double image_rate_hz = 30;  // of most endoscopes
 
 std::vector<TrackingScenario> scenarios() {
   std::vector<TrackingScenario> all{
@@ -187,12 +187,8 @@ std::optional<TrackingRun> run_scenario(const TrackingScenario& scenario, const 
                                         int total) {
   TrackingRun run;
   run.scenario = scenario;
-  SimulatorConfig simulated;
-  simulated.seed = setup.seed;
-  simulated.endoscope.frame_rate_hz = image_rate_hz;
-  simulated.endoscope.latency_s = scenario.latency_s;
   const Trajectory trajectory = sinusoids(paper_sinusoids());
-  Simulator simulator(setup.rig, simulated, start);
+  Simulator simulator(setup.rig, tracking_simulator(scenario, setup.seed), start);
   if (scenario.hidden_from_s) simulator.cover_marker({*scenario.hidden_from_s, *scenario.hidden_to_s});
 
   RunConfig config{setup.rig, tracking_controller(scenario, setup.rig.camera), {}, {scenario.method, false}};
@@ -220,6 +216,14 @@ int periods_of(const TrackingScenario& scenario) {
 }
 
 }  // namespace
+
+SimulatorConfig tracking_simulator(const TrackingScenario& scenario, std::uint64_t seed) {
+  SimulatorConfig config;
+  config.seed = seed;
+  config.endoscope.frame_rate_hz = 30;  // of most endoscopes
+  config.endoscope.latency_s = scenario.latency_s;
+  return config;
+}
 
 ControllerConfig tracking_controller(const TrackingScenario& scenario, const Camera& camera) {
   ControllerConfig config =

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include "lapservo/experiments/setup.h"
 #include "lapservo/experiments/time_series.h"
 #include "lapservo/report/html_report.h"
+#include "lapservo/sim/simulator.h"
 
 namespace lapservo::internal {
 
@@ -40,7 +42,7 @@ struct TrackingRun {
 };
 
 /// The paper's section V-D: from a random start in the field of view the instrument tracks the trajectory of its
-/// features, steered by what the simulated endoscope sees (60 frames/s, 80 ms late, sensor noise, an arm with lag,
+/// features, steered by what the simulated endoscope sees (30 frames/s, 80 ms late, sensor noise, an arm with lag,
 /// backlash and 3 mm and 2 degrees of kinematic offsets).
 struct TrackingResult {
   std::vector<TrackingRun> runs;
@@ -49,6 +51,8 @@ struct TrackingResult {
 };
 
 inline constexpr double tracking_period_s = 1.0 / 60;
+/// The arm and the endoscope of a run.
+SimulatorConfig tracking_simulator(const TrackingScenario& scenario, std::uint64_t seed);
 /// The controller of a run.
 ControllerConfig tracking_controller(const TrackingScenario& scenario, const Camera& camera);
 

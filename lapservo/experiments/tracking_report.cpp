@@ -209,7 +209,7 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
   papers.mode = ControlMode::paper;
   const Eigen::Vector4d papers_per_s = tracking_controller(papers, setup.rig.camera).gains.per_s,
                         ours_per_s = tracking_controller(ours, setup.rig.camera).gains.per_s;
-  const SimulatorConfig simulated;
+  const SimulatorConfig simulated = tracking_simulator(ours, setup.seed);
   ReportSection section{"tracking", "Trajectory tracking (section V-D)", {}, {}, {}, {}, {}, {}, {}};
   section.text = {fmt::format(
       "From a random start in the field of view the instrument follows {}, driven by what the simulated endoscope "
@@ -217,8 +217,8 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
       "{:.0f} frames/s, {:.0f} ms late, with noise, jitter and lost frames; an arm with lag, encoder steps, backlash, "
       "and "
       "measured joints that are {:.0f} mm and {:.0f} degrees off. All errors are those of the true features.",
-      trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * ours.latency_s, 1000 * simulated.arm.joint_offset[2],
-      deg_from_rad(simulated.arm.joint_offset[0]))};
+      trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * simulated.endoscope.latency_s,
+      1000 * simulated.arm.joint_offset[2], deg_from_rad(simulated.arm.joint_offset[0]))};
   for (const std::string& title : result.missing)
     section.unfinished += (section.unfinished.empty() ? "Stopped. Missing: " : ", ") + title;
   if (!result.missing.empty()) section.unfinished += ".";
