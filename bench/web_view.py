@@ -1,9 +1,9 @@
 """The cost of the live page and of a bag for the loop, and the age of the page's images: web_view.py LAPSERVO RIG [SECONDS].
 
 `lapservo sim-robot` and `lapservo servo` over ROS 2 on this computer, at the rig's size and 30 frames/s: without the page, with
-one viewer, with a crowd of a thousand connections as well, and with `lapservo record` in its place. Printed: how late the loop's ticks begin (of log.csv), how
-late an empty loop of the same rate and priority wakes meanwhile (this machine's own part), and the age of each image, from when
-the image came to the loop to when a viewer on this computer has it whole.
+one viewer, with a crowd of a thousand connections as well, and with `lapservo record` in its place. Printed: how late the loop's
+ticks begin (of log.csv), how late an empty loop of the same rate and priority wakes meanwhile (this machine's own part), and the
+age of each image, from when the image came to the loop to when a viewer on this computer has it whole.
 """
 
 import csv
@@ -29,7 +29,7 @@ def quantile(values, fraction):
     return values[min(len(values) - 1, int(fraction * len(values)))] if values else float("nan")
 
 
-def late(late_ms):
+def quantiles(late_ms):
     return ", ".join(f"p{100 * q:g} {quantile(late_ms, q):.2f}" for q in (0.5, 0.99, 0.999))
 
 
@@ -142,7 +142,7 @@ def main():
     for name, web, crowded, recorded in (("without the page", False, False, False), ("one viewer", True, False, False),
                                          ("and a thousand connections", True, True, False), ("one viewer and a bag", True, False, True)):
         late_ms, empty_ms, ages_ms = run(tool, rig, duration_s, web, crowded, recorded)
-        print(f"{name:28} tick late {late(late_ms)} ms; empty loop {late(empty_ms)} ms", end="")
+        print(f"{name:28} tick late {quantiles(late_ms)} ms; empty loop {quantiles(empty_ms)} ms", end="")
         if ages_ms:
             seen_s = duration_s - SETTLING_S
             print(f"; image age p50 {quantile(ages_ms, 0.5):.0f}, p95 {quantile(ages_ms, 0.95):.0f} ms, {len(ages_ms) / seen_s:.1f} images/s", end="")

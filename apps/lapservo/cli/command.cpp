@@ -163,7 +163,7 @@ int run_subcommand(int argc, char** argv, const std::string& version, const std:
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
     std::fprintf(stderr, "lapservo: %s%s (try --help)\n", error.what(), suggestion(app, argc, argv).c_str());
-    return 2;
+    return bad_input;
   }
   return run();
 }

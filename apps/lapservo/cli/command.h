@@ -14,6 +14,7 @@ namespace lapservo::app {
 /// The job of a parsed command line; returns the exit code: 0, or 1 when nothing was found or nothing converged. Throws
 /// InputError for bad input, which main() prints in one line and ends with 2.
 using Run = std::function<int()>;
+inline constexpr int bad_input = 2;
 
 // CLI11 reads the command line; its headers, which take seconds to compile, stay in command.cpp.
 

@@ -14,8 +14,6 @@
 namespace lapservo::app {
 namespace {
 
-constexpr int bad_input = 2;
-
 // The libraries beneath print their own complaints; ours is one line that names the file.
 void silence_libraries() {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
