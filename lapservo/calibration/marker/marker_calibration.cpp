@@ -53,7 +53,7 @@ double turn_between(double before_tau_rad, double tau_rad) {
 
 // Sharper is better, and a pose that settled best.
 double worth(const Sighting& sighting) {
-  return (sighting.settled ? 100 : 0) - sighting.blur.boundaries_px - sighting.blur.sides_px;
+  return (sighting.settled ? 100 : 0) - sighting.blur.boundaries_px() - sighting.blur.sides_px;
 }
 
 // Whether a frame determines a pose by itself: with one boundary and the contours a roll and a shift along the shaft
@@ -193,7 +193,9 @@ std::size_t seam_views(const std::vector<ViewMeasurements>& measured) {
 std::string blur_refusal(const std::vector<KeyFrame>& frames, const Marker& marker) {
   const auto blurred = std::count_if(frames.begin(), frames.end(), [&](const KeyFrame& frame) {
     const double depth_m = frame.sighting.unknowns.pose().camera_from_unrolled.translation.z();
-    return frame.sighting.blur.boundaries_px >
+    // Defocus and motion widen all boundaries; a camera's filters those between two colours.
+    const auto& along_px = frame.sighting.blur.along_px;
+    return *std::min_element(along_px.begin(), along_px.end()) >
            max_blur_diameters * marker.diameter_m * frame.view.camera.fx_px / depth_m;
   });
   if (2 * static_cast<std::size_t>(blurred) > frames.size()) {

@@ -33,7 +33,7 @@ double length_in_image_px(const Scene& scene, const ShaftPose& pose, double azim
 
 // The print's fault, not the scene's: a boundary is not where it should be on lines on which nothing hides it.
 bool misses_a_boundary(const Scene& scene, const FineFit& fit, const ColourAgreement& agreement) {
-  if (agreement.matching <= limits.unhidden_matching || fit.blur.boundaries_px >= limits.unblurred_px) return false;
+  if (agreement.matching <= limits.unhidden_matching || fit.blur.boundaries_px() >= limits.unblurred_px) return false;
   for (std::size_t k = 0; k < 4; ++k) {
     if (fit.in_image[k] < limits.enough_lines || fit.used[k] >= limits.missed_fraction * fit.in_image[k]) continue;
     const int clear = lines_in_clear_view(scene, fit.unknowns.pose(), k, fit.lines);
@@ -112,7 +112,7 @@ bool shows_wholly_among_others(const Scene& scene, const ColourAgreement& agreem
 // Motion and turns move boundaries as a print's errors would; defocus is alike along the shaft and across it.
 bool has_moved(const FineFit& fit) {
   if (variance_of_uneven_turn(fit.turn, std::nullopt) > 0) return true;
-  const auto [narrower_px, wider_px] = std::minmax(fit.blur.boundaries_px, fit.blur.sides_px);
+  const auto [narrower_px, wider_px] = std::minmax(fit.blur.boundaries_px(), fit.blur.sides_px);
   const bool even =
       wider_px < limits.even_blur * narrower_px && std::abs(fit.blur.correlation) < limits.even_correlation;
   return fit.blur.widest_px() > limits.unblurred_px && !even;
@@ -123,7 +123,7 @@ bool has_moved(const FineFit& fit) {
 double max_sigma_suspected_rad(const FineFit& fit) {
   if (!is_well_seen(fit) || has_moved(fit) || fit.inlier_rms_sigmas > limits.scattered_rms_sigmas)
     return limits.max_sigma_suspected_of_poor_rad;
-  const double scale = std::max(1.0, limits.usual_radius_px / fit.blur.radius_px);
+  const double scale = std::max(1.0, limits.usual_radius_px / fit.radius_px);
   return std::min(scale * limits.max_sigma_suspected_rad, limits.max_sigma_suspected_of_poor_rad);
 }
 

@@ -5,10 +5,10 @@
 namespace lapservo::internal {
 namespace {
 
-// Of a picture that looks processed.
+// Of a picture that looks processed, or unlike any, through the departure.
 bool looks_better(const ProcessingEvidence& as_the_rig_says, const ProcessingEvidence& departed) {
   if (as_the_rig_says.processing != Processing::found) return as_the_rig_says.processing == Processing::none;
-  return as_the_rig_says.edges->misfit_without < departed.edges->misfit_without;
+  return !departed.edges || as_the_rig_says.edges->misfit_without < departed.edges->misfit_without;
 }
 
 struct CameraLook {
@@ -43,10 +43,9 @@ SeenCamera look_at_camera(const LightImage& light, std::span<const Measurement> 
   const PooledEdges glance = glance_at(seen.light(), measurements);
   camera.evidence = find_processing(seen.light(), measurements, glance, blur_px);
   camera.explained += camera.evidence.explained;
-  if (camera.evidence.processing == Processing::found) {
-    look.doubt_known(camera);
-    return camera;
-  }
+  if (camera.evidence.processing != Processing::none) look.doubt_known(camera);
+  const bool withdrawn = known.any() && !camera.departure.any();
+  if (withdrawn || camera.evidence.processing == Processing::found) return camera;
   ++camera.asked_for_departure;
   const auto more = find_departure(seen.light(), measurements, glance, blur_px);
   if (more)

@@ -317,7 +317,10 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
   const ProcessingVector sigmas = expected_sigmas(expected.only_video);
   const Problem problem(light_of_value, all, blur_px, sigmas, expected);
   const Problem without(light_of_value, all, blur_px, sigmas_of_none(), expected);
+  const State none = minimised(without, without.prior());
   State state = minimised(problem, problem.prior());
+  // From where the picture is expected to be, the way to the least cost may end beside it.
+  if (problem.cost(none) < problem.cost(state)) state = minimised(problem, none);
   if (processing_of(state.processing).chroma_variance_px2 > processing_limits.chroma_variance_px2) {
     const Problem beside(light_of_value, all, blur_px, sigmas_beside(sigmas), expected);
     const State anywhere = minimised(beside, state);
@@ -327,7 +330,7 @@ std::optional<ProcessedEdges> explain(const std::array<float, 256>& light_of_val
   ProcessedEdges out;
   out.processing = processing_of(state.processing);
   out.misfit = problem.misfit(state);
-  out.misfit_without = without.misfit(minimised(without, without.prior()));
+  out.misfit_without = without.misfit(none);
   const auto bias_px = [&](std::size_t k) { return all[k].residual_px - state.edges[k][edge_offset]; };
   std::array<double, 4> places{}, sum_px{};
   for (std::size_t k = 0; k < all.size(); ++k) {

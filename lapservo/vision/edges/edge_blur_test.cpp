@@ -11,8 +11,8 @@ namespace edge_blur_test {
 namespace {
 
 // Edges whose blur along the line is `truth`'s, as located with `blur`: what a fit of their width says.
-WideBlurEvidence evidence_of(const EdgeBlur& truth, const EdgeBlur& blur, std::size_t boundaries = 4) {
-  WideBlurEvidence evidence;
+EllipseEvidence evidence_of(const EdgeBlur& truth, const EdgeBlur& blur, std::size_t boundaries = 4) {
+  EllipseEvidence evidence;
   for (std::size_t k = 0; k < boundaries; ++k)
     for (int i = -10; i <= 10; ++i) {
       const Eigen::Vector2d normal = Eigen::Vector2d(1, 0.06 * i + 0.15 * static_cast<double>(k)).normalized();
@@ -45,7 +45,7 @@ TEST(EdgeBlur, IsFoundFromBoundariesOfSeveralInclinations) {
 
 TEST(EdgeBlur, OfABoundaryThatIsHiddenIsTheOthers) {
   EdgeBlur blur{2, 3};
-  for (int i = 0; i < 20; ++i) blur = evidence_of(EdgeBlur{3, 3}, blur, 3).improved(blur);
+  for (int i = 0; i < 20; ++i) blur = evidence_of({3, 3}, blur, 3).improved(blur);
   EXPECT_NEAR(blur.along_px[3], 3, 0.05);
 }
 
@@ -53,7 +53,7 @@ TEST(EdgeBlur, IsAnEllipseWhateverEdgesSay) {
   Random random(1);
   EdgeBlur blur{2, 3};
   for (int i = 0; i < 200; ++i) {
-    WideBlurEvidence evidence;
+    EllipseEvidence evidence;
     for (int j = 0; j < 30; ++j) {
       EdgeFit edge;
       edge.blur_information = static_cast<float>(random.uniform(0, 10));
@@ -69,27 +69,8 @@ TEST(EdgeBlur, IsAnEllipseWhateverEdgesSay) {
       EXPECT_LE(blur.along_px[k], 8);
     }
   }
-  const EdgeBlur unseen = WideBlurEvidence().improved(blur);
-  EXPECT_TRUE(std::isfinite(unseen.boundaries_px) && std::isfinite(unseen.correlation));
-}
-
-TEST(EdgeBlur, IsWideBeyondALensOnlyAndWhereSidesAreNotMerelyMisplaced) {
-  EXPECT_FALSE((EdgeBlur{1.2, 1.2}.wide()));
-  EXPECT_FALSE((EdgeBlur{1.2, 2}.wide()));
-  EXPECT_TRUE((EdgeBlur{1.4, 2}.wide()));
-  EXPECT_TRUE((EdgeBlur{1.1, 2.5}.wide()));
-  EXPECT_TRUE((EdgeBlur{2, 1.2}.wide()));
-}
-
-TEST(EdgeBlur, OfAThinShaftIsWideSooner) {
-  EdgeBlur blur{1.4, 1.2};
-  blur.radius_px = 40;
-  EXPECT_FALSE(blur.wide());
-  blur.radius_px = 14;
-  EXPECT_TRUE(blur.wide());
-  EdgeBlur usual{1.2, 1.2};
-  usual.radius_px = 14;
-  EXPECT_FALSE(usual.wide());
+  const EdgeBlur unseen = EllipseEvidence().improved(blur);
+  EXPECT_TRUE(std::isfinite(unseen.boundaries_px()) && std::isfinite(unseen.correlation));
 }
 
 }  // namespace

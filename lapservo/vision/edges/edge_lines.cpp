@@ -216,7 +216,7 @@ struct Basis {
   std::array<std::array<V, linear>, linear> triangle;  // of the orthogonalisation
   Columns by_position, by_blur;
   Imitated position_imitated, blur_imitated;
-  Gram position_gram, blur_gram;
+  Gram position_gram, blur_gram, both_gram;  // both: of derivatives by position (first index) with those by blur
   Mask independent;
 
   Basis(const LineLanes& lines, const Column& present, V edge_px) {
@@ -224,6 +224,11 @@ struct Basis {
     orthogonalise(lines, present);
     tell_apart(by_position, lines.samples, position_imitated, position_gram);
     tell_apart(by_blur, lines.samples, blur_imitated, blur_gram);
+    for (std::size_t t = 0; t < Shapes; ++t) {
+      const auto products = dots(pointers(by_position), by_blur[t], lines.samples);
+      for (std::size_t s = 0; s < Shapes; ++s)
+        both_gram[s][t] = left_of(products[s], position_imitated[s], blur_imitated[t]);
+    }
   }
 
  private:
@@ -278,6 +283,17 @@ struct Basis {
     }
   }
 
+  static std::array<const Column*, Shapes> pointers(const Columns& columns) {
+    std::array<const Column*, Shapes> out;
+    for (std::size_t s = 0; s < Shapes; ++s) out[s] = &columns[s];
+    return out;
+  }
+  // Of the product of two derivatives, what the basis can't imitate.
+  static V left_of(V product, const std::array<V, linear>& a, const std::array<V, linear>& b) {
+    for (std::size_t j = 0; j < linear; ++j) product = hn::NegMulAdd(a[j], b[j], product);
+    return product;
+  }
+
   void tell_apart(const Columns& derivatives, std::size_t samples, Imitated& imitated, Gram& gram) const {
     for (std::size_t s = 0; s < Shapes; ++s) {
       std::array<const Column*, linear + Shapes> columns;
@@ -285,11 +301,8 @@ struct Basis {
       for (std::size_t r = 0; r < Shapes; ++r) columns[linear + r] = &derivatives[r];
       const auto products = dots(columns, derivatives[s], samples);
       std::copy_n(products.begin(), linear, imitated[s].begin());
-      for (std::size_t r = 0; r <= s; ++r) {
-        V left = products[linear + r];
-        for (std::size_t j = 0; j < linear; ++j) left = hn::NegMulAdd(imitated[s][j], imitated[r][j], left);
-        gram[s][r] = gram[r][s] = left;
-      }
+      for (std::size_t r = 0; r <= s; ++r)
+        gram[s][r] = gram[r][s] = left_of(products[linear + r], imitated[s], imitated[r]);
     }
   }
 };
@@ -325,7 +338,7 @@ FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& pr
     columns[linear + Shapes + s] = &basis.by_blur[s];
   }
   FitLanes fit{zero, zero, zero, zero, zero, {zero, zero, zero}, {zero, zero, zero}, basis.independent};
-  V position_gradient = zero, squares = seen.squares;
+  V position_gradient = zero, position_and_blur = zero, squares = seen.squares;
   for (std::size_t c = 0; c < 3; ++c) {
     const auto products = dots(columns, seen.light[c], lines.samples);
     std::array<V, linear> amplitude;
@@ -352,6 +365,7 @@ FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& pr
         const V both = hn::Mul(a, amplitude[t + 1]);
         fit.information = hn::MulAdd(both, basis.position_gram[s][t], fit.information);
         fit.blur_information = hn::MulAdd(both, basis.blur_gram[s][t], fit.blur_information);
+        position_and_blur = hn::MulAdd(both, basis.both_gram[s][t], position_and_blur);
       }
       fit.step[c] = hn::Add(fit.step[c], a);
     }
@@ -359,6 +373,10 @@ FitLanes project(const LineLanes& lines, const LineLight& seen, const Column& pr
   const V degrees =
       hn::MulAdd(hn::Set(d, 3), hn::Sub(samples_of(lines), hn::Set(d, static_cast<float>(linear))), hn::Set(d, -1));
   fit.offset = hn::Div(position_gradient, fit.information);
+  // Of the blur, whatever the position is.
+  fit.blur_gradient = hn::NegMulAdd(fit.offset, position_and_blur, fit.blur_gradient);
+  fit.blur_information =
+      hn::NegMulAdd(hn::Div(position_and_blur, fit.information), position_and_blur, fit.blur_information);
   fit.residual_variance = hn::Div(hn::Max(zero, squares), degrees);
   // Comparisons with what is not finite are false.
   const V huge = hn::Set(d, 1e30F);

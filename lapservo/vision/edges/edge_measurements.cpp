@@ -46,7 +46,9 @@ struct Frame {
 
   const Marker& marker() const { return scene.marker; }
   Generatrix generatrix(double azimuth_rad) const {
-    const double cosine = std::cos(azimuth_rad), sine = std::sin(azimuth_rad);
+    return generatrix(azimuth_rad, std::cos(azimuth_rad), std::sin(azimuth_rad));
+  }
+  Generatrix generatrix(double azimuth_rad, double cosine, double sine) const {
     const Eigen::Vector3d outwards = cosine * axes.col(0) + sine * axes.col(1);
     return {azimuth_rad,
             {cosine, sine, 0},
@@ -100,18 +102,35 @@ UnknownVector row_of(const PoseUnknowns& unknowns, const Eigen::Vector3d& point,
   return row;
 }
 
-// The course of boundary `k` in the image, in the directions of `along`, by how it goes on around the shaft on either
+constexpr double aside_rad = 0.05;
+
+// A generatrix, and those as far aside of it on either side.
+struct Neighbourhood {
+  Generatrix middle;
+  std::array<Generatrix, 2> aside;
+
+  Neighbourhood(const Frame& frame, double azimuth_rad)
+      : middle(frame.generatrix(azimuth_rad)), aside{turned(frame, -1), turned(frame, 1)} {}
+
+ private:
+  Generatrix turned(const Frame& frame, double way) const {
+    static const double cosine = std::cos(aside_rad), sine = std::sin(aside_rad);
+    const double x = middle.outwards_unrolled.x(), y = middle.outwards_unrolled.y();
+    return frame.generatrix(middle.azimuth_rad + way * aside_rad, cosine * x - way * sine * y,
+                            cosine * y + way * sine * x);
+  }
+};
+
+// The course of a boundary in the image, in the directions of `along`, by how it goes on around the shaft on either
 // side, `depth_m` below the outside. The light is the camera's, diffuse: so the ends' films are seen, too.
-BoundaryCourse course_of(const Frame& frame, const Generatrix& generatrix, double along_m, double slope_m,
+BoundaryCourse course_of(const Frame& frame, const Neighbourhood& generatrices, double along_m, double slope_m,
                          double depth_m, const Eigen::Vector2d& point_px, const Eigen::Vector2d& along) {
-  constexpr double aside_rad = 0.05;
   const Eigen::Vector2d across(-along.y(), along.x());
   std::array<Eigen::Vector2d, 2> places_px;
   std::array<double, 2> light;
   for (std::size_t i = 0; i < 2; ++i) {
-    const double turn_rad = i == 0 ? -aside_rad : aside_rad;
-    const Generatrix aside = frame.generatrix(generatrix.azimuth_rad + turn_rad);
-    const double there_m = along_m + turn_rad * slope_m;
+    const Generatrix& aside = generatrices.aside[i];
+    const double there_m = along_m + (i == 0 ? -aside_rad : aside_rad) * slope_m;
     const Eigen::Vector2d from_px =
         frame.scene.camera.raw_from_point(frame.point(aside, there_m) - depth_m * aside.outwards) - point_px;
     places_px[i] = {from_px.dot(along), from_px.dot(across)};
@@ -122,7 +141,7 @@ BoundaryCourse course_of(const Frame& frame, const Generatrix& generatrix, doubl
   BoundaryCourse course;
   course.curvature_per_px = 2 * (slope_b - slope_a) / apart_px;
   course.slope = slope_a - 0.5 * course.curvature_per_px * a.y();
-  course.light_change_per_px = std::log(light[1] / light[0]) / apart_px;
+  course.light_change_per_px = 2 * (light[1] - light[0]) / (light[1] + light[0]) / apart_px;
   return course;
 }
 
@@ -130,22 +149,16 @@ BoundaryCourse course_of(const Frame& frame, const Generatrix& generatrix, doubl
 struct BoundaryPlace {
   Measurement measurement;
   Eigen::Vector2d point_px, along;
-  double normal_cosine;
+  Eigen::Vector2d normal;  // of the boundary, its parts along the shaft and across it
   EdgeLine line;
   Facing facing;
   double film_shift;         // by which fraction of its projected width the film's edge is expected to move it
   double film_px_per_m;      // that width by the film's thickness, along the normal
   double film_moved_px = 0;  // how far it moves it beyond what was expected, and one sigma of that
   double film_sigma_px = 0;
+  double moved_by_blur_px;  // along the shaft
 
   bool shows_film() const { return facing.film_edge > 0; }
-};
-
-// What a wide blur does to it: `ellipse` is the boundary's.
-struct InWideBlur {
-  BlurEllipse ellipse;
-  Eigen::Vector2d normal;  // its parts along the line and across it
-  double moved_px;         // along the line
 };
 
 // Whether the pixels on both sides have the colours that should be there. A blurred band tints the shaft beyond its
@@ -160,13 +173,14 @@ bool colours_agree(const Frame& frame, const BoundaryPlace& place, float offset_
 }
 
 // False where it can't be looked for.
-bool place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_t k,
-                    const std::array<double, 4>& along_m, double slope_m, const Effort& effort, double blur_px,
-                    InWideBlur* wide, BoundaryPlace& place) {
+bool place_boundary(const Frame& frame, const Neighbourhood& generatrices, std::size_t k,
+                    const std::array<double, 4>& along_m, double slope_m, const Effort& effort, const BlurEllipse& blur,
+                    BoundaryPlace& place) {
+  const Generatrix& generatrix = generatrices.middle;
   place.facing = frame.facing(k, generatrix, along_m[k]);
   place.film_shift = place.shows_film() ? film_edge_level(place.facing, film_edge_limits.usual_even_light) : 0;
-  Eigen::Vector3d point = frame.point(generatrix, along_m[k]);
-  if (place.shows_film()) point -= place.film_shift * frame.film_m * generatrix.outwards;
+  const double depth_m = place.film_shift * frame.film_m;
+  const Eigen::Vector3d point = frame.point(generatrix, along_m[k]) - depth_m * generatrix.outwards;
   if (!frame.scene.field.contains(point)) return false;
   const ProjectionWithJacobian image = frame.scene.camera.raw_with_jacobian(point);
   const Eigen::Vector2d axis_px = image.d_px_d_point * frame.axes.col(2);
@@ -176,20 +190,16 @@ bool place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_
   const Eigen::Vector2d tangent =
       (frame.marker().radius_m() * (image.d_px_d_point * generatrix.around) + slope_m * axis_px).normalized();
   const Eigen::Vector2d normal(-tangent.y(), tangent.x());
-  place.normal_cosine = normal.dot(place.along);
-  if (!(std::abs(place.normal_cosine) > edge_limits.min_normal_cosine)) return false;
-  if (wide) {
-    wide->normal = {place.normal_cosine, normal.dot(Eigen::Vector2d(-place.along.y(), place.along.x()))};
-    blur_px = wide->ellipse.along_normal_px(wide->normal);
-    wide->moved_px = moved_by_blur_px(
-        course_of(frame, generatrix, along_m[k], slope_m, place.film_shift * frame.film_m, image.point_px, place.along),
-        wide->ellipse);
-  }
+  place.normal = {normal.dot(place.along), normal.dot(Eigen::Vector2d(-place.along.y(), place.along.x()))};
+  const double cosine = std::abs(place.normal.x());
+  if (!(cosine > edge_limits.min_normal_cosine)) return false;
+  place.moved_by_blur_px =
+      moved_by_blur_px(course_of(frame, generatrices, along_m[k], slope_m, depth_m, image.point_px, place.along), blur);
 
   double gap_px = 1e9;
   if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
   if (k < 3) gap_px = std::min(gap_px, (along_m[k + 1] - along_m[k]) * px_per_m);
-  const double line_blur_px = blur_px / std::abs(place.normal_cosine);
+  const double blur_px = blur.along_normal_px(place.normal), line_blur_px = blur_px / cosine;
   const int reach =
       static_cast<int>(std::min({2.5 * line_blur_px + effort.extra_px, 0.6 * gap_px - line_blur_px, 22.0}));
   if (reach < 3) return false;
@@ -205,7 +215,7 @@ bool place_boundary(const Frame& frame, const Generatrix& generatrix, std::size_
   place.measurement.along_px_per_m = pull.dot(frame.axes.col(2));
   place.measurement.expected_px = image.point_px.cast<float>();
   place.measurement.normal = normal.cast<float>();
-  place.measurement.clear_px = static_cast<float>(0.6 * gap_px * std::abs(place.normal_cosine) - blur_px);
+  place.measurement.clear_px = static_cast<float>(0.6 * gap_px * cosine - blur_px);
   return true;
 }
 
@@ -273,7 +283,6 @@ void see_film(const Frame& frame, std::size_t k, double even_light, const EdgeBl
 // A boundary point that was located.
 struct Candidate {
   const BoundaryPlace* place;
-  const InWideBlur* wide;  // nullptr in usual blur
   const EdgeFit* edge;
   bool colours_agree;
 };
@@ -295,7 +304,7 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
     if (candidate.colours_agree) values.push_back(candidate.edge->residual_variance);
   const double typical_variance = median(values);
   const float typical_square = dot(typical, typical);
-  for (const auto& [place, wide, edge, agree] : candidates) {
+  for (const auto& [place, edge, agree] : candidates) {
     const float projection = dot(edge->step, typical), square = dot(edge->step, edge->step);
     const bool alike = projection > edge_limits.min_step * typical_square &&
                        projection * projection > edge_limits.least_alike * square * typical_square;
@@ -303,24 +312,21 @@ void trust(std::span<const Candidate> candidates, const EdgeBlur& blur, EdgeMeas
                       edge_limits.max_residual * square + edge_limits.max_residual_variances * typical_variance)
       continue;
     const double variance = 0.5 * (edge->residual_variance + typical_variance) * edge_limits.interpolation_noise;
-    const double cosine = place->normal_cosine;
+    const double cosine = place->normal.x();
     out.all.push_back(place->measurement);
     Measurement& measurement = out.all.end()[-1];
-    measurement.residual_px = edge->offset_px * cosine - place->film_moved_px;
-    if (wide) {
-      measurement.residual_px -= wide->moved_px * cosine;
-      out.wide_blur.add(*edge, variance, blur, measurement.group, wide->normal);
-    }
+    const double moved_px = place->moved_by_blur_px * cosine;
+    measurement.expected_px += static_cast<float>(moved_px) * measurement.normal;
+    measurement.residual_px = edge->offset_px * cosine - moved_px - place->film_moved_px;
+    out.ellipse.add(*edge, variance, blur, measurement.group, place->normal);
     measurement.sigma_px = std::sqrt(variance / edge->information * cosine * cosine +
                                      edge_limits.single_floor_px * edge_limits.single_floor_px +
                                      place->film_sigma_px * place->film_sigma_px);
-    out.boundary_blurs[measurement.group].add(*edge, variance);
   }
 }
 
-// Of the visible half width: wide blur mixes what lies beside the shaft into what is near its sides.
+// Of the visible half width: blur mixes what lies beside the shaft into what is near its sides.
 double line_reach(const EdgeBlur& blur, double radius_px) {
-  if (!blur.wide()) return edge_limits.line_reach;
   return std::clamp(1 - edge_limits.blurs_from_side * blur.sides_px / radius_px, edge_limits.least_line_reach,
                     edge_limits.line_reach);
 }
@@ -330,31 +336,26 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
   out.radius_px = radius_px;
   out.lines = std::max(edge_limits.min_lines, std::min(static_cast<int>(1.2 * radius_px), max_lines) / effort.thinning);
   const auto slopes_m = boundary_slopes_m(frame.marker());
-  const bool wide = blur.wide();
   std::array<bool, 4> jumps{};
-  for (std::size_t k = 0; k < 4; ++k) jumps[k] = jumps_at_seam(frame.marker(), k);
+  std::array<BlurEllipse, 4> ellipses;
+  for (std::size_t k = 0; k < 4; ++k) jumps[k] = jumps_at_seam(frame.marker(), k), ellipses[k] = blur.ellipse(k);
   const double sine_of_half = std::sin(frame.view.half_visible_rad), reach = line_reach(blur, radius_px);
   InplaceVector<BoundaryPlace, 4 * max_lines> places;
-  InplaceVector<InWideBlur, 4 * max_lines> in_wide_blur;
   InplaceVector<EdgeLine, 4 * max_lines> lines;
   for (int i = 0; i < out.lines; ++i) {
     const double sine = reach * (2.0 * (i + 0.5) / out.lines - 1) * sine_of_half;
-    const Generatrix generatrix = frame.generatrix(frame.view.facing_azimuth_rad + std::asin(sine));
-    const double tau_rad = frame.tau(generatrix.azimuth_rad);
+    const Neighbourhood generatrices(frame, frame.view.facing_azimuth_rad + std::asin(sine));
+    const double tau_rad = frame.tau(generatrices.middle.azimuth_rad);
     const auto along_m = boundaries_m(frame.marker(), tau_rad);
     const double seam_px = distance_to_seam_rad(frame.marker(), tau_rad) * radius_px * std::sqrt(1 - sine * sine);
     for (std::size_t k = 0; k < 4; ++k) {
-      if (jumps[k] && seam_px < edge_limits.seam_blurs * blur.boundaries_px + edge_limits.seam_px) continue;
-      InWideBlur blurred;
-      if (wide) blurred.ellipse = blur.ellipse(k);
+      if (jumps[k] && seam_px < edge_limits.seam_blurs * blur.along_px[k] + edge_limits.seam_px) continue;
       BoundaryPlace& place = places.emplace_back();
-      if (!place_boundary(frame, generatrix, k, along_m, slopes_m[k], effort, blur.boundaries_px,
-                          wide ? &blurred : nullptr, place) ||
-          (!frame.scene.others.empty() && lies_behind_another(frame, place.line, generatrix, along_m[k]))) {
+      if (!place_boundary(frame, generatrices, k, along_m, slopes_m[k], effort, ellipses[k], place) ||
+          (!frame.scene.others.empty() && lies_behind_another(frame, place.line, generatrices.middle, along_m[k]))) {
         places.pop_back();
         continue;
       }
-      if (wide) in_wide_blur.push_back(blurred);
       ++out.in_image[k];
       place.measurement.across = sine / sine_of_half;
       lines.push_back(place.line);
@@ -369,8 +370,7 @@ void measure_boundaries(const Frame& frame, const Effort& effort, const EdgeBlur
     InplaceVector<Candidate, max_lines> candidates;
     for (std::size_t i = 0; i < places.size(); ++i)
       if (places[i].measurement.group == k && edges[i].converged)
-        candidates.push_back({&places[i], wide ? &in_wide_blur[i] : nullptr, &edges[i],
-                              colours_agree(frame, places[i], edges[i].offset_px)});
+        candidates.push_back({&places[i], &edges[i], colours_agree(frame, places[i], edges[i].offset_px)});
     trust(candidates, blur, out);
   }
 }
@@ -418,7 +418,7 @@ bool place_side(const Frame& frame, const Side& side, double along_m, const Effo
   if (inwards.dot(frame.scene.camera.raw_from_point(frame.point(side.deep, along_m)) - image.point_px) < 0)
     inwards = -inwards;
   const double radius_px = frame.marker().radius_m() / point.norm() * frame.scene.camera.fx_px;
-  const int inside = inside_of_side_px(radius_px), outside = outside_of_side_px(blur_px, effort.extra_px);
+  const int inside = inside_of_side_px(radius_px), outside = outside_of_side_px(blur_px, effort.extra_of_sides_px);
   if (inside < 3) return false;
   const double room_m = 2.5 * blur_px * frame.marker().length_m() / 200;
   if (!one_band(frame, side.contour.azimuth_rad, side.deep.azimuth_rad, along_m, room_m)) return false;
@@ -460,7 +460,7 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
     if (!edge.converged) continue;
     const double variance = 0.5 * (edge.residual_variance + typical_variance) * edge_limits.interpolation_noise;
     const double sigma_px =
-        std::sqrt(variance / edge.information + 4 * edge_limits.single_floor_px * edge_limits.single_floor_px);
+        std::sqrt(variance / edge.information + edge_limits.side_floor_px * edge_limits.side_floor_px);
     if (sigma_px > edge_limits.max_side_sigma_px) continue;
     out.all.push_back(places[i].measurement);
     Measurement& measurement = out.all.end()[-1];
@@ -473,17 +473,9 @@ void measure_sides(const Frame& frame, const Effort& effort, double blur_px, Edg
 }  // namespace
 
 EdgeBlur EdgeMeasurements::improved(const EdgeBlur& blur) const {
-  BlurEvidence boundary_blur;
-  for (const BlurEvidence& each : boundary_blurs) boundary_blur.add(each);
-  const double sides_px = side_blur.improved(blur.sides_px);
-  const bool wide = blur.wide();
-  EdgeBlur next = wide ? wide_blur.improved(blur) : EdgeBlur{boundary_blur.improved(blur.boundaries_px)};
-  next.sides_px = sides_px;
-  next.radius_px = radius_px;
-  if (!wide || next.wide()) return next;
-  EdgeBlur usual{next.boundaries_px, sides_px};
-  usual.radius_px = radius_px;
-  return usual;
+  EdgeBlur next = ellipse.improved(blur);
+  next.sides_px = side_blur.improved(blur.sides_px);
+  return next;
 }
 
 EdgeMeasurements measure_edges(const Scene& scene, const LightImage& light, const PoseUnknowns& unknowns, double film_m,

@@ -17,7 +17,7 @@ struct EdgeLimits {
   double line_reach = 0.9;  ///< of the visible half width: beyond, light and resolution are gone
   /// What the model leaves out (shading across the blur, lens, print) of every single boundary point; twice that of
   /// sides.
-  double single_floor_px = 0.04;
+  double single_floor_px = 0.016, side_floor_px = 0.09;
   double interpolation_noise = 1.6;        ///< of the variance: interpolated samples are smoother than pixels are noisy
   double blurred_ambient_fraction = 0.05;  ///< of the light on the shaft, the even part
   /// Lines end so many blurs before a side, of which the blur would mix the outside in, and no nearer to the middle.
@@ -63,10 +63,11 @@ struct Measurement {
 };
 inline constexpr std::size_t measurement_groups = 6;
 
-/// How far beyond the blur a pass looks for edges, how often it refines each before the pose, and which fraction of the
-/// generatrices and stations it uses: one of so many.
+/// How far beyond the blur a pass looks for boundaries and for sides, how often it refines each before the pose, and
+/// which fraction of the generatrices and stations it uses: one of so many. What lies beside the shaft is less even
+/// than its bands: where a side's place is known to a pixel, 2 px beyond the blur make its error half as large again.
 struct Effort {
-  double extra_px;
+  double extra_px, extra_of_sides_px;
   int iterations;
   int thinning;
 };
@@ -80,9 +81,8 @@ struct EdgeMeasurements {
   int sides_in_image = 0;         ///< stations on which a side lies inside the image and off the boundaries
   int lines = 0;                  ///< generatrices looked at
   double radius_px = 0;           ///< the shaft's
-  std::array<BlurEvidence, 4> boundary_blurs;
+  EllipseEvidence ellipse;
   BlurEvidence side_blur;
-  WideBlurEvidence wide_blur;  ///< where the blur that they were located with is wide
 
   /// The blur that they were located with after a step.
   EdgeBlur improved(const EdgeBlur& blur) const;

@@ -13,7 +13,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr Effort effort{3, 3, 1};
+constexpr Effort effort{3, 3, 3, 1};
 
 TEST(EdgeMeasurements, WhatTheLensFoldsIntoTheImageIsNotLookedFor) {
   Rig rig = scenes::usual_rig();

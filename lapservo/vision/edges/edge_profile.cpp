@@ -55,7 +55,7 @@ EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
   using Matrix = Eigen::Matrix<float, linear, linear>;
   using Vector = Eigen::Matrix<float, linear, 1>;
   EdgeFit fit;
-  float position_gradient = 0, squares = 0;
+  float position_gradient = 0, position_and_blur = 0, squares = 0;
   int degrees = -1;
   for (std::size_t c = 0; c < 3; ++c) {
     Matrix normal = Matrix::Zero();
@@ -103,6 +103,7 @@ EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
       fit.information += p * p;
       fit.blur_gradient += b * miss[i];
       fit.blur_information += b * b;
+      position_and_blur += p * b;
       squares += miss[i] * miss[i];
     }
     degrees += used - linear;
@@ -111,6 +112,9 @@ EdgeFit project(const EdgeProfile& profile, const Basis<Shapes>& basis) {
   }
   if (degrees < 3 || !(fit.information > min_edge_information)) return fit;
   fit.offset_px = position_gradient / fit.information;
+  // Of the blur, whatever the position is.
+  fit.blur_gradient -= fit.offset_px * position_and_blur;
+  fit.blur_information -= position_and_blur * position_and_blur / fit.information;
   fit.residual_variance = squares / static_cast<float>(degrees);
   fit.converged = std::isfinite(fit.offset_px) && std::isfinite(fit.residual_variance);
   return fit;

@@ -21,36 +21,26 @@ double median_sigma_px(std::span<const Measurement> measurements) {
   return sigmas_px.empty() ? 0 : median(sigmas_px);
 }
 
-// By which noise is smaller than the measurements say: of what they have beyond the light's, for what single points may
-// be off besides, no more than their scatter shows.
-double told_noise_scale(double scatter_sigmas, double sigma_px) {
-  const double floor = edge_limits.single_floor_px / std::max(sigma_px, edge_limits.single_floor_px);
-  const double of_light = std::sqrt(1 - floor * floor);
-  return std::clamp(scatter_sigmas, std::max(of_light, usual.least_noise_scale), 1.0);
-}
-
 // Of a blur, what is beyond the usual.
 double beyond_px2(double blur_px, double usual_px) {
   return std::max(0.0, blur_px * blur_px - usual_px * usual_px);
 }
 
-void add_boundaries(const EdgeBlur& blur, const std::optional<ProcessedEdges>& processed, const Boundaries& bias_px,
-                    const Boundaries& departure_px, CommonErrors& errors) {
+void add_boundaries(const EdgeBlur& blur, double radius_px, const std::optional<ProcessedEdges>& processed,
+                    const Boundaries& bias_px, const Boundaries& departure_px, CommonErrors& errors) {
   const double unexplained = processed ? std::max(0.0, processed->misfit - usual.usual_misfit) : 0;
   const double unexplained_px = usual.px_per_misfit * unexplained;
   for (std::size_t k = 0; k < 4; ++k) {
-    const double boundary_px =
-        usual.common_boundary_px + usual.common_fraction_of_blur * std::max(0.0, blur.along_px[k] - usual_blur_px);
+    const double boundary_px = usual.boundary_of_blur * blur.along_px[k] * blur.along_px[k] / radius_px +
+                               usual.common_fraction_of_blur * std::max(0.0, blur.along_px[k] - usual_blur_px);
     const bool corrected = processed && processed->bias_px[k];
     const double fraction = processed && processed->clips ? usual.fraction_of_clipped : usual.fraction_of_processing;
     const double left_px = (corrected ? fraction : 1) * bias_px[k];
-    const double camera_px = std::hypot(left_px, unexplained_px, departure_px[k]);
-    errors.px[k] = std::hypot(boundary_px, camera_px);
-    errors.told_px[k] = std::hypot(boundary_px - usual.untold_boundary_px, camera_px);
+    errors.px[k] = std::hypot(boundary_px, std::hypot(left_px, unexplained_px, departure_px[k]));
   }
 }
 
-double beyond_usual_px(const EdgeBlur& blur) {
+double beyond_usual_blur_px(const EdgeBlur& blur) {
   return std::max(0.0, blur.widest_px() - usual_blur_px);
 }
 
@@ -58,29 +48,28 @@ double beyond_usual_px(const EdgeBlur& blur) {
 void add_sides(const EdgeBlur& blur, double radius_px, double moved_px, CommonErrors& errors) {
   const double side_px =
       usual.common_side_px + usual.side_of_blur * beyond_px2(blur.sides_px, usual.usual_side_blur_px) / radius_px;
-  const double camera_px = usual.side_fraction_of_processing * moved_px;
-  errors.px[4] = errors.px[5] = std::hypot(side_px, camera_px);
-  errors.told_px[4] = errors.told_px[5] = std::hypot(side_px - usual.untold_side_px, camera_px);
+  errors.px[4] = errors.px[5] = std::hypot(side_px, usual.side_fraction_of_processing * moved_px);
 }
 
 void add_patterns(const EdgeBlur& blur, double radius_px, double moved_px, CommonErrors& errors) {
-  const double whole_px = usual.whole_fraction_of_blur * beyond_usual_px(blur);
-  const double leaning_px = (blur.wide() ? usual.leaning_of_wide_blur : usual.leaning_of_blur) *
-                            beyond_px2(blur.widest_px(), usual_blur_px) / radius_px;
+  const double whole_px = usual.whole_fraction_of_blur * beyond_usual_blur_px(blur);
+  const double leaning_px = usual.leaning_of_blur * beyond_px2(blur.widest_px(), usual_blur_px) / radius_px;
   errors.whole_px = std::hypot(whole_px, usual.whole_fraction_of_processing * moved_px);
   errors.leaning_px = std::hypot(leaning_px, usual.leaning_fraction_of_processing * moved_px);
   errors.bowed_px = usual.bowed_fraction_of_processing * moved_px;
 }
 
 // `moved_px`: by the camera's processing, root mean square of the boundaries; so much of it is doubted.
-PrintDoubt doubt_of(double sigma_px, double beyond_usual_blur_px, double moved_px, double doubted_of_processing) {
-  const double beyond_usual_px = std::max(0.0, sigma_px - usual.usual_sigma_px);
+PrintDoubt doubt_of(double sigma_px, const EdgeBlur& blur, double radius_px, double moved_px,
+                    double doubted_of_processing) {
+  const double beyond_usual_px = std::max(0.0, sigma_px - usual.usual_sigma_px), blur_px = beyond_usual_blur_px(blur);
+  const double width_px = blur.boundaries_px();
   const double moved_or_noisy_px =
-      std::hypot(usual.doubted_of_sigma * beyond_usual_px, doubted_of_processing * moved_px);
-  return {
-      std::hypot(moved_or_noisy_px, usual.doubted_boundary_of_blur * beyond_usual_blur_px),
-      std::hypot(moved_or_noisy_px, usual.doubted_tilt_of_blur * beyond_usual_blur_px),
-      std::hypot(usual.doubted_length_of_sigma * beyond_usual_px, usual.doubted_length_of_blur * beyond_usual_blur_px)};
+      std::hypot(usual.doubted_of_sigma * beyond_usual_px, doubted_of_processing * moved_px,
+                 usual.doubted_boundary_of_radius * width_px * width_px / radius_px);
+  return {std::hypot(moved_or_noisy_px, usual.doubted_boundary_of_blur * blur_px),
+          std::hypot(moved_or_noisy_px, usual.doubted_tilt_of_blur * blur_px),
+          std::hypot(usual.doubted_length_of_sigma * beyond_usual_px, usual.doubted_length_of_blur * blur_px)};
 }
 
 }  // namespace
@@ -94,15 +83,18 @@ CommonErrors common_errors(const EdgeMeasurements& pass, const ResidualLines& li
                            const std::optional<ProcessedEdges>& processed, const Boundaries& bias_px,
                            const Boundaries& departure_px) {
   CommonErrors errors;
-  add_boundaries(blur, processed, bias_px, departure_px, errors);
+  add_boundaries(blur, pass.radius_px, processed, bias_px, departure_px, errors);
   const double moved_px = std::sqrt(Eigen::Map<const Eigen::Array4d>(bias_px.data()).square().mean());
   add_sides(blur, pass.radius_px, moved_px, errors);
   add_patterns(blur, pass.radius_px, moved_px, errors);
   const double scatter = scatter_sigmas(pass.all, lines), sigma_px = median_sigma_px(pass.all);
-  errors.noise_scale = std::max(1.0, scatter);
-  errors.told_noise_scale = told_noise_scale(scatter, sigma_px);
+  errors.boundary_noise_scale = std::max(usual.least_noise_scale, scatter);
+  // What scatters points beyond their noise moves whole boundaries and sides, too.
+  const double unmodelled = std::max(1.0, scatter);
+  for (double& error_px : errors.px) error_px *= unmodelled;
+  for (double* error_px : {&errors.whole_px, &errors.leaning_px, &errors.bowed_px}) *error_px *= unmodelled;
   errors.inner_doubt_scale = doubt_scale(sigma_px, blur.widest_px(), moved_px);
-  errors.doubt = doubt_of(sigma_px, beyond_usual_px(blur), moved_px, processed ? usual.doubted_of_processing : 1);
+  errors.doubt = doubt_of(sigma_px, blur, pass.radius_px, moved_px, processed ? usual.doubted_of_processing : 1);
   return errors;
 }
 

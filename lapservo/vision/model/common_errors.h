@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <optional>
 
@@ -15,17 +16,14 @@ namespace lapservo::internal {
 struct UsualErrors {
   /// What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole: it does not
   /// average over lines. With it error over sigma is 0.7 on the rotation samples, 1.3 on rendered ones (usual).
-  double common_boundary_px = 0.007, common_side_px = 0.02;
-  /// Of that, what is doubted of a print but not told of the pose. One pose rendered 25 times (16 poses leaning by up
-  /// to 20 degrees): psi scatters by 0.21 mrad and is 0.25 mrad off (rms), where a picture says 0.4.
-  double untold_boundary_px = 0.004, untold_side_px = 0.01;
+  double boundary_of_blur = 0.12, common_side_px = 0.02;
   /// And as a fraction of the blur beyond the usual: defocus and motion do not blur like a Gaussian. All boundaries
   /// move together by more, mostly where the light comes from aside.
   double common_fraction_of_blur = 0.008, whole_fraction_of_blur = 0.02;
   /// And of the blur's square beyond a lens's, by the shaft's radius: how far sides, which are no steps, are off, and
-  /// by how much all boundaries lean alike: what blur does to them where it is not modelled (blurred_boundary.h), and
-  /// what the model leaves. Of sharp pictures sides have a blur of usual_side_blur_px.
-  double usual_side_blur_px = 1.05, side_of_blur = 1.4, leaning_of_blur = 0.4, leaning_of_wide_blur = 0.035;
+  /// by how much all boundaries lean alike, which is what the model of it (blurred_boundary.h) leaves. Of sharp
+  /// pictures sides have a blur of usual_side_blur_px.
+  double usual_side_blur_px = 1.05, side_of_blur = 1.4, leaning_of_blur = 0.035;
   /// And as a fraction of what the camera's processing moves a boundary by, which is known so well; where colours are
   /// clipped beside boundaries, the larger one. A processing that moves them by doubted_processing_px (rms) doubles the
   /// noise where a hidden boundary's print is asked for, and what `calibrate marker` says.
@@ -38,10 +36,9 @@ struct UsualErrors {
   double doubted_of_processing = 0.12;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
   double usual_misfit = 0.004, px_per_misfit = 8;
-  /// What single points may be off (EdgeLimits::single_floor_px) is told of the pose as far as their scatter shows it,
-  /// of clean frames 0.4 to 0.5 of a sigma; neighbours share pixels, so no less than this, which psi's scatter has
-  /// there.
-  double least_noise_scale = 0.47;
+  /// Noise is as the scatter about the fit shows it, but not less than this part of what the light's says: points that
+  /// share pixels are not independent.
+  double least_noise_scale = 0.5;
   double usual_sigma_px = 0.05;  ///< of an edge; compressed ones (--format jpg) have three times that
 
   /// What is doubted before the print is blamed (PrintDoubt): by what is beyond the usual sigma of an edge, by the blur
@@ -49,6 +46,7 @@ struct UsualErrors {
   /// px in JPEG, 0.09 in H.264, 0.007 in defocus (2 to 3.2 px); their tilts 0.03, 0.08, 0.05; the marker looks shorter
   /// by 0.5 % in defocus. In the dark and in noise nothing is left of it.
   double doubted_of_sigma = 0.8, doubted_length_of_sigma = 0.1;
+  double doubted_boundary_of_radius = 0.25;  ///< px, times the blur's square by the radius
   double doubted_tilt_of_blur = 0.025, doubted_length_of_blur = 0.001;
   /// And what a processing that a blurred picture can't tell moves boundaries by.
   double doubted_boundary_of_blur = 0.04;
@@ -61,11 +59,11 @@ struct CommonErrors {
   std::array<double, measurement_groups> px{};
   /// Of all boundaries alike (rms): moved along the shaft, leaning from side to side, bowed.
   double whole_px = 0, leaning_px = 0, bowed_px = 0;
-  double noise_scale = 1;
-  /// And what of all that is told of the pose, once the print was judged: what a group shares, and, 1 or less, by how
-  /// much noise is smaller.
-  std::array<double, measurement_groups> told_px{};
-  double told_noise_scale = 1;
+  /// By how much noise is larger than measurements say: of boundaries as they scatter, of sides no less than they say.
+  double boundary_noise_scale = 1;
+  double noise_scale(const Measurement& m) const {
+    return m.group < 4 ? boundary_noise_scale : std::max(1.0, boundary_noise_scale);
+  }
   PrintDoubt doubt;
   double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_off_m
 };

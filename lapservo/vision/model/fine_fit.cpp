@@ -15,7 +15,7 @@
 namespace lapservo::internal {
 namespace {
 
-constexpr int max_passes = 3, max_wide_passes = 5, most_departures = 2, passes_of_departure = 2;
+constexpr int max_passes = 5, most_departures = 2, passes_of_departure = 2;
 
 double robust_weight(const Measurement& m, double residual_px) {
   return cauchy_weight(residual_px / m.sigma_px, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
@@ -48,7 +48,7 @@ struct Change {
   double points_px = 0;       // how far the farthest measured point moved
   double blur_fraction = 0;   // by how much the blur did, of what it was
   double motion_blur_px = 0;  // by how much a blur beyond a lens's did
-  double oblique_px2 = 0;     // by how much its covariance along the shaft and across it did, at most
+  double oblique_px2 = 0;     // by how much a boundary's covariance along the shaft and across it did, at most
 
   void add_blur(double before_px, double after_px) {
     blur_fraction = std::max(blur_fraction, std::abs(after_px / before_px - 1));
@@ -76,7 +76,7 @@ class Fitter {
   void judge();
 
  private:
-  static constexpr Effort capture{5, 3, 3}, approach{4, 6, 3}, measure_all{2, 1, 1};
+  static constexpr Effort capture{5, 5, 3, 3}, approach{4, 4, 6, 3}, measure_all{2, 0, 1, 1};
 
   int unknowns() const { return fit_.unknowns.size(); }
   double film_prior() const { return (film_mean_m - film_m_) / film_sigma_m; }
@@ -116,9 +116,12 @@ double Fitter::move() {
 Change Fitter::take_blur(const EdgeBlur& improved) {
   Change change;
   const EdgeBlur& before = fit_.blur;
-  for (std::size_t k = 0; k < 4; ++k) change.add_blur(before.along_px[k], improved.along_px[k]);
+  for (std::size_t k = 0; k < 4; ++k) {
+    change.add_blur(before.along_px[k], improved.along_px[k]);
+    const double oblique_px2 = improved.ellipse(k).oblique_px2 - before.ellipse(k).oblique_px2;
+    change.oblique_px2 = std::max(change.oblique_px2, std::abs(oblique_px2));
+  }
   change.add_blur(before.sides_px, improved.sides_px);
-  change.oblique_px2 = before.widest_px() * before.widest_px() * std::abs(improved.correlation - before.correlation);
   fit_.blur = improved;
   return change;
 }
@@ -145,20 +148,18 @@ bool Fitter::settle() {
 
 bool Fitter::refine_until_settled(int least_passes) {
   bool settled = false;
-  for (int i = 1; i <= (fit_.blur.wide() ? max_wide_passes : max_passes); ++i) {
+  for (int i = 1; i <= max_passes; ++i) {
     const auto change = refine(measure_all);
     if (!change) return false;
     settled = change->settled();
-    // Of a blur that has just become wide the ellipse was not asked yet.
-    const bool as_wide = located_with_.wide() == fit_.blur.wide();
-    if (i >= least_passes && settled && change->ellipse_settled() && as_wide) break;
+    if (i >= least_passes && settled && change->ellipse_settled()) break;
   }
   return settled;
 }
 
 bool Fitter::see_camera(const ExpectedProcessing& expected) {
   for (int i = 0; expected.ask; ++i) {
-    SeenCamera camera = look_at_camera(light_, pass_.all, located_with_.boundaries_px, fit_.departure);
+    SeenCamera camera = look_at_camera(light_, pass_.all, located_with_.boundaries_px(), fit_.departure);
     fit_.processing = camera.evidence.processing;
     processed_ = std::move(camera.evidence.edges);
     fit_.processing_explained += camera.explained, fit_.asked_for_departure += camera.asked_for_departure;
@@ -182,6 +183,7 @@ void Fitter::take_processing_off(const ProcessedEdges& edges) {
 void Fitter::judge() {
   fit_.turn = turn_blur(pass_, located_with_, fit_.processing == Processing::found);
   fit_.lines = pass_.lines;
+  fit_.radius_px = pass_.radius_px;
   fit_.in_image = pass_.in_image;
   fit_.sides_in_image = pass_.sides_in_image;
   const ResidualLines lines = residual_lines(pass_.all);
@@ -212,7 +214,7 @@ void Fitter::count_inliers() {
   double squares = 0;
   int inliers = 0;
   for (const Measurement& m : pass_.all) {
-    const double sigmas = std::abs(m.residual_px) / m.sigma_px;
+    const double sigmas = std::abs(m.residual_px) / std::hypot(m.sigma_px, fine_fit_limits.tolerated_px);
     if (sigmas > inlier_sigmas) continue;
     m.group < 4 ? ++fit_.used[m.group] : ++fit_.sides_used;
     if (m.group < 4) squares += sigmas * sigmas, ++inliers;

@@ -18,6 +18,8 @@ struct FineFitLimits {
   /// Where less than the usual fraction of a marker shows, some of what was taken for its boundaries are the blood's:
   /// sigma grows by so much for all that is missing.
   double usual_fraction = 0.7, doubt_of_hidden = 4;
+  /// What a point may be off beside its noise and still agrees with the fit: edges of blood beside a boundary move it.
+  double tolerated_px = 0.037;
   double settled_px = 1.5;    ///< a pass that moves no point farther is the last
   double settled_blur = 0.1;  ///< change of the blur, a fraction of it, below which edges need not be located again
   double motion_blur_weight =
@@ -33,19 +35,20 @@ struct FineFit {
   PoseUnknowns unknowns;
   UnknownMatrix covariance;  ///< of the unknowns, one sigma squared
   EdgeBlur blur;
-  int lines = 0;                         ///< generatrices looked at
-  std::array<int, 4> used{};             ///< of them, lines on which the boundary was located and agrees with the fit
-  std::array<int, 4> in_image{};         ///< lines on which the boundary lies inside the image and off the seam
-  int sides_in_image = 0;                ///< places at which the shaft's sides were looked for
-  int sides_used = 0;                    ///< of them, those at which the side was located and agrees with the fit
-  double inlier_rms_sigmas = 0;          ///< of the boundaries' residuals, print errors taken out
-  double print_off_probability = 0;      ///< that the print is off by more than the rig's tolerance
-  double psi_variance = 0;               ///< by which picture and print are judged (print_fit.h)
-  double psi_variance_by_tolerance = 0;  ///< of the covariance, what the rig's tolerance of the print adds
-  double psi_variance_by_print = 0;      ///< and what the print adds beyond that
-  double far_off_probability = 1;        ///< where many prints are off (print_fit.h)
-  double psi_variance_suspected = 0;     ///< and what one that is suspicious adds (print_fit.h)
-  double inner_off_m = 3;                ///< how far off an inner boundary of the print may lie (print_fit.h)
+  double radius_px = 0;           ///< the shaft's
+  int lines = 0;                  ///< generatrices looked at
+  std::array<int, 4> used{};      ///< of them, lines on which the boundary was located and agrees with the fit
+  std::array<int, 4> in_image{};  ///< lines on which the boundary lies inside the image and off the seam
+  int sides_in_image = 0;         ///< places at which the shaft's sides were looked for
+  int sides_used = 0;             ///< of them, those at which the side was located and agrees with the fit
+  double inlier_rms_sigmas = 0;   ///< of the boundaries' residuals, print errors taken out, by noise and tolerated_px
+  double print_off_probability = 0;             ///< that the print is off by more than the rig's tolerance
+  double psi_variance = 0;                      ///< by which picture and print are judged (print_fit.h)
+  double psi_variance_by_tolerance = 0;         ///< of the covariance, what the rig's tolerance of the print adds
+  double psi_variance_by_print = 0;             ///< and what the print adds beyond that
+  double far_off_probability = 1;               ///< where many prints are off (print_fit.h)
+  double psi_variance_suspected = 0;            ///< and what one that is suspicious adds (print_fit.h)
+  double inner_off_m = 3;                       ///< how far off an inner boundary of the print may lie (print_fit.h)
   Processing processing = Processing::unknown;  ///< as far as asked
   int processing_explained = 0;                 ///< how often ProcessingEvidence::explained
   int asked_for_departure = 0;                  ///< how often find_departure() was

@@ -52,8 +52,9 @@ double normalised_square(const UnknownVector& error, const UnknownMatrix& covari
 
 // The sigmas include floors for what a renderer has none of (lens, print), so errors here stay somewhat below them.
 void expect_honest(bool rcm) {
-  constexpr int frames = 16;
+  constexpr int frames = 48;
   double squares = 0, psi_squares = 0, psi_sum = 0;
+  int far = 0;
   for (std::uint64_t seed = 1; seed <= frames; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Shot& shot = usual_shot(seed);
@@ -64,7 +65,7 @@ void expect_honest(bool rcm) {
     const UnknownVector error = difference(truth, fit.unknowns);
     const Eigen::Index psi = error.size() - 1;
     EXPECT_LT(std::abs(error[psi]), 6e-3);
-    EXPECT_LT(normalised_square(error, fit.covariance), 4);
+    far += normalised_square(error, fit.covariance) > 4;
     squares += normalised_square(error, fit.covariance);
     psi_squares += error[psi] * error[psi] / fit.covariance(psi, psi);
     psi_sum += error[psi];
@@ -73,6 +74,7 @@ void expect_honest(bool rcm) {
     EXPECT_GT(std::sqrt(sum / frames), 0.45);
     EXPECT_LT(std::sqrt(sum / frames), 1.2);
   }
+  EXPECT_LE(far, 1) << "of chi^2 of four degrees of freedom three in a thousand";
   EXPECT_NEAR(psi_sum / frames, 0, 1.5e-3);
 }
 TEST(FineFit, ErrorsAreAsPredictedThroughTheRcm) {
@@ -125,7 +127,7 @@ TEST(FineFit, FindsTheBlurOfTheCamera) {
     ASSERT_TRUE(fit.converged) << blur_px;
     // A pixel's own area, and the interpolation between pixels, blur too.
     const double expected_px = std::sqrt(blur_px * blur_px + 1 / 12.0 + 1 / 6.0);
-    EXPECT_NEAR(fit.blur.boundaries_px, expected_px, 0.1) << blur_px;
+    EXPECT_NEAR(fit.blur.boundaries_px(), expected_px, 0.1) << blur_px;
     EXPECT_NEAR(fit.blur.sides_px, expected_px, 0.2) << blur_px;
   }
 }

@@ -77,14 +77,14 @@ GroupPull gathered(const Products<Unknowns>& products, std::size_t group, PrintE
   return pull;
 }
 
-double robust_certainty(const Measurement& m, const ResidualLines& lines, double certainty) {
-  const double sigmas = lines[m.group].residual_px(m) / m.sigma_px;
-  return certainty * cauchy_weight(sigmas, cauchy_scale_sigmas) / (m.sigma_px * m.sigma_px);
+double robust_certainty(const Measurement& m, const ResidualLines& lines, const CommonErrors& errors) {
+  const double sigmas = lines[m.group].residual_px(m) / m.sigma_px, noise_px = errors.noise_scale(m) * m.sigma_px;
+  return cauchy_weight(sigmas, cauchy_scale_sigmas) / (noise_px * noise_px);
 }
 
 // All boundaries moved alike, leaning alike, or bowed alike.
-void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, double certainty,
-                      const CommonErrors& errors, PrintSums& sums) {
+void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualLines& lines, const CommonErrors& errors,
+                      PrintSums& sums) {
   const auto unknowns = sums.equations.x.size();
   const std::array<double, 3> patterns_px{errors.whole_px, errors.leaning_px, errors.bowed_px};
   std::array<GroupPull, 3> pulls;
@@ -93,7 +93,7 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
   double all = 0;
   for (const Measurement& m : measurements) {
     if (m.group >= errors_of_boundary.size()) continue;
-    const double weight = robust_certainty(m, lines, certainty);
+    const double weight = robust_certainty(m, lines, errors);
     const auto& edges = errors_of_boundary[m.group];
     const Eigen::Vector2d by_print = print_row(m);
     const std::array<double, 3> moved{1, m.across, m.across * m.across - 1.0 / 3};
@@ -108,7 +108,7 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
   }
   for (std::size_t i = 0; i < pulls.size(); ++i) {
     if (!(squares[i] > 0 && patterns_px[i] > 0)) continue;
-    pulls[i].error_px = pulls[i].told_px = std::sqrt(1 / certainty) * patterns_px[i] * std::sqrt(all / squares[i]);
+    pulls[i].error_px = patterns_px[i] * std::sqrt(all / squares[i]);
     sums.of_all_boundaries.push_back(pulls[i]);
   }
 }
@@ -116,19 +116,16 @@ void add_pulls_of_all(std::span<const Measurement> measurements, const ResidualL
 template <int Unknowns>
 PrintSums print_sums_of(std::span<const Measurement> measurements, const ResidualLines& lines, double film_prior,
                         const CommonErrors& errors) {
-  const double certainty = 1 / (errors.noise_scale * errors.noise_scale);
   std::array<Products<Unknowns>, measurement_groups> products;
-  for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, certainty));
-  PrintSums sums{PrintEquations(Unknowns), {}, {}, {}};
+  for (const Measurement& m : measurements) products[m.group].add(m, robust_certainty(m, lines, errors));
+  PrintSums sums{PrintEquations(Unknowns), {}, {}};
   for (std::size_t group = 0; group < measurement_groups; ++group) {
-    if (group == errors_of_boundary.size()) sums.of_boundaries = sums.equations.xx;
     sums.pulls[group] = gathered(products[group], group, sums.equations);
-    sums.pulls[group].error_px = errors.noise_scale * errors.px[group];
-    sums.pulls[group].told_px = errors.noise_scale * errors.told_px[group];
+    sums.pulls[group].error_px = errors.px[group];
   }
-  sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), certainty, film_prior);
+  sums.equations.add(UnknownVector::Unit(Unknowns, Unknowns - 1), PrintVector::Zero(), 1, film_prior);
   if (errors.whole_px > 0 || errors.leaning_px > 0 || errors.bowed_px > 0)
-    add_pulls_of_all(measurements, lines, certainty, errors, sums);
+    add_pulls_of_all(measurements, lines, errors, sums);
   return sums;
 }
 
@@ -150,7 +147,7 @@ std::optional<PrintInformation> information_of(const PrintSums& sums) {
   return PrintInformation{e.nn - through.lazyProduct(e.nx.transpose()), e.n - through.lazyProduct(e.x)};
 }
 
-std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior, ToldCovariance* told) {
+std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior) {
   const PrintEquations& e = sums.equations;
   const PrintMatrix print_covariance = covariance_of(e.nn, prior);
   const PrintCrossMatrix by_x = print_covariance.lazyProduct(e.nx);
@@ -162,30 +159,13 @@ std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const Prin
   solution.print_mm = print_covariance * (e.n - e.nx * solution.step);
   solution.covariance = inverse;
   const auto widen = [&](const GroupPull& pull) {
-    const UnknownVector shift = inverse * (pull.x - by_x.transpose() * pull.n);
-    const UnknownVector error = pull.error_px * shift;
+    const UnknownVector error = pull.error_px * (inverse * (pull.x - by_x.transpose() * pull.n));
     solution.covariance.noalias() += error * error.transpose();
-    if (!told) return;
-    const UnknownVector told_error = pull.told_px * shift;
-    told->covariance.noalias() += told_error * told_error.transpose();
   };
-  if (told) told->covariance = told->without_common = inverse;
   for (const GroupPull& pull : sums.pulls) widen(pull);
   for (const GroupPull& pull : sums.of_all_boundaries) widen(pull);
   const bool finite = solution.covariance.allFinite() && solution.step.allFinite() && solution.print_mm.allFinite();
   return finite && (solution.covariance.diagonal().array() > 0).all() ? std::optional(solution) : std::nullopt;
-}
-
-UnknownMatrix covariance_of_less_noise(const UnknownMatrix& all, double noise_scale) {
-  const UnknownVector by_film = all.col(all.cols() - 1);
-  return (1 - noise_scale * noise_scale) * (all - by_film * by_film.transpose());
-}
-
-UnknownMatrix covariance_of_less_boundary_noise(const PrintSums& sums, const UnknownMatrix& all, double noise_scale) {
-  const UnknownMatrix by_boundaries = all.lazyProduct(sums.of_boundaries);
-  UnknownMatrix less = by_boundaries.lazyProduct(all);
-  less *= (1 - noise_scale * noise_scale) / 2;
-  return less;
 }
 
 }  // namespace lapservo::internal

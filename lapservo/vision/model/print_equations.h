@@ -52,13 +52,12 @@ struct PrintEquations {
 struct GroupPull {
   UnknownVector x;
   PrintVector n = PrintVector::Zero();
-  double weight = 0, residual = 0, error_px = 0, told_px = 0;
+  double weight = 0, residual = 0, error_px = 0;
 };
 
 /// Of all measurements; what each group says, and what all boundaries together do.
 struct PrintSums {
   PrintEquations equations;
-  UnknownMatrix of_boundaries;  ///< what boundaries alone say about pose and film
   std::array<GroupPull, measurement_groups> pulls;
   InplaceVector<GroupPull, 3> of_all_boundaries;
 };
@@ -85,22 +84,7 @@ struct PrintSolution {
   UnknownMatrix covariance;
 };
 
-/// A solution's covariance by the common errors that are told, and without any.
-struct ToldCovariance {
-  UnknownMatrix covariance, without_common;
-};
-
-/// The likeliest pose when the print's errors are so, and how sure it is; `told`: by the common errors that are told.
-/// Nullopt when a direction is not seen at all.
-std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior,
-                                               ToldCovariance* told = nullptr);
-
-/// What is less uncertain of an exact print's pose where noise is smaller by this scale; the film's prior leaves what
-/// it does. `all`: ToldCovariance::without_common.
-UnknownMatrix covariance_of_less_noise(const UnknownMatrix& all, double noise_scale);
-
-/// The same of the whole pose, by half of what boundaries' noise is smaller: their scatter says less of angles, which
-/// neighbours tell, than of places.
-UnknownMatrix covariance_of_less_boundary_noise(const PrintSums& sums, const UnknownMatrix& all, double noise_scale);
+/// The likeliest pose when the print's errors are so, and how sure it is. Nullopt when a direction is not seen at all.
+std::optional<PrintSolution> solved_with_print(const PrintSums& sums, const PrintPrior& prior);
 
 }  // namespace lapservo::internal

@@ -98,25 +98,23 @@ double far_off(const Weights& weights) {
   return far / std::accumulate(weights.begin(), weights.end(), 0.0);
 }
 
-// Solutions for a print as the rig says, exactly and but for its tolerance; of the latter also as it is to be told.
+// Solutions for a print as the rig says, exactly and but for its tolerance.
 struct AsTheRigSays {
-  PrintSolution exact, tolerated, told;
-  UnknownMatrix less;  // of the tolerated one's covariance, what the whole pose is told to be surer by
+  PrintSolution exact, tolerated;
 };
 
-std::optional<AsTheRigSays> solved_as_the_rig_says(const PrintSums& sums, double tolerance_mm,
-                                                   double told_noise_scale) {
-  ToldCovariance of_exact, of_tolerated;
-  const auto exact = solved_with_print(sums, {}, &of_exact);
-  auto tolerated = tolerance_mm > 0 ? solved_with_print(sums, {tolerance_mm}, &of_tolerated) : exact;
-  if (!exact || !tolerated) return std::nullopt;
+std::optional<AsTheRigSays> solved_as_the_rig_says(const PrintSums& sums, double tolerance_mm) {
+  const auto exact = solved_with_print(sums, {});
+  if (!exact) return std::nullopt;
+  AsTheRigSays out{*exact, *exact};
   // The exact print's pose is where the measurements were taken.
-  if (tolerance_mm == 0) tolerated->step.setZero(), tolerated->print_mm.setZero();
-  const ToldCovariance& by_told = tolerance_mm > 0 ? of_tolerated : of_exact;
-  AsTheRigSays out{*exact, *tolerated, *tolerated, {}};
-  out.told.covariance = by_told.covariance - covariance_of_less_noise(of_exact.without_common, told_noise_scale);
-  out.less = tolerated->covariance - by_told.covariance +
-             covariance_of_less_boundary_noise(sums, of_exact.without_common, told_noise_scale);
+  if (tolerance_mm == 0) {
+    out.tolerated.step.setZero(), out.tolerated.print_mm.setZero();
+    return out;
+  }
+  const auto tolerated = solved_with_print(sums, {tolerance_mm});
+  if (!tolerated) return std::nullopt;
+  out.tolerated = *tolerated;
   return out;
 }
 
@@ -150,8 +148,8 @@ struct Mixtures {
 
   explicit Mixtures(int pose_unknowns)
       : judged(pose_unknowns + 1), told(pose_unknowns + 1), suspected(pose_unknowns + 1) {}
-  void add(const PrintSolution& solution, const PrintSolution& as_told, const Beliefs& beliefs, std::size_t at) {
-    judged.add(solution, beliefs.judged[at]), told.add(as_told, beliefs.told[at]);
+  void add(const PrintSolution& solution, const Beliefs& beliefs, std::size_t at) {
+    judged.add(solution, beliefs.judged[at]), told.add(solution, beliefs.told[at]);
     if (beliefs.suspicious) suspected.add(solution, beliefs.suspected[at]);
   }
 };
@@ -159,12 +157,12 @@ struct Mixtures {
 std::optional<Mixtures> mixed(const PrintSums& sums, const AsTheRigSays& as_the_rig_says, const Beliefs& beliefs,
                               int pose_unknowns, double tolerance_mm) {
   Mixtures mixtures(pose_unknowns);
-  mixtures.add(as_the_rig_says.tolerated, as_the_rig_says.told, beliefs, 0);
+  mixtures.add(as_the_rig_says.tolerated, beliefs, 0);
   for (std::size_t i = 0; i < sizes; ++i) {
     if (!beliefs.counts(i + 1)) continue;
     const auto off = solved_with_print(sums, prior_of(i, tolerance_mm));
     if (!off) return std::nullopt;
-    mixtures.add(*off, *off, beliefs, i + 1);
+    mixtures.add(*off, beliefs, i + 1);
   }
   return mixtures;
 }
@@ -176,8 +174,7 @@ PrintFit told_fit(const AsTheRigSays& as_the_rig_says, const Beliefs& beliefs, c
   PrintFit fit;
   fit.step = mean.step;
   fit.off_probability = off_probability(beliefs.judged);
-  fit.covariance =
-      (mean.covariance - (1 - fit.off_probability) * as_the_rig_says.less).topLeftCorner(pose_unknowns, pose_unknowns);
+  fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
   double told = mixtures.told.about(mean.step)(psi, psi);
   fit.far_off_probability = beliefs.far_off_probability;
   if (beliefs.suspicious) {
@@ -199,7 +196,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
                                   double film_prior, const Marker& marker, const CommonErrors& errors) {
   const PrintSums sums = print_sums(measurements, lines, pose_unknowns, film_prior, errors);
   const double tolerance_mm = marker.tolerance_m / mm_in_m;
-  const auto as_the_rig_says = solved_as_the_rig_says(sums, tolerance_mm, errors.told_noise_scale);
+  const auto as_the_rig_says = solved_as_the_rig_says(sums, tolerance_mm);
   if (!as_the_rig_says) return std::nullopt;
   // Nothing, where the frame tells nothing of the print.
   const PrintInformation print = information_of(sums).value_or(PrintInformation{});

@@ -5,6 +5,9 @@
 #include <cmath>
 #include <cstddef>
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
 namespace lapservo::internal {
 namespace {
 
@@ -12,40 +15,28 @@ namespace {
 // its mean, which lies T / 12 from psi in the middle.
 constexpr double square_of_uneven = 45.0 / 4 / 144;
 
-// One boundary: its blur's variance, and by how much that grows with psi's.
-struct BoundaryBlur {
-  int points = 0;
-  double steepness2 = 0;  // mean, [px/rad] squared
-  double variance_px2 = 0, information = 0;
+// How steep the boundaries are: the mean of their squares [px^2/rad^2], and which show at all.
+struct Steepness {
+  Eigen::Vector4d squares = Eigen::Vector4d::Zero();
+  std::array<int, 4> points{};
 
-  bool seen() const { return points >= turn_blur_limits.min_points && information > 0; }
+  explicit Steepness(const EdgeMeasurements& pass) {
+    for (const Measurement& m : pass.all) {
+      if (m.group >= points.size()) continue;
+      const double steepness = m.row[m.row.size() - 2];  // psi is the last unknown before the film
+      squares[static_cast<Eigen::Index>(m.group)] += steepness * steepness, ++points[m.group];
+    }
+    for (std::size_t k = 0; k < points.size(); ++k) squares[static_cast<Eigen::Index>(k)] /= std::max(1, points[k]);
+  }
+  bool shows(std::size_t boundary) const { return points[boundary] >= turn_blur_limits.min_points; }
 };
 
-std::array<BoundaryBlur, 4> blurs_of(const EdgeMeasurements& pass, const EdgeBlur& located_with) {
-  std::array<BoundaryBlur, 4> out;
-  for (const Measurement& m : pass.all) {
-    if (m.group >= out.size()) continue;
-    const double steepness = m.row[m.row.size() - 2];  // psi is the last unknown before the film
-    ++out[m.group].points, out[m.group].steepness2 += steepness * steepness;
-  }
-  const bool wide = located_with.wide();
-  for (std::size_t k = 0; k < out.size(); ++k) {
-    const BlurEvidence& evidence = pass.boundary_blurs[k];
-    if (!out[k].points || !(evidence.information > 0)) continue;
-    const double blur_px = wide ? located_with.along_px[k] : located_with.boundaries_px;
-    out[k].steepness2 /= out[k].points;
-    out[k].variance_px2 = blur_px * blur_px + 2 * blur_px * evidence.gradient / evidence.information;
-    out[k].information = evidence.information / (4 * blur_px * blur_px);
-  }
-  return out;
-}
-
-// What else may have blurred one boundary by more than another [px^2]: oblique motion has the shape of a turn.
-double else_px2(const std::array<BoundaryBlur, 4>& blurs, double sides_px, bool processed) {
+// What else may have blurred one boundary by more than another [px^2].
+double else_px2(const EllipseEvidence::Squares& blurs, const Steepness& steepness, double sides_px, bool processed) {
   const double usual_px2 = usual_blur_px * usual_blur_px;
   double ends_px2 = 0;
-  for (const std::size_t end : {0, 3})
-    if (blurs[end].seen()) ends_px2 = std::max(ends_px2, blurs[end].variance_px2);
+  for (const Eigen::Index end : {0, 3})
+    if (steepness.shows(static_cast<std::size_t>(end))) ends_px2 = std::max(ends_px2, blurs.px2[end]);
   const double moved_px2 = std::max(0.0, ends_px2 - usual_px2) + std::max(0.0, sides_px * sides_px - usual_px2);
   return std::hypot(turn_blur_limits.unexplained_px2, moved_px2, processed ? turn_blur_limits.of_processing_px2 : 0);
 }
@@ -53,34 +44,27 @@ double else_px2(const std::array<BoundaryBlur, 4>& blurs, double sides_px, bool 
 }  // namespace
 
 TurnBlur turn_blur(const EdgeMeasurements& pass, const EdgeBlur& located_with, bool processed) {
-  const auto blurs = blurs_of(pass, located_with);
-  if (!blurs[1].seen() || !blurs[2].seen() || !(blurs[0].seen() || blurs[3].seen())) return {};
-  const double unexplained_px2 = else_px2(blurs, located_with.sides_px, processed);
-  // A straight line of the blurs' variances over the squared steepness.
-  std::array<double, 4> weights{};
-  double sum = 0, mean_px2 = 0, mean_steepness2 = 0;
-  for (std::size_t k = 0; k < 4; ++k) {
-    if (!blurs[k].seen()) continue;
-    weights[k] = 1 / (1 / blurs[k].information + unexplained_px2 * unexplained_px2);
-    sum += weights[k];
-    mean_px2 += weights[k] * blurs[k].variance_px2, mean_steepness2 += weights[k] * blurs[k].steepness2;
-  }
-  mean_px2 /= sum, mean_steepness2 /= sum;
-  double squares = 0, products = 0, information = 0;
-  int degrees = -2;
-  for (std::size_t k = 0; k < 4; ++k) {
-    if (!blurs[k].seen()) continue;
-    const double beyond_px2 = blurs[k].variance_px2 - mean_px2, steepness2 = blurs[k].steepness2 - mean_steepness2;
-    squares += weights[k] * beyond_px2 * beyond_px2;
-    products += weights[k] * beyond_px2 * steepness2;
-    information += weights[k] * steepness2 * steepness2;
-    ++degrees;
-  }
-  if (!(information > 0)) return {};
+  const Steepness steepness(pass);
+  if (!steepness.shows(1) || !steepness.shows(2) || !(steepness.shows(0) || steepness.shows(3))) return {};
+  const auto blurs = pass.ellipse.squares(located_with);
+  const double unexplained_px2 = else_px2(blurs, steepness, located_with.sides_px, processed);
+  // A straight line of the blurs' squares over the squared steepness.
+  Eigen::Matrix4d covariance = blurs.covariance;
+  covariance.diagonal().array() += unexplained_px2 * unexplained_px2;
+  Eigen::Matrix<double, 4, 2> line;
+  line << Eigen::Vector4d::Ones(), steepness.squares;
+  const Eigen::LDLT<Eigen::Matrix4d> factor(covariance);
+  const Eigen::Matrix<double, 4, 2> weighted = factor.solve(line);
+  const Eigen::Matrix2d information = line.transpose() * weighted;
+  const double determinant = information.determinant();
+  if (!(determinant > 0)) return {};
+  const Eigen::Vector2d found = information.inverse() * (weighted.transpose() * blurs.px2);
   // Where the blurs don't lie on that line, it was something else.
-  const double variance = products / information;
-  const double misfit = std::max(1.0, turn_blur_limits.misfit_fraction * (squares - variance * products) / degrees);
-  return {variance, std::sqrt(misfit / information)};
+  const Eigen::Vector4d left_px2 = blurs.px2 - line * found;
+  const int degrees = steepness.shows(0) && steepness.shows(3) ? 2 : 1;
+  const double squares = left_px2.dot(factor.solve(left_px2)) / degrees;
+  const double misfit = std::max(1.0, turn_blur_limits.misfit_fraction * squares);
+  return {found[1], std::sqrt(misfit * information(0, 0) / determinant)};
 }
 
 double variance_of_uneven_turn(const TurnBlur& blur, std::optional<double> change_rad) {

@@ -18,8 +18,6 @@ namespace {
 constexpr const SearchCosts& costs = search_costs;
 
 constexpr double rival_apart_radii = 1;  // two places nearer than this are one
-// Of psi's variance: a print that is off contradicts any registration.
-constexpr double max_print_fraction = 0.25;
 
 Found refusal(Status status, const PoseUnknowns& unknowns) {
   const ShaftPose& pose = unknowns.pose();
@@ -28,8 +26,10 @@ Found refusal(Status status, const PoseUnknowns& unknowns) {
   return {status, std::nullopt, finite ? std::optional(pose) : std::nullopt};
 }
 
+// A print that is off would contradict any registration.
 bool contradicts_registration(const FineFit& free) {
-  return is_well_seen(free) && free.psi_variance_by_print <= max_print_fraction * free.psi_variance;
+  constexpr double likelier_than_not = 0.5;
+  return is_well_seen(free) && free.print_off_probability < likelier_than_not && free.psi_variance_suspected == 0;
 }
 
 // What the model leaves out of one side, the other one doesn't balance: error / sigma was 1.7 on 80 renderings.

@@ -186,15 +186,15 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
   const LightImage& light = seen.light();
   const Scene scene{image, view.camera, classes_, marker, bands_};
   ViewMeasurements measured;
-  measured.edges =
-      measure_edges(scene, light, sighting.unknowns, sighting.film_m, {reach.extra_px, iterations, 1}, sighting.blur);
+  measured.edges = measure_edges(scene, light, sighting.unknowns, sighting.film_m,
+                                 {reach.extra_px, reach.extra_px, iterations, 1}, sighting.blur);
   if (reach.ask_processing)
-    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px,
+    measured.processing = find_processing(light, measured.edges.all, sighting.blur.boundaries_px(),
                                           reach.only_video ? expected_video : expected_picture);
   const auto& found = measured.processing.edges;
   const auto processing = found ? std::optional(found->processing) : std::nullopt;
   const auto seam_by = [&](const LightImage* grey) {
-    return measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px, reach.seam_m, reach.free_gap,
+    return measure_seam(scene, light, sighting.unknowns, sighting.blur.boundaries_px(), reach.seam_m, reach.free_gap,
                         processing, grey);
   };
   if (processing && reach.only_video) {
@@ -203,7 +203,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
     const LightImage grey_light(grey_image, light.light_of_value());
     const Scene grey_scene{grey_image, view.camera, classes_, marker, bands_};
     take_sides(measure_edges(grey_scene, grey_light, sighting.unknowns, sighting.film_m,
-                             {reach.extra_px, iterations, 1}, sighting.blur),
+                             {reach.extra_px, reach.extra_px, iterations, 1}, sighting.blur),
                measured.edges);
     measured.seam = seam_by(&grey_light);
   } else {
@@ -213,7 +213,7 @@ ViewMeasurements ViewMeasurer::measure(const MarkerView& view, const Marker& mar
                                                marker.radius_m() / cylinder->camera_to_axis_m * view.camera.fx_px);
     measured.seam = seam_by(nullptr);
   }
-  measured.blur_px = std::max(sighting.blur.boundaries_px, sighting.blur.sides_px);
+  measured.blur_px = std::max(sighting.blur.boundaries_px(), sighting.blur.sides_px);
   measured.film_m = sighting.film_m;
   return measured;
 }

@@ -86,7 +86,7 @@ EdgeProfile processed_profile(const EdgeProfile& like, const ContourColours& col
 double light_blur_px(const EdgeBlur& blur, const PictureProcessing& processing) {
   constexpr double linear_sampling_px2 = 1.0 / 6;
   const double by_processing_px2 =
-      blur.boundaries_px * blur.boundaries_px - processing.blur_px * processing.blur_px - linear_sampling_px2;
+      blur.boundaries_px() * blur.boundaries_px() - processing.blur_px * processing.blur_px - linear_sampling_px2;
   return std::sqrt(
       std::max(blur_limits.min_blur_px * blur_limits.min_blur_px, blur.sides_px * blur.sides_px - by_processing_px2));
 }
