@@ -28,6 +28,12 @@ std::vector<Row> blood_rows();
 /// Instruments that move or turn while the shutter is open, psi's truth being that in the middle of the exposure.
 std::vector<Row> motion_rows();
 
+/// The frames of one of these rows.
+std::vector<acceptance::TrueFrame> motion_frames(const std::string& name, int frames, std::uint64_t seed);
+
+/// Prints how far boundaries and sides are located from where the true pose has them: of UsualErrors and EdgeLimits.
+void print_edge_errors(int frames, std::uint64_t seed);
+
 /// The truth for a tracker whose rig has this print. The seam's displacement shows in no image and counts for no error.
 void take_print_for(acceptance::TrueFrame& frame, const Marker& marker);
 

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -119,30 +120,39 @@ void scale(Marker& marker, double diameter_m) {
   marker.diameter_m = diameter_m;
 }
 
-Score score_kind(const Kind& kind, int frames, std::uint64_t seed) {
+TrueFrame drawn_frame(const Kind& kind, std::uint64_t seed, int index) {
   constexpr double nearest_m = 0.075, farthest_m = 0.115, steepest_rad = 0.35, border_px = 30;
+  const std::uint64_t of_frame = 10'000 * seed + static_cast<std::uint64_t>(index);
+  Random random(of_frame);
+  const auto [motion, farther] = draw(kind, random);
+  Rig rig = scenes::usual_rig();
+  Instrument& instrument = rig.instruments[0];
+  scale(instrument.marker, kind.diameter_m);
+  instrument.camera_from_rcm->translation *= farther;
+  const ViewRange range{farther * nearest_m, farther * farthest_m, {steepest_rad, border_px}};
+  const Marker nominal = instrument.marker;
+  const JointVector q =
+      random_configuration_in_view(rig.camera, nominal, *instrument.camera_from_rcm, range, random).value();
+  instrument.marker = off_print(nominal, kind.off, random);
+  TrueFrame frame{rig, picture_of(rig, q, kind, motion, of_frame, random), {truth_of(rig, 0, q)}};
+  take_print_for(frame, nominal);
+  return frame;
+}
+
+Score score_kind(const Kind& kind, int frames, std::uint64_t seed) {
   Score score;
-  for (int i = 0; i < frames; ++i) {
-    const std::uint64_t of_frame = 10'000 * seed + static_cast<std::uint64_t>(i);
-    Random random(of_frame);
-    const auto [motion, farther] = draw(kind, random);
-    Rig rig = scenes::usual_rig();
-    Instrument& instrument = rig.instruments[0];
-    scale(instrument.marker, kind.diameter_m);
-    instrument.camera_from_rcm->translation *= farther;
-    const ViewRange range{farther * nearest_m, farther * farthest_m, {steepest_rad, border_px}};
-    const Marker nominal = instrument.marker;
-    const JointVector q =
-        random_configuration_in_view(rig.camera, nominal, *instrument.camera_from_rcm, range, random).value();
-    instrument.marker = off_print(nominal, kind.off, random);
-    TrueFrame frame{rig, picture_of(rig, q, kind, motion, of_frame, random), {truth_of(rig, 0, q)}};
-    take_print_for(frame, nominal);
-    score_alone(frame, score);
-  }
+  for (int i = 0; i < frames; ++i) score_alone(drawn_frame(kind, seed, i), score);
   return score;
 }
 
 }  // namespace
+
+std::vector<TrueFrame> motion_frames(const std::string& name, int frames, std::uint64_t seed) {
+  const auto kind = std::find_if(kinds.begin(), kinds.end(), [&](const Kind& k) { return k.name == name; });
+  std::vector<TrueFrame> drawn;
+  for (int i = 0; i < frames; ++i) drawn.push_back(drawn_frame(*kind, seed, i));
+  return drawn;
+}
 
 std::vector<Row> motion_rows() {
   std::vector<Row> rows;

@@ -15,8 +15,8 @@ namespace lapservo::internal {
 struct EdgeLimits {
   int min_lines = 12;       ///< generatrices of a pass
   double line_reach = 0.9;  ///< of the visible half width: beyond, light and resolution are gone
-  /// What the model leaves out (shading across the blur, lens, print) of every single boundary point; twice that of
-  /// sides.
+  /// What the model leaves out of every single point of a boundary and of a side (`accuracy_study edges`): tissue
+  /// beside a side is not even.
   double single_floor_px = 0.016, side_floor_px = 0.09;
   double interpolation_noise = 1.6;        ///< of the variance: interpolated samples are smoother than pixels are noisy
   double blurred_ambient_fraction = 0.05;  ///< of the light on the shaft, the even part

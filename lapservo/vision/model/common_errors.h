@@ -14,8 +14,8 @@ namespace lapservo::internal {
 
 /// How large the errors are that measurements share, and what is doubted of a picture. Fractions are of pixels.
 struct UsualErrors {
-  /// What the model leaves out (shading across the blur, lens, print) of each boundary and side as a whole: it does not
-  /// average over lines. With it error over sigma is 0.7 on the rotation samples, 1.3 on rendered ones (usual).
+  /// What the model leaves out of each boundary as a whole (px, times the blur's square by the shaft's radius: shading
+  /// across the blur) and of each side: it does not average over lines. `accuracy_study edges` measures it.
   double boundary_of_blur = 0.12, common_side_px = 0.02;
   /// And as a fraction of the blur beyond the usual: defocus and motion do not blur like a Gaussian. All boundaries
   /// move together by more, mostly where the light comes from aside.
@@ -36,8 +36,7 @@ struct UsualErrors {
   double doubted_of_processing = 0.12;
   /// What even that does not explain of a value, beyond the usual: 0.012 moved boundaries by 0.1 px.
   double usual_misfit = 0.004, px_per_misfit = 8;
-  /// Noise is as the scatter about the fit shows it, but not less than this part of what the light's says: points that
-  /// share pixels are not independent.
+  /// Noise is as the scatter about the fit shows it, but no less than this part of what measurements say.
   double least_noise_scale = 0.5;
   double usual_sigma_px = 0.05;  ///< of an edge; compressed ones (--format jpg) have three times that
 
@@ -46,7 +45,9 @@ struct UsualErrors {
   /// px in JPEG, 0.09 in H.264, 0.007 in defocus (2 to 3.2 px); their tilts 0.03, 0.08, 0.05; the marker looks shorter
   /// by 0.5 % in defocus. In the dark and in noise nothing is left of it.
   double doubted_of_sigma = 0.8, doubted_length_of_sigma = 0.1;
-  double doubted_boundary_of_radius = 0.25;  ///< px, times the blur's square by the radius
+  /// And by what another renderer than ours leaves of a boundary and its tilt: px, times the blur's square by the
+  /// radius.
+  double doubted_boundary_of_radius = 0.25;
   double doubted_tilt_of_blur = 0.025, doubted_length_of_blur = 0.001;
   /// And what a processing that a blurred picture can't tell moves boundaries by.
   double doubted_boundary_of_blur = 0.04;
