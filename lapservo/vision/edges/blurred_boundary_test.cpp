@@ -1,12 +1,15 @@
 #include "lapservo/vision/edges/blurred_boundary.h"
 
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <gtest/gtest.h>
 
 #include "lapservo/core/angles.h"
+#include "lapservo/core/statistics.h"
 #include "lapservo/sim/instrument_shaft.h"
 #include "lapservo/sim/tissue.h"
 #include "lapservo/testing/motion.h"
@@ -42,6 +45,34 @@ TEST(BlurredBoundary, LiesWhereItsBlurredPictureHasIt) {
                                        BoundaryCourse{0, -0.02, 0}, BoundaryCourse{0.1, 0.01, -0.05}})
     for (const BlurEllipse& blur : {BlurEllipse{4, 4, 0}, BlurEllipse{9, 4, 4}, BlurEllipse{1, 9, -2}})
       EXPECT_NEAR(moved_by_blur_px(course, blur), blurred_place_px(course, blur), 0.005);
+}
+
+Rig with_thin_instrument() {
+  Rig rig = scenes::usual_rig();
+  Marker& marker = rig.instruments[0].marker;
+  const double scale = 0.003 / marker.diameter_m;
+  for (auto* bands_m : {&marker.bands_upper_m, &marker.bands_lower_m})
+    for (double& band_m : *bands_m) band_m *= scale;
+  marker.diameter_m *= scale;
+  return rig;
+}
+
+// A lens's blur moves the inner boundaries of a shaft of 14 px of radius by up to 0.1 px, to the other side on the
+// other half of the shaft.
+TEST(BlurredBoundary, ALensLeavesNoLean) {
+  std::array<std::vector<double>, 2> residuals_px;  // of either half
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const Shot shot(seed, {}, with_thin_instrument());
+    const EdgeMeasurements edges = measure_edges(shot.sight.scene(), shot.sight.light(), shot.truth(true), film_mean_m,
+                                                 {2, 0, 3, 1}, {0.96, 0.96});
+    for (const Measurement& m : edges.all)
+      if ((m.group == 1 || m.group == 2) && std::abs(m.across) > 0.5) {
+        const double along_px = m.residual_px * (m.along_px_per_m > 0 ? 1 : -1);
+        residuals_px[m.across > 0 ? 1 : 0].push_back(along_px);
+      }
+  }
+  ASSERT_GT(residuals_px[0].size(), 50U);
+  EXPECT_NEAR(median(residuals_px[0]), median(residuals_px[1]), 0.015);
 }
 
 // With the marker's middle moving evenly by so many pixels along the shaft and across it.

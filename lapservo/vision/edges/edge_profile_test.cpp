@@ -102,6 +102,21 @@ TEST(EdgeProfile, TheErrorOfAContourIsAsPredicted) {
   EXPECT_NEAR(std::sqrt(squares / profiles), 1, 0.12);
 }
 
+// A contour's blur moves its edge, so one step to both is needed: to the blur as if the place were known leads part of
+// the way.
+TEST(EdgeProfile, OneStepFindsTheBlurOfAContour) {
+  constexpr double blur_px = 1.0;
+  for (const double radius_px : {14.0, 45.0})
+    for (const double assumed_px : {0.9, 1.15}) {
+      const int reach_px = static_cast<int>(0.34 * radius_px);
+      const EdgeFit fit = fit_contour(profile_of(contour(blur_px, radius_px), 0, reach_px),
+                                      static_cast<float>(assumed_px), static_cast<float>(radius_px), 8);
+      ASSERT_TRUE(fit.converged);
+      EXPECT_NEAR(assumed_px + fit.blur_gradient / fit.blur_information, blur_px, 0.25 * std::abs(assumed_px - blur_px))
+          << radius_px << ", " << assumed_px;
+    }
+}
+
 // Clipped light is no measurement: whatever stands there changes nothing, and the edge stays in place.
 TEST(EdgeProfile, SaturatedSamplesAreDropped) {
   EdgeProfile profile = profile_of(step(1.2), 0.6, 9, 0.003, 5);
