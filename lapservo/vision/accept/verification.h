@@ -18,7 +18,7 @@ struct ValidationLimits {
   double max_sigma_print_off_rad = 0.01;  ///< where the print is certainly off: how far is known from four numbers
                                           ///< at best, so ten sigma
   double certainly_off = 0.999;           ///< probability
-  /// And of psi as it is told, of which prints that are off are more: in defocus and in the dark they show little.
+  /// And of psi as it is told, with what a suspicious print and a turn within the exposure add.
   double max_sigma_told_rad = 0.04;
   /// And of psi where a third of all prints are off (suspected_fractions), if this one is suspicious: an ink that lies
   /// 0.05 mm aside has 12.2 mrad in shafts of the usual radius. Of hidden, moved or strongly compressed markers a

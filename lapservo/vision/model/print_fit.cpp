@@ -118,9 +118,9 @@ std::optional<AsTheRigSays> solved_as_the_rig_says(const PrintSums& sums, double
   return out;
 }
 
-// How likely each size is, by what is believed of prints when a frame is judged, told and suspected (PrintLimits).
+// How likely each size is, by what is believed of prints when a frame is judged and suspected (PrintLimits).
 struct Beliefs {
-  Weights judged, told, suspected;
+  Weights judged, suspected;
   double far_off_probability = 1;
   bool suspicious = false;
 
@@ -128,7 +128,6 @@ struct Beliefs {
     const double tolerance_mm = marker.tolerance_m / mm_in_m;
     const Weights likelihoods = likelihoods_of(evidence, tolerance_mm);
     judged = weights_of(likelihoods, print_limits.fractions);
-    told = weights_of(likelihoods, print_limits.told_fractions);
     suspected = weights_of(likelihoods, print_limits.suspected_fractions);
     far_off_probability = far_off(suspected);
     if (marker.bands_are_measured() || far_off_probability < print_limits.suspicious) return;
@@ -137,19 +136,17 @@ struct Beliefs {
     suspicious = far_off_probability > print_limits.suspicious_of_usual * far_off(usual);
   }
   bool counts(std::size_t at) const {
-    return std::max(judged[at], told[at]) >= print_limits.min_weight ||
-           (suspicious && suspected[at] >= print_limits.min_suspected_weight);
+    return judged[at] >= print_limits.min_weight || (suspicious && suspected[at] >= print_limits.min_suspected_weight);
   }
 };
 
 // The pose, whatever the print is, by each of these.
 struct Mixtures {
-  Mixture judged, told, suspected;
+  Mixture judged, suspected;
 
-  explicit Mixtures(int pose_unknowns)
-      : judged(pose_unknowns + 1), told(pose_unknowns + 1), suspected(pose_unknowns + 1) {}
+  explicit Mixtures(int pose_unknowns) : judged(pose_unknowns + 1), suspected(pose_unknowns + 1) {}
   void add(const PrintSolution& solution, const Beliefs& beliefs, std::size_t at) {
-    judged.add(solution, beliefs.judged[at]), told.add(solution, beliefs.told[at]);
+    judged.add(solution, beliefs.judged[at]);
     if (beliefs.suspicious) suspected.add(solution, beliefs.suspected[at]);
   }
 };
@@ -167,23 +164,21 @@ std::optional<Mixtures> mixed(const PrintSums& sums, const AsTheRigSays& as_the_
   return mixtures;
 }
 
-PrintFit told_fit(const AsTheRigSays& as_the_rig_says, const Beliefs& beliefs, const Mixtures& mixtures,
-                  const PrintSolution& mean, int pose_unknowns) {
+PrintFit print_fit_of(const AsTheRigSays& as_the_rig_says, const Beliefs& beliefs, const Mixtures& mixtures,
+                      const PrintSolution& mean, int pose_unknowns) {
   const int psi = pose_unknowns - 1;
   const double judged = mean.covariance(psi, psi), tolerated = as_the_rig_says.tolerated.covariance(psi, psi);
   PrintFit fit;
   fit.step = mean.step;
   fit.off_probability = off_probability(beliefs.judged);
   fit.covariance = mean.covariance.topLeftCorner(pose_unknowns, pose_unknowns);
-  double told = mixtures.told.about(mean.step)(psi, psi);
   fit.far_off_probability = beliefs.far_off_probability;
   if (beliefs.suspicious) {
     const double suspected = mixtures.suspected.about(mean.step)(psi, psi);
     fit.psi_variance_suspected = suspected - tolerated;
-    told = std::max(told, print_limits.suspected_told * print_limits.suspected_told * suspected);
+    const double widened = std::max(1.0, print_limits.suspected_told * std::sqrt(suspected / judged));
+    fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
   }
-  const double widened = std::sqrt(told / fit.covariance(psi, psi));
-  fit.covariance.row(psi) *= widened, fit.covariance.col(psi) *= widened;
   fit.psi_variance = judged;
   fit.psi_variance_by_print = judged - tolerated;
   fit.psi_variance_by_tolerance = tolerated - as_the_rig_says.exact.covariance(psi, psi);
@@ -206,7 +201,7 @@ std::optional<PrintFit> fit_print(std::span<Measurement> measurements, const Res
   if (!mixtures) return std::nullopt;
   const PrintSolution mean = mixtures->judged.mean();
   for (Measurement& m : measurements) m.residual_px -= m.row.dot(mean.step) + print_shift_px(m, mean.print_mm);
-  PrintFit fit = told_fit(*as_the_rig_says, beliefs, *mixtures, mean, pose_unknowns);
+  PrintFit fit = print_fit_of(*as_the_rig_says, beliefs, *mixtures, mean, pose_unknowns);
   fit.inner_off_m = inner_off_mm(print, errors.inner_doubt_scale) * mm_in_m;
   return fit;
 }

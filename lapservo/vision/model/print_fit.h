@@ -14,15 +14,10 @@ namespace lapservo::internal {
 
 /// What is assumed of prints that are not the rig's.
 struct PrintLimits {
-  /// How far a print is off when it is [mm], and how often that is; all others are the rig's. What is seen, and whether
-  /// the print is to blame, goes by `fractions`, each about half of the one before: an exact print's sigma grows by a
-  /// tenth, and with all sizes alike frames that tell nothing lost 17 % of what was found.
+  /// How far a print is off when it is [mm], and how often that is; all others are the rig's. Each is about half as
+  /// often as the one before: with all sizes alike frames that tell nothing lost 17 % of what was found.
   std::array<double, 8> sigmas_mm{0.005, 0.01, 0.02, 0.04, 0.08, 0.16, 0.32, 0.64};
   std::array<double, 8> fractions{0.05, 0.025, 0.0125, 0.00625, 0.006, 0.0016, 0.0008, 0.0004};
-  /// How sure the pose is goes by these. Nobody prints, cuts and wraps to 5 um: with half of them there, lucky prints
-  /// were taken for exact ones (error / sigma 2.06). Blaming the print by these, a focal length that is off by 3 % was
-  /// a print that is off.
-  std::array<double, 8> told_fractions{0, 0.04, 0.07, 0.03, 0.006, 0.0016, 0.0008, 0.0004};
   /// And whether the picture shows that the print is the rig's goes by these: a third are off, by any size. By the
   /// others a print that is off by 0.1 mm is so rare that one which looks like a turn but for little passed for exact.
   std::array<double, 8> suspected_fractions{0, 0.05, 0.05, 0.05, 0.05, 0.05, 0.05, 0.02};
@@ -47,7 +42,7 @@ inline constexpr PrintLimits print_limits;
 /// ones have a seventh beside them that both inner boundaries share: an ink that lies aside.
 struct PrintFit {
   UnknownVector step;                    ///< to the mean of pose and film, from where the measurements were taken
-  UnknownMatrix covariance;              ///< of the pose's unknowns, as it is to be told
+  UnknownMatrix covariance;              ///< of the pose's unknowns; of a suspicious print wider in psi
   double psi_variance = 0;               ///< by which picture and print are judged
   double off_probability = 0;            ///< that the print is off by more than the tolerance
   double psi_variance_by_tolerance = 0;  ///< of it, what the rig's tolerance adds to an exact print's
