@@ -195,6 +195,7 @@ bool place_boundary(const Frame& frame, const Neighbourhood& generatrices, std::
   if (!(cosine > edge_limits.min_normal_cosine)) return false;
   place.moved_by_blur_px =
       moved_by_blur_px(course_of(frame, generatrices, along_m[k], slope_m, depth_m, image.point_px, place.along), blur);
+  if (!std::isfinite(place.moved_by_blur_px)) return false;  // seen along the axis
 
   double gap_px = 1e9;
   if (k > 0) gap_px = std::min(gap_px, (along_m[k] - along_m[k - 1]) * px_per_m);
