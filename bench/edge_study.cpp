@@ -1,9 +1,9 @@
-#include <array>
 #include <cmath>
 #include <cstdio>
 
 #include "bench/accuracy_study.h"
 #include "lapservo/core/statistics.h"
+#include "lapservo/testing/scenes.h"
 #include "lapservo/vision/model/fine_fit.h"
 
 namespace lapservo::bench {
@@ -45,16 +45,11 @@ void print_errors(const std::string& name, const std::vector<TrueFrame>& frames)
   EdgeErrors boundaries, sides;
   std::vector<double> radii_px;
   for (const TrueFrame& frame : frames) {
-    const Instrument& instrument = frame.rig.instruments[0];
-    const ImageView image(frame.bgr);
-    const ColourClasses classes(frame.rig.instruments);
-    const auto light_of_value = frame.rig.camera.response.table();
-    const LightImage light(image, light_of_value, ChannelGeometry(frame.rig.camera));
-    const Scene scene{image, frame.rig.camera, classes, instrument.marker, classes.of_bands(0)};
-    const PoseUnknowns truth = PoseUnknowns::rcm(*instrument.camera_from_rcm, frame.truths[0].q);
-    const FineFit fit = fit_finely(scene, light, truth, {});
+    const scenes::Sight sight(frame.rig, frame.bgr);
+    const PoseUnknowns truth = PoseUnknowns::rcm(*frame.rig.instruments[0].camera_from_rcm, frame.truths[0].q);
+    const FineFit fit = fit_finely(sight.scene(), sight.light(), truth, {});
     if (!fit.converged) continue;
-    const EdgeMeasurements edges = measure_edges(scene, light, truth, film_mean_m, effort, fit.blur);
+    const EdgeMeasurements edges = measure_edges(sight.scene(), sight.light(), truth, film_mean_m, effort, fit.blur);
     radii_px.push_back(edges.radius_px);
     for (std::size_t group = 0; group < measurement_groups; ++group)
       group < 4 ? add(edges, group, edge_limits.single_floor_px, boundaries)

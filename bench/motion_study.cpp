@@ -114,12 +114,6 @@ cv::Mat picture_of(const Rig& rig, const JointVector& q, const Kind& kind, const
   return kind.subsampled ? effects::seen_through(effects, bgr, rig.camera) : bgr;
 }
 
-void scale(Marker& marker, double diameter_m) {
-  for (auto* bands : {&marker.bands_upper_m, &marker.bands_lower_m})
-    for (double& band_m : *bands) band_m *= diameter_m / marker.diameter_m;
-  marker.diameter_m = diameter_m;
-}
-
 TrueFrame drawn_frame(const Kind& kind, std::uint64_t seed, int index) {
   constexpr double nearest_m = 0.075, farthest_m = 0.115, steepest_rad = 0.35, border_px = 30;
   const std::uint64_t of_frame = 10'000 * seed + static_cast<std::uint64_t>(index);
@@ -127,7 +121,7 @@ TrueFrame drawn_frame(const Kind& kind, std::uint64_t seed, int index) {
   const auto [motion, farther] = draw(kind, random);
   Rig rig = scenes::usual_rig();
   Instrument& instrument = rig.instruments[0];
-  scale(instrument.marker, kind.diameter_m);
+  instrument.marker = scenes::scaled_to(instrument.marker, kind.diameter_m);
   instrument.camera_from_rcm->translation *= farther;
   const ViewRange range{farther * nearest_m, farther * farthest_m, {steepest_rad, border_px}};
   const Marker nominal = instrument.marker;

@@ -61,6 +61,13 @@ Rig usual_rig(std::size_t instruments) {
   return rig;
 }
 
+Marker scaled_to(Marker marker, double diameter_m) {
+  for (auto* bands_m : {&marker.bands_upper_m, &marker.bands_lower_m})
+    for (double& band_m : *bands_m) band_m *= diameter_m / marker.diameter_m;
+  marker.diameter_m = diameter_m;
+  return marker;
+}
+
 JointVector random_configuration(const Rig& rig, std::size_t i, Random& random, double steepest_rad) {
   const Instrument& instrument = rig.instruments[i];
   for (int attempt = 0; attempt < 50000; ++attempt) {

@@ -21,6 +21,9 @@ using namespace internal;
 /// 960x540, up to three instruments through ports left, right and above; their markers share colours in other orders.
 Rig usual_rig(std::size_t instruments = 1);
 
+/// The same print on a shaft of another diameter, in proportion.
+Marker scaled_to(Marker marker, double diameter_m);
+
 /// The marker wholly in view (a lens's distortion neglected), at most so far from facing the camera.
 JointVector random_configuration(const Rig& rig, std::size_t instrument, Random& random, double steepest_rad = 0.35);
 

@@ -49,11 +49,7 @@ TEST(BlurredBoundary, LiesWhereItsBlurredPictureHasIt) {
 
 Rig with_thin_instrument() {
   Rig rig = scenes::usual_rig();
-  Marker& marker = rig.instruments[0].marker;
-  const double scale = 0.003 / marker.diameter_m;
-  for (auto* bands_m : {&marker.bands_upper_m, &marker.bands_lower_m})
-    for (double& band_m : *bands_m) band_m *= scale;
-  marker.diameter_m *= scale;
+  rig.instruments[0].marker = scenes::scaled_to(rig.instruments[0].marker, 0.003);
   return rig;
 }
 

@@ -49,23 +49,19 @@ void EllipseEvidence::add(const EdgeFit& edge, double variance, const EdgeBlur& 
   information_ += edge.blur_information / variance * row * row.transpose();
 }
 
-EllipseEvidence::Step EllipseEvidence::step(const EdgeBlur& blur) const {
+EllipseEvidence::Equations EllipseEvidence::with_prior(const EdgeBlur& blur) const {
   // What is not seen is taken to be as the others, and the correlation to be none.
   const double mean_px = blur.boundaries_px();
-  auto information = information_;
-  Numbers gradient = gradient_;
-  for (int k = 0; k < 4; ++k) {
-    information(k, k) += 1;
-    gradient[k] += mean_px - blur.along_px[static_cast<std::size_t>(k)];
-  }
-  information(4, 4) += 1;
-  gradient[4] -= blur.correlation;
-  const auto factor = information.ldlt();
-  return {factor.solve(gradient), factor.solve(decltype(information)::Identity())};
+  Equations equations{information_, gradient_};
+  equations.information.diagonal().array() += 1;
+  for (int k = 0; k < 4; ++k) equations.gradient[k] += mean_px - blur.along_px[static_cast<std::size_t>(k)];
+  equations.gradient[4] -= blur.correlation;
+  return equations;
 }
 
 EdgeBlur EllipseEvidence::improved(const EdgeBlur& blur) const {
-  const Numbers change = step(blur).change;
+  const Equations equations = with_prior(blur);
+  const Numbers change = equations.information.ldlt().solve(equations.gradient);
   if (!change.allFinite()) return blur;
   EdgeBlur next = blur;
   for (std::size_t k = 0; k < 4; ++k)
@@ -75,11 +71,14 @@ EdgeBlur EllipseEvidence::improved(const EdgeBlur& blur) const {
 }
 
 EllipseEvidence::Squares EllipseEvidence::squares(const EdgeBlur& blur) const {
-  const Step of_all = step(blur);
+  const Equations equations = with_prior(blur);
+  const Eigen::LDLT<Information> factor(equations.information);
+  const Numbers change = factor.solve(equations.gradient);
+  const Information covariance = factor.solve(Information::Identity());
   const Eigen::Map<const Eigen::Vector4d> along_px(blur.along_px.data());
   const Eigen::Vector4d twice_px = 2 * along_px;
-  return {along_px.cwiseAbs2() + twice_px.cwiseProduct(of_all.change.head<4>()),
-          twice_px.asDiagonal() * of_all.covariance.topLeftCorner<4, 4>() * twice_px.asDiagonal()};
+  return {along_px.cwiseAbs2() + twice_px.cwiseProduct(change.head<4>()),
+          twice_px.asDiagonal() * covariance.topLeftCorner<4, 4>() * twice_px.asDiagonal()};
 }
 
 }  // namespace lapservo::internal

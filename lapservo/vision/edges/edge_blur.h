@@ -80,13 +80,17 @@ class EllipseEvidence {
  private:
   static constexpr int numbers = 5;  // the four boundaries' blurs, the correlation
   using Numbers = Eigen::Matrix<double, numbers, 1>;
-  struct Step {
-    Numbers change;
-    Eigen::Matrix<double, numbers, numbers> covariance;
+  using Information = Eigen::Matrix<double, numbers, numbers>;
+
+  // Gauss-Newton's equations: what the boundaries say, and what is expected.
+  struct Equations {
+    Information information;
+    Numbers gradient;
   };
-  Step step(const EdgeBlur& blur) const;
+  Equations with_prior(const EdgeBlur& blur) const;
+
   Numbers gradient_ = Numbers::Zero();
-  Eigen::Matrix<double, numbers, numbers> information_ = Eigen::Matrix<double, numbers, numbers>::Zero();
+  Information information_ = Information::Zero();
 };
 
 }  // namespace lapservo::internal

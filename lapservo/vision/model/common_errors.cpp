@@ -31,12 +31,11 @@ void add_boundaries(const EdgeBlur& blur, double radius_px, const std::optional<
   const double unexplained = processed ? std::max(0.0, processed->misfit - usual.usual_misfit) : 0;
   const double unexplained_px = usual.px_per_misfit * unexplained;
   for (std::size_t k = 0; k < 4; ++k) {
-    const double boundary_px = usual.boundary_of_blur * blur.along_px[k] * blur.along_px[k] / radius_px +
-                               usual.common_fraction_of_blur * std::max(0.0, blur.along_px[k] - usual_blur_px);
     const bool corrected = processed && processed->bias_px[k];
     const double fraction = processed && processed->clips ? usual.fraction_of_clipped : usual.fraction_of_processing;
     const double left_px = (corrected ? fraction : 1) * bias_px[k];
-    errors.px[k] = std::hypot(boundary_px, std::hypot(left_px, unexplained_px, departure_px[k]));
+    errors.px[k] = std::hypot(common_boundary_px(blur.along_px[k], radius_px),
+                              std::hypot(left_px, unexplained_px, departure_px[k]));
   }
 }
 
@@ -73,6 +72,11 @@ PrintDoubt doubt_of(double sigma_px, const EdgeBlur& blur, double radius_px, dou
 }
 
 }  // namespace
+
+double common_boundary_px(double blur_px, double radius_px) {
+  return usual.boundary_of_blur * blur_px * blur_px / radius_px +
+         usual.common_fraction_of_blur * std::max(0.0, blur_px - usual_blur_px);
+}
 
 double doubt_scale(double sigma_px, double blur_px, double bias_px) {
   return std::max(1.0, sigma_px / usual.usual_sigma_px) + std::max(0.0, blur_px - usual_blur_px) +

@@ -69,6 +69,9 @@ struct CommonErrors {
   double inner_doubt_scale = 1;  ///< by how much larger still noise is taken for PrintFit::inner_off_m
 };
 
+/// What a boundary of this blur as a whole may be off beside a camera's processing, on a shaft of this radius.
+double common_boundary_px(double blur_px, double radius_px);
+
 /// By how much noise is to be taken larger before a print is blamed: compression, motion blur and a camera's processing
 /// move edges of this sigma, which were blurred by this and moved by this.
 double doubt_scale(double sigma_px, double blur_px, double bias_px);

@@ -52,7 +52,7 @@ double normalised_square(const UnknownVector& error, const UnknownMatrix& covari
 
 // The sigmas include floors for what a renderer has none of (lens, print), so errors here stay somewhat below them.
 void expect_honest(bool rcm) {
-  constexpr int frames = 48;
+  constexpr int frames = 48, bounded = 16;
   double squares = 0, psi_squares = 0, psi_sum = 0;
   int far = 0;
   for (std::uint64_t seed = 1; seed <= frames; ++seed) {
@@ -65,6 +65,9 @@ void expect_honest(bool rcm) {
     const UnknownVector error = difference(truth, fit.unknowns);
     const Eigen::Index psi = error.size() - 1;
     EXPECT_LT(std::abs(error[psi]), 6e-3);
+    if (seed <= bounded) {
+      EXPECT_LT(normalised_square(error, fit.covariance), 4);
+    }
     far += normalised_square(error, fit.covariance) > 4;
     squares += normalised_square(error, fit.covariance);
     psi_squares += error[psi] * error[psi] / fit.covariance(psi, psi);
