@@ -56,8 +56,8 @@ TEST(CrtkRobot, SendsSetPointsOfAllJointsInItsOwnThreadUntilSomethingIsAmiss) {
   StandingClock clock;
   CrtkRobot robot(transport, "PSM1", config_of(true), clock);
   send_a_path(transport, clock, robot);
-  ASSERT_TRUE(wait_for([&] { return transport.joints("/PSM1/servo_jp").size() > 5; }));
-  const JointMessage sent = transport.joints("/PSM1/servo_jp").front();
+  ASSERT_TRUE(wait_for([&] { return transport.sent<JointMessage>("/PSM1/servo_jp").size() > 5; }));
+  const JointMessage sent = transport.sent<JointMessage>("/PSM1/servo_jp").front();
   EXPECT_EQ(sent.names, (std::vector<std::string>{"yaw", "pitch", "insertion", "roll", "wrist"}));
   EXPECT_EQ(sent.positions, (std::vector<double>{0.1, 1.5, 0.1, 0.2, 0.7}));
   EXPECT_EQ(sent.velocities, std::vector<double>(5, 0.0));

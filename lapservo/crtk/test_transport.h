@@ -5,6 +5,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -12,140 +13,110 @@
 
 namespace lapservo::internal {
 
-/// Topics in memory: what is published is kept; what say() says, handlers get, in the caller's thread.
+/// Topics in memory: messages that are published are kept; handlers get what say() says, in the caller's thread.
 class TestTransport : public Transport {
  public:
-  Publisher<JointMessage> joint_publisher(const std::string& topic) override { return keep(topic, joints_); }
-  Publisher<JointMessage> set_point_publisher(const std::string& topic) override { return keep(topic, joints_); }
-  Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) override {
-    return keep(topic, states_);
-  }
-  Publisher<StringMessage> string_publisher(const std::string& topic) override { return keep(topic, strings_); }
-  Publisher<JoyMessage> joy_publisher(const std::string& topic) override { return keep(topic, joys_); }
-  Publisher<BoolMessage> bool_publisher(const std::string& topic) override { return keep(topic, bools_); }
-  Publisher<TrajectoryMessage> trajectory_publisher(const std::string& topic) override {
-    return keep(topic, trajectories_);
-  }
-  Publisher<ImageMessage> image_publisher(const std::string& topic) override { return keep(topic, images_); }
-  Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) override {
-    return keep(topic, compressed_);
-  }
-  Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) override { return keep(topic, infos_); }
+  using Topic = const std::string&;
+  Publisher<JointMessage> joint_publisher(Topic topic) override { return keep(topic); }
+  Publisher<JointMessage> set_point_publisher(Topic topic) override { return keep(topic); }
+  Publisher<OperatingStateMessage> operating_state_publisher(Topic topic) override { return keep(topic); }
+  Publisher<StringMessage> string_publisher(Topic topic) override { return keep(topic); }
+  Publisher<JoyMessage> joy_publisher(Topic topic) override { return keep(topic); }
+  Publisher<BoolMessage> bool_publisher(Topic topic) override { return keep(topic); }
+  Publisher<TrajectoryMessage> trajectory_publisher(Topic topic) override { return keep(topic); }
+  Publisher<ImageMessage> image_publisher(Topic topic) override { return keep(topic); }
+  Publisher<CompressedImageMessage> compressed_image_publisher(Topic topic) override { return keep(topic); }
+  Publisher<CameraInfoMessage> camera_info_publisher(Topic topic) override { return keep(topic); }
 
-  Publisher<PoseMessage> pose_publisher(const std::string& topic) override { return keep(topic, poses_); }
-  Publisher<DiagnosticMessage> diagnostic_publisher(const std::string& topic) override {
-    return keep(topic, diagnostics_);
-  }
-  Publisher<ObservationMessage> observation_publisher(const std::string& topic) override {
-    return keep(topic, observations_);
-  }
+  Publisher<PoseMessage> pose_publisher(Topic topic) override { return keep(topic); }
+  Publisher<DiagnosticMessage> diagnostic_publisher(Topic topic) override { return keep(topic); }
+  Publisher<ObservationMessage> observation_publisher(Topic topic) override { return keep(topic); }
 
-  Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) override {
-    return add(joint_handlers_[topic], std::move(handler));
+  Subscription subscribe_joints(Topic topic, Handler<JointMessage> handler) override { return add(topic, handler); }
+  Subscription subscribe_operating_state(Topic topic, Handler<OperatingStateMessage> handler) override {
+    return add(topic, handler);
   }
-  Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> handler) override {
-    return add(state_handlers_[topic], std::move(handler));
+  Subscription subscribe_strings(Topic topic, Handler<StringMessage> handler) override { return add(topic, handler); }
+  Subscription subscribe_buttons(Topic topic, Handler<BoolMessage> handler) override { return add(topic, handler); }
+  Subscription subscribe_commands(Topic topic, CommandType, Handler<CommandMessage> handler) override {
+    return add(topic, handler);
   }
-  Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) override {
-    return add(string_handlers_[topic], std::move(handler));
+  Subscription subscribe_trajectories(Topic topic, Handler<TrajectoryMessage> handler) override {
+    return add(topic, handler);
   }
-  Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) override {
-    return add(button_handlers_[topic], std::move(handler));
-  }
-  Subscription subscribe_commands(const std::string& topic, CommandType, Handler<CommandMessage> handler) override {
-    return add(command_handlers_[topic], std::move(handler));
-  }
-  Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> handler) override {
-    return add(trajectory_handlers_[topic], std::move(handler));
-  }
-  Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) override {
-    return add(image_handlers_[topic], std::move(handler));
-  }
-  Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override {
-    return add(compressed_handlers_[topic], std::move(handler));
+  Subscription subscribe_images(Topic topic, Handler<ImageMessage> handler) override { return add(topic, handler); }
+  Subscription subscribe_compressed_images(Topic topic, Handler<CompressedImageMessage> handler) override {
+    return add(topic, handler);
   }
   std::set<std::string> readers(const std::string&) const override { return readers_; }
   std::map<std::string, std::string> published() const override { return {}; }
   double stamp_now_s() const override { return stamp_s; }
 
-  void say(const std::string& topic, const JointMessage& message) { tell(joint_handlers_[topic], message); }
-  void say(const std::string& topic, const OperatingStateMessage& message) { tell(state_handlers_[topic], message); }
-  void say(const std::string& topic, const StringMessage& message) { tell(string_handlers_[topic], message); }
-  void say(const std::string& topic, const BoolMessage& message) { tell(button_handlers_[topic], message); }
-  void say(const std::string& topic, const CommandMessage& message) { tell(command_handlers_[topic], message); }
-  void say(const std::string& topic, const TrajectoryMessage& message) { tell(trajectory_handlers_[topic], message); }
-  std::vector<PoseMessage> poses(const std::string& topic) { return poses_[topic]; }
-  std::vector<DiagnosticMessage> diagnostics(const std::string& topic) { return diagnostics_[topic]; }
-  std::vector<ObservationMessage> observations(const std::string& topic) { return observations_[topic]; }
-  std::vector<CompressedImageMessage> compressed_images(const std::string& topic) {
+  template <typename Message>
+  void say(const std::string& topic, const Message& message) {
+    for (const auto& weak : handlers<Message>()[topic])
+      if (const auto handler = weak.lock()) (*handler)(Message(message));
+  }
+  /// All that was published.
+  template <typename Message>
+  std::vector<Message> sent(const std::string& topic) {
     const std::lock_guard lock(mutex_);
-    return compressed_[topic];
+    return kept<Message>()[topic];
   }
   /// Says all that was published since the last call.
-  void deliver() {
-    for (auto& [topic, messages] : std::exchange(joints_, {}))
-      for (const auto& message : messages) tell(joint_handlers_[topic], message);
-    for (auto& [topic, messages] : std::exchange(states_, {}))
-      for (const auto& message : messages) tell(state_handlers_[topic], message);
-    for (auto& [topic, messages] : std::exchange(images_, {}))
-      for (const auto& message : messages) tell(image_handlers_[topic], message);
-  }
+  void deliver() { deliver_all<JointMessage>(), deliver_all<OperatingStateMessage>(), deliver_all<ImageMessage>(); }
 
   /// Who reads, from now on.
   void let_read(std::set<std::string> readers) { readers_ = std::move(readers); }
 
   double stamp_s = 1000;
 
-  std::vector<JointMessage> joints(const std::string& topic) {
-    const std::lock_guard lock(mutex_);
-    return joints_[topic];
-  }
-
  private:
   template <typename Message>
-  using Handlers = std::vector<std::weak_ptr<Handler<Message>>>;
+  using Handlers = std::map<std::string, std::vector<std::weak_ptr<Handler<Message>>>>;
+  template <typename Message>
+  using Kept = std::map<std::string, std::vector<Message>>;
 
   template <typename Message>
-  Publisher<Message> keep(const std::string& topic, std::map<std::string, std::vector<Message>>& kept) {
-    return [this, topic, &kept](const Message& message) {
-      const std::lock_guard lock(mutex_);
-      kept[topic].push_back(message);
-    };
+  Handlers<Message>& handlers() {
+    return std::get<Handlers<Message>>(handlers_);
   }
   template <typename Message>
-  Subscription add(Handlers<Message>& handlers, Handler<Message> handler) {
-    auto shared = std::make_shared<Handler<Message>>(std::move(handler));
-    handlers.push_back(shared);
+  Kept<Message>& kept() {
+    return std::get<Kept<Message>>(kept_);
+  }
+  struct Keeper {
+    TestTransport* transport;
+    std::string topic;
+    template <typename Message>
+    void operator()(const Message& message) const {
+      const std::lock_guard lock(transport->mutex_);
+      transport->kept<Message>()[topic].push_back(message);
+    }
+  };
+  Keeper keep(const std::string& topic) { return {this, topic}; }
+  template <typename Message>
+  Subscription add(const std::string& topic, const Handler<Message>& handler) {
+    auto shared = std::make_shared<Handler<Message>>(handler);
+    handlers<Message>()[topic].push_back(shared);
     return shared;
   }
   template <typename Message>
-  void tell(const Handlers<Message>& handlers, const Message& message) {
-    for (const auto& weak : handlers)
-      if (const auto handler = weak.lock()) (*handler)(Message(message));
+  void deliver_all() {
+    for (auto& [topic, messages] : std::exchange(kept<Message>(), {}))
+      for (const auto& message : messages) say(topic, message);
   }
 
   std::mutex mutex_;
   std::set<std::string> readers_{"/arm"};
-  std::map<std::string, std::vector<JointMessage>> joints_;
-  std::map<std::string, std::vector<OperatingStateMessage>> states_;
-  std::map<std::string, std::vector<StringMessage>> strings_;
-  std::map<std::string, std::vector<JoyMessage>> joys_;
-  std::map<std::string, std::vector<BoolMessage>> bools_;
-  std::map<std::string, std::vector<TrajectoryMessage>> trajectories_;
-  std::map<std::string, std::vector<ImageMessage>> images_;
-  std::map<std::string, std::vector<CompressedImageMessage>> compressed_;
-  std::map<std::string, std::vector<CameraInfoMessage>> infos_;
-  std::map<std::string, std::vector<PoseMessage>> poses_;
-  std::map<std::string, std::vector<DiagnosticMessage>> diagnostics_;
-  std::map<std::string, std::vector<ObservationMessage>> observations_;
-  std::map<std::string, Handlers<JointMessage>> joint_handlers_;
-  std::map<std::string, Handlers<OperatingStateMessage>> state_handlers_;
-  std::map<std::string, Handlers<StringMessage>> string_handlers_;
-  std::map<std::string, Handlers<BoolMessage>> button_handlers_;
-  std::map<std::string, Handlers<CommandMessage>> command_handlers_;
-  std::map<std::string, Handlers<TrajectoryMessage>> trajectory_handlers_;
-  std::map<std::string, Handlers<ImageMessage>> image_handlers_;
-  std::map<std::string, Handlers<CompressedImageMessage>> compressed_handlers_;
+  std::tuple<Kept<JointMessage>, Kept<OperatingStateMessage>, Kept<StringMessage>, Kept<JoyMessage>, Kept<BoolMessage>,
+             Kept<TrajectoryMessage>, Kept<ImageMessage>, Kept<CompressedImageMessage>, Kept<CameraInfoMessage>,
+             Kept<PoseMessage>, Kept<DiagnosticMessage>, Kept<ObservationMessage>>
+      kept_;
+  std::tuple<Handlers<JointMessage>, Handlers<OperatingStateMessage>, Handlers<StringMessage>, Handlers<BoolMessage>,
+             Handlers<CommandMessage>, Handlers<TrajectoryMessage>, Handlers<ImageMessage>,
+             Handlers<CompressedImageMessage>>
+      handlers_;
 };
 
 }  // namespace lapservo::internal

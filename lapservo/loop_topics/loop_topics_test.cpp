@@ -40,10 +40,10 @@ TEST(LoopTopics, TellsWhatWasSeenAndDecided) {
   {
     LoopTopics topics(transport, rig, "endoscope");
     topics.publish(tick_of(rig), "");
-    EXPECT_TRUE(
-        testing::wait_for([&] { return !transport.compressed_images("/lapservo/PSM1/overlay/compressed").empty(); }));
+    EXPECT_TRUE(testing::wait_for(
+        [&] { return !transport.sent<CompressedImageMessage>("/lapservo/PSM1/overlay/compressed").empty(); }));
   }
-  const auto observations = transport.observations("/lapservo/PSM1/observation");
+  const auto observations = transport.sent<ObservationMessage>("/lapservo/PSM1/observation");
   ASSERT_EQ(observations.size(), 1u);
   const ObservationMessage& seen = observations.front();
   EXPECT_NEAR(seen.stamp_s, transport.stamp_s - 0.02, 1e-9);  // the stamp of the image, not of the message
@@ -54,11 +54,11 @@ TEST(LoopTopics, TellsWhatWasSeenAndDecided) {
   EXPECT_EQ(seen.features[2], 182);
   EXPECT_EQ(seen.q_covariance[15], 4e-6);
   EXPECT_EQ(seen.error[1], 1);
-  EXPECT_EQ(transport.poses("/lapservo/PSM1/pose").size(), 1u);
-  EXPECT_EQ(transport.joints("/lapservo/PSM1/error").at(0).positions[3], 3);
-  EXPECT_EQ(transport.joints("/lapservo/PSM1/desired").at(0).names[1], "r_px");
-  EXPECT_EQ(transport.diagnostics("/diagnostics").at(0).message, "track");
-  EXPECT_EQ(transport.compressed_images("/lapservo/PSM1/overlay/compressed").size(), 1u);
+  EXPECT_EQ(transport.sent<PoseMessage>("/lapservo/PSM1/pose").size(), 1u);
+  EXPECT_EQ(transport.sent<JointMessage>("/lapservo/PSM1/error").at(0).positions[3], 3);
+  EXPECT_EQ(transport.sent<JointMessage>("/lapservo/PSM1/desired").at(0).names[1], "r_px");
+  EXPECT_EQ(transport.sent<DiagnosticMessage>("/diagnostics").at(0).message, "track");
+  EXPECT_EQ(transport.sent<CompressedImageMessage>("/lapservo/PSM1/overlay/compressed").size(), 1u);
 }
 
 TEST(LoopTopics, WhatIsNotKnownIsNotANumber) {
@@ -71,13 +71,13 @@ TEST(LoopTopics, WhatIsNotKnownIsNotANumber) {
   tick.decision.control.estimate.reset();
   tick.decision.control.action = ControlAction::hold;
   topics.publish(tick, "hold: marker_lost");
-  const ObservationMessage seen = transport.observations("/lapservo/PSM1/observation").at(0);
+  const ObservationMessage seen = transport.sent<ObservationMessage>("/lapservo/PSM1/observation").at(0);
   EXPECT_EQ(seen.status, "no_marker");
   for (const double number : {seen.q[0], seen.features[0], seen.error[0], seen.edges_px[7], seen.q_covariance[5]})
     EXPECT_TRUE(std::isnan(number));
-  EXPECT_TRUE(transport.poses("/lapservo/PSM1/pose").empty());
-  EXPECT_EQ(transport.diagnostics("/diagnostics").at(0).message, "hold: marker_lost");
-  EXPECT_EQ(transport.diagnostics("/diagnostics").at(0).level, DiagnosticMessage::Level::warning);
+  EXPECT_TRUE(transport.sent<PoseMessage>("/lapservo/PSM1/pose").empty());
+  EXPECT_EQ(transport.sent<DiagnosticMessage>("/diagnostics").at(0).message, "hold: marker_lost");
+  EXPECT_EQ(transport.sent<DiagnosticMessage>("/diagnostics").at(0).level, DiagnosticMessage::Level::warning);
 }
 
 // The pose's covariance is that of poses whose joints are drawn from theirs.

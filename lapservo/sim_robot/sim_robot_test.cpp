@@ -88,14 +88,14 @@ TEST(SimRobot, OffersItsImagesCompressedToThoseWhoReadThem) {
   Room room;
   room.transport.let_read({});
   room.pass(0.3, Eigen::Vector4d::Zero());
-  EXPECT_TRUE(room.transport.compressed_images(topic).empty());
+  EXPECT_TRUE(room.transport.sent<CompressedImageMessage>(topic).empty());
   room.transport.let_read({"/viewer"});
   ImageReceiver received(640, 360);
   ASSERT_TRUE(testing::wait_for([&] {
     room.pass(0.1, Eigen::Vector4d::Zero());
-    return !room.transport.compressed_images(topic).empty();
+    return !room.transport.sent<CompressedImageMessage>(topic).empty();
   }));
-  received.receive(CompressedImageMessage(room.transport.compressed_images(topic).front()), room.now_s);
+  received.receive(CompressedImageMessage(room.transport.sent<CompressedImageMessage>(topic).front()), room.now_s);
   const auto image = received.newest();
   ASSERT_TRUE(image) << received.complaint();
   EXPECT_EQ(image->bgr.size(), cv::Size(640, 360));
