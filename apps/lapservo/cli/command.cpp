@@ -61,11 +61,6 @@ Option& Option::required() {
   return *this;
 }
 
-Option& Option::shows_default() {
-  option_->capture_default_str();
-  return *this;
-}
-
 Option& Option::hidden() {
   option_->group("");
   return *this;
@@ -124,7 +119,9 @@ void Command::require_subcommand() {
 
 template <typename Value>
 Option Command::add_option(const std::string& names, Value& value, const std::string& help) {
-  return Option(app_->add_option(names, value, help));
+  CLI::Option* option = app_->add_option(names, value, help)->capture_default_str();
+  if (option->get_default_str() == "[]") option->default_str("");
+  return Option(option);
 }
 
 template Option Command::add_option(const std::string&, double&, const std::string&);

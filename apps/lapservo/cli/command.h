@@ -24,8 +24,6 @@ class Option {
   explicit Option(CLI::Option* option) : option_(option) {}
 
   Option& required();
-  /// --help shows what it is without being given.
-  Option& shows_default();
   /// --help leaves it out: another name of an option.
   Option& hidden();
   /// Takes so many values.
@@ -55,7 +53,7 @@ class Command {
   Command add_subcommand(const std::string& name, const std::string& about);
   void require_subcommand();
   /// Value: double, int, std::uint64_t, std::string, and optionals and vectors as command.cpp has them. It must live
-  /// until the command line is parsed.
+  /// until the command line is parsed; --help shows what it is without being given.
   template <typename Value>
   Option add_option(const std::string& names, Value& value, const std::string& help);
   void add_flag(const std::string& names, bool& value, const std::string& help);

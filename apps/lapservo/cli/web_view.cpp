@@ -12,11 +12,9 @@ namespace {
 constexpr int highest_port = 65535;
 
 void add_listen_option(Command command, WebOptions& options) {
-  command
-      .add_option("--listen", options.listen,
-                  "The page for others too, at this address of this computer (0.0.0.0: all); a token, printed once "
-                  "with the page's address, is required then")
-      .shows_default();
+  command.add_option("--listen", options.listen,
+                     "The page for others too, at this address of this computer (0.0.0.0: all); a token, printed once "
+                     "with the page's address, is required then");
 }
 
 }  // namespace

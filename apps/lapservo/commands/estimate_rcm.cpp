@@ -33,7 +33,7 @@ namespace fs = std::filesystem;
 
 struct EstimateRcmOptions {
   std::string observations, rig, out;
-  double sigma_px = 0;  // 0: to be estimated
+  std::optional<double> sigma_px;  // else it is estimated
   double common_px = 0.01;
 };
 
@@ -62,7 +62,6 @@ Eigen::Vector2d read_ideal_point(const CsvTable& table, std::size_t row, const c
 // Every instrument of the file has an entry, if only an empty one.
 LinesByInstrument read_lines(const EstimateRcmOptions& options, const std::optional<Rig>& rig) {
   const CsvTable table = CsvTable::read(options.observations);
-  const double sigma_px = options.sigma_px > 0 ? options.sigma_px : 1;
   LinesByInstrument lines;
   Progress progress(static_cast<int>(table.rows()));
   for (std::size_t row = 0; row < table.rows(); ++row) {
@@ -74,7 +73,7 @@ LinesByInstrument read_lines(const EstimateRcmOptions& options, const std::optio
     if (table.text(row, "status") != "ok") continue;
     const Eigen::Vector2d e0 = read_ideal_point(table, row, "e0", options, rig);
     const Eigen::Vector2d e3 = read_ideal_point(table, row, "e3", options, rig);
-    own.push_back(line_between(e0, e3, sigma_px));
+    own.push_back(line_between(e0, e3, options.sigma_px.value_or(1)));
   }
   return lines;
 }
@@ -87,7 +86,7 @@ std::vector<RcmResult> estimate_all(const EstimateRcmOptions& options, const std
     if (lines.size() < rows.size())
       std::fprintf(stderr, "lapservo: note: %s: %zu rows of %zu positions that differ: a position counts once\n",
                    name.c_str(), rows.size(), lines.size());
-    for (RcmResult result : estimate_rcm(lines, options.sigma_px, options.common_px)) {
+    for (RcmResult result : estimate_rcm(lines, options.sigma_px.value_or(0), options.common_px)) {
       result.instrument = name;
       if (instrument && instrument->camera_from_rcm)
         result.rig_px = projected_rcm_px(rig->camera, *instrument->camera_from_rcm);
@@ -184,7 +183,6 @@ void add_estimate_rcm(Command app, Run& run_later) {
       .add_option("--common-px", options->common_px,
                   "Standard deviation of an error across the lines that all of them share and no number of lines "
                   "averages out; the default is that of `lapservo track` behind a well calibrated lens")
-      .shows_default()
       .number_between(0.0, 1000.0);
   command.footer(
       "Prints two estimates: weighted, by total least squares without outliers, and pairwise, the paper's mean of all\n"

@@ -175,9 +175,8 @@ void add_experiment(Command app, Run& run_later) {
   command.add_flag("--force", options->force, OutputFolder::force_help);
   command.add_option("--rig", options->rig,
                      "Camera and instrument (the first), with camera_from_rcm; else the built-in configs/paper.yaml");
-  command.add_option("--seed", options->seed, "Seed of positions, background and noise").shows_default().seed_number();
+  command.add_option("--seed", options->seed, "Seed of positions, background and noise").seed_number();
   command.add_option("--method", options->method, "centerline: the paper's; surface: the default; or both")
-      .shows_default()
       .one_of({"both", "centerline", "surface"});
   command.footer("Example:\n  lapservo experiment all --out results");
   command.runs(run_later, [options] { return run(*options); });

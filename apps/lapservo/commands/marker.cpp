@@ -32,15 +32,9 @@ struct ViewingOptions {
 };
 
 void add_viewing(Command command, ViewingOptions& options) {
-  command.add_option("--focal-px", options.focal_px, "Focal length of the camera")
-      .shows_default()
-      .number_between(10.0, 1e5);
-  command.add_option("--distance-mm", options.distance_mm, "From the camera to the marker")
-      .shows_default()
-      .number_between(5.0, 2000.0);
-  command.add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line")
-      .shows_default()
-      .number_between(1e-4, 100.0);
+  command.add_option("--focal-px", options.focal_px, "Focal length of the camera").number_between(10.0, 1e5);
+  command.add_option("--distance-mm", options.distance_mm, "From the camera to the marker").number_between(5.0, 2000.0);
+  command.add_option("--sigma-px", options.sigma_px, "Noise of one boundary on one line").number_between(1e-4, 100.0);
 }
 
 struct DesignOptions {
@@ -208,9 +202,7 @@ int run_show(const RigOptions& options) {
 void add_design(Command parent, Run& run_later) {
   auto options = std::make_shared<DesignOptions>();
   Command command = parent.add_subcommand("design", "Choose the bands of a marker, or evaluate given ones.");
-  command.add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included")
-      .shows_default()
-      .number_between(0.5, 100.0);
+  command.add_option("--diameter-mm", options->diameter_mm, "Outer diameter, film included").number_between(0.5, 100.0);
   command.add_option("--length-mm", options->length_mm, "Length of the marker; default three diameters")
       .number_between(1.0, 500.0);
   command.add_option("--smallest-band-mm", options->min_band_mm, "No band is shorter; default 3 mm or 12 px")
@@ -223,8 +215,7 @@ void add_design(Command parent, Run& run_later) {
       .number_between(0.001, 10.0);
   command.add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
       .finite_number()
-      .delimiter(',')
-      .shows_default();
+      .delimiter(',');
   command.add_option("--bands-upper-mm", options->upper_mm, "Evaluate this design: lengths at the upper edge")
       .finite_number()
       .delimiter(',');
@@ -256,10 +247,8 @@ void add_marker(Command app, Run& run_later) {
   auto printing = std::make_shared<RigOptions>();
   Command print = add_for_rig(marker, "print", "Write a sheet to print at true scale.", printing);
   print.add_option("--out", printing->out, "sheet.pdf or sheet.svg; a file of that name is replaced").required();
-  print.add_option("--paper", printing->paper, "a4 or letter").shows_default().one_of({"a4", "letter"});
-  print.add_option("--copies", printing->copies, "Markers on the sheet, as many as fit")
-      .shows_default()
-      .whole_number_between(1, 100);
+  print.add_option("--paper", printing->paper, "a4 or letter").one_of({"a4", "letter"});
+  print.add_option("--copies", printing->copies, "Markers on the sheet, as many as fit").whole_number_between(1, 100);
   print.footer("Example:\n  lapservo marker print --rig configs/example.yaml --out sheet.pdf");
   print.runs(run_later, [printing] { return run_print(*printing); });
 

@@ -295,12 +295,8 @@ void add_record(Command app, Run& run_later) {
   command.add_option("--out", options->out, "Folder to make: a ROS 2 bag; a second of raw 720p takes 80 MB").required();
   command.add_option("--rig", options->rig,
                      "Its camera's size is that of /dev/videoN, else GStreamer's choice; also for --move");
-  command.add_option("--duration", options->duration_s, "Seconds, from the first image on")
-      .shows_default()
-      .number_between(1, 3600);
-  command.add_option("--fps", options->fps, "Keep no more images a second than about so many")
-      .shows_default()
-      .number_between(1, 1000);
+  command.add_option("--duration", options->duration_s, "Seconds, from the first image on").number_between(1, 3600);
+  command.add_option("--fps", options->fps, "Keep no more images a second than about so many").number_between(1, 1000);
   command
       .add_option(
           "--move", options->move,
@@ -312,7 +308,6 @@ void add_record(Command app, Run& run_later) {
   command
       .add_option("--scale", options->scale,
                   "Scale of a swing: 1 is 0.25 rad, 0.2 rad, 10 mm, 1 rad to either side at most")
-      .shows_default()
       .number_between(0.05, 4);
   add_setpoint_readers_option(command, options->setpoint_readers);
   command.add_option("--joint-limits", options->joint_limits,

@@ -186,34 +186,22 @@ void add_render(Command app, Run& run_later) {
   command.add_option("--poses", options->poses,
                      "CSV of theta_rad, phi_rad, rho_m, psi_rad (and instrument), a row a frame and instrument; else "
                      "random ones in view");
-  command.add_option("--count", options->count, "How many random configurations")
-      .shows_default()
-      .whole_number_between(1, 100000);
-  command.add_option("--seed", options->seed, "Seed of configurations, background and noise")
-      .shows_default()
-      .seed_number();
+  command.add_option("--count", options->count, "How many random configurations").whole_number_between(1, 100000);
+  command.add_option("--seed", options->seed, "Seed of configurations, background and noise").seed_number();
   command.add_flag("--moving", options->moving, "A smooth path through random configurations");
-  command.add_option("--background", options->background, "An image, or tissue").shows_default();
-  command.add_option("--light", options->light, "Exposure, 1 is normal").shows_default().number_between(0.01, 10.0);
-  command.add_option("--smoke", options->smoke, "Share of grey veil, 0 to 1").shows_default().number_between(0.0, 1.0);
-  command.add_option("--blood", options->blood, "Share of the marker covered, 0 to 0.9")
-      .shows_default()
-      .number_between(0.0, 0.9);
-  command.add_option("--noise", options->noise, "Times the sensor's usual noise")
-      .shows_default()
-      .number_between(0.0, 20.0);
-  command.add_option("--blur-px", options->blur_px, "Sigma of the optical blur")
-      .shows_default()
-      .number_between(0.0, 20.0);
+  command.add_option("--background", options->background, "An image, or tissue");
+  command.add_option("--light", options->light, "Exposure, 1 is normal").number_between(0.01, 10.0);
+  command.add_option("--smoke", options->smoke, "Share of grey veil, 0 to 1").number_between(0.0, 1.0);
+  command.add_option("--blood", options->blood, "Share of the marker covered, 0 to 0.9").number_between(0.0, 0.9);
+  command.add_option("--noise", options->noise, "Times the sensor's usual noise").number_between(0.0, 20.0);
+  command.add_option("--blur-px", options->blur_px, "Sigma of the optical blur").number_between(0.0, 20.0);
   command.add_option("--motion", options->motion, "Motion blur: fraction of the step to the next frame, 0 to 1")
-      .shows_default()
       .number_between(0.0, 1.0);
   command.add_option("--film-mm", options->film_mm, "Thickness of the film that carries the marker")
-      .shows_default()
       .number_between(0.0, 1.0);
-  command.add_option("--format", options->format, "png or jpg").shows_default().one_of({"png", "jpg"});
+  command.add_option("--format", options->format, "png or jpg").one_of({"png", "jpg"});
   command.add_flag("--video", options->video, "Write video.mp4 instead of images");
-  command.add_option("--fps", options->fps, "Frame rate of the video").shows_default().number_between(0.1, 1000.0);
+  command.add_option("--fps", options->fps, "Frame rate of the video").number_between(0.1, 1000.0);
   command.add_flag("--force", options->force, OutputFolder::force_help);
   command.footer("Example:\n  lapservo render --rig configs/example.yaml --out frames --count 50 --moving --blood 0.2");
   command.runs(run_later, [options] { return run(*options); });

@@ -100,21 +100,17 @@ void add_sim_robot(Command app, Run& run_later) {
   Command command =
       app.add_subcommand("sim-robot", "Be an arm and its camera, simulated, for another process to steer.");
   command.add_option("--rig", options->rig, "The scene before the camera");
-  command.add_option("--transport", options->transport, "ros2 or ros1").shows_default();
-  command.add_option("--arm", options->arm, "Namespace of its CRTK topics, where no other arm is").shows_default();
-  command.add_option("--camera", options->camera, "Namespace of image_raw and camera_info").shows_default();
+  command.add_option("--transport", options->transport, "ros2 or ros1");
+  command.add_option("--arm", options->arm, "Namespace of its CRTK topics, where no other arm is");
+  command.add_option("--camera", options->camera, "Namespace of image_raw and camera_info");
   command.add_option("--start", options->start, "Measured joints to start from, theta,phi,rho,psi; else random")
       .finite_number()
       .delimiter(',')
       .expected(4);
-  command.add_option("--seed", options->seed, "Seed of start, tissue, noise, jitter").shows_default().seed_number();
-  command.add_option("--latency-ms", options->latency_ms, "From exposure to publication")
-      .shows_default()
-      .number_between(0.0, 1000.0);
-  command.add_option("--fps", options->fps, "Frames a second").shows_default().number_between(6.0, 120.0);
-  command.add_option("--duration", options->duration_s, "Seconds; 0: until interrupted")
-      .shows_default()
-      .number_between(0.0, 1e6);
+  command.add_option("--seed", options->seed, "Seed of start, tissue, noise, jitter").seed_number();
+  command.add_option("--latency-ms", options->latency_ms, "From exposure to publication").number_between(0.0, 1000.0);
+  command.add_option("--fps", options->fps, "Frames a second").number_between(6.0, 120.0);
+  command.add_option("--duration", options->duration_s, "Seconds; 0: until interrupted").number_between(0.0, 1e6);
   command.footer(
       "Example, in two terminals (ROS_LOCALHOST_ONLY=1 keeps it on this computer):\n"
       "  lapservo sim-robot --rig configs/paper.yaml\n"

@@ -343,15 +343,12 @@ void add_input_options(Command command, TrackOptions& options) {
   command.add_option("--rig", options.rig,
                      "Camera and instruments; without it NAME.rig.yaml or rig.yaml beside the input");
   command.add_option("--method", options.method, "surface: all visible lines; centerline: the paper's Algorithm 1")
-      .shows_default()
       .one_of({"surface", "centerline"});
   command.add_flag("--single", options.single, "Treat every frame on its own, without tracking from the frame before");
   command.add_flag("--deinterlace", options.deinterlace,
                    "For interlaced video (status: interlaced): track the field of the even rows; the same as "
                    "deinterlace: true in the rig's camera");
-  command.add_option("--fps", options.fps, "Frames per second of a folder's images")
-      .shows_default()
-      .number_between(0.001, 100000.0);
+  command.add_option("--fps", options.fps, "Frames per second of a folder's images").number_between(0.001, 100000.0);
 }
 
 }  // namespace
@@ -361,17 +358,15 @@ void add_track(Command app, Run& run_later) {
   Command command =
       app.add_subcommand("track", "Measure the instruments in images, a video, a bag or a camera's frames.");
   add_input_options(command, *options);
-  command
-      .add_option("--out", options->out,
-                  "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
-                  "killed, the rows are in NAME.part, which the next run of that name writes over")
-      .shows_default();
+  command.add_option(
+      "--out", options->out,
+      "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
+      "killed, the rows are in NAME.part, which the next run of that name writes over");
   command.add_option("--overlay", options->overlay,
                      "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
                      "same name");
   add_web_options(command, options->web);
   command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
-      .shows_default()
       .whole_number_between(0, 1000000000);
   command.footer("Example:\n  lapservo track video.mp4 --rig rig.yaml --out obs.csv --overlay overlay.mp4");
   command.runs(run_later, [options] { return run(*options); });

@@ -64,7 +64,6 @@ void add_setpoint_readers_option(Command command, int& setpoint_readers) {
           "--setpoint-readers", setpoint_readers,
           "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
           "is not moved")
-      .shows_default()
       .whole_number_between(1, 64);
 }
 

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 struct AllOptions : FrameOptions {
   std::string rig, boards, board, aruco, motion, turn, swing, joints, judged, judged_joints, report, instrument, redo;
   std::string camera, robot, joint_limits;  // of a live system
-  double square_mm = 0;
+  std::optional<double> square_mm;
   bool no_questions = false, enable_motion = false;
 };
 
@@ -59,7 +59,7 @@ std::string shell_word(const std::string& word) {
 
 std::string command_line(const std::vector<std::string>& arguments) {
   std::string text = "lapservo";
-  for (const std::string& argument : arguments) text += " " + shell_word(argument);
+  for (const std::string& argument : arguments) text.append(" ").append(shell_word(argument));
   return text;
 }
 
@@ -122,7 +122,7 @@ class Guide {
 
   std::vector<Step> steps() {
     AllOptions& o = options_;
-    std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm)};
+    std::vector<std::string> board{"--board", o.board, "--square-mm", fmt::format("{}", o.square_mm.value_or(0))};
     if (!o.aruco.empty()) board.insert(board.end(), {"--aruco", o.aruco});
     return {
         {"camera", "12 or more images of a chessboard: near, sharp, tilted to all sides, in every part of the image",
@@ -194,7 +194,7 @@ class Guide {
       return 0;
     }
     expect_recording(step);
-    if (step.name == "camera" && (options_.board.empty() || options_.square_mm <= 0))
+    if (step.name == "camera" && (options_.board.empty() || !options_.square_mm))
       throw InputError("--boards", "needs --board and --square-mm, for example --board 9x6 --square-mm 5");
     const CalibrationStep now{step.name, command_line(arguments_of(step)), state_of(step), now_utc()};
     if (done && options_.redo != step.name && done->command == now.command && done->inputs == now.inputs)
@@ -314,9 +314,7 @@ void add_calibrate_all(Command parent, Run& run_later) {
   command.add_option("--instrument", options->instrument, "Its name, where the rig has several");
   add_video_options(command, *options);
   command.add_flag("--deinterlace", options->deinterlace, "For interlaced video: measure the field of the even rows");
-  command.add_option("--fps", options->fps, "Frames per second of folders of images")
-      .shows_default()
-      .number_between(0.001, 1000.0);
+  command.add_option("--fps", options->fps, "Frames per second of folders of images").number_between(0.001, 1000.0);
   command.add_option("--redo", options->redo, "A step that is done again though it was done, with those after it")
       .one_of({"camera", "colour", "marker", "registration", "check"});
   command.add_flag("--no-questions", options->no_questions,

@@ -27,7 +27,7 @@ namespace {
 namespace fs = std::filesystem;
 
 Board board_of(const CalibrateCameraOptions& options) {
-  BoardWords words{options.board, 1e-3 * options.square_mm, options.dictionary};
+  BoardWords words{options.board, 1e-3 * options.square_mm.value(), options.dictionary};
   if (options.marker_mm) words.marker_m = 1e-3 * *options.marker_mm;
   return internal::board_of(words);
 }
@@ -150,7 +150,6 @@ void add_calibrate_camera(Command parent, Run& run_later) {
   command.add_option("--camera-info", options->camera_info,
                      "The camera alone, as a ROS camera_info, which a rig's camera may name");
   command.add_option("--views", options->views, "Views to choose from a video or a camera at most")
-      .shows_default()
       .whole_number_between(4, 200);
   command.footer(
       "Show the whole board, flat and sharp, in 12 or more images: in every part of the image, near, and tilted "

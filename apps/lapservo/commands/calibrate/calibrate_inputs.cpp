@@ -33,9 +33,7 @@ void add_recording_options(Command command, CalibrateOptions& options) {
   command.add_flag("--deinterlace", options.deinterlace, "For interlaced video: measure the field of the even rows");
   add_image_topic_option(command, options.image_topic);
   add_video_options(command, options);
-  command.add_option("--fps", options.fps, "Frames per second of a folder of images")
-      .shows_default()
-      .number_between(0.001, 1000.0);
+  command.add_option("--fps", options.fps, "Frames per second of a folder of images").number_between(0.001, 1000.0);
 }
 
 std::size_t named_instrument(const Rig& rig, const std::string& name, const std::string& rig_file) {

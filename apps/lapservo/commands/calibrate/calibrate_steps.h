@@ -12,8 +12,7 @@ namespace lapservo::app {
 struct CalibrateCameraOptions : FrameOptions {
   std::vector<std::string> inputs;
   std::string rig, out, camera_info, board, dictionary;
-  double square_mm = 0;
-  std::optional<double> marker_mm;
+  std::optional<double> square_mm, marker_mm;
   std::size_t views = 30;
 
   /// Where the rig goes; empty without one.

@@ -199,7 +199,6 @@ void add_arm_options(Command command, ServoOptions& options) {
       .add_option("--control", options.control,
                   "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "
                   "network may publish, both, or nobody but Ctrl-C")
-      .shows_default()
       .one_of({"none", "page", "topics", "page,topics"});
   command.add_option("--operator-present", options.operator_present,
                      "Move the arm only while a button is pressed, and said to be every 0.2 s: of this topic, a "
@@ -214,10 +213,9 @@ void add_arm_options(Command command, ServoOptions& options) {
 }
 
 void add_trajectory_options(Command command, ServoOptions& options) {
-  command
-      .add_option("--trajectory", options.trajectory,
-                  "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px")
-      .shows_default();
+  command.add_option(
+      "--trajectory", options.trajectory,
+      "paper: section V-D's sinusoids, omega 0.5 read in rad/s; or a CSV of time_s,s_rad,r_px,l_px,d_px");
   command.add_option("--set-point", options.set_point, "Instead: s_rad,r_px,l_px,d_px to reach and keep")
       .finite_number()
       .delimiter(',')
@@ -232,19 +230,17 @@ void add_trajectory_options(Command command, ServoOptions& options) {
 }
 
 void add_control_options(Command command, ServoOptions& options) {
-  command
-      .add_option("--method", options.method,
-                  "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
-                  "uncalibrated: learns "
-                  "the Jacobian")
-      .shows_default();
+  command.add_option("--method", options.method,
+                     "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
+                     "uncalibrated: learns "
+                     "the Jacobian");
   command
       .add_option("--tracker", options.tracker,
                   "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
                   "--method paper, else surface")
       .one_of({"surface", "centerline"});
   command.add_option("--controller", options.controller, "YAML: gains_per_s, limits, window, delay_s ...");
-  command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`").shows_default();
+  command.add_option("--delay-ms", options.delay, "The images' age, or `estimate`");
   command.add_option("--rcm-px", options.rcm_px, "Image of the RCM u,v, for --method uncalibrated")
       .finite_number()
       .delimiter(',')
@@ -274,10 +270,8 @@ void add_simulator_options(Command command, ServoOptions& options) {
       .finite_number()
       .delimiter(',')
       .expected(4);
-  command.add_option("--seed", options.seed, "sim: of start, tissue, noise, jitter").shows_default().seed_number();
-  command.add_option("--latency-ms", options.latency_ms, "sim: from exposure to arrival")
-      .shows_default()
-      .number_between(0.0, 1000.0);
+  command.add_option("--seed", options.seed, "sim: of start, tissue, noise, jitter").seed_number();
+  command.add_option("--latency-ms", options.latency_ms, "sim: from exposure to arrival").number_between(0.0, 1000.0);
   command
       .add_option("--fps", options.fps,
                   "Control periods, and frames in sim, a second; else 60 in sim and 120 with an arm")
