@@ -106,7 +106,7 @@ Series by_light(const IlluminationResult::OfMethod& of_method) {
 
 Plot distance_plot(const std::string& title, Axis x, const std::string& y, const IlluminationResult& result,
                    Series (*series_of)(const IlluminationResult::OfMethod&)) {
-  Plot plot{title, std::move(x), {y, "px", {}, {}, true}, {}, {}, false};
+  Plot plot{title, std::move(x), {y, "px", {}, {}, true}};
   for (const auto& of_method : result.methods) plot.series.push_back(series_of(of_method));
   return plot;
 }
@@ -223,7 +223,7 @@ void write_data(const IlluminationResult& result, const std::filesystem::path& f
 }
 
 ReportSection section_of(const IlluminationResult& result, const ExperimentSetup& setup) {
-  ReportSection section{"illumination", "Illumination (section V-B)", {}, {}, {}, {}, {}, {}, {}};
+  ReportSection section{"illumination", "Illumination (section V-B)"};
   section.text = {fmt::format(
       "The instrument stands still at {} positions spread over the field of view, lit at {} of the lamps\u2019 power. "
       "Each of the four boundary points should stay where it is. As in the paper: of each point in each position the "

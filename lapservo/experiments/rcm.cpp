@@ -63,8 +63,8 @@ Figure cloud_of_intersections(const RcmResult::OfMethod& of_method, const Eigen:
     return at.set == 0 ? PlotPoint({at.px.x() - true_px.x(), at.px.y() - true_px.y()}) : std::nullopt;
   };
   Plot plot{"Intersections about the truth: " + method_title(of_method.method),
-            {"error in u", "px", {}, {}},
-            {"error in v", "px", {}, {}},
+            {"error in u", "px"},
+            {"error in v", "px"},
             {{"truth", {0}, {0}, Draw::points, -1},
              series_of("of two lines", of_method.intersections, of_set, Draw::points, method_colour(of_method.method))},
             {},
@@ -81,8 +81,7 @@ Plot fractions_within(const RcmResult& result) {
             {"distance", "px", {}, {}, true},
             {"fraction within", "%", 0, 100},
             {},
-            {{"half of them", 50}},
-            false};
+            {{"half of them", 50}}};
   for (const auto& of_method : result.methods) {
     Series series{method_title(of_method.method), {}, {}, Draw::line, method_colour(of_method.method)};
     const auto distances = distances_of(of_method, 0);
@@ -103,8 +102,7 @@ Plot fractions_within(const RcmResult& result) {
 // The lines of the first set, from the RCM to their far ends.
 Plot fan(const RcmResult& result, const Camera& camera) {
   const RcmResult::OfMethod& of_method = result.methods.back();
-  Plot plot{
-      "The centre lines of the first set meet in the RCM", {"u", "px", {}, {}}, {"v", "px", {}, {}}, {}, {}, true};
+  Plot plot{"The centre lines of the first set meet in the RCM", {"u", "px"}, {"v", "px"}, {}, {}, true};
   const double right = camera.width_px - 1, bottom = camera.height_px - 1;
   plot.series.push_back({"image", {0, right, right, 0, 0}, {0, 0, bottom, bottom, 0}, Draw::dashed, -1});
   Series extended{"", {}, {}, Draw::line, -1}, seen{"e0 to e3", {}, {}, Draw::line, method_colour(of_method.method)};
@@ -126,8 +124,7 @@ Plot fan(const RcmResult& result, const Camera& camera) {
 Table by_estimator(const RcmResult& result) {
   Table table{
       "Distance of the estimate from the true RCM",
-      {"lines of", "estimator", "mean [px]", "std [px]", "median [px]", "largest [px]", "error / sigma", "sets"},
-      {}};
+      {"lines of", "estimator", "mean [px]", "std [px]", "median [px]", "largest [px]", "error / sigma", "sets"}};
   for (const auto& of_method : result.methods)
     for (const bool pairwise : {true, false}) {
       const auto& of = pairwise ? of_method.pairwise : of_method.least_squares;
@@ -278,7 +275,7 @@ void write_data(const RcmResult& result, const std::filesystem::path& folder) {
 }
 
 ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) {
-  ReportSection section{"rcm", "Image of the RCM (section V-B)", {}, {}, {}, {}, {}, {}, {}};
+  ReportSection section{"rcm", "Image of the RCM (section V-B)"};
   section.text = {
       fmt::format(
           "Every centre line, extended, passes through the image of the remote centre of motion (RCM), here in view at "

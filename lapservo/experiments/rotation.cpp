@@ -33,12 +33,8 @@ std::string mrad(double rad) {
 
 // Fig. 5 of the paper.
 Plot one_trial(const RotationResult& result) {
-  Plot plot{fmt::format("Figure 5: one trial, from {:.2f} rad", initial_rotation_rad(0)),
-            {"time", "s", {}, {}},
-            {"rotation", "rad", {}, {}},
-            {},
-            {},
-            false};
+  Plot plot{
+      fmt::format("Figure 5: one trial, from {:.2f} rad", initial_rotation_rad(0)), {"time", "s"}, {"rotation", "rad"}};
   Series reference{"reference", {}, {}, Draw::dashed, -1};
   for (int step = 0; step < RotationResult::steps; ++step) {
     reference.x.push_back(RotationResult::turn_s * step / RotationResult::steps);
@@ -57,11 +53,10 @@ Plot one_trial(const RotationResult& result) {
 // Fig. 6 of the paper.
 Plot distribution_by_trial(const RotationResult::OfMethod& of_method) {
   Plot plot{"Figure 6: errors by trial, " + method_title(of_method.method),
-            {"initial rotation", "rad", {}, {}},
-            {"error", "mrad", {}, {}},
+            {"initial rotation", "rad"},
+            {"error", "mrad"},
             {},
-            {{"no error", 0}},
-            false};
+            {{"no error", 0}}};
   const auto of_set = [](const RotationResult::Sample& sample) {
     return sample.set == 0 ? PlotPoint({initial_rotation_rad(sample.trial), 1e3 * sample.error_rad()}) : std::nullopt;
   };
@@ -71,8 +66,7 @@ Plot distribution_by_trial(const RotationResult::OfMethod& of_method) {
 
 Table table_one(const RotationResult& result) {
   Table table{"Table I: mean and standard deviation of the error in each trial of the first set [mrad]",
-              {"initial rotation [rad]", "the paper: mean", "std"},
-              {}};
+              {"initial rotation [rad]", "the paper: mean", "std"}};
   for (const auto& of_method : result.methods) {
     table.header.push_back((of_method.method == Method::centerline ? "its method here" : "the default here") +
                            std::string(": mean"));
@@ -241,7 +235,7 @@ void write_data(const RotationResult& result, const std::filesystem::path& folde
 }
 
 ReportSection section_of(const RotationResult& result, const ExperimentSetup& setup) {
-  ReportSection section{"rotation", "Rotation (section V-C)", {}, {}, {}, {}, {}, {}, {}};
+  ReportSection section{"rotation", "Rotation (section V-C)"};
   section.text = {fmt::format(
       "{} trials start at rotations from {:.2f} to {:.2f} rad, each at its own place in the field of view. In each the "
       "instrument turns about its shaft once round, in {} steps, and the rotation measured in every frame is compared "

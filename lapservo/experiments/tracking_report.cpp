@@ -100,8 +100,7 @@ Plot error_plot(const TrackingRun& run, double from_s) {
 Table run_table(const TrackingResult& result) {
   Table table{"All runs; rms, mean and largest error over the last third, with the hidden marker from its return on",
               {"run", "latency [ms]", "estimated [ms]", "converged", "rms s [mrad]", "rms r, l, d [px]",
-               "mean r, l, d [px]", "largest r, l, d [px]", "largest rate / limit"},
-              {}};
+               "mean r, l, d [px]", "largest r, l, d [px]", "largest rate / limit"}};
   const auto three = [](const Eigen::Vector4d& v, bool sign) {
     return sign ? fmt::format("{:+.3f}, {:+.3f}, {:+.3f}", v[1], v[2], v[3])
                 : fmt::format("{:.3f}, {:.3f}, {:.3f}", v[1], v[2], v[3]);
@@ -118,8 +117,7 @@ Table run_table(const TrackingResult& result) {
 Table decay_table(const TrackingResult& result, const Eigen::Vector4d& gains_per_s) {
   Table table{
       "The paper\u2019s law: decay of each feature\u2019s error (eq. 22); \u2013 where it was small from the start",
-      {"feature", "K [a period]", "K [1/s]", "Algorithm 1 [1/s]", "our tracker [1/s]"},
-      {}};
+      {"feature", "K [a period]", "K [1/s]", "Algorithm 1 [1/s]", "our tracker [1/s]"}};
   for (std::size_t k = 0; k < 4; ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const auto decay = [i](const TrackingRun& run) { return decay_text(run.decay_per_s[i]); };
@@ -210,7 +208,7 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
   const Eigen::Vector4d papers_per_s = tracking_controller(papers, setup.rig.camera).gains.per_s,
                         ours_per_s = tracking_controller(ours, setup.rig.camera).gains.per_s;
   const SimulatorConfig simulated = tracking_simulator(ours, setup.seed);
-  ReportSection section{"tracking", "Trajectory tracking (section V-D)", {}, {}, {}, {}, {}, {}, {}};
+  ReportSection section{"tracking", "Trajectory tracking (section V-D)"};
   section.text = {fmt::format(
       "From a random start in the field of view the instrument follows {}, driven by what the simulated endoscope "
       "sees: "

@@ -19,8 +19,8 @@ struct Comparison {
 struct Table {
   std::string caption;
   std::vector<std::string> header;
-  std::vector<std::vector<std::string>> rows;  ///< each as long as the header
-  bool words = false;                          ///< sentences, which may break, not numbers
+  std::vector<std::vector<std::string>> rows = {};  ///< each as long as the header
+  bool words = false;                               ///< sentences, which may break, not numbers
 };
 
 /// 8-bit BGR.
@@ -38,14 +38,14 @@ struct Figure {
 struct ReportSection {
   std::string id;  ///< a word: the link to it
   std::string title;
-  std::vector<std::string> text;
-  std::vector<Comparison> comparisons;  ///< those that have a figure of the paper's stand in the summary too
-  std::vector<Figure> figures;
-  std::vector<Table> tables;
-  std::vector<std::string> notes;  ///< how to read it, what departs from the paper
-  std::string command;             ///< that makes it again
-  std::vector<std::string> files;  ///< CSVs beside the report
-  std::string unfinished = {};     ///< what is missing, when it was stopped before its end
+  std::vector<std::string> text = {};
+  std::vector<Comparison> comparisons = {};  ///< those that have a figure of the paper's stand in the summary too
+  std::vector<Figure> figures = {};
+  std::vector<Table> tables = {};
+  std::vector<std::string> notes = {};  ///< how to read it, what departs from the paper
+  std::string command = {};             ///< that makes it again
+  std::vector<std::string> files = {};  ///< CSVs beside the report
+  std::string unfinished = {};          ///< what is missing, when it was stopped before its end
 };
 
 struct Report {

@@ -100,24 +100,11 @@ std::string colour_class(int colour) {
 }
 
 // A point's mark, of about the same area for every shape.
-std::string shape_path(int colour, double x, double y, double size) {
-  switch (colour < 0 ? 0 : colour % 5) {
-    case 1:
-      return fmt::format("M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z", x - 0.9 * size, y - 0.9 * size, 1.8 * size, 1.8 * size,
-                         -1.8 * size);
-    case 2:
-      return fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}h{:.1f}z", x, y - 1.2 * size, 1.2 * size, 2.1 * size,
-                         -2.4 * size);
-    case 3:
-      return fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}l{:.1f} {:.1f}l{:.1f} {:.1f}z", x, y - 1.3 * size, 1.3 * size,
-                         1.3 * size, -1.3 * size, 1.3 * size, -1.3 * size, -1.3 * size);
-    case 4:
-      return fmt::format("M{:.1f} {:.1f}l{:.1f} {:.1f}h{:.1f}z", x, y + 1.2 * size, 1.2 * size, -2.1 * size,
-                         -2.4 * size);
-    default:
-      return fmt::format("M{:.1f} {:.1f}a{:.1f} {:.1f} 0 1 0 {:.1f} 0a{:.1f} {:.1f} 0 1 0 {:.1f} 0z", x - size, y, size,
-                         size, 2 * size, size, size, -2 * size);
-  }
+std::string mark(const char* css_class, int colour, double x, double y, double size) {
+  static constexpr std::array shapes{"M-1 0a1 1 0 1 0 2 0a1 1 0 1 0-2 0z", "M-.9-.9h1.8v1.8h-1.8z",
+                                     "M0-1.2l1.2 2.1h-2.4z", "M0-1.3l1.3 1.3-1.3 1.3-1.3-1.3z", "M0 1.2l1.2-2.1h-2.4z"};
+  return fmt::format("<path class=\"{}{}\" transform=\"translate({:.1f} {:.1f}) scale({:.1f})\" d=\"{}\"", css_class,
+                     colour_class(colour), x, y, size, shapes[colour < 0 ? 0 : static_cast<std::size_t>(colour % 5)]);
 }
 
 bool has_line(Draw draw) {
@@ -160,10 +147,8 @@ std::string points_of(const Plot& plot, const Layout& layout, const Series& seri
   std::string text;
   for (std::size_t i = 0; i < series.x.size(); ++i) {
     if (!drawable(layout, series, i)) continue;
-    text += fmt::format("<path class=\"{}{}\" d=\"{}\"><title>{}</title></path>\n", point_class(series.draw),
-                        colour_class(series.colour),
-                        shape_path(series.colour, layout.x(series.x[i]), layout.y(series.y[i]), size),
-                        hover_text(plot, series, i));
+    text += mark(point_class(series.draw), series.colour, layout.x(series.x[i]), layout.y(series.y[i]), size) +
+            "><title>" + hover_text(plot, series, i) + "</title></path>\n";
   }
   return text;
 }
@@ -220,10 +205,8 @@ std::string hover_points_of(const Plot& plot, const Layout& layout, const Series
   return text;
 }
 
-std::string drawn(const Plot& plot, const Layout& layout, const Series& given) {
-  if (given.draw == Draw::boxes) return boxes_of(plot, layout, given);
-  const bool many = has_line(given.draw) && given.x.size() > 2000;
-  const Series series = many ? thinned(given, static_cast<int>(width_px)) : given;
+std::string drawn(const Plot& plot, const Layout& layout, const Series& series) {
+  if (series.draw == Draw::boxes) return boxes_of(plot, layout, series);
   std::string text;
   if (has_line(series.draw))
     text += fmt::format("<path class=\"line s-{}{}\" d=\"{}\"/>\n", colour_class(series.colour),
@@ -260,8 +243,7 @@ std::string drawn(const LegendEntry& entry) {
     text += fmt::format("<path class=\"line s-{}{}\" d=\"M{:.1f} {:.1f}h22\"/>", colour_class(colour),
                         !entry.series || entry.series->draw == Draw::dashed ? " dashed" : "", entry.x_px, middle);
   if (entry.series && has_points(entry.series->draw))
-    text += fmt::format("<path class=\"{}{}\" d=\"{}\"/>", point_class(entry.series->draw), colour_class(colour),
-                        shape_path(colour, entry.x_px + 11, middle, 4));
+    text += mark(point_class(entry.series->draw), colour, entry.x_px + 11, middle, 4) + "/>";
   return text +
          fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", entry.x_px + 28, entry.y_px, escaped(entry.name));
 }
@@ -403,61 +385,22 @@ std::vector<std::string> tick_labels(const std::vector<double>& ticks) {
   return labels;
 }
 
-Series thinned(const Series& series, int columns) {
-  if (series.x.empty() || series.x.size() <= 4 * static_cast<std::size_t>(columns)) return series;
-  Series thin = series;
-  thin.x.clear(), thin.y.clear();
-  const double low = series.x.front(), span = series.x.back() - low;
-  const auto column_of = [&](std::size_t i) {
-    return span > 0 ? std::min(columns - 1, static_cast<int>((series.x[i] - low) / span * columns)) : 0;
-  };
-  for (std::size_t first = 0; first < series.x.size();) {
-    std::size_t last = first, lowest = first, highest = first;
-    for (std::size_t i = first; i < series.x.size() && column_of(i) == column_of(first); ++i) {
-      last = i;
-      if (!(series.y[i] >= series.y[lowest])) lowest = i;
-      if (!(series.y[i] <= series.y[highest])) highest = i;
-    }
-    std::array<std::size_t, 4> kept{first, lowest, highest, last};
-    std::sort(kept.begin(), kept.end());
-    const auto end = std::unique(kept.begin(), kept.end());
-    for (auto i = kept.begin(); i != end; ++i) thin.x.push_back(series.x[*i]), thin.y.push_back(series.y[*i]);
-    first = last + 1;
-  }
-  return thin;
-}
-
 std::string escaped(const std::string& text) {
+  static const std::map<char, std::string> entities{
+      {'&', "&amp;"}, {'<', "&lt;"}, {'>', "&gt;"}, {'"', "&quot;"}, {'\'', "&#39;"}};
   std::string safe;
-  for (const char c : text) switch (c) {
-      case '&':
-        safe += "&amp;";
-        break;
-      case '<':
-        safe += "&lt;";
-        break;
-      case '>':
-        safe += "&gt;";
-        break;
-      case '"':
-        safe += "&quot;";
-        break;
-      case '\'':
-        safe += "&#39;";
-        break;
-      default:
-        if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t') safe += c;  // others are not HTML
-    }
+  for (const char c : text) {
+    const auto entity = entities.find(c);
+    if (entity != entities.end())
+      safe += entity->second;
+    else if (static_cast<unsigned char>(c) >= 0x20 || c == '\n' || c == '\t')
+      safe += c;  // others are not HTML
+  }
   return safe;
 }
 
 Plot time_plot(std::string title, std::string label, std::string unit, std::vector<Series> series) {
-  return {std::move(title),
-          {"time", "s", {}, {}},
-          {std::move(label), std::move(unit), {}, {}},
-          std::move(series),
-          {},
-          false};
+  return {std::move(title), {"time", "s"}, {std::move(label), std::move(unit)}, std::move(series)};
 }
 
 std::string svg_from(const Plot& plot) {
@@ -515,7 +458,7 @@ std::string plot_css() {
       ".plot .line{fill:none;stroke-width:1.8;stroke-linejoin:round}.plot .dashed{stroke-dasharray:6 4}\n"
       ".plot .box{fill-opacity:.25;stroke-width:1.4}.plot "
       ".bar{stroke-width:1.4;opacity:.6}.plot .hover{fill:transparent}\n"
-      ".plot .ring{fill:none;stroke-width:1.4}\n"
+      ".plot .ring{fill:none;stroke-width:1.4}.plot .ring,.plot .point{vector-effect:non-scaling-stroke}\n"
       ".plot .point{fill-opacity:.8}.plot .point:hover,.plot .hover:hover{stroke:var(--ink);stroke-width:1.5}\n";
   for (const char* name : {"c0", "c1", "c2", "c3", "c4", "grey"})
     css += fmt::format(".s-{0}{{stroke:var(--{0})}}.f-{0}{{fill:var(--{0})}}\n", name);

@@ -34,8 +34,8 @@ Series series_of(std::string name, const Items& items, PointOf point_of, Draw dr
 
 struct Axis {
   std::string label, unit;
-  std::optional<double> low, high;  ///< else from the data
-  bool logarithmic = false;         ///< then values of 0 and below are not drawn
+  std::optional<double> low = {}, high = {};  ///< else from the data
+  bool logarithmic = false;                   ///< then values of 0 and below are not drawn
 };
 
 /// A horizontal line to compare with.
@@ -47,8 +47,8 @@ struct ReferenceLine {
 struct Plot {
   std::string title;
   Axis x, y;
-  std::vector<Series> series;
-  std::vector<ReferenceLine> references;
+  std::vector<Series> series = {};
+  std::vector<ReferenceLine> references = {};
   bool image_plane = false;  ///< one scale for both axes, y down
 };
 
@@ -56,7 +56,7 @@ struct Plot {
 Plot time_plot(std::string title, std::string label, std::string unit, std::vector<Series> series);
 
 /// The plot as an <svg> element for an HTML page that has plot_css(). Readable at 340 px of width; every point shows
-/// its numbers under the pointer. Lines of many points are thinned to the visible resolution.
+/// its numbers under the pointer.
 std::string svg_from(const Plot& plot);
 
 /// How many points the axes of svg_from() leave out, because a limit is nearer than the data.
@@ -79,10 +79,6 @@ std::vector<double> nice_logarithmic_ticks(double low, double high);
 
 /// Labels of ticks, as short as they stay distinct.
 std::vector<std::string> tick_labels(const std::vector<double>& ticks);
-
-/// A line with at most four points for each of `columns` parts of its x range (first, lowest, highest, last): looks the
-/// same. Needs x that does not decrease.
-Series thinned(const Series& series, int columns);
 
 /// Text for HTML and SVG, in elements and in quoted attributes.
 std::string escaped(const std::string& text);

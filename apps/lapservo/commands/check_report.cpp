@@ -86,7 +86,7 @@ Series residual_means(const std::vector<PrintResidual>& residuals, std::size_t b
 Plot print_plot(const std::vector<PrintResidual>& residuals) {
   Plot plot{"Boundaries about the rig's print",
             {"tau", "deg", 0, 360},
-            {"along the shaft", "mm", {}, {}},
+            {"along the shaft", "mm"},
             {},
             {{"the rig's print", 0}}};
   for (std::size_t boundary = 0; boundary < 4; ++boundary) plot.series.push_back(residual_means(residuals, boundary));
