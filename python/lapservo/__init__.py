@@ -27,48 +27,7 @@ from ._calibration import (
 )
 from ._display import Picture
 from ._errors import InputError
-from ._lapservo import (
-    Camera,
-    Clock,
-    Controller,
-    ControlTick,
-    Frame,
-    FrameSource,
-    ImageStream,
-    Instrument,
-    JointPath,
-    Joints,
-    JointState,
-    Kinematics,
-    Marker,
-    MarkerPose,
-    Observation,
-    ObservationCsv,
-    RcmEstimate,
-    Renderer,
-    Rig,
-    Robot,
-    Simulator,
-    SteadyClock,
-    Tracker,
-    Trajectory,
-    camera_from_marker,
-    design_marker,
-    estimate_rcm,
-    load_trajectory,
-    open_frames,
-    paper_trajectory,
-    print_marker,
-    read_image,
-    run,
-    set_point,
-    sinusoids,
-    via_points,
-)
-try:
-    from ._lapservo import Ros2Camera, Ros2Robot  # not in a build without Cyclone DDS
-except ImportError:
-    pass
+from ._lapservo import *  # noqa: F403, all that this build has: __init__.pyi lists it
 from ._observation import Sigmas
 from ._status import Status
 
