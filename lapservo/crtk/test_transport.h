@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -7,6 +8,7 @@
 #include <string>
 #include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "lapservo/crtk/transport.h"
@@ -16,36 +18,8 @@ namespace lapservo::internal {
 /// Topics in memory: messages that are published are kept; handlers get what say() says, in the caller's thread.
 class TestTransport : public Transport {
  public:
-  using Topic = const std::string&;
-  Publisher<JointMessage> joint_publisher(Topic topic) override { return keep(topic); }
-  Publisher<JointMessage> set_point_publisher(Topic topic) override { return keep(topic); }
-  Publisher<OperatingStateMessage> operating_state_publisher(Topic topic) override { return keep(topic); }
-  Publisher<StringMessage> string_publisher(Topic topic) override { return keep(topic); }
-  Publisher<JoyMessage> joy_publisher(Topic topic) override { return keep(topic); }
-  Publisher<BoolMessage> bool_publisher(Topic topic) override { return keep(topic); }
-  Publisher<TrajectoryMessage> trajectory_publisher(Topic topic) override { return keep(topic); }
-  Publisher<ImageMessage> image_publisher(Topic topic) override { return keep(topic); }
-  Publisher<CompressedImageMessage> compressed_image_publisher(Topic topic) override { return keep(topic); }
-  Publisher<CameraInfoMessage> camera_info_publisher(Topic topic) override { return keep(topic); }
-
-  Publisher<PoseMessage> pose_publisher(Topic topic) override { return keep(topic); }
-  Publisher<DiagnosticMessage> diagnostic_publisher(Topic topic) override { return keep(topic); }
-  Publisher<ObservationMessage> observation_publisher(Topic topic) override { return keep(topic); }
-
-  Subscription subscribe_joints(Topic topic, Handler<JointMessage> handler) override { return add(topic, handler); }
-  Subscription subscribe_operating_state(Topic topic, Handler<OperatingStateMessage> handler) override {
-    return add(topic, handler);
-  }
-  Subscription subscribe_strings(Topic topic, Handler<StringMessage> handler) override { return add(topic, handler); }
-  Subscription subscribe_buttons(Topic topic, Handler<BoolMessage> handler) override { return add(topic, handler); }
-  Subscription subscribe_commands(Topic topic, CommandType, Handler<CommandMessage> handler) override {
-    return add(topic, handler);
-  }
-  Subscription subscribe_trajectories(Topic topic, Handler<TrajectoryMessage> handler) override {
-    return add(topic, handler);
-  }
-  Subscription subscribe_images(Topic topic, Handler<ImageMessage> handler) override { return add(topic, handler); }
-  Subscription subscribe_compressed_images(Topic topic, Handler<CompressedImageMessage> handler) override {
+  Publisher<JointMessage> set_point_publisher(const std::string& topic) override { return joint_publisher(topic); }
+  Subscription subscribe_commands(const std::string& topic, CommandType, Handler<CommandMessage> handler) override {
     return add(topic, handler);
   }
   std::set<std::string> readers(const std::string&) const override { return readers_; }
@@ -85,18 +59,20 @@ class TestTransport : public Transport {
   Kept<Message>& kept() {
     return std::get<Kept<Message>>(kept_);
   }
-  struct Keeper {
-    TestTransport* transport;
-    std::string topic;
-    template <typename Message>
-    void operator()(const Message& message) const {
-      const std::lock_guard lock(transport->mutex_);
-      transport->kept<Message>()[topic].push_back(message);
-    }
-  };
-  Keeper keep(const std::string& topic) { return {this, topic}; }
+  void open(const std::string& topic, AnyPublisher& publisher) override {
+    const auto make = [&]<typename Message>(Publisher<Message>& one) {
+      one = [this, topic](const Message& message) {
+        const std::lock_guard lock(mutex_);
+        kept<Message>()[topic].push_back(message);
+      };
+    };
+    std::visit(make, publisher);
+  }
+  Subscription listen(const std::string& topic, const AnyHandler& handler) override {
+    return std::visit([&](const auto& one) { return add(topic, one); }, handler);
+  }
   template <typename Message>
-  Subscription add(const std::string& topic, const Handler<Message>& handler) {
+  Subscription add(const std::string& topic, const std::function<void(Message&&)>& handler) {
     auto shared = std::make_shared<Handler<Message>>(handler);
     handlers<Message>()[topic].push_back(shared);
     return shared;

@@ -7,7 +7,9 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "lapservo/core/wall_clock.h"
 #include "transports/ros1/ros1_names.h"
@@ -116,92 +118,28 @@ double Ros1Transport::stamp_now_s() const {
   return since_1970_s();
 }
 
-Transport::Publisher<JointMessage> Ros1Transport::joint_publisher(const std::string& topic) {
-  return publisher<JointMessage>(node_, readers_, topic, few);
+void Ros1Transport::open(const std::string& topic, AnyPublisher& made) {
+  const auto make = [&]<typename Message>(Publisher<Message>& one) {
+    constexpr bool latched = std::is_same_v<Message, OperatingStateMessage>;
+    one = publisher<Message>(node_, readers_, topic, is_image<Message> ? newest : few, latched);
+  };
+  std::visit(make, made);
 }
 
 Transport::Publisher<JointMessage> Ros1Transport::set_point_publisher(const std::string& topic) {
   return publisher<JointMessage>(node_, readers_, topic, 1);
 }
 
-Transport::Publisher<OperatingStateMessage> Ros1Transport::operating_state_publisher(const std::string& topic) {
-  return publisher<OperatingStateMessage>(node_, readers_, topic, few, true);
-}
-
-Transport::Publisher<StringMessage> Ros1Transport::string_publisher(const std::string& topic) {
-  return publisher<StringMessage>(node_, readers_, topic, few);
-}
-
-Transport::Publisher<JoyMessage> Ros1Transport::joy_publisher(const std::string& topic) {
-  return publisher<JoyMessage>(node_, readers_, topic, few);
-}
-
-Transport::Publisher<BoolMessage> Ros1Transport::bool_publisher(const std::string& topic) {
-  return publisher<BoolMessage>(node_, readers_, topic, few);
-}
-
-Transport::Publisher<TrajectoryMessage> Ros1Transport::trajectory_publisher(const std::string& topic) {
-  return publisher<TrajectoryMessage>(node_, readers_, topic, few);
-}
-
-Transport::Publisher<ImageMessage> Ros1Transport::image_publisher(const std::string& topic) {
-  return publisher<ImageMessage>(node_, readers_, topic, newest);
-}
-
-Transport::Publisher<CompressedImageMessage> Ros1Transport::compressed_image_publisher(const std::string& topic) {
-  return publisher<CompressedImageMessage>(node_, readers_, topic, newest);
-}
-
-Transport::Publisher<CameraInfoMessage> Ros1Transport::camera_info_publisher(const std::string& topic) {
-  return publisher<CameraInfoMessage>(node_, readers_, topic, few);
-}
-
-Transport::Publisher<PoseMessage> Ros1Transport::pose_publisher(const std::string& topic) {
-  return publisher<PoseMessage>(node_, readers_, topic, few);
-}
-
-Transport::Publisher<DiagnosticMessage> Ros1Transport::diagnostic_publisher(const std::string& topic) {
-  return publisher<DiagnosticMessage>(node_, readers_, topic, few);
-}
-
-Transport::Publisher<ObservationMessage> Ros1Transport::observation_publisher(const std::string& topic) {
-  return publisher<ObservationMessage>(node_, readers_, topic, few);
-}
-
-Transport::Subscription Ros1Transport::subscribe_joints(const std::string& topic, Handler<JointMessage> handler) {
-  return subscription<JointMessage>(node_, topic, few, handler);
-}
-
-Transport::Subscription Ros1Transport::subscribe_operating_state(const std::string& topic,
-                                                                 Handler<OperatingStateMessage> handler) {
-  return subscription<OperatingStateMessage>(node_, topic, few, handler);
-}
-
-Transport::Subscription Ros1Transport::subscribe_strings(const std::string& topic, Handler<StringMessage> handler) {
-  return subscription<StringMessage>(node_, topic, few, handler);
-}
-
-Transport::Subscription Ros1Transport::subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) {
-  return subscription<BoolMessage>(node_, topic, few, handler);
+Transport::Subscription Ros1Transport::listen(const std::string& topic, const AnyHandler& handler) {
+  const auto subscribe = [&]<typename Message>(const Handler<Message>& one) {
+    return subscription<Message>(node_, topic, is_image<Message> ? newest : few, one);
+  };
+  return std::visit(subscribe, handler);
 }
 
 Transport::Subscription Ros1Transport::subscribe_commands(const std::string& topic, CommandType,
                                                           Handler<CommandMessage> handler) {
   return subscription<CommandMessage>(node_, topic, few, handler);
-}
-
-Transport::Subscription Ros1Transport::subscribe_trajectories(const std::string& topic,
-                                                              Handler<TrajectoryMessage> handler) {
-  return subscription<TrajectoryMessage>(node_, topic, few, handler);
-}
-
-Transport::Subscription Ros1Transport::subscribe_images(const std::string& topic, Handler<ImageMessage> handler) {
-  return subscription<ImageMessage>(node_, topic, newest, handler);
-}
-
-Transport::Subscription Ros1Transport::subscribe_compressed_images(const std::string& topic,
-                                                                   Handler<CompressedImageMessage> handler) {
-  return subscription<CompressedImageMessage>(node_, topic, newest, handler);
 }
 
 }  // namespace lapservo::internal

@@ -9,7 +9,9 @@
 #include <map>
 #include <set>
 #include <thread>
+#include <type_traits>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "lapservo/core/wall_clock.h"
@@ -74,6 +76,15 @@ std::vector<const dds_topic_descriptor_t*> types_of(CommandType command) {
   return {};
 }
 
+template <typename Message>
+std::vector<Delivery> deliveries_of() {
+  if constexpr (std::is_same_v<Message, OperatingStateMessage>)
+    return {Delivery::latched, Delivery::reliable, Delivery::best_effort};
+  if constexpr (std::is_same_v<Message, StringMessage> || std::is_same_v<Message, TrajectoryMessage>)
+    return {Delivery::reliable, Delivery::best_effort};
+  return {Delivery::best_effort};
+}
+
 // Readers of a topic with the thread that takes from them.
 class Reading {
  public:
@@ -99,8 +110,6 @@ class Reading {
     dds_delete(waitset_);
     for (const dds_entity_t reader : readers_) node_->remove(reader);
   }
-  Reading(const Reading&) = delete;
-  Reading& operator=(const Reading&) = delete;
 
  private:
   void work() {
@@ -205,96 +214,33 @@ double Ros2Transport::stamp_now_s() const {
   return since_1970_s();
 }
 
-Transport::Publisher<JointMessage> Ros2Transport::joint_publisher(const std::string& topic) {
-  return implementation_->publisher<JointMessage>(topic, Delivery::reliable);
+void Ros2Transport::open(const std::string& topic, AnyPublisher& publisher) {
+  const auto make = [&]<typename Message>(Publisher<Message>& one) {
+    constexpr bool latched = std::is_same_v<Message, OperatingStateMessage>;
+    one = implementation_->publisher<Message>(topic, latched             ? Delivery::latched
+                                                     : is_image<Message> ? Delivery::best_effort
+                                                                         : Delivery::reliable);
+  };
+  std::visit(make, publisher);
 }
 
 Transport::Publisher<JointMessage> Ros2Transport::set_point_publisher(const std::string& topic) {
   return implementation_->publisher<JointMessage>(topic, Delivery::set_point);
 }
 
-Transport::Publisher<OperatingStateMessage> Ros2Transport::operating_state_publisher(const std::string& topic) {
-  return implementation_->publisher<OperatingStateMessage>(topic, Delivery::latched);
-}
-
-Transport::Publisher<StringMessage> Ros2Transport::string_publisher(const std::string& topic) {
-  return implementation_->publisher<StringMessage>(topic, Delivery::reliable);
-}
-
-Transport::Publisher<JoyMessage> Ros2Transport::joy_publisher(const std::string& topic) {
-  return implementation_->publisher<JoyMessage>(topic, Delivery::reliable);
-}
-
-Transport::Publisher<BoolMessage> Ros2Transport::bool_publisher(const std::string& topic) {
-  return implementation_->publisher<BoolMessage>(topic, Delivery::reliable);
-}
-
-Transport::Publisher<TrajectoryMessage> Ros2Transport::trajectory_publisher(const std::string& topic) {
-  return implementation_->publisher<TrajectoryMessage>(topic, Delivery::reliable);
-}
-
-Transport::Publisher<ImageMessage> Ros2Transport::image_publisher(const std::string& topic) {
-  return implementation_->publisher<ImageMessage>(topic, Delivery::best_effort);
-}
-
-Transport::Publisher<CompressedImageMessage> Ros2Transport::compressed_image_publisher(const std::string& topic) {
-  return implementation_->publisher<CompressedImageMessage>(topic, Delivery::best_effort);
-}
-
-Transport::Publisher<CameraInfoMessage> Ros2Transport::camera_info_publisher(const std::string& topic) {
-  return implementation_->publisher<CameraInfoMessage>(topic, Delivery::reliable);
-}
-
-Transport::Publisher<PoseMessage> Ros2Transport::pose_publisher(const std::string& topic) {
-  return implementation_->publisher<PoseMessage>(topic, Delivery::reliable);
-}
-
-Transport::Publisher<DiagnosticMessage> Ros2Transport::diagnostic_publisher(const std::string& topic) {
-  return implementation_->publisher<DiagnosticMessage>(topic, Delivery::reliable);
-}
-
-Transport::Publisher<ObservationMessage> Ros2Transport::observation_publisher(const std::string& topic) {
-  return implementation_->publisher<ObservationMessage>(topic, Delivery::reliable);
-}
-
-Transport::Subscription Ros2Transport::subscribe_joints(const std::string& topic, Handler<JointMessage> handler) {
-  return implementation_->subscribe<JointMessage>(topic, {Delivery::best_effort}, handler);
-}
-
-Transport::Subscription Ros2Transport::subscribe_operating_state(const std::string& topic,
-                                                                 Handler<OperatingStateMessage> handler) {
-  return implementation_->subscribe<OperatingStateMessage>(
-      topic, {Delivery::latched, Delivery::reliable, Delivery::best_effort}, handler);
-}
-
-Transport::Subscription Ros2Transport::subscribe_strings(const std::string& topic, Handler<StringMessage> handler) {
-  return implementation_->subscribe<StringMessage>(topic, {Delivery::reliable, Delivery::best_effort}, handler);
-}
-
-Transport::Subscription Ros2Transport::subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) {
-  const auto joys = [handler](JoyMessage&& message) { handler(first_button(message)); };
-  using Both = std::pair<Subscription, Subscription>;
-  return std::make_shared<Both>(implementation_->subscribe<BoolMessage>(topic, {Delivery::best_effort}, handler),
-                                implementation_->subscribe<JoyMessage>(topic, {Delivery::best_effort}, joys));
+Transport::Subscription Ros2Transport::listen(const std::string& topic, const AnyHandler& handler) {
+  const auto subscribe = [&]<typename Message>(const Handler<Message>& one) {
+    return implementation_->subscribe<Message>(topic, deliveries_of<Message>(), one);
+  };
+  const auto* const buttons = std::get_if<Handler<BoolMessage>>(&handler);
+  if (!buttons) return std::visit(subscribe, handler);
+  const Handler<JoyMessage> joys = [take = *buttons](JoyMessage&& message) { take(first_button(message)); };
+  return std::make_shared<std::pair<Subscription, Subscription>>(subscribe(*buttons), subscribe(joys));
 }
 
 Transport::Subscription Ros2Transport::subscribe_commands(const std::string& topic, CommandType type,
                                                           Handler<CommandMessage> handler) {
   return implementation_->subscribe_commands(topic, type, handler);
-}
-
-Transport::Subscription Ros2Transport::subscribe_trajectories(const std::string& topic,
-                                                              Handler<TrajectoryMessage> handler) {
-  return implementation_->subscribe<TrajectoryMessage>(topic, {Delivery::reliable, Delivery::best_effort}, handler);
-}
-
-Transport::Subscription Ros2Transport::subscribe_images(const std::string& topic, Handler<ImageMessage> handler) {
-  return implementation_->subscribe<ImageMessage>(topic, {Delivery::best_effort}, handler);
-}
-
-Transport::Subscription Ros2Transport::subscribe_compressed_images(const std::string& topic,
-                                                                   Handler<CompressedImageMessage> handler) {
-  return implementation_->subscribe<CompressedImageMessage>(topic, {Delivery::best_effort}, handler);
 }
 
 }  // namespace lapservo::internal

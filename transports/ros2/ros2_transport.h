@@ -17,34 +17,16 @@ class Ros2Transport : public Transport {
   explicit Ros2Transport(const std::string& node_name);
   ~Ros2Transport() override;
 
-  Publisher<JointMessage> joint_publisher(const std::string& topic) override;
   Publisher<JointMessage> set_point_publisher(const std::string& topic) override;
-  Publisher<OperatingStateMessage> operating_state_publisher(const std::string& topic) override;
-  Publisher<StringMessage> string_publisher(const std::string& topic) override;
-  Publisher<JoyMessage> joy_publisher(const std::string& topic) override;
-  Publisher<BoolMessage> bool_publisher(const std::string& topic) override;
-  Publisher<TrajectoryMessage> trajectory_publisher(const std::string& topic) override;
-  Publisher<ImageMessage> image_publisher(const std::string& topic) override;
-  Publisher<CompressedImageMessage> compressed_image_publisher(const std::string& topic) override;
-  Publisher<CameraInfoMessage> camera_info_publisher(const std::string& topic) override;
-  Publisher<PoseMessage> pose_publisher(const std::string& topic) override;
-  Publisher<DiagnosticMessage> diagnostic_publisher(const std::string& topic) override;
-  Publisher<ObservationMessage> observation_publisher(const std::string& topic) override;
-
-  Subscription subscribe_joints(const std::string& topic, Handler<JointMessage> handler) override;
-  Subscription subscribe_operating_state(const std::string& topic, Handler<OperatingStateMessage> handler) override;
-  Subscription subscribe_strings(const std::string& topic, Handler<StringMessage> handler) override;
-  Subscription subscribe_buttons(const std::string& topic, Handler<BoolMessage> handler) override;
   Subscription subscribe_commands(const std::string& topic, CommandType type, Handler<CommandMessage> handler) override;
-  Subscription subscribe_trajectories(const std::string& topic, Handler<TrajectoryMessage> handler) override;
-  Subscription subscribe_images(const std::string& topic, Handler<ImageMessage> handler) override;
-  Subscription subscribe_compressed_images(const std::string& topic, Handler<CompressedImageMessage> handler) override;
-
   std::set<std::string> readers(const std::string& topic) const override;
   std::map<std::string, std::string> published() const override;
   double stamp_now_s() const override;
 
  private:
+  void open(const std::string& topic, AnyPublisher& publisher) override;
+  Subscription listen(const std::string& topic, const AnyHandler& handler) override;
+
   class Implementation;
   std::shared_ptr<Implementation> implementation_;  // publishers and subscriptions keep it
 };
