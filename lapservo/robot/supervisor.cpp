@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "lapservo/core/words.h"
+
 namespace lapservo {
 namespace {
 
@@ -13,6 +15,21 @@ Blocked arm_of(const JointState& state, double now_s, double max_age_s) {
   if (state.operating_state != OperatingState::enabled) return Blocked::not_enabled;
   return now_s - state.time_s <= max_age_s ? Blocked::none : Blocked::old_joint_states;
 }
+
+constexpr internal::Words<Blocked, 13> remedies{
+    {{Blocked::no_joint_states, "check the arm's namespace and the names of its joints"},
+     {Blocked::old_joint_states, "the arm is silent: restore its joint states"},
+     {Blocked::non_finite_joints, "check the arm"},
+     {Blocked::no_setpoint, "enable and home the arm"},
+     {Blocked::no_operating_state, "let the arm repeat its operating_state"},
+     {Blocked::not_homed, "home the arm"},
+     {Blocked::busy, "wait until the arm's own motion has ended"},
+     {Blocked::far_from_setpoint, "let the arm settle at its own setpoint"},
+     {Blocked::foreign_command, "another program commands the arm: end that"},
+     {Blocked::second_source, "two programs publish the arm's states: end one of them"},
+     {Blocked::second_reader, "other nodes than the arm's read servo_jp: end them, or allow their number"},
+     {Blocked::no_reader, "nobody reads servo_jp: start the arm"},
+     {Blocked::operator_absent, "press what says that the operator is present"}}};
 
 std::string names_of(const Commanders& holders) {
   constexpr const char* names[]{"the program", "the page", "the topic"};
@@ -80,38 +97,9 @@ Blocked Supervisor::blocked() const {
 }
 
 std::string Supervisor::remedy() const {
-  switch (state_.obstacle) {
-    case Blocked::no_joint_states:
-      return "check the arm's namespace and the names of its joints";
-    case Blocked::old_joint_states:
-      return "the arm is silent: restore its joint states";
-    case Blocked::non_finite_joints:
-      return "check the arm";
-    case Blocked::no_setpoint:
-      return "enable and home the arm";
-    case Blocked::no_operating_state:
-      return "let the arm repeat its operating_state";
-    case Blocked::not_enabled:
-      return fmt::format("the arm is {}: enable it", to_string(operating_state_));
-    case Blocked::not_homed:
-      return "home the arm";
-    case Blocked::busy:
-      return "wait until the arm's own motion has ended";
-    case Blocked::far_from_setpoint:
-      return "let the arm settle at its own setpoint";
-    case Blocked::foreign_command:
-      return "another program commands the arm: end that";
-    case Blocked::second_source:
-      return "two programs publish the arm's states: end one of them";
-    case Blocked::second_reader:
-      return "other nodes than the arm's read servo_jp: end them, or allow their number";
-    case Blocked::no_reader:
-      return "nobody reads servo_jp: start the arm";
-    case Blocked::operator_absent:
-      return "press what says that the operator is present";
-    default:
-      return "";
-  }
+  if (state_.obstacle == Blocked::not_enabled)
+    return fmt::format("the arm is {}: enable it", to_string(operating_state_));
+  return std::string(internal::word_of(remedies, state_.obstacle));
 }
 
 std::string Supervisor::text() const {

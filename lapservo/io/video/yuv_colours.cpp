@@ -17,22 +17,18 @@ extern "C" {
 namespace lapservo::internal {
 namespace {
 
+template <typename Key, typename Value>
+std::optional<Value> found_in(const std::map<Key, Value>& values, const Key& key) {
+  const auto found = values.find(key);
+  return found == values.end() ? std::nullopt : std::optional(found->second);
+}
+
 std::optional<YuvMatrix> matrix_of(AVColorSpace tag) {
-  switch (tag) {
-    case AVCOL_SPC_BT470BG:
-    case AVCOL_SPC_SMPTE170M:
-      return YuvMatrix::bt601;
-    case AVCOL_SPC_BT709:
-      return YuvMatrix::bt709;
-    case AVCOL_SPC_FCC:
-      return YuvMatrix::fcc;
-    case AVCOL_SPC_SMPTE240M:
-      return YuvMatrix::smpte240m;
-    case AVCOL_SPC_BT2020_NCL:
-      return YuvMatrix::bt2020;
-    default:
-      return std::nullopt;
-  }
+  static const std::map<AVColorSpace, YuvMatrix> matrices{
+      {AVCOL_SPC_BT470BG, YuvMatrix::bt601},       {AVCOL_SPC_SMPTE170M, YuvMatrix::bt601},
+      {AVCOL_SPC_BT709, YuvMatrix::bt709},         {AVCOL_SPC_FCC, YuvMatrix::fcc},
+      {AVCOL_SPC_SMPTE240M, YuvMatrix::smpte240m}, {AVCOL_SPC_BT2020_NCL, YuvMatrix::bt2020}};
+  return found_in(matrices, tag);
 }
 
 // Some cameras' streams say RGB of YUV.
@@ -47,45 +43,23 @@ bool is_rgb(const AVFrame& frame) {
 }
 
 ChromaSite usual_site(AVCodecID codec, AVColorSpace matrix) {
-  switch (codec) {
-    case AV_CODEC_ID_MJPEG:
-    case AV_CODEC_ID_WEBP:
-    case AV_CODEC_ID_THEORA:
-    case AV_CODEC_ID_MPEG1VIDEO:
-    case AV_CODEC_ID_H261:
-    case AV_CODEC_ID_H263:
-    case AV_CODEC_ID_H263I:
-    case AV_CODEC_ID_H263P:
-    case AV_CODEC_ID_FLV1:
-    case AV_CODEC_ID_MSMPEG4V1:
-    case AV_CODEC_ID_MSMPEG4V2:
-    case AV_CODEC_ID_MSMPEG4V3:
-    case AV_CODEC_ID_WMV1:
-    case AV_CODEC_ID_WMV2:
-      return ChromaSite::centre;
-    default:
-      return matrix == AVCOL_SPC_BT2020_NCL ? ChromaSite::top_left : ChromaSite::left;
-  }
+  constexpr std::array amid_pixels{
+      AV_CODEC_ID_MJPEG,     AV_CODEC_ID_WEBP,      AV_CODEC_ID_THEORA, AV_CODEC_ID_MPEG1VIDEO, AV_CODEC_ID_H261,
+      AV_CODEC_ID_H263,      AV_CODEC_ID_H263I,     AV_CODEC_ID_H263P,  AV_CODEC_ID_FLV1,       AV_CODEC_ID_MSMPEG4V1,
+      AV_CODEC_ID_MSMPEG4V2, AV_CODEC_ID_MSMPEG4V3, AV_CODEC_ID_WMV1,   AV_CODEC_ID_WMV2};
+  if (std::find(amid_pixels.begin(), amid_pixels.end(), codec) != amid_pixels.end()) return ChromaSite::centre;
+  return matrix == AVCOL_SPC_BT2020_NCL ? ChromaSite::top_left : ChromaSite::left;
 }
 
 // Decoders of H.264, H.265 and MPEG-4 say left where the stream says nothing.
 ChromaSite site_of(const AVFrame& frame, AVCodecID codec, bool from_rgb) {
-  switch (frame.chroma_location) {
-    case AVCHROMA_LOC_CENTER:
-      return ChromaSite::centre;
-    case AVCHROMA_LOC_TOPLEFT:
-      return ChromaSite::top_left;
-    case AVCHROMA_LOC_TOP:
-      return ChromaSite::top;
-    case AVCHROMA_LOC_BOTTOMLEFT:
-      return ChromaSite::bottom_left;
-    case AVCHROMA_LOC_BOTTOM:
-      return ChromaSite::bottom;
-    case AVCHROMA_LOC_LEFT:
-      return from_rgb ? ChromaSite::centre : ChromaSite::left;
-    default:
-      return from_rgb ? ChromaSite::centre : usual_site(codec, frame.colorspace);
-  }
+  static const std::map<AVChromaLocation, ChromaSite> sites{
+      {AVCHROMA_LOC_CENTER, ChromaSite::centre}, {AVCHROMA_LOC_TOPLEFT, ChromaSite::top_left},
+      {AVCHROMA_LOC_TOP, ChromaSite::top},       {AVCHROMA_LOC_BOTTOMLEFT, ChromaSite::bottom_left},
+      {AVCHROMA_LOC_BOTTOM, ChromaSite::bottom}, {AVCHROMA_LOC_LEFT, ChromaSite::left}};
+  const auto site = found_in(sites, frame.chroma_location);
+  if (from_rgb && (!site || *site == ChromaSite::left)) return ChromaSite::centre;
+  return site.value_or(usual_site(codec, frame.colorspace));
 }
 
 }  // namespace
@@ -103,9 +77,7 @@ GivenColours given_colours(const std::string& colour_matrix, const std::string& 
       {"bt601", YuvMatrix::bt601}, {"bt709", YuvMatrix::bt709}, {"bt2020", YuvMatrix::bt2020}};
   static const std::map<std::string, ChromaSite> sites{
       {"left", ChromaSite::left}, {"centre", ChromaSite::centre}, {"top-left", ChromaSite::top_left}};
-  GivenColours given;
-  if (const auto found = matrices.find(colour_matrix); found != matrices.end()) given.matrix = found->second;
-  if (const auto found = sites.find(chroma_location); found != sites.end()) given.chroma = found->second;
+  const GivenColours given{found_in(matrices, colour_matrix), found_in(sites, chroma_location)};
   if (!colour_matrix.empty() && !given.matrix)
     throw InputError("colour matrix", "is " + colour_matrix + ", expected bt601, bt709 or bt2020");
   if (!chroma_location.empty() && !given.chroma)
