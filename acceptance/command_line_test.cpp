@@ -254,10 +254,7 @@ TEST_F(CommandLine, PagesThatCanNotBeServed) {
   expect_refused("servo --robot sim --rig configs/example.yaml --listen 0.0.0.0", {"--listen", "expected --web"});
   expect_refused(track + "--web 65536", {"--web", "65536"});
   expect_refused(track + "--web 0 --listen robot.example", {"--listen", "robot.example", "an address"});
-  for (const std::string option : {"--web", "--port"})
-    expect_refused("view " + picture + option + " 0 --listen 192.0.2.1", {"--web", "192.0.2.1"});  // nobody's
-  expect_done("view --help");
-  EXPECT_EQ(output().find("--port"), std::string::npos) << output();
+  expect_refused("view " + picture + "--web 0 --listen 192.0.2.1", {"--web", "192.0.2.1"});  // nobody's
 }
 #endif
 

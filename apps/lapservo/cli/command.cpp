@@ -61,11 +61,6 @@ Option& Option::required() {
   return *this;
 }
 
-Option& Option::hidden() {
-  option_->group("");
-  return *this;
-}
-
 Option& Option::expected(int count) {
   option_->expected(count);
   return *this;

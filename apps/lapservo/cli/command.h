@@ -24,8 +24,6 @@ class Option {
   explicit Option(CLI::Option* option) : option_(option) {}
 
   Option& required();
-  /// --help leaves it out: another name of an option.
-  Option& hidden();
   /// Takes so many values.
   Option& expected(int count);
   Option& delimiter(char between_values);

@@ -25,26 +25,18 @@ void WebOptions::check() const {
 }
 
 void add_web_options(Command command, WebOptions& options) {
-  const auto add = [&](const char* name) {
-    return command
-        .add_option(name, options.port,
-                    "Show it live on a page at this port for a browser on this computer; 0: any port that is free")
-        .whole_number_between(0, highest_port)
-        .without_value("8080");
-  };
-  add("--web");
-  add("--view").hidden();
+  command
+      .add_option("--web", options.port,
+                  "Show it live on a page at this port for a browser on this computer; 0: any port that is free")
+      .whole_number_between(0, highest_port)
+      .without_value("8080");
   add_listen_option(command, options);
 }
 
 void add_page_options(Command command, WebOptions& options) {
   options.port = 8080;
-  const auto add = [&](const char* name) {
-    return command.add_option(name, options.port, "The port of the page, else 8080; 0: any port that is free")
-        .whole_number_between(0, highest_port);
-  };
-  add("--web");
-  add("--port").hidden();
+  command.add_option("--web", options.port, "The port of the page, else 8080; 0: any port that is free")
+      .whole_number_between(0, highest_port);
   add_listen_option(command, options);
 }
 
@@ -87,9 +79,8 @@ bool WebView::operator_present() {
 #else
 
 WebView::WebView(const WebOptions&, PageConfig) {
-  throw InputError("--web",
-                   "needs a page, which this build lacks: it was built without libmicrohttpd-dev and "
-                   "nlohmann-json3-dev");
+  throw InputError(
+      "--web", "needs a page, which this build lacks: it was built without libmicrohttpd-dev and nlohmann-json3-dev");
 }
 
 void WebView::show(PageImage) {}
