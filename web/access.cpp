@@ -25,10 +25,6 @@ constexpr const char* welcome_html = R"(<!doctype html>
 </html>
 )";
 
-HttpResponse refusal(int status, const std::string& why) {
-  return {status, "text/plain; charset=utf-8", why + "\n"};
-}
-
 // "localhost", "192.0.2.1" or "::1" of a Host header; empty for what is none.
 std::string name_in(const std::string& host) {
   const bool bracketed = host.starts_with('[');
@@ -100,7 +96,7 @@ std::optional<HttpResponse> Access::ask_for_token(const HttpRequest& request) co
   const auto given = request.query.find("token");
   if (request.method != "GET" || request.path != "/" || given == request.query.end() ||
       !equal_in_constant_time(given->second, token_))
-    return refusal(401, "open the address with the token that lapservo printed");
+    return plain(401, "open the address with the token that lapservo printed");
   return HttpResponse{200,
                       "text/html; charset=utf-8",
                       welcome_html,
@@ -109,14 +105,14 @@ std::optional<HttpResponse> Access::ask_for_token(const HttpRequest& request) co
 
 std::optional<HttpResponse> Access::refuse(const HttpRequest& request) const {
   const auto host = request.header("host");
-  if (!host || !is_own_host(*host)) return refusal(403, "the host is to be an address or localhost");
+  if (!host || !is_own_host(*host)) return plain(403, "the host is to be an address or localhost");
   const auto count = request.headers.count("origin");
   if (count > 0 && request.header("origin") != "http://" + *host)
-    return refusal(403, "a page of another site sends this");
-  if (request.method == "POST" && count == 0) return refusal(403, "a POST is to have its Origin");
+    return plain(403, "a page of another site sends this");
+  if (request.method == "POST" && count == 0) return plain(403, "a POST is to have its Origin");
   const auto site = request.header("sec-fetch-site");
   if (site && *site != "same-origin" && *site != "none" && !follows_a_link(request))
-    return refusal(403, "a page of another site sends this");
+    return plain(403, "a page of another site sends this");
   return ask_for_token(request);
 }
 

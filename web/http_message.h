@@ -23,8 +23,12 @@ struct HttpRequest {
 
 struct HttpResponse {
   int status = 200;
-  std::string type = "text/plain; charset=utf-8", body;
+  std::string type = "text/plain; charset=utf-8", body{};
   std::vector<std::pair<std::string, std::string>> headers{};
 };
+
+inline HttpResponse plain(int status, const std::string& text) {
+  return {.status = status, .body = text + "\n"};
+}
 
 }  // namespace lapservo::internal

@@ -29,9 +29,7 @@ constexpr std::pair<const char*, const char*> always[] = {{"Content-Security-Pol
                                                           {"Cross-Origin-Resource-Policy", "same-origin"},
                                                           {"Cache-Control", "no-store"}};
 
-HttpResponse failed() {
-  return {500, "text/plain; charset=utf-8", "the server failed\n"};
-}
+const HttpResponse failed = plain(500, "the server failed");
 
 union Address {
   sockaddr any;
@@ -110,7 +108,7 @@ struct HttpServer::Callbacks {
       if (!*exchange) {
         *exchange = begin(self, connection, url, method);
         return has_body(static_cast<Exchange*>(*exchange)->request)
-                   ? queue(connection, {413, "text/plain; charset=utf-8", "a request is to have no body\n"})
+                   ? queue(connection, plain(413, "a request is to have no body"))
                    : MHD_YES;
       }
       if (*upload_size > 0) return MHD_NO;
@@ -215,9 +213,9 @@ int HttpServer::answer(MHD_Connection* connection, Exchange& exchange) {
     try {
       response = handler_(exchange.request, last);
     } catch (const std::exception&) {
-      response = failed();
+      response = failed;
     }
-    if (!response && last) response = failed();
+    if (!response && last) response = failed;
     if (response) return queue(connection, *response);
     lock.lock();
     if (wakes != wakes_ || ended_) continue;

@@ -39,8 +39,6 @@ class HttpServer {
   HttpServer(const std::string& address, int port, const std::string& option, const HttpLimits& limits,
              Handler handler);
   ~HttpServer();
-  HttpServer(const HttpServer&) = delete;
-  HttpServer& operator=(const HttpServer&) = delete;
 
   int port() const { return port_; }
   /// Calls the handler again for waiting requests. From any thread.

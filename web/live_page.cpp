@@ -43,10 +43,6 @@ bool is_recent_start(double asked_s) {
   return std::abs(now_s() - asked_s) <= start_lasts_s;
 }
 
-HttpResponse plain(int status, const std::string& text) {
-  return {status, "text/plain; charset=utf-8", text + "\n"};
-}
-
 std::optional<HttpResponse> file_at(const std::string& path) {
   if (path == "/") return HttpResponse{200, "text/html; charset=utf-8", page_html};
   if (path == "/page.css") return HttpResponse{200, "text/css; charset=utf-8", page_css};
@@ -147,7 +143,7 @@ std::optional<HttpResponse> LivePage::picture(const HttpRequest& request, bool l
     watched_until_ = now + watched;
     lock.unlock();
     changed_.notify_one();
-    return last ? std::optional(HttpResponse{204, "text/plain; charset=utf-8", ""}) : std::nullopt;
+    return last ? std::optional(HttpResponse{.status = 204}) : std::nullopt;
   }
   lock.unlock();
   return HttpResponse{200,

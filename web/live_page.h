@@ -62,8 +62,6 @@ class LivePage {
   /// Throws InputError when it can't listen there.
   explicit LivePage(const PageConfig& config);
   ~LivePage();
-  LivePage(const LivePage&) = delete;
-  LivePage& operator=(const LivePage&) = delete;
 
   /// To be opened in a browser, with the token.
   std::string url() const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "lapservo/crtk/joint_map.h"
@@ -50,22 +51,13 @@ bool Interlock::is_of(Source& source, std::uint64_t sender, const std::optional<
 
 std::optional<double> Interlock::stamped(StampClock& clock, const JointMessage& message, double arrival_s) {
   const StampClock::Reading measured = clock.read(message.stamp_s, arrival_s);
-  switch (measured.verdict) {
-    case StampVerdict::fresh:
-      return measured.time_s;
-    case StampVerdict::repeated:
-      ++counts_.repeated;
-      break;
-    case StampVerdict::late:
-      ++counts_.late;
-      break;
-    case StampVerdict::jumped:
-      ++counts_.jumped;
-      break;
-    case StampVerdict::unusable:
-      ++counts_.unstamped;
-      break;
-  }
+  if (measured.verdict == StampVerdict::fresh) return measured.time_s;
+  static const std::map<StampVerdict, long InterlockCounts::*> counts{
+      {StampVerdict::repeated, &InterlockCounts::repeated},
+      {StampVerdict::late, &InterlockCounts::late},
+      {StampVerdict::jumped, &InterlockCounts::jumped},
+      {StampVerdict::unusable, &InterlockCounts::unstamped}};
+  ++(counts_.*counts.at(measured.verdict));
   return std::nullopt;
 }
 
