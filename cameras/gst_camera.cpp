@@ -155,8 +155,6 @@ class GstCamera : public LiveCamera {
     }
   }
   ~GstCamera() override { gst_element_set_state(pipeline_.get(), GST_STATE_NULL); }
-  GstCamera(const GstCamera&) = delete;
-  GstCamera& operator=(const GstCamera&) = delete;
 
   std::optional<std::string> ended() const override {
     const Owned<GstBus> bus(gst_element_get_bus(pipeline_.get()));

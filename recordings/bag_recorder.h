@@ -28,8 +28,6 @@ class BagRecorder {
   /// See Ros2BagWriter.
   explicit BagRecorder(const std::filesystem::path& folder);
   ~BagRecorder();
-  BagRecorder(const BagRecorder&) = delete;
-  BagRecorder& operator=(const BagRecorder&) = delete;
 
   using Message = std::variant<JointMessage, ImageMessage, CompressedImageMessage>;
   void add(const std::string& topic, Message message);

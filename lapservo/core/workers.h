@@ -26,8 +26,6 @@ class Workers {
     tasks_.cancel();
     for (std::thread& thread : threads_) thread.join();
   }
-  Workers(const Workers&) = delete;
-  Workers& operator=(const Workers&) = delete;
 
   /// Calls the task with the index of its thread, 0 without threads. The future has what it returns or throws.
   template <typename Task>

@@ -25,8 +25,6 @@ class CrtkRobot : public Robot {
   /// `arm`: the arm's namespace, for example PSM1 or /dvrk/PSM1. The transport and the clock must outlive it.
   CrtkRobot(Transport& transport, const std::string& arm, const InterlockConfig& config, const Clock& clock);
   ~CrtkRobot() override;
-  CrtkRobot(const CrtkRobot&) = delete;
-  CrtkRobot& operator=(const CrtkRobot&) = delete;
 
   JointState state() override;
   std::vector<JointReading> readings() override;

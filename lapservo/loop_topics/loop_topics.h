@@ -40,8 +40,6 @@ class LoopTopics {
   /// `hears`: whether it hears anything; else it only publishes.
   LoopTopics(Transport& transport, const Rig& rig, const std::string& camera_frame, bool hears = true);
   ~LoopTopics();
-  LoopTopics(const LoopTopics&) = delete;
-  LoopTopics& operator=(const LoopTopics&) = delete;
 
   /// `state`: the loop's, in words; empty where it tracks.
   void publish(const ControlTick& tick, const std::string& state);

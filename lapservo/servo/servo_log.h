@@ -31,8 +31,6 @@ class ServoLog {
   /// Throws InputError when the file can't be written.
   explicit ServoLog(const std::filesystem::path& path);
   ~ServoLog();
-  ServoLog(const ServoLog&) = delete;
-  ServoLog& operator=(const ServoLog&) = delete;
 
   /// Does not wait for the disk. Throws InputError when a row before could not be written, or too many wait.
   void add(const ServoInput& input, const ServoDecision& decision, const std::optional<InstrumentTruth>& truth);

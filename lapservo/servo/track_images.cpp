@@ -56,8 +56,6 @@ class OwnThreadTracking : public TrackedImageStream {
     stop_ = true;
     thread_.join();
   }
-  OwnThreadTracking(const OwnThreadTracking&) = delete;
-  OwnThreadTracking& operator=(const OwnThreadTracking&) = delete;
 
   std::optional<TrackedImage> newest() override {
     const std::lock_guard lock(mutex_);

@@ -48,8 +48,6 @@ class SimRobot {
   /// The rig's first instrument; its `joints`, or default_joints(). The arguments must outlive it.
   SimRobot(Transport& transport, const Rig& rig, Simulator& simulator, const SimRobotConfig& config);
   ~SimRobot();
-  SimRobot(const SimRobot&) = delete;
-  SimRobot& operator=(const SimRobot&) = delete;
 
   /// Lets the simulator's time pass and says what is due.
   void advance(double time_s);

@@ -29,8 +29,6 @@ class DdsNode {
  public:
   DdsNode(const std::string& node_name, std::uint32_t domain);
   ~DdsNode();
-  DdsNode(const DdsNode&) = delete;
-  DdsNode& operator=(const DdsNode&) = delete;
 
   /// `topic` as in ROS.
   dds_entity_t create_writer(const std::string& topic, const dds_topic_descriptor_t& type, Delivery delivery);

@@ -21,8 +21,6 @@ class ReadAhead : public FrameSource {
         first_stamp_s_(source_->first_stamp_s()),
         remark_(source_->remark()) {}
   ~ReadAhead() override { stop(); }
-  ReadAhead(const ReadAhead&) = delete;
-  ReadAhead& operator=(const ReadAhead&) = delete;
 
   std::optional<Frame> next() override {
     if (!thread_.joinable() && !stopped_) thread_ = std::thread([this] { read(); });
