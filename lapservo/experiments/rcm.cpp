@@ -276,17 +276,15 @@ void write_data(const RcmResult& result, const std::filesystem::path& folder) {
 
 ReportSection section_of(const RcmResult& result, const ExperimentSetup& setup) {
   ReportSection section{"rcm", "Image of the RCM (section V-B)"};
-  section.text = {
-      fmt::format(
-          "Every centre line, extended, passes through the image of the remote centre of motion (RCM), here in view at "
-          "({:.1f}, {:.1f}) px. {} positions give {} lines and {} intersections of two; the paper\u2019s figure is the "
-          "distance of each intersection from the RCM in the image. Here: {} sets of {} positions, pooled, "
-          "against the exact RCM.",
-          result.true_px.x(), result.true_px.y(), RcmResult::positions, RcmResult::positions, RcmResult::pairs,
-          RcmResult::sets, RcmResult::positions),
-      "The loop uses one estimate from all lines, whose error the paper does not give: its mean of the "
-      "intersections (eq. 9), or the default\u2019s weighted total least squares, which leaves outliers out and states "
-      "its covariance."};
+  section.text = {fmt::format("Every centre line, extended, passes through the image of the remote centre of motion "
+                              "(RCM), here in view at ({:.1f}, {:.1f}) px. {} positions give {} lines and {} "
+                              "intersections of two; the paper\u2019s figure is the distance of each intersection from "
+                              "the RCM in the image. Here: {} sets of {} positions, pooled, against the exact RCM.",
+                              result.true_px.x(), result.true_px.y(), RcmResult::positions, RcmResult::positions,
+                              RcmResult::pairs, RcmResult::sets, RcmResult::positions),
+                  "The loop uses one estimate from all lines, whose error the paper does not give: its mean of the "
+                  "intersections (eq. 9), or the default\u2019s weighted total least squares, which leaves outliers "
+                  "out and states its covariance."};
   section.comparisons = comparisons_of(result);
   for (const auto& of_method : result.methods)
     section.figures.push_back(cloud_of_intersections(of_method, result.true_px));

@@ -236,21 +236,20 @@ void write_data(const RotationResult& result, const std::filesystem::path& folde
 
 ReportSection section_of(const RotationResult& result, const ExperimentSetup& setup) {
   ReportSection section{"rotation", "Rotation (section V-C)"};
-  section.text = {fmt::format(
-      "{} trials start at rotations from {:.2f} to {:.2f} rad, each at its own place in the field of view. In each the "
-      "instrument turns about its shaft once round, in {} steps, and the rotation measured in every frame is compared "
-      "with the true one. {} such sets, each with other places, background and noise, are pooled where it says "
-      "\u201call\u201d or \u201cfrom trial to trial\u201d.",
-      RotationResult::trials, RotationResult::first_rad, RotationResult::last_rad, RotationResult::steps,
-      RotationResult::sets)};
+  section.text = {
+      fmt::format("{} trials start at rotations from {:.2f} to {:.2f} rad, each at its own place in the field of view. "
+                  "In each the instrument turns about its shaft once round, in {} steps, and the rotation measured in "
+                  "every frame is compared with the true one. {} such sets, each with other places, background and "
+                  "noise, are pooled where it says \u201call\u201d or \u201cfrom trial to trial\u201d.",
+                  RotationResult::trials, RotationResult::first_rad, RotationResult::last_rad, RotationResult::steps,
+                  RotationResult::sets)};
   section.comparisons = comparisons_of(result);
   section.figures = figures_of(result);
   section.tables.push_back(table_one(result));
   section.notes = {
       "Rotation is psi, absolute: the direction from which the camera sees the shaft is taken into account.",
       "The paper\u2019s errors are against its robot\u2019s encoder, ours against the exact rotation of rendered "
-      "frames. "
-      "Its trials\u2019 length is not given; ours are one turn each, so that each passes the seam once.",
+      "frames. Its trials\u2019 length is not given; ours are one turn each, so that each passes the seam once.",
       "Once in each turn the marker\u2019s seam passes the centre line, where the cross-ratio jumps. The centre-line "
       "method is at its worst there; lines beside the centre carry the default across.",
       "Each frame is looked at on its own, without help from the one before."};

@@ -180,20 +180,17 @@ std::vector<Figure> figures(const TrackingResult& result) {
 
 std::vector<std::string> notes(const TrackingResult& result, const Eigen::Vector4d& papers_per_s,
                                const Eigen::Vector4d& ours_per_s) {
-  return {fmt::format(
-              "The paper gives neither K nor omega a unit of time. K per second would mean time constants of {:.0f} s "
-              "(s) to {:.0f} s (l) beside a swing of {:.1f} s; K is read per control period here ({:.0f} a second), "
-              "omega per second.",
-              1 / (papers_per_s[0] * tracking_period_s), 1 / (papers_per_s[2] * tracking_period_s),
-              two_pi / paper_sinusoids().omega_rad_s[0], 1 / tracking_period_s),
-          fmt::format(
-              "The paper\u2019s law takes the late image for the present. At its own gains (at most {:.2f} /s) that "
-              "makes s decay faster than K; at ours ({:.0f} /s) it would swing. The remaining errors of r, l and d are "
-              "the desired features\u2019 motion of that time.",
-              papers_per_s.maxCoeff(), ours_per_s.maxCoeff()),
+  return {fmt::format("The paper gives neither K nor omega a unit of time. K per second would mean time constants of "
+                      "{:.0f} s (s) to {:.0f} s (l) beside a swing of {:.1f} s; K is read per control period here "
+                      "({:.0f} a second), omega per second.",
+                      1 / (papers_per_s[0] * tracking_period_s), 1 / (papers_per_s[2] * tracking_period_s),
+                      two_pi / paper_sinusoids().omega_rad_s[0], 1 / tracking_period_s),
+          fmt::format("The paper\u2019s law takes the late image for the present. At its own gains (at most {:.2f} /s) "
+                      "that makes s decay faster than K; at ours ({:.0f} /s) it would swing. The remaining errors of "
+                      "r, l and d are the desired features\u2019 motion of that time.",
+                      papers_per_s.maxCoeff(), ours_per_s.maxCoeff()),
           "Starts lie where the paper\u2019s law can lead home: on its way each feature has a pace of its own, and all "
-          "four "
-          "must be possible together (d is a fraction of l that the marker\u2019s bands limit).",
+          "four must be possible together (d is a fraction of l that the marker\u2019s bands limit).",
           "The default fuses the measured joints with the late image and estimates the delay by itself.",
           fmt::format(
               "The uncalibrated run goes by the RCM\u2019s image as estimated from 20 positions: {:.1f}, {:.1f} px.",
@@ -209,14 +206,13 @@ ReportSection section_of(const TrackingResult& result, const ExperimentSetup& se
                         ours_per_s = tracking_controller(ours, setup.rig.camera).gains.per_s;
   const SimulatorConfig simulated = tracking_simulator(ours, setup.seed);
   ReportSection section{"tracking", "Trajectory tracking (section V-D)"};
-  section.text = {fmt::format(
-      "From a random start in the field of view the instrument follows {}, driven by what the simulated endoscope "
-      "sees: "
-      "{:.0f} frames/s, {:.0f} ms late, with noise, jitter and lost frames; an arm with lag, encoder steps, backlash, "
-      "and "
-      "measured joints that are {:.0f} mm and {:.0f} degrees off. All errors are those of the true features.",
-      trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * simulated.endoscope.latency_s,
-      1000 * simulated.arm.joint_offset[2], deg_from_rad(simulated.arm.joint_offset[0]))};
+  section.text = {
+      fmt::format("From a random start in the field of view the instrument follows {}, driven by what the simulated "
+                  "endoscope sees: {:.0f} frames/s, {:.0f} ms late, with noise, jitter and lost frames; an arm with "
+                  "lag, encoder steps, backlash, and measured joints that are {:.0f} mm and {:.0f} degrees off. All "
+                  "errors are those of the true features.",
+                  trajectory_text(), simulated.endoscope.frame_rate_hz, 1000 * simulated.endoscope.latency_s,
+                  1000 * simulated.arm.joint_offset[2], deg_from_rad(simulated.arm.joint_offset[0]))};
   for (const std::string& title : result.missing)
     section.unfinished += (section.unfinished.empty() ? "Stopped. Missing: " : ", ") + title;
   if (!result.missing.empty()) section.unfinished += ".";

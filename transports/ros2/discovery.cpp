@@ -113,8 +113,7 @@ std::optional<std::string> remedy_of_warning(const std::string& warning) {
   if (warning.find("TYPE_INFORMATION") == std::string::npos) return std::nullopt;
   return "a program's topics are dropped, since Cyclone DDS can't read the type information that it sends. Generate "
          "its types by fastddsgen -no-typeobjectsupport, or call auto_fill_type_information(false) on its TypeSupport, "
-         "as "
-         "ROS 2's nodes do";
+         "as ROS 2's nodes do";
 }
 
 }  // namespace lapservo::internal

@@ -102,9 +102,8 @@ void add_check(Command app, Run& run_later) {
   command.add_option("--rig", options->rig, "The rig to check").required();
   add_joint_options(
       command, *options,
-      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
-      "bag; without it those in the input, where it is a bag: registration, delay, focal length and "
-      "drift too");
+      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a bag; "
+      "without it those in the input, where it is a bag: registration, delay, focal length and drift too");
   add_recording_options(command, *options);
   command.add_option("--out", options->report, "HTML page with figures");
   command.footer(

@@ -129,11 +129,10 @@ void warn(const RcmResult& r) {
                  "(the port, the camera)\n",
                  r.instrument.c_str(), r.outliers, r.lines);
   if (r.noise_px && *r.noise_px < implausibly_small_px)
-    std::fprintf(
-        stderr,
-        "lapservo: warning: %s: the lines meet almost exactly: if they were tracked with camera_from_rcm in the "
-        "rig, this is only that; track with a rig that has none\n",
-        r.instrument.c_str());
+    std::fprintf(stderr,
+                 "lapservo: warning: %s: the lines meet almost exactly: if they were tracked with camera_from_rcm in "
+                 "the rig, this is only that; track with a rig that has none\n",
+                 r.instrument.c_str());
 }
 
 int run(const EstimateRcmOptions& options) {

@@ -86,17 +86,16 @@ std::string missing_from(const std::vector<ReportSection>& sections, const std::
 }
 
 Report report_of(std::vector<ReportSection> sections, const std::string& missing, const ExperimentOptions& options) {
-  return {
-      "lapservo: the experiments of the paper",
-      {"\u201cImage-Based Trajectory Tracking Control of 4-DoF Laparoscopic Instruments Using a Rotation "
-       "Distinguishing Marker\u201d (Wang et al., IEEE Robotics and Automation Letters 2(3), 2017), section V, once "
-       "more: in a simulator with exact truth, by the paper\u2019s own method and by lapservo\u2019s default.",
-       fmt::format("The simulator: {}, a light beside the camera, tissue behind, a sensor with blur and noise. The "
-                   "paper\u2019s method reads the marker on the shaft\u2019s centre line (its Algorithm 1); the "
-                   "default fits all visible lines of the surface. Everything is repeatable: seed {}.",
-                   options.rig.empty() ? "the rig of configs/paper.yaml" : "the rig " + options.rig, options.seed)},
-      std::move(sections),
-      missing};
+  return {"lapservo: the experiments of the paper",
+          {"\u201cImage-Based Trajectory Tracking Control of 4-DoF Laparoscopic Instruments Using a Rotation "
+           "Distinguishing Marker\u201d (Wang et al., IEEE Robotics and Automation Letters 2(3), 2017), section V, "
+           "once more: in a simulator with exact truth, by the paper\u2019s own method and by lapservo\u2019s default.",
+           fmt::format("The simulator: {}, a light beside the camera, tissue behind, a sensor with blur and noise. The "
+                       "paper\u2019s method reads the marker on the shaft\u2019s centre line (its Algorithm 1); the "
+                       "default fits all visible lines of the surface. Everything is repeatable: seed {}.",
+                       options.rig.empty() ? "the rig of configs/paper.yaml" : "the rig " + options.rig, options.seed)},
+          std::move(sections),
+          missing};
 }
 
 // The library knows the rig, but not its file.

@@ -114,10 +114,9 @@ int run_design(const DesignOptions& options) {
     std::printf("  %4zu   %9.0f   %15.2f   %15.2f\n", i, marker.hues_deg[i], 1e3 * marker.bands_upper_m[i],
                 1e3 * marker.bands_lower_m[i]);
   print_sigmas(marker, viewing, options.print_error_mm ? 1e-3 * *options.print_error_mm : usual_print_error_m);
-  std::printf("\nThe cross-ratio is monotonic over the turn%s.\n", in_linear_family(marker)
-                                                                       ? ", and linear: eq. (18) is exact"
-                                                                       : " (not linear: decoded by the rational "
-                                                                         "inverse)");
+  std::printf(
+      "\nThe cross-ratio is monotonic over the turn%s.\n",
+      in_linear_family(marker) ? ", and linear: eq. (18) is exact" : " (not linear: decoded by the rational inverse)");
   std::puts("");
   std::fputs(yaml_of(marker).c_str(), stdout);
   if (file) {
@@ -208,10 +207,9 @@ void add_design(Command parent, Run& run_later) {
   command.add_option("--smallest-band-mm", options->min_band_mm, "No band is shorter; default 3 mm or 12 px")
       .number_between(0.1, 200.0);
   command
-      .add_option(
-          "--print-error-mm", options->print_error_mm,
-          "Standard deviation of where each boundary is printed and cut: minimise what it does to the rotation, "
-          "together with the noise; else noise alone, and what 0.1 mm does is said")
+      .add_option("--print-error-mm", options->print_error_mm,
+                  "Standard deviation of where each boundary is printed and cut: minimise what it does to the "
+                  "rotation, together with the noise; else noise alone, and what 0.1 mm does is said")
       .number_between(0.001, 10.0);
   command.add_option("--hues", options->hues_deg, "Three hues in degrees, proximal to distal")
       .finite_number()

@@ -119,8 +119,6 @@ class MovingArm {
     std::this_thread::sleep_for(
         std::chrono::duration<double>(stopping_time_s(config_.limits) + MotionFollower::period_s));
   }
-  MovingArm(const MovingArm&) = delete;
-  MovingArm& operator=(const MovingArm&) = delete;
 
   // How far each joint moved; empty before it began.
   std::string travels() const { return readings_.empty() ? "" : travels_text(config_.joints, ranges_of(readings_)); }
@@ -298,10 +296,9 @@ void add_record(Command app, Run& run_later) {
   command.add_option("--duration", options->duration_s, "Seconds, from the first image on").number_between(1, 3600);
   command.add_option("--fps", options->fps, "Keep no more images a second than about so many").number_between(1, 1000);
   command
-      .add_option(
-          "--move", options->move,
-          "Move the arm meanwhile, from where it is, as the calibrations want it: swing (registration, check: all "
-          "joints, for --duration), turn (marker: a full turn about its axis)")
+      .add_option("--move", options->move,
+                  "Move the arm meanwhile, from where it is, as the calibrations want it: swing (registration, check: "
+                  "all joints, for --duration), turn (marker: a full turn about its axis)")
       .one_of({"swing", "turn"});
   command.add_option("--instrument", options->instrument,
                      "For --move: the arm's name in the rig, where it has several");

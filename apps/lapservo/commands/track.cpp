@@ -158,21 +158,19 @@ bool say_mismatched(const Tally& tally) {
   for (const auto& [name, count] : tally.mismatched) {
     if (count == 0) continue;
     any = true;
-    std::fprintf(
-        stderr,
-        "lapservo: %s: in %d of %d frames the print is not as the rig says (marker_mismatch); lapservo calibrate "
-        "marker measures it from a slow turn\n",
-        name.c_str(), count, tally.frames);
+    std::fprintf(stderr,
+                 "lapservo: %s: in %d of %d frames the print is not as the rig says (marker_mismatch); lapservo "
+                 "calibrate marker measures it from a slow turn\n",
+                 name.c_str(), count, tally.frames);
   }
   return any;
 }
 
 void say_moved(const TrackOptions& options, const Frame& frame) {
-  std::fprintf(
-      stderr,
-      "lapservo: %s: the endoscope moved: from %d frames before frame %d (%.2f s) on shafts miss the RCM of the "
-      "rig, and q is empty or off; lapservo calibrate registration measures camera_from_rcm anew\n",
-      options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s);
+  std::fprintf(stderr,
+               "lapservo: %s: the endoscope moved: from %d frames before frame %d (%.2f s) on shafts miss the RCM of "
+               "the rig, and q is empty or off; lapservo calibrate registration measures camera_from_rcm anew\n",
+               options.input.c_str(), RegistrationWatch::frames - 1, frame.index, frame.time_s);
 }
 
 [[noreturn]] void rethrow_with_frame(const InputError& error, const TrackOptions& options, const Frame& frame) {
@@ -334,8 +332,7 @@ void add_input_options(Command command, TrackOptions& options) {
   command
       .add_option(
           "input", options.input,
-          "Image, folder of images, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), "
-          "topic "
+          "Image, folder of images, video file, bag of ROS 1 or 2, camera (0, /dev/video0), stream (rtsp://...), topic "
           "(ros2:/image_raw, ros1:/image_raw/compressed) or GStreamer pipeline without its sink (gst:decklinkvideosrc)")
       .required();
   add_image_topic_option(command, options.image_topic);
@@ -358,13 +355,12 @@ void add_track(Command app, Run& run_later) {
   Command command =
       app.add_subcommand("track", "Measure the instruments in images, a video, a bag or a camera's frames.");
   add_input_options(command, *options);
+  command.add_option("--out", options->out,
+                     "CSV of observations, replacing one of that name when all is measured; until then, and if the run "
+                     "is killed, the rows are in NAME.part, which the next run of that name writes over");
   command.add_option(
-      "--out", options->out,
-      "CSV of observations, replacing one of that name when all is measured; until then, and if the run is "
-      "killed, the rows are in NAME.part, which the next run of that name writes over");
-  command.add_option("--overlay", options->overlay,
-                     "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the "
-                     "same name");
+      "--overlay", options->overlay,
+      "Write images (a folder) or a video (.mp4) with the detection drawn in, replacing those of the same name");
   add_web_options(command, options->web);
   command.add_option("--frames", options->frames, "End after so many; 0: all, a camera's until Ctrl-C")
       .whole_number_between(0, 1000000000);

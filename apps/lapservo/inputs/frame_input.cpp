@@ -31,11 +31,10 @@ std::unique_ptr<FrameSource> open_frames(const std::string& input, const FrameOp
 
 void say_if_undistorted(const std::string& topic, const Camera* camera) {
   if (!camera || !camera->distorted() || topic.find("image_rect") == std::string::npos) return;
-  std::fprintf(
-      stderr,
-      "lapservo: %s: its images are undistorted by its name, but the rig's camera has distortion_coefficients: "
-      "take the raw topic (image_raw), or a rig of the undistorted camera\n",
-      topic.c_str());
+  std::fprintf(stderr,
+               "lapservo: %s: its images are undistorted by its name, but the rig's camera has "
+               "distortion_coefficients: take the raw topic (image_raw), or a rig of the undistorted camera\n",
+               topic.c_str());
 }
 
 void refuse_topic_outside_bags(const std::string& option, const std::string& topic, const std::string& input) {

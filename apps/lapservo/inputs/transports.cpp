@@ -50,9 +50,9 @@ std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_
 #ifdef LAPSERVO_ROS1
     return std::make_unique<Ros1Transport>(node_name);
 #else
-    refuse_missing(option, transport,
-                   "libroscpp-dev, libsensor-msgs-dev, libdiagnostic-msgs-dev, libtrajectory-msgs-dev and "
-                   "python3-gencpp");
+    refuse_missing(
+        option, transport,
+        "libroscpp-dev, libsensor-msgs-dev, libdiagnostic-msgs-dev, libtrajectory-msgs-dev and python3-gencpp");
 #endif
   }
   throw InputError(option, "is " + transport + ", expected ros2 or ros1");
@@ -60,18 +60,17 @@ std::unique_ptr<Transport> make_transport(const std::string& transport, [[maybe_
 
 void add_setpoint_readers_option(Command command, int& setpoint_readers) {
   command
-      .add_option(
-          "--setpoint-readers", setpoint_readers,
-          "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the arm "
-          "is not moved")
+      .add_option("--setpoint-readers", setpoint_readers,
+                  "Nodes that may read servo_jp: the arm's and, for example, a recorder's; while there are more, the "
+                  "arm is not moved")
       .whole_number_between(1, 64);
 }
 
 void require_joint_limits(const std::string& option, const std::string& joint_limits) {
   if (joint_limits.empty())
-    throw InputError(option,
-                     "needs --joint-limits, the limits of the arm's joints, for example "
-                     "configs/joint_limits/psm-classic.yaml");
+    throw InputError(
+        option,
+        "needs --joint-limits, the limits of the arm's joints, for example configs/joint_limits/psm-classic.yaml");
 }
 
 }  // namespace lapservo::app

@@ -110,10 +110,9 @@ class Advisor {
   void response() {
     if (!f_.response || !f_.response->better || f_.response->before_px < rig_limits.response_px) return;
     add(true,
-        fmt::format(
-            "the camera encodes light otherwise than the rig says{}, rather as {}: edges of channels that rise and "
-            "fall at one place lie {:.2f} px apart",
-            f_.response_measured ? " and a board did" : "", f_.response->name, f_.response->before_px),
+        fmt::format("the camera encodes light otherwise than the rig says{}, rather as {}: edges of channels that rise "
+                    "and fall at one place lie {:.2f} px apart",
+                    f_.response_measured ? " and a board did" : "", f_.response->name, f_.response->before_px),
         f_.response_measured ? "switch off the camera's sharpening and record again; where that changes nothing, "
                                "lapservo calibrate colour --replace-response"
                              : "lapservo calibrate colour",

@@ -200,11 +200,10 @@ std::string blur_refusal(const std::vector<KeyFrame>& frames, const Marker& mark
   });
   if (2 * static_cast<std::size_t>(blurred) > frames.size()) {
     char text[200];
-    std::snprintf(
-        text, sizeof text,
-        "%zd of %zu frames are too blurred (by more than %.0f %% of the shaft's width): focus, turn more slowly, "
-        "or come nearer",
-        static_cast<std::ptrdiff_t>(blurred), frames.size(), 100 * max_blur_diameters);
+    std::snprintf(text, sizeof text,
+                  "%zd of %zu frames are too blurred (by more than %.0f %% of the shaft's width): focus, turn more "
+                  "slowly, or come nearer",
+                  static_cast<std::ptrdiff_t>(blurred), frames.size(), 100 * max_blur_diameters);
     return text;
   }
   return {};
@@ -222,11 +221,10 @@ std::string refusal_of(const std::vector<KeyFrame>& frames, const Marker& marker
   }
   const double unseen_rad = widest_unseen(frames, marker);
   if (unseen_rad > widest_unseen_rad) {
-    std::snprintf(
-        text, sizeof text,
-        "the marker is not seen from all sides (%.0f of 360 degrees are missing): film a slow full turn about "
-        "the shaft's axis",
-        deg_from_rad(unseen_rad));
+    std::snprintf(text, sizeof text,
+                  "the marker is not seen from all sides (%.0f of 360 degrees are missing): film a slow full turn "
+                  "about the shaft's axis",
+                  deg_from_rad(unseen_rad));
     return text;
   }
   return blur_refusal(frames, marker);
@@ -357,8 +355,7 @@ MarkerCalibration calibrate_marker(const Rig& rig, std::size_t instrument, std::
   if (calibration.seam_views < min_seam_views)
     return refused(
         "the seam is not visible well enough to locate the beginning of the print: film it slowly passing the camera, "
-        "without "
-        "glare");
+        "without glare");
   if (!settled) return refused("the fit does not settle: more frames, sharper ones, or a rig nearer to the print");
   calibration.after_px = summary_of(*last, fit.measured(), fit.marker(), 2).rms_px;
   calibration.marker = fit.marker();

@@ -152,8 +152,7 @@ void add_calibrate_camera(Command parent, Run& run_later) {
   command.add_option("--views", options->views, "Views to choose from a video or a camera at most")
       .whole_number_between(4, 200);
   command.footer(
-      "Show the whole board, flat and sharp, in 12 or more images: in every part of the image, near, and tilted "
-      "by\n"
+      "Show the whole board, flat and sharp, in 12 or more images: in every part of the image, near, and tilted by\n"
       "20 to 40 degrees to all sides; fix exposure and focus. A camera is looked at until its views suffice, or "
       "Ctrl-C.\n"
       "All numbers are written with one standard deviation each (sigma_...), the response's where the images determine "

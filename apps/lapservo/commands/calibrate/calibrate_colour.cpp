@@ -59,8 +59,7 @@ void add_calibrate_colour(Command parent, Run& run_later) {
   command.add_flag("--replace-response", options->replace_response,
                    "Also a response that calibrate camera measured (sigma_response), which stays else");
   command.footer(
-      "Move the instrument through the image and turn it, 10 s or more, wholly in view and not overexposed. The "
-      "rig's\n"
+      "Move the instrument through the image and turn it, 10 s or more, wholly in view and not overexposed. The rig's\n"
       "hues may be up to 60 degrees off; the response is written where the frames show another than the rig's.\n"
       "Example:\n  lapservo calibrate colour motion.mp4 --rig rig.yaml --out rig.yaml");
   command.runs(run_later, [options] { return calibrate_colour(*options); });

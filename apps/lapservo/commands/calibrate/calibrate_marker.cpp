@@ -59,8 +59,7 @@ int calibrate_marker(const CalibrateOptions& options) {
   std::printf("\nboundaries miss the print by %.3f px rms before, %.3f px after\n", calibration.before_px,
               calibration.after_px);
   std::printf(
-      "diameter_m is the rig's (%.3f mm): images give lengths in diameters; a smaller shaft nearer by looks "
-      "the same\n",
+      "diameter_m is the rig's (%.3f mm): images give lengths in diameters; a smaller shaft nearer by looks the same\n",
       1e3 * instrument.marker.diameter_m);
   if (calibration.seam_may_lag)
     std::printf(
@@ -83,10 +82,9 @@ void add_calibrate_marker(Command parent, Run& run_later) {
                   "Images of a slow full turn about the shaft's axis: a folder, a video, a bag, a camera or a stream")
       .required();
   add_calibrate_options(command, *options);
-  add_joint_options(
-      command, *options,
-      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
-      "bag, the input itself for example: for seam_rad too, which images alone can't determine");
+  add_joint_options(command, *options,
+                    "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or "
+                    "a bag, the input itself for example: for seam_rad too, which images alone can't determine");
   command.footer(
       "Turn the instrument about its axis once, or a little more, in 20 to 60 s, near and sharp, the whole marker in "
       "view;\n"

@@ -49,8 +49,8 @@ void print_residuals(const Registration& registration) {
     return;
   }
   std::printf(
-      "\nmarkers are %.2f mm, %.2f mrad (axis), %.2f mrad (about it) rms from where the joints have them, in "
-      "%zu frames\n",
+      "\nmarkers are %.2f mm, %.2f mrad (axis), %.2f mrad (about it) rms from where the joints have them, in %zu "
+      "frames\n",
       position_mm, 1e3 * rms(registration.residuals, &RegistrationResidual::axis_rad),
       1e3 * rms(registration.residuals, &RegistrationResidual::roll_rad), registration.residuals.size());
 }
@@ -62,8 +62,8 @@ void print_reach(const Marker& marker, const Registration& registration) {
   const auto within = placement_sigma_beyond(marker, registration, 0, 0);
   const auto beyond = placement_sigma_beyond(marker, registration, beyond_rad, beyond_m);
   std::printf(
-      "it places the marker to %.2f mm and %.1f mrad (one sigma) where %s, to %.2f mm and %.1f mrad 30 degrees "
-      "and 20 mm beyond\n",
+      "it places the marker to %.2f mm and %.1f mrad (one sigma) where %s, to %.2f mm and %.1f mrad 30 degrees and 20 "
+      "mm beyond\n",
       1e3 * within.place_m, 1e3 * within.axis_rad,
       ranges_text(registration.arm->joints, registration.arm->ranges).c_str(), 1e3 * beyond.place_m,
       1e3 * beyond.axis_rad);
@@ -108,17 +108,15 @@ void add_calibrate_registration(Command parent, Run& run_later) {
       "registration",
       "Measure where the arm stands before the camera, its joints' signs and offsets, and the video's delay.");
   command
-      .add_option(
-          "input", options->input,
-          "The marker in motion: a folder, a video, a bag (which brings its joints along), a camera, a stream, or "
-          "a CSV of observations that were tracked without camera_from_rcm")
+      .add_option("input", options->input,
+                  "The marker in motion: a folder, a video, a bag (which brings its joints along), a camera, a stream, "
+                  "or a CSV of observations that were tracked without camera_from_rcm")
       .required();
   add_calibrate_options(command, *options);
   add_joint_options(
       command, *options,
-      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a "
-      "bag; without it those in the input, where it is a bag. Without any only the RCM's position can be "
-      "determined");
+      "CSV of the arm's joints meanwhile (time_s and a column a joint, named as in the rig's joints), or a bag; "
+      "without it those in the input, where it is a bag. Without any only the RCM's position can be determined");
   command.footer(
       "Swing the instrument by 0.5 rad in both directions, insert and withdraw it by 20 mm, turn it by 2 rad, all of "
       "it\n"

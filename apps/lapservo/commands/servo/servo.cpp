@@ -191,10 +191,9 @@ void add_arm_options(Command command, ServoOptions& options) {
   command.add_option(
       "--robot", options.robot,
       "sim: the built-in simulator; ros2:PSM1 or ros1:PSM1: the arm of that CRTK namespace, see docs/dvrk.md");
-  command.add_option(
-      "--camera", options.camera,
-      "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a CompressedImage; "
-      "/dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
+  command.add_option("--camera", options.camera,
+                     "Images of a real arm: ros2:/topic or ros1:/topic, an Image or, where it ends in /compressed, a "
+                     "CompressedImage; /dev/videoN; gst:PIPELINE, for example 'gst:decklinkvideosrc ! deinterlace'");
   command
       .add_option("--control", options.control,
                   "Who may say stop and start, and set goals: the page of --web, the topics, which anybody in the "
@@ -207,8 +206,7 @@ void add_arm_options(Command command, ServoOptions& options) {
                    "Move a real arm; without it nothing is sent, and what would be is said");
   command.add_option(
       "--joint-limits", options.joint_limits,
-      "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml; with --enable-motion "
-      "needed");
+      "YAML of the arm's joints, for example configs/joint_limits/psm-classic.yaml; with --enable-motion needed");
   add_setpoint_readers_option(command, options.setpoint_readers);
 }
 
@@ -232,8 +230,7 @@ void add_trajectory_options(Command command, ServoOptions& options) {
 void add_control_options(Command command, ServoOptions& options) {
   command.add_option("--method", options.method,
                      "default: measured joints and images fused; paper: its law (eq. 21), gains and Algorithm 1; "
-                     "uncalibrated: learns "
-                     "the Jacobian");
+                     "uncalibrated: learns the Jacobian");
   command
       .add_option("--tracker", options.tracker,
                   "surface: all visible lines; centerline: the paper's Algorithm 1. Without it centerline with "
@@ -257,10 +254,9 @@ void add_result_options(Command command, ServoOptions& options) {
 }
 
 void add_replay_options(Command command, ServoOptions& options) {
-  command.add_option(
-      "--replay", options.replay,
-      "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2: decide on the "
-      "recorded images and joints as without --enable-motion");
+  command.add_option("--replay", options.replay,
+                     "A run's log.csv: decide everything again and compare every bit; a bag of ROS 1 or 2: decide on "
+                     "the recorded images and joints as without --enable-motion");
   add_image_topic_option(command, options.image_topic);
   add_joint_topic_option(command, options.joint_topic);
 }
