@@ -43,11 +43,5 @@ TEST(Angles, TheEndsOfTheIntervalsBelongToTheirBeginnings) {
   EXPECT_LT(wrap_two_pi(-std::numeric_limits<double>::min()), two_pi);
 }
 
-TEST(Angles, DegreesAndRadiansAreInverse) {
-  EXPECT_DOUBLE_EQ(rad_from_deg(180), pi);
-  for (double angle_deg = -720; angle_deg <= 720; angle_deg += 7.5)
-    EXPECT_NEAR(deg_from_rad(rad_from_deg(angle_deg)), angle_deg, 1e-12);
-}
-
 }  // namespace
 }  // namespace lapservo::internal

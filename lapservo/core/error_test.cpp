@@ -18,14 +18,6 @@ TEST(InputError, KeepsItsFieldsAsTheyWereGiven) {
   EXPECT_EQ(error.what(), "a: b.yaml: instruments[0].name: is " + std::string(80, 'x') + "..., expected a name");
 }
 
-TEST(InputError, KeepsTheProblemOfASourceWithoutFields) {
-  const InputError error("rig.yaml", "is empty, expected a YAML file");
-  EXPECT_EQ(error.source(), "rig.yaml");
-  EXPECT_EQ(error.problem(), "is empty, expected a YAML file");
-  EXPECT_EQ(error.field() + error.value() + error.expectation(), "");
-  EXPECT_STREQ(error.what(), "rig.yaml: is empty, expected a YAML file");
-}
-
 // Whatever its text looks like: nothing is read out of the message.
 TEST(InputError, SaysTheSameOfAnotherSource) {
   const InputError fields("rig", "rig: camera", "rig: 3", "another");

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -72,6 +73,14 @@ TEST(TemporaryFile, IsBesideItsTargetAndGoneInTheEnd) {
   }
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 1);
   EXPECT_EQ(read_file(folder / "a.mp4"), "old");
+}
+
+TEST(TemporaryFile, BecomesANewFileByTheUsersMask) {
+  const TemporaryFolder folder;
+  const mode_t before = ::umask(027);
+  TemporaryFile(OutputTarget(folder / "new.csv")).commit();
+  ::umask(before);
+  EXPECT_EQ(fs::status(folder / "new.csv").permissions(), fs::perms(0640));
 }
 
 TEST(TemporaryFile, OfTwoWritersTheLastIsThereWhole) {
