@@ -135,26 +135,6 @@ TEST(ImageDecoder, ChromaOfYuv422IsInterpolatedFromTheLeftOfEachTwoPixels) {
   }
 }
 
-// An evenly coloured scene through each pattern: the first row's first two letters are its first two pixels.
-TEST(ImageDecoder, BayerPatternsByTheirLetters) {
-  const cv::Vec3b colour(40, 120, 220);
-  for (const std::string pattern : {"rggb", "bggr", "gbrg", "grbg"})
-    for (const bool deep : {false, true}) {
-      ImageMessage message;
-      message.width = 12, message.height = 10;
-      message.step = deep ? 24 : 12;
-      message.encoding = "bayer_" + pattern + (deep ? "16" : "8");
-      for (int v = 0; v < 10; ++v)
-        for (int u = 0; u < 12; ++u) {
-          const char letter = pattern[2 * (v % 2) + u % 2];
-          if (deep) message.data.push_back(99);
-          message.data.push_back(letter == 'b' ? colour[0] : letter == 'g' ? colour[1] : colour[2]);
-        }
-      const cv::Vec3b got = bgr_at(decode(message), 5, 6);
-      for (int i = 0; i < 3; ++i) EXPECT_NEAR(got[i], colour[i], 2) << message.encoding;
-    }
-}
-
 TEST(ImageDecoder, RefusesWithTheReason) {
   EXPECT_NE(why(decode(message_of("mono8", 1))).find("has no colours"), std::string::npos);
   EXPECT_NE(why(decode(message_of("32FC1\x1b[2J", 4))).find("encoding 32FC1?[2J, expected"), std::string::npos);

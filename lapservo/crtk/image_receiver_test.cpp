@@ -43,18 +43,6 @@ TEST(ImageReceiver, StampsByTheLoopsClockStay) {
   EXPECT_DOUBLE_EQ(receiver.newest()->time_s, 5.11);
 }
 
-TEST(ImageReceiver, RepeatedStampsAreNotFresh) {
-  ImageReceiver receiver(4, 2);
-  receiver.receive(image(epoch_s), 5);
-  EXPECT_TRUE(receiver.newest());
-  for (int k = 1; k < 100; ++k) {
-    receiver.receive(image(epoch_s), 5 + k * period_s);
-    EXPECT_FALSE(receiver.newest());
-  }
-  EXPECT_EQ(receiver.counts().repeated, 99);
-  EXPECT_EQ(receiver.complaint(), "the same stamp again");
-}
-
 TEST(ImageReceiver, DropsAndCountsWhatCanNotBeUsed) {
   ImageReceiver receiver(4, 2);
   double now_s = 5;
