@@ -8,9 +8,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
-#include <optional>
-#include <sstream>
 #include <string>
 #include <sys/stat.h>
 #include <utility>
@@ -22,6 +19,7 @@
 
 #include "acceptance/tool_test.h"
 #include "lapservo/core/csv.h"
+#include "lapservo/rig/rig.h"
 #include "lapservo/sim/boards.h"
 #ifdef LAPSERVO_TEST_BAGS
 #include <fmt/format.h>
@@ -110,22 +108,13 @@ class CommandLine : public acceptance::ToolTest {
           EXPECT_EQ(found.text(row, column), expected.text(row, column)) << column;
         }
   }
-  // Two rigs' measured numbers, of times that differ in their last digits.
-  static void expect_same_numbers(const std::string& one, const std::string& other) {
-    const auto words_of = [](const std::string& text) {
-      std::istringstream from(text);
-      return std::vector<std::string>(std::istream_iterator<std::string>(from), {});
-    };
-    const auto a = words_of(one), b = words_of(other);
-    ASSERT_EQ(a.size(), b.size());
-    const auto number = [](const std::string& word) {
-      const std::size_t at = word.find_first_of("-0123456789");
-      return at == std::string::npos ? std::nullopt : std::optional(std::stod(word.substr(at)));
-    };
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      if (a[i] == b[i]) continue;
-      EXPECT_NEAR(number(a[i]).value(), number(b[i]).value(), 1e-5) << a[i] << " " << b[i];
-    }
+  static void expect_same_arm(const Instrument& one, const Instrument& other) {
+    constexpr double within = 1e-5;
+    EXPECT_EQ(one.joints->sign, other.joints->sign);
+    for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(one.joints->offset[i], other.joints->offset[i], within);
+    EXPECT_NEAR(one.image_delay_s.value(), other.image_delay_s.value(), within);
+    const Rigid3 moved = one.camera_from_rcm->inverse() * *other.camera_from_rcm;
+    EXPECT_LE(moved.translation.norm() + moved.rotation.vec().norm(), within);
   }
 #endif
 };
@@ -159,14 +148,9 @@ TEST_F(CommandLine, TrackNamesTheRigThatItFound) {
 
 // Such a print gives no numbers, only the remedy.
 TEST_F(CommandLine, SaysWhatToDoAboutAPrintThatIsOff) {
-  std::string printed = read_file("configs/example.yaml");
-  for (const auto& [of_rig, off] :
-       {std::pair<std::string, std::string>{"[0.0035, 0.0035, 0.017]", "[0.0037, 0.0035, 0.0168]"},
-        {"[0.0095, 0.0095, 0.005]", "[0.0097, 0.0095, 0.0048]"}}) {
-    ASSERT_NE(printed.find(of_rig), std::string::npos);
-    printed.replace(printed.find(of_rig), of_rig.size(), off);
-  }
-  write_file("out/printed.yaml", printed);
+  const std::string upper =
+      replaced(read_file("configs/example.yaml"), "[0.0035, 0.0035, 0.017]", "[0.0037, 0.0035, 0.0168]");
+  write_file("out/printed.yaml", replaced(upper, "[0.0095, 0.0095, 0.005]", "[0.0097, 0.0095, 0.0048]"));
   expect_done("render --rig out/printed.yaml --out out/frames --count 2 --seed 5");
   EXPECT_EQ(run("track out/frames --rig configs/example.yaml --out out/obs.csv"), 1);
   expect_in(errors(), "in 2 of 2 frames the print is not as the rig says (marker_mismatch)");
@@ -222,12 +206,8 @@ TEST_F(CommandLine, DevicesThatAreNoCamera) {
 #endif
 
 TEST_F(CommandLine, BagsThatCannotBeRead) {
-  for (const auto& [name, content, what] : {std::array{"new.mcap", "\x89MCAP0", "ros2 bag convert"},
-                                            {"packed.db3.zstd", "(\xb5/\xfd", "zstd -d"},
-                                            {"run.bag", "#ROSBAG V2.0\n", "ROS 1 bag"},
-                                            {"run.db3", "SQLite format 3", "ROS 2 bag"}}) {
-    expect_refused(track(in(name, content)), {name, what});
-  }
+  expect_refused(track(in("run.bag", "#ROSBAG V2.0\n")), {"run.bag", "ROS 1 bag"});
+  in("run.db3", "SQLite format 3");
   expect_refused("servo --replay in/run.bag", {"--rig", "is missing"});
   expect_refused("servo --replay in/run.bag --rig configs/example.yaml", {"run.bag", "ROS 1 bag"});
   expect_refused("calibrate registration in/run.db3 --rig configs/example.yaml --out out/rig.yaml",
@@ -264,21 +244,16 @@ TEST_F(CommandLine, UnknownWordsGetTheNearestKnownOne) {
   expect_refused("calibrate color in/a.png", {"color is unknown, the nearest is colour"});
 }
 
+// More of them in the tests of io.
 TEST_F(CommandLine, PicturesThatAreNone) {
-  cv::Mat noise(720, 1280, CV_8UC3);
+  cv::Mat noise(540, 960, CV_8UC3);
   cv::randu(noise, 0, 255);
-  cv::imwrite("in/whole.png", noise);
-  cv::imwrite("in/whole.jpg", noise);
-  cv::imwrite("in/small.png", noise(cv::Rect(0, 0, 960, 540)));
-  const std::string png = read_file("in/whole.png"), jpg = read_file("in/whole.jpg");
+  cv::imwrite("in/small.png", noise);
+  const std::string png = read_file("in/small.png");
   expect_refused(track("in/missing.png"), {"missing.png", "does not exist"});
   expect_refused(track(in("half.png", png.substr(0, png.size() / 2))), {"half.png", "truncated"});
-  expect_refused(track(in("half.jpg", jpg.substr(0, jpg.size() / 2))), {"half.jpg", "truncated"});
-  expect_refused(track(in("text.png", "this is no image")), {"text.png", "expected a PNG"});
   expect_refused(track(in("film.mp4", "this is no film")), {"film.mp4", "expected"});
   expect_refused(track("in/small.png"), {"small.png", "960x540", "1280x720"});
-  in("empty.png", "");
-  expect_refused(track("in/empty.png"), {"empty.png", "is empty"});
   fs::create_directories("in/folder");
   expect_refused(track("in/folder"), {"folder", "no images"});
 }
@@ -288,9 +263,7 @@ TEST_F(CommandLine, RigsThatAreNone) {
   write_grey("in/grey.png");
   const std::string good = read_file("configs/example.yaml");
   const auto with = [&](const std::string& what, const std::string& instead) {
-    std::string text = good;
-    text.replace(text.find(what), what.size(), instead);
-    return "track in/grey.png --rig " + in("rig.yaml", text) + " --out out/obs.csv";
+    return "track in/grey.png --rig " + in("rig.yaml", replaced(good, what, instead)) + " --out out/obs.csv";
   };
   expect_refused("track in/grey.png --rig in/none.yaml --out out/obs.csv", {"none.yaml"});
   expect_refused(with("diameter_m: 0.0084", "diameter_m: -1"), {"rig.yaml", "diameter_m", "-1"});
@@ -561,23 +534,14 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   expect_done("render --rig configs/example.yaml --out in/swing --poses " + in("poses.csv", poses));
   const std::string calibrate = "calibrate registration in/swing --fps 8 --rig " + unregistered + " --out out/rig.yaml";
   expect_done(calibrate + " --joints " + in("joints.csv", joints));
-  const std::string written = read_file("out/rig.yaml");
-  expect_in(written, "sign: [1, -1, 1, -1]");
-  const auto numbers_of = [&](const std::string& key) {
-    std::string text = written.substr(written.find("\n      " + key + ": [") + key.size() + 10);
-    std::vector<double> numbers;
-    for (std::size_t at = 0; at < text.find(']'); at = text.find(',', at) + 1)
-      numbers.push_back(std::stod(text.substr(at)));
-    return numbers;
-  };
-  const auto offset = numbers_of("offset"), translation = numbers_of("translation_m");
-  EXPECT_NEAR(offset[1], 1.5, 1.7e-3);
-  EXPECT_NEAR(offset[2], -0.02, 3e-4);
-  EXPECT_NEAR(offset[3], 0.7, 3e-3);
-  EXPECT_NEAR(translation[0], -0.077782, 3e-4);
-  EXPECT_NEAR(translation[2], 0.059220, 3e-4);
-  const std::string delay = "\n    image_delay_s: ";
-  EXPECT_NEAR(std::stod(written.substr(written.find(delay) + delay.size())), clock_s, 5e-3);
+  const Instrument found = load_rig("out/rig.yaml").instruments[0];
+  EXPECT_EQ(found.joints->sign, (Joints{{}, {1, -1, 1, -1}, {}}.sign));
+  EXPECT_NEAR(found.joints->offset[1], 1.5, 1.7e-3);
+  EXPECT_NEAR(found.joints->offset[2], -0.02, 3e-4);
+  EXPECT_NEAR(found.joints->offset[3], 0.7, 3e-3);
+  EXPECT_NEAR(found.camera_from_rcm->translation.x(), -0.077782, 3e-4);
+  EXPECT_NEAR(found.camera_from_rcm->translation.z(), 0.059220, 3e-4);
+  EXPECT_NEAR(found.image_delay_s.value(), clock_s, 5e-3);
 
   // The same swing tests both rigs: the first has no calibration yet.
   const std::string check = "check in/swing --fps 8 --joints in/joints.csv --rig ";
@@ -625,7 +589,7 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
   for (const std::string bag : {"in/run.bag", "in/run"}) {
     expect_tracked_as("out/bound.csv", bag, "out/rig.yaml");
     expect_done("calibrate registration " + bag + " --rig " + unregistered + " --out out/bag.yaml");
-    expect_same_numbers(written, read_file("out/bag.yaml"));
+    expect_same_arm(found, load_rig("out/bag.yaml").instruments[0]);
   }
   // The loop over the same recording; what it decided is a run's log like any other.
   const std::string decide = "servo --replay in/run.bag --rig ";
@@ -658,22 +622,15 @@ TEST_F(CommandLine, CalibrateRegistrationWritesWhereTheArmStands) {
 // A turn of a print that is not the rig's: the marker is wrapped askew, and joints say where its seam lies.
 TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
   constexpr int frames = 48;
-  const std::string plain = read_file("configs/example.yaml");
-  const auto with = [&](const std::string& bands, const std::string& more) {
-    std::string text = plain;
-    const auto replace = [&](const std::string& from, const std::string& to) {
-      const auto at = text.find(from);
-      ASSERT_NE(at, std::string::npos) << from;
-      text.replace(at, from.size(), to);
-    };
-    if (!bands.empty()) replace("bands_upper_m: [0.0035, 0.0035, 0.017]", "bands_upper_m: " + bands);
-    replace("seam_rad: 0.0", "seam_rad: 0.0" + more);
-    return text +
-           "    joints: {names: [yaw, pitch, insertion, roll], sign: [1, 1, 1, 1], offset: [0, 0, 0, 0]}\n"
-           "    image_delay_s: 0.1\n    sigma_image_delay_s: 0.01\n";
-  };
-  const std::string real = in("real.yaml", with("[0.0037, 0.0032, 0.0171]", "\n      wrap_m: 0.0013"));
-  const std::string designed = in("designed.yaml", with("", ""));
+  const std::string plain = read_file("configs/example.yaml"), bands = "bands_upper_m: [0.0035, 0.0035, 0.017]",
+                    seam = "seam_rad: 0.0";
+  const std::string joints_entry =
+      "    joints: {names: [yaw, pitch, insertion, roll], sign: [1, 1, 1, 1], offset: [0, 0, 0, 0]}\n"
+      "    image_delay_s: 0.1\n    sigma_image_delay_s: 0.01\n";
+  const std::string wrapped = replaced(plain, seam, seam + "\n      wrap_m: 0.0013");
+  const std::string real =
+      in("real.yaml", replaced(wrapped, bands, "bands_upper_m: [0.0037, 0.0032, 0.0171]") + joints_entry);
+  const std::string designed = in("designed.yaml", plain + joints_entry);
   std::string poses = "theta_rad,phi_rad,rho_m,psi_rad\n", joints = "time_s,roll,yaw,pitch,insertion\n";
   for (int i = 0; i < frames; ++i) {
     const double psi_rad = -3 + 6.6 * i / frames;
@@ -691,23 +648,20 @@ TEST_F(CommandLine, CalibrateMarkerWritesTheRigOfThePrint) {
   const std::string written = read_file("out/rig.yaml");
   for (const char* key : {"sigma_bands_upper_m", "sigma_wrap_m", "sigma_seam_rad", "sigma_image_delay_s: 0.01"})
     expect_in(written, key);
-  const auto value_of = [&](const std::string& key) {
-    return std::stod(written.substr(written.find("\n      " + key + ": ") + key.size() + 9));
-  };
-  EXPECT_NEAR(value_of("wrap_m"), 0.0013, 2e-5);
-  EXPECT_NEAR(value_of("seam_rad"), 0.3, 5e-3);
+  const Marker found = load_rig("out/rig.yaml").instruments[0].marker;
+  EXPECT_NEAR(found.wrap_m, 0.0013, 2e-5);
+  EXPECT_NEAR(found.seam_rad, 0.3, 5e-3);
   expect_done("track in/turn --rig out/rig.yaml --out out/obs.csv");
   const CsvTable observed = CsvTable::read("out/obs.csv");
   for (std::size_t row = 0; row < observed.rows(); ++row) EXPECT_EQ(observed.text(row, "status"), "ok") << row;
 
   // A refused calibration leaves the existing file.
-  const std::string before = written;
   fs::create_directories("in/few");
   for (const char* name : {"0000.png", "0010.png", "0020.png"})
     fs::copy_file(fs::path("in/turn") / name, fs::path("in/few") / name);
   EXPECT_EQ(run("calibrate marker in/few --rig " + designed + " --out out/rig.yaml"), 1);
   expect_in(errors(), "film a slow full turn");
-  EXPECT_EQ(read_file("out/rig.yaml"), before);
+  EXPECT_EQ(read_file("out/rig.yaml"), written);
 }
 
 TEST_F(CommandLine, CalibratesACamera) {

@@ -21,12 +21,6 @@ namespace fs = std::filesystem;
 using lapservo::testing::read_file;
 using lapservo::testing::write_file;
 
-std::string replaced(std::string text, const std::string& what, const std::string& by) {
-  const auto at = text.find(what);
-  EXPECT_NE(at, std::string::npos) << what;
-  return at == std::string::npos ? text : text.replace(at, what.size(), by);
-}
-
 class EstimateRcm : public acceptance::ToolTest {
  protected:
   static std::string write(const std::string& name, const std::string& content) {

@@ -47,6 +47,11 @@ class ToolTest : public ::testing::Test {
     EXPECT_EQ(text.find("filesystem error"), std::string::npos) << text;
     for (const std::string& word : words) expect_in(text, word);
   }
+  static std::string replaced(std::string text, const std::string& what, const std::string& by) {
+    const auto at = text.find(what);
+    EXPECT_NE(at, std::string::npos) << what;
+    return at == std::string::npos ? text : text.replace(at, what.size(), by);
+  }
   static void expect_in(const std::string& text, std::string_view word) {
     EXPECT_NE(text.find(word), std::string::npos) << "no '" << word << "' in: " << text;
   }
