@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -53,17 +54,26 @@ std::string bars(const std::string& format, const Matrix& matrix, bool full_rang
   return format == "yuy2" ? packed : light + (format == "nv12" ? uv_plane : u_plane + v_plane);
 }
 
-TEST(Colours, AreThoseOfTheCapsColorimetry) {
+// An image of these bytes, by GStreamer.
+struct Shown {
+  std::string pipeline;
+  std::optional<Frame> image;
+};
+Shown shown(const std::string& bytes, const std::string& format, const cv::Size& size, const std::string& caps) {
   const testing::TemporaryFolder folder;
+  testing::write_file(folder / "raw", bytes);
+  const std::string pipeline = fmt::format(
+      "filesrc location={} ! rawvideoparse format={} width={} height={} ! capssetter caps=video/x-raw,colorimetry={}",
+      (folder / "raw").string(), format, size.width, size.height, caps);
+  return {pipeline, open_camera_or_file("gst:" + pipeline, 30)->next()};
+}
+
+TEST(Colours, AreThoseOfTheCapsColorimetry) {
   for (const char* format : {"i420", "nv12", "yuy2"}) {
     for (const Matrix& matrix : matrices) {
       for (const bool full_range : {false, true}) {
-        testing::write_file(folder / "bars", bars(format, matrix, full_range));
-        const std::string pipeline = fmt::format(
-            "filesrc location={} ! rawvideoparse format={} width={} height={} ! "
-            "capssetter caps=video/x-raw,colorimetry={}",
-            (folder / "bars").string(), format, width, height, colorimetry(matrix, full_range));
-        const auto image = open_camera_or_file("gst:" + pipeline, 30)->next();
+        const auto [pipeline, image] =
+            shown(bars(format, matrix, full_range), format, {width, height}, colorimetry(matrix, full_range));
         ASSERT_TRUE(image) << pipeline;
         for (std::size_t i = 0; i < colours.size(); ++i) {
           const auto bgr = image->bgr.at<cv::Vec3b>(height / 2, static_cast<int>(i) * bar + bar / 2);
@@ -84,7 +94,6 @@ struct Slope {
 
 TEST(Colours, ChromaLiesWhereTheCapsPutIt) {
   constexpr int side = 32, per_pixel = 3, middle = 128, light = 120;
-  const testing::TemporaryFolder folder;
   for (const Slope& slope : {Slope{"i420", ",chroma-site=mpeg2", 0, 0.5},
                              {"i420", ",chroma-site=jpeg", 0.5, 0.5},
                              {"nv12", ",chroma-site=mpeg2", 0, 0.5},
@@ -103,12 +112,8 @@ TEST(Colours, ChromaLiesWhereTheCapsPutIt) {
           if (!packed && row % 2 == 0) u += blue, v += static_cast<char>(middle);
           if (interleaved && row % 2 == 0) u += static_cast<char>(middle);
         }
-      testing::write_file(folder / "slope", y + u + (interleaved ? "" : v));
-      const std::string pipeline = fmt::format(
-          "filesrc location={} ! rawvideoparse format={} width={} height={} ! "
-          "capssetter caps=video/x-raw,colorimetry=bt601{}",
-          (folder / "slope").string(), slope.format, side, side, slope.site);
-      const auto image = open_camera_or_file("gst:" + pipeline, 30)->next();
+      const auto [pipeline, image] =
+          shown(y + u + (interleaved ? "" : v), slope.format, {side, side}, std::string("bt601") + slope.site);
       ASSERT_TRUE(image) << pipeline;
       for (int i = 4; i < side - 4; ++i) {
         const auto bgr = along_rows ? image->bgr.at<cv::Vec3b>(i, side / 2) : image->bgr.at<cv::Vec3b>(side / 2, i);

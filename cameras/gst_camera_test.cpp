@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <functional>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -11,22 +10,16 @@
 
 #include "cameras/camera.h"
 #include "lapservo/crtk/image_decoder.h"
-#include "lapservo/crtk/image_receiver.h"
 #include "lapservo/crtk/test_inbox.h"
 #include "lapservo/io/pictures/jpeg_encoding.h"
 #include "lapservo/robot/steady_clock.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/wait_for.h"
 
 namespace lapservo::internal {
 namespace {
-
-bool wait_for(const std::function<bool()>& condition) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-  while (!condition() && std::chrono::steady_clock::now() < end)
-    std::this_thread::sleep_for(std::chrono::milliseconds(2));
-  return condition();
-}
+using testing::wait_for;
 
 TEST(GstCamera, ImagesCarryTheMonotonicTimeOfTheirCapture) {
   TestInbox<ImageMessage> images;
@@ -108,23 +101,6 @@ TEST(GstCamera, ADevicesRawAndJpegImagesHaveTheirColours) {
   }
 }
 
-TEST(GstCamera, RepeatedAndResizedFramesAreCounted) {
-  const SteadyClock clock;
-  ImageReceiver receiver(64, 48);
-  // Each frame twice, with one stamp.
-  const auto camera =
-      open_camera("gst:videotestsrc is-live=true num-buffers=10 ! video/x-raw,width=32,height=48,framerate=50/1", {},
-                  [&](ImageMessage&& message) {
-                    receiver.receive(ImageMessage(message), clock.now_s());
-                    receiver.newest();
-                    receiver.receive(std::move(message), clock.now_s());
-                  });
-  ASSERT_TRUE(wait_for([&] { return camera->ended().has_value(); }));
-  EXPECT_GT(receiver.counts().resized, 0);
-  EXPECT_EQ(receiver.counts().repeated, receiver.counts().resized);
-  EXPECT_EQ(receiver.complaint(), "the same stamp again");
-}
-
 TEST(GstCamera, WhatGivesNoImagesIsRefusedInOneLine) {
   struct Refusal {
     std::string camera;
@@ -152,15 +128,6 @@ TEST(GstCamera, WhatGivesNoImagesIsRefusedInOneLine) {
     for (const std::string& part : said) EXPECT_NE(refusal.find(part), std::string::npos) << camera << ": " << refusal;
     EXPECT_EQ(refusal.find('\n'), std::string::npos) << refusal;
   }
-}
-
-// An error while it plays: a source that breaks off.
-TEST(GstCamera, AnErrorLaterIsSaid) {
-  const auto camera = open_camera(
-      "gst:videotestsrc is-live=true ! video/x-raw,width=64,height=48,framerate=50/1 ! identity error-after=5", {},
-      [](ImageMessage&&) {});
-  ASSERT_TRUE(wait_for([&] { return camera->ended().has_value(); }));
-  EXPECT_NE(camera->ended()->find("identity"), std::string::npos) << *camera->ended();
 }
 
 TEST(CameraFrames, AreAllOfAFileAndEndWithIt) {

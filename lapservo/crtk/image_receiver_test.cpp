@@ -62,7 +62,8 @@ TEST(ImageReceiver, DropsAndCountsWhatCanNotBeUsed) {
   EXPECT_FALSE(offer(image(0)));
   EXPECT_FALSE(offer(image(epoch_s + now_s + 3600)));
   EXPECT_TRUE(offer(image(epoch_s + now_s + 3600)));
-  EXPECT_FALSE(offer(image(epoch_s + now_s + 3600 - 2)));  // repeated
+  EXPECT_FALSE(offer(image(epoch_s + now_s + 3600 - 2)));
+  EXPECT_EQ(receiver.complaint(), "the same stamp again");
   CompressedImageMessage compressed;
   compressed.stamp_s = epoch_s + now_s + 3600;
   receiver.receive(std::move(compressed), now_s + period_s);

@@ -1,6 +1,7 @@
 #include "lapservo/crtk/interlock.h"
 
 #include <cmath>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <string>
@@ -42,6 +43,14 @@ class Bench {
     return {epoch_s + now_s,
             {"yaw", "pitch", "wrist", "insertion", "roll"},
             {joints[0], joints[1], wrist, joints[2], joints[3]}};
+  }
+  // An arm's word of the other process `source`, on its state's (0), its setpoints' (1) or its joints' (2) topic.
+  void hear(int topic, std::uint64_t source, const Eigen::Vector4d& of_q) {
+    JointMessage joints = message(of_q);
+    joints.source = source;
+    if (topic == 0) interlock.on_operating_state({epoch_s, "ENABLED", true, false, source}, now_s);
+    if (topic == 1) interlock.on_setpoint(joints, now_s);
+    if (topic == 2) interlock.on_measured(joints, now_s);
   }
   Eigen::Vector4d followed() const {
     const Eigen::Vector4d q = on_their_way_.empty() ? setpoint : on_their_way_.front().second;
@@ -252,21 +261,13 @@ TEST(Interlock, TellsOfAFaultHoweverShort) {
 }
 
 TEST(Interlock, NothingIsSentWhileSomebodyElseCommandsTheArm) {
-  const std::vector<std::function<void(Bench&)>> commands{[](Bench& b) { b.interlock.on_foreign_command(b.now_s); },
-                                                          [](Bench& b) {
-                                                            JointMessage foreign = b.message(b.setpoint);
-                                                            foreign.stamp_s += 1e-4, foreign.positions[0] += 0.02;
-                                                            b.interlock.on_setpoint(foreign, b.now_s);
-                                                          },
-                                                          [](Bench& b) {
-                                                            JointMessage foreign = b.message(b.setpoint);
-                                                            foreign.stamp_s += 1e-4, foreign.positions[2] += 0.02;
-                                                            b.interlock.on_setpoint(foreign, b.now_s);
-                                                          }};
-  for (const auto& command : commands) {
+  for (const int joint : {-1, 0, 2}) {  // whose setpoint the arm says that it follows; -1: the command itself is heard
     Bench bench;
     bench.control(0.3, slow);
-    command(bench);
+    JointMessage foreign = bench.message(bench.setpoint);
+    foreign.stamp_s += 1e-4;
+    if (joint >= 0) foreign.positions.at(static_cast<std::size_t>(joint)) += 0.02;
+    joint < 0 ? bench.interlock.on_foreign_command(bench.now_s) : bench.interlock.on_setpoint(foreign, bench.now_s);
     const int sent = bench.sent_count;
     EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::foreign_command);
     bench.control(max_s / 2, slow);
@@ -363,26 +364,12 @@ TEST(Interlock, ReleasedItBrakesToRestAndIsSilent) {
 
 // One topic after the other: not one of a second arm's messages is used, and none is sent while there is one.
 TEST(Interlock, OfTwoArmsOfANameNeitherIsMoved) {
-  const std::vector<std::function<void(Bench&)>> others{
-      [](Bench& b) {
-        JointMessage other = b.message(b.setpoint + slow);
-        other.source = 7;
-        b.interlock.on_measured(other, b.now_s);
-      },
-      [](Bench& b) {
-        JointMessage other = b.message(b.setpoint + slow);
-        other.source = 7;
-        b.interlock.on_setpoint(other, b.now_s);
-      },
-      [](Bench& b) {
-        b.interlock.on_operating_state({epoch_s, "ENABLED", true, false, 7}, b.now_s);
-      }};
-  for (const auto& says : others) {
+  for (int topic = 0; topic < 3; ++topic) {
     Bench bench;
     bench.control(0.3, slow);
     const int sent = bench.sent_count;
     for (int k = 0; k < 10; ++k) {
-      says(bench);
+      bench.hear(topic, 7, bench.setpoint + slow);
       EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::second_source);
       bench.control(0.05, slow);
     }
@@ -425,18 +412,10 @@ TEST(Interlock, AnArmThatWasRestartedIsTheArm) {
     bench.control(0.3, slow);
     bench.talking = false;
     bench.control(0.6, slow);
-    JointMessage message = bench.message(bench.setpoint);
-    message.source = 7;
-    for (int k = 0; k < 3; ++k) {
-      const int topic = (first + k) % 3;
-      if (topic == 0) bench.interlock.on_operating_state({epoch_s, "ENABLED", true, false, 7}, bench.now_s);
-      if (topic == 1) bench.interlock.on_setpoint(message, bench.now_s);
-      if (topic == 2) bench.interlock.on_measured(message, bench.now_s);
-    }
+    for (int k = 0; k < 3; ++k) bench.hear((first + k) % 3, 7, bench.setpoint);
     bench.interlock.state(bench.now_s);  // takes the reason of before
     EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::none);
-    message.source = 0;
-    bench.interlock.on_measured(message, bench.now_s);
+    bench.hear(2, 0, bench.setpoint);
     EXPECT_EQ(bench.interlock.state(bench.now_s).blocked, Blocked::second_source);
   }
 }
