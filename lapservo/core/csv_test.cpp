@@ -10,7 +10,6 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/testing/input_error.h"
-#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::internal {
 namespace {
@@ -126,16 +125,6 @@ TEST(CsvTable, AComplaintIsOnePrintableLineWhateverTheFieldHolds) {
   const std::string error = input_error([&] { table.number(0, "a"); });
   EXPECT_LT(error.size(), 200U);
   for (const char c : error) EXPECT_GE(static_cast<unsigned char>(c), ' ');
-}
-
-TEST(CsvTable, ReadsFilesAndNamesThoseItCannotRead) {
-  const testing::TemporaryFolder folder;
-  testing::write_file(folder / "q.csv", "x\n4\n");
-  EXPECT_EQ(CsvTable::read(folder / "q.csv").number(0, "x"), 4);
-  const auto error = [&](const std::filesystem::path& path) { return input_error([&] { CsvTable::read(path); }); };
-  EXPECT_EQ(error(folder / "none.csv"), (folder / "none.csv").string() + ": can't be opened, expected a CSV file");
-  EXPECT_EQ(error(folder.path()), folder.path().string() + ": is a folder, expected a CSV file");
-  EXPECT_NE(error(folder / std::string(300, 'x')), "");
 }
 
 TEST(ParseFinite, TakesTheWholeTextAsOneFiniteNumberOrNothing) {

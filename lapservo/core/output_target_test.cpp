@@ -22,17 +22,6 @@ std::string refusal_to_write(const fs::path& path) {
   return input_error([&] { const OutputTarget target(path); });
 }
 
-TEST(OutputTarget, FollowsLinksToFiles) {
-  const TemporaryFolder folder;
-  fs::create_directory(folder / "sub");
-  testing::write_file(folder / "sub/there.csv", "old");
-  fs::create_symlink("sub/there.csv", folder / "first");
-  fs::create_symlink(folder / "first", folder / "second");
-  EXPECT_EQ(OutputTarget(folder / "second").file, fs::canonical(folder / "sub/there.csv"));
-  EXPECT_TRUE(OutputTarget(folder / "second").existing);
-  EXPECT_FALSE(OutputTarget(folder / "sub/new.csv").existing);
-}
-
 TEST(OutputTarget, RefusesWhatCanNotBeAFile) {
   const TemporaryFolder folder;
   const std::string place = folder.path().string();

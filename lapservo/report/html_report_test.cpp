@@ -1,18 +1,12 @@
 #include "lapservo/report/html_report.h"
 
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-
 #include <gtest/gtest.h>
 
-#include "lapservo/core/error.h"
 #include "lapservo/io/image_file.h"
 #include "lapservo/report/test_markup.h"
 
 namespace lapservo::internal {
 namespace {
-namespace fs = std::filesystem;
 
 Report sample_report(const std::string& word = "word") {
   ReportSection section;
@@ -97,19 +91,6 @@ TEST(HtmlReport, EmbedsPictures) {
   ASSERT_EQ(image.size(), cv::Size(60, 40));
   EXPECT_NEAR(image.at<cv::Vec3b>(20, 30)[0], 200, 6);
   EXPECT_NEAR(image.at<cv::Vec3b>(20, 30)[2], 20, 6);
-}
-
-TEST(HtmlReport, AppearsWholeOrNotAtAll) {
-  const fs::path folder = fs::temp_directory_path() / ("lapservo_report_" + std::to_string(::getpid()));
-  fs::create_directories(folder);
-  write_report(folder / "report.html", sample_report());
-  std::ifstream file(folder / "report.html");
-  std::stringstream text;
-  text << file.rdbuf();
-  EXPECT_EQ(text.str(), html_from(sample_report()));
-  EXPECT_THROW(write_report(folder / "missing" / "report.html", sample_report()), InputError);
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
-  fs::remove_all(folder);
 }
 
 TEST(HtmlReport, SaysAtTheTopThatItIsNotWhole) {

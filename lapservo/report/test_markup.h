@@ -1,63 +1,48 @@
 #pragma once
 
-#include <cctype>
-#include <regex>
+#include <cstddef>
+#include <set>
 #include <string>
 #include <vector>
 
 namespace lapservo::testing {
 
+/// The fault of a tag's attributes, each ` name="value"`; cuts them off.
+inline std::string attribute_problem(std::string& tag) {
+  std::set<std::string> names;
+  while (tag.ends_with('"')) {
+    const std::size_t value = tag.rfind("=\"", tag.size() - 3), name = tag.rfind(' ', value);
+    if (value == std::string::npos || name == std::string::npos) return "attribute without a name or quotes: " + tag;
+    if (!names.insert(tag.substr(name + 1, value - name - 1)).second) return "attribute twice: " + tag;
+    tag.resize(name);
+  }
+  return tag.find_first_of(" =\"") == std::string::npos ? "" : "attribute without quotes: " + tag;
+}
+
 /// Empty when the text is well-formed markup: tags balanced and nested, attributes quoted and unique, no stray < or &.
 /// Enough of XML for what we write.
 inline std::string markup_problem(const std::string& text) {
   std::vector<std::string> open;
-  static const std::regex entity("&(amp|lt|gt|quot|#39);.*", std::regex::extended);
-  for (std::size_t i = 0; i < text.size();) {
+  for (std::size_t i = 0; (i = text.find_first_of("<&", i)) != std::string::npos; ++i) {
+    const std::string start = text.substr(i, 60);
     if (text[i] == '&') {
-      const std::string rest = text.substr(i, 8);
-      if (!std::regex_match(rest.substr(0, rest.find(';') + 1), entity)) return "stray & at " + text.substr(i, 40);
-      ++i;
+      const std::set<std::string> entities{"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
+      if (!entities.contains(start.substr(0, start.find(';') + 1))) return "stray &: " + start;
       continue;
     }
-    if (text[i] != '<') {
-      ++i;
-      continue;
-    }
-    if (text.compare(i, 9, "<!DOCTYPE") == 0) {
-      i = text.find('>', i) + 1;
-      continue;
-    }
-    std::size_t at = i + 1;
-    const bool closing = text[at] == '/';
-    if (closing) ++at;
-    const std::size_t name_start = at;
-    while (at < text.size() && std::isalnum(static_cast<unsigned char>(text[at]))) ++at;
-    const std::string name = text.substr(name_start, at - name_start);
-    if (name.empty()) return "stray < at " + text.substr(i, 40);
-    std::vector<std::string> attributes;
-    while (at < text.size() && text[at] == ' ') {
-      const std::size_t equals = text.find('=', ++at);
-      const std::string attribute = text.substr(at, equals - at);
-      for (const std::string& other : attributes)
-        if (other == attribute) return "attribute twice: " + attribute;
-      attributes.push_back(attribute);
-      if (equals == std::string::npos || text[equals + 1] != '"') return "attribute without quotes in " + name;
-      const std::size_t end = text.find('"', equals + 2);
-      if (end == std::string::npos) return "attribute without end in " + name;
-      const std::string value = text.substr(equals + 2, end - equals - 2);
-      if (value.find('<') != std::string::npos) return "< in an attribute of " + name;
-      at = end + 1;
-    }
-    const bool empty = text[at] == '/';
-    if (empty) ++at;
-    if (text[at] != '>') return "tag " + name + " is not closed: " + text.substr(i, 60);
-    if (closing) {
-      if (open.empty() || open.back() != name) return "</" + name + "> closes nothing";
+    const std::size_t end = text.find('>', i);
+    if (end == std::string::npos || text.find('<', i + 1) < end) return "not closed: " + start;
+    std::string tag = text.substr(i + 1, end - i - 1);
+    if (tag.starts_with("!DOCTYPE")) continue;
+    const bool closing = tag.starts_with('/'), empty = tag.ends_with('/');
+    tag = tag.substr(closing, tag.size() - closing - empty);
+    if (const std::string problem = attribute_problem(tag); !problem.empty()) return problem;
+    if (tag.empty()) return "stray <: " + start;
+    if (closing && (open.empty() || open.back() != tag)) return "</" + tag + "> closes nothing";
+    if (closing)
       open.pop_back();
-    } else if (!empty) {
-      open.push_back(name);
-    }
-    i = at + 1;
+    else if (!empty)
+      open.push_back(tag);
   }
   return open.empty() ? "" : "<" + open.back() + "> stays open";
 }
