@@ -2,14 +2,10 @@ import os
 import pathlib
 import subprocess
 
-import hypothesis
 import numpy as np
 import pytest
 
 import lapservo
-
-hypothesis.settings.register_profile("here", derandomize=True, database=None, deadline=None)
-hypothesis.settings.load_profile("here")
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 Q = np.array([0.05, 1.57, 0.064, 1.2])

@@ -1,6 +1,4 @@
 import os
-import pathlib
-import re
 import shutil
 import subprocess
 import sys
@@ -83,12 +81,3 @@ def test_each_example_runs():
     for path in EXAMPLES.glob("*.py"):
         compile(path.read_text(), path, "exec")
         assert f'"{path.name}"' in tests
-
-
-def test_what_the_page_shows_runs(monkeypatch, tmp_path):
-    (tmp_path / "configs").symlink_to(SOURCE / "configs")
-    monkeypatch.chdir(tmp_path)
-    blocks = re.findall(r"```python\n(.*?)```", (SOURCE / "docs" / "python.md").read_text(), re.DOTALL)
-    assert blocks
-    for block in blocks:
-        exec(block, {})
