@@ -1,8 +1,6 @@
 // Compares images and videos with OpenCV's codecs, which share nothing with ours but libjpeg and libpng.
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,9 +11,6 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/io/image_file.h"
-#include "lapservo/io/pictures/jpeg_encoding.h"
-#include "lapservo/io/pictures/png_encoding.h"
-#include "lapservo/io/video/video_reader.h"
 #include "lapservo/io/video/video_writer.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
@@ -56,20 +51,6 @@ cv::Mat opencv_decode(const Bytes& bytes) {
 
 double largest_difference(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && a.type() == b.type() ? cv::norm(a, b, cv::NORM_INF) : 1e9;
-}
-
-TEST(Encoding, GivesTheBytesOfOpenCv) {
-  Random random(seed);
-  for (const int type : {CV_8UC1, CV_8UC3}) {
-    const cv::Mat image = picture_of(type, random);
-    for (const int quality : {1, 50, 80, 95, 100})
-      EXPECT_EQ(encode_jpeg(image, quality), opencv_encode(".jpg", image, {cv::IMWRITE_JPEG_QUALITY, quality}))
-          << type << " " << quality;
-  }
-  for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4}) {
-    const cv::Mat image = picture_of(type, random);
-    EXPECT_EQ(encode_png(image), opencv_encode(".png", image)) << type;
-  }
 }
 
 TEST(Decoding, GivesThePixelsOfOpenCv) {
@@ -146,70 +127,6 @@ TEST(OurVideo, IsReadByOpenCv) {
     }
     EXPECT_FALSE(reader.read(frame)) << name;
   }
-}
-
-// A blurred edge between two colours, which goes down or to the right by a sixteenth, so that it lies in every way
-// between pixels.
-cv::Mat edge_of_colours(bool down) {
-  const cv::Vec3d green(40, 160, 80), purple(170, 50, 110);
-  constexpr int size = 256;
-  cv::Mat image(size, size, CV_8UC3);
-  for (int v = 0; v < size; ++v)
-    for (int u = 0; u < size; ++u) {
-      const double across_px = down ? u - v / 16.0 : v - u / 16.0;
-      const double share = 0.5 * std::erfc((across_px - 120.13) / std::sqrt(2.0));
-      image.at<cv::Vec3b>(v, u) = share * green + (1 - share) * purple;
-    }
-  return image;
-}
-
-// Where luma and both colour differences change, a mean over lines across the edge.
-std::array<double, 3> places_px(const cv::Mat& bgr, bool down) {
-  const auto mean_over = [&](const cv::Range& along, const cv::Range& across) {
-    return cv::mean(down ? bgr(along, across) : bgr(across, along));
-  };
-  const cv::Range along(32, 224);
-  const auto difference = [](const cv::Scalar& mean, int of) {
-    const double luma = 0.114 * mean[0] + 0.587 * mean[1] + 0.299 * mean[2];
-    return of == 0 ? luma : mean[of == 1 ? 0 : 2] - luma;
-  };
-  const cv::Scalar before = mean_over(along, {80, 96}), between = mean_over(along, {96, 160}),
-                   after = mean_over(along, {160, 176});
-  std::array<double, 3> places{};
-  for (int of = 0; of < 3; ++of)
-    places[static_cast<std::size_t>(of)] =
-        64 * (difference(between, of) - difference(after, of)) / (difference(before, of) - difference(after, of));
-  return places;
-}
-
-// Colour differences, which a video has for four pixels together, keep their place: a reader that places their samples
-// on the left pixels' columns, as H.264 has it by default, would shift them by half a pixel.
-TEST(Videos, LeaveColoursWhereTheyAre) {
-  constexpr double farthest_px = 0.2;  // by compression
-  const testing::TemporaryFolder folder;
-  const auto path = folder / "a.mp4";
-  for (const bool ours : {true, false})
-    for (const bool down : {true, false}) {
-      const cv::Mat image = edge_of_colours(down);
-      if (ours) {
-        VideoWriter writer(path, 30);
-        for (int i = 0; i < 3; ++i) writer.add(image);
-        writer.commit();
-      } else {
-        cv::VideoWriter writer(path.string(), cv::CAP_FFMPEG, cv::VideoWriter::fourcc('a', 'v', 'c', '1'), 30,
-                               image.size());
-        if (!writer.isOpened()) GTEST_SKIP() << "OpenCV here lacks H.264";
-        for (int i = 0; i < 3; ++i) writer.write(image);
-      }
-      const auto written = places_px(image, down);
-      VideoReader reader(path);
-      for (int i = 0; i < 3; ++i) {
-        const auto read = places_px(reader.next().value().bgr, down);
-        // How far compression moves luma is the encoder's own: 0.21 px by OpenCV's on Debian 13.
-        for (std::size_t of = ours ? 0 : 1; of < 3; ++of)
-          EXPECT_NEAR(read[of], written[of], farthest_px) << ours << down << " frame " << i << " difference " << of;
-      }
-    }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 
@@ -10,6 +11,7 @@
 
 #include "lapservo/core/random.h"
 #include "lapservo/io/frame_source.h"
+#include "lapservo/testing/temporary_folder.h"
 
 namespace lapservo::testing {
 
@@ -45,6 +47,22 @@ inline VideoRead read_video(const std::filesystem::path& path) {
   }
   result.complaint = source->complaint();
   return result;
+}
+
+/// Whether the command ffmpeg is there and can do this.
+inline bool ffmpeg(const std::string& arguments) {
+  return std::system(("ffmpeg -v quiet -y " + arguments).c_str()) == 0;
+}
+
+/// An image as a video of 25 frames a second, with these arguments for its output; see ffmpeg().
+inline bool write_by_ffmpeg(const std::filesystem::path& path, const cv::Mat& bgr, const std::string& arguments,
+                            int frames = 1) {
+  const TemporaryFolder folder;
+  write_file(folder / "raw", {reinterpret_cast<const char*>(bgr.data), bgr.total() * bgr.elemSize()});
+  const std::string input = "-stream_loop " + std::to_string(frames - 1) + " -f rawvideo -pix_fmt bgr24 -s " +
+                            std::to_string(bgr.cols) + "x" + std::to_string(bgr.rows) + " -r 25 -i '" +
+                            (folder / "raw").string() + "' ";
+  return ffmpeg(input + arguments + " '" + path.string() + "'");
 }
 
 /// The bytes with 200 of them, from `from` on, drawn at random.

@@ -74,16 +74,6 @@ std::string refusal(const Bytes& bytes) {
 
 const Bytes rgb{10, 20, 30, 40, 50, 60, 70, 80, 90, 100, 110, 120};
 
-TEST(Tiff, HasItsPixelsPackedOrNot) {
-  constexpr std::uint32_t deflate = 8;
-  for (const Bytes& bytes : {tiff(rgb, {}), tiff(deflated(rgb), {{compression, deflate}})}) {
-    const cv::Mat image = decode_image(bytes, "p");
-    ASSERT_EQ(image.size(), cv::Size(2, 2));
-    EXPECT_EQ(image.at<cv::Vec3b>(0, 0), cv::Vec3b(30, 20, 10));
-    EXPECT_EQ(image.at<cv::Vec3b>(1, 1), cv::Vec3b(120, 110, 100));
-  }
-}
-
 TEST(Tiff, MaySayThatItsFourthSampleIsAlpha) {
   Bytes rgba;
   for (std::size_t i = 0; i < rgb.size(); i += 3) rgba.insert(rgba.end(), {rgb[i], rgb[i + 1], rgb[i + 2], 255});

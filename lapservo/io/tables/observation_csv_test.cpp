@@ -1,6 +1,5 @@
 #include "lapservo/io/tables/observation_csv.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -74,55 +73,39 @@ TEST(ObservationCsv, NumbersComeBackFarFinerThanTheyAreKnown) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Observation o = random_observation(random);
     const CsvTable table = table_of(o);
-    const auto value = [&](const std::string& column) { return table.number(0, column); };
-    EXPECT_EQ(value("frame"), 3);
-    EXPECT_EQ(value("time_s"), 0.1);
-    EXPECT_EQ(table.text(0, "file"), "0003.png");
-    EXPECT_EQ(table.text(0, "instrument"), "PSM1");
-    EXPECT_EQ(table.text(0, "status"), "ok");
-    EXPECT_NEAR(value("theta_rad"), o.rcm->q.theta_rad, 1e-7);
-    EXPECT_NEAR(value("phi_rad"), o.rcm->q.phi_rad, 1e-7);
-    EXPECT_NEAR(value("rho_m"), o.rcm->q.rho_m, 1e-8);
-    EXPECT_NEAR(value("psi_rad"), o.rcm->q.psi_rad, 1e-7);
-    EXPECT_NEAR(value("tau_rad"), o.tau_rad, 1e-7);
-    const char* const sigmas[] = {"sigma_theta_rad", "sigma_phi_rad", "sigma_rho_m", "sigma_psi_rad"};
-    for (Eigen::Index k = 0; k < 4; ++k)
-      EXPECT_NEAR(value(sigmas[k]) / std::sqrt(o.rcm->covariance(k, k)), 1, 1e-3) << sigmas[k];
-    EXPECT_NEAR(value("sigma_tau_rad") / o.sigma_tau_rad, 1, 1e-3);
-    for (std::size_t k = 0; k < 4; ++k) {
-      const std::string edge = "e" + std::to_string(k);
-      EXPECT_NEAR(value(edge + "_u_px"), o.edges_raw_px[k].x(), 1e-4) << "raw pixels, for drawing";
-      EXPECT_NEAR(value(edge + "_v_px"), o.edges_raw_px[k].y(), 1e-4);
+    for (const auto& [column, text] : {std::pair("frame", "3"), std::pair("file", "0003.png"),
+                                       std::pair("instrument", "PSM1"), std::pair("status", "ok")})
+      EXPECT_EQ(table.text(0, column), text);
+    EXPECT_EQ(table.number(0, "time_s"), 0.1);
+    const auto expect = [&](const std::string& column, double expected, double within) {
+      EXPECT_NEAR(table.number(0, column), expected, within) << column;
+    };
+    const char* const names[] = {"theta_rad", "phi_rad", "rho_m", "psi_rad"};
+    for (Eigen::Index k = 0; k < 4; ++k) {
+      const double sigma = std::sqrt(o.rcm->covariance(k, k));
+      expect(names[k], o.rcm->q.vector()[k], k == 2 ? 1e-8 : 1e-7);
+      expect(std::string("sigma_") + names[k], sigma, 1e-3 * sigma);
     }
-    EXPECT_NEAR(value("s_rad"), o.features.s_rad, 1e-7);
-    EXPECT_NEAR(value("r_px"), o.features.r_px.value(), 1e-4);
-    EXPECT_NEAR(value("l_px"), o.features.l_px, 1e-4);
-    EXPECT_NEAR(value("d_px"), o.features.d_px, 1e-4);
-    EXPECT_NEAR(value("cross_ratio"), o.features.cross_ratio, 1e-7);
+    expect("tau_rad", o.tau_rad, 1e-7), expect("sigma_tau_rad", o.sigma_tau_rad, 1e-3 * o.sigma_tau_rad);
+    for (std::size_t k = 0; k < 4; ++k) {  // raw pixels, for drawing
+      expect("e" + std::to_string(k) + "_u_px", o.edges_raw_px[k].x(), 1e-4);
+      expect("e" + std::to_string(k) + "_v_px", o.edges_raw_px[k].y(), 1e-4);
+    }
+    expect("s_rad", o.features.s_rad, 1e-7), expect("r_px", o.features.r_px.value(), 1e-4);
+    expect("l_px", o.features.l_px, 1e-4), expect("d_px", o.features.d_px, 1e-4);
+    expect("cross_ratio", o.features.cross_ratio, 1e-7);
     const Rigid3& pose = o.marker->camera_from_marker;
-    EXPECT_NEAR(value("marker_y_m"), pose.translation.y(), 1e-8);
-    EXPECT_NEAR(value("marker_z_m"), pose.translation.z(), 1e-8);
-    EXPECT_NEAR(value("marker_qx"), pose.rotation.x(), 1e-8);
-    EXPECT_NEAR(value("marker_qw"), pose.rotation.w(), 1e-8);
-    EXPECT_NEAR(value("sigma_marker_xy_m"), 1e-5, 1e-8);
-    EXPECT_NEAR(value("sigma_marker_z_m"), 2e-4, 1e-7);
-    EXPECT_NEAR(value("sigma_axis_rad"), 3e-4, 1e-7);
-    EXPECT_NEAR(value("sigma_roll_rad"), 4e-4, 1e-7);
+    expect("marker_y_m", pose.translation.y(), 1e-8), expect("marker_z_m", pose.translation.z(), 1e-8);
+    expect("marker_qx", pose.rotation.x(), 1e-8), expect("marker_qw", pose.rotation.w(), 1e-8);
+    expect("sigma_marker_xy_m", 1e-5, 1e-8), expect("sigma_marker_z_m", 2e-4, 1e-7);
+    expect("sigma_axis_rad", 3e-4, 1e-7), expect("sigma_roll_rad", 4e-4, 1e-7);
   }
 }
 
 std::vector<std::string> empty_columns(const CsvTable& table) {
   std::vector<std::string> empty;
-  const CsvTable header = CsvTable::parse(
-      "name\n" +
-          [] {
-            std::string names = observation_csv_header;
-            std::replace(names.begin(), names.end(), ',', '\n');
-            return names;
-          }(),
-      "names");
-  for (std::size_t i = 0; i < header.rows(); ++i)
-    if (table.text(0, header.text(i, "name")).empty()) empty.push_back(header.text(i, "name"));
+  for (const std::string& column : table.columns())
+    if (table.text(0, column).empty()) empty.push_back(column);
   return empty;
 }
 
@@ -144,17 +127,14 @@ TEST(ObservationCsv, WithoutAPoseTheMarkersColumnsAreEmpty) {
 
 TEST(ObservationCsv, WithoutAnObservationEveryMeasurementIsEmpty) {
   Random random(seed);
-  for (const auto& [status, word] :
-       {std::pair(Status::no_marker, "no_marker"), std::pair(Status::cut, "cut"),
-        std::pair(Status::occluded, "occluded"), std::pair(Status::ambiguous, "ambiguous"),
-        std::pair(Status::poor_fit, "poor_fit"), std::pair(Status::uncertain, "uncertain"),
-        std::pair(Status::marker_mismatch, "marker_mismatch"), std::pair(Status::interlaced, "interlaced")}) {
+  for (const Status status : {Status::no_marker, Status::cut, Status::occluded, Status::ambiguous, Status::poor_fit,
+                              Status::uncertain, Status::marker_mismatch, Status::interlaced}) {
     Observation o = random_observation(random);
     o.status = status;
     const CsvTable table = table_of(o);
-    EXPECT_EQ(table.text(0, "status"), word);
+    EXPECT_EQ(table.text(0, "status"), to_string(status));
     EXPECT_EQ(table.text(0, "instrument"), "PSM1");
-    EXPECT_EQ(empty_columns(table).size(), 34U) << word;
+    EXPECT_EQ(empty_columns(table).size(), 34U) << to_string(status);
   }
 }
 

@@ -1,14 +1,16 @@
 // Colour edges at known places through what FFmpeg writes, by where the format or its tags put chroma.
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
 #include "lapservo/io/frame_source.h"
+#include "lapservo/io/video/video_writer.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/videos.h"
 
 namespace lapservo {
 namespace {
@@ -50,6 +52,14 @@ double shift_px(const cv::Mat& half, int channel) {
   return sum_px / rows;
 }
 
+void expect_edges(const cv::Mat& bgr, double within_px) {
+  for (const int channel : {0, 2}) {
+    EXPECT_NEAR(shift_px(bgr.colRange(0, side_px), channel), 0, within_px) << "along rows, channel " << channel;
+    EXPECT_NEAR(shift_px(bgr.colRange(side_px, 2 * side_px).t(), channel), 0, within_px)
+        << "along columns, channel " << channel;
+  }
+}
+
 constexpr const char *left = "0:out_v_chr_pos=128", *left_422 = "0", *centre = "128:out_v_chr_pos=128",
                      *centre_422 = "128", *top_left = "0:out_v_chr_pos=0", *top = "128:out_v_chr_pos=0",
                      *bottom_left = "0:out_v_chr_pos=256";
@@ -59,7 +69,7 @@ constexpr const char *bt709 = "bt709:range=tv", *bt2020 = "bt2020nc:range=tv", *
 struct Coding {
   const char* site;
   const char* tags;
-  const char* options;
+  std::string options;
   const char* ending;
 };
 
@@ -68,67 +78,62 @@ class ChromaSites : public ::testing::TestWithParam<Coding> {};
 TEST_P(ChromaSites, ColourEdgesAreWhereLumaHasThem) {
   const Coding& coding = GetParam();
   const testing::TemporaryFolder folder;
-  const cv::Mat picture = edges();
-  testing::write_file(folder / "raw", std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
   const std::string path = (folder / (std::string("a.") + coding.ending)).string(), tags = coding.tags;
   const std::string matrix = tags.starts_with("bt709") ? "bt709" : tags.starts_with("bt2020") ? "bt2020" : "bt601";
-  const std::string command =
-      "ffmpeg -v quiet -y -f rawvideo -pix_fmt bgr24 -s 192x96 -r 25 -i '" + (folder / "raw").string() +
-      "' -vf scale=flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp:out_color_matrix=" + matrix +
-      ":out_range=" + tags.substr(tags.size() - 2) + ":out_h_chr_pos=" + coding.site + ",setparams=colorspace=" + tags +
-      " " + coding.options + " '" + path + "'";
-  if (std::system(command.c_str()) != 0) GTEST_SKIP() << "FFmpeg here can't write " << coding.options;
+  const std::string filters =
+      "-vf scale=flags=bicubic+accurate_rnd+full_chroma_int+full_chroma_inp:out_color_matrix=" + matrix +
+      ":out_range=" + tags.substr(tags.size() - 2) + ":out_h_chr_pos=" + coding.site + ",setparams=colorspace=" + tags;
+  if (!testing::write_by_ffmpeg(path, edges(), filters + " " + coding.options))
+    GTEST_SKIP() << "FFmpeg here can't write " << coding.options;
   const auto frame = open_frame_source(path, 25)->next();
   ASSERT_TRUE(frame);
-  for (const int channel : {0, 2}) {
-    EXPECT_NEAR(shift_px(frame->bgr.colRange(0, side_px), channel), 0, 0.05) << "along rows, channel " << channel;
-    EXPECT_NEAR(shift_px(frame->bgr.colRange(side_px, 2 * side_px).t(), channel), 0, 0.05)
-        << "along columns, channel " << channel;
-  }
+  expect_edges(frame->bgr, 0.05);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Left, ChromaSites,
-    ::testing::Values(Coding{left, bt709, "-c:v libx264 -crf 2 -pix_fmt yuv420p", "mp4"},
-                      Coding{left_422, bt709, "-c:v libx264 -crf 2 -pix_fmt yuv422p", "mp4"},
-                      Coding{left, bt709, "-c:v libx265 -x265-params lossless=1:log-level=-1 -pix_fmt yuv420p", "mp4"},
-                      Coding{left_422, bt709, "-c:v libx265 -x265-params lossless=1:log-level=-1 -pix_fmt yuv422p",
-                             "mp4"},
-                      Coding{left, bt709, "-c:v libvpx-vp9 -lossless 1 -pix_fmt yuv420p", "webm"},
-                      Coding{left, bt709, "-c:v mpeg2video -qmin 1 -q:v 1 -pix_fmt yuv420p", "mkv"},
-                      Coding{left, bt709, "-c:v ffv1 -pix_fmt yuv420p", "mkv"},
-                      Coding{left, bt709, "-c:v ffv1 -pix_fmt yuv420p10le", "mkv"},
-                      Coding{left_422, bt709, "-c:v ffv1 -pix_fmt yuv422p", "mkv"},
-                      Coding{left_422, bt709, "-c:v prores_ks -profile:v 3 -pix_fmt yuv422p10le", "mov"},
-                      Coding{left, bt709,
-                             "-c:v libaom-av1 -cpu-used 8 -crf 2 -bsf:v av1_metadata=chroma_sample_position=vertical "
-                             "-pix_fmt yuv420p",
-                             "mp4"}));
+// Colour differences, which a video has for four pixels together, keep their place.
+TEST(Videos, LeaveColoursWhereTheyAre) {
+  constexpr double by_compression_px = 0.2;
+  const testing::TemporaryFolder folder;
+  internal::VideoWriter writer(folder / "a.mp4", 30);
+  for (int i = 0; i < 3; ++i) writer.add(edges());
+  writer.commit();
+  const auto source = open_frame_source((folder / "a.mp4").string(), 30);
+  for (int i = 0; i < 3; ++i) expect_edges(source->next().value().bgr, by_compression_px);
+}
 
-INSTANTIATE_TEST_SUITE_P(
-    Centre, ChromaSites,
-    ::testing::Values(Coding{centre, bt709, "-c:v libx264 -crf 2 -x264-params chromaloc=1 -pix_fmt yuv420p", "mp4"},
-                      Coding{centre, bt709,
-                             "-c:v libx265 -x265-params lossless=1:chromaloc=1:log-level=-1 -pix_fmt yuv420p", "mp4"},
-                      Coding{centre, bt709, "-c:v mpeg1video -qmin 1 -q:v 1 -pix_fmt yuv420p", "mkv"},
-                      Coding{centre, jpeg, "-c:v mjpeg -qmin 1 -q:v 1 -pix_fmt yuvj420p", "avi"},
-                      Coding{centre_422, jpeg, "-c:v mjpeg -qmin 1 -q:v 1 -pix_fmt yuvj422p", "mov"},
-                      Coding{centre, jpeg, "-c:v mjpeg -qmin 1 -q:v 1 -pix_fmt yuvj420p", "jpg"},
-                      Coding{centre_422, jpeg, "-c:v mjpeg -qmin 1 -q:v 1 -pix_fmt yuvj422p", "jpg"},
-                      Coding{centre, untagged, "-c:v libwebp -quality 100 -pix_fmt yuv420p", "webp"},
-                      Coding{centre, untagged, "-c:v libx264 -crf 2 -pix_fmt yuv420p", "mp4"},
-                      Coding{centre, untagged, "-c:v mpeg4 -qmin 1 -q:v 1 -pix_fmt yuv420p", "avi"},
-                      Coding{centre_422, untagged, "-c:v ffv1 -pix_fmt yuv422p", "mkv"}));
+const std::string x264 = "-c:v libx264 -crf 2 ", x265 = "-c:v libx265 -x265-params lossless=1:log-level=-1",
+                  mjpeg = "-c:v mjpeg -qmin 1 -q:v 1 ", p420 = " -pix_fmt yuv420p", p422 = " -pix_fmt yuv422p";
 
-INSTANTIATE_TEST_SUITE_P(
-    Elsewhere, ChromaSites,
-    ::testing::Values(Coding{top_left, bt709, "-c:v libx264 -crf 2 -x264-params chromaloc=2 -pix_fmt yuv420p", "mp4"},
-                      Coding{top_left, bt709,
-                             "-c:v libx265 -x265-params lossless=1:chromaloc=2:log-level=-1 -pix_fmt yuv420p", "mp4"},
-                      Coding{top_left, bt2020, "-c:v ffv1 -pix_fmt yuv420p", "mkv"},
-                      Coding{top, bt709, "-c:v libx264 -crf 2 -x264-params chromaloc=3 -pix_fmt yuv420p", "mkv"},
-                      Coding{bottom_left, bt709, "-c:v libx264 -crf 2 -x264-params chromaloc=4 -pix_fmt yuv420p",
-                             "mp4"}));
+const std::vector<Coding> codings{
+    {left, bt709, x264 + p420, "mp4"},
+    {left_422, bt709, x264 + p422, "mp4"},
+    {left, bt709, x265 + p420, "mp4"},
+    {left_422, bt709, x265 + p422, "mp4"},
+    {left, bt709, "-c:v libvpx-vp9 -lossless 1" + p420, "webm"},
+    {left, bt709, "-c:v mpeg2video -qmin 1 -q:v 1" + p420, "mkv"},
+    {left, bt709, "-c:v ffv1" + p420, "mkv"},
+    {left, bt709, "-c:v ffv1 -pix_fmt yuv420p10le", "mkv"},
+    {left_422, bt709, "-c:v ffv1" + p422, "mkv"},
+    {left_422, bt709, "-c:v prores_ks -profile:v 3 -pix_fmt yuv422p10le", "mov"},
+    {left, bt709, "-c:v libaom-av1 -cpu-used 8 -crf 2 -bsf:v av1_metadata=chroma_sample_position=vertical" + p420,
+     "mp4"},
+    {centre, bt709, x264 + "-x264-params chromaloc=1" + p420, "mp4"},
+    {centre, bt709, x265 + ":chromaloc=1" + p420, "mp4"},
+    {centre, bt709, "-c:v mpeg1video -qmin 1 -q:v 1" + p420, "mkv"},
+    {centre, jpeg, mjpeg + "-pix_fmt yuvj420p", "avi"},
+    {centre_422, jpeg, mjpeg + "-pix_fmt yuvj422p", "mov"},
+    {centre, jpeg, mjpeg + "-pix_fmt yuvj420p", "jpg"},
+    {centre_422, jpeg, mjpeg + "-pix_fmt yuvj422p", "jpg"},
+    {centre, untagged, "-c:v libwebp -quality 100" + p420, "webp"},
+    {centre, untagged, x264 + p420, "mp4"},
+    {centre, untagged, "-c:v mpeg4 -qmin 1 -q:v 1" + p420, "avi"},
+    {centre_422, untagged, "-c:v ffv1" + p422, "mkv"},
+    {top_left, bt709, x264 + "-x264-params chromaloc=2" + p420, "mp4"},
+    {top_left, bt709, x265 + ":chromaloc=2" + p420, "mp4"},
+    {top_left, bt2020, "-c:v ffv1" + p420, "mkv"},
+    {top, bt709, x264 + "-x264-params chromaloc=3" + p420, "mkv"},
+    {bottom_left, bt709, x264 + "-x264-params chromaloc=4" + p420, "mp4"}};
+INSTANTIATE_TEST_SUITE_P(Of, ChromaSites, ::testing::ValuesIn(codings));
 
 }  // namespace
 }  // namespace lapservo

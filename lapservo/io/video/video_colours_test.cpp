@@ -1,8 +1,6 @@
 // Pure colours through the videos that FFmpeg writes, by matrix, range, codec and sampling of chroma.
 #include <array>
 #include <cstddef>
-#include <cstdlib>
-#include <filesystem>
 #include <string>
 #include <tuple>
 
@@ -12,6 +10,7 @@
 #include "lapservo/io/frame_source.h"
 #include "lapservo/testing/input_error.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/videos.h"
 
 namespace lapservo {
 namespace {
@@ -48,24 +47,15 @@ void expect_patches(const cv::Mat& bgr, int tolerance) {
 
 class VideoColours : public ::testing::TestWithParam<std::tuple<Colours, Coding>> {};
 
-// False where FFmpeg or the encoder is missing.
-bool write_patches(const std::filesystem::path& path, const Colours& colours, const Coding& coding,
-                   const std::filesystem::path& scratch) {
-  const cv::Mat picture = patches_of(patch_px);
-  testing::write_file(scratch, std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
-  const std::string command =
-      "ffmpeg -v quiet -y -stream_loop 2 -f rawvideo -pix_fmt bgr24 -s 256x64 -r 25 -i '" + scratch.string() +
-      "' -vf scale=out_color_matrix=" + colours.matrix + ":out_range=" + colours.range +
-      ":flags=accurate_rnd+full_chroma_int,setparams=colorspace=" + colours.tag + ":range=" + colours.range + " " +
-      coding.options + " -colorspace " + colours.tag + " -color_range " + colours.range + " '" + path.string() + "'";
-  return std::system(command.c_str()) == 0;
-}
-
 TEST_P(VideoColours, ReadAsTheirTagsSay) {
   const auto& [colours, coding] = GetParam();
   const testing::TemporaryFolder folder;
   const auto path = folder / (std::string("a.") + coding.ending);
-  if (!write_patches(path, colours, coding, folder / "raw"))
+  const std::string tags = std::string(" -colorspace ") + colours.tag + " -color_range " + colours.range;
+  const std::string filters =
+      std::string("-vf scale=out_color_matrix=") + colours.matrix + ":out_range=" + colours.range +
+      ":flags=accurate_rnd+full_chroma_int,setparams=colorspace=" + colours.tag + ":range=" + colours.range + " ";
+  if (!testing::write_by_ffmpeg(path, patches_of(patch_px), filters + coding.options + tags, 3))
     GTEST_SKIP() << "FFmpeg here can't write " << coding.options;
   const auto source = open_frame_source(path.string(), 30);
   int frames = 0;
@@ -91,16 +81,12 @@ TEST(VideoWithoutTags, IsReadByItsHeightOrItsWriterOrAsGiven) {
         Video{"bt601", 480, "a.mpg", {}, ""}, Video{"bt601", 720, "a.mpg", {.colour_matrix = "bt601"}, ""},
         Video{"bt601", 720, "a.mp4", {}, "read as Rec. 601 with chroma amid the pixels"},
         Video{"bt601", 480, "a.mp4", {}, ""}, Video{"bt709", 720, "a.mp4", {.colour_matrix = "bt709"}, ""}}) {
-    const cv::Mat picture = patches_of(video.height_px);
-    testing::write_file(folder / "raw", std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
     const std::string path = (folder / video.name).string();
-    const std::string command = "ffmpeg -v quiet -y -f rawvideo -pix_fmt bgr24 -s 256x" +
-                                std::to_string(video.height_px) + " -r 25 -i '" + (folder / "raw").string() +
-                                "' -vf scale=out_range=tv:flags=accurate_rnd:out_color_matrix=" + video.matrix +
-                                ",setparams=colorspace=unknown " +
-                                (path.ends_with("mpg") ? "-c:v mpeg2video -q:v 1 -dc 10" : "-c:v libx264 -crf 2") +
-                                " -pix_fmt yuv420p '" + path + "'";
-    if (std::system(command.c_str()) != 0) GTEST_SKIP() << "FFmpeg here can't write " << video.name;
+    const std::string arguments = std::string("-vf scale=out_range=tv:flags=accurate_rnd:out_color_matrix=") +
+                                  video.matrix + ",setparams=colorspace=unknown -pix_fmt yuv420p " +
+                                  (path.ends_with("mpg") ? "-c:v mpeg2video -q:v 1 -dc 10" : "-c:v libx264 -crf 2");
+    if (!testing::write_by_ffmpeg(path, patches_of(video.height_px), arguments))
+      GTEST_SKIP() << "FFmpeg here can't write " << video.name;
     SCOPED_TRACE(path + ", " + std::to_string(video.height_px) + " rows, " + video.reading.colour_matrix);
     const auto source = open_frame_source(path, 25, video.reading);
     EXPECT_NE(source->remark().find(video.remark), std::string::npos) << source->remark();
@@ -121,14 +107,11 @@ TEST(VideoFields, HaveTheirOwnChroma) {
   const testing::TemporaryFolder folder;
   cv::Mat picture(64, 64, CV_8UC3);
   for (int row = 0; row < picture.rows; ++row) picture.row(row).setTo(patches[row % 2 == 0 ? 0 : 2]);
-  testing::write_file(folder / "raw", std::string(reinterpret_cast<const char*>(picture.data), picture.total() * 3));
   const auto path = folder / "a.mkv";
-  const std::string command = "ffmpeg -v quiet -y -f rawvideo -pix_fmt bgr24 -s 64x64 -r 25 -i '" +
-                              (folder / "raw").string() +
-                              "' -vf scale=interl=1:out_color_matrix=bt709:out_range=tv:flags=accurate_rnd "
-                              "-c:v ffv1 -pix_fmt yuv420p -colorspace bt709 -color_range tv '" +
-                              path.string() + "'";
-  if (std::system(command.c_str()) != 0) GTEST_SKIP() << "no ffmpeg";
+  if (!testing::write_by_ffmpeg(path, picture,
+                                "-vf scale=interl=1:out_color_matrix=bt709:out_range=tv:flags=accurate_rnd "
+                                "-c:v ffv1 -pix_fmt yuv420p -colorspace bt709 -color_range tv"))
+    GTEST_SKIP() << "no ffmpeg";
   const auto frame = open_frame_source(path.string(), 25, {.deinterlaced = true})->next();
   ASSERT_TRUE(frame);
   for (const int row : {30, 31, 32, 33})

@@ -1,6 +1,5 @@
 // Times of videos that FFmpeg writes: frames dropped, and cut without being encoded again.
 #include <cstddef>
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -11,9 +10,11 @@
 #include "lapservo/io/frame_source.h"
 #include "lapservo/io/video/video_writer.h"
 #include "lapservo/testing/temporary_folder.h"
+#include "lapservo/testing/videos.h"
 
 namespace lapservo {
 namespace {
+using testing::ffmpeg;
 
 struct TimesRead {
   std::vector<double> s;
@@ -26,10 +27,6 @@ TimesRead read_times(const std::filesystem::path& path) {
   while (const auto frame = source->next()) times.s.push_back(frame->time_s);
   times.complaint = source->complaint();
   return times;
-}
-
-bool ffmpeg(const std::string& arguments) {
-  return std::system(("ffmpeg -v quiet -y " + arguments).c_str()) == 0;
 }
 
 TEST(VideoTimes, AreTheContainersWhereFramesWereDropped) {
