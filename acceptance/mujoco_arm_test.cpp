@@ -70,23 +70,5 @@ TEST(MujocoArm, LagsByItsDamping) {
     EXPECT_NEAR(behind[i], rate[i] * lag[i] + std::copysign(stuck[i], rate[i]), 0.1 * std::abs(behind[i])) << i;
 }
 
-TEST(MujocoArm, PushesAgainstWhatBlocksItAndGoesOnWhenItIsReleased) {
-  const Eigen::Vector4d push(0.02, 0.02, 0.002, 0.1);
-  for (int joint = 0; joint < 4; ++joint) {
-    SCOPED_TRACE(joint);
-    MujocoArm arm(exact_encoders(), start);
-    const double truth = arm.true_jp()[joint];
-    Eigen::Vector4d setpoint = arm.setpoint();
-    setpoint[joint] += push[joint];
-    arm.block(joint);
-    arm.servo_jp(setpoint);
-    arm.step(1);
-    EXPECT_NEAR(arm.true_jp()[joint], truth, small[joint]);
-    arm.release(joint);
-    arm.step(1);
-    EXPECT_GT(arm.true_jp()[joint] - truth, 0.75 * push[joint]);
-  }
-}
-
 }  // namespace
 }  // namespace lapservo::internal
