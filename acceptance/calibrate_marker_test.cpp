@@ -16,6 +16,7 @@
 #include <gtest/gtest.h>
 
 #include "acceptance/frame_sets.h"
+#include "acceptance/tally.h"
 #include "lapservo/calibration/marker/marker_calibration.h"
 #include "lapservo/calibration/marker/marker_measurement.h"
 #include "lapservo/core/angles.h"
@@ -77,21 +78,11 @@ std::vector<std::vector<JointVector>> turn_of_way(const Rig& rig, int frames, st
   return all;
 }
 
-struct Tracked {
-  std::map<std::string, int> statuses;
-  std::vector<double> errors_rad, errors_sigmas, edge_px;
-};
-
-Tracked tracked(const std::vector<TrueFrame>& frames, const Rig& rig) {
-  Tracked result;
-  for (const TrueFrame& frame : frames) {
-    Tracker tracker(rig, {.method = Method::surface, .single = true});
-    const Observation o = tracker.track(frame.bgr)[0];
-    ++result.statuses[std::string(to_string(o.status))];
-    if (o.status != Status::ok || !o.rcm) continue;
-    result.errors_rad.push_back(wrap_pi(o.rcm->q.psi_rad - frame.truths[0].q.psi_rad));
-    result.errors_sigmas.push_back(result.errors_rad.back() / std::sqrt(o.rcm->covariance(3, 3)));
-  }
+Tally tracked(const std::vector<TrueFrame>& frames, const Rig& rig) {
+  Tally result;
+  for (const TrueFrame& frame : frames)
+    result.add(Tracker(rig, {.method = Method::surface, .single = true}).track(frame.bgr)[0], frame.truths[0].q.psi_rad,
+               0);
   return result;
 }
 
@@ -146,8 +137,8 @@ class CalibrateMarker : public ::testing::TestWithParam<Errors> {
 };
 
 TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
-  std::vector<double> before_rad, after_rad, true_rad, after_sigmas, written_sigmas;
-  std::map<std::string, int> after_statuses;
+  Tally all_before, all_after, all_by_true;
+  std::vector<double> written_sigmas;
   for (int i = 0; i < prints; ++i) {
     const effects::CameraEffects effects = effects_of(i);
     Rig nominal = example_rig();
@@ -170,7 +161,7 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
         rendered(print, random_configurations(nominal, held_out, 7 * own_seed, steepest_rad), own_seed, effects);
     Rig exact = nominal;
     exact.instruments[0].marker = print;
-    const Tracked before = tracked(frames, tolerant), after = tracked(frames, rig), by_true = tracked(frames, exact);
+    const Tally before = tracked(frames, tolerant), after = tracked(frames, rig), by_true = tracked(frames, exact);
     const auto sigmas = errors_over_sigmas(calibration.marker, print);
     std::printf(
         "print %d: %d found, %zu used, %zu with the seam, %.3f px before, %.3f px after; psi rms %.2f mrad before, "
@@ -181,26 +172,22 @@ TEST_P(CalibrateMarker, LeavesLittleOfAPrintsErrors) {
         1e3 * rms(by_true.errors_rad), 1e3 * mean(by_true.errors_rad), rms(after.errors_sigmas),
         text_of(after.statuses).c_str(), 1e3 * calibration.marker.gap_rad * print.radius_m(),
         1e3 * print.gap_rad * print.radius_m(), rms(sigmas));
-    const auto append = [](std::vector<double>& all, const std::vector<double>& more) {
-      all.insert(all.end(), more.begin(), more.end());
-    };
-    append(before_rad, before.errors_rad), append(after_rad, after.errors_rad), append(true_rad, by_true.errors_rad);
-    append(after_sigmas, after.errors_sigmas), append(written_sigmas, sigmas);
-    for (const auto& [status, count] : after.statuses) after_statuses[status] += count;
+    all_before.add(before), all_after.add(after), all_by_true.add(by_true);
+    written_sigmas.insert(written_sigmas.end(), sigmas.begin(), sigmas.end());
   }
   std::printf(
       "all: psi rms %.1f mrad before, %.2f after, %.2f with the true prints, error / sigma %.2f;%s; written numbers' "
       "error / sigma %.2f\n",
-      1e3 * rms(before_rad), 1e3 * rms(after_rad), 1e3 * rms(true_rad), rms(after_sigmas),
-      text_of(after_statuses).c_str(), rms(written_sigmas));
+      1e3 * rms(all_before.errors_rad), 1e3 * rms(all_after.errors_rad), 1e3 * rms(all_by_true.errors_rad),
+      rms(all_after.errors_sigmas), text_of(all_after.statuses).c_str(), rms(written_sigmas));
   // With some prints nothing is ok before: then there is nothing to compare with.
-  if (GetParam().bands_m > 0 && !before_rad.empty()) {
-    EXPECT_LE(rms(after_rad), 0.1 * rms(before_rad));
+  if (GetParam().bands_m > 0 && !all_before.errors_rad.empty()) {
+    EXPECT_LE(rms(all_after.errors_rad), 0.1 * rms(all_before.errors_rad));
   }
-  EXPECT_LE(rms(after_rad), GetParam().max_psi_rms_rad);
-  EXPECT_LE(rms(after_sigmas), 2);
+  EXPECT_LE(rms(all_after.errors_rad), GetParam().max_psi_rms_rad);
+  EXPECT_LE(rms(all_after.errors_sigmas), 2);
   EXPECT_LE(rms(written_sigmas), 2);
-  EXPECT_GE(after_statuses["ok"], 0.95 * prints * held_out);
+  EXPECT_GE(all_after.fraction("ok"), 0.95);
 }
 
 // A turn's frames, as a video has them or as files of their own.
