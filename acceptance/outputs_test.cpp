@@ -2,23 +2,20 @@
 // process.
 
 #include <algorithm>
-#include <chrono>
-#include <csignal>
 #include <cstdlib>
-#include <fcntl.h>
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <sys/mount.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <thread>
 #include <unistd.h>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "acceptance/tool_test.h"
+#include "lapservo/testing/process.h"
+#include "lapservo/testing/wait_for.h"
 
 namespace lapservo {
 namespace {
@@ -30,26 +27,15 @@ class Outputs : public acceptance::ToolTest {
  protected:
   void SetUp() override {
     ToolTest::SetUp();
-    ::setenv("ASAN_OPTIONS", "detect_leaks=0", 1);
     fs::create_directory("out");
   }
   void render(const std::string& more = "") { expect_done("render --rig " + rig_ + " --out frames --count 2" + more); }
 
   // Starts the tool, kills it when `far_enough`, says whether it came that far.
   static bool killed_when(const std::string& arguments, const std::function<bool()>& far_enough) {
-    const std::string command = "exec " + std::string(LAPSERVO_TOOL) + " " + arguments + " >stdout 2>stderr </dev/null";
-    const pid_t tool = ::fork();
-    if (tool == 0) {
-      ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
-      ::_exit(127);
-    }
+    testing::Process tool(LAPSERVO_TOOL, testing::words_of(arguments), "killed.txt");
     bool reached = false;
-    for (int i = 0; i < 6000 && !reached && ::waitpid(tool, nullptr, WNOHANG) == 0; ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-      reached = far_enough();
-    }
-    ::kill(tool, SIGKILL);
-    ::waitpid(tool, nullptr, 0);
+    testing::wait_for([&] { return !tool.running() || (reached = far_enough()); });
     return reached;
   }
   static long lines_in(const fs::path& path) {
@@ -347,18 +333,6 @@ TEST_F(Outputs, StandardOutputIsWrittenIntoWhereverItGoes) {
   EXPECT_TRUE(read_file("piped").starts_with("frame,time_s"));
   std::system((tool + "closed.csv >&- 2>&-").c_str());
   EXPECT_EQ(lines_in("closed.csv"), 3);
-}
-
-TEST_F(Outputs, HelpSaysWhatBecomesOfExistingOnes) {
-  for (const char* command : {"track", "estimate-rcm", "marker design", "marker print", "marker show"}) {
-    expect_done(std::string(command) + " --help");
-    expect_in(output(), "repla");
-  }
-  for (const char* command : {"render", "servo", "experiment"}) {
-    expect_done(std::string(command) + " --help");
-    expect_in(output(), "--force");
-    expect_in(output(), "unfinished");
-  }
 }
 
 }  // namespace

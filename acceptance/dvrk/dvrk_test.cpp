@@ -30,11 +30,11 @@
 #include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
-#include "acceptance/process.h"
 #include "lapservo/kinematics/feature_map.h"
 #include "lapservo/rig/joint_conversion.h"
 #include "lapservo/rig/rig_writer.h"
 #include "lapservo/sim_robot/sim_robot.h"
+#include "lapservo/testing/process.h"
 #include "lapservo/testing/rigs.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/wait_for.h"
@@ -322,7 +322,7 @@ class Dvrk : public ::testing::Test {
                                         R"({"name": "MTMR", "type": "MTM", "simulation": "KINEMATIC", )"
                                         R"("arm": "arm/MTMR_KIN_SIMULATED.json"}], )" +
                                             std::string(Teleoperation::configuration()) + "}");
-    console_ = std::make_unique<acceptance::Process>(
+    console_ = std::make_unique<testing::Process>(
         program_, std::vector<std::string>{"-j", std::filesystem::absolute("console.json").string()}, "console.txt");
     until("the console",
           [&] { return reads("/PSM1/state_command") && reads("/PSM1/move_jp") && judge_->is("DISABLED"); });
@@ -331,25 +331,11 @@ class Dvrk : public ::testing::Test {
   bool reads(const std::string& topic) const { return !transport_->readers(topic).empty(); }
   void start_servo(const std::string& limits = "") {
     const std::string psm = (testing::source_folder() / "configs/joint_limits/psm-classic.yaml").string();
-    const std::vector<std::string> arguments{"servo",
-                                             "--rig",
-                                             "rig.yaml",
-                                             "--robot",
-                                             "ros1:PSM1",
-                                             "--camera",
-                                             "ros1:/endoscope/image_raw",
-                                             "--fps",
-                                             "30",
-                                             "--set-point",
-                                             fmt::format("{},{},{},{}", goal_[0], goal_[1], goal_[2], goal_[3]),
-                                             "--duration",
-                                             "36000",
-                                             "--enable-motion",
-                                             "--joint-limits",
-                                             limits.empty() ? psm : limits,
-                                             "--setpoint-readers",
-                                             "2"};
-    servo_ = std::make_unique<acceptance::Process>(LAPSERVO_TOOL, arguments, "servo.txt");
+    const std::string line = fmt::format(
+        "servo --rig rig.yaml --robot ros1:PSM1 --camera ros1:/endoscope/image_raw --fps 30 --set-point {},{},{},{} "
+        "--duration 36000 --enable-motion --joint-limits {} --setpoint-readers 2",
+        goal_[0], goal_[1], goal_[2], goal_[3], limits.empty() ? psm : limits);
+    servo_ = std::make_unique<testing::Process>(LAPSERVO_TOOL, testing::words_of(line), "servo.txt");
   }
   static std::string said() { return testing::read_file("servo.txt"); }
   static void expect_soon_said(const std::string& words, std::size_t after = 0) {
@@ -460,6 +446,12 @@ class Dvrk : public ::testing::Test {
     judge_->expect_still_since(from_s);
     EXPECT_EQ(spy_->count(), count);
   }
+  void expect_held_until_a_start(double steady_s = 1) {
+    expect_held(1);
+    EXPECT_EQ(judge_->faults(), operators_faults_);
+    start_until_at_goal();
+    expect_steady(steady_s);
+  }
   void work_until_at_goal() {
     start_console();
     home_and_move_to_view();
@@ -481,7 +473,7 @@ class Dvrk : public ::testing::Test {
   ros::Publisher set_tool_type_, servo_cp_;
   Rig rig_;
   std::unique_ptr<EndoscopeOfTheArm> endoscope_;
-  std::unique_ptr<acceptance::Process> console_, servo_;
+  std::unique_ptr<testing::Process> console_, servo_;
   Eigen::Vector4d goal_ = Eigen::Vector4d::Zero();
   Eigen::Array4d worst_rms_ = Eigen::Array4d::Zero();
   double worst_late_s_ = 0;
@@ -549,19 +541,21 @@ void Dvrk::go_through(const Event& event) {
   if (event.arm_rests) judge_->expect_still_since(acted_s + allowed_s);
   event.recover();
   EXPECT_EQ(spy_->count(), held) << "something was sent while it was held";
-  expect_held(1);
-  EXPECT_EQ(judge_->faults(), operators_faults_);
-  start_until_at_goal();
-  expect_steady(1);
+  expect_held_until_a_start();
 }
 
+// Each of the words, and again for LAPSERVO_DVRK_MINUTES.
 TEST_F(Dvrk, AnOperatorsWordHoldsTheLoopUntilAStart) {
+  const char* const minutes = std::getenv("LAPSERVO_DVRK_MINUTES");
+  const double end_s = now_s() + 60 * (minutes ? std::atof(minutes) : 0);
   work_until_at_goal();
   surgeon_->power_on();
-  for (const Event& event : events()) go_through(event);
+  const auto all = events();
+  std::size_t words = 0;
+  for (; (words < all.size() || now_s() < end_s) && !HasFatalFailure(); ++words) go_through(all[words % all.size()]);
   EXPECT_TRUE(spy_->all_finite());
-  std::printf("steady to %.2f mrad, %.2f px; last setpoint %.0f ms after a word\n", worst_rms_[0] * 1e3,
-              worst_rms_.tail<3>().maxCoeff(), worst_late_s_ * 1e3);
+  std::printf("%zu words; steady to %.2f mrad, %.2f px; last setpoint %.0f ms after a word\n", words,
+              worst_rms_[0] * 1e3, worst_rms_.tail<3>().maxCoeff(), worst_late_s_ * 1e3);
 }
 
 TEST_F(Dvrk, ConnectsBeforePowerOnAndLetsTheOperatorHome) {
@@ -569,11 +563,8 @@ TEST_F(Dvrk, ConnectsBeforePowerOnAndLetsTheOperatorHome) {
   start_console();
   sleep(1);
   home_and_move_to_view();
-  expect_held(1);
   EXPECT_EQ(spy_->count(), 0);
-  EXPECT_EQ(judge_->faults(), 0);
-  start_until_at_goal();
-  expect_steady(2);
+  expect_held_until_a_start(2);
 }
 
 TEST_F(Dvrk, AnArmThatIsEnabledAndNotHomedIsNotHijacked) {
@@ -586,11 +577,8 @@ TEST_F(Dvrk, AnArmThatIsEnabledAndNotHomedIsNotHijacked) {
   while (now_s() < enabled_s + 2) command_({now_s(), "start"}), sleep(0.01);
   command("home");
   wait_for_rest_at("homed", homed);
-  EXPECT_EQ(judge_->faults(), 0);
   move(view());
-  expect_held(1);
-  start_until_at_goal();
-  expect_steady(1);
+  expect_held_until_a_start();
 }
 
 TEST_F(Dvrk, WithoutAToolItSaysSoAndAToolThatIsChangedHolds) {
@@ -602,9 +590,7 @@ TEST_F(Dvrk, WithoutAToolItSaysSoAndAToolThatIsChangedHolds) {
   EXPECT_EQ(spy_->count(), 0);
   set_tool(needle_driver);
   move(view());
-  expect_held(1);
-  start_until_at_goal();
-  expect_steady(1);
+  expect_held_until_a_start();
 
   // Named in the midst of it, another tool makes the console disable the arm.
   wish_the_other_goal();
@@ -632,9 +618,7 @@ TEST_F(Dvrk, SendsNoNaNAndIsHeldWhenAnotherClientDoes) {
     return judge_->is("DISABLED");
   });
   disable_home_and_move_to_view();
-  expect_held(1);
-  start_until_at_goal();
-  expect_steady(1);
+  expect_held_until_a_start();
   EXPECT_TRUE(spy_->all_finite());
 }
 
@@ -649,11 +633,8 @@ TEST_F(Dvrk, AConsoleThatIsKilledAndStartedAgainIsNotMovedUntilAStart) {
   const long held = spy_->count();
   start_console();
   home_and_move_to_view();
-  expect_held(1);
   EXPECT_EQ(spy_->count(), held);
-  EXPECT_EQ(judge_->faults(), 0);
-  start_until_at_goal();
-  expect_steady(1);
+  expect_held_until_a_start();
 }
 
 TEST_F(Dvrk, KeepsToItsRatesAndRefusesGoalsBeyondItsLimits) {
@@ -678,23 +659,6 @@ TEST_F(Dvrk, KeepsToItsRatesAndRefusesGoalsBeyondItsLimits) {
     const double passed_s = samples[i].time_s - samples[i - apart].time_s + 0.02;  // they arrive irregularly
     EXPECT_TRUE((step <= rate * passed_s).all()) << step.transpose() << " in " << passed_s;
   }
-}
-
-TEST_F(Dvrk, AnOperatorWorksBesideTheLoop) {
-  const char* const minutes = std::getenv("LAPSERVO_DVRK_MINUTES");
-  const double end_s = now_s() + 60 * (minutes ? std::atof(minutes) : 2);
-  work_until_at_goal();
-  surgeon_->power_on();
-  const auto all = events();
-  int words = 0;
-  for (; now_s() < end_s && !HasFatalFailure(); ++words) {
-    const double begin_s = now_s();
-    go_through(all[static_cast<std::size_t>(words) % all.size()]);
-    if (begin_s + 30 > now_s()) expect_steady(begin_s + 30 - now_s());
-  }
-  EXPECT_TRUE(spy_->all_finite());
-  std::printf("%d words; steady to %.2f mrad, %.2f px; last setpoint %.0f ms after a word\n", words,
-              worst_rms_[0] * 1e3, worst_rms_.tail<3>().maxCoeff(), worst_late_s_ * 1e3);
 }
 
 }  // namespace

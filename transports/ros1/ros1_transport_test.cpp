@@ -15,6 +15,7 @@
 #include "lapservo/crtk/test_inbox.h"
 #include "lapservo/crtk/test_messages.h"
 #include "lapservo/testing/input_error.h"
+#include "lapservo/testing/process.h"
 #include "lapservo/testing/wait_for.h"
 #include "transports/ros1/ros1_master.h"
 #include "transports/ros1/test_ros_master.h"
@@ -41,12 +42,10 @@ TEST(Ros1Master, IsMissedInOneLineWithinTwoSeconds) {
 class Ros1Wire : public ::testing::Test {
  protected:
   void SetUp() override { transport_ = std::make_unique<Ros1Transport>("tester"); }
-  static std::unique_ptr<TestChild> peer() {
-    return std::make_unique<TestChild>(std::vector<std::string>{LAPSERVO_ROS1_PEER});
-  }
+  static std::unique_ptr<testing::Process> peer() { return std::make_unique<testing::Process>(LAPSERVO_ROS1_PEER); }
 
   TestRosMaster master_;
-  std::unique_ptr<TestChild> peer_ = peer();
+  std::unique_ptr<testing::Process> peer_ = peer();
   std::unique_ptr<Ros1Transport> transport_;
 };
 

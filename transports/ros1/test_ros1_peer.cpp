@@ -60,24 +60,21 @@ int main() {
   using namespace lapservo::internal;
   Ros1Transport transport("peer");
   std::vector<Transport::Subscription> subscriptions;
-  const auto joints = transport.joint_publisher("/out/joints");
-  subscriptions.push_back(transport.subscribe_joints("/in/joints", [&](JointMessage&& m) { joints(m); }));
+  const auto echo = [&](const std::string& kind, auto publisher, auto subscribe) {
+    const auto say = (transport.*publisher)("/out/" + kind);
+    subscriptions.push_back((transport.*subscribe)("/in/" + kind, [say](auto&& message) { say(message); }));
+  };
+  echo("joints", &Transport::joint_publisher, &Transport::subscribe_joints);
+  echo("bool", &Transport::bool_publisher, &Transport::subscribe_buttons);
+  echo("trajectory", &Transport::trajectory_publisher, &Transport::subscribe_trajectories);
+  echo("image", &Transport::image_publisher, &Transport::subscribe_images);
+  echo("compressed", &Transport::compressed_image_publisher, &Transport::subscribe_compressed_images);
   const auto state = transport.operating_state_publisher("/out/state");
   state({1700000000, "DISABLED", false, false});  // before anybody listens: it is latched
   subscriptions.push_back(
       transport.subscribe_operating_state("/in/state", [&](OperatingStateMessage&& m) { state(m); }));
   const auto joy = transport.joy_publisher("/out/joy");
   subscriptions.push_back(transport.subscribe_buttons("/in/joy", [&](BoolMessage&& m) { joy({0, {m.value}}); }));
-  const auto button = transport.bool_publisher("/out/bool");
-  subscriptions.push_back(transport.subscribe_buttons("/in/bool", [&](BoolMessage&& m) { button(m); }));
-  const auto trajectory = transport.trajectory_publisher("/out/trajectory");
-  subscriptions.push_back(
-      transport.subscribe_trajectories("/in/trajectory", [&](TrajectoryMessage&& m) { trajectory(m); }));
-  const auto image = transport.image_publisher("/out/image");
-  subscriptions.push_back(transport.subscribe_images("/in/image", [&](ImageMessage&& m) { image(m); }));
-  const auto compressed = transport.compressed_image_publisher("/out/compressed");
-  subscriptions.push_back(
-      transport.subscribe_compressed_images("/in/compressed", [&](CompressedImageMessage&& m) { compressed(m); }));
   const auto odd = transport.image_publisher("/out/odd");
   ros::Publisher pretender = ros::NodeHandle().advertise<Pretender>("/out/pretender", 10);
   const auto text = transport.string_publisher("/out/text");

@@ -4,51 +4,19 @@
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <fcntl.h>
 #include <stdexcept>
 #include <string>
-#include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
 #include <thread>
 #include <unistd.h>
 #include <vector>
 
 #include "lapservo/core/error.h"
+#include "lapservo/testing/process.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "transports/ros1/ros1_master.h"
 
 namespace lapservo::internal {
-
-/// A program that ends with the object, or with this process.
-class TestChild {
- public:
-  explicit TestChild(const std::vector<std::string>& command) {
-    std::vector<char*> argv;
-    for (const std::string& word : command) argv.push_back(const_cast<char*>(word.c_str()));
-    argv.push_back(nullptr);
-    id_ = ::fork();
-    if (id_ != 0) return;
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    ::dup2(::open("/dev/null", O_WRONLY), STDOUT_FILENO);
-    ::execv(argv.front(), argv.data());
-    ::_exit(127);
-  }
-  ~TestChild() { kill(); }
-  TestChild(const TestChild&) = delete;
-  TestChild& operator=(const TestChild&) = delete;
-
-  void kill() {
-    if (id_ <= 0) return;
-    ::kill(id_, SIGKILL);
-    ::waitpid(id_, nullptr, 0);
-    id_ = 0;
-  }
-  void stop() const { ::kill(id_, SIGSTOP); }
-
- private:
-  pid_t id_ = 0;
-};
 
 /// A socket on loopback with a port of its own. Listening, it takes connections and answers nothing.
 class TestPort {
@@ -75,7 +43,7 @@ class TestPort {
 /// ROS 1's own master, on loopback and a free port, which this process's environment names.
 class TestRosMaster {
  public:
-  TestRosMaster() : port_(free_port()), child_((prepare(), command())) {
+  TestRosMaster() : port_(free_port()), child_(LAPSERVO_ROSMASTER, (prepare(), command())) {
     for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30); !answers();) {
       if (std::chrono::steady_clock::now() > end) throw std::runtime_error("rosmaster does not start");
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -83,7 +51,7 @@ class TestRosMaster {
   }
   void kill() { child_.kill(); }
   /// It listens on, and answers no more.
-  void stop() { child_.stop(); }
+  void stop() { child_.signal(SIGSTOP); }
 
  private:
   // The same each time: roscpp keeps the master that it knew first.
@@ -106,11 +74,11 @@ class TestRosMaster {
     ::unsetenv("ROS_HOSTNAME");
     ::unsetenv("ROS_NAMESPACE");
   }
-  std::vector<std::string> command() const { return {LAPSERVO_ROSMASTER, "--core", "-p", std::to_string(port_)}; }
+  std::vector<std::string> command() const { return {"--core", "-p", std::to_string(port_)}; }
 
   testing::TemporaryFolder folder_;
   int port_;
-  TestChild child_;
+  testing::Process child_;
 };
 
 }  // namespace lapservo::internal

@@ -1,20 +1,15 @@
 // An arm on Fast DDS, ROS 2's default, in a process of its own.
 
 #include <chrono>
-#include <csignal>
-#include <fcntl.h>
 #include <sstream>
 #include <string>
-#include <sys/prctl.h>
-#include <sys/wait.h>
 #include <thread>
-#include <unistd.h>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
-#include "lapservo/testing/sample_frames.h"
+#include "lapservo/testing/process.h"
 #include "lapservo/testing/temporary_folder.h"
 #include "lapservo/testing/wait_for.h"
 #include "transports/ros2/ros2_transport.h"
@@ -28,19 +23,7 @@ constexpr std::chrono::milliseconds tick(2);
 
 class Arm {
  public:
-  explicit Arm(std::string output) : output_(std::move(output)), id_(::fork()) {
-    if (id_ != 0) return;
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    ::dup2(::open(output_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), STDOUT_FILENO);
-    ::execl(LAPSERVO_FASTDDS_PEER, LAPSERVO_FASTDDS_PEER, nullptr);
-    ::_exit(127);
-  }
-  ~Arm() {
-    ::kill(id_, SIGKILL);
-    ::waitpid(id_, nullptr, 0);
-  }
-  Arm(const Arm&) = delete;
-  Arm& operator=(const Arm&) = delete;
+  explicit Arm(std::string output) : output_(std::move(output)), process_(LAPSERVO_FASTDDS_PEER, {}, output_) {}
 
   // The positions of the setpoints that came.
   std::vector<double> heard() const {
@@ -55,7 +38,7 @@ class Arm {
 
  private:
   std::string output_;
-  pid_t id_;
+  testing::Process process_;
 };
 
 TEST(FastDds, AnArmThatIsRestartedIsFoundWithinTwoSecondsAndGetsNoOldSetPoint) {
