@@ -22,8 +22,11 @@ namespace {
 constexpr double mrad = 1e-3, mm = 1e-3;
 constexpr double steepest_rad = 0.35;
 
-#define NEED_SAMPLES() \
-  if (!sample_folder()) GTEST_SKIP() << "no ray-traced samples: set LAPSERVO_FRAMES"
+class Samples : public ::testing::Test {
+  void SetUp() override {
+    if (!sample_folder()) GTEST_SKIP() << "no ray-traced samples: set LAPSERVO_FRAMES";
+  }
+};
 
 void expect_pose_figures(const Score& score) {
   EXPECT_LE(rms(score.theta_rad), 0.3 * mrad);
@@ -62,8 +65,7 @@ double illumination_spread_px(const Score& score, std::size_t intensities) {
   return mean(distances);
 }
 
-TEST(Samples, Rotation) {
-  NEED_SAMPLES();
+TEST_F(Samples, Rotation) {
   expect_rotation_figures(score_single(sample_frames("rotation")));
 }
 
@@ -88,8 +90,7 @@ struct PoseErrors {
   }
 };
 
-TEST(Samples, TheMarkersPoseIsFoundWithoutTheRcm) {
-  NEED_SAMPLES();
+TEST_F(Samples, TheMarkersPoseIsFoundWithoutTheRcm) {
   PoseErrors errors;
   for (const TrueFrame& frame : sample_frames("rotation")) {
     Rig rig = frame.rig;
@@ -110,15 +111,13 @@ TEST(Samples, TheMarkersPoseIsFoundWithoutTheRcm) {
   }
 }
 
-TEST(Samples, Illumination) {
-  NEED_SAMPLES();
+TEST_F(Samples, Illumination) {
   const Score score = score_single(sample_frames("illumination"));
   EXPECT_EQ(score.found, score.expected);
   EXPECT_LE(illumination_spread_px(score, 4), 0.15);
 }
 
-TEST(Samples, Stress) {
-  NEED_SAMPLES();
+TEST_F(Samples, Stress) {
   Score usual, hard;
   for (const TrueFrame& frame : sample_frames("stress")) {
     const std::string& condition = frame.truths[0].condition;
@@ -129,15 +128,13 @@ TEST(Samples, Stress) {
   expect_found_within(hard, 0.8, 15 * mrad);
 }
 
-TEST(Samples, TwoInstrumentsAreNeverSwapped) {
-  NEED_SAMPLES();
+TEST_F(Samples, TwoInstrumentsAreNeverSwapped) {
   const Score score = score_single(sample_frames("two"));
   expect_found_within(score, 1, 6 * mrad);
   EXPECT_LE(rms(score.edge_px), 0.5);
 }
 
-TEST(Samples, TiltedAndDistorted) {
-  NEED_SAMPLES();
+TEST_F(Samples, TiltedAndDistorted) {
   for (const char* set : {"tilt", "distorted"}) {
     SCOPED_TRACE(set);
     const Score score = score_single(sample_frames(set));
@@ -146,8 +143,7 @@ TEST(Samples, TiltedAndDistorted) {
   }
 }
 
-TEST(Samples, NothingIsFoundWhereNothingIs) {
-  NEED_SAMPLES();
+TEST_F(Samples, NothingIsFoundWhereNothingIs) {
   const Rig rig = load_rig(*sample_folder() / "two/rig.yaml");
   int pictures = 0;
   for (const auto& entry : std::filesystem::directory_iterator(*sample_folder() / "negatives")) {
@@ -159,8 +155,7 @@ TEST(Samples, NothingIsFoundWhereNothingIs) {
   EXPECT_GE(pictures, 5);
 }
 
-TEST(Samples, Video) {
-  NEED_SAMPLES();
+TEST_F(Samples, Video) {
   auto frames = sample_frames("video");
   const auto source = open_frame_source((*sample_folder() / "video/video.mp4").string(), 30);
   Tracker tracker(frames[0].rig);
@@ -213,13 +208,11 @@ int seen_with_a_wrong_registration(const std::vector<TrueFrame>& frames) {
   return seen;
 }
 
-TEST(Samples, WithoutTheRcmTheFeaturesAreAsGood) {
-  NEED_SAMPLES();
+TEST_F(Samples, WithoutTheRcmTheFeaturesAreAsGood) {
   expect_features_without_rcm(sample_frames("rotation"), 3 * mrad);
 }
 
-TEST(Samples, AWrongRegistrationGivesFeaturesButNoRotation) {
-  NEED_SAMPLES();
+TEST_F(Samples, AWrongRegistrationGivesFeaturesButNoRotation) {
   EXPECT_GE(seen_with_a_wrong_registration(sample_frames("rotation")), 8);
 }
 
@@ -270,6 +263,13 @@ RenderedSet moving_set(std::uint64_t seed, int count, int times) {
     set.configurations.push_back(
         {JointVector::from_vector(from + (to - from) * (0.5 - 0.5 * std::cos(pi * times * i / (count - 1))))});
   return set;
+}
+
+Score score_tracked(const RenderedSet& set) {
+  Tracker tracker(set.rig);
+  Score score;
+  for (const TrueFrame& frame : rendered_frames(set)) score.add(frame, tracker.track(frame.bgr));
+  return score;
 }
 
 // A full turn, seam included; so many places that the normalised error is known to a tenth.
@@ -341,10 +341,7 @@ TEST(Rendered, AlmostNoLight) {
 TEST(Rendered, BlurredMarkersAreNotGuessed) {
   RenderedSet set = moving_set(53, 40, 4);
   set.motion = 0.4;
-  const auto frames = rendered_frames(set);
-  Tracker tracker(set.rig);
-  Score tracked;
-  for (const TrueFrame& frame : frames) tracked.add(frame, tracker.track(frame.bgr));
+  const Score tracked = score_tracked(set);
   EXPECT_EQ(tracked.wrong, 0);
   EXPECT_GT(tracked.found_fraction(), 0.3);
   EXPECT_LE(rms(tracked.psi_sigmas), 5);
@@ -406,10 +403,7 @@ TEST(Rendered, AnotherInstrumentIsNotOurs) {
 // Tracking agrees with looking at every frame anew, and costs no accuracy.
 TEST(Rendered, TrackingFollowsMotion) {
   const RenderedSet set = moving_set(46, 40, 1);
-  const auto frames = rendered_frames(set);
-  Tracker tracker(set.rig);
-  Score tracked;
-  for (const TrueFrame& frame : frames) tracked.add(frame, tracker.track(frame.bgr));
+  const Score tracked = score_tracked(set);
   EXPECT_EQ(tracked.found, tracked.expected);
   EXPECT_LE(rms(tracked.psi_rad), 3 * mrad);
 }
