@@ -25,18 +25,13 @@ TEST(CsvTable, NumbersComeBackAsTheyWereWritten) {
   std::vector<double> written;
   std::ostringstream text;
   text.precision(std::numeric_limits<double>::max_digits10);
-  text << "x,y\n";
-  for (int row = 0; row < 200; ++row) {
-    for (int column = 0; column < 2; ++column)
-      written.push_back(random.normal() * std::pow(10.0, random.uniform(-100, 100)));
-    text << written[written.size() - 2] << ',' << written.back() << '\n';
-  }
+  text << "x\n";
+  for (int row = 0; row < 400; ++row)
+    text << written.emplace_back(random.normal() * std::pow(10.0, random.uniform(-100, 100))) << '\n';
   const CsvTable table = CsvTable::parse(text.view(), "t.csv");
-  ASSERT_EQ(table.rows(), 200U);
-  for (std::size_t row = 0; row < 200; ++row) {
-    EXPECT_EQ(table.number(row, "x"), written[2 * row]) << "seed " << seed;
-    EXPECT_EQ(table.number(row, "y"), written[2 * row + 1]) << "seed " << seed;
-  }
+  ASSERT_EQ(table.rows(), written.size());
+  for (std::size_t row = 0; row < table.rows(); ++row)
+    EXPECT_EQ(table.number(row, "x"), written[row]) << "seed " << seed;
 }
 
 TEST(CsvTable, ToleratesCarriageReturnsBlanksEmptyLinesAByteOrderMarkAndNoLastNewline) {

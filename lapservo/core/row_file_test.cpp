@@ -15,18 +15,6 @@ using testing::input_error;
 using testing::read_file;
 using testing::TemporaryFolder;
 
-TEST(RowFile, RowsAreInTheFileAtOnceAndUnderItsNameInTheEnd) {
-  const TemporaryFolder folder;
-  testing::write_file(folder / "o.csv", "old");
-  RowFile file(folder / "o.csv", "a,b");
-  file.add("1,2");
-  EXPECT_EQ(read_file(folder / "o.csv.part"), "a,b\n1,2\n");
-  EXPECT_EQ(read_file(folder / "o.csv"), "old");
-  file.commit();
-  EXPECT_EQ(read_file(folder / "o.csv"), "a,b\n1,2\n");
-  EXPECT_FALSE(fs::exists(folder / "o.csv.part"));
-}
-
 TEST(RowFile, WithoutCommitNothingIsLeft) {
   const TemporaryFolder folder;
   { RowFile(folder / "o.csv", "a,b").add("1,2"); }

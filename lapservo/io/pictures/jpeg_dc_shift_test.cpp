@@ -25,23 +25,6 @@ void lift(std::vector<float>& steps, int begin, int end, float by) {
   for (int i = std::max(begin, columns); i < end; ++i) steps[static_cast<std::size_t>(i)] += by;
 }
 
-TEST(DcShift, FromAnyBlockWithinARowOnIsFound) {
-  Random random(seed);
-  int tried = 0, found = 0;
-  for (int first = columns; first < columns * (rows - 2); ++first) {
-    if (first % columns < 4 || first % columns > columns - 4) continue;  // too few borders on one side
-    std::vector<float> steps = texture(random);
-    const float by = random.bits() % 2 == 0 ? 8 : -8;
-    lift(steps, first, first + columns, by);
-    ++tried;
-    const auto shift = dc_shift({steps, 0.25F, columns, 0});
-    if (!shift) continue;
-    ++found;
-    EXPECT_NEAR(*shift, by, 1) << "block " << first << ", seed " << seed;
-  }
-  EXPECT_GE(found, 95 * tried / 100) << "of " << tried;
-}
-
 TEST(DcShift, TextureHasNone) {
   Random random(seed);
   for (int i = 0; i < 50; ++i) EXPECT_FALSE(dc_shift({texture(random), 0.25F, columns, 0})) << "picture " << i;
