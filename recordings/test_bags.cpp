@@ -8,8 +8,10 @@
 #include <sqlite3.h>
 #include <stdexcept>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include "lapservo/testing/fast_cdr.h"
-#include "recordings/test_ros1_bag.h"
 #include "transports/ros1/ros1_messages.h"
 
 namespace lapservo::testing {
@@ -40,34 +42,6 @@ std::vector<std::uint8_t> written(double stamp_s, bool big_endian, const Fields&
   return {begin, begin + lapservo::testing::bytes_of(cdr)};
 }
 
-class Database {
- public:
-  explicit Database(const std::string& path) {
-    if (sqlite3_open(path.c_str(), &database_) != SQLITE_OK) throw std::runtime_error(path);
-  }
-  ~Database() { sqlite3_close(database_); }
-  Database(const Database&) = delete;
-  Database& operator=(const Database&) = delete;
-
-  void run(const std::string& command) {
-    if (sqlite3_exec(database_, command.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK)
-      throw std::runtime_error(sqlite3_errmsg(database_));
-  }
-  void add_message(int topic, std::int64_t time_ns, const std::vector<std::uint8_t>& bytes) {
-    sqlite3_stmt* made = nullptr;
-    sqlite3_prepare_v2(database_, "INSERT INTO messages(topic_id, timestamp, data) VALUES (?, ?, ?)", -1, &made,
-                       nullptr);
-    const std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement(made, sqlite3_finalize);
-    sqlite3_bind_int(made, 1, topic);
-    sqlite3_bind_int64(made, 2, time_ns);
-    sqlite3_bind_blob(made, 3, bytes.data(), static_cast<int>(bytes.size()), SQLITE_STATIC);
-    if (sqlite3_step(made) != SQLITE_DONE) throw std::runtime_error(sqlite3_errmsg(database_));
-  }
-
- private:
-  sqlite3* database_ = nullptr;
-};
-
 }  // namespace
 
 std::vector<std::uint8_t> ros1_bytes(const JointMessage& message) {
@@ -92,17 +66,15 @@ std::vector<std::uint8_t> cdr_bytes(const CompressedImageMessage& message, bool 
   return written(message.stamp_s, big_endian, message.format, message.data);
 }
 
-void write_ros1_bag(const std::filesystem::path& path, const std::vector<BagEntry>& entries,
-                    const std::string& compression) {
-  Ros1BagWriter bag(path.string(), compression);
-  for (const BagEntry& entry : entries)
-    bag.write(entry.topic, entry.type, entry.time_s, entry.bytes.data(), entry.bytes.size());
-}
-
 void write_ros2_bag(const std::filesystem::path& path, const std::vector<BagEntry>& entries) {
-  Database database(path.string());
-  database.run(
-      "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;"
+  sqlite3* opened = nullptr;
+  sqlite3_open(path.c_str(), &opened);
+  const std::unique_ptr<sqlite3, decltype(&sqlite3_close)> database(opened, sqlite3_close);
+  const auto run = [&](const std::string& command) {
+    if (sqlite3_exec(database.get(), command.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK)
+      throw std::runtime_error(sqlite3_errmsg(database.get()));
+  };
+  run("PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL;"
       "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);"
       "CREATE TABLE metadata(id INTEGER PRIMARY KEY, metadata_version INTEGER NOT NULL, metadata TEXT NOT NULL);"
       "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL, serialization_format TEXT "
@@ -115,12 +87,13 @@ void write_ros2_bag(const std::filesystem::path& path, const std::vector<BagEntr
   for (const BagEntry& entry : entries) {
     const auto [number, is_new] = numbers.emplace(entry.topic, static_cast<int>(numbers.size()) + 1);
     std::string type = entry.type;
+    type.insert(type.find('/'), "/msg");
     if (is_new)
-      database.run("INSERT INTO topics VALUES (" + std::to_string(number->second) + ", '" + entry.topic + "', '" +
-                   type.insert(type.find('/'), "/msg") + "', 'cdr', '')");
-    database.add_message(number->second, std::llround(1e9 * entry.time_s), entry.bytes);
+      run(fmt::format("INSERT INTO topics VALUES ({}, '{}', '{}', 'cdr', '')", number->second, entry.topic, type));
+    run(fmt::format("INSERT INTO messages(topic_id, timestamp, data) VALUES ({}, {}, x'{:02x}')", number->second,
+                    std::llround(1e9 * entry.time_s), fmt::join(entry.bytes, "")));
   }
-  database.run("COMMIT");
+  run("COMMIT");
 }
 
 void write_ros2_metadata(const std::filesystem::path& folder, const std::vector<std::string>& files,

@@ -1,8 +1,8 @@
 // rosbag's own writer. In C++17: of its headers no more can be had.
-#include "recordings/test_ros1_bag.h"
-
 #include <cstring>
 #include <rosbag/bag.h>
+
+#include "recordings/test_bags.h"
 
 namespace {
 
@@ -51,28 +51,18 @@ struct Serializer<Raw> {
 }  // namespace serialization
 }  // namespace ros
 
-namespace lapservo {
-namespace testing {
+namespace lapservo::testing {
 
-struct Ros1BagWriter::Implementation {
-  rosbag::Bag bag;
-};
-
-Ros1BagWriter::Ros1BagWriter(const std::string& path, const std::string& compression)
-    : implementation_(std::make_unique<Implementation>()) {
-  implementation_->bag.open(path, rosbag::bagmode::Write);
-  implementation_->bag.setCompression(compression == "bz2"   ? rosbag::compression::BZ2
-                                      : compression == "lz4" ? rosbag::compression::LZ4
-                                                             : rosbag::compression::Uncompressed);
-  implementation_->bag.setChunkThreshold(4096);
+void write_ros1_bag(const std::filesystem::path& path, const std::vector<BagEntry>& entries,
+                    const std::string& compression) {
+  rosbag::Bag bag(path.string(), rosbag::bagmode::Write);
+  bag.setCompression(compression == "bz2"   ? rosbag::compression::BZ2
+                     : compression == "lz4" ? rosbag::compression::LZ4
+                                            : rosbag::compression::Uncompressed);
+  bag.setChunkThreshold(4096);
+  for (const BagEntry& entry : entries)
+    bag.write(entry.topic, ros::Time(entry.time_s),
+              Raw{entry.type.c_str(), entry.bytes.data(), static_cast<std::uint32_t>(entry.bytes.size())});
 }
 
-Ros1BagWriter::~Ros1BagWriter() = default;
-
-void Ros1BagWriter::write(const std::string& topic, const std::string& type, double time_s, const std::uint8_t* data,
-                          std::size_t size) {
-  implementation_->bag.write(topic, ros::Time(time_s), Raw{type.c_str(), data, static_cast<std::uint32_t>(size)});
-}
-
-}  // namespace testing
-}  // namespace lapservo
+}  // namespace lapservo::testing
