@@ -36,11 +36,6 @@ PageConfig config_of_test() {
   return config;
 }
 
-int port_of(const LivePage& page) {
-  const std::string url = page.url();
-  return std::stoi(url.substr(url.rfind(':') + 1));
-}
-
 std::string body_of(const std::string& answer) {
   return answer.substr(answer.find("\r\n\r\n") + 4);
 }
@@ -52,22 +47,31 @@ PageImage image_of(const Rig& rig, double brightness) {
   return {bgr, std::make_shared<const Rig>(rig), {seen}, 0.01};
 }
 
-// Like the page: requests again after a timeout.
-std::string newer_picture(int port, int after) {
-  std::string answer;
-  for (int i = 0; i < 100 && http_status(answer) != 200; ++i)
-    answer = http(port, "GET", fmt::format("/picture?after={}", after));
-  return answer;
-}
+// A page that is served; get() and post() give the status.
+struct Served : LivePage {
+  explicit Served(const PageConfig& config = config_of_test()) : LivePage(config) {}
+  int get(const std::string& path, const std::string& headers = "") const {
+    return http_status(http(port, "GET", path, headers));
+  }
+  int post(const std::string& path) const { return http_status(http_post(port, path)); }
+  std::string state() const { return http(port, "GET", "/state"); }
+  bool tells(const std::string& part) const { return state().find(part) != std::string::npos; }
+  // Like the page: requests again after a timeout.
+  std::string newer_picture(int after) const {
+    std::string answer;
+    for (int i = 0; i < 100 && http_status(answer) != 200; ++i)
+      answer = http(port, "GET", fmt::format("/picture?after={}", after));
+    return answer;
+  }
+  const int port = std::stoi(url().substr(url().rfind(':') + 1));
+};
 
 TEST(LivePage, ShowsTheNewestImageToWhoeverWaits) {
   const Rig rig = testing::small_test_rig();
-  const LivePage empty(config_of_test());
-  EXPECT_EQ(http_status(http(port_of(empty), "GET", "/picture")), 204);
-  LivePage page(config_of_test());
-  const int port = port_of(page);
+  EXPECT_EQ(Served().get("/picture"), 204);
+  Served page;
   for (const double brightness : {10, 90, 200}) page.show(image_of(rig, brightness));
-  const std::string answer = newer_picture(port, 0);
+  const std::string answer = page.newer_picture(0);
   ASSERT_EQ(http_status(answer), 200);
   EXPECT_NE(answer.find("X-Number: 3\r\n"), std::string::npos) << answer.substr(0, 600);
   const std::string jpeg = body_of(answer);
@@ -75,50 +79,46 @@ TEST(LivePage, ShowsTheNewestImageToWhoeverWaits) {
       decode_image({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()}, "the page's image");
   ASSERT_EQ(shown.size(), cv::Size(rig.camera.width_px, rig.camera.height_px));
   EXPECT_NEAR(shown.at<cv::Vec3b>(shown.rows / 2, shown.cols / 2)[1], 200, 3);
-  EXPECT_EQ(http_status(http(port, "GET", "/picture?after=3")), 204);
+  EXPECT_EQ(page.get("/picture?after=3"), 204);
   std::thread later([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     page.show(image_of(rig, 40));
   });
-  EXPECT_NE(newer_picture(port, 3).find("X-Number: 4\r\n"), std::string::npos);
+  EXPECT_NE(page.newer_picture(3).find("X-Number: 4\r\n"), std::string::npos);
   later.join();
 }
 
 TEST(LivePage, ServesItsFilesAndNothingElse) {
-  LivePage page(config_of_test());
-  const int port = port_of(page);
-  const std::string html = http(port, "GET", "/");
+  Served page;
+  const std::string html = http(page.port, "GET", "/");
   EXPECT_EQ(http_status(html), 200);
   EXPECT_NE(html.find("<script src=\"page.js\""), std::string::npos);
   EXPECT_NE(html.find("frame-ancestors 'none'"), std::string::npos);
-  for (const char* path : {"/page.css", "/page.js", "/welcome.js", "/state"})
-    EXPECT_EQ(http_status(http(port, "GET", path)), 200) << path;
+  for (const char* path : {"/page.css", "/page.js", "/welcome.js", "/state"}) EXPECT_EQ(page.get(path), 200) << path;
   for (const char* path : {"/x", "/../etc/passwd", "//page.js", "/page.js/", "/hold"})
-    EXPECT_EQ(http_status(http(port, "GET", path)), 404) << path;
-  EXPECT_EQ(http_status(http(port, "DELETE", "/state")), 405);
+    EXPECT_EQ(page.get(path), 404) << path;
+  EXPECT_EQ(http_status(http(page.port, "DELETE", "/state")), 405);
 }
 
 TEST(LivePage, KnowsItsViewersAndTellsThemTheEnd) {
-  LivePage page(config_of_test());
-  const int port = port_of(page);
+  Served page;
   EXPECT_FALSE(page.was_watched());
-  EXPECT_NE(http(port, "GET", "/state").find("\"ended\":false"), std::string::npos);
+  EXPECT_TRUE(page.tells("\"ended\":false"));
   EXPECT_TRUE(page.was_watched());
   page.end();
-  EXPECT_NE(http(port, "GET", "/state").find("\"ended\":true"), std::string::npos);
+  EXPECT_TRUE(page.tells("\"ended\":true"));
 }
 
 TEST(LivePage, TellsWhatTheLoopDoes) {
   const Rig rig = testing::small_test_rig();
-  LivePage page(config_of_test());
-  const int port = port_of(page);
+  Served page;
   page.show(image_of(rig, 10));
   PageLoop loop;
   loop.desired = Eigen::Vector4d(0.9, 400, 180, 100);
   loop.error = Eigen::Vector4d(0.001, NAN, 2, 3);
   page.tell(loop, "track");
   page.tell(loop, "hold: marker_lost");
-  const std::string state = http(port, "GET", "/state");
+  const std::string state = page.state();
   for (const char* part :
        {R"("state":"hold: marker_lost")", R"("state":"track")", R"("name":"PSM1","status":"no_marker")",
         R"("name":"r_px","measured":null,"desired":400.0,"error":null)", R"("may_start":false)"})
@@ -128,67 +128,62 @@ TEST(LivePage, TellsWhatTheLoopDoes) {
 TEST(LivePage, HoldsAlwaysAndStartsOnlyWhereMotionIsEnabled) {
   PageConfig config = config_of_test();
   {
-    LivePage page(config);
-    const int port = port_of(page);
-    EXPECT_EQ(http_status(http_post(port, start_path())), 403);
+    Served page(config);
+    EXPECT_EQ(page.post(start_path()), 403);
     EXPECT_FALSE(page.take_wishes().hold);
-    EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
+    EXPECT_EQ(page.post("/hold"), 202);
     EXPECT_EQ(page.take_wishes().hold, true);
     EXPECT_FALSE(page.take_wishes().hold);  // once
-    EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
-    EXPECT_EQ(http_status(http_post(port, start_path())), 403);
+    EXPECT_EQ(page.post("/hold"), 202);
+    EXPECT_EQ(page.post(start_path()), 403);
     EXPECT_EQ(page.take_wishes().hold, true);
-    EXPECT_EQ(http_status(http_post(port, "/stop")), 202);
+    EXPECT_EQ(page.post("/stop"), 202);
     EXPECT_TRUE(page.take_wishes().stop);
-    EXPECT_EQ(http_status(http_post(port, "/explode")), 404);
+    EXPECT_EQ(page.post("/explode"), 404);
   }
   config.may_start = true;
   {
-    LivePage page(config);
-    const int port = port_of(page);
-    EXPECT_EQ(http_status(http_post(port, start_path())), 202);
+    Served page(config);
+    EXPECT_EQ(page.post(start_path()), 202);
     EXPECT_EQ(page.take_wishes().hold, false);
-    EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
-    EXPECT_EQ(http_status(http_post(port, start_path())), 202);
+    EXPECT_EQ(page.post("/hold"), 202);
+    EXPECT_EQ(page.post(start_path()), 202);
     EXPECT_EQ(page.take_wishes().hold, true);  // of two in a tick
   }
   config.has_loop = false;
-  LivePage page(config);
-  EXPECT_EQ(http_status(http_post(port_of(page), start_path())), 403);
-  EXPECT_EQ(http_status(http_post(port_of(page), "/hold")), 403);
+  EXPECT_EQ(Served(config).post(start_path()), 403);
+  EXPECT_EQ(Served(config).post("/hold"), 403);
 }
 
 // The network or a stopped process may delay it: its sender does not expect it any more.
 TEST(LivePage, StartsNothingLate) {
   PageConfig config = config_of_test();
   config.may_start = true;
-  LivePage page(config);
-  const int port = port_of(page);
+  Served page(config);
   for (const std::string& path : {start_path(1.1), start_path(100), start_path(-100)})
-    EXPECT_EQ(http_status(http_post(port, path)), 409) << path;
+    EXPECT_EQ(page.post(path), 409) << path;
   for (const char* path : {"/start", "/start?at=", "/start?at=now", "/start?at=nan", "/start?at=inf"})
-    EXPECT_EQ(http_status(http_post(port, path)), 400) << path;
+    EXPECT_EQ(page.post(path), 400) << path;
   EXPECT_FALSE(page.take_wishes().hold);
-  EXPECT_EQ(http_status(http_post(port, start_path(0.5))), 202);
-  EXPECT_NE(http(port, "GET", "/state").find(R"("asked":"start")"), std::string::npos);
+  EXPECT_EQ(page.post(start_path(0.5)), 202);
+  EXPECT_TRUE(page.tells(R"("asked":"start")"));
   std::this_thread::sleep_for(std::chrono::milliseconds(520));
-  EXPECT_NE(http(port, "GET", "/state").find(R"("asked":"")"), std::string::npos);
+  EXPECT_TRUE(page.tells(R"("asked":"")"));
   EXPECT_FALSE(page.take_wishes().hold);
   // A hold counts late too.
-  EXPECT_EQ(http_status(http_post(port, "/hold")), 202);
+  EXPECT_EQ(page.post("/hold"), 202);
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  EXPECT_EQ(http_status(http_post(port, start_path(1.1))), 409);
+  EXPECT_EQ(page.post(start_path(1.1)), 409);
   EXPECT_EQ(page.take_wishes().hold, true);
 }
 
 // Without an answer in time, a pressed button is a released one.
 TEST(LivePage, TheRunButtonIsPressedWhileThePageSaysSo) {
   PageConfig config = config_of_test();
-  EXPECT_EQ(http_status(http_post(port_of(LivePage(config)), press_path())), 404);
+  EXPECT_EQ(Served(config).post(press_path()), 404);
   config.has_run_button = true;
-  LivePage page(config);
-  const int port = port_of(page);
-  const auto press = [&](double ago_s = 0) { return http_status(http_post(port, press_path(ago_s))); };
+  Served page(config);
+  const auto press = [&](double ago_s = 0) { return page.post(press_path(ago_s)); };
   EXPECT_FALSE(page.operator_present());
   EXPECT_EQ(press(), 202);
   EXPECT_TRUE(page.operator_present());
@@ -201,11 +196,10 @@ TEST(LivePage, TheRunButtonIsPressedWhileThePageSaysSo) {
   EXPECT_FALSE(page.operator_present());
   for (const double ago_s : {0.21, 5.0, -0.21}) EXPECT_EQ(press(ago_s), 409) << ago_s;
   EXPECT_FALSE(page.operator_present());
-  for (const char* path : {"/press", "/press?at=", "/press?at=nan"})
-    EXPECT_EQ(http_status(http_post(port, path)), 400) << path;
+  for (const char* path : {"/press", "/press?at=", "/press?at=nan"}) EXPECT_EQ(page.post(path), 400) << path;
   // Released and pressed again between two queries; a press from before the release comes late.
   EXPECT_EQ(press(), 202);
-  EXPECT_EQ(http_status(http_post(port, "/release")), 202);
+  EXPECT_EQ(page.post("/release"), 202);
   EXPECT_EQ(press(0.1), 409);
   EXPECT_EQ(press(), 202);
   EXPECT_FALSE(page.operator_present());
@@ -215,29 +209,28 @@ TEST(LivePage, TheRunButtonIsPressedWhileThePageSaysSo) {
 TEST(LivePage, RefusesStrangersAndOtherSites) {
   PageConfig config = config_of_test();
   config.address = "0.0.0.0";
-  LivePage page(config);
+  Served page(config);
   const std::string url = page.url();
   const std::string token = url.substr(url.find("token=") + 6);
-  const int port = std::stoi(url.substr(url.rfind(':') + 1));
   for (const char* path : {"/", "/page.js", "/state", "/picture", "/?token=", "/?token=abc"})
-    EXPECT_EQ(http_status(http(port, "GET", path)), 401) << path;
-  EXPECT_EQ(http_status(http_post(port, "/stop")), 401);
+    EXPECT_EQ(page.get(path), 401) << path;
+  EXPECT_EQ(page.post("/stop"), 401);
   EXPECT_FALSE(page.take_wishes().stop);
-  const std::string welcome = http(port, "GET", "/?token=" + token);
+  const std::string welcome = http(page.port, "GET", "/?token=" + token);
   EXPECT_EQ(http_status(welcome), 200);
   EXPECT_NE(welcome.find("<script src=\"welcome.js\">"), std::string::npos);
-  const std::string cookie = fmt::format("Cookie: theme=dark; lapservo_token_{}={}\r\n", port, token);
-  EXPECT_EQ(http_status(http(port, "GET", "/state", cookie)), 200);
-  EXPECT_EQ(http_status(http(port, "GET", "/state", cookie + "Host: evil.example\r\n")), 403);
-  EXPECT_EQ(http_status(http(port, "POST", "/hold", cookie + "Origin: http://evil.example\r\nContent-Length: 0\r\n")),
-            403);
+  const std::string cookie = fmt::format("Cookie: theme=dark; lapservo_token_{}={}\r\n", page.port, token);
+  EXPECT_EQ(page.get("/state", cookie), 200);
+  EXPECT_EQ(page.get("/state", cookie + "Host: evil.example\r\n"), 403);
+  EXPECT_EQ(
+      http_status(http(page.port, "POST", "/hold", cookie + "Origin: http://evil.example\r\nContent-Length: 0\r\n")),
+      403);
   EXPECT_FALSE(page.take_wishes().hold);
 }
 
 TEST(LivePage, RefusesWhatIsMalformedOrTooLarge) {
-  LivePage page(config_of_test());
-  const int port = port_of(page);
-  const std::string host = fmt::format("Host: 127.0.0.1:{0}\r\nOrigin: http://127.0.0.1:{0}\r\n", port);
+  Served page;
+  const std::string host = fmt::format("Host: 127.0.0.1:{0}\r\nOrigin: http://127.0.0.1:{0}\r\n", page.port);
   for (const std::string& text :
        {std::string("\r\n\r\n\r\n"), std::string("hello\r\n\r\n"), std::string(200, '\0'),
         "GET / HTTP/1.1\r\n" + host + "Host: evil\r\n\r\n", "GET /" + std::string(40000, 'a') + " HTTP/1.1\r\n\r\n",
@@ -245,18 +238,18 @@ TEST(LivePage, RefusesWhatIsMalformedOrTooLarge) {
         "POST /hold HTTP/1.1\r\n" + host + "Content-Length: 99999999\r\n\r\n",
         "POST /hold HTTP/1.1\r\n" + host + "Content-Length: -1\r\n\r\n",
         "POST /hold HTTP/1.1\r\n" + host + "Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n"}) {
-    const RawConnection connection(port);
+    const RawConnection connection(page.port);
     connection.say(text);
     const int status = http_status(connection.hear());
     EXPECT_TRUE(status == 0 || (status >= 400 && status < 500)) << status << " to " << text.substr(0, 80);
   }
   EXPECT_FALSE(page.take_wishes().hold);
-  EXPECT_EQ(http_status(http(port, "GET", "/state")), 200);
+  EXPECT_EQ(page.get("/state"), 200);
 }
 
 TEST(LivePage, ForgetsWhoDoesNotFinishAsking) {
-  LivePage page(config_of_test());
-  const RawConnection slow(port_of(page));
+  Served page;
+  const RawConnection slow(page.port);
   const auto begin = std::chrono::steady_clock::now();
   while (slow.say("x") && std::chrono::steady_clock::now() < begin + std::chrono::seconds(5))
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -269,10 +262,9 @@ TEST(LivePage, WaitsLongerForTheNextRequestThanForTheFirst) {
   PageConfig config = config_of_test();
   config.limits.first_s = 0.1;
   config.limits.head_s = 60;
-  LivePage page(config);
-  const int port = port_of(page);
-  const RawConnection silent(port), asking(port);
-  const std::string question = fmt::format("GET /state HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n", port);
+  Served page(config);
+  const RawConnection silent(page.port), asking(page.port);
+  const std::string question = fmt::format("GET /state HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n", page.port);
   asking.say(question + "\r\n");
   const auto begin = std::chrono::steady_clock::now();
   EXPECT_EQ(silent.hear(), "");
@@ -285,8 +277,7 @@ TEST(LivePage, WaitsLongerForTheNextRequestThanForTheFirst) {
 
 TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
   const Rig rig = testing::small_test_rig();
-  LivePage page(config_of_test());
-  const int port = port_of(page);
+  Served page;
   std::vector<std::unique_ptr<RawConnection>> crowd;
   std::chrono::steady_clock::duration longest{};
   const auto take_time = [&longest](const std::function<void()>& call) {
@@ -296,7 +287,7 @@ TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
   };
   try {
     for (int i = 0; i < 1000; ++i) {
-      crowd.push_back(std::make_unique<RawConnection>(port));
+      crowd.push_back(std::make_unique<RawConnection>(page.port));
       if (i % 20) continue;
       PageImage image = image_of(rig, 10);
       take_time([&] { page.show(std::move(image)); });
@@ -311,15 +302,15 @@ TEST(LivePage, AThousandConnectionsLeaveTheLoopAlone) {
   crowd.clear();
   // Once they have gone.
   int status = 0;
-  for (int i = 0; i < 200 && (status = http_status(http(port, "GET", "/state"))) != 200; ++i)
+  for (int i = 0; i < 200 && (status = page.get("/state")) != 200; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   EXPECT_EQ(status, 200);
 }
 
 TEST(LivePage, SaysWhereItCanNotListen) {
-  LivePage page(config_of_test());
+  Served page;
   PageConfig config = config_of_test();
-  config.port = port_of(page);
+  config.port = page.port;
   EXPECT_TRUE(testing::input_error([&] { const LivePage second(config); }).starts_with("--web: "));
 }
 
@@ -330,9 +321,9 @@ TEST(LivePage, EndsWhileSomebodyWaits) {
   std::optional<RawConnection> viewer;
   std::chrono::steady_clock::time_point begin;
   {
-    LivePage page(config);
-    viewer.emplace(port_of(page));
-    viewer->say(fmt::format("GET /picture HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", port_of(page)));
+    Served page(config);
+    viewer.emplace(page.port);
+    viewer->say(fmt::format("GET /picture HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n", page.port));
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     begin = std::chrono::steady_clock::now();
   }
