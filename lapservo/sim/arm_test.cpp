@@ -33,20 +33,6 @@ TEST(Arm, FollowsASmallStepWithItsTimeConstant) {
   }
 }
 
-TEST(Arm, LagsBehindARampByItsTimeConstant) {
-  ArmConfig config = ideal();
-  config.lag_s = 0.02;
-  Arm arm(config, start);
-  const double speed = 0.5, period_s = 1e-4;
-  double goal = start[0];
-  for (int k = 0; k < 5000; ++k) {
-    goal += speed * period_s;
-    arm.servo_jp({goal, start[1], start[2], start[3]});
-    arm.step(period_s);
-  }
-  EXPECT_NEAR(goal - arm.measured_jp()[0], speed * config.lag_s, speed * period_s);
-}
-
 TEST(Arm, NeverExceedsItsRatesOrItsLimits) {
   const std::uint64_t seed = 4;
   Random random(seed);

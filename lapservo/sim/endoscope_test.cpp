@@ -36,14 +36,6 @@ TEST(Endoscope, FramesAreExposedAtTheirRateAndArriveAfterTheLatency) {
   }
 }
 
-TEST(Endoscope, NothingArrivesBeforeItsTimeNorTwice) {
-  Endoscope endoscope({}, {}, {}, {}, without_pictures(), 1);
-  endoscope.expose({});
-  EXPECT_TRUE(endoscope.arrived(0.0799).empty());
-  EXPECT_EQ(endoscope.arrived(0.08).size(), 1U);
-  EXPECT_TRUE(endoscope.arrived(0.2).empty());
-}
-
 TEST(Endoscope, JitterIsEvenWithinItsBoundsAndKeepsTheOrder) {
   EndoscopeConfig config = without_pictures();
   config.jitter_s = 0.004;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -36,6 +37,17 @@ SimulatorConfig without_offsets() {
   config.arm.joint_offset.setZero();
   config.arm.backlash.setZero();
   return config;
+}
+
+SimulatorConfig without_pictures(SimulatorConfig config) {
+  config.endoscope.pictures = false;
+  return config;
+}
+
+CentreLine line_in(const Rig& rig, const SimulatedFrame& frame) {
+  const Instrument& instrument = rig.instruments[0];
+  const Rigid3 pose = *instrument.camera_from_rcm * rcm_from_unrolled(frame.q);
+  return centre_line(rig.camera, instrument.marker, pose, frame.q.psi_rad).value();
 }
 
 struct Seen {
@@ -86,8 +98,7 @@ TEST(Simulator, IsTheSameBitForBitWhateverThreadsRender) {
 
 TEST(Simulator, StepsOfAnyLengthGiveTheSameFrames) {
   const Rig rig = small_rig();
-  SimulatorConfig config;
-  config.endoscope.pictures = false;
+  const SimulatorConfig config = without_pictures({});
   Simulator coarse(rig, config, in_view(rig)), fine(rig, config, in_view(rig));
   const Eigen::Vector4d goal = in_view(rig).vector() + Eigen::Vector4d(0.05, 0.02, 0.01, 1);
   coarse.servo_jp(goal);
@@ -120,9 +131,7 @@ TEST(Simulator, AFrameShowsTheInstrumentAtItsExposure) {
       EXPECT_GE(seen.polled_s[k], frame.picture.stamp_s - 1e-9);
       EXPECT_LE(seen.polled_s[k], frame.picture.stamp_s + 0.001 + 1e-9);
       if (k % 6 != 0) continue;
-      const auto line = centre_line(rig.camera, rig.instruments[0].marker,
-                                    *rig.instruments[0].camera_from_rcm * rcm_from_unrolled(frame.q), frame.q.psi_rad)
-                            .value();
+      const CentreLine line = line_in(rig, frame);
       const cv::Mat light = light_of(frame.picture.bgr, rig.camera.response);
       const Eigen::Vector2d direction = (line.ideal_px[3] - line.ideal_px[0]).normalized();
       const auto off_px = crossing_px(light, line.ideal_px[1], direction);
@@ -134,8 +143,7 @@ TEST(Simulator, AFrameShowsTheInstrumentAtItsExposure) {
 
 TEST(Simulator, MeasuredJointsAreOffByTwoDegreesAndThreeMillimetres) {
   const Rig rig = small_rig();
-  SimulatorConfig config;
-  config.endoscope.pictures = false;
+  SimulatorConfig config = without_pictures({});
   Simulator simulator(rig, config, in_view(rig));
   const Eigen::Vector4d off = (simulator.true_q().vector() - simulator.measured_jp()).cwiseAbs();
   for (const int joint : {0, 1, 3}) EXPECT_NEAR(off[joint], 0.0349, 2e-4);
@@ -154,9 +162,7 @@ TEST(Simulator, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
   Simulator simulator(rig, config, in_view(rig));
   simulator.cover_marker({0.2, 0.3});
   const auto middle_of_band = [&](const SimulatedFrame& frame) {
-    const auto line = centre_line(rig.camera, rig.instruments[0].marker,
-                                  *rig.instruments[0].camera_from_rcm * rcm_from_unrolled(frame.q), frame.q.psi_rad)
-                          .value();
+    const CentreLine line = line_in(rig, frame);
     const cv::Mat light = light_of(frame.picture.bgr, rig.camera.response);
     return light_at(light, 0.5 * (line.ideal_px[0] + line.ideal_px[1]));
   };
@@ -178,42 +184,22 @@ TEST(Simulator, TheMarkerIsHiddenWhileCoveredAndTheLightFollowsItsSetting) {
   }
 }
 
+// Evenly, or smoothly from rest to rest: as far after all and half of the time.
 TEST(Simulator, TheEndoscopeMovesByWhatItIsTold) {
   const Rig rig = small_rig();
-  SimulatorConfig config = without_offsets();
-  config.endoscope.pictures = false;
-  Simulator simulator(rig, config, in_view(rig));
-  const EndoscopeMotion motion{0.2, 0.4, {0.03, 0, -0.01}, {0, 0.3, 0.1}};
-  simulator.move_endoscope(motion);
-  const Rigid3 first = simulator.placement().camera_from_unrolled;
-  simulator.step(0.1);
-  EXPECT_EQ(simulator.camera_from_first_camera().translation.norm(), 0);
-  simulator.step(0.3);  // half of the way
-  const Rigid3 half = simulator.camera_from_first_camera().inverse();
-  EXPECT_LT((half.translation - motion.translation_m / 2).norm(), 1e-9);
-  EXPECT_NEAR(Eigen::AngleAxisd(half.rotation).angle(), motion.rotation_rad.norm() / 2, 1e-9);
-  simulator.step(0.4);
-  const Rigid3 whole = simulator.camera_from_first_camera().inverse();
-  EXPECT_LT((whole.translation - motion.translation_m).norm(), 1e-12);
-  EXPECT_LT((whole * simulator.placement().camera_from_unrolled.translation - first.translation).norm(), 1e-12);
-}
-
-// From rest to rest, as far as evenly after all and half of the time.
-TEST(Simulator, TheEndoscopeMovesSmoothlyWhereItIsTold) {
-  const Rig rig = small_rig();
-  SimulatorConfig config = without_offsets();
-  config.endoscope.pictures = false;
-  Simulator simulator(rig, config, in_view(rig));
-  const EndoscopeMotion motion{0.2, 0.4, {0.03, 0, -0.01}, {0, 0.3, 0.1}, MotionProfile::smooth};
-  simulator.move_endoscope(motion);
-  const auto part_after = [&](double dt_s) {
-    simulator.step(dt_s);
-    return simulator.camera_from_first_camera().inverse().translation.norm() / motion.translation_m.norm();
-  };
-  EXPECT_NEAR(part_after(0.24), 0.00856, 1e-5);  // a tenth of it
-  EXPECT_NEAR(part_after(0.16), 0.5, 1e-8);
-  EXPECT_NEAR(part_after(0.16), 1 - 0.00856, 1e-5);
-  EXPECT_NEAR(part_after(0.2), 1, 1e-12);
+  for (const auto& [profile, tenth] : {std::pair(MotionProfile::even, 0.1), {MotionProfile::smooth, 0.00856}}) {
+    Simulator simulator(rig, without_pictures(without_offsets()), in_view(rig));
+    const EndoscopeMotion motion{0.2, 0.4, {0.03, 0, -0.01}, {0, 0.3, 0.1}, profile};
+    simulator.move_endoscope(motion);
+    const Rigid3 first = simulator.placement().camera_from_unrolled;
+    for (const auto& [dt_s, part] : {std::pair(0.1, 0.0), {0.14, tenth}, {0.16, 0.5}, {0.16, 1 - tenth}, {0.2, 1.0}}) {
+      simulator.step(dt_s);
+      const Rigid3 moved = simulator.camera_from_first_camera().inverse();
+      EXPECT_LT((moved.translation - part * motion.translation_m).norm(), 1e-6) << part;
+      EXPECT_NEAR(Eigen::AngleAxisd(moved.rotation).angle(), part * motion.rotation_rad.norm(), 1e-5) << part;
+      EXPECT_LT((moved * simulator.placement().camera_from_unrolled.translation - first.translation).norm(), 1e-12);
+    }
+  }
 }
 
 TEST(Simulator, RefusesNonsense) {
