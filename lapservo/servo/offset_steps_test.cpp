@@ -34,6 +34,28 @@ class Swing {
   int count_ = 0;
 };
 
+// After 150 images in which the offset stood.
+struct Watched {
+  explicit Watched(std::uint64_t seed) : swing(seed) { expect_silent(150); }
+
+  bool add(const Eigen::Vector3d& offset) { return steps.add(swing.next(offset), true); }
+  void expect_silent(int images, const Eigen::Vector3d& offset = Eigen::Vector3d::Zero()) {
+    for (int i = 0; i < images; ++i) EXPECT_FALSE(add(offset)) << i;
+  }
+  // The motion of the offset from rest, on a smooth way that takes `duration_s`, when the first image is reported.
+  double told_after_mrad(double duration_s) {
+    const Eigen::Vector3d way(0.3, -0.2, 0.015);
+    for (int i = 0; i * period_s < duration_s; ++i) {
+      const Eigen::Vector3d moved = MinimumJerk::position(i * period_s / duration_s) * way;
+      if (add(moved)) return 1e3 * moved[0];
+    }
+    return 1e3 * way[0];
+  }
+
+  Swing swing;
+  OffsetSteps steps;
+};
+
 TEST(OffsetSteps, IsSilentWhileTheJointsSwing) {
   for (const double jitter_s : {0.0, 0.001, 0.004})
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -47,13 +69,11 @@ TEST(OffsetSteps, IsSilentWhileTheJointsSwing) {
 // As slow as 30 mm and 20 degrees in some seconds are: within five images, and for as long as it goes on.
 TEST(OffsetSteps, TellsAnOffsetThatMovesOnAndOn) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    Swing swing(seed);
-    OffsetSteps steps;
-    for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
+    Watched watched(seed);
     const Eigen::Vector3d per_s(0.15, -0.12, 0.008);
     int told = 0;
     for (int i = 1; i <= 60; ++i) {
-      const bool unusual = steps.add(swing.next(i * period_s * per_s), true);
+      const bool unusual = watched.add(i * period_s * per_s);
       told += unusual;
       if (i >= 5 && i <= 10) {
         EXPECT_TRUE(unusual) << seed << " " << i;
@@ -63,49 +83,29 @@ TEST(OffsetSteps, TellsAnOffsetThatMovesOnAndOn) {
   }
 }
 
-// The motion of the offset from rest, on a smooth way that takes `duration_s`, when the first image is reported.
-double told_after_mrad(OffsetSteps& steps, Swing& swing, double duration_s) {
-  const Eigen::Vector3d way(0.3, -0.2, 0.015);
-  for (int i = 0; i * period_s < duration_s; ++i) {
-    const Eigen::Vector3d moved = MinimumJerk::position(i * period_s / duration_s) * way;
-    if (steps.add(swing.next(moved), true)) return 1e3 * moved[0];
-  }
-  return 1e3 * way[0];
-}
-
 // Its speed grows little from image to image: what it gained is not usual.
 TEST(OffsetSteps, TellsAnOffsetThatGainsSpeedByAndBy) {
   for (const double duration_s : {0.6, 1.0, 2.0, 4.0})
-    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-      Swing swing(seed);
-      OffsetSteps steps;
-      for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
-      EXPECT_LT(told_after_mrad(steps, swing, duration_s), 20) << duration_s << " " << seed;
-    }
+    for (std::uint64_t seed = 1; seed <= 5; ++seed)
+      EXPECT_LT(Watched(seed).told_after_mrad(duration_s), 20) << duration_s << " " << seed;
 }
 
 // Nor is it when it is over and all begins anew.
 TEST(OffsetSteps, LearnsNothingFromWhatMovedBeforeItIsTold) {
-  Swing swing(8);
-  OffsetSteps steps;
-  for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
-  const double first_mrad = told_after_mrad(steps, swing, 2);
-  steps.drop_latest();
-  for (int i = 0; i < 60; ++i) EXPECT_FALSE(steps.add(swing.next(), true)) << i;
-  EXPECT_LT(told_after_mrad(steps, swing, 2), 1.5 * first_mrad);
+  Watched watched(8);
+  const double first_mrad = watched.told_after_mrad(2);
+  watched.steps.drop_latest();
+  watched.expect_silent(60);
+  EXPECT_LT(watched.told_after_mrad(2), 1.5 * first_mrad);
 }
 
 // A step as of an encoder or a belt; the same step in two joints is reported.
 TEST(OffsetSteps, TakesAJointThatSlipsForThatJoints) {
-  const auto told = [](const Eigen::Vector3d& per_s) {
-    Swing swing(9);
-    OffsetSteps steps;
+  const auto told = [](const Eigen::Vector3d& way) {
+    Watched watched(9);
     int count = 0;
-    for (int i = 0; i < 150; ++i) EXPECT_FALSE(steps.add(swing.next(), true));
-    for (int i = 0; i < 60; ++i) {
-      const double gained = MinimumJerk::position(std::min(1.0, i / 30.0));  // in half a second
-      count += steps.add(swing.next(gained * per_s), true);
-    }
+    for (int i = 0; i < 60; ++i)
+      count += watched.add(MinimumJerk::position(std::min(1.0, i / 30.0)) * way);  // in half a second
     return count;
   };
   EXPECT_LE(told({0.03, 0, 0}), 2);
@@ -114,22 +114,18 @@ TEST(OffsetSteps, TakesAJointThatSlipsForThatJoints) {
 }
 
 TEST(OffsetSteps, TellsAJumpForATenthOfASecondOnly) {
-  Swing swing(3);
-  OffsetSteps steps;
-  for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
+  Watched watched(3);
   const Eigen::Vector3d elsewhere(0.004, -0.004, 0.001);
-  EXPECT_TRUE(steps.add(swing.next(elsewhere), true));
-  for (int i = 0; i < 7; ++i) steps.add(swing.next(elsewhere), true);
-  for (int i = 0; i < 30; ++i) EXPECT_FALSE(steps.add(swing.next(elsewhere), true)) << i;
+  EXPECT_TRUE(watched.add(elsewhere));
+  for (int i = 0; i < 7; ++i) watched.add(elsewhere);
+  watched.expect_silent(30, elsewhere);
 }
 
 // One image that is off is one.
 TEST(OffsetSteps, GoesOnAfterAnOutlier) {
-  Swing swing(4);
-  OffsetSteps steps;
-  for (int i = 0; i < 150; ++i) ASSERT_FALSE(steps.add(swing.next(), true));
-  EXPECT_TRUE(steps.add(swing.next({0.01, 0, 0}), true));
-  for (int i = 0; i < 30; ++i) EXPECT_FALSE(steps.add(swing.next(), true)) << i;
+  Watched watched(4);
+  EXPECT_TRUE(watched.add({0.01, 0, 0}));
+  watched.expect_silent(30);
 }
 
 // Where images came late before, one more is nothing new.
