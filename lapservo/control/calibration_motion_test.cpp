@@ -42,27 +42,20 @@ TEST(CalibrationMotion, StaysWithinTheLimitsFromAnywhere) {
   }
 }
 
-TEST(CalibrationMotion, SwingsAllJointsAndReturns) {
+TEST(CalibrationMotion, SwingsAsFarAsItsReachAndReturns) {
   const JointLimits limits;
-  const Eigen::Vector4d start(0, 1.5, 0.1, 0);
-  const JointMotion motion = swing_motion(start, limits, 1, 20);
-  EXPECT_LT((motion.at(20) - start).norm(), 1e-12);
-  Eigen::Vector4d reach = Eigen::Vector4d::Zero();
-  for (double t = 0; t < 20; t += step_s) reach = reach.cwiseMax((motion.at(t) - start).cwiseAbs());
-  EXPECT_TRUE((reach.array() > 0.8 * Eigen::Array4d(0.25, 0.2, 0.01, 1)).all()) << reach.transpose();
-}
-
-TEST(CalibrationMotion, SwingsAsFarAsItsReach) {
-  JointLimits limits;
-  const Eigen::Vector4d start(0, 2.47, 0.03, 0);  // phi 0.03 rad from its limit, rho at it
-  const Eigen::Vector4d reach = swing_reach(start, limits, 1, 20);
-  EXPECT_NEAR(reach[0], 0.25, 1e-12);
-  EXPECT_NEAR(reach[1], 0.03, 1e-12);
-  EXPECT_EQ(reach[2], 0);
-  const JointMotion motion = swing_motion(start, limits, 1, 20);
-  Eigen::Vector4d most = Eigen::Vector4d::Zero();
-  for (double t = 0; t < 20; t += step_s) most = most.cwiseMax((motion.at(t) - start).cwiseAbs());
-  EXPECT_TRUE((most.array() < reach.array() + 1e-8).all() && (most.array() > 0.8 * reach.array() - 1e-8).all());
+  const Eigen::Vector4d free(0, 1.5, 0.1, 0),
+      beside_limits(0, 2.47, 0.03, 0);  // phi 0.03 rad from its limit, rho at it
+  EXPECT_TRUE(swing_reach(free, limits, 1, 20).isApprox(Eigen::Vector4d(0.25, 0.2, 0.01, 1)));
+  EXPECT_TRUE(swing_reach(beside_limits, limits, 1, 20).isApprox(Eigen::Vector4d(0.25, 0.03, 0, 1)));
+  for (const Eigen::Vector4d& start : {free, beside_limits}) {
+    const Eigen::Array4d reach = swing_reach(start, limits, 1, 20);
+    const JointMotion motion = swing_motion(start, limits, 1, 20);
+    Eigen::Array4d most = Eigen::Array4d::Zero();
+    for (double t = 0; t < 20; t += step_s) most = most.max((motion.at(t) - start).cwiseAbs().array());
+    EXPECT_TRUE((most < reach + 1e-8).all() && (most > 0.8 * reach - 1e-8).all()) << most.transpose();
+    EXPECT_LT((motion.at(20) - start).norm(), 1e-12);
+  }
 }
 
 TEST(CalibrationMotion, TurnsOnceAndALittleMore) {

@@ -12,36 +12,46 @@ namespace following_error_limit_test {
 
 constexpr double period_s = 1.0 / 60, lag_s = 0.03;
 const JointLimits limits;
-const Eigen::Vector4d q(0, 1, 0.1, 0);
+const Eigen::Vector4d q(0, 1, 0.1, 0), change = limits.acceleration * period_s;
+
+// A setpoint whose velocities are limited; they keep to rate and acceleration.
+struct Limited {
+  FollowingErrorLimit limit{limits};
+  MotionState setpoint{q, Eigen::Vector4d::Zero()};
+
+  Eigen::Vector4d move(const Eigen::Vector4d& wanted, const Eigen::Vector4d& joint, const DriveState& drive) {
+    limit.update(setpoint, joint, drive, lag_s, period_s);
+    const Eigen::Vector4d velocity = limit.apply(setpoint.velocity, wanted, period_s);
+    EXPECT_LE(((velocity - setpoint.velocity).cwiseAbs() - change).maxCoeff(), 1e-12);
+    EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
+    setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
+    setpoint.velocity = velocity;
+    return velocity;
+  }
+  Eigen::Vector4d slower() const { return setpoint.velocity - setpoint.velocity.cwiseMax(-change).cwiseMin(change); }
+  Eigen::Vector4d faster() const { return limits.rate.cwiseMin(setpoint.velocity + change); }
+};
 
 // Setpoints at full speed, joints that follow with their lag, then stand.
 TEST(FollowingErrorLimit, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands) {
-  FollowingErrorLimit limit(limits);
-  MotionState setpoint{q, Eigen::Vector4d::Zero()};
+  Limited limited;
+  const MotionState& setpoint = limited.setpoint;
   DriveState drive;
   drive.load << 0.001, -0.001, 0.0005, 0.01;
   drive.load_known.fill(true);
   Eigen::Vector4d joint = q, farthest = Eigen::Vector4d::Zero();
   for (int k = 0; k < 240; ++k) {
     const bool stands = k >= 60;
-    const Eigen::Vector4d before = joint;
-    const Eigen::Vector4d change = limits.acceleration * period_s;
-    const Eigen::Vector4d wanted = limits.rate.cwiseMin(setpoint.velocity + change);
-    limit.update(setpoint, joint, drive, lag_s, period_s);
-    const Eigen::Vector4d velocity = limit.apply(setpoint.velocity, wanted, period_s);
+    const Eigen::Vector4d before = joint, wanted = limited.faster(), velocity = limited.move(wanted, joint, drive);
     if (!stands) {
       EXPECT_EQ(velocity, wanted) << k;
     }
     if (k < 75) {
-      EXPECT_FALSE(limit.is_reached()) << k;
+      EXPECT_FALSE(limited.limit.is_reached()) << k;
     }
     if (k > 120) {
-      EXPECT_TRUE(limit.is_reached()) << k;
+      EXPECT_TRUE(limited.limit.is_reached()) << k;
     }
-    EXPECT_LE(((velocity - setpoint.velocity).cwiseAbs() - change).maxCoeff(), 1e-12);
-    EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
-    setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
-    setpoint.velocity = velocity;
     if (!stands) joint += -std::expm1(-period_s / lag_s) * (setpoint.position - drive.load - joint);
     drive.velocity = (joint - before) / period_s;
     drive.follows.fill(!stands);
@@ -56,35 +66,24 @@ TEST(FollowingErrorLimit, LeavesAnArmThatFollowsAloneAndComesBackToOneThatStands
 
 // Its load may be off by its friction, in whose direction nobody knows.
 TEST(FollowingErrorLimit, IsShorterForAJointThatHasNotGoneBothWays) {
-  FollowingErrorLimit limit(limits);
-  MotionState setpoint{q, Eigen::Vector4d::Zero()};
+  Limited limited;
+  const MotionState& setpoint = limited.setpoint;
   DriveState drive;
   drive.load_known = {true, false, true, false};
-  for (int k = 0; k < 240; ++k) {
-    limit.update(setpoint, q, drive, lag_s, period_s);
-    const Eigen::Vector4d change = limits.acceleration * period_s;
-    const Eigen::Vector4d velocity =
-        limit.apply(setpoint.velocity, (setpoint.velocity + change).cwiseMin(limits.rate), period_s);
-    setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
-    setpoint.velocity = velocity;
-  }
+  for (int k = 0; k < 240; ++k) limited.move(limited.faster(), q, drive);
   const Eigen::Vector4d lead = (setpoint.position - q).cwiseQuotient(lag_s * limits.rate);
   EXPECT_TRUE(lead.isApprox(Eigen::Vector4d(0.9, 0.7, 0.9, 0.7), 0.01)) << lead.transpose();
 }
 
 // An arm that hangs far below its setpoints follows them nevertheless: it is not pulled down step by step.
 TEST(FollowingErrorLimit, DoesNotTakeALoadForABlockedJoint) {
-  FollowingErrorLimit limit(limits);
-  MotionState setpoint{q, Eigen::Vector4d::Zero()};
+  Limited limited;
+  const MotionState& setpoint = limited.setpoint;
   DriveState drive;
   const Eigen::Vector4d sag = 5 * lag_s * limits.rate;
   Eigen::Vector4d joint = q - sag;
   for (int k = 0; k < 240; ++k) {
-    const Eigen::Vector4d before = joint;
-    limit.update(setpoint, joint, drive, lag_s, period_s);
-    const Eigen::Vector4d velocity = limit.apply(setpoint.velocity, Eigen::Vector4d::Zero(), period_s);
-    setpoint.position += period_s * (setpoint.velocity + velocity) / 2;
-    setpoint.velocity = velocity;
+    const Eigen::Vector4d before = joint, velocity = limited.move(limited.slower(), joint, drive);
     joint += -std::expm1(-period_s / lag_s) * (setpoint.position - sag - joint);
     drive.velocity = (joint - before) / period_s;
     for (int i = 0; i < 4; ++i)
@@ -98,21 +97,17 @@ TEST(FollowingErrorLimit, DoesNotTakeALoadForABlockedJoint) {
 TEST(FollowingErrorLimit, StaysWithinTheLimitsWhateverIsWanted) {
   Random random(3);
   for (int k = 0; k < 1000; ++k) {
-    MotionState setpoint;
+    Limited limited;
+    MotionState& setpoint = limited.setpoint;
     DriveState drive;
     Eigen::Vector4d wanted;
     for (int i = 0; i < 4; ++i) {
       setpoint.position[i] = q[i] + random.uniform(-1, 1) * limits.rate[i];
       setpoint.velocity[i] = random.uniform(-1, 1) * limits.rate[i];
       drive.velocity[i] = random.uniform(-1, 1) * limits.rate[i];
-      const double change = limits.acceleration[i] * period_s;
-      wanted[i] = std::clamp(setpoint.velocity[i] + random.uniform(-1, 1) * change, -limits.rate[i], limits.rate[i]);
+      wanted[i] = std::clamp(setpoint.velocity[i] + random.uniform(-1, 1) * change[i], -limits.rate[i], limits.rate[i]);
     }
-    FollowingErrorLimit limit(limits);
-    limit.update(setpoint, q, drive, lag_s, period_s);
-    const Eigen::Vector4d velocity = limit.apply(setpoint.velocity, wanted, period_s);
-    EXPECT_LE(((velocity - setpoint.velocity).cwiseAbs() - limits.acceleration * period_s).maxCoeff(), 1e-12);
-    EXPECT_LE((velocity.cwiseAbs() - limits.rate).maxCoeff(), 1e-12);
+    limited.move(wanted, q, drive);
   }
 }
 

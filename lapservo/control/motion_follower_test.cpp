@@ -52,31 +52,34 @@ Progress follow(MotionFollower& follower, SimulatedRun& run, const std::function
   ADD_FAILURE() << "it never ends";
   return Progress::moving;
 }
+// The swing of 10 s that is followed.
+const JointLimits limits;
+MotionFollower follower_of_a_swing() {
+  return MotionFollower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+}
+
 const auto undisturbed = [](SimulatedRun&) {};
 const auto as_it_is = [](const SimulatedRun&, JointVector&) {};
 
-void expect_within(const SimulatedRun& run, const JointLimits& limits) {
+void expect_within(const SimulatedRun& run) {
   EXPECT_TRUE((run.max_rate <= 1.001 * limits.rate.array()).all()) << run.max_rate.transpose();
   EXPECT_TRUE((run.max_acceleration <= 1.05 * limits.acceleration.array()).all()) << run.max_acceleration.transpose();
 }
 
 TEST(MotionFollower, LeadsAnArmToTheEnd) {
-  const JointLimits limits;
-  const JointMotion motion = swing_motion(start, limits, 1, 10);
-  MotionFollower follower(motion, limits, max_lead, 0);
+  MotionFollower follower = follower_of_a_swing();
   SimulatedRun run;
   EXPECT_EQ(follow(follower, run, undisturbed, as_it_is), Progress::done);
   EXPECT_LT((run.q - start).cwiseAbs().maxCoeff(), 2e-3);
   Eigen::Vector4d reach = Eigen::Vector4d::Zero();
   for (const Eigen::Vector4d& q : run.set_points) reach = reach.cwiseMax((q - start).cwiseAbs());
   EXPECT_GT(reach[0], 0.1);
-  expect_within(run, limits);
+  expect_within(run);
 }
 
 TEST(MotionFollower, GoesOnFromRestAfterAPause) {
-  const JointLimits limits;
   for (const double begin_s : {1.0, 2.2, 3.7, 5.1}) {
-    MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+    MotionFollower follower = follower_of_a_swing();
     SimulatedRun run;
     while (run.now_s < begin_s) {
       run.path = follower.step(run.now_s, JointVector::from_vector(run.q)).path;
@@ -92,8 +95,7 @@ TEST(MotionFollower, GoesOnFromRestAfterAPause) {
 }
 
 TEST(MotionFollower, LetsGoOfWhatItRunsAgainst) {
-  const JointLimits limits;
-  MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+  MotionFollower follower = follower_of_a_swing();
   SimulatedRun run;
   std::optional<double> stuck;
   const auto blocked = [&](SimulatedRun& r) {
@@ -103,13 +105,11 @@ TEST(MotionFollower, LetsGoOfWhatItRunsAgainst) {
   };
   EXPECT_EQ(follow(follower, run, blocked, as_it_is), Progress::does_not_follow);
   EXPECT_LT(std::abs(run.set_point[0] - *stuck), 0.02);
-  expect_within(run, limits);
+  expect_within(run);
 }
 
 TEST(MotionFollower, OneWildReadingMovesNothing) {
-  const JointLimits limits;
-  MotionFollower follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0),
-      undisturbed_follower(swing_motion(start, limits, 1, 10), limits, max_lead, 0);
+  MotionFollower follower = follower_of_a_swing(), undisturbed_follower = follower_of_a_swing();
   SimulatedRun run, other;
   bool was_wild = false;
   const auto wild = [&](const SimulatedRun& r, JointVector& q) {

@@ -41,6 +41,12 @@ inline FeatureModel model_of(const TestRig& rig) {
   return [rig](const Eigen::Vector4d& q) { return exact_map(rig, q); };
 }
 
+/// The measurement of a visible marker.
+inline ImageMeasurement image_of(const FeatureState& state, double stamp_s) {
+  const Eigen::Vector4d variances(1e-7, 0.02, 0.02, 0.02);
+  return {true, stamp_s, state.features, variances.asDiagonal(), state.ends_px, {}};
+}
+
 /// The model errors between the controller and the instrument.
 struct Flaws {
   double latency_s = 0.08;

@@ -33,10 +33,6 @@ TEST(TrackingLaw, SampledErrorDecaysExactlyWithVelocityRamped) {
   }
 }
 
-TEST(TrackingLaw, TheExactGainTendsToTheDecayRate) {
-  EXPECT_NEAR(exact_gain_ramped(3, 1e-6), 3, 1e-4);
-}
-
 TEST(TrackingLaw, ErrorOfTheAngleTakesTheShorterWay) {
   const Eigen::Vector4d features(3.1, 10, 20, 30), desired(-3.1, 9, 22, 30);
   const Eigen::Vector4d error = feature_error(features, desired);

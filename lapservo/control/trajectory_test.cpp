@@ -125,32 +125,21 @@ TEST_F(TrajectoryCheck, AcceptsThePapersTrajectory) {
 }
 
 TEST_F(TrajectoryCheck, NamesTimeAndLimit) {
-  auto far = paper_sinusoids();
-  far.amplitude[1] = 600;  // off the image
-  const auto outside = find_infeasible(sinusoids(far), 30, model, config, start);
-  ASSERT_TRUE(outside);
-  EXPECT_GT(outside->time_s, 0);
-
-  auto fast = paper_sinusoids();
-  fast.omega_rad_s[1] = 12;
-  const auto rate = find_infeasible(sinusoids(fast), 30, model, config, start);
-  ASSERT_TRUE(rate);
-  EXPECT_NE(rate->what.find("limits.rate"), std::string::npos) << rate->what;
-
-  ControllerConfig narrow = config;
-  narrow.limits.upper[2] = 0.066;
-  const auto joint = find_infeasible(sinusoids(paper_sinusoids()), 30, model, narrow, start);
-  ASSERT_TRUE(joint);
-  EXPECT_NE(joint->what.find("limits.upper rho_m 0.066"), std::string::npos) << joint->what;
-
-  narrow = config;
-  narrow.window = ImageWindow{20, 800, 20, 699};
-  const auto window = find_infeasible(sinusoids(paper_sinusoids()), 30, model, narrow, start);
-  ASSERT_TRUE(window);
-  EXPECT_NE(window->what.find("field of view"), std::string::npos) << window->what;
-
-  const auto none = find_infeasible(set_point({0.9, 795, 365, 900}), 1, model, config, start);
-  ASSERT_TRUE(none);
+  Sinusoids off_the_image = paper_sinusoids(), fast = paper_sinusoids();
+  off_the_image.amplitude[1] = 600, fast.omega_rad_s[1] = 12;
+  ControllerConfig near_joint_limit = config, narrow_window = config;
+  near_joint_limit.limits.upper[2] = 0.066, narrow_window.window = ImageWindow{20, 800, 20, 699};
+  const auto expect_problem = [&](const Trajectory& trajectory, const ControllerConfig& with, const std::string& part) {
+    const auto problem = find_infeasible(trajectory, 30, model, with, start);
+    ASSERT_TRUE(problem) << part;
+    EXPECT_NE(problem->what.find(part), std::string::npos) << problem->what;
+  };
+  expect_problem(sinusoids(off_the_image), config, "");
+  EXPECT_GT(find_infeasible(sinusoids(off_the_image), 30, model, config, start)->time_s, 0);
+  expect_problem(sinusoids(fast), config, "limits.rate");
+  expect_problem(sinusoids(paper_sinusoids()), near_joint_limit, "limits.upper rho_m 0.066");
+  expect_problem(sinusoids(paper_sinusoids()), narrow_window, "field of view");
+  expect_problem(set_point({0.9, 795, 365, 900}), config, "");
 }
 
 }  // namespace

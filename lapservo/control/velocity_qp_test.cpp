@@ -1,9 +1,11 @@
 #include "lapservo/control/velocity_qp.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
-#include <Eigen/LU>
+#include <Eigen/QR>
 #include <gtest/gtest.h>
 
 #include "lapservo/core/random.h"
@@ -44,10 +46,6 @@ Problem random_problem(Random& random) {
   return p;
 }
 
-double cost(const Problem& p, const Eigen::Vector4d& x) {
-  return (x - p.wanted).dot(p.weight * (x - p.wanted));
-}
-
 double worst_violation(const Problem& p, const Eigen::Vector4d& x) {
   double worst = -std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < p.limits.size; ++i) {
@@ -57,67 +55,44 @@ double worst_violation(const Problem& p, const Eigen::Vector4d& x) {
   return worst;
 }
 
-/// The least cost over the feasible minimisers of all sets of up to four sides taken as equalities.
-double brute_force_cost(const Problem& p) {
-  double least = std::numeric_limits<double>::infinity();
-  if (worst_violation(p, p.wanted) < 1e-9) return 0;
-  for (unsigned set = 1; set < (1U << p.limits.size); ++set) {
-    const int n = __builtin_popcount(set);
-    if (n > 4) continue;
-    Eigen::MatrixXd normals(4, n);
-    Eigen::VectorXd bounds(n);
-    int k = 0;
-    for (std::size_t i = 0; i < p.limits.size; ++i) {
+/// The distance of the downhill direction from x to the nearest combination of the normals of up to four sides that x
+/// touches, none of them negative: 0 proves that x is the optimum (Karush, Kuhn and Tucker).
+double distance_to_optimality(const Problem& p, const Eigen::Vector4d& x) {
+  const Eigen::Vector4d downhill = p.weight * (p.wanted - x);
+  std::vector<Eigen::Vector4d> touched;
+  for (std::size_t i = 0; i < p.limits.size; ++i) {
+    const HalfSpace& side = p.limits.items[i];
+    if (side.bound - side.normal.dot(x) < 1e-8 * side.normal.norm()) touched.push_back(side.normal.normalized());
+  }
+  double least = downhill.norm();
+  for (unsigned set = 1; set < (1U << touched.size()); ++set) {
+    Eigen::MatrixXd normals(4, 0);
+    for (std::size_t i = 0; i < touched.size(); ++i) {
       if ((set >> i & 1U) == 0) continue;
-      normals.col(k) = p.limits.items[i].normal;
-      bounds[k++] = p.limits.items[i].bound;
+      normals.conservativeResize(4, normals.cols() + 1);
+      normals.rightCols<1>() = touched[i];
     }
-    const Eigen::MatrixXd by_weight = p.weight.inverse() * normals;
-    const Eigen::FullPivLU<Eigen::MatrixXd> gram(normals.transpose() * by_weight);
-    if (n > 0 && !gram.isInvertible()) continue;
-    Eigen::Vector4d x = p.wanted;
-    if (n > 0) x -= by_weight * gram.solve(normals.transpose() * p.wanted - bounds);
-    if (worst_violation(p, x) < 1e-7) least = std::min(least, cost(p, x));
+    if (normals.cols() > 4) continue;
+    const Eigen::VectorXd multipliers = normals.colPivHouseholderQr().solve(downhill);
+    if (multipliers.minCoeff() > -1e-6 * (1 + downhill.norm()))
+      least = std::min(least, (normals * multipliers - downhill).norm());
   }
   return least;
 }
 
-TEST(VelocityQp, IsFeasibleAndAsGoodAsBruteForce) {
+TEST(VelocityQp, IsFeasibleAndOptimal) {
   int constrained = 0;
-  for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 5000; ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     const Problem p = random_problem(random);
     const QpSolution solution = solve_velocity_qp(p.weight, p.wanted, p.limits, p.start);
     ASSERT_TRUE(solution.optimal);
-    EXPECT_LE(worst_violation(p, solution.x), 1e-8);
-    const double least = brute_force_cost(p);
-    EXPECT_NEAR(cost(p, solution.x), least, 1e-6 * (1 + least));
+    ASSERT_LE(worst_violation(p, solution.x), 1e-8);
+    ASSERT_LE(distance_to_optimality(p, solution.x), 1e-6 * (1 + (p.weight * (p.wanted - solution.x)).norm()));
     constrained += solution.constrained ? 1 : 0;
   }
-  EXPECT_GT(constrained, 40);
-}
-
-/// Stationarity, sign of the multipliers and complementary slackness over many more problems.
-TEST(VelocityQp, NoFeasibleDirectionImprovesTheSolution) {
-  int directions = 0;
-  for (std::uint64_t seed = 1; seed <= 5000; ++seed) {
-    Random random(seed);
-    const Problem p = random_problem(random);
-    const QpSolution solution = solve_velocity_qp(p.weight, p.wanted, p.limits, p.start);
-    ASSERT_TRUE(solution.optimal) << "seed " << seed;
-    ASSERT_LE(worst_violation(p, solution.x), 1e-8) << "seed " << seed;
-    // The variational inequality of a convex problem: gradient . (z - x) >= 0 for every feasible z.
-    const Eigen::Vector4d gradient = 2 * p.weight * (solution.x - p.wanted);
-    for (int i = 0; i < 20; ++i) {
-      Eigen::Vector4d z = p.start + random.uniform(0, 2) * random_vector(random);
-      for (int halvings = 0; halvings < 30 && worst_violation(p, z) > 0; ++halvings) z = (z + p.start) / 2;
-      if (worst_violation(p, z) > 0) continue;
-      ASSERT_GE(gradient.dot(z - solution.x), -1e-6 * (1 + gradient.norm())) << "seed " << seed;
-      ++directions;
-    }
-  }
-  EXPECT_GT(directions, 20000);
+  EXPECT_GT(constrained, 3000);
 }
 
 TEST(VelocityQp, ReturnsTheWantedPointWhenItIsFeasible) {
