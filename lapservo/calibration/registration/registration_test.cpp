@@ -23,6 +23,7 @@
 
 namespace lapservo::internal {
 namespace {
+using lapservo::testing::input_error;
 
 // An arm in smooth motion, its joints read at 100 Hz, its marker seen 30 times a second with the noise that its sigmas
 // say.
@@ -94,6 +95,10 @@ Rigid3 marker_at(const Instrument& instrument, const std::array<double, 4>& read
   return camera_from_marker(instrument.marker, *instrument.camera_from_rcm * rcm_from_unrolled(q), q.psi_rad);
 }
 
+bool has(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
 // A user's joints: names only.
 Instrument with_names_only(Instrument instrument) {
   const double theta_offset = instrument.joints->offset[0];
@@ -101,6 +106,14 @@ Instrument with_names_only(Instrument instrument) {
   instrument.joints->sign = {instrument.joints->sign[0], 1, 1, 1};
   instrument.joints->offset = {theta_offset, 0, 0, 0};
   return instrument;
+}
+
+Registration registered_by(const Recorded& data, const Instrument& believed) {
+  return register_arm(believed, data.poses, data.recording, "joints.csv");
+}
+
+Registration registered_from_names(const Recorded& data) {
+  return registered_by(data, with_names_only(data.truth));
 }
 
 struct Errors {
@@ -124,7 +137,7 @@ TEST(RegisterArm, FindsAllOfItFromNamesAlone) {
       Motion motion;
       motion.delay_s = delay_s, motion.sign[1] = phi_sign, motion.sign[2] = -phi_sign;
       const Recorded data = recorded(motion);
-      const auto found = register_arm(with_names_only(data.truth), data.poses, data.recording, "joints.csv");
+      const auto found = registered_from_names(data);
       ASSERT_EQ(found.refusal, "");
       EXPECT_EQ(found.arm->joints.sign, data.truth.joints->sign);
       const Errors e = errors_of(found, data.truth);
@@ -147,7 +160,7 @@ TEST(RegisterArm, OfTwoDescriptionsTakesTheRigs) {
       known.camera_from_rcm->rotation * Eigen::AngleAxisd(0.15, Eigen::Vector3d(1, 2, 3).normalized());
   known.camera_from_rcm->translation += Eigen::Vector3d(5e-3, -5e-3, 8e-3);
   known.joints->sign[0] = 1;  // wrong: the rig's rotation shows it
-  const auto found = register_arm(known, data.poses, data.recording, "joints.csv");
+  const auto found = registered_by(data, known);
   ASSERT_EQ(found.refusal, "");
   EXPECT_EQ(found.arm->joints.sign, data.truth.joints->sign);
   EXPECT_LT(errors_of(found, data.truth).rotation_rad, 1e-3);
@@ -160,7 +173,7 @@ TEST(RegisterArm, ErrorsAreAsTheirSigmasSayBacklashOrNot) {
     motion.seed = seed, motion.seconds = 10;
     if (seed % 2) motion.backlash = {0.01, 0.01, 1e-3, 0.03};
     const Recorded data = recorded(motion);
-    const auto found = register_arm(with_names_only(data.truth), data.poses, data.recording, "joints.csv");
+    const auto found = registered_from_names(data);
     ASSERT_EQ(found.refusal, "");
     const Errors e = errors_of(found, data.truth);
     EXPECT_LT(e.position_m, 5e-4);
@@ -188,7 +201,7 @@ TEST(RegisterArm, PlacesMarkersAsTheirSigmasSayBesideTheSwing) {
     if (seed % 2) motion.backlash = {0.01, 0.01, 1e-3, 0.03};
     motion.common_turn_rad = 0.5e-3 * Random(100 + seed).normal();  // half of a frame's sigma
     const Recorded data = recorded(motion);
-    const auto found = register_arm(with_names_only(data.truth), data.poses, data.recording, "joints.csv");
+    const auto found = registered_from_names(data);
     ASSERT_EQ(found.refusal, "");
     Instrument registered = data.truth;
     registered.camera_from_rcm = found.camera_from_rcm, registered.joints = found.arm->joints;
@@ -225,10 +238,9 @@ TEST(RegisterArm, RefusesWhereJointsStoodStillAndNamesThem) {
     for (std::size_t wrong = 0; wrong < 4; ++wrong) {
       Instrument rig = data.truth;
       rig.joints->offset = {}, rig.joints->sign[wrong] *= -1;
-      const auto found = register_arm(rig, data.poses, data.recording, "joints.csv");
+      const auto found = registered_by(data, rig);
       for (std::size_t j = 0; j < 4; ++j)
-        EXPECT_EQ(found.refusal.find(data.truth.joints->names[j] + " moved by 0.0") != std::string::npos,
-                  (still >> j & 1U) != 0)
+        EXPECT_EQ(has(found.refusal, data.truth.joints->names[j] + " moved by 0.0"), (still >> j & 1U) != 0)
             << still << ": " << found.refusal;
     }
   }
@@ -252,33 +264,23 @@ TEST(RegisterArm, RefusesASignThatDoesNotShow) {
       }
       swung.recording = led;
     }
-    const std::string refusal =
-        register_arm(with_names_only(truth), swung.poses, swung.recording, "joints.csv").refusal;
-    EXPECT_EQ(refusal.find("both signs of pitch explain the motion") != std::string::npos, in_step) << refusal;
+    const std::string refusal = registered_from_names(swung).refusal;
+    EXPECT_EQ(has(refusal, "both signs of pitch explain the motion"), in_step) << refusal;
   }
 }
 
 TEST(RegisterArm, RefusesWhatCanNotTell) {
   Motion still;
   still.swing.fill(0.01);
-  const Recorded little = recorded(still);
-  EXPECT_NE(register_arm(with_names_only(little.truth), little.poses, little.recording, "j").refusal.find("swing"),
-            std::string::npos);
-
-  Recorded data = recorded({});
-  Instrument swapped = with_names_only(data.truth);
-  for (auto& joints : data.recording.joints) std::swap(joints[0], joints[2]);
-  EXPECT_NE(register_arm(swapped, data.poses, data.recording, "j").refusal, "");
-  for (auto& joints : data.recording.joints) std::swap(joints[0], joints[2]);
-
-  for (double& time_s : data.recording.time_s) time_s += 100;
-  EXPECT_NE(lapservo::testing::input_error([&] {
-              register_arm(swapped, data.poses, data.recording, "joints.csv");
-            }).find("has no time in common"),
-            std::string::npos);
-  data.poses.resize(10);
-  EXPECT_NE(register_arm(swapped, data.poses, data.recording, "j").refusal.find("found in 10 frames"),
-            std::string::npos);
+  EXPECT_TRUE(has(registered_from_names(recorded(still)).refusal, "swing"));
+  const Recorded data = recorded({});
+  Recorded swapped = data, elsewhere = data, few = data;
+  for (auto& joints : swapped.recording.joints) std::swap(joints[0], joints[2]);
+  EXPECT_NE(registered_from_names(swapped).refusal, "");
+  for (double& time_s : elsewhere.recording.time_s) time_s += 100;
+  EXPECT_TRUE(has(input_error([&] { registered_from_names(elsewhere); }), "has no time in common"));
+  few.poses.resize(10);
+  EXPECT_TRUE(has(registered_from_names(few).refusal, "found in 10 frames"));
 }
 
 TEST(JointRecording, IsRefinedSmoothlyAndKeepsItsPauses) {
@@ -313,11 +315,9 @@ TEST(PosesInTable, LeavesOutWhatACameraFromRcmBent) {
   ASSERT_EQ(found.all.size(), 1U);
   EXPECT_EQ(found.none, "");
   EXPECT_DOUBLE_EQ(found.all[0].marker.sigma_roll_rad, 2e-3);
-  EXPECT_NE(read("1,A,ok,0.3," + pose).none.find("its 1 rows were measured with a camera_from_rcm"), std::string::npos);
-  EXPECT_NE(lapservo::testing::input_error([&] { read("1,A,ok,," + pose + "0,A,ok,," + pose); }).find("clock jumps"),
-            std::string::npos);
-  EXPECT_NE(lapservo::testing::input_error([&] { read("0,A,ok,,0,0,1,0,0,0,2,1,1,1,1\n"); }).find("no pose"),
-            std::string::npos);
+  EXPECT_TRUE(has(read("1,A,ok,0.3," + pose).none, "its 1 rows were measured with a camera_from_rcm"));
+  EXPECT_TRUE(has(input_error([&] { read("1,A,ok,," + pose + "0,A,ok,," + pose); }), "clock jumps"));
+  EXPECT_TRUE(has(input_error([&] { read("0,A,ok,,0,0,1,0,0,0,2,1,1,1,1\n"); }), "no pose"));
 }
 
 TEST(RegisterRcm, PutsItWhereTheAxesMeet) {
@@ -342,7 +342,7 @@ TEST(RegisterRcm, PutsItWhereTheAxesMeet) {
   EXPECT_LT(std::sqrt(squares / count), 1);
   Motion still;
   still.swing.fill(0.05);
-  EXPECT_NE(register_rcm(recorded(still).truth, recorded(still).poses).refusal.find("too alike"), std::string::npos);
+  EXPECT_TRUE(has(register_rcm(recorded(still).truth, recorded(still).poses).refusal, "too alike"));
 }
 
 }  // namespace

@@ -74,38 +74,35 @@ TEST(RegisterSeam, RefusesRecordingsOfOtherTimesAndOtherTurns) {
             std::string::npos);
 }
 
-TEST(JointRecording, NamesWhatIsWrong) {
+class JointRecordingFile : public ::testing::Test {
+ protected:
+  JointRecording read(const std::string& rows) const {
+    write_file(folder / "joints.csv", rows);
+    return read_joint_recording(folder / "joints.csv", instrument_with_joints().joints.value());
+  }
+  void expect_wrong(const std::string& rows, const std::string& part) const {
+    const std::string said = lapservo::testing::input_error([&] { read(rows); });
+    EXPECT_NE(said.find(part), std::string::npos) << said;
+  }
   const lapservo::testing::TemporaryFolder folder;
-  const auto path = folder / "joints.csv";
-  const Joints joints = instrument_with_joints().joints.value();
-  const auto message = [&](const std::string& text) {
-    write_file(path, text);
-    return lapservo::testing::input_error([&] { read_joint_recording(path, joints); });
-  };
-  EXPECT_NE(message("time_s,yaw,pitch,insertion\n0,0,0,0\n").find("roll"), std::string::npos);
-  EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n0,0,0,0,nan\n").find("roll"), std::string::npos);
-  EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n1,0,0,0,0\n0.5,0,0,0,0\n").find("clock jumps"),
-            std::string::npos);
-  EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n1,0,0,0,0\n").find("two rows"), std::string::npos);
-  EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n0,0,0,0,0\n1,20,0,0,0\n").find("looks like degrees"),
-            std::string::npos);
-  EXPECT_NE(message("time_s,yaw,pitch,insertion,roll\n0,0,0,0,0\n1,0,0,90,0\n").find("looks like millimetres"),
-            std::string::npos);
-  write_file(path, "time_s,roll,yaw,pitch,insertion\n0,4,1,2,0.3\n1,8,5,6,0.7\n");
-  const JointRecording recording = read_joint_recording(path, joints);
+  const std::string header = "time_s,yaw,pitch,insertion,roll\n";
+};
+
+TEST_F(JointRecordingFile, NamesWhatIsWrong) {
+  expect_wrong("time_s,yaw,pitch,insertion\n0,0,0,0\n", "roll");
+  expect_wrong(header + "0,0,0,0,nan\n", "roll");
+  expect_wrong(header + "1,0,0,0,0\n0.5,0,0,0,0\n", "clock jumps");
+  expect_wrong(header + "1,0,0,0,0\n", "two rows");
+  expect_wrong(header + "0,0,0,0,0\n1,20,0,0,0\n", "looks like degrees");
+  expect_wrong(header + "0,0,0,0,0\n1,0,0,90,0\n", "looks like millimetres");
+  const JointRecording recording = read("time_s,roll,yaw,pitch,insertion\n0,4,1,2,0.3\n1,8,5,6,0.7\n");
   EXPECT_EQ(recording.joints[1], (std::array<double, 4>{5, 6, 0.7, 8}));
 }
 
-TEST(JointRecording, PassesOverARowThatRepeatsTheOneBefore) {
-  const lapservo::testing::TemporaryFolder folder;
-  const auto path = folder / "joints.csv";
-  const Joints joints = instrument_with_joints().joints.value();
-  const std::string begin = "time_s,yaw,pitch,insertion,roll\n0,1,2,0.3,4\n0,1,2,0.3,4\n";
-  write_file(path, begin + "1,5,6,0.7,8\n1,5,6,0.7,8\n");
-  EXPECT_EQ(read_joint_recording(path, joints).time_s, (std::vector<double>{0, 1}));
-  write_file(path, begin + "0,1,2,0.3,5\n1,5,6,0.7,8\n");
-  EXPECT_NE(lapservo::testing::input_error([&] { read_joint_recording(path, joints); }).find("clock jumps"),
-            std::string::npos);
+TEST_F(JointRecordingFile, PassesOverARowThatRepeatsTheOneBefore) {
+  const std::string begin = header + "0,1,2,0.3,4\n0,1,2,0.3,4\n";
+  EXPECT_EQ(read(begin + "1,5,6,0.7,8\n1,5,6,0.7,8\n").time_s, (std::vector<double>{0, 1}));
+  expect_wrong(begin + "0,1,2,0.3,5\n1,5,6,0.7,8\n", "clock jumps");
 }
 
 }  // namespace seam_registration_test
