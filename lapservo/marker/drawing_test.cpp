@@ -227,25 +227,27 @@ TEST(PrintSheet, IsAsWideAsTheShaftIsAround) {
 }
 
 TEST(PrintSheet, HasTheSizeOfItsPaper) {
-  for_sheets(example, Paper::a4, 1, [](const Page& page) {
-    EXPECT_NEAR(page.width_mm, 210, rounding_mm);
-    EXPECT_NEAR(page.height_mm, 297, rounding_mm);
-  });
-  for_sheets(example, Paper::letter, 1, [](const Page& page) {
-    EXPECT_NEAR(page.width_mm, 215.9, rounding_mm);
-    EXPECT_NEAR(page.height_mm, 279.4, rounding_mm);
-  });
+  for (const auto& [paper, size_mm] : {std::pair(Paper::a4, Vector2d(210, 297)), {Paper::letter, {215.9, 279.4}}})
+    for_sheets(example, paper, 1, [expected_mm = Vector2d(size_mm)](const Page& page) {
+      EXPECT_LT((Vector2d(page.width_mm, page.height_mm) - expected_mm).norm(), rounding_mm);
+    });
+}
+
+// Both ends of each line of an SVG page.
+std::vector<std::array<Vector2d, 2>> lines_of(const std::string& svg) {
+  std::vector<std::array<Vector2d, 2>> lines;
+  for (const auto& m : matches(svg, std::regex(R"re(d="M ([\d.]+) ([\d.]+) L ([\d.]+) ([\d.]+) ?")re")))
+    lines.push_back({Vector2d(number(m[1]), number(m[2])), Vector2d(number(m[3]), number(m[4]))});
+  return lines;
 }
 
 TEST(PrintSheet, HasRulersOfOneHundredAndFiftyMillimetres) {
   const TemporaryFolder folder;
   write_print_sheet(folder / "sheet.svg", "PSM1", example, Paper::a4, 1);
-  const std::string text = testing::read_file(folder / "sheet.svg");
-  std::vector<Vector2d> lines;
-  for (const auto& match : matches(text, std::regex(R"re(d="M ([\d.]+) ([\d.]+) L ([\d.]+) ([\d.]+) ?")re")))
-    lines.emplace_back(number(match[3]) - number(match[1]), number(match[4]) - number(match[2]));
-  const auto drawn = [&](const Vector2d& line) {
-    return std::any_of(lines.begin(), lines.end(), [&](const Vector2d& l) { return (l - line).norm() < rounding_mm; });
+  const auto lines = lines_of(testing::read_file(folder / "sheet.svg"));
+  const auto drawn = [&](const Vector2d& way) {
+    return std::any_of(lines.begin(), lines.end(),
+                       [&](const auto& line) { return (line[1] - line[0] - way).norm() < rounding_mm; });
   };
   EXPECT_TRUE(drawn({100, 0}));
   EXPECT_TRUE(drawn({0, 50}));
@@ -286,8 +288,7 @@ TEST(PrintSheet, KeepsAwayFromThePapersEdges) {
       const Page page = read_svg(folder / "sheet.svg");
       const std::string text = testing::read_file(folder / "sheet.svg");
       std::vector<Vector2d> points = letters(text);
-      for (const auto& match : matches(text, std::regex(R"re(d="M ([\d.]+) ([\d.]+) L ([\d.]+) ([\d.]+) ?")re")))
-        for (const int i : {1, 3}) points.emplace_back(number(match[i]), number(match[i + 1]));
+      for (const auto& line : lines_of(text)) points.insert(points.end(), line.begin(), line.end());
       for (const Polygon& polygon : page.polygons)
         if (polygon.colour != Vector3d::Ones())  // else the page itself
           points.insert(points.end(), polygon.points_mm.begin(), polygon.points_mm.end());

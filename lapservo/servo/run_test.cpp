@@ -226,6 +226,14 @@ class FreezingImages : public ImageStream {
   std::optional<StampedImage> kept_;
 };
 
+const JointVector start{0.05, 1.57, 0.064, 1.2};
+
+SimulatorConfig without_pictures() {
+  SimulatorConfig simulated;
+  simulated.endoscope.pictures = false;
+  return simulated;
+}
+
 PastRun run_case(const Case& c) {
   const Rig rig = testing::small_test_rig();
   const RunConfig config = config_of(rig, c);
@@ -300,7 +308,7 @@ TEST(Run, IsNotSilentlyWrongWhereTheRigIs) {
   const Rig rig = testing::small_test_rig();
   const auto last_of = [&](const Rig& believed) {
     const Case c;
-    Simulator simulator(rig, {}, {0.05, 1.57, 0.064, 1.2});
+    Simulator simulator(rig, {}, start);
     Watcher watcher(c, rig, simulator);
     run(simulator, simulator, simulator, config_of(believed, c), small_trajectory(), 1, watcher);
     return watcher.done.records.back().decision;
@@ -357,8 +365,8 @@ EndoscopeMotion random_motion(const Rig& rig, double duration_s, Random& random)
   };
   ControllerConfig controller;
   controller.window = image_window(rig.camera, 10);
-  const Eigen::Vector4d start(0.05, 1.57, 0.064, 1.2);
-  const auto q = newton_inverse(feature_model(rig), small_trajectory().at(endoscope_moves_s).features, start, {});
+  const auto q =
+      newton_inverse(feature_model(rig), small_trajectory().at(endoscope_moves_s).features, start.vector(), {});
   while (true) {
     const EndoscopeMotion motion{endoscope_moves_s, duration_s, translation_m * direction(),
                                  rotation_rad * direction()};
@@ -371,9 +379,8 @@ EndoscopeMotion random_motion(const Rig& rig, double duration_s, Random& random)
       return point.z() > 0.03 && rig.camera.contains(rig.camera.raw_from_point(point), margin_px);
     };
     if (!shows(-beyond_m) || !shows(instrument.marker.length_m() + beyond_m)) continue;
-    const JointVector from = JointVector::from_vector(start);
     const std::string refused = testing::input_error(
-        [&] { refuse_infeasible(small_trajectory(), 9, feature_model(rig, moved), controller, from, ""); });
+        [&] { refuse_infeasible(small_trajectory(), 9, feature_model(rig, moved), controller, start, ""); });
     if (refused.empty()) return motion;
   }
 }
@@ -634,9 +641,7 @@ class TicksDuringVision : public RunObserver {
 TEST(Run, SetPointsDoNotWaitForVisionInItsOwnThread) {
   constexpr int ticks = 60;
   const Rig rig = testing::small_test_rig();
-  SimulatorConfig simulated;
-  simulated.endoscope.pictures = false;
-  Simulator simulator(rig, simulated, {0.05, 1.57, 0.064, 1.2});
+  Simulator simulator(rig, without_pictures(), start);
   Case c;
   c.thread = TrackingThread::own;
   EndlessVision vision;
@@ -671,9 +676,7 @@ TEST(Run, WhatVisionThrowsInItsOwnThreadEndsTheRunAndReleasesTheArm) {
     bool on_tick(const ControlTick&) override { return true; }
   } nobody;
   const Rig rig = testing::small_test_rig();
-  SimulatorConfig simulated;
-  simulated.endoscope.pictures = false;
-  Simulator simulator(rig, simulated, {0.05, 1.57, 0.064, 1.2});
+  Simulator simulator(rig, without_pictures(), start);
   Driven arm(simulator);
   SteadyClock clock;
   Case c;
@@ -692,7 +695,7 @@ TEST(Run, NeedsTheLimitsOfAnArmThatIsNotSimulated) {
     bool is_simulated() const override { return false; }
   };
   const Rig rig = testing::small_test_rig();
-  Simulator simulator(rig, {}, {0.05, 1.57, 0.064, 1.2});
+  Simulator simulator(rig, {}, start);
   Real arm(simulator);
   Watcher watcher({}, rig, simulator);
   RunConfig config = config_of(rig, {});
@@ -735,8 +738,7 @@ std::string wrong_rig_of(const Misread& misread) {
   Rigid3& believed = *config.rig.instruments[0].camera_from_rcm;
   believed.rotation = misread.turned * believed.rotation;
   config.controller.limits.lower.setConstant(-7), config.controller.limits.upper.setConstant(7);
-  Simulator simulator(
-      rig, {}, std::make_unique<MisreadArm>(misread.sign, misread.offset, Eigen::Vector4d(0.05, 1.57, 0.064, 1.2)));
+  Simulator simulator(rig, {}, std::make_unique<MisreadArm>(misread.sign, misread.offset, start.vector()));
   OperatedArm arm(simulator);
   Watcher watcher({}, rig, simulator, &arm);
   run(arm, simulator, simulator, config, small_trajectory(), misread.duration_s, watcher);
@@ -753,11 +755,11 @@ TEST(Run, NamesWhatOfTheRigWasWrongFromTheStart) {
   const std::array<std::string, 4> names{"outer_yaw", "outer_pitch", "outer_insertion", "outer_roll"};
   constexpr std::array mirrored_s{1.0, 5.5, 3.0, 2.0};
   const std::string remedy = " is wrong: run lapservo calibrate registration";
-  const Eigen::Vector4d start(0.05, 1.57, 0.064, 1.2), shift(-0.8, 0.7, 0.06, 1.5);
+  const Eigen::Vector4d shift(-0.8, 0.7, 0.06, 1.5);
   for (std::size_t k = 0; k < 4; ++k) {
     const auto joint = static_cast<Eigen::Index>(k);
     Misread mirrored, shifted;
-    mirrored.sign[joint] = -1, mirrored.offset[joint] = 2 * start[joint], mirrored.duration_s = mirrored_s[k];
+    mirrored.sign[joint] = -1, mirrored.offset[joint] = 2 * start.vector()[joint], mirrored.duration_s = mirrored_s[k];
     shifted.offset[joint] = shift[joint];
     EXPECT_EQ(wrong_rig_of(mirrored), "joints.sign of " + names[k] + remedy);
     // Where psi does not agree nothing moves that would distinguish its sign from its offset.
@@ -827,7 +829,7 @@ std::string refusal_of(const Refused& refused) {
   config.rcm_px = rcm_image_px(rig, {});
   config.trajectory_name = "fast.csv";
   if (!refused.registered) config.rig.instruments[0].camera_from_rcm.reset();
-  Simulator simulator(rig, {}, {0.05, 1.57, 0.064, 1.2});
+  Simulator simulator(rig, {}, start);
   const Eigen::Vector4d before = simulator.measured_jp();
   AheadArm arm(simulator, refused.joints_ahead_s, refused.homing_s);
   OtherClock others(simulator, refused.images_ahead_s, refused.clock_in_order);
@@ -847,13 +849,11 @@ TEST(Run, RefusesWhatCanNotBeFollowedNamingTimeAndLimit) {
   const std::string complaint = refusal_of({.trajectory = sinusoids(fast)});
   EXPECT_EQ(complaint.find("fast.csv: can't be followed at "), 0U) << complaint;
   EXPECT_NE(complaint.find(" s: limits.rate"), std::string::npos) << complaint;
-  EXPECT_NE(refusal_of({.trajectory = set_point({3, 1e4, 1e4, 5e3})}), "");
-}
-
-TEST(Run, ChecksTheGoalWhereTheArmHasBeenHomedTo) {
-  const Trajectory goal = set_point({0.9, 397, 182, 106});
-  EXPECT_EQ(refusal_of({.trajectory = goal, .homing_s = 0.3}), "");
-  EXPECT_NE(refusal_of({.trajectory = set_point({3, 1e4, 1e4, 5e3}), .homing_s = 0.3}), "");
+  // At once, and where the arm has been homed to.
+  for (const double homing_s : {0.0, 0.3}) {
+    EXPECT_EQ(refusal_of({.trajectory = set_point({0.9, 397, 182, 106}), .homing_s = homing_s}), "");
+    EXPECT_NE(refusal_of({.trajectory = set_point({3, 1e4, 1e4, 5e3}), .homing_s = homing_s}), "");
+  }
 }
 
 TEST(Run, RefusesFeaturesThatNoImageShowsInEveryMode) {
